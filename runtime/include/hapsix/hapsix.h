@@ -1,0 +1,127 @@
+/* hapsix.h - the engine: models, sessions, the haptic loop. The header is the manual.
+ *
+ *   h6ModelDef -> h6CreateModel -> h6Model       fields and shells, immutable, shared by threads
+ *   h6SessionDef -> h6CreateSession -> h6Session bodies, hands, state; one thread at a time
+ *   h6Step(session, samples, commands)           one frame on the caller's own thread, or
+ *   h6StartLoop(session, devices, ...)           a real-time thread that does it at the rate
+ *
+ * Nothing here opens a file or names a device. A step never allocates, locks, prints, throws or
+ * waits. Create functions return NULL and fill `error` (which may be NULL) when they fail.
+ */
+#ifndef HAPSIX_H
+#define HAPSIX_H
+
+#include "base.h"
+#include "device.h"
+#include "types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct h6Model h6Model;
+typedef struct h6Session h6Session;
+typedef struct h6Loop h6Loop;
+
+/* Defaults. A def that was not made by its default function is not valid. */
+H6_API h6ModelDef    h6DefaultModelDef(void);
+H6_API h6BodyDef     h6DefaultBodyDef(void);    /* at the origin, at rest, 0.1 kg, no shell, no field */
+H6_API h6ContactDef  h6DefaultContactDef(void); /* robust, 1e4 N/m, beta 1e-3 s                      */
+H6_API h6CouplingDef h6DefaultCouplingDef(void);/* 1e3 N/m, critically damped, half a voxel          */
+H6_API h6HandDef     h6DefaultHandDef(void);
+H6_API h6SessionDef  h6DefaultSessionDef(void); /* implicit, 1000 Hz, 16384 contacts, 1 thread       */
+
+/* "none", "global", ...; NULL when out of range. And back: 0 when the name is known. */
+H6_API const char* h6MethodName(h6Method method);
+H6_API int         h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces);
+
+/* Copies and converts fields and shells; the def's arrays can be freed afterwards. Every array is
+ * checked: an index out of range, a NaN or a radius too small is an error, not a crash later. */
+H6_API h6Model* h6CreateModel(const h6ModelDef* def, h6Error* error);
+H6_API void     h6DestroyModel(h6Model* model);
+H6_API size_t   h6ModelBytes(const h6Model* model);
+
+/* A signed distance query for tools and tests: points (count x 3) in the field's mesh frame [m].
+ * distance (count) [m]; gradient (count x 3), unit length where it is defined, may be NULL; exact
+ * (count) may be NULL: 1 where the distance is a sample, 0 where it is a bound. -1: no such field. */
+H6_API int h6SampleField(const h6Model* model, int32_t field, const double* points, size_t count,
+                         double* distance, double* gradient, uint8_t* exact);
+
+/* The model must outlive the session. */
+H6_API h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Error* error);
+H6_API void       h6DestroySession(h6Session* session);
+
+/* One frame of 1/rate seconds: samples of each hand in, a wrench for each hand out. */
+H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
+
+/* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */
+H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
+H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
+H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
+H6_API h6FrameReport h6GetFrame(const h6Session* session);
+/* What the zeros of the defs became: coupling in use by a hand, the voxel of a body [m]. */
+H6_API h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand);
+H6_API double        h6GetVoxel(const h6Session* session, int32_t body);
+
+/* Ratings that the safety chain keeps a hand's output inside; a loop sets them from its devices.
+ * Without them: 100 N and 10 N m. Values above those are cut down to them. */
+H6_API void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities);
+/* Latches the output of every hand at zero, for this cause; and lets it start again, softly. */
+H6_API void h6Fault(h6Session* session, h6Cause cause);
+H6_API void h6Rearm(h6Session* session);
+
+/* ---- the haptic loop ---------------------------------------------------------------------------- */
+
+/* One row a frame for slow readers (recorder, viewer). */
+typedef struct h6FrameRecord {
+  double          time;                        /* since the loop began                        [s]  */
+  h6FrameReport   report;
+  h6DeviceSample  hand[H6_MAX_HANDS];
+  h6DeviceCommand command[H6_MAX_HANDS];
+  h6BodyState     body[H6_MAX_HANDS];          /* the body of each hand                            */
+  double          wakeup_us;                   /* start after the deadline                         */
+  uint32_t        late;                        /* H6_LATE_*                                        */
+} h6FrameRecord;
+
+enum { H6_LATE_COMPUTE = 1u << 0, H6_LATE_WAKEUP = 1u << 1, H6_LATE_STOLEN = 1u << 2 };
+
+typedef struct h6LoopDef {
+  double   duration;      /* seconds of frames; 0: until h6StopLoop                                */
+  bool     virtual_time;  /* as fast as possible, the clock counts frames: same code, same bits    */
+  bool     realtime;      /* ask for pinning, SCHED_FIFO and locked memory                         */
+  int32_t  core;          /* -1: the last one                                                      */
+  double   spin_us;       /* poll the clock this long before each deadline instead of sleeping [us]*/
+  size_t   ring_frames;   /* records kept for a slow reader; overruns are counted. 0: none         */
+} h6LoopDef;
+H6_API h6LoopDef h6DefaultLoopDef(void);  /* real time, realtime asked for, 1000 records           */
+
+typedef struct h6LoopReport {
+  uint64_t frames;
+  /* Frames that ended after the next deadline, each counted once, by cause: */
+  uint64_t late_compute;  /* the thread's own CPU time in the frame was over the period            */
+  uint64_t late_stolen;   /* it was not, but the clock was: the machine ran something else         */
+  uint64_t late_wakeup;   /* the frame was short enough but started too late                       */
+  uint64_t ring_overruns; /* records lost to a slow reader                                         */
+  h6Status status;        /* all bits seen                                                         */
+  h6Cause  fault;         /* why the output is latched at zero, or H6_CAUSE_NONE                   */
+  double   wakeup_us_max;
+  char     granted[1024]; /* what real-time support was granted, and how to get the rest           */
+} h6LoopReport;
+
+/* Starts the haptic thread; `devices` has one entry per hand and must outlive the loop. */
+H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
+                           h6Error* error);
+/* Takes up to `capacity` records, oldest first; call from one reader thread. Never blocks the loop. */
+H6_API size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity);
+H6_API bool   h6LoopRunning(const h6Loop* loop);
+/* Asks it to end after the current frame; any thread, and a signal handler. */
+H6_API void   h6RequestStop(h6Loop* loop);
+/* Waits for the end, stops the devices, gives the report; records can still be read until
+ * h6DestroyLoop. */
+H6_API h6LoopReport h6JoinLoop(h6Loop* loop);
+H6_API void         h6DestroyLoop(h6Loop* loop);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,203 @@
+/* types.h - what a model and a session are made of.
+ *
+ * Units are SI (m, kg, s, N, rad). Every pose is that of the MESH FRAME: it carries a point of the
+ * mesh file, in metres, to the world. Quaternions are (w, x, y, z), unit.
+ */
+#ifndef HAPSIX_TYPES_H
+#define HAPSIX_TYPES_H
+
+#include <stdbool.h>
+
+#include "base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct h6Vec3 { double x, y, z; } h6Vec3;
+typedef struct h6Quat { double w, x, y, z; } h6Quat;
+typedef struct h6Pose { h6Vec3 p; h6Quat q; } h6Pose;
+typedef struct h6Velocity { h6Vec3 linear; h6Vec3 angular; } h6Velocity; /* world frame           */
+typedef struct h6Wrench { h6Vec3 force; h6Vec3 torque; } h6Wrench; /* world frame; torque about the
+                                                                      body's centre of mass        */
+
+/* ---- immutable data: fields and shells -------------------------------------------------------- */
+
+/* A signed distance field in sparse bricks of 8 x 8 x 8 nodes. Node (i,j,k) lies at
+ * origin + voxel_size * (i,j,k); brick (a,b,c) holds nodes 8a..8a+7 and so on. Distances are in
+ * metres, negative inside the obstacle. Arrays are read while h6CreateModel runs, never after. */
+typedef struct h6FieldDef {
+  h6Vec3         origin;       /* node (0,0,0), mesh frame                                     [m] */
+  double         voxel_size;   /* node spacing, > 0                                            [m] */
+  int32_t        bricks[3];    /* bricks along x, y, z; each 1 .. 256 (2048 nodes)                 */
+  const int32_t* brick_index;  /* (bz x by x bx), x fastest: row in `samples`, or -1: no brick     */
+  const float*   samples;      /* (brick_count x 8 x 8 x 8), x fastest: signed distance        [m] */
+  size_t         brick_count;
+  const float*   far_grid;     /* (bz+1 x by+1 x bx+1), x fastest, at nodes (8a, 8b, 8c): its sign
+                                  is the side, its magnitude is at most the true distance      [m] */
+  double         band;         /* every unit cell with a point nearer than this to the surface
+                                  has all of its 8 nodes in bricks                             [m] */
+  const int32_t* part;         /* (brick_count) nearest part of the mesh, or NULL                  */
+} h6FieldDef;
+
+/* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs
+ * to its own level and to all finer ones. Nodes are the sphere tree: row r of a level is the point
+ * `node_point[r]` with the sphere, centred on that point, that holds all its descendants. The
+ * children of a node are itself one level finer, and the new points nearest to it. Nodes of one
+ * level stand together, coarse first; those of the last level are all the points, radius 0. */
+typedef struct h6ShellDef {
+  size_t          point_count;
+  const float*    x; const float* y; const float* z;    /* (point_count) mesh frame           [m] */
+  const float*    nx; const float* ny; const float* nz; /* (point_count) INWARD unit normals      */
+  const uint32_t* source;          /* (point_count) source triangle, or NULL                      */
+  uint32_t        level_count;     /* 1 .. 32                                                     */
+  const uint32_t* level_first;     /* (level_count + 1) rows of each level in the node arrays     */
+  const uint32_t* node_point;      /* (nodes)                                                     */
+  const float*    node_radius;     /* (nodes)                                                 [m] */
+  const uint32_t* node_first_child;/* (nodes) row in the node arrays; 0 in the last level         */
+  const uint32_t* node_child_count;/* (nodes) 0 in the last level                                 */
+} h6ShellDef;
+
+typedef struct h6ModelDef {
+  const h6FieldDef* fields; size_t field_count;
+  const h6ShellDef* shells; size_t shell_count;
+  h6Allocator       allocator; /* zero: the C library's                                           */
+  /* Runs body(context, i) for i in 0..count-1 on any threads, returns when all are done. Used only
+   * to convert fields. NULL: the engine's own workers. */
+  void (*parallel_for)(void* user, size_t count, void (*body)(void* context, size_t i), void* context);
+  void* parallel_user;
+} h6ModelDef;
+
+/* ---- what moves -------------------------------------------------------------------------------- */
+
+typedef struct h6BodyDef {
+  h6Pose     pose;       /* mesh frame -> world at the start                                       */
+  h6Velocity velocity;   /* of the centre of mass, at the start                                    */
+  bool       fixed;      /* never moves; mass and inertia are not read                             */
+  double     mass;       /* > 0                                                              [kg]  */
+  h6Vec3     com;        /* centre of mass, mesh frame                                        [m]  */
+  double     inertia[6]; /* xx yy zz xy xz yz about com, mesh axes; all zero: from the shell's
+                            points, each an equal share of the mass                       [kg m^2] */
+  int32_t    shell;      /* index into the model's shells, or -1                                   */
+  int32_t    field;      /* index into the model's fields, or -1                                   */
+} h6BodyDef;
+
+/* A shell body that may touch a field body. Both may move. */
+typedef struct h6PairDef { int32_t shell_body; int32_t field_body; } h6PairDef;
+
+/* How contact stiffness is shared out. The paper: Xu & Barbic 2016, IEEE Trans. Haptics. */
+typedef enum h6Method {
+  H6_METHOD_NONE = 0, /* every contact has the full stiffness                                      */
+  H6_METHOD_GLOBAL,   /* McNeely 1999: n0/n once there are n0 contacts                             */
+  H6_METHOD_GAUSS3,   /* the paper's Eq. 6-9: density of normals                                   */
+  H6_METHOD_GAUSS6,   /* the paper's Eq. 10-12: density of normals plus density of torque directions*/
+  H6_METHOD_ROBUST,   /* product density, weighted by depth, contacts facing away dropped          */
+  H6_METHOD_COUNT
+} h6Method;
+
+/* Pieces of `robust` that can be added to the paper's methods one by one. */
+enum {
+  H6_PIECE_FACING = 1u << 0, /* contacts whose normal opposes the field's gradient fade out        */
+  H6_PIECE_DEPTH  = 1u << 1, /* contacts enter the density in proportion to their depth            */
+  H6_PIECE_PRODUCT = 1u << 2 /* gauss6: product of the two hats instead of their sum               */
+};
+
+typedef struct h6ContactDef {
+  h6Method method;          /* default robust                                                      */
+  uint32_t pieces;          /* H6_PIECE_*; robust has all of them whatever stands here             */
+  double   stiffness;       /* k, > 0                                                       [N/m]  */
+  double   damping;         /* beta, >= 0: damping of a contact is beta * its stiffness       [s]  */
+  double   global_n0;       /* `global`: contacts from which the stiffness is shared, >= 1         */
+  double   epsilon;         /* `gauss3`, `gauss6`: half-width of the density hat, (0, 2]           */
+  double   epsilon_normal;  /* `robust`: half-width of the hat over normals, (0, 2]                */
+  double   epsilon_torque;  /* `robust`: half-width of the hat over torque directions, (0, 2]      */
+  double   torque_length;   /* l0: lever arms below it count for less; 0: one voxel (robust), none
+                               (others)                                                       [m]  */
+} h6ContactDef;
+
+typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
+typedef enum h6Gradient {
+  H6_SYMMETRIC = 0, /* J J^T, no geometric term: symmetric, solved by LDL^T                        */
+  H6_EXACT          /* J J_g^T and the geometric term: pivoted LU                                  */
+} h6Gradient;
+
+/* Virtual coupling between a hand's manipulandum and its body, METHOD: Wan & McNeely 2003,
+ * saturation: Barbic & James 2008. Zero means "derive it", as said. */
+typedef struct h6CouplingDef {
+  double stiffness;           /* k_VC                                                       [N/m]  */
+  double rotational_stiffness;/* 0: stiffness * (30 voxels)^2                           [N m/rad]  */
+  double damping_ratio;       /* of the coupled body, 0 .. 10                                      */
+  double max_depth_voxels;    /* x_max: the largest force is k * x_max, in voxels of the body      */
+  double max_force;           /* 0: contact stiffness * x_max                                 [N]  */
+  double max_torque;          /* 0: max_force * the body's radius                           [N m]  */
+} h6CouplingDef;
+
+typedef struct h6HandDef {
+  int32_t       body;     /* which moves with this hand                                            */
+  h6CouplingDef coupling;
+} h6HandDef;
+
+typedef struct h6SessionDef {
+  const h6BodyDef* bodies; size_t body_count;
+  const h6PairDef* pairs;  size_t pair_count;  /* 0: every moving shell against every other field;
+                                                  two moving bodies: the shell of the first listed */
+  const h6HandDef* hands;  size_t hand_count;  /* at most H6_MAX_HANDS                             */
+  h6ContactDef contact;
+  h6Integrator integrator;
+  h6Gradient   gradient;
+  double       rate;          /* frames per second, 100 .. 10000                             [Hz]  */
+  h6Vec3       gravity;       /* default 0: the arm carries the part                      [m/s^2]  */
+  size_t       max_contacts;  /* a shell body; storage is reserved once                            */
+  uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
+  h6Allocator  allocator;
+} h6SessionDef;
+
+#define H6_MAX_HANDS 8
+#define H6_MAX_BODIES 256
+
+/* ---- what can be read -------------------------------------------------------------------------- */
+
+typedef struct h6BodyState { h6Pose pose; h6Velocity velocity; } h6BodyState;
+
+/* The contacts of one shell body in the last frame. Columns of `count` rows, valid until the next
+ * step. World frame. */
+typedef struct h6Contacts {
+  size_t          count;
+  const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
+  const float*    nx; const float* ny; const float* nz; /* inward unit normal of the point         */
+  const float*    gx; const float* gy; const float* gz; /* unit gradient of the field, outward     */
+  const float*    rx; const float* ry; const float* rz; /* arm: from the centre of mass       [m]  */
+  const float*    tx; const float* ty; const float* tz; /* torque direction T                      */
+  const float*    weight;                        /* share of the stiffness                         */
+  const uint32_t* point;                         /* index into the shell's points                  */
+  const int32_t*  field_body;                    /* the body whose field it is                     */
+} h6Contacts;
+
+/* Stages of a frame, in order. */
+typedef enum h6Stage {
+  H6_STAGE_TRAVERSE = 0, /* sphere tree against the field                                          */
+  H6_STAGE_CONTACTS,     /* depth, normal, gradient, arm of each contact                           */
+  H6_STAGE_WEIGHTS,
+  H6_STAGE_WRENCH,       /* and its 6x6 gradient                                                   */
+  H6_STAGE_COUPLING,
+  H6_STAGE_INTEGRATE,
+  H6_STAGE_OUTPUT,       /* safety chain                                                           */
+  H6_STAGE_COUNT
+} h6Stage;
+H6_API const char* h6StageName(h6Stage stage);
+
+typedef struct h6FrameReport {
+  uint64_t frame;                     /* 0 for the first                                           */
+  h6Status status;
+  uint32_t contacts;                  /* over all shell bodies                                     */
+  double   max_depth;                 /* deepest contact, 0 without one                       [m]  */
+  double   max_depth_voxels;          /* the same in voxels of its field                           */
+  double   stage_us[H6_STAGE_COUNT];
+  double   frame_us;
+  uint64_t state_hash;                /* of poses and velocities after the step                    */
+} h6FrameReport;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,4 @@
+/* The contract needs nothing but a C99 compiler. */
+#include "hapsix/hapsix.h"
+
+int main(void) { return 0; }
