@@ -1,0 +1,119 @@
+#include "sched/frame_team.h"
+
+#include <oneapi/tbb/task_arena.h>
+
+#include <atomic>
+#include <ctime>
+#include <thread>
+
+#include "hapsix/base.h"
+#include "sched/clock.h"
+#include "sched/realtime.h"
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+namespace h6::sched {
+namespace {
+void relax() {
+#if defined(__SSE2__)
+  _mm_pause();
+#endif
+}
+constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
+constexpr std::int64_t kNap = 50000;          // ns; how late the helper may notice an early frame
+}  // namespace
+
+// One job at a time. The ticket is the whole job in one word: its number (32 bits), how many slices it
+// has (16) and the next free one (16). A claim is one compare-and-swap of that word, so a helper that
+// wakes late can never take a slice of a job that is over, nor read a job that is being set up.
+struct FrameTeam::Helper {
+  oneapi::tbb::task_arena arena{1, 0};
+  std::atomic<bool> stop{false}, ended{false};
+  std::atomic<bool> polling{false};         // a frame is on
+  std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
+  alignas(64) std::atomic<std::uint64_t> ticket{0};
+  alignas(64) std::atomic<std::uint32_t> done{0};  // slices of this job that are finished
+  // Written before the ticket is published, read after a claim.
+  Slice work = nullptr;
+  void* context = nullptr;
+  std::uint32_t job = 0;
+
+  static std::uint64_t ticket_of(std::uint32_t job, std::size_t slices) {
+    return std::uint64_t{job} << 32 | std::uint64_t{slices} << 16;
+  }
+
+  // Takes and runs one slice of the current job; false when none is free.
+  bool work_one() {
+    std::uint64_t t = ticket.load(std::memory_order_acquire);
+    std::uint32_t next, slices;
+    do {
+      next = t & 0xffff;
+      slices = t >> 16 & 0xffff;
+      if (next >= slices) return false;
+    } while (!ticket.compare_exchange_weak(t, t + 1, std::memory_order_acq_rel,
+                                           std::memory_order_acquire));
+    work(context, next);
+    done.fetch_add(1, std::memory_order_release);
+    return true;
+  }
+
+  void help() {
+    FlushDenormals flush;
+    while (!stop.load(std::memory_order_relaxed)) {
+      if (!polling.load(std::memory_order_acquire)) {
+        const std::int64_t due = next_frame.load(std::memory_order_relaxed) - kPollBefore;
+        const std::int64_t now = now_ns();
+        if (now < due) sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
+        else if (now > due + 2 * kPollBefore) sleep_until_ns(now + kNap);  // nobody steps
+        else relax();
+        continue;
+      }
+      if (!work_one()) relax();
+    }
+    ended.store(true, std::memory_order_release);
+  }
+};
+
+FrameTeam::FrameTeam(unsigned threads) {
+  if (threads < 2) return;
+  helper_ = std::make_unique<Helper>();
+  helper_->arena.enqueue([helper = helper_.get()] { helper->help(); });
+}
+
+FrameTeam::~FrameTeam() {
+  if (!helper_) return;
+  helper_->stop.store(true, std::memory_order_relaxed);
+  while (!helper_->ended.load(std::memory_order_acquire)) std::this_thread::yield();
+}
+
+unsigned FrameTeam::threads() const { return helper_ ? 2 : 1; }
+
+void FrameTeam::begin_frame() {
+  if (helper_) helper_->polling.store(true, std::memory_order_release);
+}
+
+void FrameTeam::end_frame(std::int64_t next_frame_ns) {
+  if (!helper_) return;
+  helper_->next_frame.store(next_frame_ns, std::memory_order_relaxed);
+  helper_->polling.store(false, std::memory_order_release);
+}
+
+void FrameTeam::run(std::size_t slices, Slice work, void* context) {
+  H6_ASSERT(slices < kMaxSlices);
+  if (!helper_ || slices < 2) {
+    for (std::size_t i = 0; i < slices; ++i) work(context, i);
+    return;
+  }
+  Helper& h = *helper_;
+  h.work = work;
+  h.context = context;
+  h.done.store(0, std::memory_order_relaxed);
+  h.ticket.store(Helper::ticket_of(++h.job, slices), std::memory_order_release);
+  while (h.work_one()) {
+  }
+  while (h.done.load(std::memory_order_acquire) != slices) relax();
+}
+
+}  // namespace h6::sched

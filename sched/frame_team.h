@@ -1,0 +1,48 @@
+// frame_team.h - a resident helper that takes slices of a frame's work from the haptic thread.
+//
+// Entering a TBB arena every millisecond costs a futex call a frame. So the helper is one task that
+// stays in an arena of its own from construction to destruction: it naps between frames, polls from
+// shortly before the next one is expected, and claims slices from a counter. The haptic thread
+// claims from the same counter until none is left, then waits at most for the one slice that the
+// helper has in hand: a helper that is pre-empted between slices is not waited for.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <type_traits>
+
+namespace h6::sched {
+
+class FrameTeam {
+ public:
+  // `threads` 1: no helper, everything runs on the caller. 2: one helper.
+  explicit FrameTeam(unsigned threads);
+  ~FrameTeam();
+  FrameTeam(const FrameTeam&) = delete;
+  FrameTeam& operator=(const FrameTeam&) = delete;
+
+  // Brackets a frame: the helper polls between these two. `period_ns` tells it when the next frame
+  // is due; 0: at once (virtual time).
+  void begin_frame();
+  void end_frame(std::int64_t next_frame_ns);
+
+  // Runs work(context, slice) for every slice in 0..slices-1, each once, on this thread and perhaps
+  // on the helper; returns when all are done. No allocation, no lock, no system call.
+  static constexpr std::size_t kMaxSlices = 65535;
+  using Slice = void (*)(void* context, std::size_t slice);
+  void run(std::size_t slices, Slice work, void* context);
+
+  template <class F>
+  void for_slices(std::size_t slices, F&& body) {
+    using Body = std::remove_reference_t<F>;
+    run(slices, [](void* context, std::size_t slice) { (*static_cast<Body*>(context))(slice); },
+        const_cast<void*>(static_cast<const void*>(&body)));
+  }
+  unsigned threads() const;
+
+ private:
+  struct Helper;
+  std::unique_ptr<Helper> helper_;
+};
+
+}  // namespace h6::sched

@@ -1,0 +1,32 @@
+#include "sched/parallel_for.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/info.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+namespace h6::sched {
+
+unsigned machine_threads() {
+  return static_cast<unsigned>(oneapi::tbb::info::default_concurrency());
+}
+
+void parallel_for(std::size_t count, unsigned threads, const std::function<void(std::size_t)>& body) {
+  // More than the machine has would only make TBB complain.
+  const unsigned most = machine_threads();
+  if (threads == 0 || threads > most) threads = most;
+  if (threads == 1 || count < 2) {
+    for (std::size_t i = 0; i < count; ++i) body(i);
+    return;
+  }
+  // An arena of our own: the host's TBB work can neither enter it nor be held up by it.
+  oneapi::tbb::task_arena arena(static_cast<int>(threads));
+  arena.execute([&] {
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count),
+                              [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+                                for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+                              });
+  });
+}
+
+}  // namespace h6::sched

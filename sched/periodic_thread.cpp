@@ -1,0 +1,69 @@
+#include "sched/periodic_thread.h"
+
+#include <algorithm>
+
+#include "sched/clock.h"
+
+namespace h6::sched {
+namespace {
+
+void wait_for(std::int64_t deadline, std::int64_t spin) {
+  if (now_ns() < deadline - spin) sleep_until_ns(deadline - spin);
+  while (now_ns() < deadline) {
+  }
+}
+
+Late cause_of(std::int64_t wakeup, std::int64_t wall, std::int64_t cpu, std::int64_t period) {
+  if (wakeup + wall <= period) return Late::no;
+  if (cpu > period) return Late::compute;
+  // The larger of the two delays that were not our work.
+  return wall - cpu >= wakeup ? Late::stolen : Late::wakeup;
+}
+
+}  // namespace
+
+PeriodicThread::PeriodicThread(const PeriodicThreadOptions& options, Work work)
+    : options_(options), work_(std::move(work)), thread_([this] { run(); }) {}
+
+PeriodicThread::~PeriodicThread() {
+  request_stop();
+  join();
+}
+
+void PeriodicThread::join() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void PeriodicThread::run() {
+  RealtimeGrant grant;
+  if (options_.realtime && !options_.virtual_time) grant = request_realtime(options_.request);
+  if (work_.begin) work_.begin(grant);
+
+  const auto period = static_cast<std::int64_t>(1e9 / options_.rate);
+  const auto spin = static_cast<std::int64_t>(1e3 * options_.spin_us);
+  std::int64_t deadline = now_ns() + period;
+  TickTiming timing;
+  for (std::uint64_t frame = 0; !stop_.load(std::memory_order_relaxed); ++frame) {
+    bool more;
+    if (options_.virtual_time) {
+      more = work_.tick(frame, timing, 0.0);
+    } else {
+      wait_for(deadline, spin);
+      const std::int64_t cpu_before = thread_cpu_ns();
+      const std::int64_t start = now_ns();
+      const double wakeup_us = 1e-3 * static_cast<double>(start - deadline);
+      more = work_.tick(frame, timing, wakeup_us);
+      const std::int64_t end = now_ns();
+      const std::int64_t cpu = thread_cpu_ns() - cpu_before;
+      timing = {wakeup_us, cause_of(start - deadline, end - start, cpu, period)};
+      deadline += period;
+      if (end > deadline + period) deadline = end + period;
+    }
+    if (work_.done) work_.done(frame, timing);
+    if (!more) break;
+  }
+  release_realtime(grant);
+  running_.store(false, std::memory_order_release);
+}
+
+}  // namespace h6::sched

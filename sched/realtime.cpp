@@ -1,0 +1,88 @@
+#include "sched/realtime.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+namespace h6::sched {
+namespace {
+
+void append(RealtimeGrant& grant, const char* format, ...) __attribute__((format(printf, 2, 3)));
+void append(RealtimeGrant& grant, const char* format, ...) {
+  const std::size_t used = std::strlen(grant.text);
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(grant.text + used, sizeof grant.text - used, format, arguments);
+  va_end(arguments);
+}
+
+// The kernel grows a stack page by page, each a page fault: take them now.
+void touch_stack() {
+  volatile char page[128 * 1024];
+  for (std::size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
+}
+
+}  // namespace
+
+RealtimeGrant request_realtime(const RealtimeRequest& request) {
+  RealtimeGrant grant;
+  const int cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
+  // The last core: the first one serves most interrupts.
+  const int core = request.core >= 0 ? request.core : cores - 1;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  if (core < CPU_SETSIZE) CPU_SET(core, &set);
+  int refused = core < cores ? pthread_setaffinity_np(pthread_self(), sizeof set, &set) : EINVAL;
+  grant.pinned = refused == 0;
+  grant.core = grant.pinned ? core : -1;
+  if (grant.pinned) append(grant, "pinned to core %d. ", core);
+  else append(grant, "not pinned to core %d (%s): choose one of 0..%d. ", core, std::strerror(refused), cores - 1);
+
+  sched_param parameters{};
+  parameters.sched_priority = request.priority;
+  refused = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+  grant.fifo = refused == 0;
+  if (grant.fifo) append(grant, "SCHED_FIFO priority %d. ", request.priority);
+  else append(grant, "no SCHED_FIFO (%s): allow it with '<user> - rtprio 99' in /etc/security/limits.conf and log in again. ",
+              std::strerror(refused));
+
+  // Only what exists now: with MCL_FUTURE a host program's next malloc could fail.
+  grant.locked = mlockall(MCL_CURRENT) == 0;
+  if (grant.locked) append(grant, "memory locked.");
+  else append(grant, "memory not locked (%s): allow it with '<user> - memlock unlimited' in /etc/security/limits.conf.",
+              std::strerror(errno));
+  touch_stack();
+  return grant;
+}
+
+void release_realtime(const RealtimeGrant& grant) {
+  if (grant.locked) munlockall();
+}
+
+#if defined(__SSE__)
+FlushDenormals::FlushDenormals() : saved_(_mm_getcsr()) {
+  _mm_setcsr(static_cast<unsigned>(saved_) | 0x8040u);  // FTZ | DAZ
+}
+FlushDenormals::~FlushDenormals() { _mm_setcsr(static_cast<unsigned>(saved_)); }
+#elif defined(__aarch64__)
+FlushDenormals::FlushDenormals() {
+  asm volatile("mrs %0, fpcr" : "=r"(saved_));
+  asm volatile("msr fpcr, %0" ::"r"(saved_ | (1ul << 24)));
+}
+FlushDenormals::~FlushDenormals() { asm volatile("msr fpcr, %0" ::"r"(saved_)); }
+#else
+FlushDenormals::FlushDenormals() : saved_(0) {}
+FlushDenormals::~FlushDenormals() = default;
+#endif
+
+}  // namespace h6::sched

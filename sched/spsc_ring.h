@@ -1,0 +1,61 @@
+// spsc_ring.h - one writer, one reader, fixed capacity; neither ever waits.
+//
+// The two cursors only grow; a slot is cursor % capacity. Each side keeps a copy of the other's
+// cursor on its own cache line, so that a half-full ring costs no shared line a push.
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <memory>
+
+namespace h6::sched {
+
+template <class T>
+class SpscRing {
+ public:
+  explicit SpscRing(std::size_t capacity)
+      : slots_(std::make_unique<T[]>(capacity)), capacity_(capacity) {}
+
+  // Writer. False when the ring is full: the value is dropped and counted.
+  bool push(const T& value) {
+    const std::size_t at = written_.load(std::memory_order_relaxed);
+    if (at - seen_read_ == capacity_) {
+      seen_read_ = read_.load(std::memory_order_acquire);
+      if (at - seen_read_ == capacity_) {
+        dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        return false;
+      }
+    }
+    slots_[at % capacity_] = value;
+    written_.store(at + 1, std::memory_order_release);
+    return true;
+  }
+  // Writer. Whether a push would be dropped now.
+  bool full() {
+    const std::size_t at = written_.load(std::memory_order_relaxed);
+    seen_read_ = read_.load(std::memory_order_acquire);
+    return at - seen_read_ == capacity_;
+  }
+
+  // Reader. Moves up to `room` values, oldest first, and returns how many.
+  std::size_t pop(T* out, std::size_t room) {
+    const std::size_t at = read_.load(std::memory_order_relaxed);
+    const std::size_t there = written_.load(std::memory_order_acquire) - at;
+    const std::size_t count = there < room ? there : room;
+    for (std::size_t i = 0; i < count; ++i) out[i] = slots_[(at + i) % capacity_];
+    read_.store(at + count, std::memory_order_release);
+    return count;
+  }
+
+  // Either side.
+  std::size_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
+
+ private:
+  std::unique_ptr<T[]> slots_;
+  std::size_t capacity_;
+  alignas(64) std::atomic<std::size_t> written_{0};
+  std::size_t seen_read_ = 0;  // the writer's
+  std::atomic<std::size_t> dropped_{0};
+  alignas(64) std::atomic<std::size_t> read_{0};
+};
+
+}  // namespace h6::sched

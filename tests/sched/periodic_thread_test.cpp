@@ -1,0 +1,108 @@
+// Deadlines are absolute, late frames have one cause, denormals are flushed only in scope.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "sched/clock.h"
+#include "sched/periodic_thread.h"
+
+using namespace h6::sched;
+
+TEST_CASE("ticks are numbered from 0 without a gap and end when the work says so") {
+  for (const bool virtual_time : {true, false}) {
+    std::vector<std::uint64_t> ticks, done;
+    PeriodicThreadOptions options;
+    options.virtual_time = virtual_time;
+    options.rate = 5000;
+    PeriodicThread thread(options, {nullptr,
+                                    [&](std::uint64_t n, const TickTiming&, double) { ticks.push_back(n); return n < 99; },
+                                    [&](std::uint64_t n, const TickTiming&) { done.push_back(n); }});
+    thread.join();
+    CHECK(!thread.running());
+    REQUIRE(ticks.size() == 100);
+    CHECK(ticks.back() == 99);
+    CHECK(done == ticks);
+  }
+}
+
+TEST_CASE("a frame never starts before its deadline") {
+  double earliest = 1e9;
+  PeriodicThreadOptions options;
+  options.spin_us = 100;
+  PeriodicThread thread(options, {nullptr, [&](std::uint64_t n, const TickTiming&, double wakeup_us) {
+                                    if (wakeup_us < earliest) earliest = wakeup_us;
+                                    return n < 100;
+                                  }, nullptr});
+  thread.join();
+  CHECK(earliest >= 0);
+}
+
+TEST_CASE("a frame that computes too long is late by its own computation; one that sleeps is not") {
+  int compute = 0, stolen = 0;
+  PeriodicThreadOptions options;
+  options.rate = 200;  // 5 ms
+  PeriodicThread thread(
+      options, {nullptr,
+                [&](std::uint64_t n, const TickTiming&, double) {
+                  const std::int64_t until = now_ns() + 8000000;
+                  if (n == 3) {
+                    const std::int64_t cpu = thread_cpu_ns() + 7000000;
+                    while (thread_cpu_ns() < cpu) {
+                    }
+                  }
+                  if (n == 6) sleep_until_ns(until);  // what a machine that runs something else looks like
+                  return n < 9;
+                },
+                [&](std::uint64_t n, const TickTiming& t) {
+                  if (n == 3) compute += t.late == Late::compute;
+                  if (n == 6) stolen += t.late == Late::stolen;
+                }});
+  thread.join();
+  CHECK(compute == 1);
+  CHECK(stolen == 1);
+}
+
+TEST_CASE("after a long stall the schedule moves on instead of catching up") {
+  std::vector<std::int64_t> starts;
+  PeriodicThreadOptions options;
+  options.rate = 1000;
+  PeriodicThread thread(options, {nullptr, [&](std::uint64_t n, const TickTiming&, double) {
+                                    starts.push_back(now_ns());
+                                    if (n == 5) sleep_until_ns(now_ns() + 50000000);
+                                    return n < 20;
+                                  }, nullptr});
+  thread.join();
+  // 14 frames follow the stall: at their own rate, not in one burst.
+  CHECK(starts[20] - starts[6] > 10 * 1000000);
+}
+
+TEST_CASE("what real-time support was granted is said in words") {
+  RealtimeGrant grant;
+  PeriodicThreadOptions options;
+  PeriodicThread thread(options, {[&](const RealtimeGrant& g) { grant = g; },
+                                  [](std::uint64_t, const TickTiming&, double) { return false; }, nullptr});
+  thread.join();
+  const std::string text = grant.text;
+  CHECK(text.find("core") != std::string::npos);
+  CHECK(text.find("SCHED_FIFO") != std::string::npos);
+  CHECK(text.find("memory") != std::string::npos);
+  if (!grant.fifo) CHECK(text.find("limits.conf") != std::string::npos);
+}
+
+TEST_CASE("denormals are zero in scope and back after it") {
+  volatile double tiny = std::numeric_limits<double>::min();
+  {
+    const FlushDenormals flush;
+    volatile double half = tiny * 0.5;
+    CHECK(half == 0);
+  }
+  volatile double half = tiny * 0.5;
+  std::uint64_t bits;
+  const double value = half;
+  std::memcpy(&bits, &value, sizeof bits);
+  CHECK(bits != 0);
+}
