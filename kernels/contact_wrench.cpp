@@ -1,0 +1,163 @@
+// contact_wrench.cpp - the SIMD twin of contact_wrench_ref.cpp.
+//
+// Lanes are doubles: sums of many contacts nearly cancel, and products of floats are then exact. It
+// agrees with the reference to 1e-13 of the sum of magnitudes. Contacts go through a small stage of
+// columns, from which each row of the result is summed:
+//
+//     columns (float) -> stage: J, J_g, kw J, kw e, kw depth (double, 128 contacts)
+//                     -> lanes of 69 sums -> one reduction at the end
+#include "kernels/contact_wrench.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/contact_wrench.cpp"
+#include "kernels/simd.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/tail-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+using DD = hn::ScalableTag<double>;
+using DF = hn::Rebind<float, DD>;
+using VD = hn::Vec<DD>;
+
+constexpr std::size_t kStage = 128;  // contacts; a multiple of every vector length
+constexpr std::size_t kWidth = hn::MaxLanes(DD());
+
+struct Stage {
+  HWY_ALIGN double J[6][kStage];
+  HWY_ALIGN double Jg[6][kStage];
+  HWY_ALIGN double kwJ[6][kStage];
+  HWY_ALIGN double kwe[kStage];
+  HWY_ALIGN double kwd[kStage];
+};
+
+// Lanes of every sum. B is symmetric: column `col` of row `row` from `row` on.
+struct Sums {
+  HWY_ALIGN double force[6][kWidth];
+  HWY_ALIGN double elastic[6][kWidth];
+  HWY_ALIGN double damping[6][6][kWidth];
+  HWY_ALIGN double stiffness[6][6][kWidth];
+};
+
+HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
+  return hn::PromoteTo(DD(), load_n(DF(), column + first, live));
+}
+
+HWY_INLINE VD cross(VD a, VD b, VD c, VD e) {
+  return hn::NegMulAdd(c, e, hn::Mul(a, b));
+}  // ab - ce
+
+struct Axis6 {
+  VD v[6];
+};
+
+// [v; r x v]
+HWY_INLINE Axis6 wrench_axis(VD x, VD y, VD z, VD rx, VD ry, VD rz) {
+  return {{x, y, z, cross(ry, z, rz, y), cross(rz, x, rx, z), cross(rx, y, ry, x)}};
+}
+
+// Contacts first..first+count-1 to the stage; lanes past the end are zero and count for nothing.
+HWY_INLINE void fill(const WrenchColumns& c, const WrenchParameters& p, std::size_t first,
+                     std::size_t count, Stage& stage) {
+  const DD d;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const std::size_t at = first + i, live = count - i;
+    const VD rx = load_column(c.rx, at, live), ry = load_column(c.ry, at, live);
+    const VD rz = load_column(c.rz, at, live);
+    const Axis6 J = wrench_axis(load_column(c.nx, at, live), load_column(c.ny, at, live),
+                                load_column(c.nz, at, live), rx, ry, rz);
+    VD approach = hn::Zero(d);  // J.u
+    for (int k = 0; k < 6; ++k) approach = hn::MulAdd(J.v[k], hn::Set(d, p.velocity[k]), approach);
+    const VD depth = load_column(c.depth, at, live);
+    const VD e = hn::NegMulAdd(hn::Set(d, p.damping), approach, depth);
+    const VD weight = hn::IfThenElseZero(hn::Gt(e, hn::Zero(d)), load_column(c.weight, at, live));
+    const VD kw = hn::Mul(hn::Set(d, p.stiffness), weight);
+    hn::Store(hn::Mul(kw, e), d, stage.kwe + i);
+    hn::Store(hn::Mul(kw, depth), d, stage.kwd + i);
+    for (int k = 0; k < 6; ++k) {
+      hn::Store(J.v[k], d, stage.J[k] + i);
+      hn::Store(hn::Mul(kw, J.v[k]), d, stage.kwJ[k] + i);
+    }
+    if (!p.exact) continue;
+    const Axis6 Jg = wrench_axis(load_column(c.gx, at, live), load_column(c.gy, at, live),
+                                 load_column(c.gz, at, live), rx, ry, rz);
+    for (int k = 0; k < 6; ++k) hn::Store(Jg.v[k], d, stage.Jg[k] + i);
+  }
+}
+
+// sum[col] += factor * columns[col] over the stage, for col from kFrom on.
+template <int kFrom>
+HWY_INLINE void add_row(const double* factor, const double (*columns)[kStage], std::size_t count,
+                        double (*sum)[kWidth]) {
+  const DD d;
+  VD lanes[6];
+  HWY_UNROLL(8)
+  for (int col = kFrom; col < 6; ++col) lanes[col] = hn::Load(d, sum[col]);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const VD f = hn::Load(d, factor + i);
+    HWY_UNROLL(8)
+    for (int col = kFrom; col < 6; ++col) {
+      lanes[col] = hn::MulAdd(f, hn::Load(d, columns[col] + i), lanes[col]);
+    }
+  }
+  HWY_UNROLL(8)
+  for (int col = kFrom; col < 6; ++col) hn::Store(lanes[col], d, sum[col]);
+}
+
+HWY_INLINE double total(const double* lanes) {
+  const DD d;
+  return hn::GetLane(hn::SumOfLanes(d, hn::Load(d, lanes)));
+}
+
+void contact_wrench_simd(const WrenchColumns& contacts, const WrenchParameters& parameters,
+                         std::size_t begin, std::size_t end, WrenchSum& out) {
+  Stage stage;
+  Sums sums{};
+  for (std::size_t first = begin; first < end; first += kStage) {
+    const std::size_t count = HWY_MIN(kStage, end - first);
+    fill(contacts, parameters, first, count, stage);
+    add_row<0>(stage.kwe, stage.J, count, sums.force);
+    add_row<0>(stage.kwd, stage.J, count, sums.elastic);
+    add_row<0>(stage.kwJ[0], stage.J, count, sums.damping[0]);
+    add_row<1>(stage.kwJ[1], stage.J, count, sums.damping[1]);
+    add_row<2>(stage.kwJ[2], stage.J, count, sums.damping[2]);
+    add_row<3>(stage.kwJ[3], stage.J, count, sums.damping[3]);
+    add_row<4>(stage.kwJ[4], stage.J, count, sums.damping[4]);
+    add_row<5>(stage.kwJ[5], stage.J, count, sums.damping[5]);
+    if (!parameters.exact) continue;
+    for (int row = 0; row < 6; ++row) {
+      add_row<0>(stage.kwJ[row], stage.Jg, count, sums.stiffness[row]);
+    }
+  }
+  for (int row = 0; row < 6; ++row) {
+    out.force[row] = total(sums.force[row]);
+    out.elastic[row] = total(sums.elastic[row]);
+    for (int col = 0; col < 6; ++col) {
+      const double b = total(col < row ? sums.damping[col][row] : sums.damping[row][col]);
+      out.damping[6 * row + col] = b;
+      out.stiffness[6 * row + col] = parameters.exact ? total(sums.stiffness[row][col]) : b;
+    }
+  }
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(contact_wrench_simd);
+
+WrenchSum contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
+                         std::size_t begin, std::size_t end) {
+  WrenchSum sum;
+  HWY_DYNAMIC_DISPATCH(contact_wrench_simd)(contacts, parameters, begin, end, sum);
+  return sum;
+}
+
+}  // namespace h6::kernels
+#endif

@@ -1,0 +1,221 @@
+// field_layout.cpp - from samples in metres to int16 nodes and far bounds in voxels.
+//
+// The bound of a far cell. Let D be the true unsigned distance, L_c <= D the far grid's magnitude
+// at the cell's 8 corners, H = 8 voxels its edge, and I(f) the trilinear interpolation of corner
+// values, at a point with fractions t along the axes. We want corner values V with I(V) <= D in
+// the cell.
+//
+// 1. D^2 - |x|^2 is a minimum of linear functions of x, so concave. Trilinear weights are positive,
+//    sum to 1 and reproduce x, so by Jensen I(D^2) - I(|x|^2) <= D(x)^2 - |x|^2, and
+//        D(x)^2 >= I(L^2) - H^2 sum_a t_a (1 - t_a).
+// 2. I(L^2) = I(L)^2 + Var, the variance of L under the weights. Coordinates are independent there,
+//    so Var is at least the sum over axes of t_a (1 - t_a) (mean difference along a)^2, and that
+//    mean is between the 4 edge differences: at least q_a in magnitude when they share a sign and
+//    q_a is the smallest, else q_a = 0. With t (1 - t) <= 1/4:
+//        D(x)^2 >= I(L)^2 - S,   S = 1/4 sum_a (H^2 - min(q_a, H)^2)
+//    S is 32 near a plane, 48 at worst. To first order this is I(L) - S / 2D, the known 3 H^2 / 8D
+//    at worst.
+// 3. Let k be any constant with D >= k in the cell, p = sqrt(k^2 + S). For every s in [0, 1]
+//        V_c = k + s (L_c - p)
+//    is safe: where I(L) <= p, I(V) <= k <= D; where I(L) > p, I(V) <= k + I(L) - p, and
+//    sqrt(I^2 - S) - I grows with I from k - p, so that this is <= sqrt(I(L)^2 - S) <= D.
+//    s is the largest that keeps every V_c >= 0 (a bound needs no clamp in the kernel then), or 0
+//    where that is better on average.
+// 4. k is the largest of: the band (a far cell lies outside it); sqrt(m^2 - S), m the smallest L_c;
+//    max_c L_c less the cell's diagonal (D is 1-Lipschitz).
+// Values are rounded down, by a little more than the sampler's own rounding.
+#include "kernels/field_layout.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace h6::kernels {
+namespace {
+
+constexpr double kEdge = 8.0;               // voxels a far cell
+constexpr double kFloatSlack = 1.0 / 1024;  // voxels: float interpolation of values up to 1024
+constexpr double kInt16Max = 32767.0;
+
+struct Cell {
+  std::int32_t at[3];
+};
+
+std::size_t slot_of(const h6FieldDef& def, const Cell& c) {
+  return (static_cast<std::size_t>(c.at[2]) * def.bricks[1] + c.at[1]) * def.bricks[0] + c.at[0];
+}
+
+Cell cell_of(const h6FieldDef& def, std::size_t slot) {
+  const std::size_t bx = def.bricks[0], by = def.bricks[1];
+  return {{static_cast<std::int32_t>(slot % bx), static_cast<std::int32_t>(slot / bx % by),
+           static_cast<std::int32_t>(slot / (bx * by))}};
+}
+
+std::size_t slot_count(const h6FieldDef& def) {
+  return std::size_t(def.bricks[0]) * std::size_t(def.bricks[1]) * std::size_t(def.bricks[2]);
+}
+
+// Corner values of a far cell's bound, in voxels, >= 0, and the side.
+struct FarBound {
+  double corner[8];
+  double side;  // 1 outside the obstacle, -1 inside
+};
+
+// S of the head comment.
+double interpolation_excess(const double L[8]) {
+  double excess = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    double lowest = kEdge, highest = -kEdge;
+    for (int k = 0; k < 8; ++k) {
+      if ((k >> axis & 1) != 0) continue;
+      const double difference = L[k | 1 << axis] - L[k];
+      lowest = std::min(lowest, difference);
+      highest = std::max(highest, difference);
+    }
+    const double q = std::min(kEdge, std::max({0.0, lowest, -highest}));
+    excess += (kEdge * kEdge - q * q) / 4;
+  }
+  return excess;
+}
+
+FarBound far_bound(const h6FieldDef& def, const Cell& c) {
+  FarBound bound{{}, 1.0};
+  const std::size_t nx = def.bricks[0] + 1u, ny = def.bricks[1] + 1u;
+  double L[8];
+  bool inside = false, outside = false;
+  for (int k = 0; k < 8; ++k) {
+    const std::size_t x = c.at[0] + (k & 1), y = c.at[1] + (k >> 1 & 1), z = c.at[2] + (k >> 2);
+    const double value = def.far_grid[(z * ny + y) * nx + x] / def.voxel_size;
+    L[k] = std::fabs(value);
+    inside |= value < 0;
+    outside |= value > 0;
+  }
+  if (inside && outside) return bound;  // no far cell holds the surface: nothing is known then
+  if (inside) bound.side = -1.0;
+
+  const auto [low, high] = std::minmax_element(L, L + 8);
+  const double S = interpolation_excess(L);
+  const double k =
+      std::max({0.0, def.band / def.voxel_size, std::sqrt(std::max(0.0, *low * *low - S)),
+                *high - std::sqrt(3.0) * kEdge});
+  const double p = std::sqrt(k * k + S);
+  double mean = 0;
+  for (double value : L) mean += value / 8;
+  double s = *low < p ? std::min(1.0, k / (p - *low)) : 1.0;
+  if (mean < p) s = 0;
+  for (int i = 0; i < 8; ++i) bound.corner[i] = std::max(0.0, k + s * (L[i] - p));
+  return bound;
+}
+
+std::int16_t round_near(double voxels) {
+  const double q = std::nearbyint(voxels / kNearQuantum);
+  return static_cast<std::int16_t>(std::clamp(q, -kInt16Max, kInt16Max));
+}
+
+std::int16_t round_far(double voxels) {
+  const double q = std::floor((voxels - kFloatSlack) / kFarQuantum);
+  return static_cast<std::int16_t>(std::clamp(q, 0.0, kInt16Max));
+}
+
+// The 9 x 9 x 9 nodes of a brick: its own 8 and one layer of up to 7 neighbours.
+class BrickNodes {
+ public:
+  BrickNodes(const h6FieldDef& def, const Cell& brick) : def_(def) {
+    for (int k = 0; k < 8; ++k) look_up(brick, k);
+  }
+
+  // Node (x, y, z) of the brick, 0..8 each, in voxels.
+  double at(int x, int y, int z) const {
+    const int node[3] = {x, y, z};
+    int local[3], neighbour = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool beyond = node[axis] == 8;
+      // Past the last brick there is no node, and no sample reads one: repeat the last.
+      local[axis] = !beyond ? node[axis] : in_grid_[axis] ? 0 : 7;
+      if (beyond && in_grid_[axis]) neighbour |= 1 << axis;
+    }
+    return value(source_[neighbour], local);
+  }
+
+ private:
+  struct Source {
+    const float* samples;  // null: a far cell
+    FarBound bound;
+  };
+
+  // Neighbour k lies one brick on along the axes whose bit is set.
+  void look_up(const Cell& brick, int k) {
+    Cell c = brick;
+    for (int axis = 0; axis < 3; ++axis) {
+      in_grid_[axis] = brick.at[axis] + 1 < def_.bricks[axis];
+      if ((k >> axis & 1) != 0) ++c.at[axis];
+      if (c.at[axis] >= def_.bricks[axis]) return;  // never asked for
+    }
+    const std::int32_t row = def_.brick_index[slot_of(def_, c)];
+    if (row >= 0) {
+      source_[k].samples = def_.samples + std::size_t{512} * row;
+    } else {
+      source_[k].bound = far_bound(def_, c);
+    }
+  }
+
+  double value(const Source& source, const int n[3]) const {
+    if (source.samples != nullptr) {
+      return source.samples[(n[2] * 8 + n[1]) * 8 + n[0]] / def_.voxel_size;
+    }
+    double d = 0;
+    for (int k = 0; k < 8; ++k) {
+      double weight = 1;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double t = n[axis] / kEdge;
+        weight *= (k >> axis & 1) != 0 ? t : 1 - t;
+      }
+      d += weight * source.bound.corner[k];
+    }
+    return source.bound.side * std::max(d, def_.band / def_.voxel_size);
+  }
+
+  const h6FieldDef& def_;
+  Source source_[8] = {};
+  bool in_grid_[3] = {};
+};
+
+}  // namespace
+
+FieldLayoutSize field_layout_size(const h6FieldDef& def) {
+  FieldLayoutSize size{0, 0};
+  for (std::size_t slot = 0; slot < slot_count(def); ++slot) {
+    ++(def.brick_index[slot] >= 0 ? size.bricks : size.far_cells);
+  }
+  return size;
+}
+
+void layout_table(const h6FieldDef& def, std::int32_t* table) {
+  std::int32_t bricks = 0, far_cells = 0;
+  for (std::size_t slot = 0; slot < slot_count(def); ++slot) {
+    table[slot] = def.brick_index[slot] >= 0 ? bricks++ : -1 - far_cells++;
+  }
+}
+
+void layout_cell(const h6FieldDef& def, const std::int32_t* table, std::size_t slot,
+                 std::int16_t* bricks, std::int16_t* far) {
+  const Cell cell = cell_of(def, slot);
+  const std::ptrdiff_t entry = table[slot];
+  if (entry < 0) {
+    const FarBound bound = far_bound(def, cell);
+    std::int16_t* out = far + 8 * (-1 - entry);
+    for (int k = 0; k < 8; ++k) {
+      out[k] = static_cast<std::int16_t>(bound.side * round_far(bound.corner[k]));
+    }
+    return;
+  }
+  const BrickNodes nodes(def, cell);
+  std::int16_t* out = bricks + kBrickStride * entry;
+  for (int z = 0; z < 9; ++z) {
+    for (int y = 0; y < 9; ++y) {
+      for (int x = 0; x < 9; ++x) *out++ = round_near(nodes.at(x, y, z));
+    }
+  }
+  std::fill_n(out, kBrickStride - kBrickNodes, std::int16_t{0});
+}
+
+}  // namespace h6::kernels

@@ -1,0 +1,126 @@
+// Exact distances of a brick's nodes to triangles: SIMD against the reference, and against
+// geometry.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "kernels/triangle_distance.h"
+
+using namespace h6::kernels;
+
+namespace {
+
+struct Random {
+  std::mt19937_64 engine{7};
+  double operator()(double low, double high) {
+    return low + (high - low) * double(engine() >> 11) * 0x1p-53;
+  }
+};
+
+using Triangles = std::vector<double>;  // 9 a triangle
+
+Triangles random_triangles(std::size_t count, double size, Random& random) {
+  Triangles t;
+  for (std::size_t i = 0; i < count; ++i) {
+    double middle[3];
+    for (double& m : middle) m = random(-4, 12);
+    for (int corner = 0; corner < 3; ++corner)
+      for (double m : middle) t.push_back(m + random(-size, size));
+  }
+  return t;
+}
+
+double worst_gap(const Triangles& t, float reach) {
+  std::vector<float> fast(kBrickSamples, -1.0f), exact(kBrickSamples, -2.0f);
+  triangle_distance(t.data(), t.size() / 9, reach, fast.data());
+  triangle_distance_ref(t.data(), t.size() / 9, reach, exact.data());
+  double worst = 0;
+  for (std::size_t n = 0; n < kBrickSamples; ++n)
+    worst = std::max(worst, std::fabs(double(fast[n]) - exact[n]));
+  return worst;
+}
+
+template <class F>
+void on_every_target(F&& check) {
+  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    INFO("target " << hwy::TargetName(target));
+    check();
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+}  // namespace
+
+TEST_CASE("triangle_distance: SIMD agrees with the reference on every target, for every count") {
+  on_every_target([] {
+    Random random;
+    for (std::size_t count = 0; count <= 67; ++count)
+      CHECK(worst_gap(random_triangles(count, 2.0, random), 5.0f) < 2e-5);
+    for (double size : {1e-5, 1e-3, 0.1, 10.0, 50.0})
+      CHECK(worst_gap(random_triangles(20, size, random), 40.0f) < 1e-4);
+  });
+}
+
+TEST_CASE("triangle_distance: slivers, needles and points count as what is left of them") {
+  on_every_target([] {
+    Random random;
+    for (double width : {0.0, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2}) {
+      Triangles t;
+      for (int i = 0; i < 10; ++i) {
+        double a[3], b[3];
+        for (int k = 0; k < 3; ++k) a[k] = random(-30, 38), b[k] = random(-30, 38);
+        t.insert(t.end(), a, a + 3);
+        t.insert(t.end(), b, b + 3);
+        const double s = random(0, 1);
+        for (int k = 0; k < 3; ++k) t.push_back(a[k] + s * (b[k] - a[k]) + random(-width, width));
+      }
+      INFO("width " << width);
+      CHECK(worst_gap(t, 60.0f) < 1e-4);
+    }
+    const Triangles point = {3.5, 3.5, 3.5, 3.5, 3.5, 3.5, 3.5, 3.5, 3.5};
+    CHECK(worst_gap(point, 20.0f) < 1e-6);
+  });
+}
+
+TEST_CASE("triangle_distance: a node on a corner, an edge or the face is at distance zero") {
+  const Triangles t = {0, 0, 3, 7, 0, 3, 0, 7, 3};
+  std::vector<float> distance(kBrickSamples);
+  triangle_distance(t.data(), 1, 9.0f, distance.data());
+  for (std::size_t y = 0; y < 8; ++y)
+    for (std::size_t x = 0; x + y < 8; ++x) CHECK(distance[(3 * 8 + y) * 8 + x] == 0.0f);
+  CHECK(distance[(7 * 8 + 2) * 8 + 2] == doctest::Approx(4.0));
+  CHECK(distance[(3 * 8 + 7) * 8 + 7] == doctest::Approx(7.0 / std::sqrt(2.0)));
+}
+
+TEST_CASE("triangle_distance: beyond the reach it says the reach") {
+  const Triangles t = {-50, 0, 0, -50, 1, 0, -50, 0, 1};
+  std::vector<float> distance(kBrickSamples);
+  triangle_distance(t.data(), 1, 6.0f, distance.data());
+  CHECK(std::all_of(distance.begin(), distance.end(), [](float v) { return v == 6.0f; }));
+  triangle_distance(nullptr, 0, 2.5f, distance.data());
+  CHECK(std::all_of(distance.begin(), distance.end(), [](float v) { return v == 2.5f; }));
+}
+
+TEST_CASE("triangle_distance: the winding and the first corner do not matter") {
+  Random random;
+  for (int i = 0; i < 50; ++i) {
+    Triangles t = random_triangles(1, 6.0, random), turned(t.begin() + 3, t.end()), flipped = t;
+    turned.insert(turned.end(), t.begin(), t.begin() + 3);
+    std::swap_ranges(flipped.begin(), flipped.begin() + 3, flipped.begin() + 3);
+    std::vector<float> d0(kBrickSamples), d1(kBrickSamples), d2(kBrickSamples);
+    triangle_distance(t.data(), 1, 30.0f, d0.data());
+    triangle_distance(turned.data(), 1, 30.0f, d1.data());
+    triangle_distance(flipped.data(), 1, 30.0f, d2.data());
+    for (std::size_t n = 0; n < kBrickSamples; ++n) {
+      CHECK(std::fabs(d0[n] - d1[n]) < 1e-5);
+      CHECK(std::fabs(d0[n] - d2[n]) < 1e-5);
+    }
+  }
+}
