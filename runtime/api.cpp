@@ -1,0 +1,82 @@
+// api.cpp - a session seen through the contract.
+#include <cstring>
+
+#include "runtime/stages.h"
+
+namespace h6 {
+
+h6Pose mesh_pose(const Body& body) { return {to(Vec3(body.x - body.R * body.com)), to(body.q)}; }
+
+void set_mesh_pose(Body& body, const h6Pose& pose) {
+  body.q = from(pose.q).normalized();
+  body.R = body.q.toRotationMatrix();
+  body.x = from(pose.p) + body.R * body.com;
+}
+
+// Every bit of every pose and velocity, mixed in order (multiply and shift, 64 bits).
+std::uint64_t state_hash(const h6Session& s) {
+  std::uint64_t hash = 0x9e3779b97f4a7c15u;
+  const auto mix = [&hash](const double* values, int count) {
+    for (int i = 0; i < count; ++i) {
+      std::uint64_t bits;
+      std::memcpy(&bits, &values[i], sizeof bits);
+      hash = (hash ^ bits) * 0xd6e8feb86659fd93u;
+      hash ^= hash >> 32;
+    }
+  };
+  for (std::size_t i = 0; i < s.body_count; ++i) {
+    const Body& body = s.bodies[i];
+    mix(body.x.data(), 3);
+    mix(body.q.coeffs().data(), 4);
+    mix(body.v.data(), 3);
+    mix(body.w.data(), 3);
+  }
+  return hash;
+}
+
+}  // namespace h6
+
+using namespace h6;
+
+extern "C" {
+
+h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands) {
+  return frame(*session, samples, commands);
+}
+
+h6BodyState h6GetBody(const h6Session* session, int32_t index) {
+  H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);
+  const Body& body = session->bodies[index];
+  return {mesh_pose(body), {to(body.v), to(body.w)}};
+}
+
+void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
+  H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);
+  Body& body = session->bodies[index];
+  set_mesh_pose(body, state->pose);
+  body.v = from(state->velocity.linear);
+  body.w = from(state->velocity.angular);
+}
+
+h6Contacts h6GetContacts(const h6Session* session, int32_t index) {
+  H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);
+  const Contacts& c = session->contacts[index];
+  return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx, c.gy, c.gz, c.rx, c.ry, c.rz,
+          c.tx,    c.ty,    c.tz, c.weight, c.point, c.field_body};
+}
+
+h6FrameReport h6GetFrame(const h6Session* session) { return session->report; }
+h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) { return session->hands[hand].coupling; }
+double h6GetVoxel(const h6Session* session, int32_t body) { return session->bodies[body].voxel; }
+
+void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities) {
+  session->hands[hand].guard.set_limits(limits_of(*capabilities));
+}
+void h6Fault(h6Session* session, h6Cause cause) {
+  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.fault(cause);
+}
+void h6Rearm(h6Session* session) {
+  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.rearm();
+}
+
+}  // extern "C"

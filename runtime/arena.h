@@ -1,0 +1,82 @@
+// arena.h - storage that is sized once.
+//
+// A layout function takes its columns from an Arena twice: first from an empty one, which only
+// counts, then from one over memory of that size. So capacity and use can never disagree.
+#pragma once
+#include <cstdint>
+#include <cstdlib>
+#include <new>
+#include <utility>
+
+#include "hapsix/base.h"
+
+namespace h6 {
+
+inline constexpr std::size_t kAlignment = 64;
+
+inline void* allocate(const h6Allocator& a, std::size_t bytes) {
+  bytes = (bytes + kAlignment - 1) & ~(kAlignment - 1);
+  if (a.allocate && a.release) return a.allocate(a.user, bytes, kAlignment);
+  return std::aligned_alloc(kAlignment, bytes ? bytes : kAlignment);
+}
+inline void release(const h6Allocator& a, void* memory, std::size_t bytes) {
+  if (!memory) return;
+  bytes = (bytes + kAlignment - 1) & ~(kAlignment - 1);
+  if (a.allocate && a.release) a.release(a.user, memory, bytes);
+  else std::free(memory);
+}
+
+template <class T, class... A>
+T* create(const h6Allocator& a, A&&... arguments) {
+  void* memory = allocate(a, sizeof(T));
+  return memory ? new (memory) T(std::forward<A>(arguments)...) : nullptr;
+}
+template <class T>
+void destroy(const h6Allocator& a, T* object) {
+  if (!object) return;
+  object->~T();
+  release(a, object, sizeof(T));
+}
+
+// A column or a block: `count` values of a type that needs no constructor.
+template <class T>
+struct Buffer {
+  h6Allocator allocator{};
+  T* data = nullptr;
+  std::size_t count = 0;
+
+  Buffer() = default;
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+  ~Buffer() { release(allocator, data, count * sizeof(T)); }
+  bool reserve(const h6Allocator& a, std::size_t n) {
+    release(allocator, data, count * sizeof(T));
+    allocator = a;
+    data = n <= SIZE_MAX / sizeof(T) - kAlignment ? static_cast<T*>(allocate(a, n * sizeof(T))) : nullptr;
+    count = data ? n : 0;
+    return data != nullptr;
+  }
+  T& operator[](std::size_t i) { return data[i]; }
+  const T& operator[](std::size_t i) const { return data[i]; }
+};
+
+class Arena {
+ public:
+  Arena() = default;  // counts only
+  Arena(void* memory, std::size_t bytes) : base_(static_cast<char*>(memory)), capacity_(bytes) {}
+  template <class T>
+  T* take(std::size_t n) {
+    const std::size_t at = (used_ + kAlignment - 1) & ~(kAlignment - 1);
+    used_ = at + n * sizeof(T);
+    if (!base_) return nullptr;
+    H6_ASSERT(used_ <= capacity_);
+    return reinterpret_cast<T*>(base_ + at);
+  }
+  std::size_t used() const { return used_; }
+
+ private:
+  char* base_ = nullptr;
+  std::size_t used_ = 0, capacity_ = 0;
+};
+
+}  // namespace h6

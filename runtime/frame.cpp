@@ -1,0 +1,97 @@
+// frame.cpp - one frame, on one page.
+//
+//   samples -> [traverse -> contacts -> weights -> wrench, K, D] -> coupling -> step -> output
+//                each shell body against every field it can touch     each hand     safety, always
+//
+// No allocation, lock, print, exception or wait in here or below; slices of work may run on the
+// helper of `team`, joined in index order: any number of threads gives the same bits.
+#include "runtime/stages.h"
+#include "sched/clock.h"
+#include "sched/realtime.h"
+
+namespace h6 {
+namespace {
+
+template <class F>
+void timed(h6Session& s, h6Stage stage, F&& work) {
+  const std::int64_t start = sched::now_ns();
+  work();
+  s.report.stage_us[stage] += 1e-3 * static_cast<double>(sched::now_ns() - start);
+}
+
+// A sample that is not finite is not used: the hand stays where it was last good.
+void accept(h6Session& s, Hand& hand, const h6DeviceSample& sample) {
+  const Vec3 v = from(sample.velocity.linear), w = from(sample.velocity.angular);
+  const double n = from(sample.pose.q).norm();
+  if (!finite(sample.pose) || !v.allFinite() || !w.allFinite() || !(n > 0.5 && n < 2.0)) {
+    s.report.status |= H6_HAND_NOT_FINITE;
+    hand.sample.velocity = {};
+    return;
+  }
+  hand.sample = sample;
+  hand.sample.pose.q = to(from(sample.pose.q).normalized());
+  hand.seen = true;
+}
+
+void begin(h6Session& s, const h6DeviceSample* samples) {
+  s.report = {};
+  s.report.frame = s.frame++;
+  for (std::size_t i = 0; i < s.body_count; ++i) {
+    Body& body = s.bodies[i];
+    body.f.setZero();
+    body.K.setZero();
+    body.D.setZero();
+    if (!body.fixed) body.f.head<3>() = body.mass * s.gravity;
+  }
+  for (std::size_t i = 0; i < s.hand_count; ++i) accept(s, s.hands[i], samples[i]);
+}
+
+// What the hand feels is the coupling's wrench turned round.
+void send(h6Session& s, Hand& hand, h6DeviceCommand* command) {
+  const h6Wrench felt{to(Vec3(-hand.wrench.head<3>())), to(Vec3(-hand.wrench.tail<3>()))};
+  if (s.report.status & H6_STATE_NOT_FINITE) hand.guard.fault(H6_CAUSE_NOT_FINITE);
+  const h6DeviceCommand passed = hand.guard.pass(felt, s.dt, &s.report.status);
+  if (command) *command = passed;
+}
+
+void note_depths(h6Session& s) {
+  for (std::size_t p = 0; p < s.pair_count; ++p) {
+    const Pair& pair = s.pairs[p];
+    const double voxel = s.model->fields[s.bodies[pair.b].field].voxel;
+    const Contacts& c = s.contacts[pair.a];
+    s.report.contacts += static_cast<std::uint32_t>(pair.end - pair.begin);
+    for (std::size_t i = pair.begin; i < pair.end; ++i) {
+      s.report.max_depth = std::max<double>(s.report.max_depth, c.depth[i]);
+      s.report.max_depth_voxels = std::max<double>(s.report.max_depth_voxels, c.depth[i] / voxel);
+    }
+  }
+}
+
+}  // namespace
+
+h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands) {
+  const sched::FlushDenormals flush;
+  const std::int64_t start = sched::now_ns();
+  s.team->begin_frame();
+  begin(s, samples);
+  for (std::size_t first = 0, end; first < s.pair_count; first = end) {
+    end = pairs_of_shell(s, first);
+    timed(s, H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
+    timed(s, H6_STAGE_CONTACTS, [&] { gather_contacts(s, first, end); });
+    timed(s, H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, s.pairs[first].a); });
+    timed(s, H6_STAGE_WRENCH, [&] { for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]); });
+  }
+  timed(s, H6_STAGE_COUPLING, [&] { for (std::size_t h = 0; h < s.hand_count; ++h) couple(s, s.hands[h]); });
+  timed(s, H6_STAGE_INTEGRATE, [&] { step_bodies(s); });
+  timed(s, H6_STAGE_OUTPUT, [&] {
+    for (std::size_t h = 0; h < s.hand_count; ++h) send(s, s.hands[h], commands ? &commands[h] : nullptr);
+  });
+  note_depths(s);
+  s.report.state_hash = state_hash(s);
+  const std::int64_t now = sched::now_ns();
+  s.report.frame_us = 1e-3 * static_cast<double>(now - start);
+  s.team->end_frame(start + static_cast<std::int64_t>(1e9 * s.dt));
+  return s.report.status;
+}
+
+}  // namespace h6

@@ -1,0 +1,49 @@
+// model.h - what never changes: fields and shells in their hot layout.
+#pragma once
+#include "hapsix/hapsix.h"
+#include "kernels/views.h"
+#include "runtime/arena.h"
+#include "runtime/math.h"
+
+namespace h6 {
+
+struct Field {
+  Vec3 origin;        // node (0,0,0), mesh frame [m]
+  double voxel = 0;   // [m]
+  bool wide = false;  // its band is under 3 voxels: culling uses the long form (cull_spheres.h)
+  kernels::FieldView view{};
+  Buffer<std::int32_t> table;
+  Buffer<std::int16_t> bricks, far;
+  std::size_t bytes() const { return table.count * 4 + bricks.count * 2 + far.count * 2; }
+};
+
+// Coordinates are relative to `centre`, so that float serves meshes far from their origin. Node
+// columns repeat the point's coordinates: traversal reads them in order.
+struct Shell {
+  Vec3 centre;             // mesh frame [m]
+  double radius = 0;       // farthest point from the centre [m]
+  std::size_t points = 0, nodes = 0;
+  std::uint32_t levels = 0;
+  Buffer<float> x, y, z, node_radius;  // (nodes)
+  Buffer<float> nx, ny, nz;            // (points) inward
+  Buffer<std::uint32_t> node_point, first_child, child_count;  // (nodes)
+  Buffer<std::uint32_t> level_first;   // (levels + 1)
+  std::size_t bytes() const { return nodes * 28 + points * 12; }
+};
+
+// Convert one definition; false with a sentence when it is not valid or memory is out.
+bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field, h6Error* error);
+bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell, h6Error* error);
+
+// Writes the sentence (when there is somebody to read it) and returns false.
+bool fail(h6Error* error, const char* format, ...) __attribute__((format(printf, 2, 3)));
+
+}  // namespace h6
+
+struct h6Model {
+  h6Allocator allocator{};
+  h6::Field* fields = nullptr;
+  std::size_t field_count = 0;
+  h6::Shell* shells = nullptr;
+  std::size_t shell_count = 0;
+};

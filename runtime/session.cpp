@@ -1,0 +1,217 @@
+// session.cpp - from a definition to a session: everything is derived, sized and reserved here, so
+// that a frame has nothing left to decide.
+#include "runtime/session.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <new>
+#include <vector>
+
+#include "runtime/session_checks.h"
+#include "runtime/stages.h"
+
+namespace h6 {
+namespace {
+
+std::vector<h6PairDef> pairs_of(const h6SessionDef& def) {
+  std::vector<h6PairDef> pairs(def.pairs, def.pairs + def.pair_count);
+  if (pairs.empty()) {
+    const auto count = static_cast<std::int32_t>(def.body_count);
+    for (std::int32_t a = 0; a < count; ++a)
+      for (std::int32_t b = 0; b < count; ++b) {
+        if (a == b || def.bodies[a].fixed || def.bodies[a].shell < 0 || def.bodies[b].field < 0) continue;
+        // Two moving bodies that have both touch once, not twice.
+        const bool both = !def.bodies[b].fixed && def.bodies[b].shell >= 0 && def.bodies[a].field >= 0;
+        if (both && b < a) continue;
+        pairs.push_back({a, b});
+      }
+  }
+  // Those of one shell body stand together: their contacts are weighed together.
+  std::stable_sort(pairs.begin(), pairs.end(), [](const h6PairDef& l, const h6PairDef& r) { return l.shell_body < r.shell_body; });
+  return pairs;
+}
+
+// Each point an equal share of the mass; a little is added where points lie on a line or a spot.
+Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) {
+  Mat3 I = Mat3::Zero();
+  const std::uint32_t first = shell.level_first[shell.levels - 1];
+  for (std::size_t r = first; r < shell.nodes; ++r) {
+    const Vec3 p = Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - com;
+    I += mass / static_cast<double>(shell.points) * (p.squaredNorm() * Mat3::Identity() - p * p.transpose());
+  }
+  const double least = 0.4 * mass * voxel * voxel;  // a ball of one voxel
+  if (Eigen::SelfAdjointEigenSolver<Mat3>(I, Eigen::EigenvaluesOnly).eigenvalues()[0] < least) I += least * Mat3::Identity();
+  return I;
+}
+
+void set_body(h6Session& s, std::size_t i, const h6BodyDef& def, const std::vector<h6PairDef>& pairs) {
+  Body& body = s.bodies[i];
+  body.fixed = def.fixed;
+  body.mass = def.mass;
+  body.com = from(def.com);
+  body.shell = def.shell;
+  body.field = def.field;
+  double voxel = HUGE_VAL;
+  for (const h6PairDef& p : pairs)
+    if (p.shell_body == static_cast<std::int32_t>(i) || p.field_body == static_cast<std::int32_t>(i))
+      voxel = std::min(voxel, s.model->fields[s.bodies[p.field_body].field].voxel);
+  body.voxel = voxel < HUGE_VAL ? voxel : 1e-3;
+  if (body.shell >= 0) {
+    const Shell& shell = s.model->shells[body.shell];
+    for (std::size_t r = shell.level_first[shell.levels - 1]; r < shell.nodes; ++r)
+      body.radius = std::max(body.radius, (Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - body.com).norm());
+  }
+  const double* v = def.inertia;
+  body.inertia << v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2];
+  if (!body.fixed && body.inertia.isZero(0)) body.inertia = inertia_of(s.model->shells[body.shell], body.com, body.mass, body.voxel);
+  set_mesh_pose(body, def.pose);
+  body.v = from(def.velocity.linear);
+  body.w = from(def.velocity.angular);
+  if (body.fixed) body.v.setZero(), body.w.setZero();
+}
+
+void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
+  Hand& hand = s.hands[i];
+  const Body& body = s.bodies[def.body];
+  hand.body = def.body;
+  h6CouplingDef& c = hand.coupling = def.coupling;
+  if (c.rotational_stiffness == 0) c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
+  if (c.max_force == 0) c.max_force = s.contact.stiffness * c.max_depth_voxels * body.voxel;
+  if (c.max_torque == 0) c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
+}
+
+// Moving bodies that pairs connect, in groups of at most four; a larger group falls into single
+// bodies, each then treating its neighbours as if they stood still within the step.
+std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>& pairs) {
+  std::vector<std::int32_t> root(s.body_count);
+  for (std::size_t i = 0; i < root.size(); ++i) root[i] = static_cast<std::int32_t>(i);
+  const auto find = [&](std::int32_t i) { while (root[i] != i) i = root[i]; return i; };
+  for (const h6PairDef& p : pairs)
+    if (!s.bodies[p.shell_body].fixed && !s.bodies[p.field_body].fixed) root[find(p.field_body)] = find(p.shell_body);
+  std::vector<Island> islands;
+  for (std::int32_t r = 0; r < static_cast<std::int32_t>(root.size()); ++r) {
+    std::vector<std::int32_t> members;
+    for (std::int32_t i = 0; i < static_cast<std::int32_t>(root.size()); ++i)
+      if (!s.bodies[i].fixed && find(i) == r) members.push_back(i);
+    if (members.size() <= kIslandBodies && !members.empty()) {
+      Island island{{}, static_cast<int>(members.size())};
+      std::copy(members.begin(), members.end(), island.body);
+      islands.push_back(island);
+    } else {
+      for (std::int32_t i : members) islands.push_back({{i}, 1});
+    }
+  }
+  return islands;
+}
+
+struct Sizes {
+  std::size_t bodies, pairs, hands, nodes, points;
+  std::vector<bool> touches;  // (bodies) the body is the shell of a pair
+};
+
+// Called twice: with an empty arena to count, then to take.
+void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
+  s.bodies = arena.take<Body>(n.bodies);
+  s.pairs = arena.take<Pair>(n.pairs);
+  s.hands = arena.take<Hand>(n.hands);
+  s.islands = arena.take<Island>(n.bodies);
+  s.contacts = arena.take<Contacts>(n.bodies);
+  // Counting has no memory to put headers in.
+  for (std::size_t i = 0; i < n.bodies; ++i) {
+    Contacts columns{};
+    if (n.touches[i]) take_columns(columns, arena, s.max_contacts);
+    if (s.contacts) s.contacts[i] = columns;
+  }
+  s.candidate_capacity = s.max_contacts + n.points;
+  s.frontier = arena.take<std::uint32_t>(n.nodes);
+  s.survivors = arena.take<std::uint32_t>(n.nodes);
+  s.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
+  for (float** column : {&s.candidate_distance, &s.scratch_depth}) *column = arena.take<float>(s.candidate_capacity);
+  for (float** column : {&s.gradient_x, &s.gradient_y, &s.gradient_z}) *column = arena.take<float>(s.max_contacts);
+  s.slice_count = arena.take<std::size_t>(n.nodes / 1024 + 1);
+  s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / 1024 + 1);
+}
+
+bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
+  const std::vector<h6PairDef> pairs = pairs_of(def);
+  Sizes n{def.body_count, pairs.size(), def.hand_count, 1, 1, std::vector<bool>(def.body_count)};
+  for (const h6PairDef& p : pairs) {
+    const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
+    n.nodes = std::max(n.nodes, shell.nodes);
+    n.points = std::max(n.points, shell.points);
+    n.touches[p.shell_body] = true;
+  }
+  Arena count;
+  lay_out(s, count, n);
+  s.memory_bytes = count.used();
+  s.memory = allocate(def.allocator, s.memory_bytes);
+  if (!s.memory) return fail(error, "no memory for the session (%zu MB): lower max_contacts", s.memory_bytes / 1000000);
+  // Pages are touched now, not in the first frames.
+  std::fill_n(static_cast<char*>(s.memory), s.memory_bytes, char{0});
+  Arena arena(s.memory, s.memory_bytes);
+  lay_out(s, arena, n);
+
+  s.body_count = n.bodies;
+  for (std::size_t i = 0; i < n.bodies; ++i) {
+    new (&s.bodies[i]) Body();
+    s.bodies[i].field = def.bodies[i].field;  // voxels of pairs are read before every body is set
+  }
+  for (std::size_t i = 0; i < n.bodies; ++i) set_body(s, i, def.bodies[i], pairs);
+  s.pair_count = n.pairs;
+  for (std::size_t i = 0; i < n.pairs; ++i) {
+    new (&s.pairs[i]) Pair();
+    s.pairs[i].a = pairs[i].shell_body;
+    s.pairs[i].b = pairs[i].field_body;
+  }
+  s.hand_count = n.hands;
+  for (std::size_t i = 0; i < n.hands; ++i) {
+    new (&s.hands[i]) Hand();
+    set_hand(s, i, def.hands[i]);
+  }
+  const std::vector<Island> islands = islands_of(s, pairs);
+  s.island_count = islands.size();
+  std::copy(islands.begin(), islands.end(), s.islands);
+  s.team = new sched::FrameTeam(def.threads);
+  return true;
+}
+
+}  // namespace
+}  // namespace h6
+
+using namespace h6;
+
+extern "C" {
+
+h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Error* error) {
+  if (!model || !def) return fail(error, "a session needs a model and a definition"), nullptr;
+  if (!check_session(*model, *def, error)) return nullptr;
+  h6Session* s = create<h6Session>(def->allocator);
+  if (!s) return fail(error, "no memory for a session"), nullptr;
+  s->model = model;
+  s->allocator = def->allocator;
+  s->contact = def->contact;
+  s->integrator = def->integrator;
+  s->gradient = def->gradient;
+  s->dt = 1 / def->rate;
+  s->gravity = from(def->gravity);
+  s->max_contacts = def->max_contacts;
+  bool ready = false;
+  try {
+    ready = fill(*s, *def, error);
+  } catch (const std::exception& e) {  // threads, small tables
+    fail(error, "the session could not be made: %s", e.what());
+  }
+  if (ready) return s;
+  h6DestroySession(s);
+  return nullptr;
+}
+
+void h6DestroySession(h6Session* s) {
+  if (!s) return;
+  delete s->team;
+  release(s->allocator, s->memory, s->memory_bytes);
+  const h6Allocator allocator = s->allocator;
+  destroy(allocator, s);
+}
+
+}  // extern "C"

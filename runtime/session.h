@@ -1,0 +1,95 @@
+// session.h - everything that changes from frame to frame, in storage sized once.
+#pragma once
+#include "hapsix/hapsix.h"
+#include "kernels/contact_wrench.h"
+#include "runtime/arena.h"
+#include "runtime/contacts.h"
+#include "runtime/math.h"
+#include "runtime/model.h"
+#include "runtime/safety.h"
+#include "sched/frame_team.h"
+
+namespace h6 {
+
+// The state of a body is that of its centre of mass; poses outside are those of the mesh frame.
+struct Body {
+  bool fixed = true;
+  double mass = 0;              // [kg]
+  Vec3 com = Vec3::Zero();      // mesh frame [m]
+  Mat3 inertia = Mat3::Zero();  // about com, mesh axes [kg m^2]
+  std::int32_t shell = -1, field = -1;
+  double voxel = 1e-3;          // the smallest among fields it can touch [m]
+  double radius = 0;            // farthest shell point from com [m]
+
+  Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();  // world frame
+  Quat q = Quat::Identity();
+  Mat3 R = Mat3::Identity();    // of q
+
+  // Gathered in a frame: wrench about x and its derivatives by this body's own motion.
+  Vec6 f = Vec6::Zero();
+  Mat6 K = Mat6::Zero(), D = Mat6::Zero();
+};
+
+// A shell body a against a field body b.
+struct Pair {
+  std::int32_t a = -1, b = -1;
+  std::size_t begin = 0, end = 0;        // its rows among a's contacts
+  std::size_t candidates = 0, first = 0; // its rows among the candidates
+  // When both move: how each one's motion changes the other's wrench.
+  Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
+};
+
+struct Hand {
+  std::int32_t body = -1;
+  h6CouplingDef coupling{};     // with no zeros left
+  h6DeviceSample sample{};      // the last good one
+  bool seen = false;            // there was one
+  Vec6 wrench = Vec6::Zero();   // of the coupling on the body
+  OutputGuard guard;
+};
+
+// Moving bodies that pairs connect: solved together when there are at most four.
+inline constexpr int kIslandBodies = 4;
+struct Island {
+  std::int32_t body[kIslandBodies];
+  int count;
+};
+
+}  // namespace h6
+
+struct h6Session {
+  const h6Model* model = nullptr;
+  h6Allocator allocator{};
+  h6ContactDef contact{};
+  h6Integrator integrator = H6_IMPLICIT;
+  h6Gradient gradient = H6_SYMMETRIC;
+  double dt = 1e-3;
+  h6::Vec3 gravity = h6::Vec3::Zero();
+  std::size_t max_contacts = 0;
+
+  h6::Body* bodies = nullptr;
+  std::size_t body_count = 0;
+  h6::Pair* pairs = nullptr;  // those of one shell body stand together
+  std::size_t pair_count = 0;
+  h6::Hand* hands = nullptr;
+  std::size_t hand_count = 0;
+  h6::Island* islands = nullptr;
+  std::size_t island_count = 0;
+  h6::Contacts* contacts = nullptr;  // (bodies); capacity 0 without a shell
+
+  // Scratch of one pair's traversal and one shell body's contacts.
+  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's nodes)
+  std::uint32_t* candidate = nullptr;                       // rows of the last level that touch
+  float *candidate_distance = nullptr;                      // [voxel]
+  float *scratch_depth = nullptr;                           // to find the deepest
+  float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
+  std::size_t candidate_capacity = 0;
+  std::size_t* slice_count = nullptr;                       // (slices) survivors of each
+  h6::kernels::WrenchSum* slice_sum = nullptr;              // (slices)
+
+  h6FrameReport report{};
+  std::uint64_t frame = 0;
+  h6::sched::FrameTeam* team = nullptr;
+  void* memory = nullptr;
+  std::size_t memory_bytes = 0;
+};

@@ -1,0 +1,198 @@
+// The loop joins devices, session and clock: what it runs, counts and hands over.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "tests/support/analytic.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr double mm = 1e-3;
+
+// A device made of two lambdas' worth of state: sinks 3 mm into the floor within a tenth of a second.
+struct Pusher {
+  std::vector<h6DeviceCommand> written;
+  std::atomic<int> stops{0};
+  int fail_read_at = -1, fail_write_at = -1, nan_at = -1;
+  int reads = 0;
+
+  h6Device device() {
+    h6Device d{};
+    d.self = this;
+    d.capabilities.max_force = 20, d.capabilities.max_torque = 2;
+    d.read = [](void* self, double t, h6DeviceSample* out) {
+      auto& p = *static_cast<Pusher*>(self);
+      *out = hand_at(pose(0, 0, (5.2 - 3 * std::min(1.0, 10 * t)) * mm));
+      if (p.reads == p.nan_at) out->pose.p.x = NAN;
+      return p.reads++ == p.fail_read_at ? -1 : 0;
+    };
+    d.write = [](void* self, double, const h6DeviceCommand* c) {
+      auto& p = *static_cast<Pusher*>(self);
+      p.written.push_back(*c);
+      return static_cast<int>(p.written.size()) - 1 == p.fail_write_at ? -1 : 0;
+    };
+    d.stop = [](void* self) { ++static_cast<Pusher*>(self)->stops; };
+    return d;
+  }
+};
+
+struct Scene {
+  FieldArrays field = sample_analytic([](double, double, double z) { return z; }, {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
+  ShellArrays shell = bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
+  Model model{{def_of(field)}, {shell.def()}};
+  h6Session* session = nullptr;
+  Pusher pusher;
+
+  Scene() {
+    std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
+    bodies[0].fixed = true, bodies[0].field = 0;
+    bodies[1].shell = 0, bodies[1].pose = pose(0, 0, 5.2 * mm);
+    h6HandDef hand = h6DefaultHandDef();
+    hand.body = 1;
+    h6SessionDef def = h6DefaultSessionDef();
+    def.bodies = bodies.data(), def.body_count = 2;
+    def.hands = &hand, def.hand_count = 1;
+    session = h6CreateSession(model.handle, &def, nullptr);
+    REQUIRE(session);
+  }
+  ~Scene() { h6DestroySession(session); }
+
+  struct Run {
+    h6LoopReport report;
+    std::vector<h6FrameRecord> records;
+  };
+  Run run(double seconds, bool virtual_time) {
+    h6LoopDef def = h6DefaultLoopDef();
+    def.duration = seconds;
+    def.virtual_time = virtual_time;
+    const h6Device device = pusher.device();
+    h6Error error{};
+    h6Loop* loop = h6StartLoop(session, &device, &def, &error);
+    REQUIRE_MESSAGE(loop, error.message);
+    Run run;
+    std::array<h6FrameRecord, 64> some;
+    const auto drain = [&] {
+      while (const std::size_t n = h6ReadRecords(loop, some.data(), some.size()))
+        run.records.insert(run.records.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(n));
+    };
+    while (h6LoopRunning(loop)) {
+      drain();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    run.report = h6JoinLoop(loop);
+    drain();
+    h6DestroyLoop(loop);
+    return run;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("virtual time runs every frame, loses no record and stops the device") {
+  Scene scene;
+  const Scene::Run run = scene.run(3, true);
+  CHECK(run.report.frames == 3000);
+  REQUIRE(run.records.size() == 3000);
+  CHECK(run.report.ring_overruns == 0);
+  CHECK(scene.pusher.stops >= 1);
+  for (std::size_t i = 0; i < run.records.size(); ++i) {
+    REQUIRE(run.records[i].report.frame == i);
+    REQUIRE(run.records[i].time == doctest::Approx(1e-3 * static_cast<double>(i)));
+  }
+  CHECK(run.records.back().report.contacts == 144);
+  CHECK(scene.pusher.written.back().wrench.force.z > 0.5);
+  CHECK(run.report.fault == H6_CAUSE_NONE);
+}
+
+TEST_CASE("real time and virtual time give the same bits") {
+  Scene a, b;
+  const Scene::Run virt = a.run(0.4, true), real = b.run(0.4, false);
+  REQUIRE(virt.records.size() == 400);
+  REQUIRE(real.records.size() + real.report.ring_overruns == 400);
+  for (const h6FrameRecord& r : real.records)
+    REQUIRE(r.report.state_hash == virt.records[r.report.frame].report.state_hash);
+}
+
+TEST_CASE("real time takes the time it says, and tells what it was granted") {
+  Scene scene;
+  const auto start = std::chrono::steady_clock::now();
+  const Scene::Run run = scene.run(0.3, false);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  CHECK(run.report.frames == 300);
+  CHECK(took.count() >= 0.299);
+  CHECK(std::string(run.report.granted).size() > 20);
+  // Each late frame has exactly one cause.
+  for (const h6FrameRecord& r : run.records) CHECK((r.late & (r.late - 1)) == 0);
+  CHECK(run.report.late_compute + run.report.late_stolen + run.report.late_wakeup <= run.report.frames);
+}
+
+TEST_CASE("a device that fails is told zero force ever after, with the cause") {
+  for (const bool reading : {true, false}) {
+    Scene scene;
+    (reading ? scene.pusher.fail_read_at : scene.pusher.fail_write_at) = 500;
+    const Scene::Run run = scene.run(1, true);
+    CHECK(run.report.frames == 1000);
+    CHECK(run.report.fault == H6_CAUSE_DEVICE_LOST);
+    CHECK((run.report.status & H6_DEVICE_LOST) != 0);
+    CHECK(scene.pusher.written[499].wrench.force.z > 0.1);
+    for (std::size_t i = 501; i < scene.pusher.written.size(); ++i) {
+      REQUIRE(scene.pusher.written[i].wrench.force.z == 0);
+      REQUIRE(scene.pusher.written[i].cause == H6_CAUSE_DEVICE_LOST);
+    }
+  }
+}
+
+TEST_CASE("one NaN from a hand is survived: the last good pose stands in") {
+  Scene scene;
+  scene.pusher.nan_at = 400;
+  const Scene::Run run = scene.run(1, true);
+  CHECK(run.report.fault == H6_CAUSE_NONE);
+  CHECK((run.records[400].report.status & H6_HAND_NOT_FINITE) != 0);
+  CHECK((run.records[401].report.status & H6_HAND_NOT_FINITE) == 0);
+  CHECK(std::isfinite(run.records.back().body[0].pose.p.x));
+  CHECK(run.records.back().report.contacts == 144);
+}
+
+TEST_CASE("stopping from another thread ends an endless loop") {
+  Scene scene;
+  h6LoopDef def = h6DefaultLoopDef();
+  const h6Device device = scene.pusher.device();
+  h6Loop* loop = h6StartLoop(scene.session, &device, &def, nullptr);
+  REQUIRE(loop);
+  h6FrameRecord record;
+  for (int seen = 0; seen < 5;) {
+    seen += static_cast<int>(h6ReadRecords(loop, &record, 1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  CHECK(h6LoopRunning(loop));
+  h6RequestStop(loop);
+  const h6LoopReport report = h6JoinLoop(loop);
+  CHECK(report.frames >= 5);
+  CHECK(!h6LoopRunning(loop));
+  h6DestroyLoop(loop);
+}
+
+TEST_CASE("a loop that cannot run is refused with a sentence") {
+  Scene scene;
+  h6Error error{};
+  h6LoopDef def = h6DefaultLoopDef();
+  CHECK(h6StartLoop(scene.session, nullptr, &def, &error) == nullptr);
+  CHECK(std::string(error.message).find("device") != std::string::npos);
+  h6Device device = scene.pusher.device();
+  device.read = nullptr;
+  CHECK(h6StartLoop(scene.session, &device, &def, &error) == nullptr);
+  device = scene.pusher.device();
+  def.duration = NAN;
+  CHECK(h6StartLoop(scene.session, &device, &def, &error) == nullptr);
+  CHECK(std::string(error.message).find("duration") != std::string::npos);
+}

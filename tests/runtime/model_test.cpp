@@ -1,0 +1,255 @@
+// Definitions that cannot be run are refused with a sentence; those that can are kept exactly.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "hapsix/hapsix.h"
+#include "tests/support/analytic.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr double mm = 1e-3;
+constexpr float nan_f = std::numeric_limits<float>::quiet_NaN();
+
+FieldArrays ball_field() {
+  return sample_analytic([](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 10 * mm; },
+                         {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+}
+
+// What creating a model of this one field and shell says; empty when it works.
+std::string complaint(const h6FieldDef* field, const h6ShellDef* shell) {
+  h6ModelDef def = h6DefaultModelDef();
+  def.fields = field, def.field_count = field ? 1 : 0;
+  def.shells = shell, def.shell_count = shell ? 1 : 0;
+  h6Error error{};
+  h6Model* model = h6CreateModel(&def, &error);
+  const std::string text = model ? "" : error.message;
+  h6DestroyModel(model);
+  return text;
+}
+bool says(const std::string& text, const char* word) { return text.find(word) != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("a field comes back as it was given") {
+  FieldArrays field = ball_field();
+  Model model({def_of(field)}, {});
+  REQUIRE(model.handle);
+  double worst = 0, worst_gradient = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const double a = 0.1 * i, b = 0.37 * i, r = (10 + 2.5 * std::sin(1.7 * i)) * mm;
+    const double u[3] = {std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b)};
+    const double p[3] = {r * u[0], r * u[1], r * u[2]};
+    double d, g[3];
+    std::uint8_t exact;
+    REQUIRE(h6SampleField(model.handle, 0, p, 1, &d, g, &exact) == 0);
+    CHECK(exact == 1);
+    worst = std::max(worst, std::fabs(d - (r - 10 * mm)));
+    worst_gradient = std::max(worst_gradient, std::hypot(g[0] - u[0], g[1] - u[1], g[2] - u[2]));
+  }
+  // Trilinear error of a ball at r voxels: h^2/8 times the Laplacian 2/r; of its gradient half a
+  // cell's diagonal times the curvature 1/r. The nearest points are at 7.5 voxels.
+  CHECK(worst < 0.25 / 7.5 * mm);
+  CHECK(worst_gradient < 0.5 * std::sqrt(3.0) / 7.5);
+}
+
+TEST_CASE("far from the surface the answer is a bound with the right sign") {
+  FieldArrays field = sample_analytic([](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 22 * mm; },
+                                      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  Model model({def_of(field)}, {});
+  const double points[] = {27 * mm, 27 * mm, 27 * mm, 0, 0, 0, 500 * mm, 0, 0, -31 * mm, 30 * mm, -28 * mm};
+  double d[4];
+  std::uint8_t exact[4];
+  h6SampleField(model.handle, 0, points, 4, d, nullptr, exact);
+  for (int i = 0; i < 4; ++i) {
+    const double* p = points + 3 * i;
+    const double truth = std::hypot(p[0], p[1], p[2]) - 22 * mm;
+    CHECK(exact[i] == 0);
+    CHECK(std::signbit(d[i]) == std::signbit(truth));
+    CHECK(std::fabs(d[i]) <= std::fabs(truth));
+    CHECK(std::fabs(d[i]) >= 0.9 * std::fabs(truth) - 5 * mm);
+  }
+  CHECK(h6SampleField(model.handle, 1, points, 1, d, nullptr, nullptr) == -1);
+}
+
+TEST_CASE("a field that cannot be is refused with a sentence that names the entry") {
+  const auto refused = [](const std::function<void(FieldArrays&, h6FieldDef&)>& spoil, const char* word) {
+    FieldArrays arrays = ball_field();
+    h6FieldDef def = def_of(arrays);
+    REQUIRE(complaint(&def, nullptr).empty());
+    spoil(arrays, def);
+    const std::string text = complaint(&def, nullptr);
+    CHECK_MESSAGE(says(text, word), text);
+  };
+  refused([](auto&, auto& d) { d.voxel_size = 0; }, "voxel_size");
+  refused([](auto&, auto& d) { d.voxel_size = NAN; }, "voxel_size");
+  refused([](auto&, auto& d) { d.origin.y = INFINITY; }, "origin");
+  refused([](auto&, auto& d) { d.bricks[1] = 0; }, "bricks[1]");
+  refused([](auto&, auto& d) { d.bricks[2] = 100000; }, "bricks[2]");
+  refused([](auto& a, auto&) { a.index[7] = 1 << 30; }, "brick_index[7]");
+  refused([](auto& a, auto&) { a.index[0] = -2; }, "brick_index[0]");
+  refused([](auto& a, auto&) { a.samples[100] = nan_f; }, "samples[100]");
+  refused([](auto& a, auto&) { a.far[3] = nan_f; }, "far_grid[3]");
+  refused([](auto&, auto& d) { d.far_grid = nullptr; }, "far_grid");
+  refused([](auto&, auto& d) { d.band = -1; }, "band");
+}
+
+TEST_CASE("a shell that would lose contacts is refused") {
+  const auto refused = [](const std::function<void(ShellArrays&, h6ShellDef&)>& spoil, const char* word) {
+    ShellArrays arrays = sphere_points(10 * mm, 50);
+    h6ShellDef def = arrays.def();
+    REQUIRE(complaint(nullptr, &def).empty());
+    spoil(arrays, def);
+    const std::string text = complaint(nullptr, &def);
+    CHECK_MESSAGE(says(text, word), text);
+  };
+  refused([](auto& a, auto&) { a.radius[0] *= 0.5f; }, "does not hold point");
+  refused([](auto& a, auto&) { a.radius[0] = nan_f; }, "radius");
+  refused([](auto& a, auto&) { a.x[4] = nan_f; }, "point 4");
+  refused([](auto& a, auto&) { a.nz[9] *= 2; }, "normal of point 9");
+  refused([](auto& a, auto&) { a.point[20] = 77; }, "node 20");
+  refused([](auto& a, auto&) { a.child_count[0] = 49; }, "nobody's children");
+  refused([](auto& a, auto&) { a.first_child[0] = 2; }, "children of node 0");
+  refused([](auto& a, auto&) { a.child_count[0] = UINT32_MAX; }, "children of node 0");
+  refused([](auto&, auto& d) { d.point_count = 0; }, "points");
+  refused([](auto&, auto& d) { d.level_count = 0; }, "levels");
+  refused([](auto&, auto& d) { d.level_count = 99; }, "levels");
+  refused([](auto&, auto& d) { d.nx = nullptr; }, "nx ny nz");
+}
+
+TEST_CASE("a session that cannot run is refused with a sentence that names the value") {
+  FieldArrays field = ball_field();
+  ShellArrays shell = sphere_points(5 * mm, 100);
+  Model model({def_of(field)}, {shell.def()});
+  struct Scene {
+    std::array<h6BodyDef, 2> bodies;
+    h6HandDef hand;
+    h6PairDef pair;
+    h6SessionDef def;
+  };
+  const auto complaint_of = [&](const std::function<void(Scene&)>& spoil) {
+    Scene s{{h6DefaultBodyDef(), h6DefaultBodyDef()}, h6DefaultHandDef(), {1, 0}, h6DefaultSessionDef()};
+    s.bodies[0].fixed = true, s.bodies[0].field = 0;
+    s.bodies[1].shell = 0;
+    s.hand.body = 1;
+    s.def.bodies = s.bodies.data(), s.def.body_count = 2;
+    s.def.pairs = &s.pair, s.def.pair_count = 1;
+    s.def.hands = &s.hand, s.def.hand_count = 1;
+    spoil(s);
+    h6Error error{};
+    h6Session* session = h6CreateSession(model.handle, &s.def, &error);
+    const std::string text = session ? "" : error.message;
+    h6DestroySession(session);
+    return text;
+  };
+  CHECK(complaint_of([](Scene&) {}) == "");
+  const std::pair<std::function<void(Scene&)>, const char*> bad[] = {
+      {[](Scene& s) { s.def.contact.stiffness = -1; }, "stiffness"},
+      {[](Scene& s) { s.def.contact.stiffness = NAN; }, "stiffness"},
+      {[](Scene& s) { s.def.contact.damping = -1e-3; }, "damping"},
+      {[](Scene& s) { s.def.contact.epsilon = 0; }, "epsilon"},
+      {[](Scene& s) { s.def.contact.epsilon_normal = 3; }, "epsilon_normal"},
+      {[](Scene& s) { s.def.contact.global_n0 = 0.5; }, "global_n0"},
+      {[](Scene& s) { s.def.contact.method = static_cast<h6Method>(77); }, "method"},
+      {[](Scene& s) { s.bodies[1].mass = 0; }, "mass"},
+      {[](Scene& s) { s.bodies[1].inertia[0] = 1; }, "inertia"},
+      {[](Scene& s) { s.bodies[1].pose.p.x = NAN; }, "finite"},
+      {[](Scene& s) { s.bodies[1].pose.q.w = 3; }, "quaternion"},
+      {[](Scene& s) { s.bodies[1].shell = 1; }, "shell 1"},
+      {[](Scene& s) { s.bodies[0].field = -7; }, "field -7"},
+      {[](Scene& s) { s.def.rate = 0; }, "rate"},
+      {[](Scene& s) { s.def.rate = 1e6; }, "rate"},
+      {[](Scene& s) { s.def.max_contacts = 0; }, "max_contacts"},
+      {[](Scene& s) { s.def.threads = 0; }, "threads"},
+      {[](Scene& s) { s.hand.body = 0; }, "fixed"},
+      {[](Scene& s) { s.hand.body = 9; }, "body 9"},
+      {[](Scene& s) { s.hand.coupling.stiffness = 0; }, "coupling stiffness"},
+      {[](Scene& s) { s.hand.coupling.max_depth_voxels = 0; }, "max_depth_voxels"},
+      {[](Scene& s) { s.hand.coupling.max_force = -2; }, "max_force"},
+      {[](Scene& s) { s.pair = {0, 1}; }, "no shell"},
+      {[](Scene& s) { s.pair = {1, 1}; }, "itself"},
+      {[](Scene& s) { s.def.hand_count = 99; }, "hands"},
+      {[](Scene& s) { s.def.body_count = 0; }, "bodies"},
+  };
+  for (const auto& [spoil, word] : bad) {
+    const std::string text = complaint_of(spoil);
+    CHECK_MESSAGE(says(text, word), word, " / ", text);
+  }
+}
+
+TEST_CASE("all memory of a model and a session comes from the given allocator and goes back") {
+  struct Counter { std::size_t bytes = 0, calls = 0; } counter;
+  const h6Allocator allocator{
+      [](void* user, std::size_t n, std::size_t alignment) {
+        auto& c = *static_cast<Counter*>(user);
+        c.bytes += n, ++c.calls;
+        return std::aligned_alloc(alignment, n);
+      },
+      [](void* user, void* memory, std::size_t n) {
+        static_cast<Counter*>(user)->bytes -= n;
+        std::free(memory);
+      },
+      &counter};
+  FieldArrays field = ball_field();
+  ShellArrays shell = sphere_points(5 * mm, 100);
+  const h6FieldDef f = def_of(field);
+  const h6ShellDef sh = shell.def();
+  h6ModelDef def = h6DefaultModelDef();
+  def.fields = &f, def.field_count = 1, def.shells = &sh, def.shell_count = 1;
+  def.allocator = allocator;
+  h6Model* model = h6CreateModel(&def, nullptr);
+  REQUIRE(model);
+  CHECK(counter.bytes >= h6ModelBytes(model));
+  const std::size_t of_model = counter.bytes;
+  h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
+  bodies[0].fixed = true, bodies[0].field = 0, bodies[1].shell = 0;
+  h6SessionDef sdef = h6DefaultSessionDef();
+  sdef.bodies = bodies, sdef.body_count = 2, sdef.allocator = allocator;
+  h6Session* session = h6CreateSession(model, &sdef, nullptr);
+  REQUIRE(session);
+  CHECK(counter.bytes > of_model);
+  h6DestroySession(session);
+  CHECK(counter.bytes == of_model);
+  h6DestroyModel(model);
+  CHECK(counter.bytes == 0);
+  CHECK(counter.calls > 5);
+}
+
+TEST_CASE("a machine without memory is an error, not a crash") {
+  const h6Allocator none{[](void*, std::size_t, std::size_t) -> void* { return nullptr; }, [](void*, void*, std::size_t) {}, nullptr};
+  FieldArrays field = ball_field();
+  const h6FieldDef f = def_of(field);
+  h6ModelDef def = h6DefaultModelDef();
+  def.fields = &f, def.field_count = 1;
+  def.allocator = none;
+  h6Error error{};
+  CHECK(h6CreateModel(&def, &error) == nullptr);
+  CHECK(says(error.message, "memory"));
+}
+
+TEST_CASE("every name has its value and back") {
+  for (int i = 0; i < H6_METHOD_COUNT; ++i) {
+    h6Method method;
+    std::uint32_t pieces = 99;
+    REQUIRE(h6MethodFromName(h6MethodName(static_cast<h6Method>(i)), &method, &pieces) == 0);
+    CHECK(method == i);
+    CHECK(pieces == 0);
+  }
+  std::uint32_t pieces;
+  h6Method method;
+  CHECK(h6MethodFromName("gauss6+facing+depth", &method, &pieces) == 0);
+  CHECK(method == H6_METHOD_GAUSS6);
+  CHECK(pieces == (H6_PIECE_FACING | H6_PIECE_DEPTH));
+  for (const char* wrong : {"", "gauss", "gauss66", "robust+", "robust+nothing", "+facing", "Robust"})
+    CHECK_MESSAGE(h6MethodFromName(wrong, &method, &pieces) != 0, wrong);
+  CHECK(h6MethodFromName(nullptr, &method, &pieces) != 0);
+  for (std::uint32_t bit = 1; bit <= H6_LATE; bit <<= 1) CHECK(h6StatusName(bit) != nullptr);
+  CHECK(h6StatusName(3) == nullptr);
+}
