@@ -1,0 +1,36 @@
+#include "io/mesh.h"
+
+#include "io/weld.h"
+
+namespace h6::io {
+
+Mesh weld(const Mesh& mesh) {
+  const Welded welded =
+      weld_points(mesh.vertices.size(), mesh.vertices.size(),
+                  [&](std::size_t i) { return without_minus_zero(mesh.vertices[i]); });
+
+  // Numbered anew by first use: the order is then that of the triangles, whatever the file's vertex
+  // list looked like, and unused vertices fall out.
+  constexpr std::uint32_t kUnused = ~std::uint32_t{0};
+  std::vector<std::uint32_t> number(welded.vertices.size(), kUnused);
+  Mesh out;
+  out.part = mesh.part;
+  out.part_names = mesh.part_names;
+  out.vertices.reserve(welded.vertices.size());
+  out.triangles.reserve(mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles) {
+    std::array<std::uint32_t, 3> renumbered{};
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t vertex = welded.index[triangle[corner]];
+      if (number[vertex] == kUnused) {
+        number[vertex] = static_cast<std::uint32_t>(out.vertices.size());
+        out.vertices.push_back(welded.vertices[vertex]);
+      }
+      renumbered[corner] = number[vertex];
+    }
+    out.triangles.push_back(renumbered);
+  }
+  return out;
+}
+
+}  // namespace h6::io
