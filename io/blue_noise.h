@@ -1,0 +1,49 @@
+// blue_noise.h - out of many points, a given number that keep their distance from one another.
+//
+// Greedy ("dart throwing") selection with a shrinking radius: a round at radius r accepts every
+// point that has no accepted point nearer than r; when fewer than the wanted number fit, r shrinks
+// and the next round fills the gaps. So every pair is at least the last r apart, every point that
+// was not chosen has a chosen one within the r before it, and the number is met exactly.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace h6::io {
+
+struct OrientedPoint {
+  float p[3];  // [m]
+  float n[3];  // unit
+};
+
+struct Thinning {
+  std::size_t target = 0;     // how many to choose; all when there are no more
+  double first_radius = 0;    // where to start [m], any guess > 0; too large costs rounds,
+                              // too small is noticed and repaired
+  bool fixed_radius = false;  // one round at first_radius, whatever number that gives
+  bool both_sides = false;    // points whose normals differ by more than 134 degrees do not
+                              // exclude one another: the two faces of a thin plate
+  std::uint64_t seed = 1;
+  unsigned threads = 0;                    // 0: all; the choice is the same for any number
+  std::function<bool(double)> keep_going;  // done in [0, 1]; false cancels. May be empty
+};
+
+struct Thinned {
+  std::vector<std::uint32_t> chosen;  // ascending
+  double spacing = 0;                 // no two (excluding) chosen points are nearer [m]
+  bool cancelled = false;
+};
+
+Thinned thin_out(std::span<const OrientedPoint> points, const Thinning& options);
+
+// A well mixed 64-bit number of two others: seeds, orders and jitter that need no state.
+inline std::uint64_t mix(std::uint64_t seed, std::uint64_t i) {
+  std::uint64_t h = seed * 0x9E3779B97F4A7C15u + i + 0x632BE59BD9B4E019u;
+  h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9u;
+  h = (h ^ (h >> 27)) * 0x94D049BB133111EBu;
+  return h ^ (h >> 31);
+}
+
+}  // namespace h6::io

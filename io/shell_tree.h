@@ -1,0 +1,26 @@
+// shell_tree.h - private to this box: the tree of points that are already laid out and checked.
+#pragma once
+#include <functional>
+#include <span>
+
+#include "hapsix/result.h"
+#include "io/blue_noise.h"
+#include "io/shell_data.h"
+
+namespace h6::io {
+
+struct TreeOptions {
+  int levels = 7;
+  double spacing = 0;  // of the points, when known [m]; 0: guessed
+  std::uint64_t seed = 1;
+  unsigned threads = 0;
+  std::function<bool(double)> keep_going;
+};
+
+// At least one point. Fails only by "cancelled".
+Result<ShellData> build_tree(std::span<const OrientedPoint> points,
+                             std::span<const std::uint32_t> source, const TreeOptions& options);
+
+Outcome check_levels(int levels);  // 1 .. 16
+
+}  // namespace h6::io
