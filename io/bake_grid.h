@@ -1,0 +1,156 @@
+// bake_grid.h - what the steps of a field bake hand to each other. Private to bake_*.cpp.
+//
+// All steps work in GRID coordinates: voxels, node (i,j,k) of the field at (i,j,k). Metres come
+// back only when the result is written.
+//
+//   surface -> grid -> bins -> narrow band (unsigned u, crossings) -> flood -> inside -> samples
+//                                                                             far grid ----^
+#pragma once
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hapsix/result.h"
+#include "io/bake_field.h"
+#include "io/mesh.h"
+#include "kernels/triangle_distance.h"
+
+namespace h6::io::bake {
+
+using kernels::kBrickSamples;
+
+// Nodes in a box around the mesh, centred on it: a symmetric part gets a symmetric field, and a
+// mesh far from the origin loses no digits.
+struct Grid {
+  Vec3 centre{};                        // of the mesh's box, mesh frame [m]
+  double voxel = 0;                     // [m]
+  std::array<std::int32_t, 3> bricks{};
+  double offset = 0;                    // sigma [voxel]
+  double band = 0;                      // [voxel]
+
+  double reach() const { return offset + band + 2.0; }  // u is exact up to here
+  std::size_t cells() const {
+    return std::size_t(bricks[0]) * std::size_t(bricks[1]) * std::size_t(bricks[2]);
+  }
+  std::size_t cell(int a, int b, int c) const {
+    return (std::size_t(c) * std::size_t(bricks[1]) + std::size_t(b)) * std::size_t(bricks[0]) +
+           std::size_t(a);
+  }
+  std::array<int, 3> place(std::size_t cell) const {
+    const std::size_t x = std::size_t(bricks[0]), y = std::size_t(bricks[1]);
+    return {int(cell % x), int(cell / x % y), int(cell / x / y)};
+  }
+  double middle(int axis) const { return (8.0 * bricks[std::size_t(axis)] - 1.0) / 2; }
+  Vec3 from_metres(const Vec3& p) const {
+    return {(p.x - centre.x) / voxel + middle(0), (p.y - centre.y) / voxel + middle(1),
+            (p.z - centre.z) / voxel + middle(2)};
+  }
+  Vec3 origin() const {
+    return {centre.x - voxel * middle(0), centre.y - voxel * middle(1),
+            centre.z - voxel * middle(2)};
+  }
+};
+
+// The triangles that count: with area, each once. Vertices are in metres until `to_grid`.
+struct Surface {
+  std::vector<Vec3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::int32_t> part;  // (triangles) or empty
+  Vec3 low{}, high{};              // [m]
+  std::size_t duplicates = 0, flat = 0;
+  std::size_t open_edges = 0;      // of one face
+  std::size_t odd_edges = 0;       // of an odd number of faces
+  bool closed = false;             // every edge has an even number of faces
+};
+Result<Surface> prepare_surface(const Mesh& mesh);
+Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
+void to_grid(Surface& surface, const Grid& grid, unsigned threads);
+
+// One bit a node of a brick: word z, bit 8*y + x.
+struct NodeMask {
+  std::array<std::uint64_t, 8> z{};
+  bool get(std::size_t n) const { return z[n / 64] >> (n % 64) & 1; }
+  void set(std::size_t n) { z[n / 64] |= std::uint64_t{1} << (n % 64); }
+  bool any() const {
+    std::uint64_t all = 0;
+    for (std::uint64_t w : z) all |= w;
+    return all != 0;
+  }
+};
+
+// Where the surface runs between nodes: bit n of edge[k] is the edge from node n along axis k.
+// Touching counts. Nodes exactly on the surface are in `on`.
+struct Crossing {
+  std::array<NodeMask, 3> edge;
+  NodeMask on;
+};
+
+// Bricks that a triangle comes near to, and what is known of their nodes. Rows are candidates, in
+// the order of cells.
+struct NarrowBand {
+  std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
+  std::vector<std::uint32_t> cell;     // (rows)
+  std::vector<std::size_t> first;      // (rows + 1) into `triangle`
+  std::vector<std::uint32_t> triangle; // triangles within reach of the row's nodes, increasing
+  std::unique_ptr<float[]> u;          // (rows x 512) unsigned distance, at most reach [voxel]
+  std::vector<Crossing> crossing;      // (rows), or empty where offset >= 0.5: not needed there
+  std::vector<std::int32_t> part;      // (rows) or empty
+  std::size_t rows() const { return cell.size(); }
+  const float* nodes(std::size_t r) const { return u.get() + r * kBrickSamples; }
+};
+
+// Steps report through this; false: cancelled.
+class Steps {
+ public:
+  explicit Steps(const Progress& progress) : progress_(progress) {}
+  // Runs body(i) in parallel, telling progress between slices of the work.
+  bool run(const std::string& what, double from, double to, std::size_t count, unsigned threads,
+           const std::function<void(std::size_t)>& body) const;
+  bool tell(const std::string& what, double done) const {
+    return !progress_ || progress_(what, done);
+  }
+
+ private:
+  const Progress& progress_;
+};
+
+// bake_bins.cpp: rows, cells and triangle lists. A sentence when there are too many.
+Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
+                        NarrowBand& band);
+// bake_distance.cpp, bake_crossing.cpp: u, part and crossings of one row.
+void measure_row(const Surface& surface, const Grid& grid, std::size_t row, NarrowBand& band);
+void cross_row(const Surface& surface, const Grid& grid, std::size_t row, NarrowBand& band);
+
+// bake_sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
+struct Reached {
+  std::vector<NodeMask> node;        // (rows)
+  std::vector<std::uint8_t> cell;    // (cells) all of it, where it has no row
+};
+Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
+              unsigned threads);
+// bake_pockets.cpp: those of the candidates from which a reached node can be reached after all.
+std::vector<NodeMask> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                                const std::vector<NodeMask>& candidates,
+                                const std::vector<NodeMask>& wet, unsigned threads);
+
+// bake_inside.cpp: signed distances [voxel] of all rows, in place of u; says which rows are needed.
+struct Inside {
+  std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within band of the zero set
+  std::size_t thin_edges = 0;        // surface between two outside nodes with no inside node near
+  std::size_t inside_nodes = 0;
+};
+bool sign_rows(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
+               const Steps& steps, Inside& inside);
+
+// bake_far.cpp: lower bounds [m] with sign at every eighth node.
+Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                      const Reached& reached, unsigned threads, const Steps& steps,
+                      std::vector<float>& far);
+
+}  // namespace h6::io::bake

@@ -1,0 +1,147 @@
+// bake_pockets.cpp - nodes at the bottom of grooves narrower than a voxel.
+//
+// Such a node is outside, yet all edges to its neighbours are crossed: the flood cannot step down
+// to it. Each candidate is judged alone: first by the parity of crossings towards reached nodes
+// (odd: it is the tip of a solid, and nearly all are), then by looking for a reached node in plain
+// view, and at last by walking on a lattice eight times finer, a few voxels far.
+#include <algorithm>
+
+#include "io/bake_grid.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io::bake {
+namespace {
+
+constexpr int kView = 2;    // nodes, along each axis; never beyond the triangles a row knows
+constexpr int kFine = 8;    // steps a voxel
+constexpr int kSide = 2 * kView * kFine + 1;
+
+struct Facet {
+  Vec3 a, e, f;  // corner and two edges
+};
+Vec3 sub(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+// Whether p + t d, t in [0, 1], meets the triangle (T. Moeller, B. Trumbore, 1997). Touching
+// counts.
+bool meets(const Vec3& p, const Vec3& d, const Facet& t) {
+  constexpr double kTouch = 1e-7;
+  const Vec3 h = cross(d, t.f);
+  const double det = dot(t.e, h);
+  if (det == 0) return false;
+  const Vec3 s = sub(p, t.a), q = cross(s, t.e);
+  const double u = dot(s, h) / det, v = dot(d, q) / det, w = dot(t.f, q) / det;
+  return u >= -kTouch && v >= -kTouch && u + v <= 1 + kTouch && w >= 0 && w <= 1;
+}
+
+class View {
+ public:
+  View(const Surface& surface, const Grid& grid, const NarrowBand& band,
+       const std::vector<NodeMask>& wet)
+      : surface_(surface), grid_(grid), band_(band), wet_(wet) {}
+
+  bool reaches_outside(std::size_t row, const std::array<int, 3>& p) const {
+    const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
+    const std::vector<Facet> near = facets_near(row, eye);
+    int odd = 0, looks = 0;
+    for (int i = 0; i < 125; ++i) {
+      const std::array<int, 3> d = {i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2};
+      if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > grid_.reach() * grid_.reach()) continue;
+      if (!is_wet({p[0] + d[0], p[1] + d[1], p[2] + d[2]})) continue;
+      const Vec3 way{double(d[0]), double(d[1]), double(d[2])};
+      const auto hits = std::count_if(near.begin(), near.end(),
+                                      [&](const Facet& t) { return meets(eye, way, t); });
+      if (hits == 0) return true;
+      odd += hits % 2;
+      if (++looks == 5 && odd > 2) return false;
+    }
+    return looks > 0 && 2 * odd <= looks && walks_outside(near, p);
+  }
+
+ private:
+  bool is_wet(const std::array<int, 3>& n) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (n[k] < 0 || n[k] >= 8 * grid_.bricks[k]) return false;
+    const std::int32_t r = band_.row[grid_.cell(n[0] / 8, n[1] / 8, n[2] / 8)];
+    return r >= 0 &&
+           wet_[std::size_t(r)].get(std::size_t(((n[2] & 7) * 8 + (n[1] & 7)) * 8 + (n[0] & 7)));
+  }
+
+  // Breadth first from the middle of a cube of fine steps to any reached node in it.
+  bool walks_outside(const std::vector<Facet>& near, const std::array<int, 3>& p) const {
+    std::vector<std::uint8_t> seen(kSide * kSide * kSide, 0);
+    std::vector<int> queue{int(seen.size() / 2)};
+    seen[std::size_t(queue[0])] = 1;
+    for (std::size_t at = 0; at < queue.size(); ++at) {
+      const int q[3] = {queue[at] % kSide, queue[at] / kSide % kSide, queue[at] / kSide / kSide};
+      if (q[0] % kFine == 0 && q[1] % kFine == 0 && q[2] % kFine == 0 &&
+          is_wet({p[0] + q[0] / kFine - kView, p[1] + q[1] / kFine - kView,
+                  p[2] + q[2] / kFine - kView}))
+        return true;
+      const Vec3 from{p[0] + double(q[0]) / kFine - kView, p[1] + double(q[1]) / kFine - kView,
+                      p[2] + double(q[2]) / kFine - kView};
+      for (int way = 0; way < 6; ++way) {
+        const int axis = way / 2, step = way % 2 ? 1 : -1;
+        if (q[axis] + step < 0 || q[axis] + step >= kSide) continue;
+        const int to = queue[at] + step * (axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide);
+        if (seen[std::size_t(to)]) continue;
+        double d[3] = {0, 0, 0};
+        d[axis] = double(step) / kFine;
+        if (std::any_of(near.begin(), near.end(), [&](const Facet& t) {
+              return meets(from, {d[0], d[1], d[2]}, t);
+            }))
+          continue;
+        seen[std::size_t(to)] = 1;
+        queue.push_back(to);
+      }
+    }
+    return false;
+  }
+
+  std::vector<Facet> facets_near(std::size_t row, const Vec3& eye) const {
+    std::vector<Facet> near;
+    for (std::size_t i = band_.first[row]; i < band_.first[row + 1]; ++i) {
+      const auto& t = surface_.triangles[band_.triangle[i]];
+      const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
+                 &c = surface_.vertices[t[2]];
+      const auto apart = [](double p, double q, double r, double at) {
+        return std::min({p, q, r}) > at + kView || std::max({p, q, r}) < at - kView;
+      };
+      if (apart(a.x, b.x, c.x, eye.x) || apart(a.y, b.y, c.y, eye.y) ||
+          apart(a.z, b.z, c.z, eye.z))
+        continue;
+      near.push_back({a, sub(b, a), sub(c, a)});
+    }
+    return near;
+  }
+
+  const Surface& surface_;
+  const Grid& grid_;
+  const NarrowBand& band_;
+  const std::vector<NodeMask>& wet_;
+};
+
+}  // namespace
+
+std::vector<NodeMask> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                                const std::vector<NodeMask>& candidates,
+                                const std::vector<NodeMask>& wet, unsigned threads) {
+  std::vector<NodeMask> seen(band.rows());
+  const View view(surface, grid, band, wet);
+  sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
+    const std::array<int, 3> place = grid.place(band.cell[r]);
+    for (std::size_t z = 0; z < 8; ++z)
+      for (std::uint64_t bits = candidates[r].z[z]; bits != 0; bits &= bits - 1) {
+        const int n = std::countr_zero(bits);
+        if (view.reaches_outside(r, {8 * place[0] + n % 8, 8 * place[1] + n / 8,
+                                  8 * place[2] + int(z)}))
+          seen[r].set(64 * z + std::size_t(n));
+      }
+  });
+  return seen;
+}
+
+}  // namespace h6::io::bake

@@ -1,0 +1,270 @@
+// Fields as files: to the bit and back, for other programs, and through every kind of damage.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+#include <fstream>
+
+#include "io/bake_field.h"
+#include "io/field_file.h"
+#include "tests/io/field_check.h"
+
+// OpenVDB allocates by the length of a compressed block; a damaged one is a bad_alloc that
+// read_field catches, but this sanitizer ends the program instead of throwing.
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kHugeAllocationsThrow = false;
+#else
+constexpr bool kHugeAllocationsThrow = true;
+#endif
+
+using namespace field_check;
+using namespace h6::io;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Folder {
+  fs::path path = fs::temp_directory_path() / ("hapsix_field_test_" + std::to_string(getpid()));
+  Folder() { fs::create_directories(path); }
+  ~Folder() { fs::remove_all(path); }
+  std::size_t files() const {
+    return std::size_t(std::distance(fs::directory_iterator(path), fs::directory_iterator()));
+  }
+};
+
+FieldData baked() {
+  Mesh mesh = turned(l_shape(0.02), 0.4, 0.3);
+  mesh.part.assign(mesh.triangles.size(), 0);
+  for (std::size_t i = 0; i < mesh.part.size(); i += 2) mesh.part[i] = 1;
+  mesh.part_names = {"left half", "right\nhalf"};
+  FieldBake options;
+  options.voxels = 48;
+  auto field = bake_field(mesh, options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  return *field;
+}
+
+template <class T>
+bool same(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() &&
+         (a.empty() || !std::memcmp(a.data(), b.data(), a.size() * sizeof(T)));
+}
+
+void check_same(const FieldData& a, const FieldData& b) {
+  CHECK(std::memcmp(&a.origin, &b.origin, sizeof a.origin) == 0);
+  CHECK(a.voxel_size == b.voxel_size);
+  CHECK(a.bricks == b.bricks);
+  CHECK(same(a.brick_index, b.brick_index));
+  CHECK(same(a.samples, b.samples));
+  CHECK(same(a.far_grid, b.far_grid));
+  CHECK(same(a.part, b.part));
+  CHECK(a.part_names == b.part_names);
+  CHECK(a.band == b.band);
+  CHECK(a.offset == b.offset);
+  CHECK(a.sign_mode == b.sign_mode);
+  CHECK(a.input_hash == b.input_hash);
+  CHECK(a.triangles == b.triangles);
+}
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+void put(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary).write(bytes.data(), std::streamsize(bytes.size()));
+}
+
+}  // namespace
+
+TEST_CASE("field_file: a field comes back to the bit, compressed or not") {
+  const Folder folder;
+  FieldData field = baked();
+  REQUIRE(field.part.size() == field.brick_count());
+  field.samples[7] = -0.0f;
+  field.far_grid[3] = -0.0f;
+  field.far_grid[4] = float(field.band);
+  for (Compression c : {Compression::none, Compression::blosc}) {
+    const fs::path file = folder.path / "field.vdb";
+    const h6::Outcome written = write_field(file, field, c);
+    REQUIRE_MESSAGE(written, written.error());
+    const auto back = read_field(file);
+    REQUIRE_MESSAGE(back, back.error());
+    check_same(field, *back);
+    CHECK(folder.files() == 1);
+  }
+}
+
+TEST_CASE("field_file: OpenVDB's own reader sees a level set in world units") {
+  const Folder folder;
+  const FieldData field = baked();
+  const fs::path file = folder.path / "field.vdb";
+  REQUIRE(write_field(file, field));
+  openvdb::initialize();
+  openvdb::io::File in(file.string());
+  in.open();
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(in.readGrid("distance"));
+  REQUIRE(grid);
+  CHECK(grid->getGridClass() == openvdb::GRID_LEVEL_SET);
+  CHECK(grid->tree().leafCount() == field.brick_count());
+  const Vec3 p = node_position(field, {20, 21, 22});
+  const openvdb::Vec3d at = grid->worldToIndex(openvdb::Vec3d(p.x, p.y, p.z));
+  CHECK(at.x() == doctest::Approx(20));
+  CHECK(at.z() == doctest::Approx(22));
+  if (const float* d = node_sample(field, {20, 21, 22}))
+    CHECK(grid->tree().getValue(openvdb::Coord(20, 21, 22)) == *d);
+  CHECK(in.readGrid("far"));
+}
+
+TEST_CASE("field_file: a truncated or damaged file is a sentence or a field, never more") {
+  const Folder folder;
+  const fs::path file = folder.path / "field.vdb";
+  const FieldData field = baked();
+  for (Compression c : {Compression::none, Compression::blosc}) {
+    REQUIRE(write_field(file, field, c));
+    const std::string whole = bytes_of(file);
+    for (std::size_t part = 0; part < 60; ++part) {
+      const std::size_t size = part < 30 ? part * 20 : whole.size() * (part - 29) / 31;
+      if (size >= whole.size()) continue;
+      put(file, whole.substr(0, size));
+      const auto back = read_field(file);
+      REQUIRE_FALSE(back);
+      CHECK(back.error().find(file.string()) != std::string::npos);
+    }
+    if (!kHugeAllocationsThrow) continue;
+    Random random(9);
+    std::size_t refused = 0;
+    for (int i = 0; i < 250; ++i) {
+      std::string bad = whole;
+      const std::size_t reach = i % 2 ? bad.size() : 2500;  // the head more often
+      for (int flips = 0; flips < 4; ++flips)
+        bad[random.below(reach)] = char(random.below(256));
+      put(file, bad);
+      refused += !read_field(file);
+    }
+    CHECK(refused > 50);
+  }
+}
+
+TEST_CASE("field_file: lengths that no file could have are refused before anything is allocated") {
+  const Folder folder;
+  const fs::path file = folder.path / "field.vdb";
+  REQUIRE(write_field(file, baked(), Compression::none));
+  const std::string whole = bytes_of(file);
+  const std::size_t at = whole.find("hapsix_sign_mode");
+  REQUIRE(at != std::string::npos);
+  for (std::size_t back : {4u, 0u}) {
+    std::string bad = whole;
+    const std::size_t place = back ? at - back : whole.find("closed") - 4;
+    std::memcpy(&bad[place], "\xf0\xff\xff\xff", 4);
+    put(file, bad);
+    rusage before, after;
+    getrusage(RUSAGE_SELF, &before);
+    CHECK_FALSE(read_field(file));
+    getrusage(RUSAGE_SELF, &after);
+    CHECK(after.ru_maxrss - before.ru_maxrss < 100 * 1024);
+  }
+}
+
+TEST_CASE("field_file: other files and missing files say what they are") {
+  const Folder folder;
+  const auto fails = [&](const fs::path& file, const std::string& about) {
+    const auto field = read_field(file);
+    REQUIRE_FALSE(field);
+    INFO(field.error());
+    CHECK(field.error().find(about) != std::string::npos);
+  };
+  fails(folder.path / "none.vdb", "no file");
+  fails(folder.path, "no file");
+  put(folder.path / "text.vdb", "this is not a field, but it is long enough to be looked at twice");
+  fails(folder.path / "text.vdb", "no OpenVDB file");
+  put(folder.path / "empty.vdb", "");
+  fails(folder.path / "empty.vdb", "no OpenVDB file");
+  openvdb::initialize();
+  const auto two = [&](const openvdb::GridPtrVec& grids) {
+    openvdb::io::File out((folder.path / "other.vdb").string());
+    out.write(grids);
+    out.close();
+  };
+  two({openvdb::Vec3SGrid::create()});
+  fails(folder.path / "other.vdb", "one float level set");
+  two({openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, {0, 0, 0}, 0.1f, 3),
+       openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, {0, 0, 0}, 0.1f, 3)});
+  fails(folder.path / "other.vdb", "one float level set");
+  two({openvdb::createLevelSet<openvdb::FloatGrid>(0.1)});
+  fails(folder.path / "other.vdb", "empty");
+  two({openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, {0, 0, 0}, 0.1f, 1.5f)});
+  fails(folder.path / "other.vdb", "narrow");
+}
+
+TEST_CASE("field_file: a level set of another program becomes a field with safe bounds") {
+  const Folder folder;
+  openvdb::initialize();
+  const double h = 0.05, radius = 1.0;
+  const openvdb::Vec3f middle(0.3f, -0.2f, 5.0f);
+  const auto grid =
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(float(radius), middle, float(h), 4);
+  openvdb::io::File out((folder.path / "sphere.vdb").string());
+  out.write(openvdb::GridPtrVec{grid});
+  out.close();
+  const auto field = read_field(folder.path / "sphere.vdb");
+  REQUIRE_MESSAGE(field, field.error());
+  CHECK(field->voxel_size == doctest::Approx(h));
+  const auto truth = [&](Vec3 p) { return norm(p - Vec3{0.3, -0.2, 5.0}) - radius; };
+  std::size_t wrong = 0, too_long = 0, missing = 0, at = 0;
+  for_nodes(*field, [&](std::array<int, 3> n, double d) {
+    const double t = truth(node_position(*field, n));
+    wrong += std::fabs(t) < field->band && std::fabs(d - t) > 1e-3 * h;
+    too_long += std::fabs(d) > std::fabs(t) + 1e-3 * h;
+  });
+  double tightest = 0;
+  for (int c = 0; c <= field->bricks[2]; ++c)
+    for (int b = 0; b <= field->bricks[1]; ++b)
+      for (int a = 0; a <= field->bricks[0]; ++a, ++at) {
+        const double t = truth(node_position(*field, {8 * a, 8 * b, 8 * c}));
+        const double d = field->far_grid[at];
+        too_long += std::fabs(d) > std::fabs(t) + 1e-3 * h;
+        tightest = std::max(tightest, std::fabs(d));
+        if (std::fabs(t) > h) wrong += (d < 0) != (t < 0);
+      }
+  Random random(2);
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 p = {0.3 + random(-1.3, 1.3), -0.2 + random(-1.3, 1.3), 5 + random(-1.3, 1.3)};
+    double value;
+    if (std::fabs(truth(p)) < field->band) missing += !interpolate(*field, p, value);
+  }
+  CHECK(at == field->far_grid.size());
+  CHECK(wrong == 0);
+  CHECK(too_long == 0);
+  CHECK(missing == 0);
+  CHECK(tightest > field->band);
+}
+
+TEST_CASE("field_file: what cannot be written leaves nothing behind") {
+  const Folder folder;
+  const FieldData field = baked();
+  CHECK_FALSE(write_field(folder.path / "no" / "such" / "folder.vdb", field));
+  FieldData broken = field;
+  broken.far_grid.pop_back();
+  CHECK_FALSE(write_field(folder.path / "broken.vdb", broken));
+  broken = field;
+  broken.brick_index[0] = 1 << 30;
+  CHECK_FALSE(write_field(folder.path / "broken.vdb", broken));
+  CHECK(folder.files() == 0);
+  // A disk that is full after 100 kB.
+  rlimit old;
+  getrlimit(RLIMIT_FSIZE, &old);
+  rlimit small = old;
+  small.rlim_cur = 100 * 1024;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &small);
+  const h6::Outcome full = write_field(folder.path / "full.vdb", field, Compression::none);
+  setrlimit(RLIMIT_FSIZE, &old);
+  std::signal(SIGXFSZ, handler);
+  CHECK_FALSE(full);
+  CHECK(folder.files() == 0);
+}
