@@ -1,0 +1,92 @@
+// scene.h - a scene as data: what a scene file says, and what a generated scene is.
+//
+// Lengths are in metres here; files carry their own units.
+#pragma once
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "io/bake_field.h"
+#include "io/bake_shell.h"
+#include "io/mesh_file.h"
+
+namespace h6::io {
+
+// One row of a path: where a hand holds the mesh frame of its body at a time.
+struct PathRow {
+  double t;     // [s], strictly increasing
+  h6Pose pose;  // unit quaternion
+};
+using Path = std::vector<PathRow>;
+
+// Where a field or shell comes from. Exactly one of mesh, file or (generated scenes) mesh_data /
+// points is set. `unit` is that of the file `mesh`: a baked `file` is always in metres.
+struct FieldSource {
+  std::filesystem::path mesh, file;
+  std::optional<Mesh> mesh_data;
+  FieldBake bake;
+  std::optional<Unit> unit;  // of the mesh; the scene's own when not set
+};
+struct ShellSource {
+  std::filesystem::path mesh, file;
+  std::optional<Mesh> mesh_data;
+  std::optional<PointCloud> points;
+  ShellBake bake;
+  std::optional<Unit> unit;
+};
+
+struct SceneBody {
+  std::string name;
+  bool fixed = false;
+  double mass = 0.1;          // [kg]
+  std::optional<h6Vec3> com;  // mesh frame [m]; default: METHOD (solid if closed)
+  std::optional<std::array<double, 6>> inertia;  // xx yy zz xy xz yz about com [kg m^2]
+  h6Pose pose;
+  std::optional<FieldSource> field;
+  std::optional<ShellSource> shell;
+};
+
+struct SceneHand {
+  std::string body;
+  std::string device = "path";      // "path", "simulated", or what the program knows
+  Path path;                        // rows, read or generated
+  std::filesystem::path path_file;  // where they came from
+  std::string mode = "impedance";   // what the device gives and takes: pose in, wrench out
+};
+
+struct Box {
+  h6Vec3 low, high;
+};
+
+struct SceneVerdict {
+  std::vector<Box> forbidden;    // world frame [m]
+  std::optional<h6Pose> target;  // of the first hand's body
+  double tolerance = 0;          // of the mesh frame's origin [m]
+  double tolerance_angle = 0;    // 0: any orientation will do [rad]
+};
+
+struct Scene {
+  std::string name, about;
+  Unit unit = Unit::m;  // of files it is exported to
+  std::vector<SceneBody> bodies;
+  h6ContactDef contact;
+  h6CouplingDef coupling;
+  h6Integrator integrator = H6_IMPLICIT;
+  h6Gradient gradient = H6_SYMMETRIC;
+  double rate = 1000;
+  double duration = 0;  // [s]; 0: to the end of the longest path
+  std::vector<SceneHand> hands;
+  SceneVerdict verdict;
+};
+
+// Where a path is at a time: the origin on straight lines, the orientation by the shorter great
+// circle; before its first row and after its last it stands still there. The path is not empty.
+h6Pose sample_path(const Path& path, double t);
+// Its velocity (of the mesh frame's origin): constant between rows, zero outside.
+h6Velocity sample_path_velocity(const Path& path, double t);
+
+}  // namespace h6::io

@@ -1,0 +1,473 @@
+// scene_read.cpp - scene files: text -> checked JSON -> Scene.
+//
+//   check_json_text   is it JSON, and of a sane size                 (scene_json.cpp)
+//   check             every key known, of its kind, in its range     (by the table of scene_keys.h)
+//   SceneReader       numbers to metres, names to bodies, files to paths; what the table cannot say
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "io/scene_file.h"
+#include "io/scene_json.h"
+#include "io/scene_keys.h"
+
+namespace h6::io {
+namespace {
+
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
+
+// ---- against the table -------------------------------------------------------------------------
+
+// Thrown inside this file only, from any depth of the tree; read_scene turns it into its sentence.
+struct Complaint {
+  std::string where, what;
+};
+
+// Edits (insert, drop, change a letter) that turn one word into the other.
+std::size_t edits_between(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i - 1] != b[j - 1]);
+      diagonal = row[j];
+      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+std::string nearest_key(const SceneKeys& keys, const std::string& name) {
+  const SceneKey* best = keys.begin();
+  std::size_t fewest = static_cast<std::size_t>(-1);
+  for (const SceneKey& key : keys) {
+    const std::size_t edits = edits_between(name, key.name);
+    if (edits < fewest) fewest = edits, best = &key;
+  }
+  return best->name;
+}
+
+// A foreign name inside our sentence.
+std::string shown(const std::string& text) {
+  std::string out;
+  for (const char c : text.substr(0, 80)) out += static_cast<unsigned char>(c) >= ' ' ? c : '?';
+  return out;
+}
+
+std::string inside(const std::string& path, const std::string& key) {
+  return path.empty() ? key : path + "." + key;
+}
+
+std::string number_text(double value) {
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out.precision(10);
+  out << value;
+  return out.str();
+}
+
+std::string range_text(const SceneKey& key) {
+  const std::string low = (key.above_low ? "above " : "at least ") + number_text(key.low);
+  const std::string high = "at most " + number_text(key.high);
+  if (key.high == kNoLimit) return low;
+  return key.low == -kNoLimit ? high : low + " and " + high;
+}
+
+void check_number(const Json& value, const SceneKey& key, const std::string& at) {
+  if (!value.is_number()) throw Complaint{at, "must be a number"};
+  const double x = value.get<double>();
+  const bool whole = key.kind != KeyKind::whole || std::floor(x) == x;
+  if (!whole) throw Complaint{at, "must be a whole number"};
+  const bool in_range = (key.above_low ? x > key.low : x >= key.low) && x <= key.high;
+  if (!in_range) throw Complaint{at, "is " + number_text(x) + " but must be " + range_text(key)};
+}
+
+void check_numbers(const Json& value, std::size_t count, const SceneKey& key,
+                   const std::string& at) {
+  if (!value.is_array() || value.size() != count)
+    throw Complaint{at, "must be a list of " + std::to_string(count) + " numbers"};
+  for (std::size_t i = 0; i < count; ++i)
+    check_number(value[i], key, at + "[" + std::to_string(i) + "]");
+}
+
+void check_text(const Json& value, const std::string& at) {
+  if (!value.is_string()) throw Complaint{at, "must be a text in quotes"};
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.empty() || text.size() > 4096) throw Complaint{at, "must have 1 to 4096 letters"};
+  for (const char c : text)
+    if (static_cast<unsigned char>(c) < ' ') throw Complaint{at, "holds a control character"};
+}
+
+void check_choice(const Json& value, const SceneKey& key, const std::string& at) {
+  const std::string all = std::string("|") + key.choices + "|";
+  const std::string name = value.is_string() ? value.get<std::string>() : "";
+  if (!name.empty() && name.find('|') == std::string::npos &&
+      all.find("|" + name + "|") != std::string::npos)
+    return;
+  std::string known = key.choices;
+  for (std::size_t bar; (bar = known.find('|')) != std::string::npos;) known.replace(bar, 1, ", ");
+  throw Complaint{at, "must be one of: " + known};
+}
+
+void check_method(const Json& value, const std::string& at) {
+  check_text(value, at);
+  h6Method method;
+  std::uint32_t pieces;
+  const auto& name = value.get_ref<const std::string&>();
+  if (h6MethodFromName(name.c_str(), &method, &pieces) != 0)
+    throw Complaint{at, "\"" + shown(name) +
+                            "\" is no method; known: none, global, gauss3, gauss6, "
+                            "robust, and with pieces: gauss3+facing+depth, gauss6+product"};
+}
+
+void check_quaternion(const Json& value, const SceneKey& key, const std::string& at) {
+  check_numbers(value, 4, key, at);
+  double norm2 = 0;
+  for (const Json& x : value) norm2 += x.get<double>() * x.get<double>();
+  if (!(std::abs(std::sqrt(norm2) - 1) <= 1e-3))
+    throw Complaint{at, "is not a unit quaternion w x y z (its length is " +
+                            number_text(std::sqrt(norm2)) + ")"};
+}
+
+// A real body's tensor: Sylvester's criterion on xx yy zz xy xz yz.
+void check_inertia(const Json& value, const SceneKey& key, const std::string& at) {
+  check_numbers(value, 6, key, at);
+  double i[6];
+  for (int n = 0; n < 6; ++n) i[n] = value[n].get<double>();
+  const double minor2 = i[0] * i[1] - i[3] * i[3];
+  const double minor3 = i[0] * (i[1] * i[2] - i[5] * i[5]) - i[3] * (i[3] * i[2] - i[5] * i[4]) +
+                        i[4] * (i[3] * i[5] - i[1] * i[4]);
+  if (!(i[0] > 0 && minor2 > 0 && minor3 > 0 && std::isfinite(minor3)))
+    throw Complaint{at, "is not positive definite (xx yy zz xy xz yz)"};
+}
+
+void check(const Json& value, const SceneKey& key, const std::string& at);
+
+void check(const Json& value, const SceneKeys& keys, const std::string& at) {
+  if (!value.is_object()) throw Complaint{at, "must be an object { ... }"};
+  for (const auto& [name, item] : value.items()) {
+    const auto key = std::find_if(keys.begin(), keys.end(),
+                                  [&, &n = name](const SceneKey& k) { return n == k.name; });
+    if (key == keys.end())
+      throw Complaint{inside(at, shown(name)), "no such key; the nearest known one is \"" +
+                                                   nearest_key(keys, shown(name)) + "\""};
+    check(item, *key, inside(at, name));
+  }
+  for (const SceneKey& key : keys)
+    if (key.required && !value.contains(key.name))
+      throw Complaint{inside(at, key.name), std::string("is missing (") + key.about + ")"};
+}
+
+void check_corners(const Json& value, const SceneKey& key, const std::string& at) {
+  if (!value.is_array() || value.size() != 2)
+    throw Complaint{at, "must be two corners [[x,y,z],[x,y,z]]"};
+  for (int i = 0; i < 2; ++i) check_numbers(value[i], 3, key, at + "[" + std::to_string(i) + "]");
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(value[0][axis].get<double>() < value[1][axis].get<double>()))
+      throw Complaint{at, "the first corner must be lower than the second on every axis"};
+}
+
+void check_list(const Json& value, const SceneKey& key, const std::string& at) {
+  if (!value.is_array()) throw Complaint{at, "must be a list [ ... ]"};
+  const auto count = static_cast<double>(value.size());
+  if (count < key.low) throw Complaint{at, "must not be empty"};
+  if (count > key.high)
+    throw Complaint{at, "may have " + number_text(key.high) + " entries at most"};
+  for (std::size_t i = 0; i < value.size(); ++i)
+    check(value[i], *key.keys, at + "[" + std::to_string(i) + "]");
+}
+
+void check(const Json& value, const SceneKey& key, const std::string& at) {
+  switch (key.kind) {
+    case KeyKind::boolean:
+      if (!value.is_boolean()) throw Complaint{at, "must be true or false"};
+      break;
+    case KeyKind::number:
+    case KeyKind::whole:
+      check_number(value, key, at);
+      break;
+    case KeyKind::text:
+      check_text(value, at);
+      break;
+    case KeyKind::choice:
+      check_choice(value, key, at);
+      break;
+    case KeyKind::method:
+      check_method(value, at);
+      break;
+    case KeyKind::vec3:
+      check_numbers(value, 3, key, at);
+      break;
+    case KeyKind::inertia:
+      check_inertia(value, key, at);
+      break;
+    case KeyKind::quaternion:
+      check_quaternion(value, key, at);
+      break;
+    case KeyKind::corners:
+      check_corners(value, key, at);
+      break;
+    case KeyKind::object:
+      check(value, *key.keys, at);
+      break;
+    case KeyKind::list:
+      check_list(value, key, at);
+      break;
+  }
+}
+
+// ---- into a Scene ------------------------------------------------------------------------------
+// Only checked JSON comes here: kinds and ranges hold.
+
+double number(const Json& o, const char* key, double fallback) {
+  return o.contains(key) ? o[key].get<double>() : fallback;
+}
+
+std::string text(const Json& o, const char* key, const std::string& fallback) {
+  return o.contains(key) ? o[key].get<std::string>() : fallback;
+}
+
+h6Vec3 vec3(const Json& v, double scale) {
+  return {v[0].get<double>() * scale, v[1].get<double>() * scale, v[2].get<double>() * scale};
+}
+
+h6Pose pose(const Json& o, double scale) {
+  h6Pose out = {{0, 0, 0}, {1, 0, 0, 0}};
+  if (o.contains("p")) out.p = vec3(o["p"], scale);
+  if (o.contains("q")) {
+    double q[4], norm2 = 0;
+    for (int i = 0; i < 4; ++i) q[i] = o["q"][i].get<double>(), norm2 += q[i] * q[i];
+    const double s = 1 / std::sqrt(norm2);
+    out.q = {q[0] * s, q[1] * s, q[2] * s, q[3] * s};
+  }
+  return out;
+}
+
+class SceneReader {
+ public:
+  explicit SceneReader(const fs::path& file) : folder_(file.parent_path()) {}
+
+  Scene read(const Json& o) {
+    const std::string units = text(o, "units", "m");
+    scene_.unit = *unit_from_name(units);
+    scale_ = metres(scene_.unit);
+    scene_.name = text(o, "name", "");
+    scene_.about = text(o, "about", "");
+    for (std::size_t i = 0; i < o["bodies"].size(); ++i)
+      read_body(o["bodies"][i], "bodies[" + std::to_string(i) + "]");
+    read_contact(o.value("contact", Json::object()));
+    read_coupling(o.value("coupling", Json::object()));
+    scene_.integrator = text(o, "integrator", "implicit") == "explicit" ? H6_EXPLICIT : H6_IMPLICIT;
+    scene_.gradient = text(o, "gradient", "symmetric") == "exact" ? H6_EXACT : H6_SYMMETRIC;
+    scene_.rate = number(o, "rate", scene_.rate);
+    scene_.duration = number(o, "duration", 0);
+    if (o.contains("hands"))
+      for (std::size_t i = 0; i < o["hands"].size(); ++i)
+        read_hand(o["hands"][i], "hands[" + std::to_string(i) + "]");
+    if (o.contains("verdict")) read_verdict(o["verdict"]);
+    return std::move(scene_);
+  }
+
+ private:
+  fs::path existing(const Json& o, const char* key, const std::string& at) const {
+    const std::string name = o[key].get<std::string>();
+    const fs::path file = folder_ / fs::path(name);  // an absolute name replaces the folder
+    std::error_code error;
+    if (!fs::is_regular_file(file, error))
+      throw Complaint{
+          inside(at, key),
+          "there is no file \"" + shown(name) + "\"" +
+              (fs::path(name).is_absolute() ? std::string{} : " beside the scene file")};
+    return file;
+  }
+
+  // `mesh` or `file`; true: a mesh, so that bake options count.
+  template <class Source>
+  bool read_source(const Json& o, const std::string& at, Source& out) const {
+    if (o.contains("mesh") == o.contains("file"))
+      throw Complaint{at, "needs either \"mesh\" (to bake) or \"file\" (baked), one of them"};
+    if (o.contains("mesh")) {
+      out.mesh = existing(o, "mesh", at);
+      if (o.contains("units")) out.unit = *unit_from_name(o["units"].get<std::string>());
+      return true;
+    }
+    out.file = existing(o, "file", at);
+    for (const auto& [key, value] : o.items())
+      if (key != "file")
+        throw Complaint{inside(at, key),
+                        "has no meaning beside \"file\": that is baked, in metres"};
+    return false;
+  }
+
+  static void not_both(const Json& o, const char* a, const char* b, const std::string& at) {
+    if (o.contains(a) && o.contains(b))
+      throw Complaint{inside(at, b), std::string("stands beside \"") + a + "\"; give one of them"};
+  }
+
+  FieldSource read_field_source(const Json& o, const std::string& at) const {
+    FieldSource out;
+    if (!read_source(o, at, out)) return out;
+    not_both(o, "voxels", "voxel_size", at);
+    out.bake.voxels = static_cast<int>(number(o, "voxels", out.bake.voxels));
+    out.bake.voxel_size = number(o, "voxel_size", 0) * scale_;
+    if (o.contains("offset")) out.bake.offset = number(o, "offset", 0) * scale_;
+    out.bake.sign = text(o, "sign", "auto") == "flood" ? SignMode::flood : SignMode::automatic;
+    out.bake.cavities =
+        text(o, "cavities", "solid") == "hollow" ? Cavities::hollow : Cavities::solid;
+    out.bake.band_voxels = number(o, "band_voxels", out.bake.band_voxels);
+    out.bake.padding_voxels =
+        static_cast<int>(number(o, "padding_voxels", out.bake.padding_voxels));
+    return out;
+  }
+
+  ShellSource read_shell_source(const Json& o, const std::string& at) const {
+    ShellSource out;
+    if (!read_source(o, at, out)) return out;
+    not_both(o, "points", "spacing", at);
+    out.bake.points =
+        static_cast<std::size_t>(number(o, "points", static_cast<double>(out.bake.points)));
+    out.bake.spacing = number(o, "spacing", 0) * scale_;
+    out.bake.levels = static_cast<int>(number(o, "levels", out.bake.levels));
+    out.bake.seed =
+        static_cast<std::uint64_t>(number(o, "seed", static_cast<double>(out.bake.seed)));
+    return out;
+  }
+
+  void read_body(const Json& o, const std::string& at) {
+    SceneBody body;
+    body.name = o["name"].get<std::string>();
+    if (find_body(body.name))
+      throw Complaint{inside(at, "name"), "there is another body \"" + shown(body.name) + "\""};
+    body.fixed = o.value("fixed", false);
+    body.mass = number(o, "mass", body.mass);
+    if (o.contains("com")) body.com = vec3(o["com"], scale_);
+    if (o.contains("inertia")) body.inertia = o["inertia"].get<std::array<double, 6>>();
+    body.pose = pose(o.value("pose", Json::object()), scale_);
+    if (o.contains("field")) body.field = read_field_source(o["field"], inside(at, "field"));
+    if (o.contains("shell")) body.shell = read_shell_source(o["shell"], inside(at, "shell"));
+    if (!body.field && !body.shell)
+      throw Complaint{at,
+                      "needs a \"shell\" (it touches others), a \"field\" (others touch it) or "
+                      "both"};
+    scene_.bodies.push_back(std::move(body));
+  }
+
+  const SceneBody* find_body(const std::string& name) const {
+    for (const SceneBody& body : scene_.bodies)
+      if (body.name == name) return &body;
+    return nullptr;
+  }
+
+  void read_contact(const Json& o) {
+    h6ContactDef& c = scene_.contact = h6DefaultContactDef();
+    if (o.contains("method"))
+      h6MethodFromName(o["method"].get_ref<const std::string&>().c_str(), &c.method, &c.pieces);
+    c.stiffness = number(o, "stiffness", c.stiffness);
+    c.damping = number(o, "damping", c.damping);
+    c.global_n0 = number(o, "global_n0", c.global_n0);
+    c.epsilon = number(o, "epsilon", c.epsilon);
+    c.epsilon_normal = number(o, "epsilon_normal", c.epsilon_normal);
+    c.epsilon_torque = number(o, "epsilon_torque", c.epsilon_torque);
+    if (o.contains("torque_length")) c.torque_length = number(o, "torque_length", 0) * scale_;
+  }
+
+  void read_coupling(const Json& o) {
+    h6CouplingDef& c = scene_.coupling = h6DefaultCouplingDef();
+    c.stiffness = number(o, "stiffness", c.stiffness);
+    c.rotational_stiffness = number(o, "rotational_stiffness", c.rotational_stiffness);
+    c.damping_ratio = number(o, "damping_ratio", c.damping_ratio);
+    c.max_depth_voxels = number(o, "max_depth_voxels", c.max_depth_voxels);
+    c.max_force = number(o, "max_force", c.max_force);
+    c.max_torque = number(o, "max_torque", c.max_torque);
+  }
+
+  void read_hand(const Json& o, const std::string& at) {
+    SceneHand hand;
+    hand.body = o["body"].get<std::string>();
+    const SceneBody* body = find_body(hand.body);
+    if (!body) throw Complaint{inside(at, "body"), "there is no body \"" + shown(hand.body) + "\""};
+    if (body->fixed)
+      throw Complaint{inside(at, "body"),
+                      "\"" + shown(hand.body) + "\" is fixed; a hand needs a body that moves"};
+    for (const SceneHand& other : scene_.hands)
+      if (other.body == hand.body)
+        throw Complaint{inside(at, "body"),
+                        "another hand holds \"" + shown(hand.body) + "\" already"};
+    hand.device = text(o, "device", hand.device);
+    hand.mode = text(o, "mode", hand.mode);
+    if (o.contains("path")) {
+      hand.path_file = existing(o, "path", at);
+      Result<Path> path = read_path(hand.path_file, scene_.unit);
+      if (!path) throw Complaint{inside(at, "path"), path.error()};
+      hand.path = std::move(*path);
+    } else if (hand.device == "path") {
+      throw Complaint{inside(at, "path"), "is missing: the device \"path\" follows a CSV file"};
+    }
+    scene_.hands.push_back(std::move(hand));
+  }
+
+  void read_verdict(const Json& o) {
+    if (o.contains("forbidden"))
+      for (const Json& entry : o["forbidden"])
+        scene_.verdict.forbidden.push_back(
+            {vec3(entry["box"][0], scale_), vec3(entry["box"][1], scale_)});
+    if (!scene_.verdict.forbidden.empty() && scene_.hands.empty())
+      throw Complaint{"verdict.forbidden", "watches the first hand's body, but there is no hand"};
+    if (!o.contains("target")) return;
+    if (scene_.hands.empty())
+      throw Complaint{"verdict.target", "is for the first hand's body, but there is no hand"};
+    scene_.verdict.target = pose(o["target"]["pose"], scale_);
+    scene_.verdict.tolerance = number(o["target"], "tolerance", 0) * scale_;
+    scene_.verdict.tolerance_angle = number(o["target"], "tolerance_angle", 0);
+  }
+
+  fs::path folder_;
+  Scene scene_;
+  double scale_ = 1;  // metres in one unit of the scene
+};
+
+Result<std::string> read_text(const fs::path& file) {
+  const std::string name = file.string();
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return Failure{name + ": no such file"};
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error || size > kMostBytes)
+    return Failure{name +
+                   ": larger than 64 MiB; a scene file names its meshes, it does not hold them"};
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return Failure{name + ": cannot be opened; check its permissions"};
+  std::string text(size, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(size));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+}  // namespace
+
+Result<Scene> read_scene(const fs::path& file) {
+  const std::string name = file.string();
+  try {
+    const Result<std::string> text = read_text(file);
+    if (!text) return text.failure();
+    if (const Outcome json = check_json_text(*text, name); !json) return json.failure();
+    const Json root = Json::parse(*text);
+    check(root, scene_keys(), "");
+    Scene scene = SceneReader(file).read(root);
+    if (scene.name.empty()) scene.name = file.stem().string();
+    return scene;
+  } catch (const Complaint& complaint) {
+    return Failure{name + ": " + (complaint.where.empty() ? "" : complaint.where + ": ") +
+                   complaint.what};
+  } catch (const std::exception& e) {
+    return Failure{name + ": cannot be read as a scene (" + e.what() + ")"};
+  }
+}
+
+}  // namespace h6::io

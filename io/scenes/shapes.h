@@ -1,0 +1,75 @@
+// shapes.h - what generated scenes are made of: primitive meshes, point grids, hand paths. Metres.
+#pragma once
+#include "io/scene.h"
+
+namespace h6::io {
+
+inline constexpr double kMm = 1e-3;
+
+// ---- small vectors -----------------------------------------------------------------------------
+
+h6Vec3 operator+(const h6Vec3& a, const h6Vec3& b);
+h6Vec3 operator-(const h6Vec3& a, const h6Vec3& b);
+h6Vec3 operator*(double s, const h6Vec3& a);
+double dot(const h6Vec3& a, const h6Vec3& b);
+h6Vec3 cross(const h6Vec3& a, const h6Vec3& b);
+double length(const h6Vec3& a);
+h6Vec3 unit(const h6Vec3& a);
+h6Vec3 rotate(const h6Quat& q, const h6Vec3& v);
+h6Quat product(const h6Quat& a, const h6Quat& b);                     // b first, then a
+h6Quat turn_by(const h6Vec3& rotation_vector);                        // [rad]
+h6Quat from_axes(const h6Vec3& x, const h6Vec3& y, const h6Vec3& z);  // right-handed, unit
+
+// ---- closed meshes, wound outward --------------------------------------------------------------
+
+Mesh box_mesh(const h6Vec3& low, const h6Vec3& high);
+// A square block |x|, |y| <= half_side, -height <= z <= 0 with a blind hole: a regular prism of
+// `segments` sides (a multiple of 8), around the z axis, whose flats are at `radius` and whose
+// floor is at -depth.
+Mesh block_with_hole(double half_side, double height, double radius, double depth, int segments);
+
+// Smallest distance between the surfaces of two meshes, 0 when they cross; all triangle pairs whose
+// spheres are not too far. For checking a scene's clearances, not for the frame.
+double mesh_distance(const Mesh& a, const Mesh& b);
+Mesh moved(const Mesh& mesh, const h6Pose& pose);
+
+// ---- explicit shells: grids of cell centres ----------------------------------------------------
+
+// nu x nv points on the parallelogram centre +- u +- v.
+void add_face(PointCloud& cloud, const h6Vec3& centre, const h6Vec3& u, const h6Vec3& v, int nu,
+              int nv, const h6Vec3& inward);
+// Six faces of the box |x|, |y|, |z| <= half, points `spacing` apart or a little less.
+void add_box(PointCloud& cloud, const h6Vec3& half, double spacing);
+// The side of a cylinder around the z axis.
+void add_cylinder_side(PointCloud& cloud, double radius, double half_length, int around, int along);
+// Points of a square grid through the axis, inside the circle, at height z.
+void add_disc(PointCloud& cloud, double radius, double z, double spacing, const h6Vec3& inward);
+
+std::array<double, 6> box_inertia(double mass, const h6Vec3& half);
+std::array<double, 6> cylinder_inertia(double mass, double radius, double half_length);
+
+// ---- hand paths --------------------------------------------------------------------------------
+
+class HandPath {
+ public:
+  explicit HandPath(const h6Pose& start) : rows_{{0, start}} {}
+  HandPath& wait(double seconds);
+  HandPath& move_by(const h6Vec3& offset, double speed);  // straight, [m/s]
+  HandPath& go_to(const h6Pose& pose, double seconds);
+  const h6Pose& pose() const { return rows_.back().pose; }
+  double time() const { return rows_.back().t; }
+  Path rows() const { return rows_; }
+
+ private:
+  Path rows_;
+};
+
+// A scene in mm with the contact and coupling settings common to the paper's experiments: voxel 1
+// mm, k = 1e4 N/m, k_VC = 1e3 N/m critically damped, half a voxel, 0.9 N m/rad, 5 N x 30 mm.
+Scene common_scene(const std::string& name, const std::string& about);
+// A fixed body with a field of `voxel_size`.
+SceneBody obstacle(const std::string& name, Mesh mesh, double voxel_size);
+// A hand that leads a body along a path.
+SceneHand path_hand(const std::string& body, Path path);
+
+}  // namespace h6::io
