@@ -1,0 +1,243 @@
+#include "io/load_scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+
+#include "io/cache.h"
+#include "io/field_file.h"
+#include "io/mass.h"
+#include "io/mesh_file.h"
+#include "io/shell_file.h"
+
+namespace h6::io {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+class Loader {
+ public:
+  Loader(LoadedScene& out, const Progress& progress) : out_(out), progress_(progress) {}
+
+  Outcome run() {
+    for (const SceneBody& body : out_.scene.bodies)
+      if (Outcome done = add(body); !done) return Failure{"body '" + body.name + "': " + done.error()};
+    for (const SceneHand& hand : out_.scene.hands) {
+      h6HandDef def = h6DefaultHandDef();
+      def.body = out_.body_index(hand.body);
+      def.coupling = out_.scene.coupling;
+      out_.hands.push_back(def);
+    }
+    watch_first_hand();
+    return make_model();
+  }
+
+ private:
+  Outcome add(const SceneBody& body) {
+    h6BodyDef def = h6DefaultBodyDef();
+    def.pose = body.pose;
+    def.fixed = body.fixed;
+    def.mass = body.mass;
+    if (body.field) {
+      Result<int> index = field(body);
+      if (!index) return index.failure();
+      def.field = *index;
+    }
+    if (body.shell) {
+      Result<int> index = shell(body);
+      if (!index) return index.failure();
+      def.shell = *index;
+    }
+    if (Outcome done = mass(body, def); !done) return done;
+    out_.bodies.push_back(def);
+    return Done{};
+  }
+
+  // Meshes are read once, however many bodies and bakes use them.
+  template <class Source>
+  Result<const Mesh*> mesh_of(const Source& source) {
+    if (source.mesh_data) return &*source.mesh_data;
+    const Unit unit = source.unit.value_or(out_.scene.unit);
+    const std::string key = source.mesh.string() + '\0' + std::to_string(static_cast<int>(unit));
+    auto found = meshes_.find(key);
+    if (found == meshes_.end()) {
+      Result<Mesh> mesh = read_mesh(source.mesh, unit);
+      if (!mesh) return mesh.failure();
+      found = meshes_.emplace(key, std::make_unique<Mesh>(std::move(*mesh))).first;
+    }
+    return static_cast<const Mesh*>(found->second.get());
+  }
+
+  template <class Data>
+  static Result<int> remember(std::map<std::string, int>& index, std::vector<Data>& all, const std::string& key, Data data) {
+    index[key] = static_cast<int>(all.size());
+    all.push_back(std::move(data));
+    return static_cast<int>(all.size()) - 1;
+  }
+
+  Result<int> field(const SceneBody& body) {
+    const FieldSource& source = *body.field;
+    const auto start = Clock::now();
+    LoadedAsset asset{body.name, true, "", false, 0, 0, {}, 0, 0, 0};
+    FieldData data;
+    std::string key;
+    if (!source.file.empty()) {
+      key = "file " + source.file.string();
+      if (const auto known = field_index_.find(key); known != field_index_.end()) return known->second;
+      Result<FieldData> read = read_field(source.file);
+      if (!read) return read.failure();
+      data = std::move(*read);
+      asset.hash = data.input_hash;
+    } else {
+      Result<const Mesh*> mesh = mesh_of(source);
+      if (!mesh) return mesh.failure();
+      key = asset.hash = content_hash(**mesh, source.bake);
+      if (const auto known = field_index_.find(key); known != field_index_.end()) return known->second;
+      Cached cached;
+      Result<FieldData> baked = cached_field(**mesh, source.bake, &cached, progress_);
+      if (!baked) return baked.failure();
+      data = std::move(*baked);
+      asset.from_cache = cached.hit;
+      for (const std::string& w : cached.warnings) out_.warnings.push_back("body '" + body.name + "': " + w);
+    }
+    asset.seconds = since(start);
+    asset.voxel_size = data.voxel_size;
+    for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
+    asset.bricks = data.brick_count();
+    out_.assets.push_back(asset);
+    return remember(field_index_, fields_, key, std::move(data));
+  }
+
+  Result<int> shell(const SceneBody& body) {
+    const ShellSource& source = *body.shell;
+    const auto start = Clock::now();
+    LoadedAsset asset{body.name, false, "", false, 0, 0, {}, 0, 0, 0};
+    ShellData data;
+    std::string key;
+    if (source.points) {
+      Result<ShellData> built = build_shell(*source.points, source.bake.levels);
+      if (!built) return built.failure();
+      data = std::move(*built);
+      key = "points of " + body.name;
+    } else if (!source.file.empty()) {
+      key = "file " + source.file.string();
+      if (const auto known = shell_index_.find(key); known != shell_index_.end()) return known->second;
+      Result<ShellData> read = read_shell(source.file);
+      if (!read) return read.failure();
+      data = std::move(*read);
+      asset.hash = data.input_hash;
+    } else {
+      Result<const Mesh*> mesh = mesh_of(source);
+      if (!mesh) return mesh.failure();
+      key = asset.hash = content_hash(**mesh, source.bake);
+      if (const auto known = shell_index_.find(key); known != shell_index_.end()) return known->second;
+      Cached cached;
+      Result<ShellData> baked = cached_shell(**mesh, source.bake, &cached, progress_);
+      if (!baked) return baked.failure();
+      data = std::move(*baked);
+      asset.from_cache = cached.hit;
+      for (const std::string& w : cached.warnings) out_.warnings.push_back("body '" + body.name + "': " + w);
+    }
+    asset.seconds = since(start);
+    asset.points = data.size();
+    asset.levels = static_cast<int>(data.level_points.size());
+    out_.assets.push_back(asset);
+    return remember(shell_index_, shells_, key, std::move(data));
+  }
+
+  // What the scene states; else a uniform solid where there is one, else the shell's points.
+  Outcome mass(const SceneBody& body, h6BodyDef& def) {
+    if (body.fixed) return Done{};
+    std::optional<MassProperties> found;
+    if (!body.com || !body.inertia) {
+      if (body.shell && (body.shell->mesh_data || !body.shell->mesh.empty())) {
+        Result<const Mesh*> mesh = mesh_of(*body.shell);
+        if (!mesh) return mesh.failure();
+        found = solid_mass(**mesh, body.mass);
+      }
+      if (!found && body.field && (body.field->mesh_data || !body.field->mesh.empty())) {
+        Result<const Mesh*> mesh = mesh_of(*body.field);
+        if (!mesh) return mesh.failure();
+        found = solid_mass(**mesh, body.mass);
+      }
+      if (!found && def.shell >= 0) found = shell_mass(shells_[static_cast<std::size_t>(def.shell)], body.mass);
+      if (!found)
+        return Failure{"its mass properties cannot be derived (no shell, no closed mesh): state 'com' and 'inertia'"};
+    }
+    def.com = body.com ? *body.com : h6Vec3{found->com.x, found->com.y, found->com.z};
+    std::array<double, 6> inertia = body.inertia ? *body.inertia : found->inertia;
+    if (body.com && !body.inertia) {  // derived about its own centre: move it to the stated one
+      const double x = def.com.x - found->com.x, y = def.com.y - found->com.y, z = def.com.z - found->com.z, m = body.mass;
+      const double more[6] = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y), -m * x * y, -m * x * z, -m * y * z};
+      for (int i = 0; i < 6; ++i) inertia[i] += more[i];
+    }
+    std::copy(inertia.begin(), inertia.end(), def.inertia);
+    return Done{};
+  }
+
+  void watch_first_hand() {
+    if (out_.hands.empty()) return;
+    const int shell = out_.bodies[static_cast<std::size_t>(out_.hands[0].body)].shell;
+    if (shell < 0) return;
+    const ShellData& data = shells_[static_cast<std::size_t>(shell)];
+    for (std::size_t i = 0; i < data.size(); ++i) out_.watched_points.push_back({data.x[i], data.y[i], data.z[i]});
+  }
+
+  Outcome make_model() {
+    std::vector<h6FieldDef> fields;
+    std::vector<h6ShellDef> shells;
+    for (const FieldData& f : fields_) fields.push_back(f.def());
+    for (const ShellData& s : shells_) shells.push_back(s.def());
+    h6ModelDef def = h6DefaultModelDef();
+    def.fields = fields.data(), def.field_count = fields.size();
+    def.shells = shells.data(), def.shell_count = shells.size();
+    h6Error error{};
+    out_.model.reset(h6CreateModel(&def, &error));
+    if (!out_.model) return Failure{error.message};
+    return Done{};
+  }
+
+  LoadedScene& out_;
+  const Progress& progress_;
+  std::map<std::string, std::unique_ptr<Mesh>> meshes_;
+  std::map<std::string, int> field_index_, shell_index_;
+  std::vector<FieldData> fields_;
+  std::vector<ShellData> shells_;
+};
+
+}  // namespace
+
+int LoadedScene::body_index(const std::string& name) const {
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == name) return static_cast<int>(i);
+  return -1;
+}
+
+double LoadedScene::duration() const {
+  if (scene.duration > 0) return scene.duration;
+  double longest = 0;
+  for (const SceneHand& hand : scene.hands)
+    if (!hand.path.empty()) longest = std::max(longest, hand.path.back().t);
+  return longest > 0 ? longest : 1;
+}
+
+h6SessionDef LoadedScene::session_def() const {
+  h6SessionDef def = h6DefaultSessionDef();
+  def.bodies = bodies.data(), def.body_count = bodies.size();
+  def.hands = hands.data(), def.hand_count = hands.size();
+  def.contact = scene.contact;
+  def.integrator = scene.integrator;
+  def.gradient = scene.gradient;
+  def.rate = scene.rate;
+  return def;
+}
+
+Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress) {
+  auto out = std::make_unique<LoadedScene>();
+  out->scene = std::move(scene);
+  if (Outcome done = Loader(*out, progress).run(); !done) return done.failure();
+  return out;
+}
+
+}  // namespace h6::io
