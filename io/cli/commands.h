@@ -1,0 +1,25 @@
+// commands.h - one function a subcommand: adds it to the program; its work runs after parsing.
+#pragma once
+#include <functional>
+
+#include "io/cli/console.h"
+
+namespace CLI {
+class App;
+}
+
+namespace h6::cli {
+
+// What the chosen subcommand does; its exit code is the program's.
+struct Program {
+  Console console;
+  std::function<int()> work;
+};
+
+void add_bake(CLI::App& app, Program& program);
+void add_run(CLI::App& app, Program& program);
+void add_info(CLI::App& app, Program& program);
+void add_scene(CLI::App& app, Program& program);
+void add_demo(CLI::App& app, Program& program);
+
+}  // namespace h6::cli

@@ -1,0 +1,17 @@
+// tables.h - runs as a person reads them.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "io/cli/run_scene.h"
+
+namespace h6::cli {
+
+// One row a run: method, contacts, deepest point, frame times, late frames by cause, verdict.
+std::string table(const std::vector<RunSummary>& runs);
+// The deepest contact over time, with the half-voxel line: full height is twice that line or more.
+std::string depth_strip(const RunSummary& run);
+// What was baked or taken from the cache, a line each.
+std::string assets(const io::LoadedScene& scene);
+
+}  // namespace h6::cli
