@@ -31,12 +31,23 @@ const std::map<std::string, std::set<std::string>> below = {
 
 // Where each package enters.
 const std::vector<std::pair<std::string, std::set<std::string>>> packages = {
-    {"hwy/", {"kernels"}},          {"tbb/", {"sched"}},           {"oneapi/", {"sched"}},
-    {"Eigen/", {"runtime"}},        {"Spectra/", {"runtime"}},     {"openvdb/", {"io"}},
-    {"embree3/", {"io"}},           {"assimp/", {"io"}},           {"hdf5", {"io"}},
-    {"H5", {"io"}},                 {"nlohmann/", {"io", "io/cli"}}, {"CLI/", {"io/cli"}},
-    {"boost/", {"io"}},             {"zlib.h", {"io"}},            {"hidapi", {"device"}},
-    {"doctest/", {"tests"}},        {"benchmark/", {"bench"}},
+    {"hwy/", {"kernels"}},
+    {"tbb/", {"sched"}},
+    {"oneapi/", {"sched"}},
+    {"Eigen/", {"runtime"}},
+    {"Spectra/", {"runtime"}},
+    {"openvdb/", {"io"}},
+    {"embree3/", {"io"}},
+    {"assimp/", {"io"}},
+    {"hdf5", {"io"}},
+    {"H5", {"io"}},
+    {"nlohmann/", {"io", "io/cli"}},
+    {"CLI/", {"io/cli"}},
+    {"boost/", {"io"}},
+    {"zlib.h", {"io"}},
+    {"hidapi", {"device"}},
+    {"doctest/", {"tests"}},
+    {"benchmark/", {"bench"}},
 };
 
 std::string box_of(const fs::path& file) {
@@ -78,7 +89,8 @@ std::vector<Include> includes() {
     std::string text;
     for (int line = 1; std::getline(in, text); ++line) {
       std::smatch match;
-      if (std::regex_search(text, match, pattern)) found.push_back({file, line, match[2], match[1] == "\""});
+      if (std::regex_search(text, match, pattern))
+        found.push_back({file, line, match[2], match[1] == "\""});
     }
   }
   return found;
@@ -99,7 +111,8 @@ TEST_CASE("every include points to the same box or one below") {
     const std::string from = box_of(include.file), to = box_of_include(include.name);
     if (to.empty() || from == to) continue;
     ++seen;
-    CHECK_MESSAGE(below.at(from).count(to) == 1, include.file, ":", include.line, " includes ", include.name);
+    CHECK_MESSAGE(below.at(from).count(to) == 1, include.file, ":", include.line, " includes ",
+                  include.name);
   }
   CHECK(seen > 50);  // the scan works
 }
@@ -112,7 +125,8 @@ TEST_CASE("each package enters through one folder, and never through the contrac
       ++seen;
       const std::string box = box_of(include.file);
       const bool proof = box == "tests" || box == "bench";  // may look at anything
-      CHECK_MESSAGE((proof || allowed.count(box) == 1), include.file, ":", include.line, " includes ", include.name);
+      CHECK_MESSAGE((proof || allowed.count(box) == 1), include.file, ":", include.line,
+                    " includes ", include.name);
     }
   CHECK(seen > 20);
 }
@@ -123,7 +137,8 @@ TEST_CASE("headers that pull a heavy package in stay inside their own box") {
   const auto is_header = [](const Include& i) { return i.file.extension() == ".h"; };
   std::set<std::string> heavy;  // headers with such an include, directly or through another
   for (const Include& i : all)
-    for (const char* prefix : {"openvdb/", "embree3/", "assimp/", "H5", "hdf5", "nlohmann/json.hpp", "tbb/", "oneapi/", "Eigen/", "hwy/"})
+    for (const char* prefix : {"openvdb/", "embree3/", "assimp/", "H5", "hdf5", "nlohmann/json.hpp",
+                               "tbb/", "oneapi/", "Eigen/", "hwy/"})
       if (!i.quoted && is_header(i) && i.name.rfind(prefix, 0) == 0) heavy.insert(path_of(i));
   for (std::size_t before = 0; before != heavy.size();) {
     before = heavy.size();

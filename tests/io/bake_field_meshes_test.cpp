@@ -73,7 +73,7 @@ class Surface {
 };
 
 struct Table {
-  double worst_node = 0;              // [voxel]
+  double worst_node = 0;  // [voxel]
   double mean_between = 0, worst_between = 0;
   std::size_t nodes = 0, buried = 0, wrong_parity = 0, voted = 0;
   std::size_t wrong_winding = 0, wound = 0, overlaps = 0, cavities = 0;
@@ -100,9 +100,9 @@ void check_node(const FieldData& f, double d, double u, Table& table) {
 bool all_inside(const FieldData& f, Vec3 p) {
   const Vec3 g = (1 / f.voxel_size) * (p - f.origin);
   for (int i = 0; i < 8; ++i) {
-    const float* d = node_sample(f, {int(std::floor(g.x)) + (i & 1),
-                                     int(std::floor(g.y)) + (i >> 1 & 1),
-                                     int(std::floor(g.z)) + (i >> 2)});
+    const float* d =
+        node_sample(f, {int(std::floor(g.x)) + (i & 1), int(std::floor(g.y)) + (i >> 1 & 1),
+                        int(std::floor(g.z)) + (i >> 2)});
     if (d == nullptr || *d >= 0) return false;
   }
   return true;
@@ -118,8 +118,8 @@ Table examine(const Mesh& mesh, const FieldData& f, const std::function<bool(Vec
   double sum = 0;
   std::size_t between = 0;
   while (table.nodes < 10000) {
-    const Vec3 p = surface.point(random) +
-                   h * Vec3{random(-2.5, 2.5), random(-2.5, 2.5), random(-2.5, 2.5)};
+    const Vec3 p =
+        surface.point(random) + h * Vec3{random(-2.5, 2.5), random(-2.5, 2.5), random(-2.5, 2.5)};
     const Vec3 g = (1 / h) * (p - f.origin);
     const std::array<int, 3> n = {int(std::lround(g.x)), int(std::lround(g.y)),
                                   int(std::lround(g.z))};
@@ -131,7 +131,10 @@ Table examine(const Mesh& mesh, const FieldData& f, const std::function<bool(Vec
     }
     const Vec3 at = node_position(f, n);
     const double d = *sample, u = judge.distance(at);
-    if (u < f.band) check_node(f, d, u, table); else ++table.nodes;
+    if (u < f.band)
+      check_node(f, d, u, table);
+    else
+      ++table.nodes;
     if (f.sign_mode == "closed" && u > 1e-4 * h) {
       ++table.voted;
       const bool odd = judge.inside_by_parity(at, random);

@@ -1,6 +1,7 @@
 // Fields of meshes made here: distances, sides, bounds and bad input.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <cstring>
 #include <limits>
@@ -41,7 +42,7 @@ bool same_bits(const FieldData& a, const FieldData& b) {
 
 // Of a closed mesh: every sample is the distance to the mesh, with the sign of parity.
 struct Verdict {
-  double worst = 0;           // [voxel], where u is within reach
+  double worst = 0;  // [voxel], where u is within reach
   std::size_t wrong_side = 0, nodes = 0, inside = 0;
 };
 Verdict judge_closed(const FieldData& field, const Mesh& mesh, std::size_t every = 1) {
@@ -150,8 +151,8 @@ TEST_CASE("bake_field: the number of threads and the watcher do not change a bit
     options.threads = 2;
     CHECK(same_bits(one, must_bake(mesh, options)));
     options.threads = 5;
-    const auto watched = bake_field(mesh, options, nullptr,
-                                    [](const std::string&, double) { return true; });
+    const auto watched =
+        bake_field(mesh, options, nullptr, [](const std::string&, double) { return true; });
     REQUIRE(watched);
     CHECK(same_bits(one, *watched));
   }
@@ -185,8 +186,8 @@ TEST_CASE("bake_field: two overlapping boxes are one solid, and the walls inside
     const Vec3 p = node_position(field, n);
     const double u = judge.distance(p);
     if (u < 1e-4 * h) return;
-    const bool inside = in(p, boxes[0].first, boxes[0].second) ||
-                        in(p, boxes[1].first, boxes[1].second);
+    const bool inside =
+        in(p, boxes[0].first, boxes[0].second) || in(p, boxes[1].first, boxes[1].second);
     wrong += inside != (d < 0);
     if (!inside && u < field.band) worst_outside = std::max(worst_outside, std::fabs(d - u));
     if (!inside || random(0, 1) > 0.05) return;
@@ -211,7 +212,7 @@ TEST_CASE("bake_field: an open sheet becomes a plate two offsets thick") {
   const FieldData field = must_bake(mesh, small_bake(), &report);
   CHECK_FALSE(report.closed);
   CHECK(field.sign_mode == "flood");
-  CHECK(field.offset == doctest::Approx(0.9 * field.voxel_size));
+  CHECK(field.offset == h6::test::near(0.9 * field.voxel_size));
   CHECK_FALSE(report.warnings.empty());
   const Judge judge(mesh);
   double worst = 0;
@@ -232,12 +233,12 @@ TEST_CASE("bake_field: a box with cracks narrower than the offset is solid") {
   for (int axis = 0; axis < 3; ++axis)
     for (double side : {0.0, 1.0})
       add(mesh, patch(3, 3, [&](double s, double t) {
-        double c[3];
-        c[axis] = side;
-        c[(axis + 1) % 3] = gap + (1 - 2 * gap) * s;
-        c[(axis + 2) % 3] = gap + (1 - 2 * gap) * t;
-        return Vec3{c[0], c[1], c[2]};
-      }));
+            double c[3];
+            c[axis] = side;
+            c[(axis + 1) % 3] = gap + (1 - 2 * gap) * s;
+            c[(axis + 2) % 3] = gap + (1 - 2 * gap) * t;
+            return Vec3{c[0], c[1], c[2]};
+          }));
   const FieldData field = must_bake(mesh);
   const double h = field.voxel_size, sigma = field.offset;
   CHECK(field.sign_mode == "flood");
@@ -273,13 +274,14 @@ TEST_CASE("bake_field: cavities are solid by default and open when hollow is ask
   FieldBake options = small_bake();
   const auto side = [](const FieldData& f, double x) {
     const Vec3 g = (1 / f.voxel_size) * (Vec3{x, 0, 0} - f.origin);
-    const float* d = node_sample(f, {int(std::lround(g.x)), int(std::lround(g.y)),
-                                     int(std::lround(g.z))});
+    const float* d =
+        node_sample(f, {int(std::lround(g.x)), int(std::lround(g.y)), int(std::lround(g.z))});
     if (d != nullptr) return *d < 0 ? -1 : 1;
     const std::size_t a = std::size_t(std::lround(g.x / 8)), b = std::size_t(std::lround(g.y / 8)),
                       c = std::size_t(std::lround(g.z / 8));
     return f.far_grid[(c * std::size_t(f.bricks[1] + 1) + b) * std::size_t(f.bricks[0] + 1) + a] < 0
-               ? -1 : 1;
+               ? -1
+               : 1;
   };
   const FieldData solid = must_bake(mesh, options);
   for (double x : {0.0, 0.17, 0.38}) CHECK(side(solid, x) == -1);
@@ -386,7 +388,7 @@ TEST_CASE("bake_field: the smallest meshes") {
   FieldBake huge_offset = small_bake();
   huge_offset.offset = 0.2;
   const FieldData thick = must_bake(one, huge_offset);
-  CHECK(thick.offset == doctest::Approx(0.2));
+  CHECK(thick.offset == h6::test::near(0.2));
   const Judge judge(one);
   double worst = 0;
   for_nodes(thick, [&](std::array<int, 3> n, double d) {

@@ -1,6 +1,7 @@
 // Fields as files: to the bit and back, for other programs, and through every kind of damage.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -113,8 +114,8 @@ TEST_CASE("field_file: OpenVDB's own reader sees a level set in world units") {
   CHECK(grid->tree().leafCount() == field.brick_count());
   const Vec3 p = node_position(field, {20, 21, 22});
   const openvdb::Vec3d at = grid->worldToIndex(openvdb::Vec3d(p.x, p.y, p.z));
-  CHECK(at.x() == doctest::Approx(20));
-  CHECK(at.z() == doctest::Approx(22));
+  CHECK(at.x() == h6::test::near(20));
+  CHECK(at.z() == h6::test::near(22));
   if (const float* d = node_sample(field, {20, 21, 22}))
     CHECK(grid->tree().getValue(openvdb::Coord(20, 21, 22)) == *d);
   CHECK(in.readGrid("far"));
@@ -141,8 +142,7 @@ TEST_CASE("field_file: a truncated or damaged file is a sentence or a field, nev
     for (int i = 0; i < 250; ++i) {
       std::string bad = whole;
       const std::size_t reach = i % 2 ? bad.size() : 2500;  // the head more often
-      for (int flips = 0; flips < 4; ++flips)
-        bad[random.below(reach)] = char(random.below(256));
+      for (int flips = 0; flips < 4; ++flips) bad[random.below(reach)] = char(random.below(256));
       put(file, bad);
       refused += !read_field(file);
     }
@@ -213,7 +213,7 @@ TEST_CASE("field_file: a level set of another program becomes a field with safe 
   out.close();
   const auto field = read_field(folder.path / "sphere.vdb");
   REQUIRE_MESSAGE(field, field.error());
-  CHECK(field->voxel_size == doctest::Approx(h));
+  CHECK(field->voxel_size == h6::test::near(h));
   const auto truth = [&](Vec3 p) { return norm(p - Vec3{0.3, -0.2, 5.0}) - radius; };
   std::size_t wrong = 0, too_long = 0, missing = 0, at = 0;
   for_nodes(*field, [&](std::array<int, 3> n, double d) {

@@ -1,6 +1,8 @@
-// From a scene to what the engine runs: mass properties, shared assets, sentences that name the body.
+// From a scene to what the engine runs: mass properties, shared assets, sentences that name the
+// body.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 #include <unistd.h>
 
 #include <cmath>
@@ -21,8 +23,10 @@ namespace {
 Mesh box(Vec3 half, Vec3 at, bool inside_out = false) {
   Mesh m;
   for (int i = 0; i < 8; ++i)
-    m.vertices.push_back({at.x + (i & 1 ? half.x : -half.x), at.y + (i & 2 ? half.y : -half.y), at.z + (i & 4 ? half.z : -half.z)});
-  const std::uint32_t quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    m.vertices.push_back({at.x + (i & 1 ? half.x : -half.x), at.y + (i & 2 ? half.y : -half.y),
+                          at.z + (i & 4 ? half.z : -half.z)});
+  const std::uint32_t quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                     {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   for (const auto& q : quads) {
     m.triangles.push_back({q[0], q[1], q[2]});
     m.triangles.push_back({q[0], q[2], q[3]});
@@ -34,7 +38,8 @@ Mesh box(Vec3 half, Vec3 at, bool inside_out = false) {
 
 // Bakes go to a folder of this run's own.
 struct PrivateCache {
-  std::filesystem::path folder = std::filesystem::temp_directory_path() / ("hapsix-load-" + std::to_string(getpid()));
+  std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("hapsix-load-" + std::to_string(getpid()));
   PrivateCache() { setenv("HAPSIX_CACHE", folder.c_str(), 1); }
   ~PrivateCache() { std::filesystem::remove_all(folder); }
 };
@@ -64,15 +69,16 @@ Scene two_boxes() {
 
 }  // namespace
 
-TEST_CASE("a solid box has the inertia of the text book, wherever it lies and however it is wound") {
+TEST_CASE(
+    "a solid box has the inertia of the text book, wherever it lies and however it is wound") {
   for (const bool inside_out : {false, true}) {
     const auto m = solid_mass(box({0.01, 0.02, 0.03}, {5, -3, 2}, inside_out), 0.6);
     REQUIRE(m);
-    CHECK(m->com.x == doctest::Approx(5));
-    CHECK(m->com.y == doctest::Approx(-3));
-    CHECK(m->inertia[0] == doctest::Approx(0.6 / 3 * (0.02 * 0.02 + 0.03 * 0.03)).epsilon(1e-6));
-    CHECK(m->inertia[1] == doctest::Approx(0.6 / 3 * (0.01 * 0.01 + 0.03 * 0.03)).epsilon(1e-6));
-    CHECK(m->inertia[2] == doctest::Approx(0.6 / 3 * (0.01 * 0.01 + 0.02 * 0.02)).epsilon(1e-6));
+    CHECK(m->com.x == h6::test::near(5));
+    CHECK(m->com.y == h6::test::near(-3));
+    CHECK(m->inertia[0] == h6::test::near(0.6 / 3 * (0.02 * 0.02 + 0.03 * 0.03)).epsilon(1e-6));
+    CHECK(m->inertia[1] == h6::test::near(0.6 / 3 * (0.01 * 0.01 + 0.03 * 0.03)).epsilon(1e-6));
+    CHECK(m->inertia[2] == h6::test::near(0.6 / 3 * (0.01 * 0.01 + 0.02 * 0.02)).epsilon(1e-6));
     for (int k = 3; k < 6; ++k) CHECK(std::fabs(m->inertia[k]) < 1e-12);
   }
 }
@@ -85,7 +91,8 @@ TEST_CASE("what is no solid has no solid mass: open, mixed winding, doubled, fla
   std::swap(mixed.triangles[3][1], mixed.triangles[3][2]);
   CHECK(!solid_mass(mixed, 1));
   Mesh doubled = box({1, 1, 1}, {0, 0, 0});
-  doubled.triangles.insert(doubled.triangles.end(), doubled.triangles.begin(), doubled.triangles.end());
+  doubled.triangles.insert(doubled.triangles.end(), doubled.triangles.begin(),
+                           doubled.triangles.end());
   CHECK(!solid_mass(doubled, 1));
   CHECK(!solid_mass(box({1, 1, 0}, {0, 0, 0}), 1));
   CHECK(!solid_mass({}, 1));
@@ -95,10 +102,10 @@ TEST_CASE("a scene becomes a model, bodies and hands that a session takes") {
   auto loaded = load_scene(two_boxes());
   REQUIRE_MESSAGE(loaded, loaded.error());
   const LoadedScene& l = **loaded;
-  CHECK(l.bodies[1].com.x == doctest::Approx(0.003));
-  CHECK(l.bodies[1].inertia[2] == doctest::Approx(0.1 / 3 * 2e-4).epsilon(1e-6));
+  CHECK(l.bodies[1].com.x == h6::test::near(0.003));
+  CHECK(l.bodies[1].inertia[2] == h6::test::near(0.1 / 3 * 2e-4).epsilon(1e-6));
   CHECK(l.watched_points.size() == 500);
-  CHECK(l.duration() == doctest::Approx(0.5));
+  CHECK(l.duration() == h6::test::near(0.5));
   CHECK(l.assets.size() == 2);
   const h6SessionDef def = l.session_def();
   h6Error error{};
@@ -109,7 +116,7 @@ TEST_CASE("a scene becomes a model, bodies and hands that a session takes") {
   for (int i = 0; i < 1000; ++i) h6Step(session, &sample, nullptr);
   // A box of half height 10 mm on a wall whose top is at 5 mm, pushed half a millimetre into it.
   CHECK(h6GetFrame(session).contacts > 20);
-  CHECK(h6GetBody(session, 1).pose.p.z == doctest::Approx(0.015).epsilon(0.01));
+  CHECK(h6GetBody(session, 1).pose.p.z == h6::test::near(0.015).epsilon(0.01));
   h6DestroySession(session);
 }
 
@@ -140,7 +147,8 @@ TEST_CASE("what the scene states wins over what could be derived") {
   REQUIRE(loaded);
   CHECK((*loaded)->bodies[1].com.z == 0.004);
   // The inertia is then about the stated point (parallel axes).
-  CHECK((*loaded)->bodies[1].inertia[2] == doctest::Approx(0.1 / 3 * 2e-4 + 0.1 * 9e-6).epsilon(1e-6));
+  CHECK((*loaded)->bodies[1].inertia[2] ==
+        h6::test::near(0.1 / 3 * 2e-4 + 0.1 * 9e-6).epsilon(1e-6));
   scene.bodies[1].inertia = std::array<double, 6>{1e-5, 2e-5, 3e-5, 0, 0, 0};
   loaded = load_scene(scene);
   REQUIRE(loaded);

@@ -1,6 +1,7 @@
 // mesh_file_test.cpp - meshes out of files: the right ones whole, the wrong ones with a sentence.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -140,7 +141,8 @@ TEST_CASE("OBJ: groups are parts, indices may count backwards, lines may go on, 
   const auto mesh = parse_mesh(
       "\xef\xbb\xbf# made by hand\r\no left\r\nv 0 0 0\r\nv +1 0 0 0.5 0.5 0.5\r\nv 0 1. 0\r\n"
       "f -3/1/1 -2/2/1 \\\r\n -1/3/1\r\ng empty\r\no right\r\ng \xff\x01 top\r\nv 0 0 1e0\r\n"
-      "f 1 2 4\r\no left\r\nf 2 3 4 # comment\r\nl 1 2\r\n", "a.obj");
+      "f 1 2 4\r\no left\r\nf 2 3 4 # comment\r\nl 1 2\r\n",
+      "a.obj");
   REQUIRE_MESSAGE(mesh, mesh.error());
   CHECK(mesh->part_names == std::vector<std::string>{"left", "right/?? top"});
   CHECK(mesh->part == std::vector<std::int32_t>{0, 1, 0});
@@ -151,7 +153,8 @@ TEST_CASE("text STL: each solid is a part, words may stand on any line, normals 
   const auto mesh = parse_mesh(
       "solid one\nFACET normal nan -nan(ind) 1.#QNAN outer loop vertex 0 0 0 vertex 1 0 0\n"
       "vertex 0 1 0 endloop endfacet\nendsolid one\n\nsolid\nfacet normal 0 0 1\nouter loop\n"
-      "vertex 0 0 1\nvertex 1 0 1\nvertex 0 1 1\nendloop\nendfacet\nendsolid", "a.stl");
+      "vertex 0 0 1\nvertex 1 0 1\nvertex 0 1 1\nendloop\nendfacet\nendsolid",
+      "a.stl");
   REQUIRE_MESSAGE(mesh, mesh.error());
   CHECK(mesh->part == std::vector<std::int32_t>{0, 1});
   CHECK(mesh->part_names == std::vector<std::string>{"one", ""});
@@ -163,12 +166,26 @@ TEST_CASE("polygons are cut into triangles that cover them once, whichever way t
     std::vector<std::array<double, 2>> outline;
     double area;
   };
-  const std::vector<Shape> shapes = {
-      {{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 3}, {0, 3}}, 4},
-      {{{0, 0}, {7, 0}, {7, 3}, {6, 3}, {6, 1}, {5, 1}, {5, 3}, {4, 3}, {4, 1}, {3, 1}, {3, 3},
-        {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}}, 15},
-      {{{0, 0}, {3, 1}, {0, 2}, {1, 1}}, 2},
-      {{{0, 0}, {1, 0}, {2, 0}, {2, 2}, {1, 2}, {0, 2}}, 4}};
+  const std::vector<Shape> shapes = {{{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 3}, {0, 3}}, 4},
+                                     {{{0, 0},
+                                       {7, 0},
+                                       {7, 3},
+                                       {6, 3},
+                                       {6, 1},
+                                       {5, 1},
+                                       {5, 3},
+                                       {4, 3},
+                                       {4, 1},
+                                       {3, 1},
+                                       {3, 3},
+                                       {2, 3},
+                                       {2, 1},
+                                       {1, 1},
+                                       {1, 3},
+                                       {0, 3}},
+                                      15},
+                                     {{{0, 0}, {3, 1}, {0, 2}, {1, 1}}, 2},
+                                     {{{0, 0}, {1, 0}, {2, 0}, {2, 2}, {1, 2}, {0, 2}}, 4}};
   for (const Shape& shape : shapes) {
     const std::size_t n = shape.outline.size();
     for (std::size_t start = 0; start < n; ++start) {
@@ -185,7 +202,7 @@ TEST_CASE("polygons are cut into triangles that cover them once, whichever way t
         const auto mesh = parse_mesh(text + face, "a.obj");
         REQUIRE_MESSAGE(mesh, mesh.error());
         CHECK(mesh->triangles.size() == n - 2);
-        CHECK(area(*mesh) == doctest::Approx(shape.area));
+        CHECK(area(*mesh) == h6::test::near(shape.area));
       }
     }
   }
@@ -201,8 +218,10 @@ TEST_CASE("a concave face of thousands of corners is cut, one of very many is re
     const auto mesh = parse_mesh(text + face, "saw.obj");
     CHECK(bool(mesh) == (teeth == 2000));
     // Teeth of height 1 over a block of height 9; the last corner stands one before the edge.
-    if (mesh) CHECK(area(*mesh) == doctest::Approx(2 * teeth * 9.5).epsilon(1e-3));
-    else CHECK(mesh.error().find("face 1: ") != std::string::npos);
+    if (mesh)
+      CHECK(area(*mesh) == h6::test::near(2 * teeth * 9.5).epsilon(1e-3));
+    else
+      CHECK(mesh.error().find("face 1: ") != std::string::npos);
   }
 }
 
@@ -248,7 +267,7 @@ TEST_CASE("wrong STL gets a sentence with byte, line or triangle") {
   const std::string good = samples::stl_binary(samples::box());
   refuses({"notes.stl", "Dear all,\nthe mesh is in the other mail.\n"}, {"text", "solid"});
   refuses({"cut.stl", good.substr(0, 60)}, {"byte 60", "truncated"});
-  refuses({"cut.stl", good.substr(0, 84 + 7 * 50 + 20)}, 
+  refuses({"cut.stl", good.substr(0, 84 + 7 * 50 + 20)},
           {"byte 454", "12 triangles", "7 are there"});
   refuses({"more.stl", good + std::string(50, 'x')}, {"byte 684", "12 triangles", "13"});
   CHECK(parse_mesh(good + std::string(49, '\0'), "padded.stl"));  // less than a triangle: padding

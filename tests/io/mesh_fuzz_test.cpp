@@ -64,7 +64,8 @@ TEST_CASE("a file cut at any byte is refused or a mesh") {
     // OBJ has no count and no end: cut behind a face, it is a smaller mesh, as any reader has it.
     if (file.name == "mesh.obj") CHECK(tally.accepted > 0);
     // Elsewhere only the last bytes may be missed: the line end, or a piece of the last number.
-    else CHECK(tally.accepted <= 1);
+    else
+      CHECK(tally.accepted <= 1);
   }
 }
 
@@ -78,16 +79,41 @@ TEST_CASE("a file with bytes changed, doubled, dropped or moved is refused or a 
       for (unsigned changes = 1 + random() % 4; changes > 0; --changes) {
         const std::size_t at = random() % bytes.size();
         const std::size_t length = std::min<std::size_t>(1 + random() % 8, bytes.size() - at);
-        static const std::string kEvil[] = {"-1",  "0",    "4294967295", "1e999", "nan", "\n", " ",
-                                            "f ",  "end",  "\xff\xff\xff\xff", "\x7f\xff\xff\xff",
-                                            "/",   "\\\n", "solid",      "g a\n", "#"};
+        static const std::string kEvil[] = {"-1",
+                                            "0",
+                                            "4294967295",
+                                            "1e999",
+                                            "nan",
+                                            "\n",
+                                            " ",
+                                            "f ",
+                                            "end",
+                                            "\xff\xff\xff\xff",
+                                            "\x7f\xff\xff\xff",
+                                            "/",
+                                            "\\\n",
+                                            "solid",
+                                            "g a\n",
+                                            "#"};
         switch (random() % 6) {
-          case 0: bytes[at] = static_cast<char>(random()); break;
-          case 1: bytes[at] = static_cast<char>(bytes[at] ^ (1u << random() % 8)); break;
-          case 2: bytes.erase(at, length); break;
-          case 3: bytes.insert(at, bytes.substr(at, length)); break;
-          case 4: bytes.replace(at, length, kEvil[random() % std::size(kEvil)]); break;
-          default: bytes.insert(random() % bytes.size(), bytes.substr(at, length)); break;
+          case 0:
+            bytes[at] = static_cast<char>(random());
+            break;
+          case 1:
+            bytes[at] = static_cast<char>(bytes[at] ^ (1u << random() % 8));
+            break;
+          case 2:
+            bytes.erase(at, length);
+            break;
+          case 3:
+            bytes.insert(at, bytes.substr(at, length));
+            break;
+          case 4:
+            bytes.replace(at, length, kEvil[random() % std::size(kEvil)]);
+            break;
+          default:
+            bytes.insert(random() % bytes.size(), bytes.substr(at, length));
+            break;
         }
         if (bytes.empty()) bytes = " ";
       }

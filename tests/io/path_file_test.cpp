@@ -1,6 +1,7 @@
 // path_file_test.cpp - hand paths: CSV there and back, what is refused, and what is between rows.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <random>
 
@@ -104,14 +105,14 @@ TEST_CASE("a path's velocity is the derivative of its pose") {
   const double t = 0.2, e = 1e-6;
   const h6Pose a = sample_path(path, t - e), b = sample_path(path, t + e);
   const h6Velocity v = sample_path_velocity(path, t);
-  CHECK(v.linear.y == doctest::Approx((b.p.y - a.p.y) / (2 * e)).epsilon(1e-6));
+  CHECK(v.linear.y == h6::test::near((b.p.y - a.p.y) / (2 * e)).epsilon(1e-6));
   // dq/dt = (0, w) q / 2, world frame.
   const h6Quat q = sample_path(path, t).q;
   const h6Vec3& w = v.angular;
   CHECK((b.q.w - a.q.w) / (2 * e) ==
-        doctest::Approx(0.5 * (-w.x * q.x - w.y * q.y - w.z * q.z)).epsilon(1e-6));
+        h6::test::near(0.5 * (-w.x * q.x - w.y * q.y - w.z * q.z)).epsilon(1e-6));
   CHECK((b.q.x - a.q.x) / (2 * e) ==
-        doctest::Approx(0.5 * (w.x * q.w + w.y * q.z - w.z * q.y)).epsilon(1e-6));
+        h6::test::near(0.5 * (w.x * q.w + w.y * q.z - w.z * q.y)).epsilon(1e-6));
   CHECK((b.q.z - a.q.z) / (2 * e) ==
-        doctest::Approx(0.5 * (w.x * q.y - w.y * q.x + w.z * q.w)).epsilon(1e-6));
+        h6::test::near(0.5 * (w.x * q.y - w.y * q.x + w.z * q.w)).epsilon(1e-6));
 }

@@ -129,8 +129,8 @@ TEST_CASE("a run killed at any instant leaves a file that opens and lacks at mos
       // A loaded machine may not let the process run at all: that time is not held against it.
       Clock::duration withheld{};
       for (std::size_t k = 1; k < reports.size(); ++k)
-        withheld = std::max(withheld, reports[k].when - reports[k - 1].when -
-                                          std::chrono::milliseconds(60));
+        withheld = std::max(withheld,
+                            reports[k].when - reports[k - 1].when - std::chrono::milliseconds(60));
       for (const Report& report : reports)
         if (report.handed_over > r.frames.size()) {
           const std::chrono::duration<double> lost = killed - report.when;
@@ -165,8 +165,8 @@ TEST_CASE("kills in the midst of writing leave a whole file and the older one") 
     // After repair nothing of the killed run is left but its recording, and the next run works.
     for (const char* other : {"run.h5.part", "run.h5.swap"})
       if (fs::exists(place / other))
-        fs::last_write_time(place / other, fs::file_time_type::clock::now() -
-                                               std::chrono::seconds(60));
+        fs::last_write_time(place / other,
+                            fs::file_time_type::clock::now() - std::chrono::seconds(60));
     REQUIRE(repair_recording(file));
     CHECK_FALSE(fs::exists(place / "run.h5.part"));
     CHECK(plain_shape(file, "/frames/t").at(0) == r.frames.size());
@@ -298,4 +298,3 @@ TEST_CASE("names swap in one step or in three, and a kill between the three is r
   CHECK(fs::exists(folder / "a.h5.damaged"));
   CHECK_FALSE(repair_recording(folder / "none.h5"));
 }
-

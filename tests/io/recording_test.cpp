@@ -120,8 +120,8 @@ TEST_CASE("files that are missing, foreign, cut off or damaged are refused with 
   CHECK(mentions(refusal(folder.path), "ordinary"));
   write_bytes(folder / "text.h5", std::vector<char>(5000, 'x'), 5000);
   CHECK(mentions(refusal(folder / "text.h5"), "not an HDF5 file"));
-  const hid_t h5 = H5Fcreate((folder / "other.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT,
-                             H5P_DEFAULT);
+  const hid_t h5 =
+      H5Fcreate((folder / "other.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   H5Fclose(h5);
   CHECK(mentions(refusal(folder / "other.h5"), "/config"));
 
@@ -160,9 +160,9 @@ TEST_CASE("lying sizes and wrong shapes and types are refused before memory is t
   CHECK(change([](hid_t) {}).empty());
   for (const hsize_t rows : {hsize_t{301}, hsize_t{100000}, hsize_t{1} << 40, hsize_t{1} << 62})
     CHECK_FALSE(change([&](hid_t h5) {
-      for (const char* name : {"/frames/t", "/frames/hash", "/frames/status"})
-        grow(h5, name, {rows});
-    }).empty());
+                  for (const char* name : {"/frames/t", "/frames/hash", "/frames/status"})
+                    grow(h5, name, {rows});
+                }).empty());
   CHECK(mentions(change([&](hid_t h5) { grow(h5, "/frames/late", {299}); }), "299 rows"));
   CHECK(mentions(change([&](hid_t h5) { grow(h5, "/events/t", {hsize_t{1} << 50}); }), "/events"));
   CHECK(mentions(change([](hid_t h5) { H5Ldelete(h5, "/frames/wrench", H5P_DEFAULT); }),
@@ -172,7 +172,9 @@ TEST_CASE("lying sizes and wrong shapes and types are refused before memory is t
   CHECK(mentions(change([](hid_t h5) { H5Ldelete(h5, "/events", H5P_DEFAULT); }),
                  "/events is missing"));
   CHECK(mentions(change([&](hid_t h5) { replace(h5, "/frames/t", H5T_STD_I8LE, {300}); }), "type"));
-  CHECK(mentions(change([&](hid_t h5) { replace(h5, "/frames/t", H5T_IEEE_F64LE, {0, 2}); }),
+  CHECK(mentions(change([&](hid_t h5) {
+                   replace(h5, "/frames/t", H5T_IEEE_F64LE, {0, 2});
+                 }),
                  "shape"));
   CHECK(mentions(change([&](hid_t h5) { replace(h5, "/frames/t", H5T_IEEE_F64LE, {}); }), "shape"));
   CHECK(mentions(change([&](hid_t h5) { replace(h5, "/frames/t", H5T_IEEE_F64LE, {300}); }),
@@ -182,18 +184,20 @@ TEST_CASE("lying sizes and wrong shapes and types are refused before memory is t
     for (const std::size_t size : {1, 10, 2000, 2001}) {
       CAPTURE(mask);
       CAPTURE(size);
-      CHECK((mask >= 2 && size == 2000) == change([&](hid_t h5) {
-        const hid_t data = H5Dopen2(h5, "/frames/t", H5P_DEFAULT);
-        const std::vector<char> junk(size, 'j');
-        const hsize_t first = 0;
-        REQUIRE(H5Dwrite_chunk(data, H5P_DEFAULT, mask, &first, size, junk.data()) >= 0);
-        H5Dclose(data);
-      }).empty());
+      CHECK((mask >= 2 && size == 2000) ==
+            change([&](hid_t h5) {
+              const hid_t data = H5Dopen2(h5, "/frames/t", H5P_DEFAULT);
+              const std::vector<char> junk(size, 'j');
+              const hsize_t first = 0;
+              REQUIRE(H5Dwrite_chunk(data, H5P_DEFAULT, mask, &first, size, junk.data()) >= 0);
+              H5Dclose(data);
+            }).empty());
     }
   CHECK(mentions(change([](hid_t h5) {
-    const hid_t data = H5Dopen2(h5, "/frames/cause", H5P_DEFAULT);
-    const std::vector<std::uint32_t> odd(300, 4000000000u);
-    H5Dwrite(data, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, odd.data());
-    H5Dclose(data);
-  }), "cause"));
+                   const hid_t data = H5Dopen2(h5, "/frames/cause", H5P_DEFAULT);
+                   const std::vector<std::uint32_t> odd(300, 4000000000u);
+                   H5Dwrite(data, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, odd.data());
+                   H5Dclose(data);
+                 }),
+                 "cause"));
 }

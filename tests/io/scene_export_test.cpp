@@ -1,6 +1,7 @@
 // scene_export_test.cpp - scenes written as files, and the schema of what is in them.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <algorithm>
 #include <cctype>
@@ -34,8 +35,8 @@ TEST_CASE("every generated scene, exported and read back, is the same scene") {
         CHECK(x.triangles == y.triangles);
         CHECK(x.vertices == y.vertices);
         CHECK(y.closed);
-        CHECK(x.volume == doctest::Approx(y.volume).epsilon(1e-5));
-        CHECK(x.high.z == doctest::Approx(y.high.z).epsilon(1e-6));
+        CHECK(x.volume == h6::test::near(y.volume).epsilon(1e-5));
+        CHECK(x.high.z == h6::test::near(y.high.z).epsilon(1e-6));
       }
       if (a.shell && a.shell->points) {
         const Result<ShellData> shell = read_shell(b.shell->file);

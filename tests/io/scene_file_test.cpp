@@ -1,6 +1,7 @@
 // scene_file_test.cpp - scene files: what is read, what is refused and how that is said.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <random>
 
@@ -23,7 +24,7 @@ TEST_CASE("a scene with only what is needed has the engine's defaults for the re
   check_same(scene->contact, h6DefaultContactDef());
   check_same(scene->coupling, h6DefaultCouplingDef());
   check_same(scene->bodies[1].pose, h6Pose{{0, 0, 0}, {1, 0, 0, 0}});
-  CHECK(scene->bodies[1].mass == doctest::Approx(0.1));
+  CHECK(scene->bodies[1].mass == h6::test::near(0.1));
   CHECK(!scene->bodies[1].com);
   CHECK(!scene->bodies[0].shell);
   CHECK(scene->bodies[0].field->bake.voxels == FieldBake{}.voxels);

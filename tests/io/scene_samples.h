@@ -2,6 +2,7 @@
 // same.
 #pragma once
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 #include <unistd.h>
 
 #include <cmath>
@@ -98,7 +99,7 @@ inline Json full_scene() {
                            "tolerance_angle": 0.1}}})");
 }
 
-inline void check_close(double a, double b) { CHECK(a == doctest::Approx(b).epsilon(1e-12)); }
+inline void check_close(double a, double b) { CHECK(a == h6::test::near(b).epsilon(1e-12)); }
 
 inline void check_same(const h6Vec3& a, const h6Vec3& b) {
   check_close(a.x, b.x);

@@ -1,6 +1,7 @@
 // scenes_test.cpp - generated scenes: are they what they claim, before anything is simulated?
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <algorithm>
 #include <cmath>
@@ -229,9 +230,9 @@ TEST_CASE("distance between meshes is exact for boxes apart, and zero for boxes 
   const auto to = [&](h6Vec3 low, h6Vec3 high) {
     return mesh_distance(unit_box, box_mesh(low, high));
   };
-  CHECK(to({2, 0.2, 0.2}, {3, 0.4, 0.4}) == doctest::Approx(1));               // face to face
-  CHECK(to({2, 3, 0.2}, {5, 5, 0.4}) == doctest::Approx(std::sqrt(5.0)));      // edge to edge
-  CHECK(to({2, 3, 4}, {5, 5, 5}) == doctest::Approx(std::sqrt(1 + 4 + 9.0)));  // corner to corner
+  CHECK(to({2, 0.2, 0.2}, {3, 0.4, 0.4}) == h6::test::near(1));               // face to face
+  CHECK(to({2, 3, 0.2}, {5, 5, 0.4}) == h6::test::near(std::sqrt(5.0)));      // edge to edge
+  CHECK(to({2, 3, 4}, {5, 5, 5}) == h6::test::near(std::sqrt(1 + 4 + 9.0)));  // corner to corner
   CHECK(to({0.5, 0.4, 0.5}, {1.5, 0.6, 0.7}) == 0);
   CHECK(to({-1, 0.4, 0.45}, {2, 0.6, 0.55}) == 0);  // right through
 }
@@ -242,11 +243,11 @@ TEST_CASE("box-on-wall starts 1 mm above the wall and is pressed 3 mm into it") 
   const Scene scene = scene_of("box-on-wall");
   double lowest = 1;
   for (const h6Vec3& p : shell_points(body_of(scene, "box"))) lowest = std::min(lowest, p.z);
-  CHECK(lowest == doctest::Approx(-5 * kMm));
+  CHECK(lowest == h6::test::near(-5 * kMm));
   const SceneHand& hand = scene.hands.front();
-  CHECK(hand.path.front().pose.p.z + lowest == doctest::Approx(1 * kMm));
-  CHECK(hand.path.back().pose.p.z + lowest == doctest::Approx(-3 * kMm));
-  CHECK(body_of(scene, "wall").field->bake.voxel_size == doctest::Approx(1 * kMm));
+  CHECK(hand.path.front().pose.p.z + lowest == h6::test::near(1 * kMm));
+  CHECK(hand.path.back().pose.p.z + lowest == h6::test::near(-3 * kMm));
+  CHECK(body_of(scene, "wall").field->bake.voxel_size == h6::test::near(1 * kMm));
 }
 
 TEST_CASE("peg-in-hole has Fig. 10's grid, clearance and depth") {
@@ -268,18 +269,18 @@ TEST_CASE("peg-in-hole has Fig. 10's grid, clearance and depth") {
         nearest = std::min(nearest, r), farthest = std::max(farthest, r);
       if (r < 6 * kMm && middle.z > -35 * kMm) deepest = std::min(deepest, middle.z);
     }
-  CHECK(nearest == doctest::Approx(10.3 * kMm).epsilon(1e-6));
+  CHECK(nearest == h6::test::near(10.3 * kMm).epsilon(1e-6));
   CHECK(farthest < 10.31 * kMm);
-  CHECK(deepest == doctest::Approx(-30 * kMm));
+  CHECK(deepest == h6::test::near(-30 * kMm));
   const h6Pose end = scene.hands.front().path.back().pose, start = peg.pose;
-  CHECK(end.p.x - start.p.x == doctest::Approx(8 * kMm));
-  CHECK(end.p.z - start.p.z == doctest::Approx(-20 * kMm));
+  CHECK(end.p.x - start.p.x == h6::test::near(8 * kMm));
+  CHECK(end.p.z - start.p.z == h6::test::near(-20 * kMm));
 }
 
 TEST_CASE("the alpha has exactly 1,008 triangles and lies on its tube") {
   const AlphaShape alpha = make_alpha();
   CHECK(alpha.mesh.triangles.size() == 1008);
-  CHECK(2 * alpha.tube_radius == doctest::Approx(kTube));
+  CHECK(2 * alpha.tube_radius == h6::test::near(kTube));
   const std::vector<h6Vec3> line = centre_line(-alpha_end(), alpha_end(), 4000, kHere);
   for (std::uint32_t i = 0; i < alpha.mesh.vertices.size(); ++i) {
     const double r = least_distance({vertex(alpha.mesh, i)}, line);
@@ -324,7 +325,7 @@ TEST_CASE("the alphas start hooked together, a millimetre or more apart") {
   const double axes = least_distance(centre_line(-alpha_end(), alpha_end(), 1500, kHere),
                                      centre_line(-alpha_end(), alpha_end(), 1500, tool.pose));
   CHECK(axes - kTube > 1 * kMm);
-  CHECK(std::abs(linking(ring(kHere), ring(tool.pose))) == doctest::Approx(1).epsilon(1e-6));
+  CHECK(std::abs(linking(ring(kHere), ring(tool.pose))) == h6::test::near(1).epsilon(1e-6));
 }
 
 TEST_CASE("the hand's way unlinks the alphas and is blocked by nothing but the gap") {

@@ -100,20 +100,26 @@ TEST_CASE("a writer that fails, throws or writes nothing leaves the old file as 
   const Folder folder;
   const fs::path file = folder.path / "a";
   REQUIRE(put(file, "old"));
-  says(write_aside(file, [](const fs::path& aside) {
-         (void)put(aside, "half");
-         return Outcome(Failure{"The disk is full."});
-       }), "The disk is full.");
-  says(write_aside(file, [](const fs::path& aside) -> Outcome {
-         (void)put(aside, "half");
-         throw std::runtime_error("out of paper");
-       }), "out of paper");
+  says(write_aside(file,
+                   [](const fs::path& aside) {
+                     (void)put(aside, "half");
+                     return Outcome(Failure{"The disk is full."});
+                   }),
+       "The disk is full.");
+  says(write_aside(file,
+                   [](const fs::path& aside) -> Outcome {
+                     (void)put(aside, "half");
+                     throw std::runtime_error("out of paper");
+                   }),
+       "out of paper");
   CHECK_THROWS_AS((void)write_aside(file, [](const fs::path&) -> Outcome { throw 7; }), int);
   says(write_aside(file, [](const fs::path&) { return Outcome(Done{}); }), "nothing was written");
-  says(write_aside(file, [](const fs::path& aside) {
-         fs::remove(aside);
-         return Outcome(Done{});
-       }), "disappeared");
+  says(write_aside(file,
+                   [](const fs::path& aside) {
+                     fs::remove(aside);
+                     return Outcome(Done{});
+                   }),
+       "disappeared");
   CHECK(content(file) == "old");
   CHECK(folder.entries() == 1);
 }
@@ -221,9 +227,8 @@ TEST_CASE("killed at any moment, the file is one of the whole ones") {
   for (int kill_after_us = 500; kill_after_us < 20'000; kill_after_us += 700) {
     const pid_t child = in_a_child([&] {
       for (char c = 'a';; c = c == 'z' ? 'a' : static_cast<char>(c + 1))
-        (void)write_aside(file, [&](const fs::path& aside) {
-          return put(aside, std::string(300'000, c));
-        });
+        (void)write_aside(
+            file, [&](const fs::path& aside) { return put(aside, std::string(300'000, c)); });
     });
     usleep(static_cast<useconds_t>(kill_after_us));
     kill(child, SIGKILL);

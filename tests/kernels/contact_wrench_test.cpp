@@ -5,6 +5,7 @@
 
 #include "kernels/contact_wrench.h"
 #include "tests/kernels/kernel_test.h"
+#include "tests/support/near.h"
 
 using namespace h6::kernels;
 using namespace h6::kernels::test;
@@ -196,7 +197,7 @@ TEST_CASE("contact_wrench: no contact pulls, and one that would is out of every 
       CHECK(along >= 0.0);
       ++(e > 0 ? in : out);
       CHECK(along ==
-            doctest::Approx(std::max(0.0, e) * kMoving.stiffness * c.column[1][i]).epsilon(1e-6));
+            h6::test::near(std::max(0.0, e) * kMoving.stiffness * c.column[1][i]).epsilon(1e-6));
       if (e <= 0) CHECK(same(one, WrenchSum{}));
     }
     CHECK(in > 20);
@@ -264,7 +265,7 @@ TEST_CASE("contact_wrench: beta B is the derivative of the force by velocity") {
     const WrenchSum a = contacts.sum(ahead), b = contacts.sum(behind);
     for (int row = 0; row < 6; ++row) {
       const double slope = (a.force[row] - b.force[row]) / 2e-3;
-      CHECK(slope == doctest::Approx(-p.damping * s.damping[6 * row + col]).epsilon(1e-8));
+      CHECK(slope == h6::test::near(-p.damping * s.damping[6 * row + col]).epsilon(1e-8));
     }
   }
 }

@@ -4,6 +4,7 @@
 #include "kernels/sample_field.h"
 #include "tests/kernels/analytic_field.h"
 #include "tests/kernels/kernel_test.h"
+#include "tests/support/near.h"
 
 using namespace h6::kernels;
 using namespace h6::kernels::test;
@@ -149,12 +150,12 @@ TEST_CASE(
 TEST_CASE("field_layout: distances beyond the range of an int16 are clamped") {
   const AnalyticField field(
       2, 2, 2, [](const Point& p) { return 100.0 * p.x - 400.0; }, 1e6, 0.5);
-  CHECK(distance_at(field, {0, 3, 3}) == doctest::Approx(-32).epsilon(1e-4));
-  CHECK(distance_at(field, {15, 3, 3}) == doctest::Approx(32).epsilon(1e-4));
+  CHECK(distance_at(field, {0, 3, 3}) == h6::test::near(-32).epsilon(1e-4));
+  CHECK(distance_at(field, {15, 3, 3}) == h6::test::near(32).epsilon(1e-4));
   CHECK(distance_at(field, {4, 3, 3}) == 0.0f);
   // And those of far cells to theirs: 1024 voxels.
   const AnalyticField wide(4, 1, 1, [](const Point& p) { return 5000.0 + p.x; });
-  CHECK(distance_at(wide, {10, 3, 3}) == doctest::Approx(1024).epsilon(1e-3));
+  CHECK(distance_at(wide, {10, 3, 3}) == h6::test::near(1024).epsilon(1e-3));
 }
 
 TEST_CASE("field_layout: rows follow the table, and the size says how many there are") {

@@ -5,6 +5,7 @@
 
 #include "kernels/gauss_weights.h"
 #include "tests/kernels/kernel_test.h"
+#include "tests/support/near.h"
 
 using namespace h6::kernels;
 using namespace h6::kernels::test;
@@ -151,7 +152,7 @@ TEST_CASE(
       for (Hat hat : kHats) {
         for (bool weighted : {false, true}) {
           const auto w = weights(c.view(weighted), hat, {0.01f, 0.01f});
-          CHECK(std::accumulate(w.begin(), w.end(), 0.0) == doctest::Approx(1.0).epsilon(1e-5));
+          CHECK(std::accumulate(w.begin(), w.end(), 0.0) == h6::test::near(1.0).epsilon(1e-5));
         }
       }
     }
@@ -171,7 +172,7 @@ TEST_CASE(
         c.set(i, v, v, 1, random.uniform(1e-5, 1e-3));
       }
       for (float w : weights(c.view(true), hat, {0.01f, 0.01f})) {
-        CHECK(w == doctest::Approx(1.0).epsilon(1e-6));
+        CHECK(w == h6::test::near(1.0).epsilon(1e-6));
       }
     }
   });
@@ -183,10 +184,10 @@ TEST_CASE("gauss_weights: the product hat tells torque directions apart, the nor
   c.set(0, normal, left, 1, 1e-3);
   c.set(1, normal, right, 1, 1e-3);
   on_every_target([&](const std::string&) {
-    CHECK(weights(c.view(true), Hat::product, {0.05f, 1.0f})[0] == doctest::Approx(1.0));
-    CHECK(weights(c.view(true), Hat::normal, {0.05f, 1.0f})[0] == doctest::Approx(0.5));
+    CHECK(weights(c.view(true), Hat::product, {0.05f, 1.0f})[0] == h6::test::near(1.0));
+    CHECK(weights(c.view(true), Hat::normal, {0.05f, 1.0f})[0] == h6::test::near(0.5));
     // As printed: 2 / (2 + 1).
-    CHECK(weights(c.view(true), Hat::sum, {0.05f, 1.0f})[0] == doctest::Approx(2.0 / 3));
+    CHECK(weights(c.view(true), Hat::sum, {0.05f, 1.0f})[0] == h6::test::near(2.0 / 3));
   });
 }
 
@@ -211,7 +212,7 @@ TEST_CASE(
       kept.count = n;
       const auto without = weights(kept.view(true), hat, {0.05f, 1.0f});
       for (std::size_t k = 0; k < n; ++k) {
-        CHECK(without[k] == doctest::Approx(with[source[k]]).epsilon(kTolerance));
+        CHECK(without[k] == h6::test::near(with[source[k]]).epsilon(kTolerance));
       }
     }
   });
@@ -247,7 +248,7 @@ TEST_CASE("gauss_weights: the order of the contacts does not matter") {
       const auto a = weights(c.view(true), hat, {0.05f, 1.0f});
       const auto b = weights(turned.view(true), hat, {0.05f, 1.0f});
       for (std::size_t i = 0; i < c.count; ++i) {
-        CHECK(b[i] == doctest::Approx(a[source(i)]).epsilon(kTolerance));
+        CHECK(b[i] == h6::test::near(a[source(i)]).epsilon(kTolerance));
       }
     }
   });

@@ -31,13 +31,26 @@ void* __libc_calloc(size_t, size_t);
 void* __libc_realloc(void*, size_t);
 void* __libc_memalign(size_t, size_t);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-void* malloc(size_t n) { note(allocations); return __libc_malloc(n); }
-void* calloc(size_t n, size_t m) { note(allocations); return __libc_calloc(n, m); }
-void* realloc(void* p, size_t n) { note(allocations); return __libc_realloc(p, n); }
-void* aligned_alloc(size_t a, size_t n) { note(allocations); return __libc_memalign(a, n); }
+void* malloc(size_t n) {
+  note(allocations);
+  return __libc_malloc(n);
+}
+void* calloc(size_t n, size_t m) {
+  note(allocations);
+  return __libc_calloc(n, m);
+}
+void* realloc(void* p, size_t n) {
+  note(allocations);
+  return __libc_realloc(p, n);
+}
+void* aligned_alloc(size_t a, size_t n) {
+  note(allocations);
+  return __libc_memalign(a, n);
+}
 int pthread_mutex_lock(pthread_mutex_t* mutex) {
   note(locks);
-  static const auto next = reinterpret_cast<int (*)(pthread_mutex_t*)>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+  static const auto next =
+      reinterpret_cast<int (*)(pthread_mutex_t*)>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
   return next(mutex);
 }
 #endif
@@ -49,10 +62,12 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-// A ball pressed into a conforming bowl: hundreds of contacts in all directions, body rolling about.
+// A ball pressed into a conforming bowl: hundreds of contacts in all directions, body rolling
+// about.
 struct BallInBowl {
-  FieldArrays bowl = sample_analytic([](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
-                                     {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  FieldArrays bowl = sample_analytic(
+      [](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
+      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
   ShellArrays ball = sphere_points(20 * mm, 30000);
   Model model{{def_of(bowl)}, {ball.def()}};
   std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
@@ -60,7 +75,8 @@ struct BallInBowl {
   h6SessionDef def = h6DefaultSessionDef();
   h6Session* session = nullptr;
 
-  explicit BallInBowl(unsigned threads, h6Method method = H6_METHOD_ROBUST, h6Gradient gradient = H6_SYMMETRIC) {
+  explicit BallInBowl(unsigned threads, h6Method method = H6_METHOD_ROBUST,
+                      h6Gradient gradient = H6_SYMMETRIC) {
     bodies[0].fixed = true, bodies[0].field = 0;
     bodies[1].shell = 0;
     hand.body = 1;
@@ -76,7 +92,8 @@ struct BallInBowl {
   }
   ~BallInBowl() { h6DestroySession(session); }
   h6DeviceSample sample(int i) const {
-    h6DeviceSample s = hand_at(pose(2 * mm * std::sin(0.02 * i), 1.5 * mm * std::cos(0.013 * i), 1 * mm * std::sin(0.05 * i)));
+    h6DeviceSample s = hand_at(pose(2 * mm * std::sin(0.02 * i), 1.5 * mm * std::cos(0.013 * i),
+                                    1 * mm * std::sin(0.05 * i)));
     const double a = 0.2 * std::sin(0.01 * i);
     s.pose.q = {std::cos(a), 0, std::sin(a), 0};
     return s;
@@ -98,7 +115,8 @@ TEST_CASE("a thousand frames allocate nothing and take no lock, on one thread an
     CHECK(locks.exchange(0) == 1);
   }
   for (const unsigned threads : {1u, 2u})
-    for (const h6Method method : {H6_METHOD_GLOBAL, H6_METHOD_GAUSS3, H6_METHOD_GAUSS6, H6_METHOD_ROBUST})
+    for (const h6Method method :
+         {H6_METHOD_GLOBAL, H6_METHOD_GAUSS3, H6_METHOD_GAUSS6, H6_METHOD_ROBUST})
       for (const h6Gradient gradient : {H6_SYMMETRIC, H6_EXACT}) {
         BallInBowl scene(threads, method, gradient);
         std::uint32_t most = 0;

@@ -17,7 +17,9 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-double uniform(std::mt19937_64& random) { return std::ldexp(static_cast<double>(random() >> 11), -52) - 1; }  // [-1, 1)
+double uniform(std::mt19937_64& random) {
+  return std::ldexp(static_cast<double>(random() >> 11), -52) - 1;
+}  // [-1, 1)
 Vec3 vector(std::mt19937_64& random) { return {uniform(random), uniform(random), uniform(random)}; }
 
 // Contacts against a plane field of a moving body, all in double: the specification itself, moved.
@@ -31,16 +33,19 @@ struct Planes {
     Quat qa = Quat::Identity(), qb = Quat::Identity();
     Vec6 ua = Vec6::Zero(), ub = Vec6::Zero();
   };
-  struct Wrenches { Vec6 a, b; };
+  struct Wrenches {
+    Vec6 a, b;
+  };
 
-  // Straight from METHOD Sec. 2, contact by contact.
+  // Straight from METHOD.md Sec. 2, contact by contact.
   Wrenches wrenches(const State& s) const {
     Wrenches w{Vec6::Zero(), Vec6::Zero()};
     const Vec3 g = s.qb * plane_normal, o = s.xb + s.qb * plane_point;
     for (std::size_t i = 0; i < point.size(); ++i) {
       const Vec3 r = s.qa * point[i], n = s.qa * normal[i], p = s.xa + r, rb = p - s.xb;
       const double d = g.dot(p - o);
-      const double rate = n.dot(s.ua.head<3>() + s.ua.tail<3>().cross(r)) - n.dot(s.ub.head<3>() + s.ub.tail<3>().cross(rb));
+      const double rate = n.dot(s.ua.head<3>() + s.ua.tail<3>().cross(r)) -
+                          n.dot(s.ub.head<3>() + s.ub.tail<3>().cross(rb));
       const Vec3 f = k * (-d - beta * rate) * n;
       w.a.head<3>() += f;
       w.a.tail<3>() += r.cross(f);
@@ -75,7 +80,8 @@ TEST_CASE("the exact contact gradients of both bodies are the derivatives of the
   state.ub << -0.01, 0.01, 0.02, 0.1, 0.1, -0.2;
 
   // The engine's own stage, fed with these contacts through a session's arrays.
-  test::FieldArrays field = test::sample_analytic([](double, double, double z) { return z; }, {0, 0, -4 * mm}, mm, 1, 1, 1);
+  test::FieldArrays field = test::sample_analytic([](double, double, double z) { return z; },
+                                                  {0, 0, -4 * mm}, mm, 1, 1, 1);
   test::ShellArrays shell = test::bottom_face(1 * mm, 1 * mm, 1 * mm, 7, 6);
   test::Model model({test::def_of(field)}, {shell.def()});
   std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
@@ -91,7 +97,8 @@ TEST_CASE("the exact contact gradients of both bodies are the derivatives of the
   REQUIRE(s->pair_count == 1);
   Body &a = s->bodies[0], &b = s->bodies[1];
   a.x = state.xa, a.q = state.qa, a.R = state.qa.toRotationMatrix(), b.x = state.xb;
-  a.v = state.ua.head<3>(), a.w = state.ua.tail<3>(), b.v = state.ub.head<3>(), b.w = state.ub.tail<3>();
+  a.v = state.ua.head<3>(), a.w = state.ua.tail<3>(), b.v = state.ub.head<3>(),
+  b.w = state.ub.tail<3>();
   Contacts& c = s->contacts[0];
   c.count = scene.point.size();
   const Vec3 g = scene.plane_normal;
@@ -100,9 +107,12 @@ TEST_CASE("the exact contact gradients of both bodies are the derivatives of the
     c.depth[i] = static_cast<float>(-g.dot(state.xa + r - scene.plane_point));
     REQUIRE(c.depth[i] > 0);
     c.weight[i] = 1;
-    c.nx[i] = static_cast<float>(n.x()), c.ny[i] = static_cast<float>(n.y()), c.nz[i] = static_cast<float>(n.z());
-    c.gx[i] = static_cast<float>(g.x()), c.gy[i] = static_cast<float>(g.y()), c.gz[i] = static_cast<float>(g.z());
-    c.rx[i] = static_cast<float>(r.x()), c.ry[i] = static_cast<float>(r.y()), c.rz[i] = static_cast<float>(r.z());
+    c.nx[i] = static_cast<float>(n.x()), c.ny[i] = static_cast<float>(n.y()),
+    c.nz[i] = static_cast<float>(n.z());
+    c.gx[i] = static_cast<float>(g.x()), c.gy[i] = static_cast<float>(g.y()),
+    c.gz[i] = static_cast<float>(g.z());
+    c.rx[i] = static_cast<float>(r.x()), c.ry[i] = static_cast<float>(r.y()),
+    c.rz[i] = static_cast<float>(r.z());
   }
   s->pairs[0].begin = 0;
   s->pairs[0].end = c.count;
@@ -112,7 +122,7 @@ TEST_CASE("the exact contact gradients of both bodies are the derivatives of the
   const Planes::Wrenches w = scene.wrenches(state);
   CHECK((a.f - w.a).norm() < 2e-5 * w.a.norm());
   CHECK((b.f - w.b).norm() < 2e-5 * w.b.norm());
-  // The undamped forces: METHOD keeps damping's own geometry out of K.
+  // The undamped forces: METHOD.md keeps damping's own geometry out of K.
   Planes elastic = scene;
   elastic.beta = 0;
   Mat6 numeric[2][2], numeric_d[2][2];
@@ -121,7 +131,8 @@ TEST_CASE("the exact contact gradients of both bodies are the derivatives of the
       const double step = i < 3 ? 1e-7 : 1e-5;
       Vec6 dq = Vec6::Zero();
       dq[i] = step;
-      const auto up = elastic.wrenches(Planes::moved(state, by, dq)), down = elastic.wrenches(Planes::moved(state, by, -dq));
+      const auto up = elastic.wrenches(Planes::moved(state, by, dq)),
+                 down = elastic.wrenches(Planes::moved(state, by, -dq));
       numeric[0][by].col(i) = (up.a - down.a) / (2 * step);
       numeric[1][by].col(i) = (up.b - down.b) / (2 * step);
       Planes::State faster = state, slower = state;
@@ -152,8 +163,10 @@ TEST_CASE("the exact contact gradients of both bodies are the derivatives of the
   h6DestroySession(s);
 }
 
-TEST_CASE("the coupling's gradients are the derivatives of its wrench, below and above saturation") {
-  test::FieldArrays field = test::sample_analytic([](double, double, double z) { return z; }, {0, 0, -4 * mm}, mm, 1, 1, 1);
+TEST_CASE(
+    "the coupling's gradients are the derivatives of its wrench, below and above saturation") {
+  test::FieldArrays field = test::sample_analytic([](double, double, double z) { return z; },
+                                                  {0, 0, -4 * mm}, mm, 1, 1, 1);
   test::ShellArrays shell = test::bottom_face(10 * mm, 8 * mm, 5 * mm, 5, 5);
   test::Model model({test::def_of(field)}, {shell.def()});
   for (const double reach : {0.3, 10.0}) {

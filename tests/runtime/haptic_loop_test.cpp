@@ -1,6 +1,7 @@
 // The loop joins devices, session and clock: what it runs, counts and hands over.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <array>
 #include <atomic>
@@ -19,7 +20,8 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-// A device made of two lambdas' worth of state: sinks 3 mm into the floor within a tenth of a second.
+// A device made of two lambdas' worth of state: sinks 3 mm into the floor within a tenth of a
+// second.
 struct Pusher {
   std::vector<h6DeviceCommand> written;
   std::atomic<int> stops{0};
@@ -47,7 +49,8 @@ struct Pusher {
 };
 
 struct Scene {
-  FieldArrays field = sample_analytic([](double, double, double z) { return z; }, {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
+  FieldArrays field = sample_analytic([](double, double, double z) { return z; },
+                                      {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
   ShellArrays shell = bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
   Model model{{def_of(field)}, {shell.def()}};
   h6Session* session = nullptr;
@@ -83,7 +86,8 @@ struct Scene {
     std::array<h6FrameRecord, 64> some;
     const auto drain = [&] {
       while (const std::size_t n = h6ReadRecords(loop, some.data(), some.size()))
-        run.records.insert(run.records.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(n));
+        run.records.insert(run.records.end(), some.begin(),
+                           some.begin() + static_cast<std::ptrdiff_t>(n));
     };
     while (h6LoopRunning(loop)) {
       drain();
@@ -107,7 +111,7 @@ TEST_CASE("virtual time runs every frame, loses no record and stops the device")
   CHECK(scene.pusher.stops >= 1);
   for (std::size_t i = 0; i < run.records.size(); ++i) {
     REQUIRE(run.records[i].report.frame == i);
-    REQUIRE(run.records[i].time == doctest::Approx(1e-3 * static_cast<double>(i)));
+    REQUIRE(run.records[i].time == h6::test::near(1e-3 * static_cast<double>(i)));
   }
   CHECK(run.records.back().report.contacts == 144);
   CHECK(scene.pusher.written.back().wrench.force.z > 0.5);
@@ -133,7 +137,8 @@ TEST_CASE("real time takes the time it says, and tells what it was granted") {
   CHECK(std::string(run.report.granted).size() > 20);
   // Each late frame has exactly one cause.
   for (const h6FrameRecord& r : run.records) CHECK((r.late & (r.late - 1)) == 0);
-  CHECK(run.report.late_compute + run.report.late_stolen + run.report.late_wakeup <= run.report.frames);
+  CHECK(run.report.late_compute + run.report.late_stolen + run.report.late_wakeup <=
+        run.report.frames);
 }
 
 TEST_CASE("a device that fails is told zero force ever after, with the cause") {

@@ -19,8 +19,9 @@ constexpr double mm = 1e-3;
 constexpr float nan_f = std::numeric_limits<float>::quiet_NaN();
 
 FieldArrays ball_field() {
-  return sample_analytic([](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 10 * mm; },
-                         {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  return sample_analytic(
+      [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 10 * mm; },
+      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
 }
 
 // What creating a model of this one field and shell says; empty when it works.
@@ -34,7 +35,9 @@ std::string complaint(const h6FieldDef* field, const h6ShellDef* shell) {
   h6DestroyModel(model);
   return text;
 }
-bool says(const std::string& text, const char* word) { return text.find(word) != std::string::npos; }
+bool says(const std::string& text, const char* word) {
+  return text.find(word) != std::string::npos;
+}
 
 }  // namespace
 
@@ -61,10 +64,12 @@ TEST_CASE("a field comes back as it was given") {
 }
 
 TEST_CASE("far from the surface the answer is a bound with the right sign") {
-  FieldArrays field = sample_analytic([](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 22 * mm; },
-                                      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  FieldArrays field = sample_analytic(
+      [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 22 * mm; },
+      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
   Model model({def_of(field)}, {});
-  const double points[] = {27 * mm, 27 * mm, 27 * mm, 0, 0, 0, 500 * mm, 0, 0, -31 * mm, 30 * mm, -28 * mm};
+  const double points[] = {27 * mm,  27 * mm, 27 * mm, 0,        0,       0,
+                           500 * mm, 0,       0,       -31 * mm, 30 * mm, -28 * mm};
   double d[4];
   std::uint8_t exact[4];
   h6SampleField(model.handle, 0, points, 4, d, nullptr, exact);
@@ -80,7 +85,8 @@ TEST_CASE("far from the surface the answer is a bound with the right sign") {
 }
 
 TEST_CASE("a field that cannot be is refused with a sentence that names the entry") {
-  const auto refused = [](const std::function<void(FieldArrays&, h6FieldDef&)>& spoil, const char* word) {
+  const auto refused = [](const std::function<void(FieldArrays&, h6FieldDef&)>& spoil,
+                          const char* word) {
     FieldArrays arrays = ball_field();
     h6FieldDef def = def_of(arrays);
     REQUIRE(complaint(&def, nullptr).empty());
@@ -102,7 +108,8 @@ TEST_CASE("a field that cannot be is refused with a sentence that names the entr
 }
 
 TEST_CASE("a shell that would lose contacts is refused") {
-  const auto refused = [](const std::function<void(ShellArrays&, h6ShellDef&)>& spoil, const char* word) {
+  const auto refused = [](const std::function<void(ShellArrays&, h6ShellDef&)>& spoil,
+                          const char* word) {
     ShellArrays arrays = sphere_points(10 * mm, 50);
     h6ShellDef def = arrays.def();
     REQUIRE(complaint(nullptr, &def).empty());
@@ -135,7 +142,10 @@ TEST_CASE("a session that cannot run is refused with a sentence that names the v
     h6SessionDef def;
   };
   const auto complaint_of = [&](const std::function<void(Scene&)>& spoil) {
-    Scene s{{h6DefaultBodyDef(), h6DefaultBodyDef()}, h6DefaultHandDef(), {1, 0}, h6DefaultSessionDef()};
+    Scene s{{h6DefaultBodyDef(), h6DefaultBodyDef()},
+            h6DefaultHandDef(),
+            {1, 0},
+            h6DefaultSessionDef()};
     s.bodies[0].fixed = true, s.bodies[0].field = 0;
     s.bodies[1].shell = 0;
     s.hand.body = 1;
@@ -173,8 +183,14 @@ TEST_CASE("a session that cannot run is refused with a sentence that names the v
       {[](Scene& s) { s.hand.coupling.stiffness = 0; }, "coupling stiffness"},
       {[](Scene& s) { s.hand.coupling.max_depth_voxels = 0; }, "max_depth_voxels"},
       {[](Scene& s) { s.hand.coupling.max_force = -2; }, "max_force"},
-      {[](Scene& s) { s.pair = {0, 1}; }, "no shell"},
-      {[](Scene& s) { s.pair = {1, 1}; }, "itself"},
+      {[](Scene& s) {
+         s.pair = {0, 1};
+       },
+       "no shell"},
+      {[](Scene& s) {
+         s.pair = {1, 1};
+       },
+       "itself"},
       {[](Scene& s) { s.def.hand_count = 99; }, "hands"},
       {[](Scene& s) { s.def.body_count = 0; }, "bodies"},
   };
@@ -185,18 +201,19 @@ TEST_CASE("a session that cannot run is refused with a sentence that names the v
 }
 
 TEST_CASE("all memory of a model and a session comes from the given allocator and goes back") {
-  struct Counter { std::size_t bytes = 0, calls = 0; } counter;
-  const h6Allocator allocator{
-      [](void* user, std::size_t n, std::size_t alignment) {
-        auto& c = *static_cast<Counter*>(user);
-        c.bytes += n, ++c.calls;
-        return std::aligned_alloc(alignment, n);
-      },
-      [](void* user, void* memory, std::size_t n) {
-        static_cast<Counter*>(user)->bytes -= n;
-        std::free(memory);
-      },
-      &counter};
+  struct Counter {
+    std::size_t bytes = 0, calls = 0;
+  } counter;
+  const h6Allocator allocator{[](void* user, std::size_t n, std::size_t alignment) {
+                                auto& c = *static_cast<Counter*>(user);
+                                c.bytes += n, ++c.calls;
+                                return std::aligned_alloc(alignment, n);
+                              },
+                              [](void* user, void* memory, std::size_t n) {
+                                static_cast<Counter*>(user)->bytes -= n;
+                                std::free(memory);
+                              },
+                              &counter};
   FieldArrays field = ball_field();
   ShellArrays shell = sphere_points(5 * mm, 100);
   const h6FieldDef f = def_of(field);
@@ -223,7 +240,8 @@ TEST_CASE("all memory of a model and a session comes from the given allocator an
 }
 
 TEST_CASE("a machine without memory is an error, not a crash") {
-  const h6Allocator none{[](void*, std::size_t, std::size_t) -> void* { return nullptr; }, [](void*, void*, std::size_t) {}, nullptr};
+  const h6Allocator none{[](void*, std::size_t, std::size_t) -> void* { return nullptr; },
+                         [](void*, void*, std::size_t) {}, nullptr};
   FieldArrays field = ball_field();
   const h6FieldDef f = def_of(field);
   h6ModelDef def = h6DefaultModelDef();
@@ -247,7 +265,8 @@ TEST_CASE("every name has its value and back") {
   CHECK(h6MethodFromName("gauss6+facing+depth", &method, &pieces) == 0);
   CHECK(method == H6_METHOD_GAUSS6);
   CHECK(pieces == (H6_PIECE_FACING | H6_PIECE_DEPTH));
-  for (const char* wrong : {"", "gauss", "gauss66", "robust+", "robust+nothing", "+facing", "Robust"})
+  for (const char* wrong :
+       {"", "gauss", "gauss66", "robust+", "robust+nothing", "+facing", "Robust"})
     CHECK_MESSAGE(h6MethodFromName(wrong, &method, &pieces) != 0, wrong);
   CHECK(h6MethodFromName(nullptr, &method, &pieces) != 0);
   for (std::uint32_t bit = 1; bit <= H6_LATE; bit <<= 1) CHECK(h6StatusName(bit) != nullptr);

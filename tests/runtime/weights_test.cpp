@@ -1,6 +1,7 @@
-// What each rule promises about shared stiffness, seen through whole frames. METHOD, Sec. 3.
+// What each rule promises about shared stiffness, seen through whole frames. METHOD.md, Sec. 3.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+#include "tests/support/near.h"
 
 #include <array>
 #include <cmath>
@@ -46,7 +47,8 @@ h6ContactDef method(h6Method m, std::uint32_t pieces = 0) {
 }
 
 FieldArrays floor_field() {
-  return sample_analytic([](double, double, double z) { return z; }, {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
+  return sample_analytic([](double, double, double z) { return z; }, {-32 * mm, -32 * mm, -16 * mm},
+                         mm, 8, 8, 4);
 }
 const h6Method gauss_methods[] = {H6_METHOD_GAUSS3, H6_METHOD_GAUSS6, H6_METHOD_ROBUST};
 
@@ -61,8 +63,8 @@ TEST_CASE("a lone contact keeps the whole stiffness") {
   for (int m = 0; m < H6_METHOD_COUNT; ++m) {
     Frame frame(model, pose(0, 0, 4.7 * mm), method(static_cast<h6Method>(m)));
     REQUIRE(frame.contacts.count == 1);
-    CHECK(frame.contacts.weight[0] == doctest::Approx(1).epsilon(1e-5));
-    CHECK(frame.contacts.depth[0] == doctest::Approx(0.3 * mm).epsilon(1e-3));
+    CHECK(frame.contacts.weight[0] == h6::test::near(1).epsilon(1e-5));
+    CHECK(frame.contacts.depth[0] == h6::test::near(0.3 * mm).epsilon(1e-3));
   }
 }
 
@@ -74,7 +76,7 @@ TEST_CASE("coincident contacts together keep the stiffness of one") {
   for (const h6Method m : gauss_methods) {
     Frame frame(model, pose(0, 0, 4.7 * mm), method(m));
     REQUIRE(frame.contacts.count == 50);
-    CHECK(frame.net == doctest::Approx(1).epsilon(1e-4));
+    CHECK(frame.net == h6::test::near(1).epsilon(1e-4));
   }
 }
 
@@ -89,12 +91,14 @@ TEST_CASE("a flat wall of 144 spread points gives k, at most 2k, at most 5k") {
     CHECK(frame.net <= most[i]);
     CHECK(frame.net >= 1 - 1e-4);
   }
-  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GAUSS3)).net == doctest::Approx(1).epsilon(1e-4));
-  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GLOBAL)).net == doctest::Approx(10));
-  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_NONE)).net == doctest::Approx(144));
+  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GAUSS3)).net ==
+        h6::test::near(1).epsilon(1e-4));
+  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GLOBAL)).net == h6::test::near(10));
+  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_NONE)).net == h6::test::near(144));
 }
 
-TEST_CASE("two clusters with equal normals and opposite torques carry equal stiffness under robust") {
+TEST_CASE(
+    "two clusters with equal normals and opposite torques carry equal stiffness under robust") {
   FieldArrays field = floor_field();
   ShellArrays clusters;
   for (int i = 0; i < 1000; ++i) clusters.add(15 * mm, 0, -5 * mm, 0, 0, 1);
@@ -103,8 +107,9 @@ TEST_CASE("two clusters with equal normals and opposite torques carry equal stif
   Frame frame(model, pose(0, 0, 4.8 * mm), method(H6_METHOD_ROBUST));
   REQUIRE(frame.contacts.count == 1014);
   double large = 0, small = 0;
-  for (std::size_t i = 0; i < frame.contacts.count; ++i) (frame.contacts.rx[i] > 0 ? large : small) += frame.contacts.weight[i];
-  CHECK(large == doctest::Approx(small).epsilon(0.05));
+  for (std::size_t i = 0; i < frame.contacts.count; ++i)
+    (frame.contacts.rx[i] > 0 ? large : small) += frame.contacts.weight[i];
+  CHECK(large == h6::test::near(small).epsilon(0.05));
 }
 
 TEST_CASE("a contact whose normal opposes the field never pulls under the facing filter") {
@@ -115,7 +120,7 @@ TEST_CASE("a contact whose normal opposes the field never pulls under the facing
   Model model({def_of(field)}, {wrong.def()});
   CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_ROBUST)).net == 0);
   CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GAUSS6, H6_PIECE_FACING)).net == 0);
-  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GAUSS6)).net == doctest::Approx(1));
+  CHECK(Frame(model, pose(0, 0, 4.7 * mm), method(H6_METHOD_GAUSS6)).net == h6::test::near(1));
 }
 
 TEST_CASE("robust forces enter from zero: a contact that just touches weighs nothing") {
@@ -132,10 +137,12 @@ TEST_CASE("robust forces enter from zero: a contact that just touches weighs not
 }
 
 TEST_CASE("weights do not depend on the order of the points, nor on how the scene is turned") {
-  FieldArrays field = sample_analytic([](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
-                                      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  FieldArrays field = sample_analytic(
+      [](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
+      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
   ShellArrays ball = sphere_points(20 * mm, 3000), reversed;
-  for (std::size_t i = ball.x.size(); i-- > 0;) reversed.add(ball.x[i], ball.y[i], ball.z[i], ball.nx[i], ball.ny[i], ball.nz[i]);
+  for (std::size_t i = ball.x.size(); i-- > 0;)
+    reversed.add(ball.x[i], ball.y[i], ball.z[i], ball.nx[i], ball.ny[i], ball.nz[i]);
   Model straight({def_of(field)}, {ball.def()}), backwards({def_of(field)}, {reversed.def()});
   for (const h6Method m : gauss_methods) {
     h6ContactDef c = method(m);
@@ -143,9 +150,9 @@ TEST_CASE("weights do not depend on the order of the points, nor on how the scen
     Frame a(straight, pose(0.9 * mm, 0, 0), c), b(backwards, pose(0.9 * mm, 0, 0), c);
     REQUIRE(a.contacts.count == b.contacts.count);
     REQUIRE(a.contacts.count > 100);
-    CHECK(a.net == doctest::Approx(b.net).epsilon(1e-5));
+    CHECK(a.net == h6::test::near(b.net).epsilon(1e-5));
     // The shell turned under the (round) field, displaced the same way in its new frame.
     Frame turned(straight, {{0, 0.9 * mm, 0}, {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}, c);
-    CHECK(turned.net == doctest::Approx(a.net).epsilon(0.02));
+    CHECK(turned.net == h6::test::near(a.net).epsilon(0.02));
   }
 }

@@ -22,9 +22,11 @@ TEST_CASE("every slice runs exactly once, whoever takes it, job after job") {
     long wrong = 0;
     for (int frame = 0; frame < 3000; ++frame) {
       team.begin_frame();
-      for (const std::size_t slices : {std::size_t{97}, std::size_t{2}, std::size_t{0}, std::size_t{1}}) {
+      for (const std::size_t slices :
+           {std::size_t{97}, std::size_t{2}, std::size_t{0}, std::size_t{1}}) {
         for (auto& r : ran) r.store(0, std::memory_order_relaxed);
-        team.for_slices(slices, [&](std::size_t i) { ran[i].fetch_add(1, std::memory_order_relaxed); });
+        team.for_slices(slices,
+                        [&](std::size_t i) { ran[i].fetch_add(1, std::memory_order_relaxed); });
         for (std::size_t i = 0; i < ran.size(); ++i) wrong += ran[i].load() != (i < slices ? 1 : 0);
       }
       team.end_frame(0);

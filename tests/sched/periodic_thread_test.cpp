@@ -18,9 +18,13 @@ TEST_CASE("ticks are numbered from 0 without a gap and end when the work says so
     PeriodicThreadOptions options;
     options.virtual_time = virtual_time;
     options.rate = 5000;
-    PeriodicThread thread(options, {nullptr,
-                                    [&](std::uint64_t n, const TickTiming&, double) { ticks.push_back(n); return n < 99; },
-                                    [&](std::uint64_t n, const TickTiming&) { done.push_back(n); }});
+    PeriodicThread thread(options,
+                          {nullptr,
+                           [&](std::uint64_t n, const TickTiming&, double) {
+                             ticks.push_back(n);
+                             return n < 99;
+                           },
+                           [&](std::uint64_t n, const TickTiming&) { done.push_back(n); }});
     thread.join();
     CHECK(!thread.running());
     REQUIRE(ticks.size() == 100);
@@ -33,10 +37,12 @@ TEST_CASE("a frame never starts before its deadline") {
   double earliest = 1e9;
   PeriodicThreadOptions options;
   options.spin_us = 100;
-  PeriodicThread thread(options, {nullptr, [&](std::uint64_t n, const TickTiming&, double wakeup_us) {
+  PeriodicThread thread(options, {nullptr,
+                                  [&](std::uint64_t n, const TickTiming&, double wakeup_us) {
                                     if (wakeup_us < earliest) earliest = wakeup_us;
                                     return n < 100;
-                                  }, nullptr});
+                                  },
+                                  nullptr});
   thread.join();
   CHECK(earliest >= 0);
 }
@@ -54,7 +60,8 @@ TEST_CASE("a frame that computes too long is late by its own computation; one th
                     while (thread_cpu_ns() < cpu) {
                     }
                   }
-                  if (n == 6) sleep_until_ns(until);  // what a machine that runs something else looks like
+                  if (n == 6)
+                    sleep_until_ns(until);  // what a machine that runs something else looks like
                   return n < 9;
                 },
                 [&](std::uint64_t n, const TickTiming& t) {
@@ -70,11 +77,13 @@ TEST_CASE("after a long stall the schedule moves on instead of catching up") {
   std::vector<std::int64_t> starts;
   PeriodicThreadOptions options;
   options.rate = 1000;
-  PeriodicThread thread(options, {nullptr, [&](std::uint64_t n, const TickTiming&, double) {
+  PeriodicThread thread(options, {nullptr,
+                                  [&](std::uint64_t n, const TickTiming&, double) {
                                     starts.push_back(now_ns());
                                     if (n == 5) sleep_until_ns(now_ns() + 50000000);
                                     return n < 20;
-                                  }, nullptr});
+                                  },
+                                  nullptr});
   thread.join();
   // 14 frames follow the stall: at their own rate, not in one burst.
   CHECK(starts[20] - starts[6] > 10 * 1000000);
@@ -83,8 +92,9 @@ TEST_CASE("after a long stall the schedule moves on instead of catching up") {
 TEST_CASE("what real-time support was granted is said in words") {
   RealtimeGrant grant;
   PeriodicThreadOptions options;
-  PeriodicThread thread(options, {[&](const RealtimeGrant& g) { grant = g; },
-                                  [](std::uint64_t, const TickTiming&, double) { return false; }, nullptr});
+  PeriodicThread thread(options,
+                        {[&](const RealtimeGrant& g) { grant = g; },
+                         [](std::uint64_t, const TickTiming&, double) { return false; }, nullptr});
   thread.join();
   const std::string text = grant.text;
   CHECK(text.find("core") != std::string::npos);

@@ -18,13 +18,15 @@ struct FieldArrays {
 
 using Distance = std::function<double(double, double, double)>;
 
-// A grid of bx x by x bz bricks from `origin`; a brick is stored when any of its 9^3 nodes is nearer
-// than `band` plus a cell's diagonal.
-inline FieldArrays sample_analytic(const Distance& f, h6Vec3 origin, double voxel, int bx, int by, int bz,
-                                   double band_voxels = 3) {
+// A grid of bx x by x bz bricks from `origin`; a brick is stored when any of its 9^3 nodes is
+// nearer than `band` plus a cell's diagonal.
+inline FieldArrays sample_analytic(const Distance& f, h6Vec3 origin, double voxel, int bx, int by,
+                                   int bz, double band_voxels = 3) {
   FieldArrays out;
   const double band = band_voxels * voxel;
-  const auto at = [&](int i, int j, int k) { return f(origin.x + voxel * i, origin.y + voxel * j, origin.z + voxel * k); };
+  const auto at = [&](int i, int j, int k) {
+    return f(origin.x + voxel * i, origin.y + voxel * j, origin.z + voxel * k);
+  };
   for (int c = 0; c < bz; ++c)
     for (int b = 0; b < by; ++b)
       for (int a = 0; a < bx; ++a) {
@@ -37,7 +39,8 @@ inline FieldArrays sample_analytic(const Distance& f, h6Vec3 origin, double voxe
         if (!near) continue;
         for (int k = 0; k < 8; ++k)
           for (int j = 0; j < 8; ++j)
-            for (int i = 0; i < 8; ++i) out.samples.push_back(static_cast<float>(at(8 * a + i, 8 * b + j, 8 * c + k)));
+            for (int i = 0; i < 8; ++i)
+              out.samples.push_back(static_cast<float>(at(8 * a + i, 8 * b + j, 8 * c + k)));
       }
   for (int c = 0; c <= bz; ++c)
     for (int b = 0; b <= by; ++b)
@@ -68,8 +71,10 @@ struct ShellArrays {
   std::vector<float> radius;
 
   void add(double px, double py, double pz, double ax, double ay, double az) {
-    x.push_back(static_cast<float>(px)), y.push_back(static_cast<float>(py)), z.push_back(static_cast<float>(pz));
-    nx.push_back(static_cast<float>(ax)), ny.push_back(static_cast<float>(ay)), nz.push_back(static_cast<float>(az));
+    x.push_back(static_cast<float>(px)), y.push_back(static_cast<float>(py)),
+        z.push_back(static_cast<float>(pz));
+    nx.push_back(static_cast<float>(ax)), ny.push_back(static_cast<float>(ay)),
+        nz.push_back(static_cast<float>(az));
   }
   h6ShellDef def() {
     const auto n = static_cast<std::uint32_t>(x.size());
@@ -125,6 +130,10 @@ struct Model {
 };
 
 inline h6Pose pose(double x, double y, double z) { return {{x, y, z}, {1, 0, 0, 0}}; }
-inline h6DeviceSample hand_at(const h6Pose& p) { h6DeviceSample s{}; s.pose = p; return s; }
+inline h6DeviceSample hand_at(const h6Pose& p) {
+  h6DeviceSample s{};
+  s.pose = p;
+  return s;
+}
 
 }  // namespace h6::test
