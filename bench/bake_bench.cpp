@@ -26,10 +26,14 @@ io::Mesh gear(int around, int across) {
   for (int i = 0; i < around; ++i)
     for (int j = 0; j < across; ++j) {
       const double t = 2 * M_PI * i / around, f = 2 * M_PI * j / across;
-      const double r = 0.01 * (1 + 0.2 * std::tanh(3 * std::sin(24 * t)) * (0.5 + 0.5 * std::cos(f)));
-      mesh.vertices.push_back({(0.03 + r * std::cos(f)) * std::cos(t), (0.03 + r * std::cos(f)) * std::sin(t), r * std::sin(f)});
+      const double r =
+          0.01 * (1 + 0.2 * std::tanh(3 * std::sin(24 * t)) * (0.5 + 0.5 * std::cos(f)));
+      mesh.vertices.push_back({(0.03 + r * std::cos(f)) * std::cos(t),
+                               (0.03 + r * std::cos(f)) * std::sin(t), r * std::sin(f)});
     }
-  const auto at = [&](int i, int j) { return static_cast<std::uint32_t>(i % around * across + j % across); };
+  const auto at = [&](int i, int j) {
+    return static_cast<std::uint32_t>(i % around * across + j % across);
+  };
   for (int i = 0; i < around; ++i)
     for (int j = 0; j < across; ++j) {
       mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
@@ -52,13 +56,15 @@ void bake_field(benchmark::State& state, const MeshPtr& mesh, int voxels, unsign
   state.counters["triangles"] = static_cast<double>(mesh->triangles.size());
 }
 
-void bake_shell(benchmark::State& state, const MeshPtr& mesh, std::size_t points, unsigned threads) {
+void bake_shell(benchmark::State& state, const MeshPtr& mesh, std::size_t points,
+                unsigned threads) {
   io::ShellBake options;
   options.points = points;
   options.threads = threads;
   for (auto _ : state) {
     auto shell = io::bake_shell(*mesh, options, nullptr);
-    if (!shell || shell->size() != points) return state.SkipWithError(shell ? "another number of points" : shell.error().c_str());
+    if (!shell || shell->size() != points)
+      return state.SkipWithError(shell ? "another number of points" : shell.error().c_str());
   }
   state.counters["triangles"] = static_cast<double>(mesh->triangles.size());
 }
@@ -67,11 +73,17 @@ void add(const std::string& name, const MeshPtr& mesh) {
   for (const unsigned threads : {1u, 2u}) {
     const std::string end = "/threads:" + std::to_string(threads);
     for (const int voxels : {256, 512})
-      benchmark::RegisterBenchmark(("bake/" + name + "/voxels:" + std::to_string(voxels) + end).c_str(), bake_field, mesh, voxels, threads)
-          ->Unit(benchmark::kMillisecond)->UseRealTime();
+      benchmark::RegisterBenchmark(
+          ("bake/" + name + "/voxels:" + std::to_string(voxels) + end).c_str(), bake_field, mesh,
+          voxels, threads)
+          ->Unit(benchmark::kMillisecond)
+          ->UseRealTime();
     for (const std::size_t points : {std::size_t{25269}, std::size_t{56823}})
-      benchmark::RegisterBenchmark(("bake/" + name + "/points:" + std::to_string(points) + end).c_str(), bake_shell, mesh, points, threads)
-          ->Unit(benchmark::kMillisecond)->UseRealTime();
+      benchmark::RegisterBenchmark(
+          ("bake/" + name + "/points:" + std::to_string(points) + end).c_str(), bake_shell, mesh,
+          points, threads)
+          ->Unit(benchmark::kMillisecond)
+          ->UseRealTime();
   }
 }
 
@@ -81,7 +93,9 @@ void add(const std::string& name, const MeshPtr& mesh) {
   if (const char* list = std::getenv("HAPSIX_BENCH_MESHES")) {
     std::stringstream files(list);
     for (std::string file; std::getline(files, file, ':');)
-      if (auto mesh = io::read_mesh(file)) add(std::filesystem::path(file).stem().string(), std::make_shared<io::Mesh>(std::move(*mesh)));
+      if (auto mesh = io::read_mesh(file))
+        add(std::filesystem::path(file).stem().string(),
+            std::make_shared<io::Mesh>(std::move(*mesh)));
   }
   return true;
 }();

@@ -1,7 +1,7 @@
 // frame_bench.cpp - whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold.
 //
-// The tool is pushed into the gap until it has the contacts asked for, then held there. Before a time
-// is reported, the contacts of the frame are compared with a brute-force pass over all points.
+// The tool is pushed into the gap until it has the contacts asked for, then held there. Before a
+// time is reported, the contacts of the frame are compared with a brute-force pass over all points.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -52,12 +52,14 @@ Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6D
 }
 
 h6Vec3 rotate(const h6Quat& q, const h6Vec3& v) {
-  const double tx = 2 * (q.y * v.z - q.z * v.y), ty = 2 * (q.z * v.x - q.x * v.z), tz = 2 * (q.x * v.y - q.y * v.x);
-  return {v.x + q.w * tx + q.y * tz - q.z * ty, v.y + q.w * ty + q.z * tx - q.x * tz, v.z + q.w * tz + q.x * ty - q.y * tx};
+  const double tx = 2 * (q.y * v.z - q.z * v.y), ty = 2 * (q.z * v.x - q.x * v.z),
+               tz = 2 * (q.x * v.y - q.y * v.x);
+  return {v.x + q.w * tx + q.y * tz - q.z * ty, v.y + q.w * ty + q.z * tx - q.x * tz,
+          v.z + q.w * tz + q.x * ty - q.y * tx};
 }
 
-// The next frame's contacts against all points at the pose before it. Points within a thousandth of a
-// voxel of the surface may fall on either side: they are sampled here along another path.
+// The next frame's contacts against all points at the pose before it. Points within a thousandth of
+// a voxel of the surface may fall on either side: they are sampled here along another path.
 bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   const h6Pose pose = h6GetBody(session, 1).pose;
   std::vector<double> points, depth(alpha()->watched_points.size());
@@ -65,7 +67,8 @@ bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
     const h6Vec3 q = rotate(pose.q, p);
     points.insert(points.end(), {q.x + pose.p.x, q.y + pose.p.y, q.z + pose.p.z});
   }
-  h6SampleField(alpha()->model.get(), alpha()->bodies[0].field, points.data(), depth.size(), depth.data(), nullptr, nullptr);
+  h6SampleField(alpha()->model.get(), alpha()->bodies[0].field, points.data(), depth.size(),
+                depth.data(), nullptr, nullptr);
   h6Step(session, &held, nullptr);
   const h6Contacts found = h6GetContacts(session, 1);
   std::vector<bool> touching(depth.size());
@@ -87,7 +90,8 @@ void frame(benchmark::State& state, h6Method method, unsigned threads, bool cold
   h6DeviceSample held{};
   Session session = pushed_in(method, threads, 100, &held);
   if (!session) return state.SkipWithError("no session");
-  if (!contacts_are_right(session.get(), held)) return state.SkipWithError("contacts differ from brute force");
+  if (!contacts_are_right(session.get(), held))
+    return state.SkipWithError("contacts differ from brute force");
   std::vector<double> times;
   std::map<int, double> stages;
   double contacts = 0;
@@ -100,15 +104,19 @@ void frame(benchmark::State& state, h6Method method, unsigned threads, bool cold
     contacts += report.contacts;
     for (int i = 0; i < H6_STAGE_COUNT; ++i) stages[i] += report.stage_us[i];
   }
-  if (!contacts_are_right(session.get(), held)) return state.SkipWithError("contacts differ from brute force");
+  if (!contacts_are_right(session.get(), held))
+    return state.SkipWithError("contacts differ from brute force");
   std::sort(times.begin(), times.end());
   const double n = static_cast<double>(times.size());
-  const auto at = [&](double p) { return times[std::min(times.size() - 1, static_cast<std::size_t>(p * n))]; };
+  const auto at = [&](double p) {
+    return times[std::min(times.size() - 1, static_cast<std::size_t>(p * n))];
+  };
   state.counters["contacts"] = contacts / n;
   state.counters["p50_us"] = at(0.5);
   state.counters["p99_us"] = at(0.99);
   state.counters["max_us"] = times.back();
-  for (const auto& [stage, sum] : stages) state.counters[std::string(h6StageName(static_cast<h6Stage>(stage))) + "_us"] = sum / n;
+  for (const auto& [stage, sum] : stages)
+    state.counters[std::string(h6StageName(static_cast<h6Stage>(stage))) + "_us"] = sum / n;
 }
 
 [[maybe_unused]] const bool registered = [] {
@@ -116,8 +124,12 @@ void frame(benchmark::State& state, h6Method method, unsigned threads, bool cold
     for (const unsigned threads : {1u, 2u})
       for (const bool cold : {false, true}) {
         const auto method = static_cast<h6Method>(m);
-        const std::string name = std::string("frame/alpha/") + h6MethodName(method) + "/threads:" + std::to_string(threads) + (cold ? "/cold" : "/warm");
-        benchmark::RegisterBenchmark(name.c_str(), frame, method, threads, cold)->UseManualTime()->Unit(benchmark::kMicrosecond)->Iterations(cold ? 300 : 5000);
+        const std::string name = std::string("frame/alpha/") + h6MethodName(method) +
+                                 "/threads:" + std::to_string(threads) + (cold ? "/cold" : "/warm");
+        benchmark::RegisterBenchmark(name.c_str(), frame, method, threads, cold)
+            ->UseManualTime()
+            ->Unit(benchmark::kMicrosecond)
+            ->Iterations(cold ? 300 : 5000);
       }
   return true;
 }();

@@ -23,7 +23,10 @@ constexpr double kSeconds = 5;
 void report(benchmark::State& state, const char* what, std::vector<double>& us) {
   if (us.empty()) return;
   std::sort(us.begin(), us.end());
-  const auto at = [&](double p) { return us[std::min(us.size() - 1, static_cast<std::size_t>(p * static_cast<double>(us.size())))]; };
+  const auto at = [&](double p) {
+    return us[std::min(us.size() - 1,
+                       static_cast<std::size_t>(p * static_cast<double>(us.size())))];
+  };
   state.counters[std::string(what) + "_p50_us"] = at(0.5);
   state.counters[std::string(what) + "_p99_us"] = at(0.99);
   state.counters[std::string(what) + "_p999_us"] = at(0.999);
@@ -37,7 +40,8 @@ void haptic_thread(benchmark::State& state, double rate, double spin_us) {
   h6SessionDef def = (*loaded)->session_def();
   def.rate = rate;
   device::HandPath path;
-  for (const io::PathRow& row : (*loaded)->scene.hands[0].path) path.time.push_back(row.t), path.pose.push_back(row.pose);
+  for (const io::PathRow& row : (*loaded)->scene.hands[0].path)
+    path.time.push_back(row.t), path.pose.push_back(row.pose);
   auto hand = device::PathDevice::open(path);
   for (auto _ : state) {
     h6Session* session = h6CreateSession((*loaded)->model.get(), &def, nullptr);
@@ -52,7 +56,8 @@ void haptic_thread(benchmark::State& state, double rate, double spin_us) {
     std::vector<h6FrameRecord> rows(loop_def.ring_frames);
     rows.resize(h6ReadRecords(loop, rows.data(), rows.size()));
     std::vector<double> wakeup, compute;
-    for (const h6FrameRecord& r : rows) wakeup.push_back(r.wakeup_us), compute.push_back(r.report.frame_us);
+    for (const h6FrameRecord& r : rows)
+      wakeup.push_back(r.wakeup_us), compute.push_back(r.report.frame_us);
     report(state, "wakeup", wakeup);
     report(state, "compute", compute);
     state.counters["late_compute"] = static_cast<double>(result.late_compute);
@@ -85,7 +90,8 @@ void plain_thread(benchmark::State& state, double rate) {
   for (const int rate : {1000, 4000}) {
     const std::string hz = std::to_string(rate) + "Hz";
     one(benchmark::RegisterBenchmark(("realtime/alpha/" + hz).c_str(), haptic_thread, rate, 0.0));
-    one(benchmark::RegisterBenchmark(("realtime/alpha/" + hz + "/spin:100us").c_str(), haptic_thread, rate, 100.0));
+    one(benchmark::RegisterBenchmark(("realtime/alpha/" + hz + "/spin:100us").c_str(),
+                                     haptic_thread, rate, 100.0));
     one(benchmark::RegisterBenchmark(("realtime/plain_thread/" + hz).c_str(), plain_thread, rate));
   }
   return true;

@@ -8,11 +8,11 @@
 
 namespace h6::device {
 
-// Rows in order of time. Between rows: straight lines and slerp; before the first and after the last
-// the hand is still.
+// Rows in order of time. Between rows: straight lines and slerp; before the first and after the
+// last the hand is still.
 struct HandPath {
-  std::vector<double> time;   // [s], strictly increasing, at least one
-  std::vector<h6Pose> pose;   // mesh frame of the body -> world, unit quaternions
+  std::vector<double> time;  // [s], strictly increasing, at least one
+  std::vector<h6Pose> pose;  // mesh frame of the body -> world, unit quaternions
 
   double duration() const { return time.empty() ? 0 : time.back(); }
   h6DeviceSample at(double t) const;  // pose and velocity, no buttons

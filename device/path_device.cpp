@@ -7,11 +7,14 @@
 namespace h6::device {
 namespace {
 
-double dot(const h6Quat& a, const h6Quat& b) { return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z; }
+double dot(const h6Quat& a, const h6Quat& b) {
+  return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 // a * conjugate(b)
 h6Quat difference(const h6Quat& a, const h6Quat& b) {
-  return {dot(a, b), -a.w * b.x + a.x * b.w - a.y * b.z + a.z * b.y, -a.w * b.y + a.y * b.w - a.z * b.x + a.x * b.z,
+  return {dot(a, b), -a.w * b.x + a.x * b.w - a.y * b.z + a.z * b.y,
+          -a.w * b.y + a.y * b.w - a.z * b.x + a.x * b.z,
           -a.w * b.z + a.z * b.w - a.x * b.y + a.y * b.x};
 }
 
@@ -53,9 +56,11 @@ h6DeviceSample HandPath::at(double t) const {
   const std::size_t i = static_cast<std::size_t>(after - time.begin());
   const h6Pose &a = pose[i - 1], &b = pose[i];
   const double seconds = time[i] - time[i - 1], s = (t - time[i - 1]) / seconds;
-  sample.pose.p = {a.p.x + s * (b.p.x - a.p.x), a.p.y + s * (b.p.y - a.p.y), a.p.z + s * (b.p.z - a.p.z)};
+  sample.pose.p = {a.p.x + s * (b.p.x - a.p.x), a.p.y + s * (b.p.y - a.p.y),
+                   a.p.z + s * (b.p.z - a.p.z)};
   sample.pose.q = slerp(a.q, b.q, s);
-  sample.velocity.linear = {(b.p.x - a.p.x) / seconds, (b.p.y - a.p.y) / seconds, (b.p.z - a.p.z) / seconds};
+  sample.velocity.linear = {(b.p.x - a.p.x) / seconds, (b.p.y - a.p.y) / seconds,
+                            (b.p.z - a.p.z) / seconds};
   sample.velocity.angular = angular_velocity(a.q, b.q, seconds);
   return sample;
 }
@@ -68,11 +73,13 @@ Outcome check_path(const HandPath& path) {
     const h6Pose& pose = path.pose[i];
     const double sum = path.time[i] + pose.p.x + pose.p.y + pose.p.z;
     if (!std::isfinite(sum) || std::fabs(dot(pose.q, pose.q) - 1) > 2e-3) {
-      std::snprintf(text, sizeof text, "row %zu of the hand path is not a finite pose with a unit quaternion", i + 1);
+      std::snprintf(text, sizeof text,
+                    "row %zu of the hand path is not a finite pose with a unit quaternion", i + 1);
       return Failure{text};
     }
     if (i > 0 && !(path.time[i] > path.time[i - 1])) {
-      std::snprintf(text, sizeof text, "row %zu of the hand path is not later than the row before it", i + 1);
+      std::snprintf(text, sizeof text,
+                    "row %zu of the hand path is not later than the row before it", i + 1);
       return Failure{text};
     }
   }

@@ -1,4 +1,5 @@
-// path_device.h - a hand that follows its path whatever it feels: an ideal, infinitely strong person.
+// path_device.h - a hand that follows its path whatever it feels: an ideal, infinitely strong
+// person.
 #pragma once
 #include <memory>
 

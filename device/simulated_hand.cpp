@@ -17,8 +17,9 @@ h6Vec3 cross(const h6Vec3& a, const h6Vec3& b) {
 }
 
 h6Quat product(const h6Quat& a, const h6Quat& b) {
-  return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-          a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+  return {
+      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 
 h6Vec3 rotate(const h6Quat& q, const h6Vec3& v) {
@@ -89,7 +90,7 @@ h6Device SimulatedHand::device() {
   d.self = this;
   std::snprintf(d.capabilities.name, sizeof d.capabilities.name, "simulated");
   d.capabilities.dof_in = d.capabilities.dof_out = 6;
-  d.capabilities.max_force = 30;   // of the order of a large desktop arm
+  d.capabilities.max_force = 30;  // of the order of a large desktop arm
   d.capabilities.max_torque = 3;
   d.capabilities.modes = H6_IMPEDANCE;
   d.read = [](void* self, double time, h6DeviceSample* out) {
@@ -103,7 +104,9 @@ h6Device SimulatedHand::device() {
     static_cast<SimulatedHand*>(self)->felt_ = command->wrench;
     return 0;
   };
-  d.stop = [](void* self) { static_cast<SimulatedHand*>(self)->stopped_.store(true, std::memory_order_relaxed); };
+  d.stop = [](void* self) {
+    static_cast<SimulatedHand*>(self)->stopped_.store(true, std::memory_order_relaxed);
+  };
   return d;
 }
 

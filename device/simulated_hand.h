@@ -15,13 +15,13 @@ namespace h6::device {
 
 // Order of magnitude of a relaxed human arm holding a stylus (Hogan 1989; Fu & Cavusoglu 2012).
 struct Arm {
-  double mass = 0.4;            // [kg]
-  double stiffness = 500;       // [N/m]
-  double damping = 20;          // [N s/m]
-  double inertia = 1e-3;        // [kg m^2]
+  double mass = 0.4;                // [kg]
+  double stiffness = 500;           // [N/m]
+  double damping = 20;              // [N s/m]
+  double inertia = 1e-3;            // [kg m^2]
   double rotational_stiffness = 3;  // [N m/rad]
   double rotational_damping = 0.1;  // [N m s/rad]
-  h6Vec3 grip{0, 0, 0};         // what the torque is about: the body's centre of mass, mesh frame [m]
+  h6Vec3 grip{0, 0, 0};  // what the torque is about: the body's centre of mass, mesh frame [m]
 };
 
 class SimulatedHand {
@@ -35,7 +35,7 @@ class SimulatedHand {
   HandPath path_;
   Arm arm_;
   double time_ = 0;
-  h6Vec3 x_{}, v_{}, w_{};      // the grip's position and the hand's velocities, world frame
+  h6Vec3 x_{}, v_{}, w_{};  // the grip's position and the hand's velocities, world frame
   h6Quat q_{1, 0, 0, 0};
   h6Wrench felt_{};
   std::atomic<bool> stopped_{false};  // the device renders nothing any more

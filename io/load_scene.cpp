@@ -14,7 +14,9 @@ namespace h6::io {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 class Loader {
  public:
@@ -22,7 +24,8 @@ class Loader {
 
   Outcome run() {
     for (const SceneBody& body : out_.scene.bodies)
-      if (Outcome done = add(body); !done) return Failure{"body '" + body.name + "': " + done.error()};
+      if (Outcome done = add(body); !done)
+        return Failure{"body '" + body.name + "': " + done.error()};
     for (const SceneHand& hand : out_.scene.hands) {
       h6HandDef def = h6DefaultHandDef();
       def.body = out_.body_index(hand.body);
@@ -70,7 +73,8 @@ class Loader {
   }
 
   template <class Data>
-  static Result<int> remember(std::map<std::string, int>& index, std::vector<Data>& all, const std::string& key, Data data) {
+  static Result<int> remember(std::map<std::string, int>& index, std::vector<Data>& all,
+                              const std::string& key, Data data) {
     index[key] = static_cast<int>(all.size());
     all.push_back(std::move(data));
     return static_cast<int>(all.size()) - 1;
@@ -84,7 +88,8 @@ class Loader {
     std::string key;
     if (!source.file.empty()) {
       key = "file " + source.file.string();
-      if (const auto known = field_index_.find(key); known != field_index_.end()) return known->second;
+      if (const auto known = field_index_.find(key); known != field_index_.end())
+        return known->second;
       Result<FieldData> read = read_field(source.file);
       if (!read) return read.failure();
       data = std::move(*read);
@@ -93,13 +98,15 @@ class Loader {
       Result<const Mesh*> mesh = mesh_of(source);
       if (!mesh) return mesh.failure();
       key = asset.hash = content_hash(**mesh, source.bake);
-      if (const auto known = field_index_.find(key); known != field_index_.end()) return known->second;
+      if (const auto known = field_index_.find(key); known != field_index_.end())
+        return known->second;
       Cached cached;
       Result<FieldData> baked = cached_field(**mesh, source.bake, &cached, progress_);
       if (!baked) return baked.failure();
       data = std::move(*baked);
       asset.from_cache = cached.hit;
-      for (const std::string& w : cached.warnings) out_.warnings.push_back("body '" + body.name + "': " + w);
+      for (const std::string& w : cached.warnings)
+        out_.warnings.push_back("body '" + body.name + "': " + w);
     }
     asset.seconds = since(start);
     asset.voxel_size = data.voxel_size;
@@ -122,7 +129,8 @@ class Loader {
       key = "points of " + body.name;
     } else if (!source.file.empty()) {
       key = "file " + source.file.string();
-      if (const auto known = shell_index_.find(key); known != shell_index_.end()) return known->second;
+      if (const auto known = shell_index_.find(key); known != shell_index_.end())
+        return known->second;
       Result<ShellData> read = read_shell(source.file);
       if (!read) return read.failure();
       data = std::move(*read);
@@ -131,13 +139,15 @@ class Loader {
       Result<const Mesh*> mesh = mesh_of(source);
       if (!mesh) return mesh.failure();
       key = asset.hash = content_hash(**mesh, source.bake);
-      if (const auto known = shell_index_.find(key); known != shell_index_.end()) return known->second;
+      if (const auto known = shell_index_.find(key); known != shell_index_.end())
+        return known->second;
       Cached cached;
       Result<ShellData> baked = cached_shell(**mesh, source.bake, &cached, progress_);
       if (!baked) return baked.failure();
       data = std::move(*baked);
       asset.from_cache = cached.hit;
-      for (const std::string& w : cached.warnings) out_.warnings.push_back("body '" + body.name + "': " + w);
+      for (const std::string& w : cached.warnings)
+        out_.warnings.push_back("body '" + body.name + "': " + w);
     }
     asset.seconds = since(start);
     asset.points = data.size();
@@ -161,15 +171,20 @@ class Loader {
         if (!mesh) return mesh.failure();
         found = solid_mass(**mesh, body.mass);
       }
-      if (!found && def.shell >= 0) found = shell_mass(shells_[static_cast<std::size_t>(def.shell)], body.mass);
+      if (!found && def.shell >= 0)
+        found = shell_mass(shells_[static_cast<std::size_t>(def.shell)], body.mass);
       if (!found)
-        return Failure{"its mass properties cannot be derived (no shell, no closed mesh): state 'com' and 'inertia'"};
+        return Failure{
+            "its mass properties cannot be derived (no shell, no closed mesh): state 'com' and "
+            "'inertia'"};
     }
     def.com = body.com ? *body.com : h6Vec3{found->com.x, found->com.y, found->com.z};
     std::array<double, 6> inertia = body.inertia ? *body.inertia : found->inertia;
     if (body.com && !body.inertia) {  // derived about its own centre: move it to the stated one
-      const double x = def.com.x - found->com.x, y = def.com.y - found->com.y, z = def.com.z - found->com.z, m = body.mass;
-      const double more[6] = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y), -m * x * y, -m * x * z, -m * y * z};
+      const double x = def.com.x - found->com.x, y = def.com.y - found->com.y,
+                   z = def.com.z - found->com.z, m = body.mass;
+      const double more[6] = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y),
+                              -m * x * y,          -m * x * z,          -m * y * z};
       for (int i = 0; i < 6; ++i) inertia[i] += more[i];
     }
     std::copy(inertia.begin(), inertia.end(), def.inertia);
@@ -181,7 +196,8 @@ class Loader {
     const int shell = out_.bodies[static_cast<std::size_t>(out_.hands[0].body)].shell;
     if (shell < 0) return;
     const ShellData& data = shells_[static_cast<std::size_t>(shell)];
-    for (std::size_t i = 0; i < data.size(); ++i) out_.watched_points.push_back({data.x[i], data.y[i], data.z[i]});
+    for (std::size_t i = 0; i < data.size(); ++i)
+      out_.watched_points.push_back({data.x[i], data.y[i], data.z[i]});
   }
 
   Outcome make_model() {

@@ -14,16 +14,16 @@ namespace h6::io {
 
 // One field or shell, whoever uses it: bodies with the same content share one.
 struct LoadedAsset {
-  std::string body;           // the first that uses it
+  std::string body;  // the first that uses it
   bool is_field = false;
-  std::string hash;           // of content and bake parameters
+  std::string hash;  // of content and bake parameters
   bool from_cache = false;
-  double seconds = 0;         // to bake or to read
-  double voxel_size = 0;      // field [m]
-  std::array<int, 3> nodes{}; // field: per axis
-  std::size_t bricks = 0;     // field
-  std::size_t points = 0;     // shell
-  int levels = 0;             // shell
+  double seconds = 0;          // to bake or to read
+  double voxel_size = 0;       // field [m]
+  std::array<int, 3> nodes{};  // field: per axis
+  std::size_t bricks = 0;      // field
+  std::size_t points = 0;      // shell
+  int levels = 0;              // shell
 };
 
 struct ModelDeleter {
@@ -33,14 +33,14 @@ struct ModelDeleter {
 struct LoadedScene {
   Scene scene;
   std::unique_ptr<h6Model, ModelDeleter> model;
-  std::vector<h6BodyDef> bodies;      // as scene.bodies
-  std::vector<h6HandDef> hands;       // as scene.hands
-  std::vector<h6Vec3> watched_points; // shell of the first hand's body, mesh frame [m]
+  std::vector<h6BodyDef> bodies;       // as scene.bodies
+  std::vector<h6HandDef> hands;        // as scene.hands
+  std::vector<h6Vec3> watched_points;  // shell of the first hand's body, mesh frame [m]
   std::vector<LoadedAsset> assets;
   std::vector<std::string> warnings;
 
   int body_index(const std::string& name) const;
-  double duration() const;            // the scene's, or to the end of its longest path [s]
+  double duration() const;  // the scene's, or to the end of its longest path [s]
   // Points at bodies and hands: valid while this object stays where it is.
   h6SessionDef session_def() const;
 };

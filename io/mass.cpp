@@ -14,7 +14,9 @@ std::array<double, 6> inertia_of(const std::array<double, 6>& m) {
   return {m[1] + m[2], m[0] + m[2], m[0] + m[1], -m[3], -m[4], -m[5]};
 }
 
-std::array<double, 6> outer(double x, double y, double z) { return {x * x, y * y, z * z, x * y, x * z, y * z}; }
+std::array<double, 6> outer(double x, double y, double z) {
+  return {x * x, y * y, z * z, x * y, x * z, y * z};
+}
 
 }  // namespace
 
@@ -22,7 +24,8 @@ std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
   const MeshAudit found = audit(mesh);
   if (!found.closed || found.flipped_edges > 0 || found.duplicates > 0) return std::nullopt;
   // About the middle of the box, so that parts far from their origin keep their digits.
-  const Vec3 o{(found.low.x + found.high.x) / 2, (found.low.y + found.high.y) / 2, (found.low.z + found.high.z) / 2};
+  const Vec3 o{(found.low.x + found.high.x) / 2, (found.low.y + found.high.y) / 2,
+               (found.low.z + found.high.z) / 2};
   double volume = 0;
   Vec3 first{0, 0, 0};
   std::array<double, 6> second{};
@@ -32,9 +35,11 @@ std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
       const Vec3& v = mesh.vertices[t[k]];
       p[k][0] = v.x - o.x, p[k][1] = v.y - o.y, p[k][2] = v.z - o.z;
     }
-    const double det = p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) - p[0][1] * (p[1][0] * p[2][2] - p[1][2] * p[2][0]) +
+    const double det = p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) -
+                       p[0][1] * (p[1][0] * p[2][2] - p[1][2] * p[2][0]) +
                        p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
-    const double s[3] = {p[0][0] + p[1][0] + p[2][0], p[0][1] + p[1][1] + p[2][1], p[0][2] + p[1][2] + p[2][2]};
+    const double s[3] = {p[0][0] + p[1][0] + p[2][0], p[0][1] + p[1][1] + p[2][1],
+                         p[0][2] + p[1][2] + p[2][2]};
     volume += det / 6;
     first.x += det / 24 * s[0], first.y += det / 24 * s[1], first.z += det / 24 * s[2];
     const auto sum = outer(s[0], s[1], s[2]);
@@ -44,7 +49,8 @@ std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
       second[i] += det / 120 * moment;
     }
   }
-  const double diagonal = std::hypot(found.high.x - found.low.x, found.high.y - found.low.y, found.high.z - found.low.z);
+  const double diagonal = std::hypot(found.high.x - found.low.x, found.high.y - found.low.y,
+                                     found.high.z - found.low.z);
   // A sheet folded onto itself is closed too, but has nothing inside.
   if (!(std::fabs(volume) > 1e-9 * diagonal * diagonal * diagonal)) return std::nullopt;
   const double density = mass / volume;  // negative when wound inside out: signs cancel
@@ -57,7 +63,8 @@ std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
 MassProperties shell_mass(const ShellData& shell, double mass) {
   const double n = static_cast<double>(shell.size());
   Vec3 c{0, 0, 0};
-  for (std::size_t i = 0; i < shell.size(); ++i) c.x += shell.x[i] / n, c.y += shell.y[i] / n, c.z += shell.z[i] / n;
+  for (std::size_t i = 0; i < shell.size(); ++i)
+    c.x += shell.x[i] / n, c.y += shell.y[i] / n, c.z += shell.z[i] / n;
   std::array<double, 6> second{};
   for (std::size_t i = 0; i < shell.size(); ++i) {
     const auto m = outer(shell.x[i] - c.x, shell.y[i] - c.y, shell.z[i] - c.z);

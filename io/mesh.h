@@ -28,7 +28,7 @@ struct Mesh {
 Mesh weld(const Mesh& mesh);
 
 // Counts after the exact weld and after dropping duplicate triangles *ignoring winding*: what
-// decides whether the mesh is closed (METHOD: every edge has an even number of faces). A triangle
+// decides whether the mesh is closed (METHOD.md, Sec. 5: every edge has an even number of faces). A triangle
 // with two equal vertices has no edges to count; one with three vertices in a line has, and they
 // count.
 struct MeshAudit {

@@ -43,7 +43,7 @@ struct SceneBody {
   std::string name;
   bool fixed = false;
   double mass = 0.1;          // [kg]
-  std::optional<h6Vec3> com;  // mesh frame [m]; default: METHOD (solid if closed)
+  std::optional<h6Vec3> com;  // mesh frame [m]; default: a solid if closed, else its points
   std::optional<std::array<double, 6>> inertia;  // xx yy zz xy xz yz about com [kg m^2]
   h6Pose pose;
   std::optional<FieldSource> field;

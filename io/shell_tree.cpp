@@ -165,7 +165,7 @@ NextRows next_rows(const Ids& rows, const NewPoints& fresh,
   return next;
 }
 
-// True distance, then up by more than any float evaluation of it can be off (METHOD 6: culling must
+// True distance, then up by more than any float evaluation of it can be off (METHOD.md, Sec. 6: culling must
 // never lose a descendant).
 float rounded_up(double distance) {
   if (distance == 0) return 0;

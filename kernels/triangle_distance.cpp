@@ -19,14 +19,14 @@
 #define H6_TRIANGLE_DISTANCE_TABLES
 namespace h6::kernels {
 
-inline constexpr std::size_t kBlock = 16;                      // nodes: 4 x 2 x 2
+inline constexpr std::size_t kBlock = 16;  // nodes: 4 x 2 x 2
 inline constexpr std::size_t kBlocks = kBrickSamples / kBlock;
 inline constexpr float kBlockHalf[3] = {1.5f, 0.5f, 0.5f};
 
 struct MortonNodes {
   alignas(64) float x[kBrickSamples], y[kBrickSamples], z[kBrickSamples];
   alignas(64) float middle_x[kBlocks], middle_y[kBlocks], middle_z[kBlocks];
-  std::array<std::uint16_t, kBrickSamples> row;                // Morton -> x fastest
+  std::array<std::uint16_t, kBrickSamples> row;  // Morton -> x fastest
 };
 
 constexpr MortonNodes morton_nodes() {
@@ -51,15 +51,15 @@ inline constexpr MortonNodes kNodes = morton_nodes();
 // One triangle, ready for float work. Its unit normal is made in double: on a long sliver a float
 // cross product is wrong by whole voxels at the far end.
 struct Facet {
-  float corner[3][3];    // a, b, c
-  float edge[3][3];      // ab, bc, ca
-  float inverse[3];      // 1 / length^2 of each edge; 0 for a point
-  float inward[3][3];    // normal x edge: positive on the triangle's side of the edge
-  float normal[3];       // unit; 0 without area
-  float level;           // normal . a
-  float middle[3];       // of the bounding box
-  float half[3];         // of the bounding box, plus half a block
-  float block_reach;     // of a block along the normal
+  float corner[3][3];  // a, b, c
+  float edge[3][3];    // ab, bc, ca
+  float inverse[3];    // 1 / length^2 of each edge; 0 for a point
+  float inward[3][3];  // normal x edge: positive on the triangle's side of the edge
+  float normal[3];     // unit; 0 without area
+  float level;         // normal . a
+  float middle[3];     // of the bounding box
+  float half[3];       // of the bounding box, plus half a block
+  float block_reach;   // of a block along the normal
   bool area;
 };
 
@@ -162,10 +162,10 @@ HWY_INLINE VF squared_distance(const Facet& f, VF x, VF y, VF z) {
     inside = hn::Min(inside, along(f.inward[e]));
   }
   if (!f.area) return nearest;
-  const VF height = hn::MulAdd(x, hn::Set(d, f.normal[0]),
-                               hn::MulAdd(y, hn::Set(d, f.normal[1]),
-                                          hn::MulSub(z, hn::Set(d, f.normal[2]),
-                                                     hn::Set(d, f.level))));
+  const VF height =
+      hn::MulAdd(x, hn::Set(d, f.normal[0]),
+                 hn::MulAdd(y, hn::Set(d, f.normal[1]),
+                            hn::MulSub(z, hn::Set(d, f.normal[2]), hn::Set(d, f.level))));
   return hn::IfThenElse(hn::Ge(inside, zero), hn::Mul(height, height), nearest);
 }
 
@@ -180,8 +180,8 @@ void TriangleDistance(const double* corners, std::size_t count, float reach, flo
       const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(live);
       VF farthest = hn::Zero(d);
       for (std::size_t n = b * kBlock; n < (b + 1) * kBlock; n += hn::Lanes(d)) {
-        const VF squared = squared_distance(f, hn::Load(d, kNodes.x + n),
-                                            hn::Load(d, kNodes.y + n), hn::Load(d, kNodes.z + n));
+        const VF squared = squared_distance(f, hn::Load(d, kNodes.x + n), hn::Load(d, kNodes.y + n),
+                                            hn::Load(d, kNodes.z + n));
         const VF nearest = hn::Min(squared, hn::Load(d, best + n));
         hn::Store(nearest, d, best + n);
         farthest = hn::Max(farthest, nearest);

@@ -13,7 +13,7 @@ inline constexpr std::size_t kBrickSamples = 512;
 // distance[n] = min(reach, distance of node n to the nearest of `count` triangles). `corners` is
 // (count x 3 corners x 3 coordinates). A triangle without area counts as its edges. The order of
 // triangles may change the last bit: keep it fixed where bits matter.
-void triangle_distance    (const double* corners, std::size_t count, float reach, float* distance);
+void triangle_distance(const double* corners, std::size_t count, float reach, float* distance);
 void triangle_distance_ref(const double* corners, std::size_t count, float reach, float* distance);
 
 // The squared distance of one point to one triangle, in double: what the reference is made of.

@@ -13,9 +13,7 @@ struct V {
 V from(const double p[3]) { return {p[0], p[1], p[2]}; }
 V sub(V a, V b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 double dot(V a, V b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-V cross(V a, V b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+V cross(V a, V b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
 // Squared distance to the segment from the origin to e, of a point at w.
 double to_segment(V w, V e) {

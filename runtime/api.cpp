@@ -61,12 +61,14 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
 h6Contacts h6GetContacts(const h6Session* session, int32_t index) {
   H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);
   const Contacts& c = session->contacts[index];
-  return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx, c.gy, c.gz, c.rx, c.ry, c.rz,
-          c.tx,    c.ty,    c.tz, c.weight, c.point, c.field_body};
+  return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx,     c.gy,    c.gz,        c.rx,
+          c.ry,    c.rz,    c.tx, c.ty, c.tz, c.weight, c.point, c.field_body};
 }
 
 h6FrameReport h6GetFrame(const h6Session* session) { return session->report; }
-h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) { return session->hands[hand].coupling; }
+h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) {
+  return session->hands[hand].coupling;
+}
 double h6GetVoxel(const h6Session* session, int32_t body) { return session->bodies[body].voxel; }
 
 void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities) {

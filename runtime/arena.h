@@ -22,8 +22,10 @@ inline void* allocate(const h6Allocator& a, std::size_t bytes) {
 inline void release(const h6Allocator& a, void* memory, std::size_t bytes) {
   if (!memory) return;
   bytes = (bytes + kAlignment - 1) & ~(kAlignment - 1);
-  if (a.allocate && a.release) a.release(a.user, memory, bytes);
-  else std::free(memory);
+  if (a.allocate && a.release)
+    a.release(a.user, memory, bytes);
+  else
+    std::free(memory);
 }
 
 template <class T, class... A>
@@ -52,7 +54,8 @@ struct Buffer {
   bool reserve(const h6Allocator& a, std::size_t n) {
     release(allocator, data, count * sizeof(T));
     allocator = a;
-    data = n <= SIZE_MAX / sizeof(T) - kAlignment ? static_cast<T*>(allocate(a, n * sizeof(T))) : nullptr;
+    data = n <= SIZE_MAX / sizeof(T) - kAlignment ? static_cast<T*>(allocate(a, n * sizeof(T)))
+                                                  : nullptr;
     count = data ? n : 0;
     return data != nullptr;
   }

@@ -1,5 +1,5 @@
-// assert.cpp - what a failed assertion does; the one piece of the contract that is code, so that the
-// leaves can assert without knowing the engine.
+// assert.cpp - what a failed assertion does; the one piece of the contract that is code, so that
+// the leaves can assert without knowing the engine.
 #include <cstdio>
 
 #include "hapsix/base.h"
@@ -13,6 +13,10 @@ h6AssertHandler assert_handler = stop_on_assert;
 }  // namespace
 
 extern "C" {
-void h6SetAssertHandler(h6AssertHandler handler) { assert_handler = handler ? handler : stop_on_assert; }
-int h6AssertFailed(const char* condition, const char* file, int line) { return assert_handler(condition, file, line); }
+void h6SetAssertHandler(h6AssertHandler handler) {
+  assert_handler = handler ? handler : stop_on_assert;
+}
+int h6AssertFailed(const char* condition, const char* file, int line) {
+  return assert_handler(condition, file, line);
+}
 }

@@ -1,7 +1,7 @@
 // coupling.cpp - the spring and damper between what the hand holds and the simulated body.
 //
-// Virtual coupling: McNeely 1999, Wan & McNeely 2003. Saturation: Barbic & James 2008. METHOD, Sec. 4.
-// Spring and damper saturate together: damping outside the bound would break it.
+// Virtual coupling: McNeely 1999, Wan & McNeely 2003. Saturation: Barbic & James 2008. METHOD.md,
+// Sec. 4. Spring and damper saturate together: damping outside the bound would break it.
 #include <cmath>
 
 #include "runtime/stages.h"
@@ -38,10 +38,12 @@ void couple(h6Session& s, Hand& hand) {
   const Vec3 vm = from(hand.sample.velocity.linear) + wm.cross(lever);
 
   const double b = 2 * c.damping_ratio * std::sqrt(c.stiffness * body.mass);
-  const double b_rot = 2 * c.damping_ratio * std::sqrt(c.rotational_stiffness * body.inertia.trace() / 3);
+  const double b_rot =
+      2 * c.damping_ratio * std::sqrt(c.rotational_stiffness * body.inertia.trace() / 3);
   const Vec3 theta = log_rotation(qm * body.q.conjugate());
   const Saturated force = saturate(c.stiffness * (xm - body.x) + b * (vm - body.v), c.max_force);
-  const Saturated torque = saturate(c.rotational_stiffness * theta + b_rot * (wm - body.w), c.max_torque);
+  const Saturated torque =
+      saturate(c.rotational_stiffness * theta + b_rot * (wm - body.w), c.max_torque);
   if (force.cut || torque.cut) s.report.status |= H6_COUPLING_SATURATED;
 
   hand.wrench << force.value, torque.value;
@@ -50,7 +52,8 @@ void couple(h6Session& s, Hand& hand) {
   body.D.topLeftCorner<3, 3>() -= b * force.P;
   body.D.bottomRightCorner<3, 3>() -= b_rot * torque.P;
   if (s.gradient == H6_EXACT)
-    body.K.bottomRightCorner<3, 3>() -= c.rotational_stiffness * torque.P * right_jacobian_inverse(theta);
+    body.K.bottomRightCorner<3, 3>() -=
+        c.rotational_stiffness * torque.P * right_jacobian_inverse(theta);
   else
     body.K.bottomRightCorner<3, 3>() -= c.rotational_stiffness * torque.P;
 }

@@ -1,16 +1,23 @@
-// defaults.cpp - start values of every definition (METHOD, Sec. 4) and names of every enumeration.
+// defaults.cpp - start values of every definition (METHOD.md, Sec. 4) and names of every enumeration.
 #include <cstring>
 
 #include "hapsix/hapsix.h"
 
 namespace {
 constexpr const char* kMethods[H6_METHOD_COUNT] = {"none", "global", "gauss3", "gauss6", "robust"};
-constexpr const char* kStages[H6_STAGE_COUNT] = {"traverse", "contacts", "weights", "wrench", "coupling", "integrate", "output"};
-constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped", "slewed", "not finite", "late", "device lost", "stopped"};
-constexpr const char* kStatus[] = {"contacts dropped", "hand not finite", "state not finite", "coupling saturated",
-                                   "solve failed", "output clamped", "output slewed", "output fault", "device lost", "late"};
-struct Piece { const char* name; uint32_t bit; };
-constexpr Piece kPieces[] = {{"facing", H6_PIECE_FACING}, {"depth", H6_PIECE_DEPTH}, {"product", H6_PIECE_PRODUCT}};
+constexpr const char* kStages[H6_STAGE_COUNT] = {"traverse", "contacts",  "weights", "wrench",
+                                                 "coupling", "integrate", "output"};
+constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped",     "slewed", "not finite",
+                                                 "late", "device lost", "stopped"};
+constexpr const char* kStatus[] = {
+    "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
+    "output clamped",   "output slewed",   "output fault",     "device lost",        "late"};
+struct Piece {
+  const char* name;
+  uint32_t bit;
+};
+constexpr Piece kPieces[] = {
+    {"facing", H6_PIECE_FACING}, {"depth", H6_PIECE_DEPTH}, {"product", H6_PIECE_PRODUCT}};
 }  // namespace
 
 extern "C" {
@@ -20,16 +27,23 @@ const char* h6StatusName(h6Status bit) {
     if (bit == 1u << i) return kStatus[i];
   return nullptr;
 }
-const char* h6StageName(h6Stage stage) { return stage >= 0 && stage < H6_STAGE_COUNT ? kStages[stage] : nullptr; }
-const char* h6CauseName(h6Cause cause) { return cause >= 0 && cause < H6_CAUSE_COUNT ? kCauses[cause] : nullptr; }
-const char* h6MethodName(h6Method method) { return method >= 0 && method < H6_METHOD_COUNT ? kMethods[method] : nullptr; }
+const char* h6StageName(h6Stage stage) {
+  return stage >= 0 && stage < H6_STAGE_COUNT ? kStages[stage] : nullptr;
+}
+const char* h6CauseName(h6Cause cause) {
+  return cause >= 0 && cause < H6_CAUSE_COUNT ? kCauses[cause] : nullptr;
+}
+const char* h6MethodName(h6Method method) {
+  return method >= 0 && method < H6_METHOD_COUNT ? kMethods[method] : nullptr;
+}
 
 int h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces) {
   if (!name) return -1;
   const std::size_t length = std::strcspn(name, "+");
   int found = -1;
   for (int i = 0; i < H6_METHOD_COUNT; ++i)
-    if (std::strlen(kMethods[i]) == length && std::strncmp(kMethods[i], name, length) == 0) found = i;
+    if (std::strlen(kMethods[i]) == length && std::strncmp(kMethods[i], name, length) == 0)
+      found = i;
   if (found < 0) return -1;
   uint32_t bits = 0;
   for (const char* rest = name + length; *rest;) {

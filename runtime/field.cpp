@@ -9,11 +9,14 @@
 namespace h6 {
 namespace {
 
-void for_each(const h6ModelDef& model, std::size_t count, const std::function<void(std::size_t)>& body) {
+void for_each(const h6ModelDef& model, std::size_t count,
+              const std::function<void(std::size_t)>& body) {
   if (model.parallel_for) {
     model.parallel_for(
         model.parallel_user, count,
-        [](void* context, std::size_t i) { (*static_cast<const std::function<void(std::size_t)>*>(context))(i); },
+        [](void* context, std::size_t i) {
+          (*static_cast<const std::function<void(std::size_t)>*>(context))(i);
+        },
         const_cast<void*>(static_cast<const void*>(&body)));
   } else {
     sched::parallel_for(count, 0, body);
@@ -24,7 +27,8 @@ bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
   if (!(def.voxel_size > 0) || !std::isfinite(def.voxel_size))
     return fail(error, "voxel_size must be a positive number of metres, it is %g", def.voxel_size);
   if (!from(def.origin).allFinite()) return fail(error, "origin is not finite");
-  if (!(def.band >= 0) || !std::isfinite(def.band)) return fail(error, "band must be >= 0, it is %g", def.band);
+  if (!(def.band >= 0) || !std::isfinite(def.band))
+    return fail(error, "band must be >= 0, it is %g", def.band);
   for (int k = 0; k < 3; ++k)
     if (def.bricks[k] < 1 || def.bricks[k] > 256)
       return fail(error, "bricks[%d] is %d; 1 to 256 (2048 nodes) are supported", k, def.bricks[k]);
@@ -32,15 +36,18 @@ bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
     return fail(error, "brick_index, far_grid and samples must all be given");
   const std::size_t cells = std::size_t(def.bricks[0]) * def.bricks[1] * def.bricks[2];
   for (std::size_t i = 0; i < cells; ++i)
-    if (def.brick_index[i] < -1 || (def.brick_index[i] >= 0 && std::size_t(def.brick_index[i]) >= def.brick_count))
-      return fail(error, "brick_index[%zu] is %d, but there are %zu bricks", i, def.brick_index[i], def.brick_count);
+    if (def.brick_index[i] < -1 ||
+        (def.brick_index[i] >= 0 && std::size_t(def.brick_index[i]) >= def.brick_count))
+      return fail(error, "brick_index[%zu] is %d, but there are %zu bricks", i, def.brick_index[i],
+                  def.brick_count);
   std::atomic<std::size_t> bad{SIZE_MAX};
   for_each(model, def.brick_count, [&](std::size_t b) {
     for (std::size_t i = b * 512; i < b * 512 + 512; ++i)
       if (!std::isfinite(def.samples[i])) bad.store(i, std::memory_order_relaxed);
   });
   if (bad.load() != SIZE_MAX) return fail(error, "samples[%zu] is not finite", bad.load());
-  const std::size_t nodes = std::size_t(def.bricks[0] + 1) * (def.bricks[1] + 1) * (def.bricks[2] + 1);
+  const std::size_t nodes =
+      std::size_t(def.bricks[0] + 1) * (def.bricks[1] + 1) * (def.bricks[2] + 1);
   for (std::size_t i = 0; i < nodes; ++i)
     if (!std::isfinite(def.far_grid[i])) return fail(error, "far_grid[%zu] is not finite", i);
   return true;
@@ -58,14 +65,17 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
   // Kernels address bricks by 32-bit byte offsets.
   constexpr std::size_t most = INT32_MAX / (kernels::kBrickStride * sizeof(std::int16_t));
   if (size.bricks > most)
-    return fail(error, "%zu bricks are more than the %zu supported: use a larger voxel or a narrower band", size.bricks, most);
+    return fail(error,
+                "%zu bricks are more than the %zu supported: use a larger voxel or a narrower band",
+                size.bricks, most);
   if (!field->table.reserve(model.allocator, cells) ||
       !field->bricks.reserve(model.allocator, (size.bricks + 1) * kernels::kBrickStride) ||
       !field->far.reserve(model.allocator, (size.far_cells + 1) * 8))
     return fail(error, "no memory for %zu bricks (%zu MB)", size.bricks,
                 size.bricks * kernels::kBrickStride * 2 / 1000000);
   // One row more than is used: a gather may read past its node, and an empty pool stays readable.
-  for (int i = 0; i < kernels::kBrickStride; ++i) field->bricks[size.bricks * kernels::kBrickStride + i] = 0;
+  for (int i = 0; i < kernels::kBrickStride; ++i)
+    field->bricks[size.bricks * kernels::kBrickStride + i] = 0;
   for (int i = 0; i < 8; ++i) field->far[size.far_cells * 8 + i] = 0;
   kernels::layout_table(def, field->table.data);
   for_each(model, cells, [&](std::size_t cell) {

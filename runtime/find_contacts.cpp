@@ -1,7 +1,7 @@
 // find_contacts.cpp - which points of a shell are inside a field, and what their contacts are.
 //
-// Xu & Barbic 2016, Sec. 3 after McNeely 1999: breadth first over nested levels; a node whose signed
-// distance exceeds its sphere is dropped with all its descendants. METHOD, Sec. 6.
+// Xu & Barbic 2016, Sec. 3 after McNeely 1999: breadth first over nested levels; a node whose
+// signed distance exceeds its sphere is dropped with all its descendants. METHOD.md, Sec. 6.
 #include <algorithm>
 #include <cstring>
 
@@ -12,11 +12,12 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSlice = 2048;      // rows of a frontier culled at a time
+constexpr std::size_t kSlice = 2048;         // rows of a frontier culled at a time
 constexpr std::size_t kWorthSharing = 8192;  // rows from which the helper is asked
 
 // Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
-kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b, const Field& field) {
+kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
+                               const Field& field) {
   const Mat3 m = b.R.transpose() * a.R / field.voxel;
   const Vec3 b_mesh = b.x - b.R * b.com;  // origin of b's mesh frame in the world
   const Vec3 centre = a.x + a.R * (shell.centre - a.com);
@@ -36,35 +37,40 @@ struct Cull {
   float scale;
   bool wide;
 
-  std::size_t operator()(const std::uint32_t* rows, std::uint32_t first, std::size_t count, std::uint32_t* out,
-                         float* distance) const {
-    return kernels::cull_spheres(field, affine, spheres, scale, wide, 0.0f, rows, first, count, out, distance);
+  std::size_t operator()(const std::uint32_t* rows, std::uint32_t first, std::size_t count,
+                         std::uint32_t* out, float* distance) const {
+    return kernels::cull_spheres(field, affine, spheres, scale, wide, 0.0f, rows, first, count, out,
+                                 distance);
   }
 };
 
 // Rows that may touch, in order, whatever runs the slices.
-std::size_t cull(h6Session& s, const Cull& cull, const std::uint32_t* rows, std::uint32_t first, std::size_t count,
-                 std::uint32_t* out, float* distance) {
-  if (count < kWorthSharing || s.team->threads() == 1) return cull(rows, first, count, out, distance);
+std::size_t cull(h6Session& s, const Cull& cull, const std::uint32_t* rows, std::uint32_t first,
+                 std::size_t count, std::uint32_t* out, float* distance) {
+  if (count < kWorthSharing || s.team->threads() == 1)
+    return cull(rows, first, count, out, distance);
   const std::size_t slices = (count + kSlice - 1) / kSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
     const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
-    s.slice_count[i] = cull(rows ? rows + at : nullptr, first + static_cast<std::uint32_t>(at), n, out + at,
-                            distance ? distance + at : nullptr);
+    s.slice_count[i] = cull(rows ? rows + at : nullptr, first + static_cast<std::uint32_t>(at), n,
+                            out + at, distance ? distance + at : nullptr);
   });
   std::size_t kept = s.slice_count[0];
   for (std::size_t i = 1; i < slices; ++i) {
     std::memmove(out + kept, out + i * kSlice, s.slice_count[i] * sizeof *out);
-    if (distance) std::memmove(distance + kept, distance + i * kSlice, s.slice_count[i] * sizeof *distance);
+    if (distance)
+      std::memmove(distance + kept, distance + i * kSlice, s.slice_count[i] * sizeof *distance);
     kept += s.slice_count[i];
   }
   return kept;
 }
 
-std::size_t expand(const Shell& shell, const std::uint32_t* nodes, std::size_t count, std::uint32_t* out) {
+std::size_t expand(const Shell& shell, const std::uint32_t* nodes, std::size_t count,
+                   std::uint32_t* out) {
   std::size_t n = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t child = shell.first_child[nodes[i]], end = child + shell.child_count[nodes[i]];
+    const std::uint32_t child = shell.first_child[nodes[i]],
+                        end = child + shell.child_count[nodes[i]];
     for (std::uint32_t c = child; c < end; ++c) out[n++] = c;
   }
   return n;
@@ -75,9 +81,11 @@ std::size_t traverse_pair(h6Session& s, const Pair& pair, std::size_t used) {
   const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Shell& shell = s.model->shells[a.shell];
   const Field& field = s.model->fields[b.field];
-  const Cull test{field.view, shell_to_field(a, shell, b, field),
+  const Cull test{field.view,
+                  shell_to_field(a, shell, b, field),
                   {shell.x.data, shell.y.data, shell.z.data, shell.node_radius.data, shell.nodes},
-                  static_cast<float>(1.0 / field.voxel), field.wide};
+                  static_cast<float>(1.0 / field.voxel),
+                  field.wide};
   const std::uint32_t* rows = nullptr;  // the whole first level
   std::size_t count = shell.level_first[1];
   for (std::uint32_t level = 0; level + 1 < shell.levels && count; ++level) {
@@ -89,7 +97,8 @@ std::size_t traverse_pair(h6Session& s, const Pair& pair, std::size_t used) {
 }
 
 // Keeps the `most` deepest of `count` candidates, in their order. Ties go to the first.
-std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair* pairs, std::size_t pair_count) {
+std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair* pairs,
+                         std::size_t pair_count) {
   std::copy_n(s.candidate_distance, count, s.scratch_depth);
   std::nth_element(s.scratch_depth, s.scratch_depth + (most - 1), s.scratch_depth + count);
   const float limit = s.scratch_depth[most - 1];
@@ -138,8 +147,9 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
     const Field& field = s.model->fields[b.field];
     const std::uint32_t* rows = s.candidate + pair.first;
     kernels::sample_field(field.view, shell_to_field(a, shell, b, field),
-                          {shell.x.data, shell.y.data, shell.z.data, shell.nodes}, rows, pair.candidates,
-                          s.candidate_distance + pair.first, s.gradient_x, s.gradient_y, s.gradient_z);
+                          {shell.x.data, shell.y.data, shell.z.data, shell.nodes}, rows,
+                          pair.candidates, s.candidate_distance + pair.first, s.gradient_x,
+                          s.gradient_y, s.gradient_z);
     const Eigen::Matrix3f Ra = a.R.cast<float>(), Rb = b.R.cast<float>();
     const Eigen::Vector3f arm0 = (a.R * (shell.centre - a.com)).cast<float>();
     const float voxel = static_cast<float>(field.voxel);
@@ -148,17 +158,25 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
       const float d = s.candidate_distance[pair.first + k];
       if (!(d < 0)) continue;  // exactly on the surface: no depth, no force
       const std::uint32_t row = rows[k], point = shell.node_point[row];
-      const Eigen::Vector3f n = Ra * Eigen::Vector3f(shell.nx[point], shell.ny[point], shell.nz[point]);
+      const Eigen::Vector3f n =
+          Ra * Eigen::Vector3f(shell.nx[point], shell.ny[point], shell.nz[point]);
       Eigen::Vector3f g = Rb * Eigen::Vector3f(s.gradient_x[k], s.gradient_y[k], s.gradient_z[k]);
       const float length = g.norm();
       // Where the gradient vanishes (a medial sheet) it has no direction: take the point's own.
       g = length > 1e-6f ? Eigen::Vector3f(g / length) : n;
-      const Eigen::Vector3f r = Ra * Eigen::Vector3f(shell.x[row], shell.y[row], shell.z[row]) + arm0;
+      const Eigen::Vector3f r =
+          Ra * Eigen::Vector3f(shell.x[row], shell.y[row], shell.z[row]) + arm0;
       const std::size_t i = c.count++;
       c.depth[i] = -d * voxel;
-      c.nx[i] = n.x(); c.ny[i] = n.y(); c.nz[i] = n.z();
-      c.gx[i] = g.x(); c.gy[i] = g.y(); c.gz[i] = g.z();
-      c.rx[i] = r.x(); c.ry[i] = r.y(); c.rz[i] = r.z();
+      c.nx[i] = n.x();
+      c.ny[i] = n.y();
+      c.nz[i] = n.z();
+      c.gx[i] = g.x();
+      c.gy[i] = g.y();
+      c.gz[i] = g.z();
+      c.rx[i] = r.x();
+      c.ry[i] = r.y();
+      c.rz[i] = r.z();
       c.point[i] = point;
       c.field_body[i] = pair.b;
     }

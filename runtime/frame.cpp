@@ -79,12 +79,17 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
     timed(s, H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
     timed(s, H6_STAGE_CONTACTS, [&] { gather_contacts(s, first, end); });
     timed(s, H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, s.pairs[first].a); });
-    timed(s, H6_STAGE_WRENCH, [&] { for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]); });
+    timed(s, H6_STAGE_WRENCH, [&] {
+      for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]);
+    });
   }
-  timed(s, H6_STAGE_COUPLING, [&] { for (std::size_t h = 0; h < s.hand_count; ++h) couple(s, s.hands[h]); });
+  timed(s, H6_STAGE_COUPLING, [&] {
+    for (std::size_t h = 0; h < s.hand_count; ++h) couple(s, s.hands[h]);
+  });
   timed(s, H6_STAGE_INTEGRATE, [&] { step_bodies(s); });
   timed(s, H6_STAGE_OUTPUT, [&] {
-    for (std::size_t h = 0; h < s.hand_count; ++h) send(s, s.hands[h], commands ? &commands[h] : nullptr);
+    for (std::size_t h = 0; h < s.hand_count; ++h)
+      send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
   note_depths(s);
   s.report.state_hash = state_hash(s);

@@ -21,7 +21,7 @@ struct h6Loop {
   std::uint64_t frames = 0;  // to run; 0: no end
   std::unique_ptr<h6::sched::SpscRing<h6FrameRecord>> ring;
   h6FrameRecord record{};
-  h6LoopReport report{};     // the haptic thread's until it has ended
+  h6LoopReport report{};  // the haptic thread's until it has ended
   std::atomic<bool> stop{false};
   std::unique_ptr<h6::sched::PeriodicThread> thread;
 };
@@ -60,10 +60,14 @@ bool tick(h6Loop& loop, std::uint64_t number, const sched::TickTiming& before, d
 
 std::uint32_t late_bit(sched::Late late) {
   switch (late) {
-    case sched::Late::compute: return H6_LATE_COMPUTE;
-    case sched::Late::stolen: return H6_LATE_STOLEN;
-    case sched::Late::wakeup: return H6_LATE_WAKEUP;
-    default: return 0;
+    case sched::Late::compute:
+      return H6_LATE_COMPUTE;
+    case sched::Late::stolen:
+      return H6_LATE_STOLEN;
+    case sched::Late::wakeup:
+      return H6_LATE_WAKEUP;
+    default:
+      return 0;
   }
 }
 
@@ -88,18 +92,25 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   }
   // Virtual time has no deadline: it waits for its reader instead of losing rows.
   if (loop.def.virtual_time)
-    while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed)) sched::sleep_until_ns(sched::now_ns() + 200000);
+    while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed))
+      sched::sleep_until_ns(sched::now_ns() + 200000);
   loop.ring->push(row);
 }
 
-bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& def, h6Error* error) {
+bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& def,
+           h6Error* error) {
   if (!session) return fail(error, "a loop needs a session");
-  if (session->hand_count && !devices) return fail(error, "a loop needs one device for each of %zu hands", session->hand_count);
+  if (session->hand_count && !devices)
+    return fail(error, "a loop needs one device for each of %zu hands", session->hand_count);
   for (std::size_t h = 0; h < session->hand_count; ++h)
-    if (!devices[h].read || !devices[h].write) return fail(error, "device %zu has no read or no write", h);
-  if (!(def.duration >= 0) || def.duration > 1e9) return fail(error, "duration must be 0 (no end) to 1e9 s, it is %g", def.duration);
-  if (!(def.spin_us >= 0 && def.spin_us <= 1e4)) return fail(error, "spin_us must be in 0..10000, it is %g", def.spin_us);
-  if (def.ring_frames > 10000000) return fail(error, "ring_frames must be at most 10000000, it is %zu", def.ring_frames);
+    if (!devices[h].read || !devices[h].write)
+      return fail(error, "device %zu has no read or no write", h);
+  if (!(def.duration >= 0) || def.duration > 1e9)
+    return fail(error, "duration must be 0 (no end) to 1e9 s, it is %g", def.duration);
+  if (!(def.spin_us >= 0 && def.spin_us <= 1e4))
+    return fail(error, "spin_us must be in 0..10000, it is %g", def.spin_us);
+  if (def.ring_frames > 10000000)
+    return fail(error, "ring_frames must be at most 10000000, it is %zu", def.ring_frames);
   return true;
 }
 
@@ -110,7 +121,8 @@ using namespace h6;
 
 extern "C" {
 
-h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def, h6Error* error) {
+h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
+                    h6Error* error) {
   const h6LoopDef used = def ? *def : h6DefaultLoopDef();
   if (!check(session, devices, used, error)) return nullptr;
   try {
@@ -124,7 +136,8 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     }
     loop->frames = static_cast<std::uint64_t>(used.duration / session->dt + 0.5);
     if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
-    if (used.ring_frames) loop->ring = std::make_unique<sched::SpscRing<h6FrameRecord>>(used.ring_frames);
+    if (used.ring_frames)
+      loop->ring = std::make_unique<sched::SpscRing<h6FrameRecord>>(used.ring_frames);
     sched::PeriodicThreadOptions options;
     options.rate = 1 / session->dt;
     options.spin_us = used.spin_us;
@@ -133,14 +146,15 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     options.request.core = used.core;
     h6Loop* raw = loop.get();
     loop->thread = std::make_unique<sched::PeriodicThread>(
-        options, sched::PeriodicThread::Work{
-                     [raw](const sched::RealtimeGrant& grant) {
-                       std::snprintf(raw->report.granted, sizeof raw->report.granted, "%s", grant.text);
-                     },
-                     [raw](std::uint64_t n, const sched::TickTiming& before, double wakeup) {
-                       return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, n, before, wakeup);
-                     },
-                     [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
+        options,
+        sched::PeriodicThread::Work{
+            [raw](const sched::RealtimeGrant& grant) {
+              std::snprintf(raw->report.granted, sizeof raw->report.granted, "%s", grant.text);
+            },
+            [raw](std::uint64_t n, const sched::TickTiming& before, double wakeup) {
+              return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, n, before, wakeup);
+            },
+            [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
     return loop.release();
   } catch (const std::exception& e) {
     fail(error, "the haptic thread could not be started: %s", e.what());

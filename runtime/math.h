@@ -46,7 +46,8 @@ inline Mat3 right_jacobian_inverse(const Vec3& theta) {
   const double a = theta.norm();
   const Mat3 k = cross_matrix(theta);
   // (1/a^2)(1 - (a/2) cot(a/2)), by its series near 0.
-  const double c = a < 1e-3 ? 1.0 / 12.0 + a * a / 720.0 : (1.0 - 0.5 * a / std::tan(0.5 * a)) / (a * a);
+  const double c =
+      a < 1e-3 ? 1.0 / 12.0 + a * a / 720.0 : (1.0 - 0.5 * a / std::tan(0.5 * a)) / (a * a);
   return Mat3::Identity() + 0.5 * k + c * k * k;
 }
 

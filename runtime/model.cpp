@@ -38,10 +38,12 @@ bool fill(h6Model& model, const h6ModelDef& def, h6Error* error) {
   if ((def.field_count && !def.fields) || (def.shell_count && !def.shells))
     return fail(error, "the model definition counts fields or shells but points at none");
   model.fields = make_array<Field>(def.allocator, def.field_count);
-  if (def.field_count && !model.fields) return fail(error, "no memory for %zu fields", def.field_count);
+  if (def.field_count && !model.fields)
+    return fail(error, "no memory for %zu fields", def.field_count);
   model.field_count = def.field_count;
   model.shells = make_array<Shell>(def.allocator, def.shell_count);
-  if (def.shell_count && !model.shells) return fail(error, "no memory for %zu shells", def.shell_count);
+  if (def.shell_count && !model.shells)
+    return fail(error, "no memory for %zu shells", def.shell_count);
   model.shell_count = def.shell_count;
   h6Error why;
   for (std::size_t i = 0; i < def.field_count; ++i)
@@ -96,7 +98,8 @@ int h6SampleField(const h6Model* model, int32_t index, const double* points, siz
     const Vec3 p(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
     const Eigen::Vector3f q = (p - field.origin).cast<float>();
     float d, gx, gy, gz;
-    kernels::sample_field(field.view, to_field, {&q[0], &q[1], &q[2], 1}, nullptr, 1, &d, &gx, &gy, &gz);
+    kernels::sample_field(field.view, to_field, {&q[0], &q[1], &q[2], 1}, nullptr, 1, &d, &gx, &gy,
+                          &gz);
     distance[i] = d * field.voxel;
     if (gradient) {
       Vec3 g(gx, gy, gz);
@@ -111,8 +114,9 @@ int h6SampleField(const h6Model* model, int32_t index, const double* points, siz
       exact[i] = 0;
       if (inside) {
         const auto* n = field.view.size;
-        const std::size_t at = (static_cast<std::size_t>(cell[2]) * n[1] + static_cast<std::size_t>(cell[1])) * n[0] +
-                               static_cast<std::size_t>(cell[0]);
+        const std::size_t at =
+            (static_cast<std::size_t>(cell[2]) * n[1] + static_cast<std::size_t>(cell[1])) * n[0] +
+            static_cast<std::size_t>(cell[0]);
         exact[i] = field.view.table[at] >= 0;
       }
     }

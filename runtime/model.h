@@ -20,20 +20,21 @@ struct Field {
 // Coordinates are relative to `centre`, so that float serves meshes far from their origin. Node
 // columns repeat the point's coordinates: traversal reads them in order.
 struct Shell {
-  Vec3 centre;             // mesh frame [m]
-  double radius = 0;       // farthest point from the centre [m]
+  Vec3 centre;        // mesh frame [m]
+  double radius = 0;  // farthest point from the centre [m]
   std::size_t points = 0, nodes = 0;
   std::uint32_t levels = 0;
-  Buffer<float> x, y, z, node_radius;  // (nodes)
-  Buffer<float> nx, ny, nz;            // (points) inward
+  Buffer<float> x, y, z, node_radius;                          // (nodes)
+  Buffer<float> nx, ny, nz;                                    // (points) inward
   Buffer<std::uint32_t> node_point, first_child, child_count;  // (nodes)
-  Buffer<std::uint32_t> level_first;   // (levels + 1)
+  Buffer<std::uint32_t> level_first;                           // (levels + 1)
   std::size_t bytes() const { return nodes * 28 + points * 12; }
 };
 
 // Convert one definition; false with a sentence when it is not valid or memory is out.
 bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field, h6Error* error);
-bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell, h6Error* error);
+bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
+                   h6Error* error);
 
 // Writes the sentence (when there is somebody to read it) and returns false.
 bool fail(h6Error* error, const char* format, ...) __attribute__((format(printf, 2, 3)));

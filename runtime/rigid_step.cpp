@@ -1,6 +1,6 @@
 // rigid_step.cpp - one time step of the moving bodies.
 //
-// Implicit (METHOD, Sec. 2; Barbic & James 2008):
+// Implicit (METHOD.md, Sec. 2; Barbic & James 2008):
 //     (M - h D - h^2 K) du = h (f + h K u - [0; w x I w]),   x += h v,   R = exp(h w) R
 // Bodies that may touch one another are one dense system when there are at most four of them.
 #include <Eigen/Cholesky>
@@ -46,7 +46,8 @@ void move(Body& body, const Vec6& du, double h) {
 }
 
 bool sane(const Body& body) {
-  return body.x.allFinite() && body.v.allFinite() && body.w.allFinite() && body.q.coeffs().allFinite();
+  return body.x.allFinite() && body.v.allFinite() && body.w.allFinite() &&
+         body.q.coeffs().allFinite();
 }
 
 // A step that leaves the numbers is taken back: the body rests where it was, and the frame says so.
@@ -119,7 +120,8 @@ template <int N>
 void step_island(h6Session& s, const Island& island) {
   Vector<N> du;
   if (s.integrator == H6_IMPLICIT && solve<N>(s, island, du)) {
-    for (int i = 0; i < N; ++i) move_or_rest(s, s.bodies[island.body[i]], du.template segment<6>(6 * i));
+    for (int i = 0; i < N; ++i)
+      move_or_rest(s, s.bodies[island.body[i]], du.template segment<6>(6 * i));
     return;
   }
   if (s.integrator == H6_IMPLICIT) s.report.status |= H6_SOLVE_FAILED;
@@ -135,10 +137,18 @@ void step_bodies(h6Session& s) {
   for (std::size_t i = 0; i < s.island_count; ++i) {
     const Island& island = s.islands[i];
     switch (island.count) {
-      case 1: step_island<1>(s, island); break;
-      case 2: step_island<2>(s, island); break;
-      case 3: step_island<3>(s, island); break;
-      case 4: step_island<4>(s, island); break;
+      case 1:
+        step_island<1>(s, island);
+        break;
+      case 2:
+        step_island<2>(s, island);
+        break;
+      case 3:
+        step_island<3>(s, island);
+        break;
+      case 4:
+        step_island<4>(s, island);
+        break;
     }
   }
 }

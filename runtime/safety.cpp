@@ -29,11 +29,15 @@ SafetyLimits limits_of(const h6DeviceCapabilities& c) {
   const SafetyLimits ceiling;
   SafetyLimits limits;
   // A rating that is not a number or negative is no rating: nothing is rendered.
-  const auto rating = [](double value, double most) { return value > 0 ? std::min(value, most) : 0.0; };
+  const auto rating = [](double value, double most) {
+    return value > 0 ? std::min(value, most) : 0.0;
+  };
   limits.force = rating(c.max_force, ceiling.force);
   limits.torque = rating(c.max_torque, ceiling.torque);
-  limits.force_rate = rating(c.max_force_rate > 0 ? c.max_force_rate : limits.force / 0.005, ceiling.force_rate);
-  limits.torque_rate = rating(c.max_torque_rate > 0 ? c.max_torque_rate : limits.torque / 0.005, ceiling.torque_rate);
+  limits.force_rate =
+      rating(c.max_force_rate > 0 ? c.max_force_rate : limits.force / 0.005, ceiling.force_rate);
+  limits.torque_rate = rating(c.max_torque_rate > 0 ? c.max_torque_rate : limits.torque / 0.005,
+                              ceiling.torque_rate);
   return limits;
 }
 
@@ -47,7 +51,8 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, double dt, h6Status* s
     torque_.setZero();
     return {{{0, 0, 0}, {0, 0, 0}}, fault_};
   }
-  const bool force_cut = clamp_norm(force, limits_.force), torque_cut = clamp_norm(torque, limits_.torque);
+  const bool force_cut = clamp_norm(force, limits_.force),
+             torque_cut = clamp_norm(torque, limits_.torque);
   if (force_cut || torque_cut) {
     *status |= H6_OUTPUT_CLAMPED;
     cause = H6_CAUSE_CLAMPED;

@@ -9,7 +9,7 @@
 namespace h6 {
 
 struct SafetyLimits {
-  double force = 100, torque = 10;             // norms [N], [N m]
+  double force = 100, torque = 10;                // norms [N], [N m]
   double force_rate = 20000, torque_rate = 2000;  // norms [N/s], [N m/s]
 };
 
@@ -19,7 +19,9 @@ SafetyLimits limits_of(const h6DeviceCapabilities& capabilities);
 class OutputGuard {
  public:
   void set_limits(const SafetyLimits& limits) { limits_ = limits; }
-  void fault(h6Cause cause) { if (fault_ == H6_CAUSE_NONE) fault_ = cause; }
+  void fault(h6Cause cause) {
+    if (fault_ == H6_CAUSE_NONE) fault_ = cause;
+  }
   void rearm() { fault_ = H6_CAUSE_NONE; }  // the output then starts from zero, at the slew limit
   h6Cause fault() const { return fault_; }
 

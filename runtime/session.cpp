@@ -19,15 +19,19 @@ std::vector<h6PairDef> pairs_of(const h6SessionDef& def) {
     const auto count = static_cast<std::int32_t>(def.body_count);
     for (std::int32_t a = 0; a < count; ++a)
       for (std::int32_t b = 0; b < count; ++b) {
-        if (a == b || def.bodies[a].fixed || def.bodies[a].shell < 0 || def.bodies[b].field < 0) continue;
+        if (a == b || def.bodies[a].fixed || def.bodies[a].shell < 0 || def.bodies[b].field < 0)
+          continue;
         // Two moving bodies that have both touch once, not twice.
-        const bool both = !def.bodies[b].fixed && def.bodies[b].shell >= 0 && def.bodies[a].field >= 0;
+        const bool both =
+            !def.bodies[b].fixed && def.bodies[b].shell >= 0 && def.bodies[a].field >= 0;
         if (both && b < a) continue;
         pairs.push_back({a, b});
       }
   }
   // Those of one shell body stand together: their contacts are weighed together.
-  std::stable_sort(pairs.begin(), pairs.end(), [](const h6PairDef& l, const h6PairDef& r) { return l.shell_body < r.shell_body; });
+  std::stable_sort(pairs.begin(), pairs.end(), [](const h6PairDef& l, const h6PairDef& r) {
+    return l.shell_body < r.shell_body;
+  });
   return pairs;
 }
 
@@ -37,14 +41,17 @@ Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) 
   const std::uint32_t first = shell.level_first[shell.levels - 1];
   for (std::size_t r = first; r < shell.nodes; ++r) {
     const Vec3 p = Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - com;
-    I += mass / static_cast<double>(shell.points) * (p.squaredNorm() * Mat3::Identity() - p * p.transpose());
+    I += mass / static_cast<double>(shell.points) *
+         (p.squaredNorm() * Mat3::Identity() - p * p.transpose());
   }
   const double least = 0.4 * mass * voxel * voxel;  // a ball of one voxel
-  if (Eigen::SelfAdjointEigenSolver<Mat3>(I, Eigen::EigenvaluesOnly).eigenvalues()[0] < least) I += least * Mat3::Identity();
+  if (Eigen::SelfAdjointEigenSolver<Mat3>(I, Eigen::EigenvaluesOnly).eigenvalues()[0] < least)
+    I += least * Mat3::Identity();
   return I;
 }
 
-void set_body(h6Session& s, std::size_t i, const h6BodyDef& def, const std::vector<h6PairDef>& pairs) {
+void set_body(h6Session& s, std::size_t i, const h6BodyDef& def,
+              const std::vector<h6PairDef>& pairs) {
   Body& body = s.bodies[i];
   body.fixed = def.fixed;
   body.mass = def.mass;
@@ -53,17 +60,20 @@ void set_body(h6Session& s, std::size_t i, const h6BodyDef& def, const std::vect
   body.field = def.field;
   double voxel = HUGE_VAL;
   for (const h6PairDef& p : pairs)
-    if (p.shell_body == static_cast<std::int32_t>(i) || p.field_body == static_cast<std::int32_t>(i))
+    if (p.shell_body == static_cast<std::int32_t>(i) ||
+        p.field_body == static_cast<std::int32_t>(i))
       voxel = std::min(voxel, s.model->fields[s.bodies[p.field_body].field].voxel);
   body.voxel = voxel < HUGE_VAL ? voxel : 1e-3;
   if (body.shell >= 0) {
     const Shell& shell = s.model->shells[body.shell];
     for (std::size_t r = shell.level_first[shell.levels - 1]; r < shell.nodes; ++r)
-      body.radius = std::max(body.radius, (Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - body.com).norm());
+      body.radius = std::max(
+          body.radius, (Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - body.com).norm());
   }
   const double* v = def.inertia;
   body.inertia << v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2];
-  if (!body.fixed && body.inertia.isZero(0)) body.inertia = inertia_of(s.model->shells[body.shell], body.com, body.mass, body.voxel);
+  if (!body.fixed && body.inertia.isZero(0))
+    body.inertia = inertia_of(s.model->shells[body.shell], body.com, body.mass, body.voxel);
   set_mesh_pose(body, def.pose);
   body.v = from(def.velocity.linear);
   body.w = from(def.velocity.angular);
@@ -75,9 +85,11 @@ void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
   const Body& body = s.bodies[def.body];
   hand.body = def.body;
   h6CouplingDef& c = hand.coupling = def.coupling;
-  if (c.rotational_stiffness == 0) c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
+  if (c.rotational_stiffness == 0)
+    c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
   if (c.max_force == 0) c.max_force = s.contact.stiffness * c.max_depth_voxels * body.voxel;
-  if (c.max_torque == 0) c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
+  if (c.max_torque == 0)
+    c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
 }
 
 // Moving bodies that pairs connect, in groups of at most four; a larger group falls into single
@@ -85,9 +97,13 @@ void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
 std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>& pairs) {
   std::vector<std::int32_t> root(s.body_count);
   for (std::size_t i = 0; i < root.size(); ++i) root[i] = static_cast<std::int32_t>(i);
-  const auto find = [&](std::int32_t i) { while (root[i] != i) i = root[i]; return i; };
+  const auto find = [&](std::int32_t i) {
+    while (root[i] != i) i = root[i];
+    return i;
+  };
   for (const h6PairDef& p : pairs)
-    if (!s.bodies[p.shell_body].fixed && !s.bodies[p.field_body].fixed) root[find(p.field_body)] = find(p.shell_body);
+    if (!s.bodies[p.shell_body].fixed && !s.bodies[p.field_body].fixed)
+      root[find(p.field_body)] = find(p.shell_body);
   std::vector<Island> islands;
   for (std::int32_t r = 0; r < static_cast<std::int32_t>(root.size()); ++r) {
     std::vector<std::int32_t> members;
@@ -126,8 +142,10 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   s.frontier = arena.take<std::uint32_t>(n.nodes);
   s.survivors = arena.take<std::uint32_t>(n.nodes);
   s.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
-  for (float** column : {&s.candidate_distance, &s.scratch_depth}) *column = arena.take<float>(s.candidate_capacity);
-  for (float** column : {&s.gradient_x, &s.gradient_y, &s.gradient_z}) *column = arena.take<float>(s.max_contacts);
+  for (float** column : {&s.candidate_distance, &s.scratch_depth})
+    *column = arena.take<float>(s.candidate_capacity);
+  for (float** column : {&s.gradient_x, &s.gradient_y, &s.gradient_z})
+    *column = arena.take<float>(s.max_contacts);
   s.slice_count = arena.take<std::size_t>(n.nodes / 1024 + 1);
   s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / 1024 + 1);
 }
@@ -145,7 +163,9 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   lay_out(s, count, n);
   s.memory_bytes = count.used();
   s.memory = allocate(def.allocator, s.memory_bytes);
-  if (!s.memory) return fail(error, "no memory for the session (%zu MB): lower max_contacts", s.memory_bytes / 1000000);
+  if (!s.memory)
+    return fail(error, "no memory for the session (%zu MB): lower max_contacts",
+                s.memory_bytes / 1000000);
   // Pages are touched now, not in the first frames.
   std::fill_n(static_cast<char*>(s.memory), s.memory_bytes, char{0});
   Arena arena(s.memory, s.memory_bytes);

@@ -18,12 +18,12 @@ struct Body {
   Vec3 com = Vec3::Zero();      // mesh frame [m]
   Mat3 inertia = Mat3::Zero();  // about com, mesh axes [kg m^2]
   std::int32_t shell = -1, field = -1;
-  double voxel = 1e-3;          // the smallest among fields it can touch [m]
-  double radius = 0;            // farthest shell point from com [m]
+  double voxel = 1e-3;  // the smallest among fields it can touch [m]
+  double radius = 0;    // farthest shell point from com [m]
 
   Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();  // world frame
   Quat q = Quat::Identity();
-  Mat3 R = Mat3::Identity();    // of q
+  Mat3 R = Mat3::Identity();  // of q
 
   // Gathered in a frame: wrench about x and its derivatives by this body's own motion.
   Vec6 f = Vec6::Zero();
@@ -33,18 +33,18 @@ struct Body {
 // A shell body a against a field body b.
 struct Pair {
   std::int32_t a = -1, b = -1;
-  std::size_t begin = 0, end = 0;        // its rows among a's contacts
-  std::size_t candidates = 0, first = 0; // its rows among the candidates
+  std::size_t begin = 0, end = 0;         // its rows among a's contacts
+  std::size_t candidates = 0, first = 0;  // its rows among the candidates
   // When both move: how each one's motion changes the other's wrench.
   Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
 };
 
 struct Hand {
   std::int32_t body = -1;
-  h6CouplingDef coupling{};     // with no zeros left
-  h6DeviceSample sample{};      // the last good one
-  bool seen = false;            // there was one
-  Vec6 wrench = Vec6::Zero();   // of the coupling on the body
+  h6CouplingDef coupling{};    // with no zeros left
+  h6DeviceSample sample{};     // the last good one
+  bool seen = false;           // there was one
+  Vec6 wrench = Vec6::Zero();  // of the coupling on the body
   OutputGuard guard;
 };
 
@@ -80,12 +80,12 @@ struct h6Session {
   // Scratch of one pair's traversal and one shell body's contacts.
   std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's nodes)
   std::uint32_t* candidate = nullptr;                       // rows of the last level that touch
-  float *candidate_distance = nullptr;                      // [voxel]
-  float *scratch_depth = nullptr;                           // to find the deepest
+  float* candidate_distance = nullptr;                      // [voxel]
+  float* scratch_depth = nullptr;                           // to find the deepest
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
   std::size_t candidate_capacity = 0;
-  std::size_t* slice_count = nullptr;                       // (slices) survivors of each
-  h6::kernels::WrenchSum* slice_sum = nullptr;              // (slices)
+  std::size_t* slice_count = nullptr;           // (slices) survivors of each
+  h6::kernels::WrenchSum* slice_sum = nullptr;  // (slices)
 
   h6FrameReport report{};
   std::uint64_t frame = 0;

@@ -10,39 +10,52 @@ bool positive(double v) { return v > 0 && std::isfinite(v); }
 bool not_negative(double v) { return v >= 0 && std::isfinite(v); }
 
 bool check_contact(const h6ContactDef& c, h6Error* error) {
-  if (c.method < 0 || c.method >= H6_METHOD_COUNT) return fail(error, "contact method %d does not exist", static_cast<int>(c.method));
-  if (!positive(c.stiffness)) return fail(error, "contact stiffness must be above 0 N/m, it is %g", c.stiffness);
-  if (!not_negative(c.damping)) return fail(error, "contact damping must be 0 s or more, it is %g", c.damping);
-  if (!(c.global_n0 >= 1) || !std::isfinite(c.global_n0)) return fail(error, "global_n0 must be 1 or more, it is %g", c.global_n0);
-  for (const auto& [name, value] : {std::pair{"epsilon", c.epsilon}, {"epsilon_normal", c.epsilon_normal}, {"epsilon_torque", c.epsilon_torque}})
-    if (!(value > 0 && value <= 2)) return fail(error, "%s must be in (0, 2], it is %g", name, value);
-  if (!not_negative(c.torque_length)) return fail(error, "torque_length must be 0 m or more, it is %g", c.torque_length);
+  if (c.method < 0 || c.method >= H6_METHOD_COUNT)
+    return fail(error, "contact method %d does not exist", static_cast<int>(c.method));
+  if (!positive(c.stiffness))
+    return fail(error, "contact stiffness must be above 0 N/m, it is %g", c.stiffness);
+  if (!not_negative(c.damping))
+    return fail(error, "contact damping must be 0 s or more, it is %g", c.damping);
+  if (!(c.global_n0 >= 1) || !std::isfinite(c.global_n0))
+    return fail(error, "global_n0 must be 1 or more, it is %g", c.global_n0);
+  for (const auto& [name, value] : {std::pair{"epsilon", c.epsilon},
+                                    {"epsilon_normal", c.epsilon_normal},
+                                    {"epsilon_torque", c.epsilon_torque}})
+    if (!(value > 0 && value <= 2))
+      return fail(error, "%s must be in (0, 2], it is %g", name, value);
+  if (!not_negative(c.torque_length))
+    return fail(error, "torque_length must be 0 m or more, it is %g", c.torque_length);
   return true;
 }
 
 bool check_body(const h6Model& model, const h6BodyDef& b, std::size_t i, h6Error* error) {
-  if (!finite(b.pose) || !from(b.velocity.linear).allFinite() || !from(b.velocity.angular).allFinite() || !from(b.com).allFinite())
+  if (!finite(b.pose) || !from(b.velocity.linear).allFinite() ||
+      !from(b.velocity.angular).allFinite() || !from(b.com).allFinite())
     return fail(error, "body %zu: pose, velocity and com must be finite", i);
   const double n = from(b.pose.q).norm();
-  if (std::fabs(n - 1) > 1e-3) return fail(error, "body %zu: its quaternion has length %g, not 1", i, n);
+  if (std::fabs(n - 1) > 1e-3)
+    return fail(error, "body %zu: its quaternion has length %g, not 1", i, n);
   if (b.shell < -1 || b.shell >= static_cast<std::int64_t>(model.shell_count))
     return fail(error, "body %zu: shell %d, but the model has %zu", i, b.shell, model.shell_count);
   if (b.field < -1 || b.field >= static_cast<std::int64_t>(model.field_count))
     return fail(error, "body %zu: field %d, but the model has %zu", i, b.field, model.field_count);
   if (b.fixed) return true;
-  if (!positive(b.mass)) return fail(error, "body %zu: a moving body needs a mass above 0 kg, it is %g", i, b.mass);
+  if (!positive(b.mass))
+    return fail(error, "body %zu: a moving body needs a mass above 0 kg, it is %g", i, b.mass);
   bool given = false;
   for (double v : b.inertia) {
     if (!std::isfinite(v)) return fail(error, "body %zu: its inertia is not finite", i);
     given = given || v != 0;
   }
-  if (!given && b.shell < 0) return fail(error, "body %zu: a moving body without a shell needs an inertia", i);
+  if (!given && b.shell < 0)
+    return fail(error, "body %zu: a moving body without a shell needs an inertia", i);
   if (given) {
     Mat3 I;
     const double* v = b.inertia;
     I << v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2];
     const Eigen::LLT<Mat3> factors(I);
-    if (factors.info() != Eigen::Success) return fail(error, "body %zu: its inertia is not positive definite", i);
+    if (factors.info() != Eigen::Success)
+      return fail(error, "body %zu: its inertia is not positive definite", i);
   }
   return true;
 }
@@ -52,23 +65,36 @@ bool check_pair(const h6SessionDef& def, std::size_t i, h6Error* error) {
   const auto count = static_cast<std::int64_t>(def.body_count);
   if (p.shell_body < 0 || p.shell_body >= count || p.field_body < 0 || p.field_body >= count)
     return fail(error, "pair %zu names a body that does not exist", i);
-  if (p.shell_body == p.field_body) return fail(error, "pair %zu: body %d against itself", i, p.shell_body);
-  if (def.bodies[p.shell_body].shell < 0) return fail(error, "pair %zu: body %d has no shell", i, p.shell_body);
-  if (def.bodies[p.field_body].field < 0) return fail(error, "pair %zu: body %d has no field", i, p.field_body);
+  if (p.shell_body == p.field_body)
+    return fail(error, "pair %zu: body %d against itself", i, p.shell_body);
+  if (def.bodies[p.shell_body].shell < 0)
+    return fail(error, "pair %zu: body %d has no shell", i, p.shell_body);
+  if (def.bodies[p.field_body].field < 0)
+    return fail(error, "pair %zu: body %d has no field", i, p.field_body);
   return true;
 }
 
 bool check_hand(const h6SessionDef& def, std::size_t i, h6Error* error) {
   const h6HandDef& h = def.hands[i];
-  if (h.body < 0 || h.body >= static_cast<std::int64_t>(def.body_count)) return fail(error, "hand %zu: body %d does not exist", i, h.body);
-  if (def.bodies[h.body].fixed) return fail(error, "hand %zu holds body %d, which is fixed", i, h.body);
+  if (h.body < 0 || h.body >= static_cast<std::int64_t>(def.body_count))
+    return fail(error, "hand %zu: body %d does not exist", i, h.body);
+  if (def.bodies[h.body].fixed)
+    return fail(error, "hand %zu holds body %d, which is fixed", i, h.body);
   const h6CouplingDef& c = h.coupling;
-  if (!positive(c.stiffness)) return fail(error, "hand %zu: coupling stiffness must be above 0 N/m, it is %g", i, c.stiffness);
-  if (!(c.damping_ratio >= 0 && c.damping_ratio <= 10)) return fail(error, "hand %zu: damping_ratio must be in 0..10, it is %g", i, c.damping_ratio);
+  if (!positive(c.stiffness))
+    return fail(error, "hand %zu: coupling stiffness must be above 0 N/m, it is %g", i,
+                c.stiffness);
+  if (!(c.damping_ratio >= 0 && c.damping_ratio <= 10))
+    return fail(error, "hand %zu: damping_ratio must be in 0..10, it is %g", i, c.damping_ratio);
   for (double v : {c.rotational_stiffness, c.max_force, c.max_torque})
-    if (!not_negative(v)) return fail(error, "hand %zu: rotational_stiffness, max_force and max_torque must be 0 (derived) or more, one is %g", i, v);
+    if (!not_negative(v))
+      return fail(error,
+                  "hand %zu: rotational_stiffness, max_force and max_torque must be 0 (derived) or "
+                  "more, one is %g",
+                  i, v);
   if (!positive(c.max_depth_voxels) && !(c.max_force > 0))
-    return fail(error, "hand %zu: max_depth_voxels must be above 0, it is %g", i, c.max_depth_voxels);
+    return fail(error, "hand %zu: max_depth_voxels must be above 0, it is %g", i,
+                c.max_depth_voxels);
   return true;
 }
 
@@ -77,18 +103,28 @@ bool check_hand(const h6SessionDef& def, std::size_t i, h6Error* error) {
 bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error) {
   if (def.body_count == 0 || !def.bodies || def.body_count > H6_MAX_BODIES)
     return fail(error, "a session needs 1 to %d bodies, it has %zu", H6_MAX_BODIES, def.body_count);
-  if (def.hand_count > H6_MAX_HANDS || (def.hand_count && !def.hands)) return fail(error, "a session has at most %d hands", H6_MAX_HANDS);
+  if (def.hand_count > H6_MAX_HANDS || (def.hand_count && !def.hands))
+    return fail(error, "a session has at most %d hands", H6_MAX_HANDS);
   if (def.pair_count && !def.pairs) return fail(error, "pairs are counted but not given");
-  if (!(def.rate >= 100 && def.rate <= 10000)) return fail(error, "rate must be in 100..10000 Hz, it is %g", def.rate);
-  if (def.integrator != H6_IMPLICIT && def.integrator != H6_EXPLICIT) return fail(error, "integrator %d does not exist", static_cast<int>(def.integrator));
-  if (def.gradient != H6_SYMMETRIC && def.gradient != H6_EXACT) return fail(error, "gradient %d does not exist", static_cast<int>(def.gradient));
-  if (def.max_contacts < 1 || def.max_contacts > 1000000) return fail(error, "max_contacts must be in 1..1000000, it is %zu", def.max_contacts);
-  if (def.threads < 1 || def.threads > 2) return fail(error, "threads must be 1 or 2 (the haptic thread and one helper), it is %u", def.threads);
+  if (!(def.rate >= 100 && def.rate <= 10000))
+    return fail(error, "rate must be in 100..10000 Hz, it is %g", def.rate);
+  if (def.integrator != H6_IMPLICIT && def.integrator != H6_EXPLICIT)
+    return fail(error, "integrator %d does not exist", static_cast<int>(def.integrator));
+  if (def.gradient != H6_SYMMETRIC && def.gradient != H6_EXACT)
+    return fail(error, "gradient %d does not exist", static_cast<int>(def.gradient));
+  if (def.max_contacts < 1 || def.max_contacts > 1000000)
+    return fail(error, "max_contacts must be in 1..1000000, it is %zu", def.max_contacts);
+  if (def.threads < 1 || def.threads > 2)
+    return fail(error, "threads must be 1 or 2 (the haptic thread and one helper), it is %u",
+                def.threads);
   if (!from(def.gravity).allFinite()) return fail(error, "gravity is not finite");
   if (!check_contact(def.contact, error)) return false;
-  for (std::size_t i = 0; i < def.body_count; ++i) if (!check_body(model, def.bodies[i], i, error)) return false;
-  for (std::size_t i = 0; i < def.pair_count; ++i) if (!check_pair(def, i, error)) return false;
-  for (std::size_t i = 0; i < def.hand_count; ++i) if (!check_hand(def, i, error)) return false;
+  for (std::size_t i = 0; i < def.body_count; ++i)
+    if (!check_body(model, def.bodies[i], i, error)) return false;
+  for (std::size_t i = 0; i < def.pair_count; ++i)
+    if (!check_pair(def, i, error)) return false;
+  for (std::size_t i = 0; i < def.hand_count; ++i)
+    if (!check_hand(def, i, error)) return false;
   return true;
 }
 

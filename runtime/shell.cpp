@@ -17,7 +17,8 @@ bool check_points(const h6ShellDef& def, h6Error* error) {
     for (const float* column : columns)
       if (!std::isfinite(column[i])) return fail(error, "point %zu is not finite", i);
     const double n = std::hypot(def.nx[i], def.ny[i], def.nz[i]);
-    if (std::fabs(n - 1) > 1e-3) return fail(error, "the normal of point %zu has length %g, not 1", i, n);
+    if (std::fabs(n - 1) > 1e-3)
+      return fail(error, "the normal of point %zu has length %g, not 1", i, n);
   }
   return true;
 }
@@ -25,23 +26,27 @@ bool check_points(const h6ShellDef& def, h6Error* error) {
 // Every level's nodes are the children of the level before, each once, and the last level holds
 // every point once: then traversal reaches each point exactly once.
 bool check_tree(const h6ShellDef& def, h6Error* error) {
-  if (def.level_count < 1 || def.level_count > 32 || !def.level_first || !def.node_point || !def.node_radius ||
-      !def.node_first_child || !def.node_child_count)
+  if (def.level_count < 1 || def.level_count > 32 || !def.level_first || !def.node_point ||
+      !def.node_radius || !def.node_first_child || !def.node_child_count)
     return fail(error, "a shell needs 1 to 32 levels and all node arrays");
   if (def.level_first[0] != 0) return fail(error, "level_first[0] must be 0");
   for (std::uint32_t l = 0; l < def.level_count; ++l)
-    if (def.level_first[l + 1] <= def.level_first[l]) return fail(error, "level %u has no nodes", l);
+    if (def.level_first[l + 1] <= def.level_first[l])
+      return fail(error, "level %u has no nodes", l);
   const std::uint32_t last = def.level_count - 1;
   if (def.level_first[last + 1] - def.level_first[last] != def.point_count)
-    return fail(error, "the last level has %u nodes for %zu points", def.level_first[last + 1] - def.level_first[last],
-                def.point_count);
+    return fail(error, "the last level has %u nodes for %zu points",
+                def.level_first[last + 1] - def.level_first[last], def.point_count);
   for (std::uint32_t l = 0; l < def.level_count; ++l) {
     std::uint32_t next = def.level_first[l + 1];
     for (std::uint32_t r = def.level_first[l]; r < def.level_first[l + 1]; ++r) {
-      if (def.node_point[r] >= def.point_count) return fail(error, "node %u names point %u of %zu", r, def.node_point[r], def.point_count);
-      if (!(def.node_radius[r] >= 0) || !std::isfinite(def.node_radius[r])) return fail(error, "the radius of node %u is %g", r, def.node_radius[r]);
+      if (def.node_point[r] >= def.point_count)
+        return fail(error, "node %u names point %u of %zu", r, def.node_point[r], def.point_count);
+      if (!(def.node_radius[r] >= 0) || !std::isfinite(def.node_radius[r]))
+        return fail(error, "the radius of node %u is %g", r, def.node_radius[r]);
       if (l == last) {
-        if (def.node_child_count[r] != 0) return fail(error, "node %u of the last level has children", r);
+        if (def.node_child_count[r] != 0)
+          return fail(error, "node %u of the last level has children", r);
         continue;
       }
       if (def.node_child_count[r] == 0 || def.node_first_child[r] != next ||
@@ -49,7 +54,8 @@ bool check_tree(const h6ShellDef& def, h6Error* error) {
         return fail(error, "the children of node %u do not follow those of the node before it", r);
       next += def.node_child_count[r];
     }
-    if (l < last && next != def.level_first[l + 2]) return fail(error, "level %u has nodes that are nobody's children", l + 1);
+    if (l < last && next != def.level_first[l + 2])
+      return fail(error, "level %u has nodes that are nobody's children", l + 1);
   }
   return true;
 }
@@ -61,15 +67,18 @@ bool check_spheres(const h6ShellDef& def, h6Error* error) {
   Buffer<std::uint32_t> parent;
   if (!parent.reserve({}, nodes)) return fail(error, "no memory to check %u nodes", nodes);
   for (std::uint32_t r = 0; r < def.level_first[def.level_count - 1]; ++r)
-    for (std::uint32_t c = 0; c < def.node_child_count[r]; ++c) parent[def.node_first_child[r] + c] = r;
+    for (std::uint32_t c = 0; c < def.node_child_count[r]; ++c)
+      parent[def.node_first_child[r] + c] = r;
   for (std::uint32_t leaf = def.level_first[def.level_count - 1]; leaf < nodes; ++leaf) {
     const std::uint32_t p = def.node_point[leaf];
     for (std::uint32_t r = leaf; r >= def.level_first[1] && def.level_count > 1;) {
       r = parent[r];
       const std::uint32_t q = def.node_point[r];
-      const double d = std::hypot(double(def.x[p]) - def.x[q], double(def.y[p]) - def.y[q], double(def.z[p]) - def.z[q]);
+      const double d = std::hypot(double(def.x[p]) - def.x[q], double(def.y[p]) - def.y[q],
+                                  double(def.z[p]) - def.z[q]);
       if (d > def.node_radius[r] * (1 + 1e-5) + 1e-9)
-        return fail(error, "the sphere of node %u (radius %g m) does not hold point %u, %g m away", r, def.node_radius[r], p, d);
+        return fail(error, "the sphere of node %u (radius %g m) does not hold point %u, %g m away",
+                    r, def.node_radius[r], p, d);
     }
   }
   return true;
@@ -77,14 +86,18 @@ bool check_spheres(const h6ShellDef& def, h6Error* error) {
 
 }  // namespace
 
-bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell, h6Error* error) {
-  if (!check_points(def, error) || !check_tree(def, error) || !check_spheres(def, error)) return false;
+bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
+                   h6Error* error) {
+  if (!check_points(def, error) || !check_tree(def, error) || !check_spheres(def, error))
+    return false;
   shell->points = def.point_count;
   shell->levels = def.level_count;
   shell->nodes = def.level_first[def.level_count];
   bool reserved = shell->level_first.reserve(allocator, def.level_count + 1);
-  for (Buffer<float>* b : {&shell->x, &shell->y, &shell->z, &shell->node_radius}) reserved = b->reserve(allocator, shell->nodes) && reserved;
-  for (Buffer<float>* b : {&shell->nx, &shell->ny, &shell->nz}) reserved = b->reserve(allocator, shell->points) && reserved;
+  for (Buffer<float>* b : {&shell->x, &shell->y, &shell->z, &shell->node_radius})
+    reserved = b->reserve(allocator, shell->nodes) && reserved;
+  for (Buffer<float>* b : {&shell->nx, &shell->ny, &shell->nz})
+    reserved = b->reserve(allocator, shell->points) && reserved;
   for (Buffer<std::uint32_t>* b : {&shell->node_point, &shell->first_child, &shell->child_count})
     reserved = b->reserve(allocator, shell->nodes) && reserved;
   if (!reserved) return fail(error, "no memory for %zu nodes", shell->nodes);

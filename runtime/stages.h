@@ -8,7 +8,7 @@ namespace h6 {
 void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair);
 // Depth, normal, gradient, arm of each; keeps the deepest when there are too many.
 void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair);
-// Shares of stiffness over all contacts of one shell body, all fields pooled. METHOD, Sec. 3.
+// Shares of stiffness over all contacts of one shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(h6Session& s, std::int32_t shell_body);
 // Wrench of a pair's contacts on both bodies, with its derivatives.
 void sum_wrench(h6Session& s, Pair& pair);

@@ -2,7 +2,7 @@
 //
 // The kernel sums over the shell body's arms. The field body's Jacobian is J_b = -[N; r_b x N] with
 // r_b = r_a + c, c = x_a - x_b: J_b = -S J_a, S = [I 0; [c]x I]. So every block follows from the
-// shell body's own sums, and no contact is touched twice. METHOD, Sec. 2.
+// shell body's own sums, and no contact is touched twice. METHOD.md, Sec. 2.
 #include <algorithm>
 
 #include "runtime/stages.h"
@@ -15,9 +15,10 @@ constexpr std::size_t kSlice = 1024;  // contacts summed at a time; slices are a
 using MapMat6 = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>;
 using MapVec6 = Eigen::Map<const Vec6>;
 
-kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair, const kernels::WrenchParameters& p) {
-  const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx, c.gy, c.gz,
-                                       c.rx, c.ry, c.rz, c.count};
+kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
+                              const kernels::WrenchParameters& p) {
+  const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
+                                       c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
   const std::size_t count = pair.end - pair.begin, slices = (count + kSlice - 1) / kSlice;
   if (slices <= 1) return kernels::contact_wrench(columns, p, pair.begin, pair.end);
   s.team->for_slices(slices, [&](std::size_t i) {
@@ -32,7 +33,10 @@ kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
 }  // namespace
 
 void sum_wrench(h6Session& s, Pair& pair) {
-  pair.Kab.setZero(); pair.Kba.setZero(); pair.Dab.setZero(); pair.Dba.setZero();
+  pair.Kab.setZero();
+  pair.Kba.setZero();
+  pair.Dab.setZero();
+  pair.Dba.setZero();
   if (pair.begin == pair.end) return;
   Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Vec3 c = a.x - b.x;
@@ -52,7 +56,8 @@ void sum_wrench(h6Session& s, Pair& pair) {
   const Mat6 K = MapMat6(sum.stiffness), D = s.contact.damping * MapMat6(sum.damping);
   Mat6 aa = Mat6::Zero(), ba = Mat6::Zero(), bb = Mat6::Zero();  // geometric terms
   if (s.gradient == H6_EXACT) {
-    const Mat3 F = cross_matrix(MapVec6(sum.elastic).head<3>()), T = cross_matrix(MapVec6(sum.elastic).tail<3>());
+    const Mat3 F = cross_matrix(MapVec6(sum.elastic).head<3>()),
+               T = cross_matrix(MapVec6(sum.elastic).tail<3>());
     aa.topRightCorner<3, 3>() = -F;
     aa.bottomRightCorner<3, 3>() = -T;
     // The arms from b grow as a and b part, and turn as a turns.

@@ -1,6 +1,6 @@
 // weigh_contacts.cpp - how the contact stiffness is shared among a shell body's contacts.
 //
-// Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD, Sec. 3, says
+// Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3, says
 // which of the paper's ambiguities are settled how: w_i = phi_self / phi_i.
 #include <algorithm>
 #include <cmath>
@@ -51,17 +51,23 @@ Rule rule_of(const h6ContactDef& def, double voxel) {
   rule.l0 = static_cast<float>(def.torque_length);
   rule.widths = {static_cast<float>(def.epsilon), static_cast<float>(def.epsilon)};
   switch (def.method) {
-    case H6_METHOD_GAUSS3: rule.gauss = true; break;
+    case H6_METHOD_GAUSS3:
+      rule.gauss = true;
+      break;
     case H6_METHOD_GAUSS6:
       rule.gauss = true;
       rule.hat = def.pieces & H6_PIECE_PRODUCT ? kernels::Hat::product : kernels::Hat::sum;
       break;
     case H6_METHOD_ROBUST:
-      rule = {true, true, true, kernels::Hat::product,
+      rule = {true,
+              true,
+              true,
+              kernels::Hat::product,
               {static_cast<float>(def.epsilon_normal), static_cast<float>(def.epsilon_torque)},
               static_cast<float>(def.torque_length > 0 ? def.torque_length : voxel)};
       break;
-    default: break;
+    default:
+      break;
   }
   return rule;
 }
@@ -77,19 +83,28 @@ void weigh_contacts(h6Session& s, std::int32_t shell_body) {
   if (!rule.gauss) {
     const double n0 = s.contact.global_n0;
     const double n = static_cast<double>(c.count);
-    const float w = s.contact.method == H6_METHOD_GLOBAL && n > n0 ? static_cast<float>(n0 / n) : 1.0f;
+    const float w =
+        s.contact.method == H6_METHOD_GLOBAL && n > n0 ? static_cast<float>(n0 / n) : 1.0f;
     for (std::size_t i = 0; i < c.count; ++i) c.weight[i] = w * c.facing[i];
     return;
   }
-  const kernels::DirectionsView view{c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, rule.facing ? c.facing : nullptr,
-                                     rule.depth ? c.depth : nullptr, c.count};
+  const kernels::DirectionsView view{c.nx,
+                                     c.ny,
+                                     c.nz,
+                                     c.tx,
+                                     c.ty,
+                                     c.tz,
+                                     rule.facing ? c.facing : nullptr,
+                                     rule.depth ? c.depth : nullptr,
+                                     c.count};
   if (c.count < kWorthSharing) {
     kernels::gauss_weights(view, rule.hat, rule.widths, 0, c.count, c.weight);
     return;
   }
   const std::size_t slices = (c.count + kSlice - 1) / kSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
-    kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice, std::min((i + 1) * kSlice, c.count), c.weight);
+    kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice,
+                           std::min((i + 1) * kSlice, c.count), c.weight);
   });
 }
 

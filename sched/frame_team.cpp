@@ -25,9 +25,10 @@ constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
 constexpr std::int64_t kNap = 50000;          // ns; how late the helper may notice an early frame
 }  // namespace
 
-// One job at a time. The ticket is the whole job in one word: its number (32 bits), how many slices it
-// has (16) and the next free one (16). A claim is one compare-and-swap of that word, so a helper that
-// wakes late can never take a slice of a job that is over, nor read a job that is being set up.
+// One job at a time. The ticket is the whole job in one word: its number (32 bits), how many slices
+// it has (16) and the next free one (16). A claim is one compare-and-swap of that word, so a helper
+// that wakes late can never take a slice of a job that is over, nor read a job that is being set
+// up.
 struct FrameTeam::Helper {
   oneapi::tbb::task_arena arena{1, 0};
   std::atomic<bool> stop{false}, ended{false};
@@ -65,9 +66,12 @@ struct FrameTeam::Helper {
       if (!polling.load(std::memory_order_acquire)) {
         const std::int64_t due = next_frame.load(std::memory_order_relaxed) - kPollBefore;
         const std::int64_t now = now_ns();
-        if (now < due) sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
-        else if (now > due + 2 * kPollBefore) sleep_until_ns(now + kNap);  // nobody steps
-        else relax();
+        if (now < due)
+          sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
+        else if (now > due + 2 * kPollBefore)
+          sleep_until_ns(now + kNap);  // nobody steps
+        else
+          relax();
         continue;
       }
       if (!work_one()) relax();

@@ -35,7 +35,8 @@ class FrameTeam {
   template <class F>
   void for_slices(std::size_t slices, F&& body) {
     using Body = std::remove_reference_t<F>;
-    run(slices, [](void* context, std::size_t slice) { (*static_cast<Body*>(context))(slice); },
+    run(
+        slices, [](void* context, std::size_t slice) { (*static_cast<Body*>(context))(slice); },
         const_cast<void*>(static_cast<const void*>(&body)));
   }
   unsigned threads() const;

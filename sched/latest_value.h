@@ -16,7 +16,8 @@ class LatestValue {
     slots_[back_] = value;
     back_ = middle_.exchange(back_ | kNew, std::memory_order_acq_rel) & kIndex;
   }
-  // Reader. True when there is a value newer than that of the last call; `out` is left alone if not.
+  // Reader. True when there is a value newer than that of the last call; `out` is left alone if
+  // not.
   bool take(T& out) {
     if (!(middle_.load(std::memory_order_relaxed) & kNew)) return false;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

@@ -11,7 +11,8 @@ unsigned machine_threads() {
   return static_cast<unsigned>(oneapi::tbb::info::default_concurrency());
 }
 
-void parallel_for(std::size_t count, unsigned threads, const std::function<void(std::size_t)>& body) {
+void parallel_for(std::size_t count, unsigned threads,
+                  const std::function<void(std::size_t)>& body) {
   // More than the machine has would only make TBB complain.
   const unsigned most = machine_threads();
   if (threads == 0 || threads > most) threads = most;

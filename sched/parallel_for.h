@@ -8,7 +8,8 @@ namespace h6::sched {
 
 // Calls body(i) once for every i in 0..count-1, in any order, on up to `threads` threads (0: all of
 // the machine's), and returns when all are done. A body must not throw.
-void parallel_for(std::size_t count, unsigned threads, const std::function<void(std::size_t)>& body);
+void parallel_for(std::size_t count, unsigned threads,
+                  const std::function<void(std::size_t)>& body);
 
 // How many threads 0 means.
 unsigned machine_threads();

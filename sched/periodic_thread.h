@@ -30,10 +30,10 @@ struct TickTiming {
 };
 
 struct PeriodicThreadOptions {
-  double rate = 1000;          // [Hz]
-  double spin_us = 0;          // poll the clock this long before a deadline
-  bool virtual_time = false;   // no clock, no sleep: frame after frame
-  bool realtime = true;        // ask for real-time treatment
+  double rate = 1000;         // [Hz]
+  double spin_us = 0;         // poll the clock this long before a deadline
+  bool virtual_time = false;  // no clock, no sleep: frame after frame
+  bool realtime = true;       // ask for real-time treatment
   RealtimeRequest request;
 };
 

@@ -45,22 +45,33 @@ RealtimeGrant request_realtime(const RealtimeRequest& request) {
   int refused = core < cores ? pthread_setaffinity_np(pthread_self(), sizeof set, &set) : EINVAL;
   grant.pinned = refused == 0;
   grant.core = grant.pinned ? core : -1;
-  if (grant.pinned) append(grant, "pinned to core %d. ", core);
-  else append(grant, "not pinned to core %d (%s): choose one of 0..%d. ", core, std::strerror(refused), cores - 1);
+  if (grant.pinned)
+    append(grant, "pinned to core %d. ", core);
+  else
+    append(grant, "not pinned to core %d (%s): choose one of 0..%d. ", core, std::strerror(refused),
+           cores - 1);
 
   sched_param parameters{};
   parameters.sched_priority = request.priority;
   refused = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
   grant.fifo = refused == 0;
-  if (grant.fifo) append(grant, "SCHED_FIFO priority %d. ", request.priority);
-  else append(grant, "no SCHED_FIFO (%s): allow it with '<user> - rtprio 99' in /etc/security/limits.conf and log in again. ",
-              std::strerror(refused));
+  if (grant.fifo)
+    append(grant, "SCHED_FIFO priority %d. ", request.priority);
+  else
+    append(grant,
+           "no SCHED_FIFO (%s): allow it with '<user> - rtprio 99' in /etc/security/limits.conf "
+           "and log in again. ",
+           std::strerror(refused));
 
   // Only what exists now: with MCL_FUTURE a host program's next malloc could fail.
   grant.locked = mlockall(MCL_CURRENT) == 0;
-  if (grant.locked) append(grant, "memory locked.");
-  else append(grant, "memory not locked (%s): allow it with '<user> - memlock unlimited' in /etc/security/limits.conf.",
-              std::strerror(errno));
+  if (grant.locked)
+    append(grant, "memory locked.");
+  else
+    append(grant,
+           "memory not locked (%s): allow it with '<user> - memlock unlimited' in "
+           "/etc/security/limits.conf.",
+           std::strerror(errno));
   touch_stack();
   return grant;
 }

@@ -1,12 +1,13 @@
-// realtime.h - asks the machine for real-time treatment of the calling thread, and says what it got.
+// realtime.h - asks the machine for real-time treatment of the calling thread, and says what it
+// got.
 #pragma once
 #include <cstddef>
 
 namespace h6::sched {
 
 struct RealtimeRequest {
-  int core = -1;       // -1: the machine's last one
-  int priority = 80;   // SCHED_FIFO, 1 .. 99
+  int core = -1;      // -1: the machine's last one
+  int priority = 80;  // SCHED_FIFO, 1 .. 99
 };
 
 struct RealtimeGrant {

@@ -121,8 +121,8 @@ typedef enum h6Gradient {
   H6_EXACT          /* J J_g^T and the geometric term: pivoted LU                                  */
 } h6Gradient;
 
-/* Virtual coupling between a hand's manipulandum and its body, METHOD: Wan & McNeely 2003,
- * saturation: Barbic & James 2008. Zero means "derive it", as said. */
+/* Virtual coupling between a hand's manipulandum and its body: Wan & McNeely 2003;
+ * saturation: Barbic & James 2008 (METHOD.md, Sec. 4). Zero means "derive it", as said. */
 typedef struct h6CouplingDef {
   double stiffness;           /* k_VC                                                       [N/m]  */
   double rotational_stiffness;/* 0: stiffness * (30 voxels)^2                           [N m/rad]  */
