@@ -22,7 +22,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using nlohmann::ordered_json;
 
-double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 // Largest memory of the process so far.
 std::size_t peak_bytes() {
@@ -39,11 +41,17 @@ struct Common {
 void add_common(CLI::App* command, Common& c, const char* ending) {
   command->add_option("MESH", c.mesh, "STL, OBJ or PLY, also .gz")->required()->option_text("FILE");
   command->add_option("-o,--output", c.out, std::string("The ") + ending + " to write")
-      ->required()->option_text("FILE")->check(ends_with(ending));
-  command->add_option("--units", c.units, "Unit of the mesh file and of lengths here: m, mm, cm or in; default m")
-      ->option_text("UNIT")->check(one_of({"m", "mm", "cm", "in"}));
+      ->required()
+      ->option_text("FILE")
+      ->check(ends_with(ending));
+  command
+      ->add_option("--units", c.units,
+                   "Unit of the mesh file and of lengths here: m, mm, cm or in; default m")
+      ->option_text("UNIT")
+      ->check(one_of({"m", "mm", "cm", "in"}));
   command->add_option("--threads", c.threads, "Default: all of the machine's")
-      ->option_text("N")->check(whole_within(0, 1024));
+      ->option_text("N")
+      ->check(whole_within(0, 1024));
 }
 
 // Whatever is wrong with the names of files is told before the bake.
@@ -73,7 +81,9 @@ Result<Input> read_input(const Common& c) {
   return input;
 }
 
-ordered_json timings(double read, double bake, double write) { return {{"read", read}, {"bake", bake}, {"write", write}}; }
+ordered_json timings(double read, double bake, double write) {
+  return {{"read", read}, {"bake", bake}, {"write", write}};
+}
 
 struct FieldOptions {
   Common common;
@@ -99,10 +109,12 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   Result<io::FieldData> field = io::bake_field(input->mesh, o.bake, &report, console.progress());
   if (!field) return console.fail(o.common.mesh + ": " + field.error());
   field->input_hash = io::content_hash(input->mesh, o.bake);
+  if (interrupted.load()) return console.fail(o.common.mesh + ": cancelled");
   const double baked = since(start);
   start = Clock::now();
   const auto compression = o.no_compression ? io::Compression::none : io::Compression::blosc;
-  if (Outcome done = io::write_field(o.common.out, *field, compression); !done) return console.fail(done.error());
+  if (Outcome done = io::write_field(o.common.out, *field, compression); !done)
+    return console.fail(done.error());
   const double written = since(start);
   console.warn(report.warnings);
   const std::size_t bytes = std::filesystem::file_size(o.common.out);
@@ -121,12 +133,15 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   console.result(json);
   if (!console.json) {
     const double unit_m = io::metres(*unit);
-    std::printf("%s: %d x %d x %d nodes, voxel %.4g %s, %zu bricks, %.1f MB\n"
-                "  %zu triangles, %s; sign mode %s, offset %.4g %s; read %.2f s, baked %.2f s, wrote %.2f s\n",
-                o.common.out.c_str(), 8 * field->bricks[0], 8 * field->bricks[1], 8 * field->bricks[2],
-                field->voxel_size / unit_m, o.common.units.c_str(), field->brick_count(),
-                1e-6 * static_cast<double>(bytes), input->audit.triangles, report.closed ? "closed" : "not closed",
-                field->sign_mode.c_str(), field->offset / unit_m, o.common.units.c_str(), input->seconds, baked, written);
+    std::printf(
+        "%s: %d x %d x %d nodes, voxel %.4g %s, %zu bricks, %.1f MB\n"
+        "  %zu triangles, %s; sign mode %s, offset %.4g %s; read %.2f s, baked %.2f s, wrote %.2f "
+        "s\n",
+        o.common.out.c_str(), 8 * field->bricks[0], 8 * field->bricks[1], 8 * field->bricks[2],
+        field->voxel_size / unit_m, o.common.units.c_str(), field->brick_count(),
+        1e-6 * static_cast<double>(bytes), input->audit.triangles,
+        report.closed ? "closed" : "not closed", field->sign_mode.c_str(), field->offset / unit_m,
+        o.common.units.c_str(), input->seconds, baked, written);
   }
   return kOk;
 }
@@ -148,9 +163,11 @@ int bake_shell_command(const Console& console, ShellOptions& o) {
   Result<io::ShellData> shell = io::bake_shell(input->mesh, o.bake, &warnings, console.progress());
   if (!shell) return console.fail(o.common.mesh + ": " + shell.error());
   shell->input_hash = io::content_hash(input->mesh, o.bake);
+  if (interrupted.load()) return console.fail(o.common.mesh + ": cancelled");
   const double baked = since(start);
   start = Clock::now();
-  if (Outcome done = io::write_shell(o.common.out, *shell); !done) return console.fail(done.error());
+  if (Outcome done = io::write_shell(o.common.out, *shell); !done)
+    return console.fail(done.error());
   const double written = since(start);
   console.warn(warnings);
   const std::size_t bytes = std::filesystem::file_size(o.common.out);
@@ -166,10 +183,12 @@ int bake_shell_command(const Console& console, ShellOptions& o) {
                     {"warnings", warnings}};
   console.result(json);
   if (!console.json)
-    std::printf("%s: %zu points on %zu levels, %.1f MB\n"
-                "  %zu triangles, %s; read %.2f s, baked %.2f s, wrote %.2f s\n",
-                o.common.out.c_str(), shell->size(), shell->level_points.size(), 1e-6 * static_cast<double>(bytes),
-                input->audit.triangles, input->audit.closed ? "closed" : "not closed", input->seconds, baked, written);
+    std::printf(
+        "%s: %zu points on %zu levels, %.1f MB\n"
+        "  %zu triangles, %s; read %.2f s, baked %.2f s, wrote %.2f s\n",
+        o.common.out.c_str(), shell->size(), shell->level_points.size(),
+        1e-6 * static_cast<double>(bytes), input->audit.triangles,
+        input->audit.closed ? "closed" : "not closed", input->seconds, baked, written);
   return kOk;
 }
 
@@ -182,29 +201,54 @@ void add_bake(CLI::App& app, Program& program) {
   CLI::App* field = bake->add_subcommand("field", "Signed distance in sparse bricks, as .vdb");
   auto f = std::make_shared<FieldOptions>();
   add_common(field, f->common, ".vdb");
-  auto* voxels = field->add_option("--voxels", f->bake.voxels, "Cells on the longest padded side, 16 to 2048; default 256")
-                     ->option_text("N")->check(whole_within(16, 2048));
+  auto* voxels = field
+                     ->add_option("--voxels", f->bake.voxels,
+                                  "Cells on the longest padded side, 16 to 2048; default 256")
+                     ->option_text("N")
+                     ->check(whole_within(16, 2048));
   field->add_option("--voxel-size", f->bake.voxel_size, "Edge of a voxel, instead of --voxels")
-      ->option_text("S")->excludes(voxels)->check(number_above(0));
-  field->add_option("--offset", f->bake.offset, "How far the surface is pushed out; default: 0 when closed, else 0.9 voxel")
-      ->option_text("S")->check(number_within(0, 1e6));
-  field->add_option("--sign", f->sign, "How inside is found: flood (whatever the outside cannot reach) or auto (default; flood only where the mesh is open)")
-      ->option_text("MODE")->check(one_of({"auto", "flood"}));
+      ->option_text("S")
+      ->excludes(voxels)
+      ->check(number_above(0));
+  field
+      ->add_option("--offset", f->bake.offset,
+                   "How far the surface is pushed out; default: 0 when closed, else 0.9 voxel")
+      ->option_text("S")
+      ->check(number_within(0, 1e6));
+  field
+      ->add_option("--sign", f->sign,
+                   "How inside is found: flood (whatever the outside cannot reach) or auto "
+                   "(default; flood only where the mesh is open)")
+      ->option_text("MODE")
+      ->check(one_of({"auto", "flood"}));
   field->add_option("--cavities", f->cavities, "Enclosed hollows: solid (default) or hollow")
-      ->option_text("MODE")->check(one_of({"solid", "hollow"}));
+      ->option_text("MODE")
+      ->check(one_of({"solid", "hollow"}));
   field->add_flag("--no-compression", f->no_compression, "Larger file, faster to load");
-  field->callback([&program, f] { program.work = [&program, f] { return bake_field_command(program.console, *f); }; });
+  field->callback([&program, f] {
+    program.work = [&program, f] { return bake_field_command(program.console, *f); };
+  });
 
-  CLI::App* shell = bake->add_subcommand("shell", "Points with inward normals on nested levels, as .ply");
+  CLI::App* shell =
+      bake->add_subcommand("shell", "Points with inward normals on nested levels, as .ply");
   auto s = std::make_shared<ShellOptions>();
   add_common(shell, s->common, ".ply");
-  auto* points = shell->add_option("--points", s->bake.points, "Points on the finest level; default 10000")
-                     ->option_text("N")->check(whole_within(1, 20000000));
-  shell->add_option("--spacing", s->bake.spacing, "Least distance between points, instead of --points")
-      ->option_text("S")->excludes(points)->check(number_above(0));
+  auto* points =
+      shell->add_option("--points", s->bake.points, "Points on the finest level; default 10000")
+          ->option_text("N")
+          ->check(whole_within(1, 20000000));
+  shell
+      ->add_option("--spacing", s->bake.spacing,
+                   "Least distance between points, instead of --points")
+      ->option_text("S")
+      ->excludes(points)
+      ->check(number_above(0));
   shell->add_option("--levels", s->bake.levels, "Nested levels, 1 to 16; default 7")
-      ->option_text("N")->check(whole_within(1, 16));
-  shell->callback([&program, s] { program.work = [&program, s] { return bake_shell_command(program.console, *s); }; });
+      ->option_text("N")
+      ->check(whole_within(1, 16));
+  shell->callback([&program, s] {
+    program.work = [&program, s] { return bake_shell_command(program.console, *s); };
+  });
 }
 
 }  // namespace h6::cli

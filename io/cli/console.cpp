@@ -62,10 +62,12 @@ int Console::fail(std::string sentence, int code) const {
   return code;
 }
 
+std::string Console::text(const nlohmann::ordered_json& object, int indent) {
+  return object.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 void Console::result(const nlohmann::ordered_json& object) const {
-  if (!json) return;
-  // Names come from files: what is not UTF-8 is replaced, not thrown at the user.
-  std::printf("%s\n", object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  if (json) std::printf("%s\n", text(object, 2).c_str());
 }
 
 int Console::finish(int code) const {
@@ -90,7 +92,8 @@ io::Progress Console::progress() const {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   return [terminal, bar = std::make_shared<Bar>()](const std::string& what, double done) {
     const auto now = Clock::now();
-    if (terminal && now - bar->start > std::chrono::milliseconds(500) && now - bar->shown > std::chrono::milliseconds(80)) {
+    if (terminal && now - bar->start > std::chrono::milliseconds(500) &&
+        now - bar->shown > std::chrono::milliseconds(80)) {
       constexpr int width = 30;
       const double share = done > 0 ? std::min(done, 1.0) : 0;  // NaN is 0
       const int full = static_cast<int>(width * share);

@@ -22,6 +22,8 @@ class Console {
   void warn(const std::vector<std::string>& sentences) const;
   // The sentence on stderr; with json also {"error": sentence} on stdout. Returns `code`.
   int fail(std::string sentence, int code = kFailed) const;
+  // As text: names come from files, so what is not UTF-8 is replaced, not thrown at the user.
+  static std::string text(const nlohmann::ordered_json& object, int indent = -1);
   // The result of a command, when json is set.
   void result(const nlohmann::ordered_json& object) const;
   // After all work: `code`, or kFailed where stdout took not everything (a full disk).

@@ -23,7 +23,9 @@ int demo_command(const Console& console, DemoOptions o) {
   if (!scene) return console.fail(scene.error(), kUsage);
   std::error_code failed;
   std::filesystem::create_directories(o.folder, failed);
-  if (failed) return console.fail("the folder " + o.folder + " cannot be made (" + failed.message() + "): choose another with -o");
+  if (failed)
+    return console.fail("the folder " + o.folder + " cannot be made (" + failed.message() +
+                        "): choose another with -o");
   console.log(scene->about + "\n");
   auto loaded = io::load_scene(std::move(*scene), console.progress());
   if (!loaded) return console.fail(loaded.error());
@@ -34,8 +36,11 @@ int demo_command(const Console& console, DemoOptions o) {
   for (const char* method : {"global", "robust"}) {
     o.run.method = method;
     o.run.record = (std::filesystem::path(o.folder) / (o.scene + "-" + method + ".h5")).string();
-    console.log("running " + o.scene + " with '" + method + "' for " + number(o.run.duration > 0 ? o.run.duration : (*loaded)->duration(), 1) + " s" +
-                (o.run.virtual_time ? " of virtual time" : " in real time at " + number((*loaded)->scene.rate, 0) + " Hz"));
+    console.log("running " + o.scene + " with '" + method + "' for " +
+                number(o.run.duration > 0 ? o.run.duration : (*loaded)->duration(), 1) + " s" +
+                (o.run.virtual_time
+                     ? " of virtual time"
+                     : " in real time at " + number((*loaded)->scene.rate, 0) + " Hz"));
     Result<RunSummary> summary = run_scene(**loaded, o.run, console);
     if (!summary) return console.fail(summary.error());
     json["runs"].push_back(to_json(*summary, **loaded, o.run.virtual_time));
@@ -45,7 +50,9 @@ int demo_command(const Console& console, DemoOptions o) {
   console.result(json);
   if (console.json) return kOk;
   std::printf("\n%s", table(runs).c_str());
-  for (const RunSummary& run : runs) std::printf("\ndeepest contact over time, %s [voxel]\n%s", run.method.c_str(), depth_strip(run).c_str());
+  for (const RunSummary& run : runs)
+    std::printf("\ndeepest contact over time, %s [voxel]\n%s", run.method.c_str(),
+                depth_strip(run).c_str());
   if (!o.run.virtual_time) std::printf("\nreal time: %s\n", runs.back().loop.granted);
   for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
   return kOk;
@@ -54,16 +61,24 @@ int demo_command(const Console& console, DemoOptions o) {
 }  // namespace
 
 void add_demo(CLI::App& app, Program& program) {
-  CLI::App* demo = app.add_subcommand("demo", "The alpha puzzle forced through its gap, two methods side by side");
+  CLI::App* demo = app.add_subcommand(
+      "demo", "The alpha puzzle forced through its gap, two methods side by side");
   auto o = std::make_shared<DemoOptions>();
-  demo->add_option("--scene", o->scene, "Another generated scene; default alpha-shortcut")->option_text("NAME");
-  demo->add_option("-o,--output", o->folder, "Folder for the recordings; default hapsix-demo")->option_text("FOLDER");
+  demo->add_option("--scene", o->scene, "Another generated scene; default alpha-shortcut")
+      ->option_text("NAME");
+  demo->add_option("-o,--output", o->folder, "Folder for the recordings; default hapsix-demo")
+      ->option_text("FOLDER");
   demo->add_option("--duration", o->run.duration, "Of each run; default: as the scene says")
-      ->option_text("SECONDS")->check(number_within(1e-3, 1e6));
-  demo->add_flag("--virtual-time", o->run.virtual_time, "As fast as possible instead of in real time");
+      ->option_text("SECONDS")
+      ->check(number_within(1e-3, 1e6));
+  demo->add_flag("--virtual-time", o->run.virtual_time,
+                 "As fast as possible instead of in real time");
   demo->add_option("--threads", o->run.threads, "1 (default), or 2 for a helper on the other core")
-      ->option_text("N")->check(whole_within(1, 2));
-  demo->callback([&program, o] { program.work = [&program, o] { return demo_command(program.console, *o); }; });
+      ->option_text("N")
+      ->check(whole_within(1, 2));
+  demo->callback([&program, o] {
+    program.work = [&program, o] { return demo_command(program.console, *o); };
+  });
 }
 
 }  // namespace h6::cli

@@ -1,9 +1,12 @@
 // info_command.cpp - hapsix info FILE: what a file is, and what is wrong with it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "io/cli/checks.h"
 #include "io/cli/commands.h"
 #include "io/field_file.h"
 #include "io/mesh_file.h"
@@ -17,14 +20,40 @@ namespace {
 using nlohmann::ordered_json;
 
 std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   return text;
 }
 
-// Objects as "key: value" lines; the same facts as the JSON.
+// A value as a person reads it: lists of plain values in one line, of an object its plain members.
+std::string text_of(const ordered_json& value) {
+  if (value.is_string())
+    return value.get_ref<const std::string&>().empty() ? "-" : value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (value.is_number_float()) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value.get<double>());
+    return text;
+  }
+  if (!value.is_structured()) return value.is_null() ? "-" : value.dump();
+  std::string out;
+  for (const auto& [key, member] : value.items()) {
+    if (value.is_object() && member.is_structured()) continue;
+    out += (out.empty() ? "" : ", ") + (value.is_object() ? key + " " : "") + text_of(member);
+  }
+  return out.empty() ? "-" : out;
+}
+
+// A line a key, a line an object of a list; the same facts as the JSON.
 void print(const ordered_json& object) {
-  for (const auto& [key, value] : object.items())
-    std::printf("%-18s %s\n", key.c_str(), value.is_string() ? value.get<std::string>().c_str() : value.dump().c_str());
+  for (const auto& [key, value] : object.items()) {
+    const bool list = value.is_array() && !value.empty() && value.front().is_object();
+    if (!list)
+      std::printf("%-18s %s\n", key.c_str(), text_of(value).c_str());
+    else
+      for (std::size_t i = 0; i < value.size(); ++i)
+        std::printf("%-18s %s\n", i == 0 ? key.c_str() : "", text_of(value[i]).c_str());
+  }
 }
 
 int show(const Console& console, const ordered_json& object) {
@@ -39,24 +68,47 @@ Result<ordered_json> mesh_info(const std::string& file, io::Unit unit) {
   Result<io::Mesh> mesh = io::read_mesh(file, unit);
   if (!mesh) return mesh.failure();
   const io::MeshAudit a = io::audit(*mesh);
-  return ordered_json{{"kind", "mesh"}, {"triangles", a.triangles}, {"vertices", a.vertices}, {"parts", std::max<std::size_t>(1, mesh->part_names.size())},
-                      {"components", a.components}, {"closed", a.closed}, {"open_edges", a.open_edges}, {"nonmanifold_edges", a.nonmanifold_edges},
-                      {"odd_edges", a.odd_edges}, {"flipped_edges", a.flipped_edges}, {"duplicates", a.duplicates}, {"degenerate", a.degenerate},
-                      {"low_m", vec(a.low)}, {"high_m", vec(a.high)}, {"volume_m3", a.closed ? ordered_json(a.volume) : ordered_json()}};
+  return ordered_json{{"kind", "mesh"},
+                      {"triangles", a.triangles},
+                      {"vertices", a.vertices},
+                      {"parts", std::max<std::size_t>(1, mesh->part_names.size())},
+                      {"components", a.components},
+                      {"closed", a.closed},
+                      {"open_edges", a.open_edges},
+                      {"nonmanifold_edges", a.nonmanifold_edges},
+                      {"odd_edges", a.odd_edges},
+                      {"flipped_edges", a.flipped_edges},
+                      {"duplicates", a.duplicates},
+                      {"degenerate", a.degenerate},
+                      {"low_m", vec(a.low)},
+                      {"high_m", vec(a.high)},
+                      {"volume_m3", a.closed ? ordered_json(a.volume) : ordered_json()}};
 }
 
 Result<ordered_json> field_info(const std::string& file) {
   Result<io::FieldData> f = io::read_field(file);
   if (!f) return f.failure();
-  return ordered_json{{"kind", "field"}, {"dims", {8 * f->bricks[0], 8 * f->bricks[1], 8 * f->bricks[2]}}, {"voxel_size_m", f->voxel_size},
-                      {"origin_m", vec(f->origin)}, {"bricks", f->brick_count()}, {"band_m", f->band}, {"offset_m", f->offset},
-                      {"sign_mode", f->sign_mode}, {"triangles", f->triangles}, {"parts", f->part_names}, {"input_hash", f->input_hash}};
+  return ordered_json{{"kind", "field"},
+                      {"dims", {8 * f->bricks[0], 8 * f->bricks[1], 8 * f->bricks[2]}},
+                      {"voxel_size_m", f->voxel_size},
+                      {"origin_m", vec(f->origin)},
+                      {"bricks", f->brick_count()},
+                      {"band_m", f->band},
+                      {"offset_m", f->offset},
+                      {"sign_mode", f->sign_mode},
+                      {"triangles", f->triangles},
+                      {"parts", f->part_names},
+                      {"input_hash", f->input_hash}};
 }
 
 Result<ordered_json> shell_info(const std::string& file) {
   Result<io::ShellData> s = io::read_shell(file);
   if (!s) return s.failure();
-  return ordered_json{{"kind", "shell"}, {"points", s->size()}, {"levels", s->level_points.size()}, {"level_points", s->level_points}, {"input_hash", s->input_hash}};
+  return ordered_json{{"kind", "shell"},
+                      {"points", s->size()},
+                      {"levels", s->level_points.size()},
+                      {"level_points", s->level_points},
+                      {"input_hash", s->input_hash}};
 }
 
 Result<ordered_json> recording_info(const Console& console, const std::string& file) {
@@ -66,10 +118,20 @@ Result<ordered_json> recording_info(const Console& console, const std::string& f
   Result<io::Recording> r = io::read_recording(file, none);
   if (!r) return r.failure();
   if (!r->remark.empty()) console.log(r->remark);
-  ordered_json json{{"kind", "recording"}, {"frames", r->frame_count}, {"seconds", static_cast<double>(r->frame_count) / r->head.rate}, {"rate", r->head.rate},
-                    {"hands", r->head.hands}, {"whole", r->whole}, {"remark", r->remark}, {"program", r->head.program},
-                    {"simd_target", r->head.simd_target}, {"asset_hashes", r->head.asset_hashes}, {"events", r->events.size()}};
-  if (!r->summary_json.empty()) json["summary"] = ordered_json::parse(r->summary_json, nullptr, false);
+  ordered_json json{{"kind", "recording"},
+                    {"frames", r->frame_count},
+                    {"seconds", static_cast<double>(r->frame_count) / r->head.rate},
+                    {"rate", r->head.rate},
+                    {"hands", r->head.hands},
+                    {"whole", r->whole},
+                    {"remark", r->remark},
+                    {"program", r->head.program},
+                    {"simd_target", r->head.simd_target},
+                    {"asset_hashes", r->head.asset_hashes},
+                    {"events", r->events.size()}};
+  if (!r->summary_json.empty())
+    json["summary"] = ordered_json::parse(r->summary_json, nullptr, false);
+  if (json.contains("summary") && json["summary"].is_discarded()) json["summary"] = nullptr;
   return json;
 }
 
@@ -78,11 +140,25 @@ Result<ordered_json> scene_info(const std::string& file) {
   if (!s) return s.failure();
   ordered_json bodies = ordered_json::array(), hands = ordered_json::array();
   for (const io::SceneBody& b : s->bodies)
-    bodies.push_back({{"name", b.name}, {"fixed", b.fixed}, {"mass", b.mass}, {"field", b.field.has_value()}, {"shell", b.shell.has_value()}});
+    bodies.push_back({{"name", b.name},
+                      {"fixed", b.fixed},
+                      {"mass", b.mass},
+                      {"field", b.field.has_value()},
+                      {"shell", b.shell.has_value()}});
   for (const io::SceneHand& h : s->hands)
-    hands.push_back({{"body", h.body}, {"device", h.device}, {"rows", h.path.size()}, {"seconds", h.path.empty() ? 0.0 : h.path.back().t}});
-  return ordered_json{{"kind", "scene"}, {"name", s->name}, {"about", s->about}, {"units", io::unit_name(s->unit)}, {"rate", s->rate},
-                      {"method", h6MethodName(s->contact.method)}, {"bodies", bodies}, {"hands", hands}, {"forbidden", s->verdict.forbidden.size()}};
+    hands.push_back({{"body", h.body},
+                     {"device", h.device},
+                     {"rows", h.path.size()},
+                     {"seconds", h.path.empty() ? 0.0 : h.path.back().t}});
+  return ordered_json{{"kind", "scene"},
+                      {"name", s->name},
+                      {"about", s->about},
+                      {"units", io::unit_name(s->unit)},
+                      {"rate", s->rate},
+                      {"method", h6MethodName(s->contact.method)},
+                      {"bodies", bodies},
+                      {"hands", hands},
+                      {"forbidden", s->verdict.forbidden.size()}};
 }
 
 Result<ordered_json> path_info(const std::string& file, io::Unit unit) {
@@ -91,23 +167,36 @@ Result<ordered_json> path_info(const std::string& file, io::Unit unit) {
   return ordered_json{{"kind", "path"}, {"rows", p->size()}, {"seconds", p->back().t}};
 }
 
-// A .ply is a shell when it has points with normals and no faces.
-bool ply_without_faces(const std::string& file) {
-  Result<io::ShellData> shell = io::read_shell(file);
-  return static_cast<bool>(shell);
+// A header names its elements within the first kilobytes.
+bool has_faces(const std::string& file) {
+  char head[4096] = {};
+  std::ifstream(file, std::ios::binary).read(head, sizeof head - 1);
+  return std::string(head).find("element face") != std::string::npos;
+}
+
+// A .ply without faces is a shell, or wants to be one.
+Result<ordered_json> ply_info(const std::string& file, io::Unit unit) {
+  return has_faces(file) ? mesh_info(file, unit) : shell_info(file);
 }
 
 int info_command(const Console& console, const std::string& file, const std::string& units) {
   Result<io::Unit> unit = io::unit_from_name(units);
   if (!unit) return console.fail(unit.error(), kUsage);
+  if (Outcome there = check_input(file); !there) return console.fail(there.error());
   const std::string ending = lower(std::filesystem::path(file).extension().string());
   Result<ordered_json> facts = Failure{""};
-  if (ending == ".vdb") facts = field_info(file);
-  else if (ending == ".h5") facts = recording_info(console, file);
-  else if (ending == ".json") facts = scene_info(file);
-  else if (ending == ".csv") facts = path_info(file, *unit);
-  else if (ending == ".ply" && ply_without_faces(file)) facts = shell_info(file);
-  else facts = mesh_info(file, *unit);
+  if (ending == ".vdb")
+    facts = field_info(file);
+  else if (ending == ".h5")
+    facts = recording_info(console, file);
+  else if (ending == ".json")
+    facts = scene_info(file);
+  else if (ending == ".csv")
+    facts = path_info(file, *unit);
+  else if (ending == ".ply")
+    facts = ply_info(file, *unit);
+  else
+    facts = mesh_info(file, *unit);
   if (!facts) return console.fail(facts.error());
   ordered_json object{{"file", file}};
   object.update(*facts);
@@ -117,19 +206,27 @@ int info_command(const Console& console, const std::string& file, const std::str
 }  // namespace
 
 void add_info(CLI::App& app, Program& program) {
-  CLI::App* info = app.add_subcommand("info", "What a file is: mesh, field, shell, scene, path or recording");
+  CLI::App* info =
+      app.add_subcommand("info", "What a file is: mesh, field, shell, scene, path or recording");
   auto file = std::make_shared<std::string>(), units = std::make_shared<std::string>("m");
   auto schema = std::make_shared<bool>(false);
-  auto* option = info->add_option("FILE", *file, "STL, OBJ, PLY (also .gz), .vdb, .json, .csv or .h5");
-  info->add_option("--units", *units, "Unit of a mesh or path: m, mm, cm or in")->capture_default_str();
-  info->add_flag("--schema", *schema, "Print the JSON schema of scene files, every key explained")->excludes(option);
+  auto* option =
+      info->add_option("FILE", *file, "STL, OBJ, PLY (also .gz), .vdb, .json, .csv or .h5")
+          ->option_text("FILE");
+  info->add_option("--units", *units, "Unit of a mesh or path: m, mm, cm or in; default m")
+      ->option_text("UNIT")
+      ->check(one_of({"m", "mm", "cm", "in"}));
+  info->add_flag("--schema", *schema, "Print the JSON schema of scene files, every key explained")
+      ->excludes(option);
   info->callback([&program, file, units, schema] {
     program.work = [&program, file, units, schema] {
       if (*schema) {
         std::printf("%s\n", io::scene_schema().c_str());
         return kOk;
       }
-      if (file->empty()) return program.console.fail("info needs a FILE, or --schema", kUsage);
+      if (file->empty())
+        return program.console.fail(
+            "info needs a FILE, or --schema; 'hapsix info --help' tells more", kUsage);
       return info_command(program.console, *file, *units);
     };
   });

@@ -1,4 +1,5 @@
-// main.cpp - hapsix, the program: parses, dispatches, exits 0 (done), 1 (failed) or 2 (wrong usage).
+// main.cpp - hapsix, the program: parses, dispatches, exits 0 (done), 1 (failed) or 2 (wrong
+// usage).
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -39,12 +40,14 @@ std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
       for (const CLI::Option* o : at->get_options())
         for (const std::string& l : o->get_lnames()) known.push_back("--" + l);
     }
-    what = option ? "there is no option '" + word + "'"
+    what = option         ? "there is no option '" + word + "'"
            : next.empty() ? "'" + word + "' is one argument too many"
                           : "there is no command '" + word + "'";
     const std::string like = nearest(word, known);
-    if (like == word) what = "'" + word + "' belongs behind '" + command + "'";
-    else if (!like.empty()) what += ", did you mean '" + like + "'?";
+    if (like == word)
+      what = "'" + word + "' belongs behind '" + command + "'";
+    else if (!like.empty())
+      what += ", did you mean '" + like + "'?";
   } else if (missing && !next.empty()) {
     what = command + " needs a command: ";
     for (std::size_t i = 0; i < next.size(); ++i)
@@ -68,31 +71,35 @@ int main(int argc, char** argv) {
   app.footer("Every command takes --json. Exit code: 0 done, 1 failed, 2 wrong usage.");
   Program program;
   app.add_flag("--json", program.console.json, "One JSON object on stdout, messages on stderr");
-  app.set_version_flag("--version", std::string("hapsix ") + std::to_string(H6_VERSION_MAJOR) + "." +
-                                        std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH));
+  app.set_version_flag("--version", std::string("hapsix ") + std::to_string(H6_VERSION_MAJOR) +
+                                        "." + std::to_string(H6_VERSION_MINOR) + "." +
+                                        std::to_string(H6_VERSION_PATCH));
   add_bake(app, program);
   add_run(app, program);
   add_info(app, program);
   add_scene(app, program);
   add_demo(app, program);
-  app.footer("COMMAND --help explains each. To begin with:\n"
-             "  hapsix demo                                  two methods side by side\n"
-             "  hapsix run peg-in-hole --virtual-time        a generated scene\n"
-             "  hapsix bake field bay.stl -o bay.vdb --units mm --voxels 512\n" +
-             app.get_footer());
+  app.footer(
+      "COMMAND --help explains each. To begin with:\n"
+      "  hapsix demo                                  two methods side by side\n"
+      "  hapsix run peg-in-hole --virtual-time        a generated scene\n"
+      "  hapsix bake field bay.stl -o bay.vdb --units mm --voxels 512\n" +
+      app.get_footer());
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {  // --help, --version
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    for (int i = 1; i < argc; ++i) program.console.json = program.console.json || std::string(argv[i]) == "--json";
+    for (int i = 1; i < argc; ++i)
+      program.console.json = program.console.json || std::string(argv[i]) == "--json";
     return program.console.fail(mistake(app, e), kUsage);
   }
   install_signal_handlers();
   try {
     return program.console.finish(program.work());
   } catch (const std::bad_alloc&) {
-    return program.console.fail("out of memory: use a larger voxel, fewer points or a smaller file");
+    return program.console.fail(
+        "out of memory: use a larger voxel, fewer points or a smaller file");
   } catch (const std::exception& e) {
     return program.console.fail(std::string("unexpected: ") + e.what());
   }

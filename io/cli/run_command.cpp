@@ -20,11 +20,13 @@ Result<io::Scene> find_scene(const std::string& name) {
   const bool is_file = std::filesystem::exists(name);
   std::vector<std::string> known;
   for (const io::SceneName& scene : io::scene_names()) known.push_back(scene.name);
-  if (!is_file && std::find(known.begin(), known.end(), name) != known.end()) return io::make_scene(name);
+  if (!is_file && std::find(known.begin(), known.end(), name) != known.end())
+    return io::make_scene(name);
   if (!is_file && std::filesystem::path(name).extension() != ".json") {  // meant as a name
     const std::string like = nearest(name, known);
     return Failure{"there is neither a file nor a generated scene '" + name + "'" +
-                   (like.empty() ? "; 'hapsix scene list' shows what there is" : ", did you mean '" + like + "'?")};
+                   (like.empty() ? "; 'hapsix scene list' shows what there is"
+                                 : ", did you mean '" + like + "'?")};
   }
   if (Outcome there = check_input(name); !there) return there.failure();
   return io::read_scene(name);
@@ -46,12 +48,15 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (!console.json) console.log(assets(**loaded));
   Result<RunSummary> summary = run_scene(**loaded, options, console);
   if (!summary) return console.fail(name + ": " + summary.error());
-  const std::string stopped = "interrupted after " + std::to_string(summary->loop.frames) + " frames";
+  const std::string stopped =
+      "interrupted after " + std::to_string(summary->loop.frames) + " frames";
   nlohmann::ordered_json json = to_json(*summary, **loaded, options.virtual_time);
-  if (summary->interrupted) json["error"] = stopped;  // what there was of the run, in the same object
+  if (summary->interrupted)
+    json["error"] = stopped;  // what there was of the run, in the same object
   console.result(json);
   if (!console.json) {
-    std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(), depth_strip(*summary).c_str());
+    std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
+                depth_strip(*summary).c_str());
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);
     if (!options.record.empty()) std::printf("recording: %s\n", options.record.c_str());
   }
@@ -66,21 +71,36 @@ void add_run(CLI::App& app, Program& program) {
   CLI::App* run = app.add_subcommand("run", "Run a scene: forces and a verdict out");
   auto name = std::make_shared<std::string>();
   auto o = std::make_shared<RunOptions>();
-  run->add_option("SCENE", *name, "A scene file, or the name of a generated scene ('hapsix scene list')")
-      ->required()->option_text("FILE|NAME");
-  run->add_option("--device", o->device, "For every hand: path (follows the scene's path exactly) or simulated (a person who yields)")
+  run->add_option("SCENE", *name,
+                  "A scene file, or the name of a generated scene ('hapsix scene list')")
+      ->required()
+      ->option_text("FILE|NAME");
+  run->add_option("--device", o->device,
+                  "For every hand: path (follows the scene's path exactly) or simulated (a person "
+                  "who yields)")
       ->option_text("NAME");
   run->add_option("--duration", o->duration, "Default: as the scene says")
-      ->option_text("SECONDS")->check(number_within(1e-3, 1e6));
-  run->add_flag("--virtual-time", o->virtual_time, "As fast as possible instead of in real time; same code, same bits");
-  run->add_option("--method", o->method, "none, global, gauss3, gauss6 or robust; the Gauss ones also with +facing, +depth, +product")
+      ->option_text("SECONDS")
+      ->check(number_within(1e-3, 1e6));
+  run->add_flag("--virtual-time", o->virtual_time,
+                "As fast as possible instead of in real time; same code, same bits");
+  run->add_option("--method", o->method,
+                  "none, global, gauss3, gauss6 or robust; the Gauss ones also with +facing, "
+                  "+depth, +product")
       ->option_text("NAME");
-  run->add_option("--threads", o->threads, "1 (default), or 2 for a helper on the other core; same bits")
-      ->option_text("N")->check(whole_within(1, 2));
+  run->add_option("--threads", o->threads,
+                  "1 (default), or 2 for a helper on the other core; same bits")
+      ->option_text("N")
+      ->check(whole_within(1, 2));
   run->add_option("--spin", o->spin_us, "Poll the clock so long before each deadline; default 0")
-      ->option_text("MICROSECONDS")->check(number_within(0, 10000));
-  run->add_option("--record", o->record, "Record every frame to this .h5 file")->option_text("FILE")->check(ends_with(".h5"));
-  run->callback([&program, name, o] { program.work = [&program, name, o] { return run_command(program.console, *name, *o); }; });
+      ->option_text("MICROSECONDS")
+      ->check(number_within(0, 10000));
+  run->add_option("--record", o->record, "Record every frame to this .h5 file")
+      ->option_text("FILE")
+      ->check(ends_with(".h5"));
+  run->callback([&program, name, o] {
+    program.work = [&program, name, o] { return run_command(program.console, *name, *o); };
+  });
 }
 
 }  // namespace h6::cli

@@ -17,8 +17,12 @@ namespace {
 
 using nlohmann::ordered_json;
 
-struct SessionDeleter { void operator()(h6Session* s) const { h6DestroySession(s); } };
-struct LoopDeleter { void operator()(h6Loop* l) const { h6DestroyLoop(l); } };
+struct SessionDeleter {
+  void operator()(h6Session* s) const { h6DestroySession(s); }
+};
+struct LoopDeleter {
+  void operator()(h6Loop* l) const { h6DestroyLoop(l); }
+};
 
 // The devices of a run, alive as long as it.
 struct Hands {
@@ -68,9 +72,14 @@ double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.
 // Everything that is made of the stream of frames, one row at a time.
 class Watcher {
  public:
-  Watcher(const io::LoadedScene& loaded, RunSummary& summary, double duration, io::Recorder* recorder)
-      : summary_(summary), recorder_(recorder), duration_(duration),
-        com_(loaded.hands.empty() ? h6Vec3{} : loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com),
+  Watcher(const io::LoadedScene& loaded, RunSummary& summary, double duration,
+          io::Recorder* recorder)
+      : summary_(summary),
+        recorder_(recorder),
+        duration_(duration),
+        com_(loaded.hands.empty()
+                 ? h6Vec3{}
+                 : loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com),
         verdict_(loaded.scene.verdict, loaded.watched_points, com_, loaded.scene.rate) {
     summary_.depth_strip.assign(60, 0);
   }
@@ -80,6 +89,8 @@ class Watcher {
     return recorder_ ? recorder_->frames(rows, count) : Outcome(Done{});
   }
   void finish() {
+    if (summary_.interrupted)
+      event({last_time_, "interrupted", "by the user; every device was told to stop"});
     summary_.contacts_mean = frames_ ? contacts_ / static_cast<double>(frames_) : 0;
     summary_.verdict = verdict_.verdict();
   }
@@ -93,7 +104,8 @@ class Watcher {
     summary_.max_depth_voxels = std::max(summary_.max_depth_voxels, f.max_depth_voxels);
     summary_.frame_us.add(f.frame_us);
     summary_.wakeup_us.add(r.wakeup_us);
-    for (int s = 0; s < H6_STAGE_COUNT; ++s) summary_.stage_us[static_cast<std::size_t>(s)].add(f.stage_us[s]);
+    for (int s = 0; s < H6_STAGE_COUNT; ++s)
+      summary_.stage_us[static_cast<std::size_t>(s)].add(f.stage_us[s]);
     for (const h6DeviceCommand& c : r.command) {
       summary_.max_force = std::max(summary_.max_force, norm(c.wrench.force));
       summary_.max_torque = std::max(summary_.max_torque, norm(c.wrench.torque));
@@ -102,21 +114,28 @@ class Watcher {
     summary_.hand_pose = r.hand[0].pose;
     summary_.state_hash = f.state_hash;
     const auto bin = static_cast<std::size_t>(60 * r.time / duration_);
-    if (bin < 60) summary_.depth_strip[bin] = std::max(summary_.depth_strip[bin], static_cast<float>(f.max_depth_voxels));
-    verdict_.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels, (f.status & H6_STATE_NOT_FINITE) == 0);
+    if (bin < 60)
+      summary_.depth_strip[bin] =
+          std::max(summary_.depth_strip[bin], static_cast<float>(f.max_depth_voxels));
+    verdict_.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
+                   (f.status & H6_STATE_NOT_FINITE) == 0);
     note_changes(r);
+    last_time_ = r.time;
   }
 
   // An event when a status bit or a cause comes up, not while it stays.
   void note_changes(const h6FrameRecord& r) {
     const h6Status status = r.report.status & ~static_cast<h6Status>(H6_COUPLING_SATURATED);
     for (h6Status bit = 1; bit && bit <= H6_LATE; bit <<= 1)
-      if ((status & bit) && !(last_status_ & bit)) event({r.time, h6StatusName(bit), "frame " + std::to_string(r.report.frame)});
+      if ((status & bit) && !(last_status_ & bit))
+        event({r.time, h6StatusName(bit), "frame " + std::to_string(r.report.frame)});
     last_status_ = status;
   }
   void event(const io::RecordingEvent& e) {
-    if (summary_.events.size() < 1000) summary_.events.push_back(e);
-    else ++summary_.events_dropped;
+    if (summary_.events.size() < 1000)
+      summary_.events.push_back(e);
+    else
+      ++summary_.events_dropped;
     if (recorder_) (void)recorder_->event(e);
   }
 
@@ -126,18 +145,21 @@ class Watcher {
   h6Vec3 com_;
   io::VerdictWatch verdict_;
   std::uint64_t frames_ = 0;
-  double contacts_ = 0;
+  double contacts_ = 0, last_time_ = 0;
   h6Status last_status_ = 0;
 };
 
-Result<std::unique_ptr<io::Recorder>> open_recording(const io::LoadedScene& loaded, const RunOptions& options, const h6SessionDef& def) {
+Result<std::unique_ptr<io::Recorder>> open_recording(const io::LoadedScene& loaded,
+                                                     const RunOptions& options,
+                                                     const h6SessionDef& def) {
   io::RecordingHead head;
   head.scene_json = io::scene_text(loaded.scene);
   for (const io::LoadedAsset& a : loaded.assets) head.asset_hashes.push_back(a.hash);
   head.simd_target = kernels::target_name();
   head.rate = def.rate;
   head.hands = def.hand_count;
-  head.program = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." + std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH);
+  head.program = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." +
+                 std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH);
   return io::Recorder::create(options.record, head);
 }
 
@@ -154,17 +176,21 @@ Outcome check_options(const RunOptions& options) {
   std::uint32_t pieces;
   if (!options.method.empty() && h6MethodFromName(options.method.c_str(), &method, &pieces) != 0)
     return Failure{"no method is called '" + options.method +
-                   "': none, global, gauss3, gauss6 or robust, the Gauss ones also with +facing, +depth, +product"};
+                   "': none, global, gauss3, gauss6 or robust, the Gauss ones also with +facing, "
+                   "+depth, +product"};
   return options.device.empty() ? Outcome(Done{}) : check_device(options.device);
 }
 
-Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& options, const Console& console) {
+Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& options,
+                             const Console& console) {
   h6SessionDef def = loaded.session_def();
   if (Outcome known = check_options(options); !known) return known.failure();
-  if (!options.method.empty()) h6MethodFromName(options.method.c_str(), &def.contact.method, &def.contact.pieces);
+  if (!options.method.empty())
+    h6MethodFromName(options.method.c_str(), &def.contact.method, &def.contact.pieces);
   def.threads = options.threads;
   h6Error error{};
-  std::unique_ptr<h6Session, SessionDeleter> session(h6CreateSession(loaded.model.get(), &def, &error));
+  std::unique_ptr<h6Session, SessionDeleter> session(
+      h6CreateSession(loaded.model.get(), &def, &error));
   if (!session) return Failure{error.message};
   Hands hands;
   if (Outcome opened = open_hands(loaded, options, hands); !opened) return opened.failure();
@@ -187,15 +213,21 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   summary.seconds = loop_def.duration;
   summary.virtual_time = options.virtual_time;
   Watcher watcher(loaded, summary, loop_def.duration, recorder.get());
-  std::unique_ptr<h6Loop, LoopDeleter> loop(h6StartLoop(session.get(), hands.devices.data(), &loop_def, &error));
+  std::unique_ptr<h6Loop, LoopDeleter> loop(
+      h6StartLoop(session.get(), hands.devices.data(), &loop_def, &error));
   if (!loop) return Failure{error.message};
   // A signal ends the loop after its frame; the devices are stopped from the handler already.
-  struct Stop { h6Loop* loop; const Hands* hands; } stop{loop.get(), &hands};
-  set_signal_hook([](void* context) {
-    const auto& s = *static_cast<Stop*>(context);
-    for (const h6Device& d : s.hands->devices) d.stop(d.self);
-    h6RequestStop(s.loop);
-  }, &stop);
+  struct Stop {
+    h6Loop* loop;
+    const Hands* hands;
+  } stop{loop.get(), &hands};
+  set_signal_hook(
+      [](void* context) {
+        const auto& s = *static_cast<Stop*>(context);
+        for (const h6Device& d : s.hands->devices) d.stop(d.self);
+        h6RequestStop(s.loop);
+      },
+      &stop);
   if (interrupted.load()) h6RequestStop(loop.get());
 
   std::vector<h6FrameRecord> rows(256);
@@ -203,11 +235,14 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   Outcome watched = Done{};
   const auto drain = [&] {
     while (const std::size_t n = h6ReadRecords(loop.get(), rows.data(), rows.size())) {
-      if (watched) watched = watcher.rows(rows.data(), n);
-      else (void)watcher.rows(nullptr, 0);
+      if (watched)
+        watched = watcher.rows(rows.data(), n);
+      else
+        (void)watcher.rows(nullptr, 0);
       progress("running " + loaded.scene.name, rows[n - 1].time / loop_def.duration);
     }
-    if (watched && recorder) watched = recorder->frames(nullptr, 0);  // what is old enough goes to disk
+    if (watched && recorder)
+      watched = recorder->frames(nullptr, 0);  // what is old enough goes to disk
     if (!watched) h6RequestStop(loop.get());
   };
   while (h6LoopRunning(loop.get())) {
@@ -219,38 +254,55 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   drain();
   progress("running", 1);
   if (!watched) return watched.failure();
+  summary.interrupted = interrupted.load() && static_cast<double>(summary.loop.frames) <
+                                                  loop_def.duration * def.rate - 0.5;
   watcher.finish();
   if (def.hand_count == 0)  // nobody holds anything: the first body that moves
     for (std::size_t b = 0; b < def.body_count; ++b)
       if (!def.bodies[b].fixed) {
-        summary.final_pose = summary.hand_pose = h6GetBody(session.get(), static_cast<int32_t>(b)).pose;
+        summary.final_pose = summary.hand_pose =
+            h6GetBody(session.get(), static_cast<int32_t>(b)).pose;
         break;
       }
-  summary.interrupted = interrupted.load() && summary.loop.frames < loop_def.duration * def.rate - 0.5;
   if (recorder)
-    if (Outcome done = recorder->finish(to_json(summary, loaded, options.virtual_time).dump()); !done) return done.failure();
+    if (Outcome done =
+            recorder->finish(Console::text(to_json(summary, loaded, options.virtual_time)));
+        !done)
+      return done.failure();
   return summary;
 }
 
 ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool virtual_time) {
   const double scale = 1 / io::metres(loaded.scene.unit);
   const auto pose = [&](const h6Pose& p) {
-    return ordered_json{{"p", {p.p.x * scale, p.p.y * scale, p.p.z * scale}}, {"q", {p.q.w, p.q.x, p.q.y, p.q.z}}};
+    return ordered_json{{"p", {p.p.x * scale, p.p.y * scale, p.p.z * scale}},
+                        {"q", {p.q.w, p.q.x, p.q.y, p.q.z}}};
   };
   const auto spread = [](const Histogram& h) {
-    return ordered_json{{"p50", h.percentile(50)}, {"p99", h.percentile(99)}, {"p999", h.percentile(99.9)}, {"max", h.max()}};
+    return ordered_json{{"p50", h.percentile(50)},
+                        {"p99", h.percentile(99)},
+                        {"p999", h.percentile(99.9)},
+                        {"max", h.max()}};
   };
   ordered_json stages = ordered_json::object();
   for (int i = 0; i < H6_STAGE_COUNT; ++i)
     stages[h6StageName(static_cast<h6Stage>(i))] = spread(s.stage_us[static_cast<std::size_t>(i)]);
-  ordered_json events = ordered_json::array(), status = ordered_json::array(), assets = ordered_json::array();
-  for (const io::RecordingEvent& e : s.events) events.push_back({{"t", e.time}, {"what", e.what}, {"detail", e.detail}});
+  ordered_json events = ordered_json::array(), status = ordered_json::array(),
+               assets = ordered_json::array();
+  for (const io::RecordingEvent& e : s.events)
+    events.push_back({{"t", e.time}, {"what", e.what}, {"detail", e.detail}});
   for (h6Status bit = 1; bit <= H6_LATE; bit <<= 1)
     if (s.loop.status & bit) status.push_back(h6StatusName(bit));
   for (const io::LoadedAsset& a : loaded.assets) {
-    ordered_json asset{{"body", a.body}, {"kind", a.is_field ? "field" : "shell"}, {"from_cache", a.from_cache}, {"seconds", a.seconds}, {"hash", a.hash}};
-    if (a.is_field) asset.update({{"voxel_size", a.voxel_size}, {"dims", a.nodes}, {"bricks", a.bricks}});
-    else asset.update({{"points", a.points}, {"levels", a.levels}});
+    ordered_json asset{{"body", a.body},
+                       {"kind", a.is_field ? "field" : "shell"},
+                       {"from_cache", a.from_cache},
+                       {"seconds", a.seconds},
+                       {"hash", a.hash}};
+    if (a.is_field)
+      asset.update({{"voxel_size", a.voxel_size}, {"dims", a.nodes}, {"bricks", a.bricks}});
+    else
+      asset.update({{"points", a.points}, {"levels", a.levels}});
     assets.push_back(asset);
   }
   char hash[20];
@@ -266,7 +318,10 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
                     {"frame_us", spread(s.frame_us)},
                     {"stage_us", stages},
                     {"wakeup_us", spread(s.wakeup_us)},
-                    {"deadline", {{"missed_compute", s.loop.late_compute}, {"missed_wakeup", s.loop.late_wakeup}, {"missed_stolen", s.loop.late_stolen}}},
+                    {"deadline",
+                     {{"missed_compute", s.loop.late_compute},
+                      {"missed_wakeup", s.loop.late_wakeup},
+                      {"missed_stolen", s.loop.late_stolen}}},
                     {"final_pose", pose(s.final_pose)},
                     {"hand_pose", pose(s.hand_pose)},
                     {"max_force", s.max_force},

@@ -15,13 +15,13 @@
 namespace h6::cli {
 
 struct RunOptions {
-  std::string device;             // empty: what the scene says for each hand
-  double duration = 0;            // 0: the scene's [s]
+  std::string device;   // empty: what the scene says for each hand
+  double duration = 0;  // 0: the scene's [s]
   bool virtual_time = false;
-  std::string method;             // empty: the scene's
+  std::string method;  // empty: the scene's
   unsigned threads = 1;
   double spin_us = 0;
-  std::string record;             // empty: none
+  std::string record;  // empty: none
 };
 
 struct RunSummary {
@@ -38,9 +38,9 @@ struct RunSummary {
   std::uint64_t state_hash = 0;
   std::vector<io::RecordingEvent> events;
   std::size_t events_dropped = 0;
-  std::vector<float> depth_strip;        // deepest contact in each 1/60 of the run [voxel]
+  std::vector<float> depth_strip;  // deepest contact in each 1/60 of the run [voxel]
   std::string recording;
-  double seconds = 0;                    // asked for
+  double seconds = 0;  // asked for
   bool virtual_time = false;
   bool interrupted = false;
 };
@@ -49,9 +49,11 @@ struct RunSummary {
 Outcome check_options(const RunOptions& options);
 Outcome check_device(const std::string& name);
 
-Result<RunSummary> run_scene(const io::LoadedScene& scene, const RunOptions& options, const Console& console);
+Result<RunSummary> run_scene(const io::LoadedScene& scene, const RunOptions& options,
+                             const Console& console);
 
 // The object that `run --json` prints; lengths in the scene's units.
-nlohmann::ordered_json to_json(const RunSummary& summary, const io::LoadedScene& scene, bool virtual_time);
+nlohmann::ordered_json to_json(const RunSummary& summary, const io::LoadedScene& scene,
+                               bool virtual_time);
 
 }  // namespace h6::cli

@@ -33,15 +33,24 @@ int export_command(const Console& console, const std::string& name, const std::s
 }  // namespace
 
 void add_scene(CLI::App& app, Program& program) {
-  CLI::App* scene = app.add_subcommand("scene", "Generated scenes: their list, or one as plain files");
+  CLI::App* scene =
+      app.add_subcommand("scene", "Generated scenes: their list, or one as plain files");
   scene->require_subcommand(1);
   CLI::App* list = scene->add_subcommand("list", "What there is");
-  list->callback([&program] { program.work = [&program] { return list_command(program.console); }; });
-  CLI::App* out = scene->add_subcommand("export", "A scene as plain files: scene.json, STL, PLY, CSV path");
+  list->callback(
+      [&program] { program.work = [&program] { return list_command(program.console); }; });
+  CLI::App* out =
+      scene->add_subcommand("export", "A scene as plain files: scene.json, STL, PLY, CSV path");
   auto name = std::make_shared<std::string>(), folder = std::make_shared<std::string>();
   out->add_option("NAME", *name, "From 'hapsix scene list'")->required()->option_text("NAME");
-  out->add_option("DIR", *folder, "A folder; made when it is not there")->required()->option_text("FOLDER");
-  out->callback([&program, name, folder] { program.work = [&program, name, folder] { return export_command(program.console, *name, *folder); }; });
+  out->add_option("DIR", *folder, "A folder; made when it is not there")
+      ->required()
+      ->option_text("FOLDER");
+  out->callback([&program, name, folder] {
+    program.work = [&program, name, folder] {
+      return export_command(program.console, *name, *folder);
+    };
+  });
 }
 
 }  // namespace h6::cli

@@ -24,7 +24,8 @@ const char* origin(const io::LoadedScene& scene, const io::LoadedAsset& asset) {
   const int index = scene.body_index(asset.body);
   if (index < 0) return "made";
   const io::SceneBody& body = scene.scene.bodies[static_cast<std::size_t>(index)];
-  const bool file = asset.is_field ? body.field && !body.field->file.empty() : body.shell && !body.shell->file.empty();
+  const bool file = asset.is_field ? body.field && !body.field->file.empty()
+                                   : body.shell && !body.shell->file.empty();
   return file ? "read" : "baked";
 }
 
@@ -33,12 +34,19 @@ const char* origin(const io::LoadedScene& scene, const io::LoadedAsset& asset) {
 std::string table(const std::vector<RunSummary>& runs) {
   int width = 8;
   for (const RunSummary& r : runs) width = std::max(width, static_cast<int>(r.method.size()));
-  std::string out = format("%-*s verdict   contacts     deepest  force  frame [us]               late frames\n", width, "method") +
-                    format("%-*s            mean   max  [voxel]    [N]     p50     p99     max  own  wake-up  stolen\n", width, "");
+  std::string out =
+      format("%-*s verdict   contacts     deepest  force  frame [us]               late frames\n",
+             width, "method") +
+      format(
+          "%-*s            mean   max  [voxel]    [N]     p50     p99     max  own  wake-up  "
+          "stolen\n",
+          width, "");
   for (const RunSummary& r : runs)
-    out += format("%-*s %-8s  %6.1f %5u %8.3f %6.2f %7.1f %7.1f %7.1f %4s %8s %7s\n", width, r.method.c_str(), io::verdict_name(r.verdict),
-                  r.contacts_mean, r.contacts_max, r.max_depth_voxels, r.max_force, r.frame_us.percentile(50), r.frame_us.percentile(99),
-                  r.frame_us.max(), late(r, r.loop.late_compute).c_str(), late(r, r.loop.late_wakeup).c_str(), late(r, r.loop.late_stolen).c_str());
+    out += format("%-*s %-8s  %6.1f %5u %8.3f %6.2f %7.1f %7.1f %7.1f %4s %8s %7s\n", width,
+                  r.method.c_str(), io::verdict_name(r.verdict), r.contacts_mean, r.contacts_max,
+                  r.max_depth_voxels, r.max_force, r.frame_us.percentile(50),
+                  r.frame_us.percentile(99), r.frame_us.max(), late(r, r.loop.late_compute).c_str(),
+                  late(r, r.loop.late_wakeup).c_str(), late(r, r.loop.late_stolen).c_str());
   return out;
 }
 
@@ -67,10 +75,13 @@ std::string assets(const io::LoadedScene& scene) {
   for (const io::LoadedAsset& a : scene.assets) {
     if (!out.empty()) out += '\n';
     if (a.is_field)
-      out += format("  field of %-10.80s %d x %d x %d nodes, %zu bricks, voxel %.4g mm, %s in %.2f s", a.body.c_str(), a.nodes[0], a.nodes[1],
-                    a.nodes[2], a.bricks, 1e3 * a.voxel_size, origin(scene, a), a.seconds);
+      out +=
+          format("  field of %-10.80s %d x %d x %d nodes, %zu bricks, voxel %.4g mm, %s in %.2f s",
+                 a.body.c_str(), a.nodes[0], a.nodes[1], a.nodes[2], a.bricks, 1e3 * a.voxel_size,
+                 origin(scene, a), a.seconds);
     else
-      out += format("  shell of %-10.80s %zu points on %d levels, %s in %.2f s", a.body.c_str(), a.points, a.levels, origin(scene, a), a.seconds);
+      out += format("  shell of %-10.80s %zu points on %d levels, %s in %.2f s", a.body.c_str(),
+                    a.points, a.levels, origin(scene, a), a.seconds);
   }
   return out;
 }

@@ -1,0 +1,247 @@
+// program.h - the program from outside: runs it as a user would, in a folder and with a cache of
+// its own, and tells what came out. Nothing of hapsix is linked.
+#pragma once
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace h6::test {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Args = std::vector<std::string>;
+
+inline std::string slurp(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+inline void spill(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+// What a process left: its code, or minus the signal that ended it.
+struct Ended {
+  int code = 0;
+  bool in_time = true;  // false: it hung and was killed
+  std::string out, err;
+  double cpu_seconds = 0;  // user and system: hardly changes with the load of the machine
+  double wall_seconds = 0;
+};
+
+// A folder that is gone with its object: the working folder of the processes started here. The
+// cache and what they print lie beside it, so `files` shows only what the program made.
+class Sandbox {
+ public:
+  Sandbox() {
+    char name[] = "/tmp/hapsix-cli-XXXXXX";
+    REQUIRE(mkdtemp(name) != nullptr);
+    root_ = name;
+    fs::create_directories(folder());
+    fs::create_directories(cache());
+  }
+  ~Sandbox() {
+    std::error_code ignored;
+    fs::remove_all(root_, ignored);
+  }
+  Sandbox(const Sandbox&) = delete;
+  Sandbox& operator=(const Sandbox&) = delete;
+
+  fs::path folder() const { return root_ / "work"; }
+  fs::path cache() const { return root_ / "cache"; }
+  fs::path file(const std::string& name) const { return folder() / name; }
+  std::set<std::string> files() const {
+    std::set<std::string> found;
+    for (const auto& entry : fs::recursive_directory_iterator(folder()))
+      found.insert(fs::relative(entry.path(), folder()).string());
+    return found;
+  }
+  // A new place for a stream of a process.
+  fs::path stream() { return root_ / ("stream-" + std::to_string(streams_++)); }
+
+ private:
+  fs::path root_;
+  int streams_ = 0;
+};
+
+// A started program. `terminal` >= 0 (an end of a pty) becomes its stderr and
+// is closed here.
+class Process {
+ public:
+  Process(Sandbox& box, const Args& args, const std::string& cache = "", int terminal = -1)
+      : out_(box.stream()), err_(box.stream()), start_(Clock::now()) {
+    std::vector<char*> argv;
+    static std::string program = HAPSIX_PROGRAM;
+    argv.push_back(program.data());
+    args_ = args;
+    for (std::string& a : args_) argv.push_back(a.data());
+    argv.push_back(nullptr);
+    const std::string folder = box.folder(), keep = cache.empty() ? box.cache().string() : cache;
+    pid_ = fork();
+    REQUIRE(pid_ >= 0);
+    if (pid_ != 0) {
+      if (terminal >= 0) close(terminal);  // else its reader would never see the end
+      return;
+    }
+    setenv("HAPSIX_CACHE", keep.c_str(), 1);
+    signal(SIGINT, SIG_DFL);  // a job of a shell without job control inherits it ignored
+    redirect(open(out_.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
+    redirect(terminal >= 0 ? terminal : open(err_.c_str(), O_WRONLY | O_CREAT, 0600),
+             STDERR_FILENO);
+    if (chdir(folder.c_str()) == 0) execv(argv[0], argv.data());
+    _exit(127);
+  }
+  ~Process() {
+    if (pid_ > 0) kill(pid_, SIGKILL), waitpid(pid_, nullptr, 0);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  void send(int number) const { kill(pid_, number); }
+  // Its end, or SIGKILL after `limit` seconds.
+  Ended wait(double limit = 30) {
+    Ended ended;
+    const auto begun = Clock::now();
+    int status = 0;
+    rusage used{};
+    while (wait4(pid_, &status, WNOHANG, &used) == 0) {
+      if (seconds_since(begun) > limit && ended.in_time) {
+        ended.in_time = false;
+        kill(pid_, SIGKILL);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    pid_ = -1;
+    ended.wall_seconds = seconds_since(start_);
+    ended.cpu_seconds = seconds_of(used.ru_utime) + seconds_of(used.ru_stime);
+    ended.code = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+    ended.out = slurp(out_), ended.err = slurp(err_);
+    return ended;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double seconds_since(Clock::time_point t) {
+    return std::chrono::duration<double>(Clock::now() - t).count();
+  }
+  static double seconds_of(const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  }
+  static void redirect(int from, int to) {
+    dup2(from, to);
+    close(from);
+  }
+
+  fs::path out_, err_;
+  Args args_;
+  Clock::time_point start_;
+  pid_t pid_ = -1;
+};
+
+inline Ended run(Sandbox& box, const Args& args, const std::string& cache = "") {
+  return Process(box, args, cache).wait();
+}
+
+// stdout as one JSON object and nothing else; null (and a failed check) when it is not.
+inline Json one_object(const Ended& ended) {
+  const Json json = Json::parse(ended.out, nullptr, false);
+  INFO("stdout: ", ended.out.substr(0, 500), "\nstderr: ", ended.err.substr(0, 500));
+  CHECK(json.is_object());
+  return json.is_object() ? json : Json::object();
+}
+
+// Runs with --json, must succeed.
+inline Json result_of(Sandbox& box, Args args, const std::string& cache = "") {
+  args.push_back("--json");
+  const Ended ended = run(box, args, cache);
+  INFO("stderr: ", ended.err);
+  CHECK(ended.code == 0);
+  return one_object(ended);
+}
+
+// Waits for a condition; false after `limit` seconds.
+template <class Condition>
+bool soon(Condition condition, double limit = 10) {
+  for (double waited = 0; waited < limit; waited += 0.005) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return condition();
+}
+
+// --- meshes, written by hand: the library's own writer is not trusted here ----------------------
+
+using Corner = std::array<float, 3>;
+using Facet = std::array<Corner, 3>;
+
+inline std::string stl(const std::vector<Facet>& facets, const char* name = "") {
+  std::string text(80, '\0');
+  std::memcpy(text.data(), name, std::min<std::size_t>(80, std::strlen(name)));
+  const auto append = [&](const auto& value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  append(static_cast<std::uint32_t>(facets.size()));
+  for (const Facet& facet : facets) {
+    append(Corner{});
+    append(facet);
+    append(std::uint16_t{0});
+  }
+  return text;
+}
+
+inline std::vector<Facet> box_facets(float edge) {
+  static const int quads[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
+                                  {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+  const auto corner = [edge](int i) {
+    return Corner{edge * static_cast<float>(i >> 2), edge * static_cast<float>(i >> 1 & 1),
+                  edge * static_cast<float>(i & 1)};
+  };
+  std::vector<Facet> facets;
+  for (const auto& q : quads) {
+    facets.push_back({corner(q[0]), corner(q[1]), corner(q[2])});
+    facets.push_back({corner(q[0]), corner(q[2]), corner(q[3])});
+  }
+  return facets;
+}
+
+inline std::vector<Facet> sphere_facets(float radius, int rings) {
+  const double pi = std::acos(-1.0);
+  const int sides = 2 * rings;
+  const auto at = [&](int i, int j) {
+    if (i == 0 || i == rings) return Corner{0, 0, i == 0 ? radius : -radius};
+    const double polar = pi * i / rings, around = 2 * pi * (j % sides) / sides;
+    return Corner{static_cast<float>(radius * std::sin(polar) * std::cos(around)),
+                  static_cast<float>(radius * std::sin(polar) * std::sin(around)),
+                  static_cast<float>(radius * std::cos(polar))};
+  };
+  std::vector<Facet> facets;
+  for (int i = 0; i < rings; ++i)
+    for (int j = 0; j < sides; ++j) {
+      if (i > 0) facets.push_back({at(i, j), at(i + 1, j), at(i, j + 1)});
+      if (i < rings - 1) facets.push_back({at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  return facets;
+}
+
+}  // namespace h6::test

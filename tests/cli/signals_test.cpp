@@ -1,0 +1,159 @@
+// Ctrl-C, a kill, a terminal: the program ends soon, leaves nothing half made, keeps what it
+// recorded.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include "tests/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+void pause_seconds(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
+
+// A pseudo terminal; what was written to it can be read once all its writers are gone.
+struct Terminal {
+  int mine = posix_openpt(O_RDWR | O_NOCTTY), theirs = -1;
+  Terminal() {
+    if (mine >= 0 && grantpt(mine) == 0 && unlockpt(mine) == 0)
+      theirs = open(ptsname(mine), O_RDWR | O_NOCTTY);
+  }
+  ~Terminal() {
+    if (mine >= 0) close(mine);
+    if (theirs >= 0) close(theirs);
+  }
+  std::string read_all() {
+    close(theirs);
+    theirs = -1;
+    std::string text;
+    char buffer[4096];
+    for (ssize_t n; (n = read(mine, buffer, sizeof buffer)) > 0;)
+      text.append(buffer, static_cast<std::size_t>(n));
+    return text;
+  }
+};
+
+std::size_t count(const std::string& text, const std::string& word) {
+  std::size_t found = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1))
+    ++found;
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("Ctrl-C ends a real-time run at once: devices stopped, recording finished, exit 1") {
+  for (const int number : {SIGINT, SIGTERM})
+    for (const bool json : {false, true}) {
+      Sandbox box;
+      Args args{"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"};
+      if (json) args.push_back("--json");
+      Process process(box, args);
+      REQUIRE(soon([&] { return fs::exists(box.file("run.h5")); }));
+      pause_seconds(0.5);
+      const auto asked = std::chrono::steady_clock::now();
+      process.send(number);
+      const Ended ended = process.wait();
+      const double took =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - asked).count();
+      CHECK(took < 1);  // some 0.03 s on an idle machine
+      CHECK(ended.code == 1);
+      CHECK(ended.err.find("interrupted after") != std::string::npos);
+      if (json) {
+        const Json result = one_object(ended);
+        CHECK(result["interrupted"] == true);
+        CHECK(result.value("error", "").find("interrupted after") == 0);
+        CHECK(result["frames"] > 100);
+      }
+      CHECK(box.files() == std::set<std::string>{"run.h5"});
+      const Json info = result_of(box, {"info", "run.h5"});
+      CHECK(info["whole"] == true);
+      CHECK(info["frames"] > 100);
+      CHECK(info["frames"] == info["summary"]["frames"]);
+      const Json& events = info["summary"]["events"];
+      REQUIRE(!events.empty());
+      CHECK(events.back()["what"] == "interrupted");
+      CHECK(events.back().value("detail", "").find("stop") != std::string::npos);
+    }
+}
+
+TEST_CASE("a killed run leaves a recording that opens and lacks half a second at most") {
+  Sandbox box;
+  Process process(box, {"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"});
+  REQUIRE(soon([&] { return fs::exists(box.file("run.h5")); }));
+  pause_seconds(1.5);
+  process.send(SIGKILL);
+  CHECK(process.wait().code == -SIGKILL);
+  const Json info = result_of(box, {"info", "run.h5"});
+  CHECK(info["kind"] == "recording");
+  CHECK(info["frames"] >= 700);  // 1.5 s less half a second, and room for a loaded machine
+  CHECK(info["whole"] == false);
+  CHECK(!info.value("remark", "").empty());
+}
+
+TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
+  const std::set<std::string> before = box.files();
+  for (const double seconds : {0.3, 1.2}) {
+    Process process(box,
+                    {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "2048", "--json"});
+    pause_seconds(seconds);
+    process.send(SIGINT);
+    const Ended ended = process.wait(10);
+    CHECK(ended.in_time);
+    CHECK(ended.code == 1);
+    CHECK(one_object(ended).value("error", "").find("cancelled") != std::string::npos);
+    CHECK(box.files() == before);
+  }
+  // The same bake on its way into the cache.
+  spill(box.file("scene.json"), R"({"hapsix": 1, "units": "m", "bodies": [
+    {"name": "ball", "fixed": true, "field": {"mesh": "ball.stl", "voxels": 2048}}]})");
+  Process process(box, {"run", "scene.json"});
+  pause_seconds(1);
+  process.send(SIGINT);
+  const Ended ended = process.wait(10);
+  CHECK(ended.in_time);
+  CHECK(ended.code == 1);
+  CHECK(fs::is_empty(box.cache()));
+}
+
+TEST_CASE("a second Ctrl-C does not wait") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
+  const std::set<std::string> before = box.files();
+  Process process(box, {"bake", "shell", "ball.stl", "-o", "ball.ply", "--points", "5000000"});
+  pause_seconds(0.7);
+  process.send(SIGINT);
+  pause_seconds(0.05);
+  process.send(SIGINT);
+  const Ended ended = process.wait(10);
+  CHECK(ended.in_time);
+  CHECK(ended.code != 0);
+  CHECK(box.files() == before);
+}
+
+TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped away") {
+  Sandbox box;
+  {
+    Terminal terminal;
+    REQUIRE(terminal.theirs >= 0);
+    Process process(box, {"run", "box-on-wall", "--duration", "1.5"}, "", dup(terminal.theirs));
+    CHECK(process.wait().code == 0);
+    const std::string seen = terminal.read_all();
+    CHECK(count(seen, "running box-on-wall") >= 3);
+    CHECK(count(seen, "%") >= 3);
+    // Every bar is wiped before the next line: nothing of it stays on the screen.
+    CHECK(seen.rfind("\033[K") > seen.rfind('%'));
+    for (std::size_t at = seen.find('%'); at != std::string::npos; at = seen.find('%', at + 1))
+      CHECK(seen.substr(at + 1, 4) == "\r\033[K");
+  }
+  {
+    Terminal terminal;
+    Process process(box, {"run", "box-on-wall", "--virtual-time"}, "", dup(terminal.theirs));
+    CHECK(process.wait().code == 0);
+    CHECK(terminal.read_all().find('%') == std::string::npos);
+  }
+  const Ended piped = run(box, {"run", "box-on-wall", "--duration", "1.2"});
+  CHECK(piped.code == 0);
+  CHECK(piped.err.find('%') == std::string::npos);
+  CHECK(piped.err.find('\r') == std::string::npos);
+}
