@@ -72,88 +72,75 @@ class Loader {
     return static_cast<const Mesh*>(found->second.get());
   }
 
+  // All fields, or all shells: what is there, found by its content.
   template <class Data>
-  static Result<int> remember(std::map<std::string, int>& index, std::vector<Data>& all,
-                              const std::string& key, Data data) {
-    index[key] = static_cast<int>(all.size());
-    all.push_back(std::move(data));
-    return static_cast<int>(all.size()) - 1;
+  struct Kept {
+    std::map<std::string, int> index;
+    std::vector<Data> all;
+  };
+
+  // Read from a baked file, or baked from a mesh through the cache; content that another body has
+  // loaded already is shared.
+  template <class Data, class Source, class Read, class Bake, class Describe>
+  Result<int> obtain(const SceneBody& body, const Source& source, Kept<Data>& kept, Read read,
+                     Bake bake, Describe describe) {
+    const auto start = Clock::now();
+    LoadedAsset asset;
+    asset.body = body.name;
+    const Mesh* mesh = nullptr;
+    std::string key = "file " + source.file.string();
+    if (source.file.empty()) {
+      Result<const Mesh*> found = mesh_of(source);
+      if (!found) return found.failure();
+      mesh = *found;
+      key = content_hash(*mesh, source.bake);
+    }
+    if (const auto known = kept.index.find(key); known != kept.index.end()) return known->second;
+    Cached cached;
+    Result<Data> data = mesh ? bake(*mesh, source.bake, &cached, progress_) : read(source.file);
+    if (!data) return data.failure();
+    for (const std::string& w : cached.warnings)
+      out_.warnings.push_back("body '" + body.name + "': " + w);
+    asset.hash = mesh ? key : data->input_hash;
+    asset.from_cache = cached.hit;
+    asset.seconds = since(start);
+    describe(*data, asset);
+    out_.assets.push_back(asset);
+    return keep(kept, key, std::move(*data));
+  }
+
+  template <class Data>
+  static int keep(Kept<Data>& kept, const std::string& key, Data data) {
+    kept.all.push_back(std::move(data));
+    return kept.index[key] = static_cast<int>(kept.all.size()) - 1;
   }
 
   Result<int> field(const SceneBody& body) {
-    const FieldSource& source = *body.field;
-    const auto start = Clock::now();
-    LoadedAsset asset{body.name, true, "", false, 0, 0, {}, 0, 0, 0};
-    FieldData data;
-    std::string key;
-    if (!source.file.empty()) {
-      key = "file " + source.file.string();
-      if (const auto known = field_index_.find(key); known != field_index_.end())
-        return known->second;
-      Result<FieldData> read = read_field(source.file);
-      if (!read) return read.failure();
-      data = std::move(*read);
-      asset.hash = data.input_hash;
-    } else {
-      Result<const Mesh*> mesh = mesh_of(source);
-      if (!mesh) return mesh.failure();
-      key = asset.hash = content_hash(**mesh, source.bake);
-      if (const auto known = field_index_.find(key); known != field_index_.end())
-        return known->second;
-      Cached cached;
-      Result<FieldData> baked = cached_field(**mesh, source.bake, &cached, progress_);
-      if (!baked) return baked.failure();
-      data = std::move(*baked);
-      asset.from_cache = cached.hit;
-      for (const std::string& w : cached.warnings)
-        out_.warnings.push_back("body '" + body.name + "': " + w);
-    }
-    asset.seconds = since(start);
-    asset.voxel_size = data.voxel_size;
-    for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
-    asset.bricks = data.brick_count();
-    out_.assets.push_back(asset);
-    return remember(field_index_, fields_, key, std::move(data));
+    return obtain(body, *body.field, fields_, read_field, cached_field,
+                  [](const FieldData& data, LoadedAsset& asset) {
+                    asset.is_field = true;
+                    asset.voxel_size = data.voxel_size;
+                    for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
+                    asset.bricks = data.brick_count();
+                  });
   }
 
   Result<int> shell(const SceneBody& body) {
-    const ShellSource& source = *body.shell;
+    const auto describe = [](const ShellData& data, LoadedAsset& asset) {
+      asset.points = data.size();
+      asset.levels = static_cast<int>(data.level_points.size());
+    };
+    if (!body.shell->points)
+      return obtain(body, *body.shell, shells_, read_shell, cached_shell, describe);
     const auto start = Clock::now();
-    LoadedAsset asset{body.name, false, "", false, 0, 0, {}, 0, 0, 0};
-    ShellData data;
-    std::string key;
-    if (source.points) {
-      Result<ShellData> built = build_shell(*source.points, source.bake.levels);
-      if (!built) return built.failure();
-      data = std::move(*built);
-      key = "points of " + body.name;
-    } else if (!source.file.empty()) {
-      key = "file " + source.file.string();
-      if (const auto known = shell_index_.find(key); known != shell_index_.end())
-        return known->second;
-      Result<ShellData> read = read_shell(source.file);
-      if (!read) return read.failure();
-      data = std::move(*read);
-      asset.hash = data.input_hash;
-    } else {
-      Result<const Mesh*> mesh = mesh_of(source);
-      if (!mesh) return mesh.failure();
-      key = asset.hash = content_hash(**mesh, source.bake);
-      if (const auto known = shell_index_.find(key); known != shell_index_.end())
-        return known->second;
-      Cached cached;
-      Result<ShellData> baked = cached_shell(**mesh, source.bake, &cached, progress_);
-      if (!baked) return baked.failure();
-      data = std::move(*baked);
-      asset.from_cache = cached.hit;
-      for (const std::string& w : cached.warnings)
-        out_.warnings.push_back("body '" + body.name + "': " + w);
-    }
+    Result<ShellData> built = build_shell(*body.shell->points, body.shell->bake.levels);
+    if (!built) return built.failure();
+    LoadedAsset asset;
+    asset.body = body.name;
     asset.seconds = since(start);
-    asset.points = data.size();
-    asset.levels = static_cast<int>(data.level_points.size());
+    describe(*built, asset);
     out_.assets.push_back(asset);
-    return remember(shell_index_, shells_, key, std::move(data));
+    return keep(shells_, "points of " + body.name, std::move(*built));
   }
 
   // What the scene states; else a uniform solid where there is one, else the shell's points.
@@ -172,7 +159,7 @@ class Loader {
         found = solid_mass(**mesh, body.mass);
       }
       if (!found && def.shell >= 0)
-        found = shell_mass(shells_[static_cast<std::size_t>(def.shell)], body.mass);
+        found = shell_mass(shells_.all[static_cast<std::size_t>(def.shell)], body.mass);
       if (!found)
         return Failure{
             "its mass properties cannot be derived (no shell, no closed mesh): state 'com' and "
@@ -195,7 +182,7 @@ class Loader {
     if (out_.hands.empty()) return;
     const int shell = out_.bodies[static_cast<std::size_t>(out_.hands[0].body)].shell;
     if (shell < 0) return;
-    const ShellData& data = shells_[static_cast<std::size_t>(shell)];
+    const ShellData& data = shells_.all[static_cast<std::size_t>(shell)];
     for (std::size_t i = 0; i < data.size(); ++i)
       out_.watched_points.push_back({data.x[i], data.y[i], data.z[i]});
   }
@@ -203,8 +190,8 @@ class Loader {
   Outcome make_model() {
     std::vector<h6FieldDef> fields;
     std::vector<h6ShellDef> shells;
-    for (const FieldData& f : fields_) fields.push_back(f.def());
-    for (const ShellData& s : shells_) shells.push_back(s.def());
+    for (const FieldData& f : fields_.all) fields.push_back(f.def());
+    for (const ShellData& s : shells_.all) shells.push_back(s.def());
     h6ModelDef def = h6DefaultModelDef();
     def.fields = fields.data(), def.field_count = fields.size();
     def.shells = shells.data(), def.shell_count = shells.size();
@@ -217,9 +204,8 @@ class Loader {
   LoadedScene& out_;
   const Progress& progress_;
   std::map<std::string, std::unique_ptr<Mesh>> meshes_;
-  std::map<std::string, int> field_index_, shell_index_;
-  std::vector<FieldData> fields_;
-  std::vector<ShellData> shells_;
+  Kept<FieldData> fields_;
+  Kept<ShellData> shells_;
 };
 
 }  // namespace

@@ -68,8 +68,8 @@ struct FrameTeam::Helper {
         const std::int64_t now = now_ns();
         if (now < due)
           sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
-        else if (now > due + 2 * kPollBefore)
-          sleep_until_ns(now + kNap);  // nobody steps
+        else if (now > due + 2 * kPollBefore)  // nobody steps: the longer, the lazier
+          sleep_until_ns(now + (now - due > 2000 * kNap ? 20 * kNap : kNap));
         else
           relax();
         continue;
