@@ -5,8 +5,11 @@
 //   part      Int32Grid, one voxel a brick; only where the mesh has parts
 // The rest of FieldData is metadata of `distance`, named hapsix_*. Leaves run z fastest, bricks x.
 //
-// OpenVDB looks at a stream's state seldom. Here the stream throws at its end, so a truncated file
-// stops at once, and check_vdb_lengths has looked at every length before OpenVDB allocates by it.
+// OpenVDB trusts its input: an exception while it reads a tree frees what was never made, and an
+// uncompressed file does not notice a flipped bit. So our files carry a seal over all bytes that is
+// looked at before OpenVDB sees them; and for anybody's files, check_vdb_lengths has looked at
+// every length before OpenVDB allocates by it, and past its end a file reads as zeros, which end
+// every tree.
 #include "io/field_file.h"
 
 #include <openvdb/io/Stream.h>
@@ -18,6 +21,7 @@
 #include <fstream>
 
 #include "io/field_grids.h"
+#include "io/file_seal.h"
 #include "io/write_aside.h"
 #include "sched/parallel_for.h"
 
@@ -31,9 +35,20 @@ using Leaves = std::vector<FloatLeaf*>;
 
 std::string key(const char* name) { return std::string("hapsix_") + name; }
 
+// How many of the file's units make a metre: 1, unless voxels are so small that OpenVDB takes their
+// volume for zero (it refuses transforms below 3e-15). hapsix_units_per_metre says so in the file;
+// our own size and place come from metadata in metres.
+double units_per_metre(const FieldData& field) {
+  double units = 1;
+  while (field.voxel_size * units < 2e-5) units *= 1000;
+  return units;
+}
+
 openvdb::math::Transform::Ptr make_transform(const FieldData& field, double spacing) {
-  auto transform = openvdb::math::Transform::createLinearTransform(spacing);
-  transform->postTranslate(openvdb::Vec3d(field.origin.x, field.origin.y, field.origin.z));
+  const double u = units_per_metre(field);
+  auto transform = openvdb::math::Transform::createLinearTransform(u * spacing);
+  transform->postTranslate(
+      openvdb::Vec3d(u * field.origin.x, u * field.origin.y, u * field.origin.z));
   return transform;
 }
 
@@ -102,6 +117,7 @@ FloatGrid::Ptr distance_grid(const FieldData& field) {
   grid->insertMeta(key("band"), openvdb::DoubleMetadata(field.band));
   grid->insertMeta(key("offset"), openvdb::DoubleMetadata(field.offset));
   grid->insertMeta(key("sign_mode"), openvdb::StringMetadata(field.sign_mode));
+  grid->insertMeta(key("units_per_metre"), openvdb::DoubleMetadata(units_per_metre(field)));
   grid->insertMeta(key("input_hash"), openvdb::StringMetadata(field.input_hash));
   grid->insertMeta(key("triangles"),
                    openvdb::Int64Metadata(static_cast<openvdb::Int64>(field.triangles)));
@@ -161,11 +177,13 @@ Outcome write_grids(const std::filesystem::path& path, const openvdb::GridPtrVec
   out.setCompression(compression == Compression::none
                          ? openvdb::io::COMPRESS_NONE
                          : openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
-  out.write(grids);
+  openvdb::MetaMap seal;
+  seal.insertMeta("hapsix_seal", openvdb::StringMetadata(seal_text()));
+  out.write(grids, seal);
   out.close();
   if (!check_vdb_lengths(path))
     return Failure{"the field could not be written whole: is the disk full?"};
-  return Done{};
+  return seal_file(path);
 }
 
 // ---- reading ------------------------------------------------------------------------------------
@@ -183,17 +201,12 @@ bool take_head(const FloatGrid& grid, FieldData& f, std::int32_t& parts) {
   openvdb::Vec3d origin;
   openvdb::Int64 triangles = 0;
   std::int32_t format = 0;
-  const bool whole =
-      take(grid, "format", format) && format == 1 &&
-      take(grid, "bricks", bricks) &&
-      take(grid, "origin", origin) &&
-      take(grid, "voxel_size", f.voxel_size) &&
-      take(grid, "band", f.band) &&
-      take(grid, "offset", f.offset) &&
-      take(grid, "sign_mode", f.sign_mode) &&
-      take(grid, "input_hash", f.input_hash) &&
-      take(grid, "triangles", triangles) && triangles >= 0 &&
-      take(grid, "parts", parts) && parts >= 0;
+  const bool whole = take(grid, "format", format) && format == 1 && take(grid, "bricks", bricks) &&
+                     take(grid, "origin", origin) && take(grid, "voxel_size", f.voxel_size) &&
+                     take(grid, "band", f.band) && take(grid, "offset", f.offset) &&
+                     take(grid, "sign_mode", f.sign_mode) &&
+                     take(grid, "input_hash", f.input_hash) && take(grid, "triangles", triangles) &&
+                     triangles >= 0 && take(grid, "parts", parts) && parts >= 0;
   if (!whole) return false;
   f.triangles = std::size_t(triangles);
   f.origin = {origin.x(), origin.y(), origin.z()};
@@ -273,11 +286,42 @@ typename Grid::Ptr find(const openvdb::GridPtrVec& grids, const std::string& nam
   return nullptr;
 }
 
-openvdb::GridPtrVec read_grids(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  in.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+// A file that goes on with zeros behind its end, and remembers that somebody went there.
+class ZerosBehind : public std::filebuf {
+ public:
+  bool passed() const { return passed_ > 0; }
+
+ protected:
+  std::streamsize xsgetn(char* out, std::streamsize count) override {
+    const std::streamsize there = std::max<std::streamsize>(0, std::filebuf::xsgetn(out, count));
+    if (there < count) {
+      passed_ += count - there;
+      if (passed_ > kMostZeros) throw std::ios_base::failure("too many bytes past the end");
+      std::fill(out + there, out + count, char{0});
+    }
+    return count;
+  }
+  int_type uflow() override {
+    const int_type c = std::filebuf::uflow();
+    if (!traits_type::eq_int_type(c, traits_type::eof())) return c;
+    ++passed_;
+    return traits_type::to_int_type(char{0});
+  }
+
+ private:
+  static constexpr std::streamsize kMostZeros = 256 << 20;
+  std::streamsize passed_ = 0;
+};
+
+Result<openvdb::GridPtrVec> read_grids(const std::filesystem::path& file) {
+  ZerosBehind bytes;
+  bytes.open(file, std::ios::in | std::ios::binary);
+  std::istream in(&bytes);
   openvdb::io::Stream stream(in, /*delayLoad=*/false);
-  return *stream.getGrids();
+  openvdb::GridPtrVec grids = *stream.getGrids();
+  if (bytes.passed())
+    return Failure{file.string() + " ends too early or is damaged: it is no whole OpenVDB file"};
+  return grids;
 }
 
 Result<FieldData> take_field(const openvdb::GridPtrVec& grids, const std::string& name) {
@@ -316,8 +360,14 @@ Result<FieldData> read_field(const std::filesystem::path& file) {
   const std::string name = file.string();
   if (const Outcome sane = check_vdb_lengths(file); !sane) return sane.failure();
   try {
+    const Result<Seal> seal = check_seal(file);
+    if (!seal) return seal.failure();
+    if (*seal == Seal::broken)
+      return Failure{name + " is a damaged field (its checksum differs): bake it again"};
     openvdb::initialize();
-    return take_field(read_grids(file), name);
+    const Result<openvdb::GridPtrVec> grids = read_grids(file);
+    if (!grids) return grids.failure();
+    return take_field(*grids, name);
   } catch (const std::ios_base::failure&) {
     return Failure{name + " ends too early or is damaged: it is no whole OpenVDB file"};
   } catch (const std::bad_alloc&) {

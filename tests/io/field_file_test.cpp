@@ -150,6 +150,41 @@ TEST_CASE("field_file: a truncated or damaged file is a sentence or a field, nev
   }
 }
 
+TEST_CASE("field_file: one flipped bit anywhere in our own file is noticed") {
+  const Folder folder;
+  const fs::path file = folder.path / "field.vdb";
+  for (Compression c : {Compression::none, Compression::blosc}) {
+    REQUIRE(write_field(file, baked(), c));
+    const std::string whole = bytes_of(file);
+    Random random(5);
+    for (int i = 0; i < 200; ++i) {
+      std::string bad = whole;
+      bad[4096 + random.below(bad.size() - 4096)] ^= char(1 << random.below(8));
+      put(file, bad);
+      const auto back = read_field(file);
+      REQUIRE_FALSE(back);
+      CHECK(back.error().find("checksum") != std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("field_file: fields with voxels of a micrometre can be written and come back") {
+  const Folder folder;
+  const fs::path file = folder.path / "small.vdb";
+  FieldData field = baked();
+  const double scale = 1e-6 / field.voxel_size;
+  field.voxel_size = 1e-6;
+  field.band *= scale;
+  for (double* v : {&field.origin.x, &field.origin.y, &field.origin.z}) *v *= scale;
+  for (float& v : field.samples) v *= float(scale);
+  for (float& v : field.far_grid) v *= float(scale);
+  const auto written = write_field(file, field, Compression::none);
+  REQUIRE_MESSAGE(written, written.error());
+  const auto back = read_field(file);
+  REQUIRE_MESSAGE(back, back.error());
+  check_same(field, *back);
+}
+
 TEST_CASE("field_file: lengths that no file could have are refused before anything is allocated") {
   const Folder folder;
   const fs::path file = folder.path / "field.vdb";
