@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <cstring>
 
 namespace h6 {
 namespace {
@@ -9,9 +10,18 @@ namespace {
 bool positive(double v) { return v > 0 && std::isfinite(v); }
 bool not_negative(double v) { return v >= 0 && std::isfinite(v); }
 
+// Programs in C can put any number into an enumeration; reading it as one would be undefined.
+template <class E>
+int number(const E& value) {
+  static_assert(sizeof(E) == sizeof(int));
+  int out;
+  std::memcpy(&out, &value, sizeof out);
+  return out;
+}
+
 bool check_contact(const h6ContactDef& c, h6Error* error) {
-  if (c.method < 0 || c.method >= H6_METHOD_COUNT)
-    return fail(error, "contact method %d does not exist", static_cast<int>(c.method));
+  if (number(c.method) < 0 || number(c.method) >= H6_METHOD_COUNT)
+    return fail(error, "contact method %d does not exist", number(c.method));
   if (!positive(c.stiffness))
     return fail(error, "contact stiffness must be above 0 N/m, it is %g", c.stiffness);
   if (!not_negative(c.damping))
@@ -108,10 +118,10 @@ bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error
   if (def.pair_count && !def.pairs) return fail(error, "pairs are counted but not given");
   if (!(def.rate >= 100 && def.rate <= 10000))
     return fail(error, "rate must be in 100..10000 Hz, it is %g", def.rate);
-  if (def.integrator != H6_IMPLICIT && def.integrator != H6_EXPLICIT)
-    return fail(error, "integrator %d does not exist", static_cast<int>(def.integrator));
-  if (def.gradient != H6_SYMMETRIC && def.gradient != H6_EXACT)
-    return fail(error, "gradient %d does not exist", static_cast<int>(def.gradient));
+  if (number(def.integrator) != H6_IMPLICIT && number(def.integrator) != H6_EXPLICIT)
+    return fail(error, "integrator %d does not exist", number(def.integrator));
+  if (number(def.gradient) != H6_SYMMETRIC && number(def.gradient) != H6_EXACT)
+    return fail(error, "gradient %d does not exist", number(def.gradient));
   if (def.max_contacts < 1 || def.max_contacts > 1000000)
     return fail(error, "max_contacts must be in 1..1000000, it is %zu", def.max_contacts);
   if (def.threads < 1 || def.threads > 2)

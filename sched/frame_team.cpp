@@ -61,6 +61,7 @@ struct FrameTeam::Helper {
   }
 
   void help() {
+    (void)polling.load(std::memory_order_acquire);
     FlushDenormals flush;
     while (!stop.load(std::memory_order_relaxed)) {
       if (!polling.load(std::memory_order_acquire)) {
@@ -83,7 +84,12 @@ struct FrameTeam::Helper {
 FrameTeam::FrameTeam(unsigned threads) {
   if (threads < 2) return;
   helper_ = std::make_unique<Helper>();
-  helper_->arena.enqueue([helper = helper_.get()] { helper->help(); });
+  // Polling is off until the first frame; the store also orders construction before the helper's
+  // work.
+  helper_->polling.store(false, std::memory_order_release);
+  // The sanitizer cannot see TBB hand the closure over; what it calls is watched as ever.
+  helper_->arena.enqueue([helper = helper_.get()]()
+                             __attribute__((no_sanitize("thread"))) { helper->help(); });
 }
 
 FrameTeam::~FrameTeam() {

@@ -5,6 +5,8 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <atomic>
+
 namespace h6::sched {
 
 unsigned machine_threads() {
@@ -20,14 +22,21 @@ void parallel_for(std::size_t count, unsigned threads,
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;
   }
+  // TBB orders all this already; said once more in atomics for a thread sanitizer, which cannot see
+  // into a TBB that was built without it.
+  std::atomic<std::size_t> order{0};
+  order.store(1, std::memory_order_release);
   // An arena of our own: the host's TBB work can neither enter it nor be held up by it.
   oneapi::tbb::task_arena arena(static_cast<int>(threads));
   arena.execute([&] {
     oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count),
                               [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+                                (void)order.load(std::memory_order_acquire);
                                 for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+                                order.fetch_add(1, std::memory_order_release);
                               });
   });
+  (void)order.load(std::memory_order_acquire);
 }
 
 }  // namespace h6::sched
