@@ -21,5 +21,6 @@ void add_run(CLI::App& app, Program& program);
 void add_info(CLI::App& app, Program& program);
 void add_scene(CLI::App& app, Program& program);
 void add_demo(CLI::App& app, Program& program);
+void add_experiments(CLI::App& app, Program& program);
 
 }  // namespace h6::cli

@@ -79,6 +79,7 @@ int main(int argc, char** argv) {
   add_info(app, program);
   add_scene(app, program);
   add_demo(app, program);
+  add_experiments(app, program);
   app.footer(
       "COMMAND --help explains each. To begin with:\n"
       "  hapsix demo                                  two methods side by side\n"

@@ -6,6 +6,13 @@ namespace h6::io {
 
 Scene box_on_wall();
 Scene peg_in_hole();
+Scene box_on_plates();
+Scene box_on_wall_explicit();
+Scene box_over_fused_wire();
+Scene box_over_post();
+Scene box_over_wire();
+Scene cone_in_gap();
+Scene rod_between_tubes();
 Scene alpha_shortcut();
 
 }  // namespace h6::io

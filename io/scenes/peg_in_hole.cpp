@@ -1,10 +1,35 @@
 // peg_in_hole.cpp - a tight conforming fit with contacts all around (Fig. 10).
+#include <cmath>
+#include <numbers>
+
+#include "io/scenes/experiments.h"
 #include "io/scenes/list.h"
-#include "io/scenes/shapes.h"
 
 namespace h6::io {
+namespace {
 
-Scene peg_in_hole() {
+// The side on a grid of 60 x 40 cells, and the bottom cap, its points 4 mm apart.
+void add_peg(PointCloud& cloud, double radius, double half_length, Sampler& sampler) {
+  const int around = sampler.along(60), along = sampler.along(40);
+  for (int i = 0; i < around; ++i)
+    for (int j = 0; j < along; ++j) {
+      const double angle = 2 * std::numbers::pi * sampler.in_cell(i) / around;
+      const h6Vec3 out = {std::cos(angle), std::sin(angle), 0};
+      const double z = half_length * (2 * sampler.in_cell(j) / along - 1);
+      add_shell_point(cloud, radius * out + h6Vec3{0, 0, z}, -1.0 * out);
+    }
+  const double spacing = sampler.spacing(4 * kMm);
+  const int reach = static_cast<int>(std::ceil(radius / spacing));
+  for (int i = -reach; i <= reach; ++i)
+    for (int j = -reach; j <= reach; ++j) {
+      const h6Vec3 p = {(i + sampler.shift()) * spacing, (j + sampler.shift()) * spacing, 0};
+      if (length(p) < radius) add_shell_point(cloud, p - h6Vec3{0, 0, half_length}, {0, 0, 1});
+    }
+}
+
+}  // namespace
+
+Scene peg_in_hole(const Sampling& sampling) {
   Scene scene = common_scene(
       "peg-in-hole",
       "A peg (R = 10 mm) in a blind hole (R = 10.3 mm, 30 mm deep) is pressed 8 mm sideways, then "
@@ -20,8 +45,8 @@ Scene peg_in_hole() {
   peg.pose = {{0, 0, -5 * kMm}, {1, 0, 0, 0}};  // its bottom 10 mm above the floor
   peg.shell.emplace();
   peg.shell->points.emplace();
-  add_cylinder_side(*peg.shell->points, radius, half_length, 60, 40);
-  add_disc(*peg.shell->points, radius, -half_length, 4 * kMm, {0, 0, 1});
+  Sampler sampler(sampling);
+  add_peg(*peg.shell->points, radius, half_length, sampler);
   peg.shell->bake.levels = 5;
   scene.bodies.push_back(peg);
 
@@ -42,5 +67,7 @@ Scene peg_in_hole() {
   };
   return scene;
 }
+
+Scene peg_in_hole() { return peg_in_hole(Sampling{}); }
 
 }  // namespace h6::io
