@@ -14,6 +14,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "io/scenes/alpha.h"
 #include "io/scenes/list.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
@@ -186,19 +187,11 @@ AlphaShape make_alpha() {
   return out;
 }
 
-Scene alpha_shortcut() {
+Scene alpha_pair(const std::string& name, const std::string& about, const h6Pose& tool_pose) {
   const AlphaShape alpha = make_alpha();
   // The voxel is about 0.22 mm: half a voxel at k = 5e4 N/m is 5.4 N. The paper forces its shortcut
   // (Fig. 8) harder than that, with 20 N, and so does this hand: below about 15 N every rule holds.
-  Scene scene = common_scene(
-      "alpha-shortcut",
-      "Two alphas of 1,008 triangles, tube " + millimetres(2 * alpha.tube_radius) +
-          " thick, hooked together. The hand slides the tool's loop along a strand of the other, "
-          "through the gap between its crossing strands, which is only " +
-          millimetres(alpha.gap) +
-          " wide, then twists and pulls with 20 N, four times the force for which half a voxel is "
-          "promised. Forbidden: a region that no point of the tool reaches while the loops are "
-          "linked.");
+  Scene scene = common_scene(name, about);
   scene.contact.stiffness = 5e4;
   scene.coupling.max_force = 20;
   scene.coupling.max_torque = 0.25;  // 5 N x 50 mm, half the tool's length
@@ -209,12 +202,27 @@ Scene alpha_shortcut() {
 
   SceneBody tool;
   tool.name = "tool";
-  tool.pose = tool_with_tip_at(tip_over_strand(kStart));
+  tool.pose = tool_pose;
   tool.shell.emplace();
   tool.shell->mesh_data = alpha.mesh;
   tool.shell->bake.points = 25269;
   tool.shell->bake.levels = 7;
   scene.bodies.push_back(std::move(tool));
+  return scene;
+}
+
+Scene alpha_shortcut() {
+  const AlphaShape alpha = make_alpha();
+  Scene scene = alpha_pair(
+      "alpha-shortcut",
+      "Two alphas of 1,008 triangles, tube " + millimetres(2 * alpha.tube_radius) +
+          " thick, hooked together. The hand slides the tool's loop along a strand of the other, "
+          "through the gap between its crossing strands, which is only " +
+          millimetres(alpha.gap) +
+          " wide, then twists and pulls with 20 N, four times the force for which half a voxel is "
+          "promised. Forbidden: a region that no point of the tool reaches while the loops are "
+          "linked.",
+      tool_with_tip_at(tip_over_strand(kStart)));
   scene.hands.push_back(path_hand("tool", shortcut_path()));
 
   // Call the loops, closed by the straight segment across their gaps, rings. Linked rings: the

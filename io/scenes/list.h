@@ -14,5 +14,6 @@ Scene box_over_wire();
 Scene cone_in_gap();
 Scene rod_between_tubes();
 Scene alpha_shortcut();
+Scene alpha_solution();
 
 }  // namespace h6::io

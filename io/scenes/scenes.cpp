@@ -30,6 +30,7 @@ constexpr Entry kScenes[] = {
     {"alpha-shortcut",
      "one alpha forced through the gap of another, narrower than its tube (Fig. 8)",
      alpha_shortcut},
+    {"alpha-solution", "the way that does take the alphas apart, without contact", alpha_solution},
 };
 
 }  // namespace

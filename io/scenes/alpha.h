@@ -1,0 +1,13 @@
+// alpha.h - what the scenes with two alphas have in common.
+#pragma once
+#include <string>
+
+#include "io/scene.h"
+
+namespace h6::io {
+
+// One fixed alpha with the paper's field, and one with the paper's shell, the tool, held at `tool`
+// with 20 N at most. Without a hand and without a verdict.
+Scene alpha_pair(const std::string& name, const std::string& about, const h6Pose& tool);
+
+}  // namespace h6::io
