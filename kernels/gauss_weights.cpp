@@ -17,6 +17,8 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+// After highway.h.
+#include "hwy/contrib/math/math-inl.h"
 #include "kernels/tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -33,22 +35,29 @@ constexpr std::size_t kRows = 4;           // rows a pass: loads and s_j are sha
 struct Scales {
   float normal2, torque2;  // epsilon^2
   float unit_n, unit_t;    // what turns a sum into phi: over N and (Hat::sum) over T
+  bool geodesic;
 };
 
 HWY_INLINE Scales scales_of(Hat kind, const GaussWidths& widths) {
   const float n = HWY_MAX(widths.normal, kMinWidth), t = HWY_MAX(widths.torque, kMinWidth);
-  Scales s{n * n, t * t, 1.0f / (n * n), 1.0f / (t * t)};
+  Scales s{n * n, t * t, 1.0f / (n * n), 1.0f / (t * t), widths.geodesic};
   if (kind == Hat::product) s.unit_n *= s.unit_t;
   return s;
 }
 
-// epsilon^2 - |V_j - V_i|^2, not yet cut at 0.
-HWY_INLINE VF gap_to_edge(VF epsilon2, VF x, VF y, VF z, const float* vx, const float* vy,
-                          const float* vz, std::size_t i) {
+// epsilon^2 - |V_j - V_i|^2, or less the angle squared; not yet cut at 0.
+HWY_INLINE VF gap_to_edge(bool geodesic, VF epsilon2, VF x, VF y, VF z, const float* vx,
+                          const float* vy, const float* vz, std::size_t i) {
   const DF d;
   const VF dx = hn::Sub(x, hn::Set(d, vx[i]));
   const VF dy = hn::Sub(y, hn::Set(d, vy[i]));
   const VF dz = hn::Sub(z, hn::Set(d, vz[i]));
+  if (geodesic) {
+    const VF gap2 = hn::MulAdd(dz, dz, hn::MulAdd(dy, dy, hn::Mul(dx, dx)));
+    const VF half = hn::Mul(hn::Sqrt(gap2), hn::Set(d, 0.5f));
+    const VF asin = hn::Asin(d, hn::Min(half, hn::Set(d, 1.0f)));
+    return hn::NegMulAdd(hn::Mul(asin, asin), hn::Set(d, 4.0f), epsilon2);
+  }
   return hn::NegMulAdd(dz, dz, hn::NegMulAdd(dy, dy, hn::NegMulAdd(dx, dx, epsilon2)));
 }
 
@@ -66,7 +75,8 @@ HWY_INLINE void add_contacts(const DirectionsView& c, const Scales& scale, std::
   VF highest = zero;
   HWY_UNROLL(8)
   for (std::size_t r = 0; r < kCount; ++r) {
-    over_normals[r] = hn::Max(gap_to_edge(normal2, x, y, z, c.nx, c.ny, c.nz, i + r), zero);
+    over_normals[r] =
+        hn::Max(gap_to_edge(scale.geodesic, normal2, x, y, z, c.nx, c.ny, c.nz, i + r), zero);
     highest = hn::Max(highest, over_normals[r]);
   }
   const bool apart = hn::AllTrue(d, hn::Eq(highest, zero));
@@ -92,7 +102,7 @@ HWY_INLINE void add_contacts(const DirectionsView& c, const Scales& scale, std::
   HWY_UNROLL(8)
   for (std::size_t r = 0; r < kCount; ++r) {
     const VF over_torques =
-        hn::Max(gap_to_edge(torque2, tx, ty, tz, c.tx, c.ty, c.tz, i + r), zero);
+        hn::Max(gap_to_edge(scale.geodesic, torque2, tx, ty, tz, c.tx, c.ty, c.tz, i + r), zero);
     if (kHat == Hat::product) {
       sum[r] = hn::MulAdd(share, hn::Mul(over_normals[r], over_torques), sum[r]);
     } else {

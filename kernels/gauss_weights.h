@@ -23,12 +23,14 @@ struct DirectionsView {
 
 inline constexpr float kMinWidth = 1e-4f;
 struct GaussWidths {
-  float normal;  // epsilon over N, > 0
-  float torque;  // epsilon over T, > 0
+  float normal;           // epsilon over N, > 0
+  float torque;           // epsilon over T, > 0
+  bool geodesic = false;  // the angle 2 asin(|V_j - V_i|/2) takes the chord's place
 };
 
 // For i in begin..end-1, against all j in 0..count-1:
 //     h(V)_ij = max(0, 1 - |V_j - V_i|^2 / epsilon^2)          differences, never 2 - 2 V_i.V_j
+//                                                              (or the angle: GaussWidths)
 //     s_j     = facing_j * depth_j
 //     phi_i   = sum_j s_j * hat_ij
 //     w_i     = facing_i * s_i * hat_self / phi_i               hat_self = 1, 2 (sum), 1

@@ -3,6 +3,7 @@
 // Xu & Barbic 2016, Eq. (6)-(12), with the weight read as phi_self/phi_i: contacts of equal
 // direction share one contact's stiffness, as the paper's text says.
 #include <algorithm>
+#include <cmath>
 
 #include "kernels/gauss_weights.h"
 
@@ -11,17 +12,22 @@ namespace {
 
 // Eq. (6): 1 at the same direction, 0 from epsilon on.
 double hat(const float* x, const float* y, const float* z, std::size_t i, std::size_t j,
-           float epsilon) {
+           float epsilon, bool geodesic) {
   const double width = std::max(epsilon, kMinWidth);
   const double dx = double{x[j]} - x[i], dy = double{y[j]} - y[i], dz = double{z[j]} - z[i];
-  return std::max(0.0, 1.0 - (dx * dx + dy * dy + dz * dz) / (width * width));
+  double gap2 = dx * dx + dy * dy + dz * dz;
+  if (geodesic) {
+    const double angle = 2 * std::asin(std::min(1.0, 0.5 * std::sqrt(gap2)));
+    gap2 = angle * angle;
+  }
+  return std::max(0.0, 1.0 - gap2 / (width * width));
 }
 
 double hat_ij(const DirectionsView& c, Hat kind, const GaussWidths& widths, std::size_t i,
               std::size_t j) {
-  const double over_normals = hat(c.nx, c.ny, c.nz, i, j, widths.normal);
+  const double over_normals = hat(c.nx, c.ny, c.nz, i, j, widths.normal, widths.geodesic);
   if (kind == Hat::normal) return over_normals;
-  const double over_torques = hat(c.tx, c.ty, c.tz, i, j, widths.torque);
+  const double over_torques = hat(c.tx, c.ty, c.tz, i, j, widths.torque, widths.geodesic);
   return kind == Hat::sum ? over_normals + over_torques : over_normals * over_torques;
 }
 

@@ -107,6 +107,8 @@ TEST_CASE("gauss_weights: SIMD agrees with the reference on every target, count 
         agree_with_reference(c, hat, {0.05f, 1.0f}, true);
         agree_with_reference(c, hat, {0.01f, 0.01f}, false);
         agree_with_reference(c, hat, {2.0f, 2.0f}, n % 2 == 0);
+        agree_with_reference(c, hat, {0.05f, 1.0f, true}, true);
+        agree_with_reference(c, hat, {2.0f, 2.0f, true}, n % 2 == 0);
       }
     }
     for (std::uint64_t seed : {5, 6}) {

@@ -1,0 +1,136 @@
+// series_solve.cpp - the SIMD twin of series_solve_ref.cpp.
+//
+// Lanes are doubles: what a dense patch carries is a small difference of e and J.y in every
+// contact. Kappa is divided out once; a pass then reads eight columns and adds to 28 sums.
+#include "kernels/series_solve.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/series_solve.cpp"
+#include "kernels/series_newton.h"
+#include "kernels/simd.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/tail-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+using DD = hn::ScalableTag<double>;
+using DF = hn::Rebind<float, DD>;
+using VD = hn::Vec<DD>;
+
+HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
+  return hn::PromoteTo(DD(), load_n(DF(), column + first, live));
+}
+
+// Scaled axes of the contacts from `i` on; zero past the end.
+struct Axes {
+  VD v[6];
+};
+HWY_INLINE Axes axes_at(const SeriesColumns& c, VD per_lever, std::size_t i) {
+  const std::size_t live = c.count - i;
+  const VD nx = load_column(c.nx, i, live), ny = load_column(c.ny, i, live);
+  const VD nz = load_column(c.nz, i, live);
+  const VD rx = hn::Mul(load_column(c.rx, i, live), per_lever);
+  const VD ry = hn::Mul(load_column(c.ry, i, live), per_lever);
+  const VD rz = hn::Mul(load_column(c.rz, i, live), per_lever);
+  return {{nx, ny, nz, hn::NegMulAdd(rz, ny, hn::Mul(ry, nz)),
+           hn::NegMulAdd(rx, nz, hn::Mul(rz, nx)), hn::NegMulAdd(ry, nx, hn::Mul(rx, ny))}};
+}
+
+HWY_INLINE VD slack_at(const SeriesColumns& c, const Axes& J, std::size_t i, const double* y) {
+  const DD d;
+  VD u = load_column(c.e, i, c.count - i);
+  for (int k = 0; k < 6; ++k) u = hn::NegMulAdd(J.v[k], hn::Set(d, y[k]), u);
+  return u;
+}
+
+HWY_INLINE void sum_active(const SeriesColumns& c, double lever, const float* kappa,
+                           const double* y, SeriesSums& out) {
+  const DD d;
+  const VD zero = hn::Zero(d), per_lever = hn::Set(d, 1 / lever);
+  VD system[kUpper6], pull[6], energy = zero;
+  for (int k = 0; k < kUpper6; ++k) system[k] = zero;
+  for (int k = 0; k < 6; ++k) pull[k] = zero;
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const Axes J = axes_at(c, per_lever, i);
+    const VD u = slack_at(c, J, i, y);
+    const auto active = hn::Gt(u, zero);
+    if (hn::AllFalse(d, active)) continue;
+    const VD w = hn::IfThenElseZero(active, load_column(kappa, i, c.count - i));
+    const VD wu = hn::Mul(w, u);
+    energy = hn::MulAdd(wu, u, energy);
+    int entry = 0;
+    HWY_UNROLL(8)
+    for (int row = 0; row < 6; ++row) {
+      pull[row] = hn::MulAdd(wu, J.v[row], pull[row]);
+      const VD wJ = hn::Mul(w, J.v[row]);
+      for (int col = row; col < 6; ++col, ++entry)
+        system[entry] = hn::MulAdd(wJ, J.v[col], system[entry]);
+    }
+  }
+  for (int k = 0; k < kUpper6; ++k) out.system[k] = hn::GetLane(hn::SumOfLanes(d, system[k]));
+  for (int k = 0; k < 6; ++k) out.pull[k] = hn::GetLane(hn::SumOfLanes(d, pull[k]));
+  out.energy = hn::GetLane(hn::SumOfLanes(d, energy));
+}
+
+// Fills kappa; returns the largest e of a contact that can carry load, or 0.
+HWY_INLINE double stiffen(const SeriesColumns& c, const SeriesParameters& p, float* kappa) {
+  const DD d;
+  const VD one = hn::Set(d, 1.0), per_lever = hn::Set(d, 1 / p.lever), per_c = hn::Set(d, 1 / p.c);
+  VD max_e = hn::Zero(d);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    const Axes J = axes_at(c, per_lever, i);
+    VD a = hn::Mul(J.v[0], J.v[0]);
+    for (int k = 1; k < 6; ++k) a = hn::MulAdd(J.v[k], J.v[k], a);
+    const VD soft = hn::NegMulAdd(hn::Min(a, hn::Set(d, 2.0)), per_c, one);
+    const VD facing = c.facing != nullptr ? load_column(c.facing, i, live) : one;
+    const VD k = hn::Div(facing, soft);
+    store_n(hn::DemoteTo(DF(), k), DF(), kappa + i, live);
+    const auto carries = hn::Gt(k, hn::Zero(d));
+    max_e = hn::Max(max_e, hn::IfThenElseZero(carries, load_column(c.e, i, live)));
+  }
+  return hn::GetLane(hn::MaxOfLanes(d, max_e));
+}
+
+void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double* y, float* kappa,
+                       float* slack, SeriesResult& result) {
+  const DD d;
+  const double max_e = stiffen(c, p, kappa);
+  result = {0, 0};
+  if (max_e > 0) {
+    result = newton(p, max_e, y, [&](const double* at) HWY_ATTR {
+      SeriesSums sums;
+      sum_active(c, p.lever, kappa, at, sums);
+      return sums;
+    });
+  } else {
+    for (int k = 0; k < 6; ++k) y[k] = 0;  // nothing to hold
+  }
+  const VD per_lever = hn::Set(d, 1 / p.lever);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const VD u = hn::Max(slack_at(c, axes_at(c, per_lever, i), i, y), hn::Zero(d));
+    store_n(hn::DemoteTo(DF(), u), DF(), slack + i, c.count - i);
+  }
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(series_solve_simd);
+
+SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
+                          double y[6], float* kappa, float* slack) {
+  SeriesResult result;
+  HWY_DYNAMIC_DISPATCH(series_solve_simd)(contacts, parameters, y, kappa, slack, result);
+  return result;
+}
+
+}  // namespace h6::kernels
+#endif

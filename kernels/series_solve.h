@@ -1,0 +1,50 @@
+// series_solve.h - the load of every contact when the whole penalty stands in series with one
+// 6-D spring of stiffness c k: net stiffness never exceeds c k, however dense the sampling.
+//
+// Lengths in metres, forces in units of k (k times a load is a force). With
+//     J_i = [N_i; (r_i x N_i)/L],  a_i = min(|J_i|^2, 2),  kappa_i = facing_i / (1 - a_i/c),  c > 2
+// the spring's extension y (m, scaled like J) is
+//     y = argmin  c/2 |y|^2 + 1/2 sum_i kappa_i max(0, e_i - J_i.y)^2                  convex, C1
+// and the loads are lambda_i = kappa_i max(0, e_i - J_i.y) >= 0, with sum_i lambda_i J_i = c y.
+// kappa is what makes a lone contact carry exactly e. Newton from the given y on the piecewise
+// quadratic, halving a step while the sum rises:
+//     A = c I + sum_active kappa J J^T,   dy = A^-1 (sum_active kappa (e - J.y) J - c y)
+// Residual: |gradient| / (c max e), which bounds the error of y (and of the wrench c y) relative to
+// the largest e. METHOD.md, Sec. 3; ours.
+#pragma once
+#include "kernels/views.h"
+
+namespace h6::kernels {
+
+template <class T>
+struct SeriesColumnsT {
+  const T *nx, *ny, *nz;  // inward unit normal
+  const T *rx, *ry, *rz;  // arm from the centre of mass                                     [m]
+  const T* e;             // -d less what damping takes; below 0 for contacts about to touch [m]
+  const T* facing;        // 0..1, or null: all 1
+  std::size_t count;
+};
+using SeriesColumns = SeriesColumnsT<float>;
+
+struct SeriesParameters {
+  double c;      // the dial, > 2
+  double lever;  // L, at least the largest |r|, > 0   [m]
+  double tolerance = 1e-6;
+  int iterations = 12;  // Newton steps at most
+};
+
+struct SeriesResult {
+  int iterations;   // Newton steps taken
+  double residual;  // at the y that was returned; 0 where nothing is active
+};
+
+// y: the start, and then the solution. kappa, slack (count): kappa_i and max(0, e_i - J_i.y); slack
+// may be the column e. A start that is not finite counts as 0.
+SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
+                          double y[6], float* kappa, float* slack);
+// The specification, for float and (gradient tests) double columns.
+template <class T>
+SeriesResult series_solve_ref(const SeriesColumnsT<T>& contacts, const SeriesParameters& parameters,
+                              double y[6], T* kappa, T* slack);
+
+}  // namespace h6::kernels
