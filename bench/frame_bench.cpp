@@ -72,10 +72,13 @@ bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   h6Step(session, &held, nullptr);
   const h6Contacts found = h6GetContacts(session, 1);
   std::vector<bool> touching(depth.size());
-  for (std::size_t i = 0; i < found.count; ++i) touching[found.point[i]] = true;
+  for (std::size_t i = 0; i < found.count; ++i)
+    if (found.depth[i] > 0) touching[found.point[i]] = true;       // `series`: some are about to
+  const bool merged = found.count < h6GetFrame(session).contacts;  // clusters name one point each
   const double doubt = 1e-3 * h6GetVoxel(session, 1);
   for (std::size_t i = 0; i < depth.size(); ++i)
-    if (std::fabs(depth[i]) > doubt && touching[i] != (depth[i] < 0)) return false;
+    if (std::fabs(depth[i]) > doubt && touching[i] != (depth[i] < 0) && (touching[i] || !merged))
+      return false;
   return true;
 }
 

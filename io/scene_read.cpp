@@ -123,8 +123,8 @@ void check_method(const Json& value, const std::string& at) {
   const auto& name = value.get_ref<const std::string&>();
   if (h6MethodFromName(name.c_str(), &method, &pieces) != 0)
     throw Complaint{at, "\"" + shown(name) +
-                            "\" is no method; known: none, global, gauss3, gauss6, "
-                            "robust, and with pieces: gauss3+facing+depth, gauss6+product"};
+                            "\" is no method; known: none, global, cluster, gauss3, gauss6, robust, "
+                            "series, and with pieces: gauss3+facing+depth, robust+cluster"};
 }
 
 void check_quaternion(const Json& value, const SceneKey& key, const std::string& at) {
@@ -376,6 +376,9 @@ class SceneReader {
     c.epsilon_normal = number(o, "epsilon_normal", c.epsilon_normal);
     c.epsilon_torque = number(o, "epsilon_torque", c.epsilon_torque);
     if (o.contains("torque_length")) c.torque_length = number(o, "torque_length", 0) * scale_;
+    c.series_c = number(o, "series_c", c.series_c);
+    c.margin_voxels = number(o, "margin_voxels", c.margin_voxels);
+    c.cluster_voxels = number(o, "cluster_voxels", c.cluster_voxels);
   }
 
   void read_coupling(const Json& o) {

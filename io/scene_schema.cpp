@@ -129,8 +129,8 @@ constexpr SceneKeys kBodyKeys = keys_of(kBody);
 constexpr SceneKey kContact[] = {
     {.name = "method",
      .kind = Kind::method,
-     .about = "none, global, gauss3, gauss6 or robust, and pieces: gauss3+facing+depth+product; "
-              "default robust"},
+     .about = "none, global, cluster, gauss3, gauss6, robust or series, and pieces of the Gauss ones: "
+              "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed; default robust"},
     {.name = "stiffness",
      .kind = Kind::number,
      .about = "k, N/m; default 1e4",
@@ -171,7 +171,24 @@ constexpr SceneKey kContact[] = {
          "l0, arms below it count for less, scene units; default 0: one voxel for robust, none "
          "for others",
      .low = 0,
-     .high = kFarthest}};
+     .high = kFarthest},
+    {.name = "series_c",
+     .kind = Kind::number,
+     .about = "series: net stiffness is at most this times k, above 2; default 4",
+     .low = 2,
+     .high = 1e6,
+     .above_low = true},
+    {.name = "margin_voxels",
+     .kind = Kind::number,
+     .about = "series: points nearer than this take part before they touch; default 0.5",
+     .low = 0,
+     .high = 2},
+    {.name = "cluster_voxels",
+     .kind = Kind::number,
+     .about = "cluster, +cluster: contacts nearer than this are one; default 0.5",
+     .low = 0.01,
+     .high = 100,
+     .above_low = true}};
 constexpr SceneKeys kContactKeys = keys_of(kContact);
 
 constexpr SceneKey kCoupling[] = {

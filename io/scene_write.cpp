@@ -186,11 +186,15 @@ class SceneWriter {
     const char* known = h6MethodName(c.method);
     if (!known) throw WriteFailed{{"the scene's contact method is out of range"}};
     std::string method = known;
-    if (c.method != H6_METHOD_ROBUST) {  // which has all pieces anyway
+    if (c.method != H6_METHOD_ROBUST) {  // which has these anyway
       if (c.pieces & H6_PIECE_FACING) method += "+facing";
       if (c.pieces & H6_PIECE_DEPTH) method += "+depth";
       if (c.pieces & H6_PIECE_PRODUCT) method += "+product";
     }
+    if (c.pieces & H6_PIECE_CLUSTER) method += "+cluster";
+    if (c.pieces & H6_PIECE_GEODESIC) method += "+geodesic";
+    if (c.pieces & H6_PIECE_HANDLES) method += "+handles";
+    if (c.pieces & H6_PIECE_PRINTED) method += "+printed";
     return {{"method", method},
             {"stiffness", c.stiffness},
             {"damping", c.damping},
@@ -198,7 +202,10 @@ class SceneWriter {
             {"epsilon", c.epsilon},
             {"epsilon_normal", c.epsilon_normal},
             {"epsilon_torque", c.epsilon_torque},
-            {"torque_length", c.torque_length / scale_}};
+            {"torque_length", c.torque_length / scale_},
+            {"series_c", c.series_c},
+            {"margin_voxels", c.margin_voxels},
+            {"cluster_voxels", c.cluster_voxels}};
   }
 
   Json coupling_json() const {

@@ -1,4 +1,5 @@
 // api.cpp - a session seen through the contract.
+#include <algorithm>
 #include <cstring>
 
 #include "runtime/stages.h"
@@ -56,13 +57,14 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   set_mesh_pose(body, state->pose);
   body.v = from(state->velocity.linear);
   body.w = from(state->velocity.angular);
+  std::fill_n(body.series_y, 6, 0.0);
 }
 
 h6Contacts h6GetContacts(const h6Session* session, int32_t index) {
   H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);
   const Contacts& c = session->contacts[index];
-  return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx,     c.gy,    c.gz,        c.rx,
-          c.ry,    c.rz,    c.tx, c.ty, c.tz, c.weight, c.point, c.field_body};
+  return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx,     c.gy,    c.gz,         c.rx,
+          c.ry,    c.rz,    c.tx, c.ty, c.tz, c.weight, c.point, c.field_body, c.load};
 }
 
 h6FrameReport h6GetFrame(const h6Session* session) { return session->report; }

@@ -1,10 +1,12 @@
-// defaults.cpp - start values of every definition (METHOD.md, Sec. 4) and names of every enumeration.
+// defaults.cpp - start values of every definition (METHOD.md, Sec. 4) and names of every
+// enumeration.
 #include <cstring>
 
 #include "hapsix/hapsix.h"
 
 namespace {
-constexpr const char* kMethods[H6_METHOD_COUNT] = {"none", "global", "gauss3", "gauss6", "robust"};
+constexpr const char* kMethods[H6_METHOD_COUNT] = {"none",   "global", "cluster", "gauss3",
+                                                   "gauss6", "robust", "series"};
 constexpr const char* kStages[H6_STAGE_COUNT] = {"traverse", "contacts",  "weights", "wrench",
                                                  "coupling", "integrate", "output"};
 constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped",     "slewed", "not finite",
@@ -16,8 +18,10 @@ struct Piece {
   const char* name;
   uint32_t bit;
 };
-constexpr Piece kPieces[] = {
-    {"facing", H6_PIECE_FACING}, {"depth", H6_PIECE_DEPTH}, {"product", H6_PIECE_PRODUCT}};
+constexpr Piece kPieces[] = {{"facing", H6_PIECE_FACING},     {"depth", H6_PIECE_DEPTH},
+                             {"product", H6_PIECE_PRODUCT},   {"cluster", H6_PIECE_CLUSTER},
+                             {"geodesic", H6_PIECE_GEODESIC}, {"handles", H6_PIECE_HANDLES},
+                             {"printed", H6_PIECE_PRINTED}};
 }  // namespace
 
 extern "C" {
@@ -81,6 +85,9 @@ h6ContactDef h6DefaultContactDef(void) {
   def.epsilon = 0.01;
   def.epsilon_normal = 0.05;
   def.epsilon_torque = 1;
+  def.series_c = 4;
+  def.margin_voxels = 0.5;
+  def.cluster_voxels = 0.5;
   return def;
 }
 

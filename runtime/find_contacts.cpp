@@ -30,17 +30,36 @@ kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
   return affine;
 }
 
+// `series` needs the points that are about to touch. [voxel]
+float margin_of(const h6Session& s) {
+  return s.contact.method == H6_METHOD_SERIES ? static_cast<float>(s.contact.margin_voxels) : 0.0f;
+}
+
+// Is the distance there a sample? Far from the surface it is only a bound, and no gap can be told.
+bool is_sampled(const kernels::FieldView& field, const kernels::Affine& to_field, float x, float y,
+                float z) {
+  std::int32_t brick[3];
+  for (int k = 0; k < 3; ++k) {
+    const float* m = to_field.m[k];
+    const float q = m[0] * x + (m[1] * y + (m[2] * z + m[3]));
+    if (!(q >= 0 && q <= static_cast<float>(8 * field.size[k] - 1))) return false;
+    brick[k] = std::min(static_cast<std::int32_t>(q), 8 * field.size[k] - 2) / 8;
+  }
+  return field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]] >= 0;
+}
+
 struct Cull {
   const kernels::FieldView& field;
   kernels::Affine affine;
   kernels::SpheresView spheres;
   float scale;
   bool wide;
+  float margin;  // [voxel]
 
   std::size_t operator()(const std::uint32_t* rows, std::uint32_t first, std::size_t count,
                          std::uint32_t* out, float* distance) const {
-    return kernels::cull_spheres(field, affine, spheres, scale, wide, 0.0f, rows, first, count, out,
-                                 distance);
+    return kernels::cull_spheres(field, affine, spheres, scale, wide, margin, rows, first, count,
+                                 out, distance);
   }
 };
 
@@ -81,11 +100,14 @@ std::size_t traverse_pair(h6Session& s, const Pair& pair, std::size_t used) {
   const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Shell& shell = s.model->shells[a.shell];
   const Field& field = s.model->fields[b.field];
+  const float margin = margin_of(s);
   const Cull test{field.view,
                   shell_to_field(a, shell, b, field),
                   {shell.x.data, shell.y.data, shell.z.data, shell.node_radius.data, shell.nodes},
                   static_cast<float>(1.0 / field.voxel),
-                  field.wide};
+                  // The short form of culling is proved up to half a voxel of margin.
+                  field.wide || margin > 0.5f,
+                  margin};
   const std::uint32_t* rows = nullptr;  // the whole first level
   std::size_t count = shell.level_first[1];
   for (std::uint32_t level = 0; level + 1 < shell.levels && count; ++level) {
@@ -146,7 +168,9 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
     const Shell& shell = s.model->shells[a.shell];
     const Field& field = s.model->fields[b.field];
     const std::uint32_t* rows = s.candidate + pair.first;
-    kernels::sample_field(field.view, shell_to_field(a, shell, b, field),
+    const kernels::Affine to_field = shell_to_field(a, shell, b, field);
+    const float margin = margin_of(s);
+    kernels::sample_field(field.view, to_field,
                           {shell.x.data, shell.y.data, shell.z.data, shell.nodes}, rows,
                           pair.candidates, s.candidate_distance + pair.first, s.gradient_x,
                           s.gradient_y, s.gradient_z);
@@ -156,8 +180,11 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
     pair.begin = c.count;
     for (std::size_t k = 0; k < pair.candidates; ++k) {
       const float d = s.candidate_distance[pair.first + k];
-      if (!(d < 0)) continue;  // exactly on the surface: no depth, no force
+      // Exactly on the surface: no depth, no force.
+      if (!(d < 0) && !(d < margin)) continue;
       const std::uint32_t row = rows[k], point = shell.node_point[row];
+      if (!(d < 0) && !is_sampled(field.view, to_field, shell.x[row], shell.y[row], shell.z[row]))
+        continue;
       const Eigen::Vector3f n =
           Ra * Eigen::Vector3f(shell.nx[point], shell.ny[point], shell.nz[point]);
       Eigen::Vector3f g = Rb * Eigen::Vector3f(s.gradient_x[k], s.gradient_y[k], s.gradient_z[k]);

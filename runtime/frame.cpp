@@ -54,13 +54,15 @@ void send(h6Session& s, Hand& hand, h6DeviceCommand* command) {
   if (command) *command = passed;
 }
 
-void note_depths(h6Session& s) {
-  for (std::size_t p = 0; p < s.pair_count; ++p) {
+// Before clusters are made of them: what is reported is how deep points are.
+void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
+  for (std::size_t p = first_pair; p < end_pair; ++p) {
     const Pair& pair = s.pairs[p];
     const double voxel = s.model->fields[s.bodies[pair.b].field].voxel;
     const Contacts& c = s.contacts[pair.a];
-    s.report.contacts += static_cast<std::uint32_t>(pair.end - pair.begin);
     for (std::size_t i = pair.begin; i < pair.end; ++i) {
+      if (!(c.depth[i] > 0)) continue;  // about to touch
+      ++s.report.contacts;
       s.report.max_depth = std::max<double>(s.report.max_depth, c.depth[i]);
       s.report.max_depth_voxels = std::max<double>(s.report.max_depth_voxels, c.depth[i] / voxel);
     }
@@ -77,9 +79,13 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   for (std::size_t first = 0, end; first < s.pair_count; first = end) {
     end = pairs_of_shell(s, first);
     timed(s, H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
-    timed(s, H6_STAGE_CONTACTS, [&] { gather_contacts(s, first, end); });
-    timed(s, H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, s.pairs[first].a); });
+    timed(s, H6_STAGE_CONTACTS, [&] {
+      gather_contacts(s, first, end);
+      note_depths(s, first, end);
+    });
+    timed(s, H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
     timed(s, H6_STAGE_WRENCH, [&] {
+      if (s.contact.method == H6_METHOD_SERIES) return sum_series(s, first, end);
       for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]);
     });
   }
@@ -91,7 +97,6 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
     for (std::size_t h = 0; h < s.hand_count; ++h)
       send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
-  note_depths(s);
   s.report.state_hash = state_hash(s);
   const std::int64_t now = sched::now_ns();
   s.report.frame_us = 1e-3 * static_cast<double>(now - start);

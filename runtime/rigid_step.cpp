@@ -80,6 +80,23 @@ int place_in(const Island& island, std::int32_t body) {
   return -1;
 }
 
+// `series`: field bodies that one shell body touches feel one another.
+template <int N>
+void add_between_fields(const h6Session& s, const Island& island, Matrix<N>& K, Matrix<N>& D) {
+  for (std::size_t first = 0, end; first < s.pair_count; first = end) {
+    end = pairs_of_shell(s, first);
+    if (place_in(island, s.pairs[first].a) < 0) continue;
+    for (std::size_t p = first; p < end; ++p)
+      for (std::size_t q = first; q < end; ++q) {
+        const int b = place_in(island, s.pairs[p].b), other = place_in(island, s.pairs[q].b);
+        if (p == q || b < 0 || other < 0) continue;
+        K.template block<6, 6>(6 * b, 6 * other) += s.pairs[p].left * s.pairs[q].right;
+        D.template block<6, 6>(6 * b, 6 * other) +=
+            s.contact.damping * s.pairs[p].left * s.pairs[q].right_d;
+      }
+  }
+}
+
 // The island's system. With one body it is that body's own 6x6 one, whatever it touches.
 template <int N>
 bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
@@ -103,6 +120,7 @@ bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
       D.template block<6, 6>(6 * a, 6 * b) += s.pairs[p].Dab;
       D.template block<6, 6>(6 * b, 6 * a) += s.pairs[p].Dba;
     }
+    if (s.contact.method == H6_METHOD_SERIES) add_between_fields<N>(s, island, K, D);
   }
   const Matrix<N> A = M - h * D - h * h * K;
   const Vector<N> rhs = h * (f + h * (K * u));

@@ -9,6 +9,7 @@
 
 #include "runtime/session_checks.h"
 #include "runtime/stages.h"
+#include "runtime/weighing.h"
 
 namespace h6 {
 namespace {
@@ -146,6 +147,10 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
     *column = arena.take<float>(s.candidate_capacity);
   for (float** column : {&s.gradient_x, &s.gradient_y, &s.gradient_z})
     *column = arena.take<float>(s.max_contacts);
+  const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
+  s.cluster_order = arena.take<std::uint32_t>(merged);
+  s.cluster_root = arena.take<std::uint32_t>(merged);
+  s.cluster_cell = arena.take<std::uint64_t>(merged);
   s.slice_count = arena.take<std::size_t>(n.nodes / 1024 + 1);
   s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / 1024 + 1);
 }

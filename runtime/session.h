@@ -28,6 +28,8 @@ struct Body {
   // Gathered in a frame: wrench about x and its derivatives by this body's own motion.
   Vec6 f = Vec6::Zero();
   Mat6 K = Mat6::Zero(), D = Mat6::Zero();
+
+  double series_y[6] = {};  // `series`: the spring's extension in the last frame, a warm start
 };
 
 // A shell body a against a field body b.
@@ -37,6 +39,9 @@ struct Pair {
   std::size_t candidates = 0, first = 0;  // its rows among the candidates
   // When both move: how each one's motion changes the other's wrench.
   Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
+  // `series` lets the field bodies of one shell body feel one another: pair p's wrench on b_p
+  // changes by left_p right_q with the motion of b_q, by beta left_p right_d_q with its velocity.
+  Mat6 left = Mat6::Zero(), right = Mat6::Zero(), right_d = Mat6::Zero();
 };
 
 struct Hand {
@@ -84,8 +89,10 @@ struct h6Session {
   float* scratch_depth = nullptr;                           // to find the deepest
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
   std::size_t candidate_capacity = 0;
-  std::size_t* slice_count = nullptr;           // (slices) survivors of each
-  h6::kernels::WrenchSum* slice_sum = nullptr;  // (slices)
+  std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)
+  std::uint64_t* cluster_cell = nullptr;                            // (max_contacts)
+  std::size_t* slice_count = nullptr;                               // (slices) survivors of each
+  h6::kernels::WrenchSum* slice_sum = nullptr;                      // (slices)
 
   h6FrameReport report{};
   std::uint64_t frame = 0;

@@ -19,6 +19,8 @@ int number(const E& value) {
   return out;
 }
 
+}  // namespace
+
 bool check_contact(const h6ContactDef& c, h6Error* error) {
   if (number(c.method) < 0 || number(c.method) >= H6_METHOD_COUNT)
     return fail(error, "contact method %d does not exist", number(c.method));
@@ -35,8 +37,16 @@ bool check_contact(const h6ContactDef& c, h6Error* error) {
       return fail(error, "%s must be in (0, 2], it is %g", name, value);
   if (!not_negative(c.torque_length))
     return fail(error, "torque_length must be 0 m or more, it is %g", c.torque_length);
+  if (!(c.series_c > 2 && c.series_c <= 1e6))
+    return fail(error, "series_c must be in (2, 1e6], it is %g", c.series_c);
+  if (!(c.margin_voxels >= 0 && c.margin_voxels <= 2))
+    return fail(error, "margin_voxels must be in 0..2, it is %g", c.margin_voxels);
+  if (!(c.cluster_voxels > 0.01 && c.cluster_voxels <= 100))
+    return fail(error, "cluster_voxels must be in (0.01, 100], it is %g", c.cluster_voxels);
   return true;
 }
+
+namespace {
 
 bool check_body(const h6Model& model, const h6BodyDef& b, std::size_t i, h6Error* error) {
   if (!finite(b.pose) || !from(b.velocity.linear).allFinite() ||

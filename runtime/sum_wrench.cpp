@@ -6,14 +6,12 @@
 #include <algorithm>
 
 #include "runtime/stages.h"
+#include "runtime/weighing.h"
 
 namespace h6 {
 namespace {
 
 constexpr std::size_t kSlice = 1024;  // contacts summed at a time; slices are added in order
-
-using MapMat6 = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>;
-using MapVec6 = Eigen::Map<const Vec6>;
 
 kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
                               const kernels::WrenchParameters& p) {
@@ -32,6 +30,35 @@ kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
 
 }  // namespace
 
+Mat6 arm_shift(const h6Session& s, const Pair& pair) {
+  Mat6 S = Mat6::Identity();
+  S.bottomLeftCorner<3, 3>() = cross_matrix(s.bodies[pair.a].x - s.bodies[pair.b].x);
+  return S;
+}
+
+Vec6 pair_velocity(const h6Session& s, const Pair& pair) {
+  const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+  Vec6 ua, ub;
+  ua << a.v, a.w;
+  ub << b.v, b.w;
+  return ua - arm_shift(s, pair).transpose() * ub;
+}
+
+void add_geometric_terms(h6Session& s, Pair& pair, const Vec6& f) {
+  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+  const Mat3 F = cross_matrix(f.head<3>()), T = cross_matrix(f.tail<3>());
+  if (!a.fixed) {
+    a.K.topRightCorner<3, 3>() -= F;
+    a.K.bottomRightCorner<3, 3>() -= T;
+  }
+  // The arms from b grow as a and b part, and turn as a turns.
+  if (!b.fixed) b.K.bottomLeftCorner<3, 3>() -= F;
+  if (a.fixed || b.fixed) return;
+  pair.Kba.topRightCorner<3, 3>() += F;
+  pair.Kba.bottomLeftCorner<3, 3>() += F;
+  pair.Kba.bottomRightCorner<3, 3>() += T + cross_matrix(a.x - b.x) * F;
+}
+
 void sum_wrench(h6Session& s, Pair& pair) {
   pair.Kab.setZero();
   pair.Kba.setZero();
@@ -39,49 +66,30 @@ void sum_wrench(h6Session& s, Pair& pair) {
   pair.Dba.setZero();
   if (pair.begin == pair.end) return;
   Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-  const Vec3 c = a.x - b.x;
-  Mat6 S = Mat6::Identity();
-  S.bottomLeftCorner<3, 3>() = cross_matrix(c);
-
-  // Velocity of a against b at a's centre of mass: u_a - S^T u_b.
-  Vec6 ua, ub;
-  ua << a.v, a.w;
-  ub << b.v, b.w;
-  const Vec6 u = ua - S.transpose() * ub;
+  const Mat6 S = arm_shift(s, pair);
   kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
-  Vec6::Map(p.velocity) = u;
+  Vec6::Map(p.velocity) = pair_velocity(s, pair);
   const kernels::WrenchSum sum = sum_slices(s, s.contacts[pair.a], pair, p);
 
-  const Vec6 f = MapVec6(sum.force);
-  const Mat6 K = MapMat6(sum.stiffness), D = s.contact.damping * MapMat6(sum.damping);
-  Mat6 aa = Mat6::Zero(), ba = Mat6::Zero(), bb = Mat6::Zero();  // geometric terms
-  if (s.gradient == H6_EXACT) {
-    const Mat3 F = cross_matrix(MapVec6(sum.elastic).head<3>()),
-               T = cross_matrix(MapVec6(sum.elastic).tail<3>());
-    aa.topRightCorner<3, 3>() = -F;
-    aa.bottomRightCorner<3, 3>() = -T;
-    // The arms from b grow as a and b part, and turn as a turns.
-    ba.topRightCorner<3, 3>() = F;
-    ba.bottomLeftCorner<3, 3>() = F;
-    ba.bottomRightCorner<3, 3>() = T + cross_matrix(c) * F;
-    bb.bottomLeftCorner<3, 3>() = -F;
-  }
+  const Vec6 f = Vec6::Map(sum.force);
+  const Mat6 K = row_major(sum.stiffness), D = s.contact.damping * row_major(sum.damping);
   if (!a.fixed) {
     a.f += f;
-    a.K += aa - K;
+    a.K -= K;
     a.D -= D;
   }
   if (!b.fixed) {
     b.f -= S * f;
-    b.K += bb - S * K * S.transpose();
+    b.K -= S * K * S.transpose();
     b.D -= S * D * S.transpose();
   }
   if (!a.fixed && !b.fixed) {
     pair.Kab = K * S.transpose();
-    pair.Kba = S * K + ba;
+    pair.Kba = S * K;
     pair.Dab = D * S.transpose();
     pair.Dba = S * D;
   }
+  if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, Vec6::Map(sum.elastic));
 }
 
 }  // namespace h6

@@ -1,12 +1,13 @@
 // weigh_contacts.cpp - how the contact stiffness is shared among a shell body's contacts.
 //
-// Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3, says
-// which of the paper's ambiguities are settled how: w_i = phi_self / phi_i.
+// Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3,
+// says which of the paper's ambiguities are settled how: w_i = phi_self / phi_i.
 #include <algorithm>
 #include <cmath>
 
 #include "kernels/gauss_weights.h"
 #include "runtime/stages.h"
+#include "runtime/weighing.h"
 
 namespace h6 {
 namespace {
@@ -15,21 +16,14 @@ constexpr std::size_t kSlice = 128;         // rows of the density sum at a time
 constexpr std::size_t kWorthSharing = 256;  // contacts from which the helper is asked
 constexpr float kFacingEdge = 0.25f;        // N.g from which a contact counts in full
 
-// A contact whose normal opposes the field's gradient would pull the body in.
-void facing(Contacts& c, bool filter) {
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const float dot = c.nx[i] * c.gx[i] + c.ny[i] * c.gy[i] + c.nz[i] * c.gz[i];
-    c.facing[i] = filter ? std::clamp(dot / kFacingEdge, 0.0f, 1.0f) : 1.0f;
-  }
-}
-
 // T = (r x N) / sqrt(|r x N|^2 + l0^2): Eq. (10), with l0 against blow-up where r is parallel to N.
-void torque_directions(Contacts& c, float l0) {
+// As handles, Eq. (13): T = r x F/|F| over `lever`; F/|F| = N.
+void torque_directions(Contacts& c, float l0, bool handles, float lever) {
   for (std::size_t i = 0; i < c.count; ++i) {
     const float x = c.ry[i] * c.nz[i] - c.rz[i] * c.ny[i];
     const float y = c.rz[i] * c.nx[i] - c.rx[i] * c.nz[i];
     const float z = c.rx[i] * c.ny[i] - c.ry[i] * c.nx[i];
-    const float length = std::sqrt(x * x + y * y + z * z + l0 * l0);
+    const float length = handles ? lever : std::sqrt(x * x + y * y + z * z + l0 * l0);
     const float scale = length > 0 ? 1.0f / length : 0.0f;
     c.tx[i] = x * scale;
     c.ty[i] = y * scale;
@@ -38,7 +32,7 @@ void torque_directions(Contacts& c, float l0) {
 }
 
 struct Rule {
-  bool gauss = false, facing = false, depth = false;
+  bool gauss = false, facing = false, depth = false, handles = false, printed = false;
   kernels::Hat hat = kernels::Hat::normal;
   kernels::GaussWidths widths{};
   float l0 = 0;
@@ -50,6 +44,8 @@ Rule rule_of(const h6ContactDef& def, double voxel) {
   rule.depth = def.pieces & H6_PIECE_DEPTH;
   rule.l0 = static_cast<float>(def.torque_length);
   rule.widths = {static_cast<float>(def.epsilon), static_cast<float>(def.epsilon)};
+  rule.handles = def.pieces & H6_PIECE_HANDLES;
+  rule.printed = def.pieces & H6_PIECE_PRINTED;
   switch (def.method) {
     case H6_METHOD_GAUSS3:
       rule.gauss = true;
@@ -59,35 +55,45 @@ Rule rule_of(const h6ContactDef& def, double voxel) {
       rule.hat = def.pieces & H6_PIECE_PRODUCT ? kernels::Hat::product : kernels::Hat::sum;
       break;
     case H6_METHOD_ROBUST:
-      rule = {true,
-              true,
-              true,
-              kernels::Hat::product,
-              {static_cast<float>(def.epsilon_normal), static_cast<float>(def.epsilon_torque)},
-              static_cast<float>(def.torque_length > 0 ? def.torque_length : voxel)};
+      rule.gauss = rule.facing = rule.depth = true;
+      rule.hat = kernels::Hat::product;
+      rule.widths = {static_cast<float>(def.epsilon_normal),
+                     static_cast<float>(def.epsilon_torque)};
+      rule.l0 = static_cast<float>(def.torque_length > 0 ? def.torque_length : voxel);
       break;
     default:
       break;
   }
+  rule.widths.geodesic = def.pieces & H6_PIECE_GEODESIC;
   return rule;
+}
+
+// Eq. (8) as it is printed: phi_i over the largest phi. phi is what a weight was divided by.
+void weigh_as_printed(Contacts& c, const Rule& rule) {
+  const float self = rule.hat == kernels::Hat::sum ? 2.0f : 1.0f;
+  float most = 0;
+  for (std::size_t i = 0; i < c.count; ++i) {
+    if (!(c.weight[i] > 0)) continue;
+    c.load[i] = c.facing[i] * c.facing[i] * (rule.depth ? c.depth[i] : 1.0f) * self / c.weight[i];
+    most = std::max(most, c.load[i]);
+  }
+  for (std::size_t i = 0; i < c.count; ++i)
+    if (c.weight[i] > 0) c.weight[i] = c.facing[i] * c.load[i] / most;
 }
 
 }  // namespace
 
-void weigh_contacts(h6Session& s, std::int32_t shell_body) {
-  Contacts& c = s.contacts[shell_body];
-  if (c.count == 0) return;
-  const Rule rule = rule_of(s.contact, s.bodies[shell_body].voxel);
-  facing(c, rule.facing);
-  torque_directions(c, rule.l0);
-  if (!rule.gauss) {
-    const double n0 = s.contact.global_n0;
-    const double n = static_cast<double>(c.count);
-    const float w =
-        s.contact.method == H6_METHOD_GLOBAL && n > n0 ? static_cast<float>(n0 / n) : 1.0f;
-    for (std::size_t i = 0; i < c.count; ++i) c.weight[i] = w * c.facing[i];
-    return;
+// A contact whose normal opposes the field's gradient would pull the body in.
+void fill_facing(Contacts& c, bool filter) {
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const float dot = c.nx[i] * c.gx[i] + c.ny[i] * c.gy[i] + c.nz[i] * c.gz[i];
+    c.facing[i] = filter ? std::clamp(dot / kFacingEdge, 0.0f, 1.0f) : 1.0f;
   }
+}
+
+namespace {
+
+void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team) {
   const kernels::DirectionsView view{c.nx,
                                      c.ny,
                                      c.nz,
@@ -97,15 +103,61 @@ void weigh_contacts(h6Session& s, std::int32_t shell_body) {
                                      rule.facing ? c.facing : nullptr,
                                      rule.depth ? c.depth : nullptr,
                                      c.count};
-  if (c.count < kWorthSharing) {
+  if (c.count < kWorthSharing || !team) {
     kernels::gauss_weights(view, rule.hat, rule.widths, 0, c.count, c.weight);
-    return;
+  } else {
+    const std::size_t slices = (c.count + kSlice - 1) / kSlice;
+    team->for_slices(slices, [&](std::size_t i) {
+      kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice,
+                             std::min((i + 1) * kSlice, c.count), c.weight);
+    });
   }
-  const std::size_t slices = (c.count + kSlice - 1) / kSlice;
-  s.team->for_slices(slices, [&](std::size_t i) {
-    kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice,
-                           std::min((i + 1) * kSlice, c.count), c.weight);
-  });
+  if (rule.printed) weigh_as_printed(c, rule);
+}
+
+// Clusters never mix fields: a merged contact belongs to one pair.
+void merge_clusters(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
+  Contacts& c = s.contacts[s.pairs[first_pair].a];
+  const ClusterScratch scratch{s.cluster_order, s.cluster_root, s.cluster_cell};
+  std::size_t out = 0;
+  for (std::size_t p = first_pair; p < end_pair; ++p) {
+    Pair& pair = s.pairs[p];
+    const double voxel = s.model->fields[s.bodies[pair.b].field].voxel;
+    const std::size_t end =
+        cluster_contacts(c, pair.begin, pair.end, out, s.contact.cluster_voxels * voxel, scratch);
+    pair.begin = out;
+    pair.end = out = end;
+  }
+  c.count = out;
+}
+
+}  // namespace
+
+void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
+                   sched::FrameTeam* team) {
+  const Rule rule = rule_of(def, voxel);
+  fill_facing(c, rule.facing);
+  torque_directions(c, rule.l0, rule.handles, static_cast<float>(lever));
+  if (rule.gauss) {
+    weigh_gauss(c, rule, team);
+  } else {
+    const double n = static_cast<double>(c.count);
+    const float w = def.method == H6_METHOD_GLOBAL && n > def.global_n0
+                        ? static_cast<float>(def.global_n0 / n)
+                        : 1.0f;
+    for (std::size_t i = 0; i < c.count; ++i) c.weight[i] = w * c.facing[i];
+  }
+  for (std::size_t i = 0; i < c.count; ++i) c.load[i] = c.weight[i] * c.depth[i];
+}
+
+void weigh_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
+  const std::int32_t a = s.pairs[first_pair].a;
+  if (s.contact.method == H6_METHOD_SERIES) return weigh_series(s, first_pair, end_pair);
+  if (s.contacts[a].count == 0) return;
+  if (uses_clusters(s.contact)) merge_clusters(s, first_pair, end_pair);
+  const Body& body = s.bodies[a];
+  weigh_columns(s.contacts[a], s.contact, body.voxel, series_lever(body.radius, body.voxel),
+                s.team);
 }
 
 }  // namespace h6

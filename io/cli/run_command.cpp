@@ -85,8 +85,8 @@ void add_run(CLI::App& app, Program& program) {
   run->add_flag("--virtual-time", o->virtual_time,
                 "As fast as possible instead of in real time; same code, same bits");
   run->add_option("--method", o->method,
-                  "none, global, gauss3, gauss6 or robust; the Gauss ones also with +facing, "
-                  "+depth, +product")
+                  "none, global, cluster, gauss3, gauss6, robust or series; the Gauss ones also with "
+                  "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
       ->option_text("NAME");
   run->add_option("--threads", o->threads,
                   "1 (default), or 2 for a helper on the other core; same bits")

@@ -176,8 +176,8 @@ Outcome check_options(const RunOptions& options) {
   std::uint32_t pieces;
   if (!options.method.empty() && h6MethodFromName(options.method.c_str(), &method, &pieces) != 0)
     return Failure{"no method is called '" + options.method +
-                   "': none, global, gauss3, gauss6 or robust, the Gauss ones also with +facing, "
-                   "+depth, +product"};
+                   "': none, global, cluster, gauss3, gauss6, robust or series, the Gauss ones also "
+                   "with +facing, +depth, +product, +cluster, +geodesic, +handles, +printed"};
   return options.device.empty() ? Outcome(Done{}) : check_device(options.device);
 }
 

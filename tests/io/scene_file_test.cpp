@@ -68,7 +68,10 @@ TEST_CASE("every key arrives, lengths in metres") {
   check_close(s.bodies[4].shell->bake.spacing, 0.75e-3);
   CHECK(s.bodies[5].shell->file == bench.path / "part.ply");
   CHECK(s.contact.method == H6_METHOD_GAUSS6);
-  CHECK(s.contact.pieces == (H6_PIECE_FACING | H6_PIECE_PRODUCT));
+  CHECK(s.contact.pieces == (H6_PIECE_FACING | H6_PIECE_PRODUCT | H6_PIECE_GEODESIC));
+  check_close(s.contact.series_c, 3);
+  check_close(s.contact.margin_voxels, 0.25);
+  check_close(s.contact.cluster_voxels, 0.75);
   check_close(s.contact.stiffness, 2e4);
   check_close(s.contact.damping, 2e-3);
   check_close(s.contact.global_n0, 7);
@@ -198,6 +201,9 @@ TEST_CASE("every wrong value is refused with the path of its key") {
       {"/contact", "{\"epsilon_normal\": 2.1}", "contact.epsilon_normal"},
       {"/contact", "{\"epsilon_torque\": 0}", "contact.epsilon_torque"},
       {"/contact", "{\"torque_length\": -1}", "contact.torque_length"},
+      {"/contact", "{\"series_c\": 2}", "contact.series_c"},
+      {"/contact", "{\"margin_voxels\": 3}", "contact.margin_voxels"},
+      {"/contact", "{\"cluster_voxels\": 0}", "contact.cluster_voxels"},
       {"/coupling", "{\"mode\": \"static\"}", "coupling.mode"},
       {"/coupling", "{\"stiffness\": 0}", "coupling.stiffness"},
       {"/coupling", "{\"damping_ratio\": 11}", "coupling.damping_ratio"},

@@ -86,9 +86,10 @@ inline Json full_scene() {
        "shell": {"mesh": "bay.stl", "points": 777, "levels": 5, "seed": 42, "units": "cm"}},
       {"name": "other", "shell": {"mesh": "bay.stl", "spacing": 0.75}},
       {"name": "third", "shell": {"file": "part.ply"}}],
-    "contact": {"method": "gauss6+facing+product", "stiffness": 2e4, "damping": 2e-3,
+    "contact": {"method": "gauss6+facing+product+geodesic", "stiffness": 2e4, "damping": 2e-3,
                 "global_n0": 7, "epsilon": 0.02, "epsilon_normal": 0.03,
-                "epsilon_torque": 0.9, "torque_length": 1.5},
+                "epsilon_torque": 0.9, "torque_length": 1.5,
+                "series_c": 3, "margin_voxels": 0.25, "cluster_voxels": 0.75},
     "coupling": {"mode": "dynamic", "stiffness": 1500, "rotational_stiffness": 0.7,
                  "damping_ratio": 0.8, "max_depth_voxels": 0.4, "max_force": 3, "max_torque": 0.2},
     "integrator": "explicit", "gradient": "exact", "rate": 2000, "duration": 1.25,
@@ -117,10 +118,12 @@ inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
   CHECK(a.method == b.method);
   if (a.method != H6_METHOD_ROBUST) CHECK(a.pieces == b.pieces);
   const double xs[] = {a.stiffness,      a.damping,        a.global_n0,    a.epsilon,
-                       a.epsilon_normal, a.epsilon_torque, a.torque_length};
+                       a.epsilon_normal, a.epsilon_torque, a.torque_length,
+                       a.series_c,       a.margin_voxels,  a.cluster_voxels};
   const double ys[] = {b.stiffness,      b.damping,        b.global_n0,    b.epsilon,
-                       b.epsilon_normal, b.epsilon_torque, b.torque_length};
-  for (int i = 0; i < 7; ++i) check_close(xs[i], ys[i]);
+                       b.epsilon_normal, b.epsilon_torque, b.torque_length,
+                       b.series_c,       b.margin_voxels,  b.cluster_voxels};
+  for (int i = 0; i < 10; ++i) check_close(xs[i], ys[i]);
 }
 
 inline void check_same(const h6CouplingDef& a, const h6CouplingDef& b) {

@@ -167,6 +167,10 @@ TEST_CASE("a session that cannot run is refused with a sentence that names the v
       {[](Scene& s) { s.def.contact.epsilon = 0; }, "epsilon"},
       {[](Scene& s) { s.def.contact.epsilon_normal = 3; }, "epsilon_normal"},
       {[](Scene& s) { s.def.contact.global_n0 = 0.5; }, "global_n0"},
+      {[](Scene& s) { s.def.contact.series_c = 2; }, "series_c"},
+      {[](Scene& s) { s.def.contact.series_c = NAN; }, "series_c"},
+      {[](Scene& s) { s.def.contact.margin_voxels = -0.1; }, "margin_voxels"},
+      {[](Scene& s) { s.def.contact.cluster_voxels = 0; }, "cluster_voxels"},
       {[](Scene& s) { s.def.contact.method = static_cast<h6Method>(77); }, "method"},
       {[](Scene& s) { s.bodies[1].mass = 0; }, "mass"},
       {[](Scene& s) { s.bodies[1].inertia[0] = 1; }, "inertia"},
@@ -265,6 +269,10 @@ TEST_CASE("every name has its value and back") {
   CHECK(h6MethodFromName("gauss6+facing+depth", &method, &pieces) == 0);
   CHECK(method == H6_METHOD_GAUSS6);
   CHECK(pieces == (H6_PIECE_FACING | H6_PIECE_DEPTH));
+  CHECK(h6MethodFromName("robust+cluster+geodesic", &method, &pieces) == 0);
+  CHECK(pieces == (H6_PIECE_CLUSTER | H6_PIECE_GEODESIC));
+  CHECK(h6MethodFromName("gauss6+handles+printed", &method, &pieces) == 0);
+  CHECK(pieces == (H6_PIECE_HANDLES | H6_PIECE_PRINTED));
   for (const char* wrong :
        {"", "gauss", "gauss66", "robust+", "robust+nothing", "+facing", "Robust"})
     CHECK_MESSAGE(h6MethodFromName(wrong, &method, &pieces) != 0, wrong);

@@ -31,6 +31,21 @@ H6_API h6CouplingDef h6DefaultCouplingDef(void);/* 1e3 N/m, critically damped, h
 H6_API h6HandDef     h6DefaultHandDef(void);
 H6_API h6SessionDef  h6DefaultSessionDef(void); /* implicit, 1000 Hz, 16384 contacts, 1 thread       */
 
+/* The weights as a filter, without scene or session: any penalty simulator can call it. With
+ * w from `contact` and J = [N; r x N], J_g = [g; r x g], u the velocity (METHOD.md, Sec. 2, 3):
+ *     wrench    = sum w k max(0, depth - beta J.u) J                                   [N, N m]
+ *     stiffness = d wrench/dq = -sum w k J J^T;  H6_EXACT: -sum w k J J_g^T and the geometric term
+ *     damping   = d wrench/du = -beta sum w k J J^T        both 6 x 6, row by row, q = (x, theta)
+ * and the forms of `series` (always from a cold start). `voxel` > 0 [m] is the length that l0 and
+ * cluster_voxels are measured in, `lever` > 0 [m] at least the largest |r| (the body's radius, not
+ * the patch's: it should not change from call to call). weights (count), wrench, stiffness (36),
+ * damping (36) may each be NULL. A clustered contact has its share of its cluster's weight, by
+ * depth. Nothing is allocated when scratch is given. 0, or -1 with `error` filled. */
+H6_API int    h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts,
+                              double voxel, double lever, float* weights, h6Wrench* wrench,
+                              double* stiffness, double* damping, h6Error* error);
+H6_API size_t h6WeighScratchBytes(size_t count);
+
 /* "none", "global", ...; NULL when out of range. And back: 0 when the name is known. */
 H6_API const char* h6MethodName(h6Method method);
 H6_API int         h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces);

@@ -89,22 +89,29 @@ typedef struct h6PairDef { int32_t shell_body; int32_t field_body; } h6PairDef;
 typedef enum h6Method {
   H6_METHOD_NONE = 0, /* every contact has the full stiffness                                      */
   H6_METHOD_GLOBAL,   /* McNeely 1999: n0/n once there are n0 contacts                             */
+  H6_METHOD_CLUSTER,  /* Kim 2003: one contact a cluster of near ones                              */
   H6_METHOD_GAUSS3,   /* the paper's Eq. 6-9: density of normals                                   */
   H6_METHOD_GAUSS6,   /* the paper's Eq. 10-12: density of normals plus density of torque directions*/
   H6_METHOD_ROBUST,   /* product density, weighted by depth, contacts facing away dropped          */
+  H6_METHOD_SERIES,   /* the whole penalty in series with one spring: net stiffness <= series_c k  */
   H6_METHOD_COUNT
 } h6Method;
 
-/* Pieces of `robust` that can be added to the paper's methods one by one. */
+/* Pieces that can be added one by one. The first three make `robust` out of the paper's methods;
+ * the others are options of the Gauss methods (`robust` among them); the rest do not read them. */
 enum {
   H6_PIECE_FACING = 1u << 0, /* contacts whose normal opposes the field's gradient fade out        */
   H6_PIECE_DEPTH  = 1u << 1, /* contacts enter the density in proportion to their depth            */
-  H6_PIECE_PRODUCT = 1u << 2 /* gauss6: product of the two hats instead of their sum               */
+  H6_PIECE_PRODUCT = 1u << 2, /* gauss6: product of the two hats instead of their sum              */
+  H6_PIECE_CLUSTER = 1u << 3, /* weights on clusters: see H6_METHOD_CLUSTER                        */
+  H6_PIECE_GEODESIC = 1u << 4, /* angles instead of chords: 2 asin(|dN|/2), the same for T         */
+  H6_PIECE_HANDLES = 1u << 5, /* Eq. 13: T = r x F/|F|, in units of the body's radius              */
+  H6_PIECE_PRINTED = 1u << 6  /* Eq. 8 as printed: w = phi / largest phi                           */
 };
 
 typedef struct h6ContactDef {
   h6Method method;          /* default robust                                                      */
-  uint32_t pieces;          /* H6_PIECE_*; robust has all of them whatever stands here             */
+  uint32_t pieces;          /* H6_PIECE_*; robust has the first three whatever stands here         */
   double   stiffness;       /* k, > 0                                                       [N/m]  */
   double   damping;         /* beta, >= 0: damping of a contact is beta * its stiffness       [s]  */
   double   global_n0;       /* `global`: contacts from which the stiffness is shared, >= 1         */
@@ -113,6 +120,11 @@ typedef struct h6ContactDef {
   double   epsilon_torque;  /* `robust`: half-width of the hat over torque directions, (0, 2]      */
   double   torque_length;   /* l0: lever arms below it count for less; 0: one voxel (robust), none
                                (others)                                                       [m]  */
+  double   series_c;        /* `series`: the dial c, in (2, 1e6]: net stiffness is at most c k     */
+  double   margin_voxels;   /* `series`: points nearer than this take part before they touch,
+                               0 .. 2 voxels of the field                                          */
+  double   cluster_voxels;  /* `cluster`, `+cluster`: contacts nearer than this are one, in (0.01,
+                               100] voxels                                                         */
 } h6ContactDef;
 
 typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
@@ -155,12 +167,28 @@ typedef struct h6SessionDef {
 #define H6_MAX_HANDS 8
 #define H6_MAX_BODIES 256
 
+/* Contacts of any simulator, for h6WeighContacts: one row a contact, x y z next to each other. All
+ * in one frame; arms and torques are about one point, the body's centre of mass. */
+typedef struct h6ContactArrays {
+  size_t            count;
+  const float*      normals;   /* (count x 3) unit, the direction in which the contact pushes       */
+  const float*      arms;      /* (count x 3) r: from the centre of mass to the contact        [m]  */
+  const float*      depths;    /* (count) > 0 inside; <= 0: only `series` reads them           [m]  */
+  const float*      gradients; /* (count x 3) g: unit, out of the obstacle, or NULL: the normals    */
+  const h6Velocity* velocity;  /* of the body against the obstacle at the centre of mass, or NULL: 0*/
+  h6Gradient        form;      /* of the derivatives                                                */
+  void*             scratch;   /* h6WeighScratchBytes(count) bytes, any alignment, or NULL: one heap
+                                  block of that size, freed before the return                       */
+  size_t            scratch_bytes;
+} h6ContactArrays;
+
 /* ---- what can be read -------------------------------------------------------------------------- */
 
 typedef struct h6BodyState { h6Pose pose; h6Velocity velocity; } h6BodyState;
 
 /* The contacts of one shell body in the last frame. Columns of `count` rows, valid until the next
- * step. World frame. */
+ * step. World frame. With clusters a row is a cluster: its means weighted by depth, and its deepest
+ * point. Under `series` there are rows with depth <= 0, about to touch: weight 0, load maybe not. */
 typedef struct h6Contacts {
   size_t          count;
   const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
@@ -171,6 +199,8 @@ typedef struct h6Contacts {
   const float*    weight;                        /* share of the stiffness                         */
   const uint32_t* point;                         /* index into the shell's points                  */
   const int32_t*  field_body;                    /* the body whose field it is                     */
+  const float*    load;                          /* force along N over k: weight * depth; `series`:
+                                                    lambda, with what damping takes           [m]  */
 } h6Contacts;
 
 /* Stages of a frame, in order. */
@@ -189,12 +219,14 @@ H6_API const char* h6StageName(h6Stage stage);
 typedef struct h6FrameReport {
   uint64_t frame;                     /* 0 for the first                                           */
   h6Status status;
-  uint32_t contacts;                  /* over all shell bodies                                     */
+  uint32_t contacts;                  /* points that touch, over all shell bodies                  */
   double   max_depth;                 /* deepest contact, 0 without one                       [m]  */
   double   max_depth_voxels;          /* the same in voxels of its field                           */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
   uint64_t state_hash;                /* of poses and velocities after the step                    */
+  uint32_t series_iterations;         /* `series`: Newton steps, the most of any shell body        */
+  double   series_residual;           /* `series`: the largest left, of c * the deepest e          */
 } h6FrameReport;
 
 #ifdef __cplusplus

@@ -1,0 +1,251 @@
+// h6WeighContacts: the weights as a filter for any simulator.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "tests/support/analytic.h"
+#include "tests/support/near.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr double mm = 1e-3;
+using Mat6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+struct Rows {
+  std::vector<float> n, r, d, g;
+  void add(const std::array<double, 3>& normal, const std::array<double, 3>& arm, double depth) {
+    for (double v : normal) n.push_back(float(v));
+    for (double v : arm) r.push_back(float(v));
+    d.push_back(float(depth));
+  }
+  h6ContactArrays arrays() const {
+    h6ContactArrays a{};
+    a.count = d.size();
+    a.normals = n.data(), a.arms = r.data(), a.depths = d.data();
+    if (!g.empty()) a.gradients = g.data();
+    return a;
+  }
+};
+
+struct Answer {
+  std::vector<float> weight;
+  h6Wrench wrench{};
+  Mat6 K, D;
+  int code;
+  h6Error error{};
+  Answer(const h6ContactDef& def, const h6ContactArrays& a, double voxel = mm, double lever = 0.02)
+      : weight(a.count, -1) {
+    code =
+        h6WeighContacts(&def, &a, voxel, lever, weight.data(), &wrench, K.data(), D.data(), &error);
+  }
+};
+
+h6ContactDef method(int m, std::uint32_t pieces = 0) {
+  h6ContactDef def = h6DefaultContactDef();
+  def.method = static_cast<h6Method>(m);
+  def.pieces = pieces;
+  return def;
+}
+
+// A patch of a ball.
+Rows cap(int n) {
+  Rows rows;
+  for (int i = 0; i < n; ++i) {
+    const double z = -1 + 0.5 * (i + 0.5) / n, q = std::sqrt(1 - z * z), a = 2.39996 * i;
+    const double x = q * std::cos(a), y = q * std::sin(a);
+    rows.add({-x, -y, -z}, {0.01 * x, 0.01 * y, 0.01 * z}, 0.3 * mm * -z);
+  }
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("a lone contact keeps k in every method: weight, wrench, stiffness, damping") {
+  Rows one;
+  one.add({0, 0, 1}, {3 * mm, 2 * mm, -5 * mm}, 0.25 * mm);
+  for (int m = 0; m < H6_METHOD_COUNT; ++m) {
+    const Answer a(method(m), one.arrays());
+    REQUIRE_MESSAGE(a.code == 0, a.error.message);
+    CAPTURE(h6MethodName(static_cast<h6Method>(m)));
+    CHECK(a.weight[0] == near(1).epsilon(1e-5));
+    CHECK(a.wrench.force.z == near(1e4 * 0.25 * mm).epsilon(1e-5));
+    CHECK(a.wrench.torque.x == near(2 * mm * 2.5).epsilon(1e-5));
+    CHECK(a.wrench.torque.y == near(-3 * mm * 2.5).epsilon(1e-5));
+    CHECK(a.K(2, 2) == near(-1e4).epsilon(1e-5));
+    CHECK(a.K(3, 2) == near(-1e4 * 2 * mm).epsilon(1e-5));
+    CHECK(a.D(2, 2) == near(-1e4 * 1e-3).epsilon(1e-5));
+    CHECK((a.K - a.K.transpose()).norm() <= 1e-9 * a.K.norm());
+  }
+}
+
+TEST_CASE("the filter weighs a session's contacts as the session does") {
+  FieldArrays field = sample_analytic(
+      [](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
+      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  ShellArrays ball = sphere_points(20 * mm, 3000);
+  Model model({def_of(field)}, {ball.def()});
+  for (int m = 0; m < H6_METHOD_COUNT; ++m) {
+    if (m == H6_METHOD_CLUSTER) continue;  // its rows are merged already
+    std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
+    bodies[0].fixed = true, bodies[0].field = 0;
+    bodies[1].shell = 0, bodies[1].pose = pose(0.9 * mm, 0, 0);
+    h6SessionDef def = h6DefaultSessionDef();
+    def.bodies = bodies.data(), def.body_count = 2;
+    def.contact = method(m);
+    h6Session* s = h6CreateSession(model.handle, &def, nullptr);
+    REQUIRE(s);
+    h6Step(s, nullptr, nullptr);
+    const h6Contacts c = h6GetContacts(s, 1);
+    Rows rows;
+    for (std::size_t i = 0; i < c.count; ++i) {
+      rows.add({c.nx[i], c.ny[i], c.nz[i]}, {c.rx[i], c.ry[i], c.rz[i]}, c.depth[i]);
+      for (float v : {c.gx[i], c.gy[i], c.gz[i]}) rows.g.push_back(v);
+    }
+    const Answer a(def.contact, rows.arrays(), mm, 20 * mm);
+    REQUIRE_MESSAGE(a.code == 0, a.error.message);
+    REQUIRE(c.count > 100);
+    for (std::size_t i = 0; i < c.count; ++i) CHECK(a.weight[i] == near(c.weight[i]).epsilon(1e-3));
+    h6DestroySession(s);
+  }
+}
+
+TEST_CASE("series: the stiffness that comes back is bounded by c k and pushes only") {
+  for (const int n : {30, 3000}) {
+    const Answer a(method(H6_METHOD_SERIES), cap(n).arrays(), mm, 0.02);
+    REQUIRE(a.code == 0);
+    Mat6 scaled = -a.K / 1e4;
+    scaled.bottomRows<3>() /= 0.02;
+    scaled.rightCols<3>() /= 0.02;
+    const Eigen::SelfAdjointEigenSolver<Mat6> eigen(scaled);
+    CHECK(eigen.eigenvalues()[5] <= 4 * (1 + 1e-9));
+    CHECK(eigen.eigenvalues()[5] >= 1 - 1e-6);
+    CHECK(eigen.eigenvalues()[0] >= -1e-6);
+    CHECK((a.D - 1e-3 * a.K).norm() <= 1e-9 * a.D.norm());
+    CHECK(a.wrench.force.z > 0);
+  }
+}
+
+TEST_CASE("the exact form adds J_g and the turning of the arms") {
+  Rows one;
+  one.add({0, 0, 1}, {3 * mm, 2 * mm, -5 * mm}, 0.25 * mm);
+  one.g = {0, 0.6f, 0.8f};
+  for (const int m : {int(H6_METHOD_NONE), int(H6_METHOD_SERIES)}) {
+    h6ContactArrays in = one.arrays();
+    in.form = H6_EXACT;
+    const Answer a(method(m), in);
+    REQUIRE(a.code == 0);
+    CHECK(a.K(2, 1) == near(-0.6e4).epsilon(1e-5));
+    CHECK(a.K(2, 2) == near(-0.8e4).epsilon(1e-5));
+    // -[F]x with F = (0, 0, 2.5 N): turning about x moves the force along -y.
+    CHECK(a.K(1, 3) == near(-2.5).epsilon(1e-5));
+    CHECK(a.K(0, 4) == near(2.5).epsilon(1e-5));
+  }
+}
+
+TEST_CASE("damping takes from the force what the velocity says, and never makes it pull") {
+  Rows one;
+  one.add({0, 0, 1}, {0, 0, -5 * mm}, 0.25 * mm);
+  for (int m = 0; m < H6_METHOD_COUNT; ++m)
+    for (const double v : {-0.1, 0.1, 5.0}) {
+      const h6Velocity velocity{{0, 0, v}, {0, 0, 0}};
+      h6ContactArrays in = one.arrays();
+      in.velocity = &velocity;
+      const Answer a(method(m), in);
+      REQUIRE(a.code == 0);
+      CHECK(a.wrench.force.z == near(1e4 * std::max(0.0, 0.25 * mm - 1e-3 * v)).epsilon(1e-4));
+    }
+}
+
+TEST_CASE("contacts that do not touch have no weight; only series reads them") {
+  Rows rows;
+  rows.add({0, 0, 1}, {0, 0, -5 * mm}, 0.25 * mm);
+  rows.add({0, 0, 1}, {mm, 0, -5 * mm}, -0.1 * mm);
+  for (int m = 0; m < H6_METHOD_COUNT; ++m) {
+    const Answer a(method(m), rows.arrays());
+    REQUIRE(a.code == 0);
+    CHECK(a.weight[0] == near(1).epsilon(1e-5));
+    CHECK(a.weight[1] == 0);
+  }
+}
+
+TEST_CASE("a clustered contact has its share of its cluster's weight, by depth") {
+  Rows rows;
+  rows.add({0, 0, 1}, {0, 0, 0}, 0.1 * mm);
+  rows.add({0, 1, 0}, {9 * mm, 0, 0}, 0.1 * mm);
+  rows.add({0, 0, 1}, {0.2 * mm, 0, 0}, 0.3 * mm);
+  const Answer a(method(H6_METHOD_CLUSTER), rows.arrays());
+  REQUIRE(a.code == 0);
+  CHECK(a.weight[0] == near(0.25).epsilon(1e-5));
+  CHECK(a.weight[1] == near(1).epsilon(1e-5));
+  CHECK(a.weight[2] == near(0.75).epsilon(1e-5));
+  CHECK(a.wrench.force.z == near(1e4 * (0.01 + 0.09) / 0.4 * mm).epsilon(1e-5));
+}
+
+TEST_CASE("given scratch of any alignment serves as well as the heap; too little is refused") {
+  const Rows rows = cap(500);
+  h6ContactArrays in = rows.arrays();
+  std::vector<char> block(h6WeighScratchBytes(in.count) + 3);
+  for (int m = 0; m < H6_METHOD_COUNT; ++m) {
+    in.scratch = nullptr;
+    const Answer heap(method(m), in);
+    in.scratch = block.data() + 3, in.scratch_bytes = block.size() - 3;
+    const Answer given(method(m), in);
+    REQUIRE(given.code == 0);
+    CHECK(std::memcmp(heap.weight.data(), given.weight.data(), 500 * sizeof(float)) == 0);
+    CHECK(heap.K == given.K);
+  }
+  --in.scratch_bytes;
+  const Answer refused(method(0), in);
+  CHECK(refused.code == -1);
+  CHECK(std::strstr(refused.error.message, "scratch") != nullptr);
+}
+
+TEST_CASE("nothing is nothing, every output may be left out, and wrong input is refused") {
+  const Answer none(method(H6_METHOD_ROBUST), h6ContactArrays{});
+  CHECK(none.code == 0);
+  CHECK(none.K.norm() == 0);
+  CHECK(none.wrench.force.z == 0);
+  const Answer series(method(H6_METHOD_SERIES), h6ContactArrays{});
+  CHECK(series.code == 0);
+  CHECK(series.K.norm() == 0);
+
+  Rows rows;
+  rows.add({0, 0, 1}, {0, 0, -5 * mm}, 0.25 * mm);
+  const h6ContactArrays in = rows.arrays();
+  const h6ContactDef good = method(H6_METHOD_SERIES);
+  CHECK(h6WeighContacts(&good, &in, mm, 0.02, nullptr, nullptr, nullptr, nullptr, nullptr) == 0);
+  CHECK(h6WeighContacts(nullptr, &in, mm, 0.02, nullptr, nullptr, nullptr, nullptr, nullptr) == -1);
+  CHECK(h6WeighContacts(&good, nullptr, mm, 1, nullptr, nullptr, nullptr, nullptr, nullptr) == -1);
+  CHECK(Answer(good, in, 0).code == -1);
+  CHECK(Answer(good, in, mm, NAN).code == -1);
+  CHECK(Answer(good, in, mm, 1 * mm).code == -1);  // the arm is longer
+  h6ContactDef bad = good;
+  bad.series_c = 2;
+  CHECK(Answer(bad, in).code == -1);
+  bad = good, bad.stiffness = 0;
+  CHECK(Answer(bad, in).code == -1);
+  h6ContactArrays missing = in;
+  missing.depths = nullptr;
+  CHECK(Answer(good, missing).code == -1);
+  for (const float wrong : {NAN, INFINITY, 2.0f}) {
+    Rows broken = rows;
+    broken.n[2] = wrong;
+    CHECK(Answer(good, broken.arrays()).code == -1);
+  }
+  Rows broken = rows;
+  broken.d[0] = NAN;
+  CHECK(Answer(good, broken.arrays()).code == -1);
+  const h6Velocity fast{{INFINITY, 0, 0}, {0, 0, 0}};
+  h6ContactArrays moving = in;
+  moving.velocity = &fast;
+  CHECK(Answer(good, moving).code == -1);
+}
