@@ -312,3 +312,49 @@ TEST_CASE("series: loads never pull and every frame says how well it converged")
   CHECK(most <= 12);
   h6DestroySession(s);
 }
+
+TEST_CASE("series: a body wedged between two moving fields keeps the momentum of all three") {
+  // Two free balls, pushed apart by a free wedge that hits both at once: nothing else acts.
+  test::FieldArrays ball = test::sample_analytic(
+      [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 10 * mm; },
+      {-16 * mm, -16 * mm, -16 * mm}, mm, 4, 4, 4);
+  test::ShellArrays box = test::bottom_face(12 * mm, 6 * mm, 5 * mm, 48, 24);
+  for (const h6Gradient gradient : {H6_SYMMETRIC, H6_EXACT}) {
+    test::Model model({test::def_of(ball)}, {box.def()});
+    std::array<h6BodyDef, 3> bodies{h6DefaultBodyDef(), h6DefaultBodyDef(), h6DefaultBodyDef()};
+    bodies[0].shell = 0;
+    bodies[0].pose = pose(0, 0, 15.4 * mm);
+    bodies[0].velocity.linear = {0.01, 0, -0.2};
+    for (int b : {1, 2}) {
+      bodies[b].field = 0;
+      bodies[b].mass = 0.2;
+      bodies[b].pose = pose(b == 1 ? -10.5 * mm : 10.5 * mm, 0, 0);
+      bodies[b].inertia[0] = bodies[b].inertia[1] = bodies[b].inertia[2] = 8e-6;
+    }
+    h6SessionDef def = h6DefaultSessionDef();
+    def.gradient = gradient;
+    def.contact.method = H6_METHOD_SERIES;
+    def.bodies = bodies.data(), def.body_count = 3;
+    h6Session* s = h6CreateSession(model.handle, &def, nullptr);
+    REQUIRE(s);
+    bool both = false;
+    double worst = 0;
+    for (int i = 0; i < 100; ++i) {
+      h6Step(s, nullptr, nullptr);
+      bool touched[3] = {};
+      const h6Contacts c = h6GetContacts(s, 0);
+      for (std::size_t k = 0; k < c.count; ++k)
+        if (c.load[k] > 0) touched[c.field_body[k]] = true;
+      both = both || (touched[1] && touched[2]);
+      Vec3 momentum = -0.1 * Vec3(0.01, 0, -0.2);
+      for (int b = 0; b < 3; ++b)
+        momentum += bodies[b].mass * from(h6GetBody(s, b).velocity.linear);
+      worst = std::max(worst, momentum.norm());
+    }
+    CHECK(both);
+    CHECK((h6GetFrame(s).status & H6_SOLVE_FAILED) == 0);
+    for (int b : {1, 2}) CHECK(h6GetBody(s, b).velocity.linear.z < -0.005);  // both were hit
+    CHECK(worst < 1e-8);
+    h6DestroySession(s);
+  }
+}
