@@ -110,7 +110,7 @@ std::vector<MethodColumn> method_columns() {
 h6Wrench elastic_wrench(const h6Contacts& c, double stiffness) {
   h6Wrench out{};
   for (std::size_t i = 0; i < c.count; ++i) {
-    const double s = stiffness * c.weight[i] * c.depth[i];
+    const double s = stiffness * c.load[i];
     const h6Vec3 f = {s * c.nx[i], s * c.ny[i], s * c.nz[i]};
     out.force.x += f.x, out.force.y += f.y, out.force.z += f.z;
     out.torque.x += c.ry[i] * f.z - c.rz[i] * f.y;

@@ -52,7 +52,8 @@ struct RunFigures {
 
 RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change);
 
-// Total elastic wrench of a body's contacts, from their weights: sum of w k d N [N], [N m].
+// Total wrench of a body's contacts from their loads: elastic, under `series` with what damping
+// takes. Sum of k load N [N], [N m].
 h6Wrench elastic_wrench(const h6Contacts& contacts, double stiffness);
 
 // Independent pieces of work on two threads; ends early once the user interrupts. `label` and the

@@ -62,6 +62,37 @@ TEST_CASE("the same experiment gives the same figures, and -o writes a report an
   CHECK(info["whole"] == true);
 }
 
+TEST_CASE("studies say what they measured for every method") {
+  Sandbox box;
+  const Json result = result_of(box, {"experiments", "plate-share", "smoothness", "net-stiffness"});
+  CHECK(result["scenes"].empty());
+  const Json& studies = result["studies"];
+  CHECK(studies.size() == 3);
+  for (const std::string& method : kMethods) {
+    CAPTURE(method);
+    for (const auto& [share, row] : studies["plate-share"].items()) {
+      CHECK(row[method].contains("verdict"));
+      CHECK(row[method].contains("final_depth_voxels"));
+    }
+    CHECK(studies["smoothness"]["tilt to flat"].contains(method));
+    CHECK(studies["net-stiffness"]["wall, 144"][method].contains("derivative"));
+  }
+  CHECK(studies["plate-share"]["0.10"]["robust"]["verdict"] == "held");
+  // A continuous force changes a tenth as much in a tenth of the time; a jump does not.
+  const Json& edge = studies["smoothness"]["slide off an edge"];
+  const auto shrinks = [&](const char* method) {
+    return edge[method]["1ms"].get<double>() / edge[method]["0.1ms"].get<double>();
+  };
+  CHECK(shrinks("robust") > 5);
+  CHECK(shrinks("gauss3") < 2);
+  // 144 parallel contacts in the engine are as stiff as METHOD.md says.
+  const Json& wall = studies["net-stiffness"]["wall, 144"];
+  CHECK(std::abs(wall["none"]["shares"].get<double>() - 144) < 0.1);
+  CHECK(std::abs(wall["gauss3"]["derivative"].get<double>() - 1) < 0.02);
+  CHECK(wall["gauss6"]["derivative"].get<double>() < 2.01);
+  CHECK(wall["robust"]["derivative"].get<double>() < 5);
+}
+
 TEST_CASE("an experiment that does not exist is told, with the nearest name") {
   Sandbox box;
   const Ended ended = run(box, {"experiments", "cone-in-gab"});
