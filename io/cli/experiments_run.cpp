@@ -4,7 +4,9 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -192,9 +194,18 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
               const std::string& label) {
   std::atomic<std::size_t> next{0}, done{0};
+  std::exception_ptr thrown;  // out of memory, say: for the caller's thread
+  std::mutex lock;
   const auto work = [&] {
     for (std::size_t i; !interrupted.load() && (i = next.fetch_add(1)) < jobs.size();) {
-      jobs[i]();
+      try {
+        jobs[i]();
+      } catch (...) {
+        const std::lock_guard<std::mutex> hold(lock);
+        if (!thrown) thrown = std::current_exception();
+        next.store(jobs.size());
+        done.store(jobs.size());
+      }
       done.fetch_add(1);
     }
   };
@@ -209,6 +220,7 @@ void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& con
   one.join();
   other.join();
   progress(label, 1);
+  if (thrown) std::rethrow_exception(thrown);
 }
 
 }  // namespace h6::cli
