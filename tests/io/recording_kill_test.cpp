@@ -172,8 +172,10 @@ TEST_CASE("kills in the midst of writing leave a whole file and the older one") 
     CHECK(plain_shape(file, "/frames/t").at(0) == r.frames.size());
     record(file, 7);
     CHECK(read(file).frames.size() == 7);
-    CHECK(fs::exists(before) == replaced);
-    if (replaced) CHECK(bytes_of(before) == older);
+    // Killed after the older file got its second name and before the new one took its place, both
+    // names hold it: one file too many, nothing lost.
+    if (replaced) CHECK(fs::exists(before));
+    if (fs::exists(before)) CHECK(bytes_of(before) == older);
   }
 }
 
