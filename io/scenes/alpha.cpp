@@ -219,7 +219,7 @@ Scene alpha_shortcut() {
           " thick, hooked together. The hand slides the tool's loop along a strand of the other, "
           "through the gap between its crossing strands, which is only " +
           millimetres(alpha.gap) +
-          " wide, then twists and pulls with 20 N, four times the force for which half a voxel is "
+          " wide, then twists and pulls with 20 N, 3.7 times the force for which half a voxel is "
           "promised. Forbidden: a region that no point of the tool reaches while the loops are "
           "linked.",
       tool_with_tip_at(tip_over_strand(kStart)));
