@@ -17,7 +17,7 @@ namespace recording {
 static_assert(sizeof(h6Pose) == 7 * sizeof(double) && offsetof(h6Pose, q) == 3 * sizeof(double));
 static_assert(sizeof(h6Velocity) == 6 * sizeof(double) && sizeof(h6Wrench) == 6 * sizeof(double));
 static_assert(sizeof(h6Cause) == 4 && sizeof(h6Status) == 4);
-static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 7, "names below, format version");
+static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 10, "names below, format version");
 
 const std::vector<Column>& columns() {
   using R = h6FrameRecord;

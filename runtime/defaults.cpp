@@ -10,7 +10,8 @@ constexpr const char* kMethods[H6_METHOD_COUNT] = {"none",   "global", "cluster"
 constexpr const char* kStages[H6_STAGE_COUNT] = {"traverse", "contacts",  "weights", "wrench",
                                                  "coupling", "integrate", "output"};
 constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped",     "slewed", "not finite",
-                                                 "late", "device lost", "stopped"};
+                                                 "late", "device lost", "stopped",
+                                                 "speed", "clutched", "passivity"};
 constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late"};
@@ -96,12 +97,16 @@ h6CouplingDef h6DefaultCouplingDef(void) {
   def.stiffness = 1e3;
   def.damping_ratio = 1;
   def.max_depth_voxels = 0.5;
+  def.max_step_voxels = 0.5;
   return def;
 }
 
 h6HandDef h6DefaultHandDef(void) {
   h6HandDef def{};
+  def.mode = H6_IMPEDANCE;
   def.coupling = h6DefaultCouplingDef();
+  def.filter.motion_scale = def.filter.rotation_scale = def.filter.force_scale = 1;
+  def.manipulandum_mass = 0.1;
   return def;
 }
 

@@ -49,7 +49,7 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, double dt, h6Status* s
     *status |= H6_OUTPUT_FAULT;
     force_.setZero();
     torque_.setZero();
-    return {{{0, 0, 0}, {0, 0, 0}}, fault_};
+    return {.wrench = {}, .pose = {{0, 0, 0}, {1, 0, 0, 0}}, .velocity = {}, .cause = fault_};
   }
   const bool force_cut = clamp_norm(force, limits_.force),
              torque_cut = clamp_norm(torque, limits_.torque);
@@ -65,7 +65,10 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, double dt, h6Status* s
   }
   force_ = force;
   torque_ = torque;
-  return {{to(force), to(torque)}, cause};
+  return {.wrench = {to(force), to(torque)},
+          .pose = {{0, 0, 0}, {1, 0, 0, 0}},
+          .velocity = {},
+          .cause = cause};
 }
 
 }  // namespace h6

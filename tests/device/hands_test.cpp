@@ -110,7 +110,8 @@ TEST_CASE("the torque turns the hand about the grip, not about the mesh's origin
   auto hand = SimulatedHand::open({{0}, {at(0, 0, 0)}}, arm);
   const h6Device d = (*hand)->device();
   h6DeviceSample sample{};
-  h6DeviceCommand twist{{{0, 0, 0}, {0, 0, 0.5}}, H6_CAUSE_NONE};
+  h6DeviceCommand twist{};
+  twist.wrench.torque.z = 0.5;
   for (int i = 0; i < 5000; ++i) {
     d.read(d.self, 1e-3 * i, &sample);
     d.write(d.self, 1e-3 * i, &twist);

@@ -15,8 +15,6 @@
 extern "C" {
 #endif
 
-enum { H6_IMPEDANCE = 1u << 0, H6_ADMITTANCE = 1u << 1, H6_PSEUDO_ADMITTANCE = 1u << 2 };
-
 typedef struct h6DeviceCapabilities {
   char     name[64];
   uint32_t dof_in;          /* 3 or 6                                                              */
@@ -36,6 +34,9 @@ typedef struct h6DeviceSample {
   h6Pose     pose;     /* world frame                                                              */
   h6Velocity velocity; /* of the mesh frame's origin, world frame                                  */
   uint32_t   buttons;
+  h6Wrench   wrench;   /* on the manipulandum, world frame, torque about the body's centre of mass:
+                          what a force sensor (admittance) or the driver's coupling
+                          (pseudo-admittance) says; not read in impedance mode           [N, N m]  */
 } h6DeviceSample;
 
 /* Why the output is not what the coupling asked for. */
@@ -47,14 +48,21 @@ typedef enum h6Cause {
   H6_CAUSE_LATE,        /* deadline missed: held, then decays                                      */
   H6_CAUSE_DEVICE_LOST, /* read or write failed: zero, latched                                     */
   H6_CAUSE_STOPPED,     /* the program asked for it                                                */
+  H6_CAUSE_SPEED,       /* admittance: the pose would have moved faster than the device may        */
+  H6_CAUSE_CLUTCHED,    /* the hand holds the clutch: nothing is rendered                          */
+  H6_CAUSE_PASSIVITY,   /* damped, because energy would have been made                             */
   H6_CAUSE_COUNT
 } h6Cause;
 H6_API const char* h6CauseName(h6Cause cause);
 
 /* What a device is told. Always finite, inside the rating, slew-limited. */
 typedef struct h6DeviceCommand {
-  h6Wrench wrench;  /* on the hand, world frame, torque about the body's centre of mass            */
-  h6Cause  cause;
+  h6Wrench   wrench;  /* on the hand, world frame, torque about the body's centre of mass; zero in
+                         the admittance modes                                                      */
+  h6Pose     pose;    /* where the device should hold the mesh frame, world frame; in impedance mode
+                         the manipulandum, for show                                                */
+  h6Velocity velocity;/* its own, of the mesh frame's origin; zero in impedance mode               */
+  h6Cause    cause;
 } h6DeviceCommand;
 
 typedef struct h6Device {

@@ -80,6 +80,7 @@ typedef struct h6BodyDef {
                             points, each an equal share of the mass                       [kg m^2] */
   int32_t    shell;      /* index into the model's shells, or -1                                   */
   int32_t    field;      /* index into the model's fields, or -1                                   */
+  bool       translation_only; /* 3-DoF: never turns, feels no torque (Xu & Barbic 2016, Sec. 3.1) */
 } h6BodyDef;
 
 /* A shell body that may touch a field body. Both may move. */
@@ -125,6 +126,8 @@ typedef struct h6ContactDef {
                                0 .. 2 voxels of the field                                          */
   double   cluster_voxels;  /* `cluster`, `+cluster`: contacts nearer than this are one, in (0.01,
                                100] voxels                                                         */
+  bool     passivity;       /* observe the work of each shell body's contacts and damp what they
+                               would make out of nothing (Hannaford & Ryu 2002)                    */
 } h6ContactDef;
 
 typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
@@ -133,20 +136,62 @@ typedef enum h6Gradient {
   H6_EXACT          /* J J_g^T and the geometric term: pivoted LU                                  */
 } h6Gradient;
 
-/* Virtual coupling between a hand's manipulandum and its body: Wan & McNeely 2003;
- * saturation: Barbic & James 2008 (METHOD.md, Sec. 4). Zero means "derive it", as said. */
+/* What stands between a hand's manipulandum and its body (METHOD.md, Sec. 4). */
+typedef enum h6CouplingMode {
+  H6_COUPLING_DYNAMIC = 0, /* a body with mass on a damped spring                                  */
+  H6_COUPLING_STATIC,      /* quasi-static: each frame one step towards the pose in which spring and
+                              contacts balance; no mass, no damping (Wan & McNeely 2003)           */
+  H6_COUPLING_DIRECT       /* none: the body is where the hand is, the hand feels its contacts     */
+} h6CouplingMode;
+
+/* Virtual coupling: Wan & McNeely 2003; saturation: Barbic & James 2008 (METHOD.md, Sec. 4). Zero
+ * means "derive it", as said. */
 typedef struct h6CouplingDef {
+  h6CouplingMode mode;
   double stiffness;           /* k_VC                                                       [N/m]  */
   double rotational_stiffness;/* 0: stiffness * (30 voxels)^2                           [N m/rad]  */
   double damping_ratio;       /* of the coupled body, 0 .. 10                                      */
   double max_depth_voxels;    /* x_max: the largest force is k * x_max, in voxels of the body      */
   double max_force;           /* 0: contact stiffness * x_max                                 [N]  */
   double max_torque;          /* 0: max_force * the body's radius                           [N m]  */
+  double max_step_voxels;     /* static: no point moves farther than this in a frame, > 0; default
+                                 half a voxel                                                      */
 } h6CouplingDef;
 
+/* Between a device and the scene: indexing and scaling of motion (METHOD.md, Sec. 4). Zeros of
+ * h6HandDef are not valid; h6DefaultHandDef passes everything through unchanged. */
+typedef struct h6HandFilterDef {
+  double   motion_scale;    /* metres in the scene a metre of the device, > 0; default 1           */
+  double   rotation_scale;  /* the same for angles, > 0; default 1                                 */
+  double   force_scale;     /* newtons at the device a newton in the scene, torque alike, > 0;
+                               default 1; equal to motion_scale keeps power                        */
+  uint32_t clutch_buttons;  /* while one of these is down the device moves alone and the hand feels
+                               nothing: indexing; 0: no clutch                                     */
+  bool     relative;        /* the first sample takes the body where it is, wherever the device is */
+} h6HandFilterDef;
+
+enum { H6_IMPEDANCE = 1u << 0, H6_ADMITTANCE = 1u << 1, H6_PSEUDO_ADMITTANCE = 1u << 2 };
+
+/* How an arm and the engine talk (Xu & Barbic 2016, Fig. 13; METHOD.md, Sec. 4):
+ *   impedance         pose in, wrench out
+ *   admittance        wrench of the person in (a force sensor), pose and velocity of the body out;
+ *                     the coupling's bounds are those of the wrench; its springs are not used
+ *   pseudo-admittance wrench of the driver's own coupling in, pose and velocity of a manipulandum
+ *                     with mass out; the virtual coupling stands between manipulandum and body */
 typedef struct h6HandDef {
-  int32_t       body;     /* which moves with this hand                                            */
-  h6CouplingDef coupling;
+  int32_t         body;     /* which moves with this hand                                          */
+  uint32_t        mode;     /* H6_IMPEDANCE (default), H6_ADMITTANCE or H6_PSEUDO_ADMITTANCE       */
+  h6CouplingDef   coupling;
+  h6HandFilterDef filter;
+  double          manipulandum_mass;  /* pseudo-admittance, > 0; its inertia is the body's in the
+                                         same ratio as the masses; default 0.1               [kg]  */
+  double          driver_stiffness;   /* pseudo-admittance: what the driver's coupling has, so that */
+  double          driver_damping;     /* the step can be implicit in it; 0: not known  [N/m, N s/m] */
+  double          admittance_damping; /* admittance: of the free body, >= 0; 0: derived, see
+                                         METHOD.md; rotation in the ratio inertia/mass     [N s/m] */
+  bool            passivity;          /* observe the energy that leaves through this hand and take
+                                         back by damping what was never put in
+                                         (Hannaford & Ryu 2002)                                    */
 } h6HandDef;
 
 typedef struct h6SessionDef {
@@ -160,6 +205,7 @@ typedef struct h6SessionDef {
   double       rate;          /* frames per second, 100 .. 10000                             [Hz]  */
   h6Vec3       gravity;       /* default 0: the arm carries the part                      [m/s^2]  */
   size_t       max_contacts;  /* a shell body; storage is reserved once                            */
+  bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
   h6Allocator  allocator;
 } h6SessionDef;
@@ -227,6 +273,12 @@ typedef struct h6FrameReport {
   uint64_t state_hash;                /* of poses and velocities after the step                    */
   uint32_t series_iterations;         /* `series`: Newton steps, the most of any shell body        */
   double   series_residual;           /* `series`: the largest left, of c * the deepest e          */
+  /* With h6SessionDef.net_stiffness: extreme eigenvalues of S J^T w k J S over all shell bodies'
+   * contacts, S = diag(1,1,1,1/L,1/L,1/L) with L the body's radius: how stiff the contacts are
+   * together, whatever their number. 0 without contacts.                                   [N/m]  */
+  double   net_stiffness_min, net_stiffness_max;
+  double   passivity_energy;          /* observed at the worst port: < 0 where energy was made; 0
+                                         when nothing is observed                             [J]  */
 } h6FrameReport;
 
 #ifdef __cplusplus
