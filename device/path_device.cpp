@@ -4,19 +4,10 @@
 #include <cmath>
 #include <cstdio>
 
+#include "device/rotation.h"
+
 namespace h6::device {
 namespace {
-
-double dot(const h6Quat& a, const h6Quat& b) {
-  return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z;
-}
-
-// a * conjugate(b)
-h6Quat difference(const h6Quat& a, const h6Quat& b) {
-  return {dot(a, b), -a.w * b.x + a.x * b.w - a.y * b.z + a.z * b.y,
-          -a.w * b.y + a.y * b.w - a.z * b.x + a.x * b.z,
-          -a.w * b.z + a.z * b.w - a.x * b.y + a.y * b.x};
-}
 
 h6Quat slerp(const h6Quat& a, h6Quat b, double s) {
   double c = dot(a, b);
@@ -30,18 +21,8 @@ h6Quat slerp(const h6Quat& a, h6Quat b, double s) {
     wa = std::sin(wa * angle) / std::sin(angle);
     wb = std::sin(wb * angle) / std::sin(angle);
   }
-  h6Quat q{wa * a.w + wb * b.w, wa * a.x + wb * b.x, wa * a.y + wb * b.y, wa * a.z + wb * b.z};
-  const double n = std::sqrt(dot(q, q));
-  return {q.w / n, q.x / n, q.y / n, q.z / n};
-}
-
-// The constant angular velocity (world frame) that turns a into b in `seconds`.
-h6Vec3 angular_velocity(const h6Quat& a, const h6Quat& b, double seconds) {
-  h6Quat d = difference(b, a);
-  if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
-  const double n = std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
-  const double scale = (n < 1e-9 ? 2 : 2 * std::atan2(n, d.w) / n) / seconds;
-  return {scale * d.x, scale * d.y, scale * d.z};
+  return unit(
+      {wa * a.w + wb * b.w, wa * a.x + wb * b.x, wa * a.y + wb * b.y, wa * a.z + wb * b.z});
 }
 
 }  // namespace
@@ -61,7 +42,7 @@ h6DeviceSample HandPath::at(double t) const {
   sample.pose.q = slerp(a.q, b.q, s);
   sample.velocity.linear = {(b.p.x - a.p.x) / seconds, (b.p.y - a.p.y) / seconds,
                             (b.p.z - a.p.z) / seconds};
-  sample.velocity.angular = angular_velocity(a.q, b.q, seconds);
+  sample.velocity.angular = (1 / seconds) * turn(a.q, b.q);
   return sample;
 }
 

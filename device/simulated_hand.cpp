@@ -1,50 +1,12 @@
 #include "device/simulated_hand.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 
 #include "device/path_device.h"
+#include "device/rotation.h"
 
 namespace h6::device {
-namespace {
-
-h6Vec3 operator+(const h6Vec3& a, const h6Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-h6Vec3 operator-(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-h6Vec3 operator*(double s, const h6Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
-h6Vec3 cross(const h6Vec3& a, const h6Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
-h6Quat product(const h6Quat& a, const h6Quat& b) {
-  return {
-      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
-}
-
-h6Vec3 rotate(const h6Quat& q, const h6Vec3& v) {
-  const h6Vec3 u{q.x, q.y, q.z}, t = 2.0 * cross(u, v);
-  return v + q.w * t + cross(u, t);
-}
-
-// The rotation vector from a to b, world frame, angle in [0, pi].
-h6Vec3 turn(const h6Quat& from, const h6Quat& to) {
-  h6Quat d = product(to, {from.w, -from.x, -from.y, -from.z});
-  if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
-  const double n = std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
-  const double scale = n < 1e-9 ? 2 : 2 * std::atan2(n, d.w) / n;
-  return {scale * d.x, scale * d.y, scale * d.z};
-}
-
-h6Quat turned(const h6Quat& q, const h6Vec3& w) {
-  const double angle = std::sqrt(w.x * w.x + w.y * w.y + w.z * w.z);
-  const double s = angle < 1e-6 ? 0.5 : std::sin(0.5 * angle) / angle;
-  const h6Quat r = product({std::cos(0.5 * angle), s * w.x, s * w.y, s * w.z}, q);
-  const double n = std::sqrt(r.w * r.w + r.x * r.x + r.y * r.y + r.z * r.z);
-  return {r.w / n, r.x / n, r.y / n, r.z / n};
-}
-
-}  // namespace
 
 Result<std::unique_ptr<SimulatedHand>> SimulatedHand::open(HandPath path, const Arm& arm) {
   if (Outcome good = check_path(path); !good) return good.failure();
@@ -97,7 +59,7 @@ h6Device SimulatedHand::device() {
     auto& hand = *static_cast<SimulatedHand*>(self);
     hand.advance(time);
     const h6Vec3 lever = rotate(hand.q_, hand.arm_.grip);
-    *out = {{hand.x_ - lever, hand.q_}, {hand.v_ - cross(hand.w_, lever), hand.w_}, 0};
+    *out = {{hand.x_ - lever, hand.q_}, {hand.v_ - cross(hand.w_, lever), hand.w_}, 0, {}};
     return 0;
   };
   d.write = [](void* self, double, const h6DeviceCommand* command) {

@@ -87,7 +87,8 @@ TEST_CASE(
   REQUIRE(hand);
   const h6Device d = (*hand)->device();
   h6DeviceSample sample{};
-  h6DeviceCommand push{{{2, 0, 0}, {0, 0, 0.3}}, H6_CAUSE_NONE};
+  h6DeviceCommand push{};
+  push.wrench = {{2, 0, 0}, {0, 0, 0.3}};
   int i = 0;
   for (; i < 5000; ++i) {
     d.read(d.self, 1e-3 * i, &sample);
