@@ -6,7 +6,13 @@
 
 namespace h6 {
 
-h6Pose mesh_pose(const Body& body) { return {to(Vec3(body.x - body.R * body.com)), to(body.q)}; }
+h6Pose mesh_pose(const Body& body) { return mesh_pose(body, body); }
+h6Pose mesh_pose(const Body& body, const RigidState& state) {
+  return {to(Vec3(state.x - state.R * body.com)), to(state.q)};
+}
+h6Velocity mesh_velocity(const Body& body, const RigidState& state) {
+  return {to(Vec3(state.v - state.w.cross(state.R * body.com))), to(state.w)};
+}
 
 void set_mesh_pose(Body& body, const h6Pose& pose) {
   body.q = from(pose.q).normalized();
@@ -25,13 +31,16 @@ std::uint64_t state_hash(const h6Session& s) {
       hash ^= hash >> 32;
     }
   };
-  for (std::size_t i = 0; i < s.body_count; ++i) {
-    const Body& body = s.bodies[i];
-    mix(body.x.data(), 3);
-    mix(body.q.coeffs().data(), 4);
-    mix(body.v.data(), 3);
-    mix(body.w.data(), 3);
-  }
+  const auto mix_state = [&mix](const RigidState& state) {
+    mix(state.x.data(), 3);
+    mix(state.q.coeffs().data(), 4);
+    mix(state.v.data(), 3);
+    mix(state.w.data(), 3);
+  };
+  for (std::size_t i = 0; i < s.body_count; ++i) mix_state(s.bodies[i]);
+  // Elsewhere the manipulandum is where the hand's sample says.
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    if (s.hands[h].mode == H6_PSEUDO_ADMITTANCE) mix_state(s.hands[h].manipulandum);
   return hash;
 }
 
@@ -57,7 +66,12 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   set_mesh_pose(body, state->pose);
   body.v = from(state->velocity.linear);
   body.w = from(state->velocity.angular);
+  if (body.translation_only) body.w.setZero();
+  if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
   std::fill_n(body.series_y, 6, 0.0);
+  forget_energy(*session, index);
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    if (session->hands[h].body == index) session->hands[h].manipulandum = body;
 }
 
 h6Contacts h6GetContacts(const h6Session* session, int32_t index) {

@@ -14,7 +14,8 @@ constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped",     "slewed"
                                                  "speed", "clutched", "passivity"};
 constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
-    "output clamped",   "output slewed",   "output fault",     "device lost",        "late"};
+    "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
+    "passivity"};
 struct Piece {
   const char* name;
   uint32_t bit;

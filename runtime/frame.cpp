@@ -5,6 +5,7 @@
 //
 // No allocation, lock, print, exception or wait in here or below; slices of work may run on the
 // helper of `team`, joined in index order: any number of threads gives the same bits.
+#include "runtime/net_stiffness.h"
 #include "runtime/stages.h"
 #include "sched/clock.h"
 #include "sched/realtime.h"
@@ -19,20 +20,6 @@ void timed(h6Session& s, h6Stage stage, F&& work) {
   s.report.stage_us[stage] += 1e-3 * static_cast<double>(sched::now_ns() - start);
 }
 
-// A sample that is not finite is not used: the hand stays where it was last good.
-void accept(h6Session& s, Hand& hand, const h6DeviceSample& sample) {
-  const Vec3 v = from(sample.velocity.linear), w = from(sample.velocity.angular);
-  const double n = from(sample.pose.q).norm();
-  if (!finite(sample.pose) || !v.allFinite() || !w.allFinite() || !(n > 0.5 && n < 2.0)) {
-    s.report.status |= H6_HAND_NOT_FINITE;
-    hand.sample.velocity = {};
-    return;
-  }
-  hand.sample = sample;
-  hand.sample.pose.q = to(from(sample.pose.q).normalized());
-  hand.seen = true;
-}
-
 void begin(h6Session& s, const h6DeviceSample* samples) {
   s.report = {};
   s.report.frame = s.frame++;
@@ -43,15 +30,10 @@ void begin(h6Session& s, const h6DeviceSample* samples) {
     body.D.setZero();
     if (!body.fixed) body.f.head<3>() = body.mass * s.gravity;
   }
-  for (std::size_t i = 0; i < s.hand_count; ++i) accept(s, s.hands[i], samples[i]);
-}
-
-// What the hand feels is the coupling's wrench turned round.
-void send(h6Session& s, Hand& hand, h6DeviceCommand* command) {
-  const h6Wrench felt{to(Vec3(-hand.wrench.head<3>())), to(Vec3(-hand.wrench.tail<3>()))};
-  if (s.report.status & H6_STATE_NOT_FINITE) hand.guard.fault(H6_CAUSE_NOT_FINITE);
-  const h6DeviceCommand passed = hand.guard.pass(felt, s.dt, &s.report.status);
-  if (command) *command = passed;
+  for (std::size_t i = 0; i < s.hand_count; ++i) {
+    accept(s, s.hands[i], samples[i]);
+    hold(s, s.hands[i]);
+  }
 }
 
 // Before clusters are made of them: what is reported is how deep points are.
@@ -90,13 +72,22 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
     });
   }
   timed(s, H6_STAGE_COUPLING, [&] {
-    for (std::size_t h = 0; h < s.hand_count; ++h) couple(s, s.hands[h]);
+    for (std::size_t h = 0; h < s.hand_count; ++h) {
+      couple(s, s.hands[h]);
+      observe_hand(s, s.hands[h]);
+    }
+    if (s.contact.passivity) damp_contacts(s);
+    if (s.net_stiffness) report_net_stiffness(s);
   });
-  timed(s, H6_STAGE_INTEGRATE, [&] { step_bodies(s); });
+  timed(s, H6_STAGE_INTEGRATE, [&] {
+    step_bodies(s);
+    if (s.contact.passivity) observe_contacts(s);
+  });
   timed(s, H6_STAGE_OUTPUT, [&] {
     for (std::size_t h = 0; h < s.hand_count; ++h)
       send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
+  s.report.passivity_energy = least_energy(s);
   s.report.state_hash = state_hash(s);
   const std::int64_t now = sched::now_ns();
   s.report.frame_us = 1e-3 * static_cast<double>(now - start);

@@ -97,6 +97,17 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   loop.ring->push(row);
 }
 
+const char* mode_name(std::uint32_t mode) {
+  if (mode == H6_ADMITTANCE) return "admittance";
+  return mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance" : "impedance";
+}
+
+// A device that does not say is an impedance device.
+bool speaks(const h6Device& device, std::uint32_t mode) {
+  const std::uint32_t modes = device.capabilities.modes;
+  return ((modes ? modes : std::uint32_t{H6_IMPEDANCE}) & mode) != 0;
+}
+
 bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& def,
            h6Error* error) {
   if (!session) return fail(error, "a loop needs a session");
@@ -105,6 +116,12 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
   for (std::size_t h = 0; h < session->hand_count; ++h)
     if (!devices[h].read || !devices[h].write)
       return fail(error, "device %zu has no read or no write", h);
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    if (!speaks(devices[h], session->hands[h].mode))
+      return fail(error,
+                  "hand %zu works in %s mode, which device %zu does not offer: choose another mode "
+                  "for the hand or another device",
+                  h, mode_name(session->hands[h].mode), h);
   if (!(def.duration >= 0) || def.duration > 1e9)
     return fail(error, "duration must be 0 (no end) to 1e9 s, it is %g", def.duration);
   if (!(def.spin_us >= 0 && def.spin_us <= 1e4))

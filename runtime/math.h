@@ -54,5 +54,16 @@ inline Mat3 right_jacobian_inverse(const Vec3& theta) {
 inline bool finite(const h6Pose& pose) {
   return from(pose.p).allFinite() && from(pose.q).coeffs().allFinite();
 }
+inline bool finite(const h6Velocity& u) {
+  return from(u.linear).allFinite() && from(u.angular).allFinite();
+}
+inline bool finite(const h6Wrench& f) {
+  return from(f.force).allFinite() && from(f.torque).allFinite();
+}
+// Numbers, and a quaternion that can be made unit.
+inline bool usable(const h6Pose& pose, const h6Velocity& u) {
+  const double n = from(pose.q).norm();
+  return finite(pose) && finite(u) && n > 0.5 && n < 2.0;
+}
 
 }  // namespace h6

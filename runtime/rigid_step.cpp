@@ -3,75 +3,52 @@
 // Implicit (METHOD.md, Sec. 2; Barbic & James 2008):
 //     (M - h D - h^2 K) du = h (f + h K u - [0; w x I w]),   x += h v,   R = exp(h w) R
 // Bodies that may touch one another are one dense system when there are at most four of them.
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
+#include "runtime/solve.h"
 #include "runtime/stages.h"
 
 namespace h6 {
 namespace {
+
+constexpr double kGripLever = 0.05;  // of a hand that twists (METHOD.md, Sec. 4) [m]
 
 template <int Bodies>
 using Matrix = Eigen::Matrix<double, 6 * Bodies, 6 * Bodies>;
 template <int Bodies>
 using Vector = Eigen::Matrix<double, 6 * Bodies, 1>;
 
-Mat6 mass_matrix(const Body& body) {
-  Mat6 m = Mat6::Zero();
-  m.topLeftCorner<3, 3>() = body.mass * Mat3::Identity();
-  m.bottomRightCorner<3, 3>() = body.R * body.inertia * body.R.transpose();
-  return m;
+bool sane(const RigidState& state) {
+  return state.x.allFinite() && state.v.allFinite() && state.w.allFinite() &&
+         state.q.coeffs().allFinite();
 }
 
-Vec6 velocity(const Body& body) {
-  Vec6 u;
-  u << body.v, body.w;
-  return u;
+// Admittance: damping of the free body, with a lever of its own for the twist of a small part.
+Mat6 drag_matrix(const Body& body) {
+  Mat6 B = body.drag / body.mass * mass_matrix(body, body, body.mass);
+  B.bottomRightCorner<3, 3>().diagonal().array() += body.drag * kGripLever * kGripLever;
+  return B;
 }
 
 // Wrench less the gyroscopic torque.
-Vec6 driving(const Body& body) {
-  Vec6 f = body.f;
-  const Vec3 momentum = body.R * (body.inertia * (body.R.transpose() * body.w));
-  f.tail<3>() -= body.w.cross(momentum);
-  return f;
-}
+Vec6 driving(const Body& body) { return body.f - gyroscopic(body, body, body.mass); }
 
-void move(Body& body, const Vec6& du, double h) {
-  body.v += du.head<3>();
-  body.w += du.tail<3>();
-  body.x += h * body.v;
-  body.q = (exp_rotation(h * body.w) * body.q).normalized();
-  body.R = body.q.toRotationMatrix();
-}
-
-bool sane(const Body& body) {
-  return body.x.allFinite() && body.v.allFinite() && body.w.allFinite() &&
-         body.q.coeffs().allFinite();
-}
-
-// A step that leaves the numbers is taken back: the body rests where it was, and the frame says so.
-void move_or_rest(h6Session& s, Body& body, const Vec6& du) {
-  const Body before = body;
-  move(body, du, s.dt);
-  if (sane(body)) return;
-  body = before;
-  body.v.setZero();
-  body.w.setZero();
-  if (!sane(body)) {
-    body.x.setZero();
-    body.q.setIdentity();
-    body.R.setIdentity();
-  }
-  s.report.status |= H6_STATE_NOT_FINITE;
+void advance(h6Session& s, Body& body, const Vec6& du) {
+  if (!move_or_rest(body, du, s.dt, body.translation_only)) s.report.status |= H6_STATE_NOT_FINITE;
 }
 
 Vec6 explicit_change(const h6Session& s, const Body& body) {
   const Vec6 f = s.dt * driving(body);
-  Vec6 du;
+  Vec6 du = Vec6::Zero();
   du.head<3>() = f.head<3>() / body.mass;
-  du.tail<3>() = body.R * body.inertia.inverse() * (body.R.transpose() * f.tail<3>());
-  return du;
+  if (!body.translation_only)
+    du.tail<3>() = body.R * body.inertia.inverse() * (body.R.transpose() * f.tail<3>());
+  if (!(body.drag > 0)) return du;
+  // The damping stays implicit.
+  Mat6 M = mass_matrix(body, body, body.mass);
+  const Mat6 B = drag_matrix(body);
+  Vec6 rhs = M * du - s.dt * (B * velocity(body));
+  M += s.dt * B;
+  if (body.translation_only) hold_rotation(M, rhs, 0);
+  return M.ldlt().solve(rhs);
 }
 
 int place_in(const Island& island, std::int32_t body) {
@@ -105,11 +82,13 @@ bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
   Vector<N> u, f;
   for (int i = 0; i < N; ++i) {
     const Body& body = s.bodies[island.body[i]];
-    M.template block<6, 6>(6 * i, 6 * i) = mass_matrix(body);
+    M.template block<6, 6>(6 * i, 6 * i) = mass_matrix(body, body, body.mass);
     K.template block<6, 6>(6 * i, 6 * i) = body.K;
     D.template block<6, 6>(6 * i, 6 * i) = body.D;
+    if (body.drag > 0) D.template block<6, 6>(6 * i, 6 * i) -= drag_matrix(body);
     u.template segment<6>(6 * i) = velocity(body);
     f.template segment<6>(6 * i) = driving(body);
+    if (body.drag > 0) f.template segment<6>(6 * i) -= drag_matrix(body) * velocity(body);
   }
   if constexpr (N > 1) {
     for (std::size_t p = 0; p < s.pair_count; ++p) {
@@ -122,36 +101,72 @@ bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
     }
     if (s.contact.method == H6_METHOD_SERIES) add_between_fields<N>(s, island, K, D);
   }
-  const Matrix<N> A = M - h * D - h * h * K;
-  const Vector<N> rhs = h * (f + h * (K * u));
-  if (s.gradient == H6_EXACT) {
-    du = A.partialPivLu().solve(rhs);
-  } else {
-    const Eigen::LDLT<Matrix<N>> factors(A);
-    if (factors.info() != Eigen::Success || !factors.isPositive()) return false;
-    du = factors.solve(rhs);
-  }
-  return du.allFinite();
+  Matrix<N> A = M - h * D - h * h * K;
+  Vector<N> rhs = h * (f + h * (K * u));
+  for (int i = 0; i < N; ++i)
+    if (s.bodies[island.body[i]].translation_only) hold_rotation(A, rhs, i);
+  return solve_system(s.gradient, A, rhs, du);
 }
 
 template <int N>
 void step_island(h6Session& s, const Island& island) {
   Vector<N> du;
   if (s.integrator == H6_IMPLICIT && solve<N>(s, island, du)) {
-    for (int i = 0; i < N; ++i)
-      move_or_rest(s, s.bodies[island.body[i]], du.template segment<6>(6 * i));
+    for (int i = 0; i < N; ++i) advance(s, s.bodies[island.body[i]], du.template segment<6>(6 * i));
     return;
   }
   if (s.integrator == H6_IMPLICIT) s.report.status |= H6_SOLVE_FAILED;
   for (int i = 0; i < N; ++i) {
     Body& body = s.bodies[island.body[i]];
-    move_or_rest(s, body, explicit_change(s, body));
+    advance(s, body, explicit_change(s, body));
   }
 }
 
 }  // namespace
 
+Mat6 mass_matrix(const Body& body, const RigidState& state, double mass) {
+  Mat6 m = Mat6::Zero();
+  m.topLeftCorner<3, 3>() = mass * Mat3::Identity();
+  m.bottomRightCorner<3, 3>() = state.R * (mass / body.mass * body.inertia) * state.R.transpose();
+  return m;
+}
+
+Vec6 velocity(const RigidState& state) {
+  Vec6 u;
+  u << state.v, state.w;
+  return u;
+}
+
+Vec6 gyroscopic(const Body& body, const RigidState& state, double mass) {
+  const Vec3 momentum =
+      state.R * ((mass / body.mass * body.inertia) * (state.R.transpose() * state.w));
+  Vec6 g = Vec6::Zero();
+  g.tail<3>() = state.w.cross(momentum);
+  return g;
+}
+
+bool move_or_rest(RigidState& state, const Vec6& du, double h, bool translation_only) {
+  const RigidState before = state;
+  state.v += du.head<3>();
+  state.x += h * state.v;
+  if (!translation_only) {
+    state.w += du.tail<3>();
+    state.q = (exp_rotation(h * state.w) * state.q).normalized();
+    state.R = state.q.toRotationMatrix();
+  }
+  if (sane(state)) return true;
+  state = before;
+  state.v.setZero();
+  state.w.setZero();
+  if (!sane(state)) state = RigidState();
+  return false;
+}
+
 void step_bodies(h6Session& s) {
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    Body& body = s.bodies[s.hands[h].body];
+    if (body.motion == Motion::quasi_static && s.hands[h].seen) step_static(s, body);
+  }
   for (std::size_t i = 0; i < s.island_count; ++i) {
     const Island& island = s.islands[i];
     switch (island.count) {

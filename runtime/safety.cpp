@@ -23,6 +23,24 @@ bool slew(Vec3& v, const Vec3& last, double most) {
   return true;
 }
 
+// An axis limits when its numbers do: min < max.
+bool clamp_to_box(Vec3& x, Vec3& v, const Vec3& least, const Vec3& most) {
+  bool cut = false;
+  for (int i = 0; i < 3; ++i) {
+    if (!(least[i] < most[i]) || (x[i] >= least[i] && x[i] <= most[i])) continue;
+    // A device that follows the velocity must not be sent on through the wall.
+    v[i] = x[i] < least[i] ? std::max(v[i], 0.0) : std::min(v[i], 0.0);
+    x[i] = std::clamp(x[i], least[i], most[i]);
+    cut = true;
+  }
+  return cut;
+}
+
+bool sane(const h6Pose& pose) {
+  const double n = from(pose.q).norm();
+  return finite(pose) && n > 0.5 && n < 2;
+}
+
 }  // namespace
 
 SafetyLimits limits_of(const h6DeviceCapabilities& c) {
@@ -38,6 +56,10 @@ SafetyLimits limits_of(const h6DeviceCapabilities& c) {
       rating(c.max_force_rate > 0 ? c.max_force_rate : limits.force / 0.005, ceiling.force_rate);
   limits.torque_rate = rating(c.max_torque_rate > 0 ? c.max_torque_rate : limits.torque / 0.005,
                               ceiling.torque_rate);
+  limits.speed = c.max_velocity > 0 ? std::min(c.max_velocity, ceiling.speed) : ceiling.speed;
+  limits.angular_speed = limits.speed * (ceiling.angular_speed / ceiling.speed);
+  limits.workspace_min = from(c.workspace_min);
+  limits.workspace_max = from(c.workspace_max);
   return limits;
 }
 
@@ -69,6 +91,45 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, double dt, h6Status* s
           .pose = {{0, 0, 0}, {1, 0, 0, 0}},
           .velocity = {},
           .cause = cause};
+}
+
+h6DeviceCommand OutputGuard::pass_motion(const h6Pose& device, const h6BodyState& wanted, double dt,
+                                         h6Status* status) {
+  if (!moving_ && sane(device)) {
+    x_ = from(device.p);
+    q_ = from(device.q).normalized();
+    moving_ = true;
+  }
+  Vec3 v = from(wanted.velocity.linear), w = from(wanted.velocity.angular);
+  Vec3 x = from(wanted.pose.p);
+  h6Cause cause = H6_CAUSE_NONE;
+  // Without a place to start from there is no safe pose; a step so large that it overflows is none.
+  if (!moving_ || !sane(wanted.pose) || !v.allFinite() || !w.allFinite() || !(x - x_).allFinite())
+    fault(H6_CAUSE_NOT_FINITE);
+  if (fault_ != H6_CAUSE_NONE) {
+    *status |= H6_OUTPUT_FAULT;
+    return {.wrench = {}, .pose = {to(x_), to(q_)}, .velocity = {}, .cause = fault_};
+  }
+  if (clamp_to_box(x, v, limits_.workspace_min, limits_.workspace_max)) {
+    *status |= H6_OUTPUT_CLAMPED;
+    cause = H6_CAUSE_CLAMPED;
+  }
+  Vec3 turn = log_rotation(from(wanted.pose.q).normalized() * q_.conjugate());
+  const bool too_fast = clamp_norm(v, limits_.speed),
+             too_fast_turning = clamp_norm(w, limits_.angular_speed);
+  const bool far = slew(x, x_, limits_.speed * dt),
+             far_turned = clamp_norm(turn, limits_.angular_speed * dt);
+  if (too_fast || too_fast_turning || far || far_turned) {
+    *status |= H6_OUTPUT_SLEWED;
+    cause = H6_CAUSE_SPEED;
+  }
+  x_ = x;
+  // What is not limited goes out to the bit.
+  if (far_turned)
+    q_ = (exp_rotation(turn) * q_).normalized();
+  else
+    q_ = from(wanted.pose.q).norm() == 1 ? from(wanted.pose.q) : from(wanted.pose.q).normalized();
+  return {.wrench = {}, .pose = {to(x_), to(q_)}, .velocity = {to(v), to(w)}, .cause = cause};
 }
 
 }  // namespace h6

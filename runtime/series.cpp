@@ -63,25 +63,26 @@ void weigh_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   s.report.series_residual = std::max(s.report.series_residual, result.residual);
 }
 
-void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
+void spread_series(h6Session& s, Pair& pair, const kernels::WrenchSum& sum) {
+  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+  const Vec6 f = s.contact.stiffness * Vec6::Map(sum.force);
+  pair.f = f;
+  pair.right = row_major(sum.stiffness);  // B_p and C_p, until A is known
+  pair.right_d = row_major(sum.damping);
+  pair.Kab.setZero(), pair.Kba.setZero();
+  if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, f);
+  if (!a.fixed) a.f += f;
+  if (!b.fixed) b.f -= arm_shift(s, pair) * f;
+}
+
+void join_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   Body& a = s.bodies[s.pairs[first_pair].a];
   const double k = s.contact.stiffness, beta = s.contact.damping;
   const Mat6 G = series_spring(s.contact, series_lever(a.radius, a.voxel));
   Mat6 B = Mat6::Zero(), C = Mat6::Zero();
   for (std::size_t p = first_pair; p < end_pair; ++p) {
-    Pair& pair = s.pairs[p];
-    Body& b = s.bodies[pair.b];
-    const kernels::WrenchSum sum =
-        sum_series_rows(s.contacts[pair.a], s.gradient == H6_EXACT, pair.begin, pair.end);
-    const Vec6 f = k * Vec6::Map(sum.force);
-    pair.right = row_major(sum.stiffness);  // B_p and C_p, until A is known
-    pair.right_d = row_major(sum.damping);
-    B += pair.right;
-    C += pair.right_d;
-    pair.Kab.setZero(), pair.Kba.setZero();
-    if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, f);
-    if (!a.fixed) a.f += f;
-    if (!b.fixed) b.f -= arm_shift(s, pair) * f;
+    B += s.pairs[p].right;
+    C += s.pairs[p].right_d;
   }
   const Mat6 inverse = (G + C).inverse();
   if (!a.fixed) {
@@ -91,6 +92,7 @@ void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   for (std::size_t p = first_pair; p < end_pair; ++p) {
     Pair& pair = s.pairs[p];
     Body& b = s.bodies[pair.b];
+    pair.B = k * (pair.right_d - pair.right_d * inverse * C);
     pair.Dab.setZero(), pair.Dba.setZero();
     if (b.fixed) continue;
     const Mat6 S = arm_shift(s, pair), Bp = pair.right, Cp = pair.right_d;
@@ -105,6 +107,15 @@ void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
     pair.Dab = k * beta * G * inverse * pair.right_d;
     pair.Dba = beta * (k * S * Cp - pair.left * C);
   }
+}
+
+void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
+  for (std::size_t p = first_pair; p < end_pair; ++p) {
+    Pair& pair = s.pairs[p];
+    spread_series(
+        s, pair, sum_series_rows(s.contacts[pair.a], s.gradient == H6_EXACT, pair.begin, pair.end));
+  }
+  join_series(s, first_pair, end_pair);
 }
 
 }  // namespace h6

@@ -73,29 +73,60 @@ void set_body(h6Session& s, std::size_t i, const h6BodyDef& def,
   }
   const double* v = def.inertia;
   body.inertia << v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2];
+  body.translation_only = def.translation_only;
   if (!body.fixed && body.inertia.isZero(0))
-    body.inertia = inertia_of(s.model->shells[body.shell], body.com, body.mass, body.voxel);
+    body.inertia = body.shell >= 0  // without a shell it never turns: any will do
+                       ? inertia_of(s.model->shells[body.shell], body.com, body.mass, body.voxel)
+                       : Mat3(body.mass * body.voxel * body.voxel * Mat3::Identity());
   set_mesh_pose(body, def.pose);
   body.v = from(def.velocity.linear);
   body.w = from(def.velocity.angular);
   if (body.fixed) body.v.setZero(), body.w.setZero();
+  if (body.translation_only) body.w.setZero();
+}
+
+// Of a free body that a person pushes, where the definition leaves it open (METHOD.md, Sec. 4): a
+// grip of 1500 N/m behind 5 ms of delay takes 7.5 N s/m of damping away.
+double admittance_damping(const h6HandDef& def, double mass) {
+  return def.admittance_damping > 0 ? def.admittance_damping : std::max(mass / 0.02, 10.0);
 }
 
 void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
   Hand& hand = s.hands[i];
-  const Body& body = s.bodies[def.body];
+  Body& body = s.bodies[def.body];
   hand.body = def.body;
+  hand.mode = def.mode;
+  hand.manipulandum_mass = def.manipulandum_mass;
+  hand.driver_stiffness = def.driver_stiffness;
+  hand.driver_damping = def.driver_damping;
+  hand.motion_scale = def.filter.motion_scale;
+  hand.rotation_scale = def.filter.rotation_scale;
+  // A body that never turns hangs on the origin of its mesh frame.
+  const Vec3 com = body.translation_only ? Vec3(Vec3::Zero()) : body.com;
+  hand.filter.set(def.filter, com, def.mode != H6_IMPEDANCE);
+  hand.passivity = def.passivity;
+  hand.port.set(com);
   h6CouplingDef& c = hand.coupling = def.coupling;
   if (c.rotational_stiffness == 0)
     c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
   if (c.max_force == 0) c.max_force = s.contact.stiffness * c.max_depth_voxels * body.voxel;
   if (c.max_torque == 0)
     c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
+  if (hand.mode == H6_ADMITTANCE) body.drag += admittance_damping(def, body.mass);
+  if (c.mode == H6_COUPLING_STATIC) body.motion = Motion::quasi_static;
+  if (c.mode == H6_COUPLING_DIRECT) body.motion = Motion::held;
+  body.max_step = c.max_step_voxels * body.voxel;
+  if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
+  hand.manipulandum = body;
 }
 
 // Moving bodies that pairs connect, in groups of at most four; a larger group falls into single
-// bodies, each then treating its neighbours as if they stood still within the step.
+// bodies, each then treating its neighbours as if they stood still within the step. Bodies without
+// mass of their own, quasi-static or held, are nobody's unknowns.
 std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>& pairs) {
+  const auto dynamic = [&](std::int32_t i) {
+    return !s.bodies[i].fixed && s.bodies[i].motion == Motion::dynamic;
+  };
   std::vector<std::int32_t> root(s.body_count);
   for (std::size_t i = 0; i < root.size(); ++i) root[i] = static_cast<std::int32_t>(i);
   const auto find = [&](std::int32_t i) {
@@ -103,13 +134,13 @@ std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>&
     return i;
   };
   for (const h6PairDef& p : pairs)
-    if (!s.bodies[p.shell_body].fixed && !s.bodies[p.field_body].fixed)
+    if (dynamic(p.shell_body) && dynamic(p.field_body))
       root[find(p.field_body)] = find(p.shell_body);
   std::vector<Island> islands;
   for (std::int32_t r = 0; r < static_cast<std::int32_t>(root.size()); ++r) {
     std::vector<std::int32_t> members;
     for (std::int32_t i = 0; i < static_cast<std::int32_t>(root.size()); ++i)
-      if (!s.bodies[i].fixed && find(i) == r) members.push_back(i);
+      if (dynamic(i) && find(i) == r) members.push_back(i);
     if (members.size() <= kIslandBodies && !members.empty()) {
       Island island{{}, static_cast<int>(members.size())};
       std::copy(members.begin(), members.end(), island.body);
@@ -219,6 +250,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   s->gradient = def->gradient;
   s->dt = 1 / def->rate;
   s->gravity = from(def->gravity);
+  s->net_stiffness = def->net_stiffness;
   s->max_contacts = def->max_contacts;
   bool ready = false;
   try {

@@ -4,15 +4,26 @@
 #include "kernels/contact_wrench.h"
 #include "runtime/arena.h"
 #include "runtime/contacts.h"
+#include "runtime/hand_filter.h"
 #include "runtime/math.h"
 #include "runtime/model.h"
+#include "runtime/passivity.h"
 #include "runtime/safety.h"
 #include "sched/frame_team.h"
 
 namespace h6 {
 
 // The state of a body is that of its centre of mass; poses outside are those of the mesh frame.
-struct Body {
+struct RigidState {
+  Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();  // world frame
+  Quat q = Quat::Identity();
+  Mat3 R = Mat3::Identity();  // of q
+};
+
+// How a body gets from one frame to the next: METHOD.md, Sec. 4.
+enum class Motion : std::uint8_t { dynamic, quasi_static, held };
+
+struct Body : RigidState {
   bool fixed = true;
   double mass = 0;              // [kg]
   Vec3 com = Vec3::Zero();      // mesh frame [m]
@@ -21,15 +32,17 @@ struct Body {
   double voxel = 1e-3;  // the smallest among fields it can touch [m]
   double radius = 0;    // farthest shell point from com [m]
 
-  Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();  // world frame
-  Quat q = Quat::Identity();
-  Mat3 R = Mat3::Identity();  // of q
+  Motion motion = Motion::dynamic;
+  bool translation_only = false;
+  double max_step = 0;  // quasi-static: of any of its points in a frame [m]
+  double drag = 0;      // of admittance hands: damping of the free body [N s/m]
 
   // Gathered in a frame: wrench about x and its derivatives by this body's own motion.
   Vec6 f = Vec6::Zero();
   Mat6 K = Mat6::Zero(), D = Mat6::Zero();
 
   double series_y[6] = {};  // `series`: the spring's extension in the last frame, a warm start
+  ContactPort contact_port;  // of this body's shell
 };
 
 // A shell body a against a field body b.
@@ -42,14 +55,31 @@ struct Pair {
   // `series` lets the field bodies of one shell body feel one another: pair p's wrench on b_p
   // changes by left_p right_q with the motion of b_q, by beta left_p right_d_q with its velocity.
   Mat6 left = Mat6::Zero(), right = Mat6::Zero(), right_d = Mat6::Zero();
+  // What telemetry and passivity read: the wrench on a and sum w k J J^T (`series`: its share of
+  // the net stiffness, as if all fields of the shell body moved alike).
+  Vec6 f = Vec6::Zero();
+  Mat6 B = Mat6::Zero();
+  Vec6 u = Vec6::Zero();    // a against b at a's centre of mass, before the step
+  Vec3 arm = Vec3::Zero();  // x_a - x_b then
+  Vec6 relief = Vec6::Zero();  // scratch of the passivity controller
 };
 
 struct Hand {
   std::int32_t body = -1;
-  h6CouplingDef coupling{};    // with no zeros left
+  std::uint32_t mode = H6_IMPEDANCE;
+  h6CouplingDef coupling{};  // with no zeros left
+  double manipulandum_mass = 0.1, driver_stiffness = 0, driver_damping = 0;
+  double motion_scale = 1, rotation_scale = 1;  // from the device to the scene
   h6DeviceSample sample{};     // the last good one
   bool seen = false;           // there was one
-  Vec6 wrench = Vec6::Zero();  // of the coupling on the body
+  bool clutched = false;       // it moves alone
+  HandFilter filter;
+  RigidState manipulandum;     // where the hand holds the body's centre of mass; pseudo-admittance:
+                               // a body of its own
+  Vec6 wrench = Vec6::Zero();  // of the hand on the body
+  bool passivity = false;
+  HandPort port;
+  h6Wrench told{};  // to the device, in the last frame
   OutputGuard guard;
 };
 
@@ -70,6 +100,7 @@ struct h6Session {
   h6Gradient gradient = H6_SYMMETRIC;
   double dt = 1e-3;
   h6::Vec3 gravity = h6::Vec3::Zero();
+  bool net_stiffness = false;
   std::size_t max_contacts = 0;
 
   h6::Body* bodies = nullptr;

@@ -67,7 +67,7 @@ bool check_body(const h6Model& model, const h6BodyDef& b, std::size_t i, h6Error
     if (!std::isfinite(v)) return fail(error, "body %zu: its inertia is not finite", i);
     given = given || v != 0;
   }
-  if (!given && b.shell < 0)
+  if (!given && b.shell < 0 && !b.translation_only)
     return fail(error, "body %zu: a moving body without a shell needs an inertia", i);
   if (given) {
     Mat3 I;
@@ -94,6 +94,65 @@ bool check_pair(const h6SessionDef& def, std::size_t i, h6Error* error) {
   return true;
 }
 
+bool check_filter(const h6HandFilterDef& f, std::size_t i, h6Error* error) {
+  for (const auto& [name, value] : {std::pair{"motion_scale", f.motion_scale},
+                                    {"rotation_scale", f.rotation_scale},
+                                    {"force_scale", f.force_scale}})
+    if (!positive(value))
+      return fail(error, "hand %zu: %s must be above 0, it is %g", i, name, value);
+  return true;
+}
+
+bool check_coupling_mode(const h6HandDef& h, std::size_t i, h6Error* error) {
+  const int mode = number(h.coupling.mode);
+  if (mode != H6_COUPLING_DYNAMIC && mode != H6_COUPLING_STATIC && mode != H6_COUPLING_DIRECT)
+    return fail(error, "hand %zu: coupling mode %d does not exist", i, mode);
+  if (!positive(h.coupling.max_step_voxels))
+    return fail(error, "hand %zu: max_step_voxels must be above 0, it is %g", i,
+                h.coupling.max_step_voxels);
+  if (mode != H6_COUPLING_DYNAMIC && h.mode != H6_IMPEDANCE)
+    return fail(
+        error,
+        "hand %zu: %s coupling has no mass that a wrench could move; a hand in %s mode needs "
+        "the dynamic coupling",
+        i, mode == H6_COUPLING_STATIC ? "static" : "direct",
+        h.mode == H6_ADMITTANCE ? "admittance" : "pseudo-admittance");
+  return true;
+}
+
+bool check_device_mode(const h6HandDef& h, std::size_t i, h6Error* error) {
+  if (h.mode != H6_IMPEDANCE && h.mode != H6_ADMITTANCE && h.mode != H6_PSEUDO_ADMITTANCE)
+    return fail(error,
+                "hand %zu: device mode %u does not exist; it is one of impedance (%u), admittance "
+                "(%u) and pseudo-admittance (%u)",
+                i, h.mode, static_cast<unsigned>(H6_IMPEDANCE),
+                static_cast<unsigned>(H6_ADMITTANCE), static_cast<unsigned>(H6_PSEUDO_ADMITTANCE));
+  if (!positive(h.manipulandum_mass))
+    return fail(error, "hand %zu: manipulandum_mass must be above 0 kg, it is %g", i,
+                h.manipulandum_mass);
+  for (const auto& [name, value] : {std::pair{"driver_stiffness", h.driver_stiffness},
+                                    {"driver_damping", h.driver_damping},
+                                    {"admittance_damping", h.admittance_damping}})
+    if (!not_negative(value))
+      return fail(error, "hand %zu: %s must be 0 or more, it is %g", i, name, value);
+  return true;
+}
+
+// Several hands pull on one body as several springs do; but it cannot be where two of them are, nor
+// step once for each.
+bool check_other_hands(const h6SessionDef& def, std::size_t i, h6Error* error) {
+  const auto alone = [](const h6HandDef& h) {
+    return number(h.coupling.mode) != H6_COUPLING_DYNAMIC;
+  };
+  for (std::size_t j = 0; j < i; ++j)
+    if (def.hands[j].body == def.hands[i].body && (alone(def.hands[i]) || alone(def.hands[j])))
+      return fail(error,
+                  "hands %zu and %zu hold body %d, which only the dynamic coupling allows: a body "
+                  "with static or direct coupling has one hand",
+                  j, i, def.hands[i].body);
+  return true;
+}
+
 bool check_hand(const h6SessionDef& def, std::size_t i, h6Error* error) {
   const h6HandDef& h = def.hands[i];
   if (h.body < 0 || h.body >= static_cast<std::int64_t>(def.body_count))
@@ -115,7 +174,8 @@ bool check_hand(const h6SessionDef& def, std::size_t i, h6Error* error) {
   if (!positive(c.max_depth_voxels) && !(c.max_force > 0))
     return fail(error, "hand %zu: max_depth_voxels must be above 0, it is %g", i,
                 c.max_depth_voxels);
-  return true;
+  return check_device_mode(h, i, error) && check_coupling_mode(h, i, error) &&
+         check_filter(h.filter, i, error) && check_other_hands(def, i, error);
 }
 
 }  // namespace

@@ -16,10 +16,49 @@ void weigh_series(h6Session& s, std::size_t first_pair, std::size_t end_pair);
 void sum_wrench(h6Session& s, Pair& pair);
 // The same for all pairs of a shell body, which one solve connects.
 void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair);
-// Virtual coupling of a hand with its body.
+// What the two do with a pair's sums, from wherever these come: shares go to both bodies and, where
+// both move, between them. join_series ends it once all pairs of the shell body are spread.
+void spread_wrench(h6Session& s, Pair& pair, const kernels::WrenchSum& sum);
+void spread_series(h6Session& s, Pair& pair, const kernels::WrenchSum& sum);
+void join_series(h6Session& s, std::size_t first_pair, std::size_t end_pair);
+// A device's sample becomes the hand's. What is not finite is not used: the hand stays where it was
+// last good, its wrench is none.
+void accept(h6Session& s, Hand& hand, const h6DeviceSample& given);
+// What the hand feels is its wrench on the body turned round; that, or where its device should be.
+void send(h6Session& s, Hand& hand, h6DeviceCommand* command);
+// Direct: puts the body where the hand is, before contacts are found.
+void hold(h6Session& s, Hand& hand);
+// What the hand does to its body, by the coupling and the device mode. METHOD.md, Sec. 4.
 void couple(h6Session& s, Hand& hand);
+// Pseudo-admittance: one time step of the manipulandum between the driver's coupling and the body.
+void step_manipulandum(h6Session& s, Hand& hand);
+// Admittance modes: where the safety chain held the device back, that which it follows is held back
+// too, by at most what it moved in this frame.
+void follow_device(Hand& hand, const Body& body, RigidState& state, const h6BodyState& wanted,
+                   const h6DeviceCommand& passed, double h);
 // One time step of all moving bodies.
 void step_bodies(h6Session& s);
+// One step of a body without mass towards the pose in which all that acts on it balances.
+void step_static(h6Session& s, Body& body);
+
+// A hand's virtual coupling: the wrench that pulls one state to another, and its derivatives by the
+// pose and velocity of the one that is pulled.
+struct Pull {
+  Vec6 wrench = Vec6::Zero();
+  Mat6 K = Mat6::Zero(), D = Mat6::Zero();
+  bool cut = false;
+};
+Pull pull_of(const h6Session& s, const Hand& hand, const RigidState& target,
+             const RigidState& pulled);
+
+// Of something with this mass in this state whose inertia is the body's in the ratio of the masses:
+// its mass matrix, and [0; w x I w]. And (v, w) of anything. World frame.
+Mat6 mass_matrix(const Body& body, const RigidState& state, double mass);
+Vec6 gyroscopic(const Body& body, const RigidState& state, double mass);
+Vec6 velocity(const RigidState& state);
+// Changes the velocity, then moves by it for h seconds; false when that leaves the numbers: then
+// it rests where it was.
+bool move_or_rest(RigidState& state, const Vec6& du, double h, bool translation_only);
 
 // S = [I 0; [x_a - x_b]x I]: carries a wrench about a's centre of mass to b's.
 Mat6 arm_shift(const h6Session& s, const Pair& pair);
@@ -37,6 +76,9 @@ inline std::size_t pairs_of_shell(const h6Session& s, std::size_t pair) {
 
 // A world-frame pose of a body's mesh frame, and back.
 h6Pose mesh_pose(const Body& body);
+// The same of something else that the body's mesh frame hangs on; and of that frame's origin.
+h6Pose mesh_pose(const Body& body, const RigidState& state);
+h6Velocity mesh_velocity(const Body& body, const RigidState& state);
 void set_mesh_pose(Body& body, const h6Pose& pose);
 std::uint64_t state_hash(const h6Session& s);
 

@@ -59,20 +59,13 @@ void add_geometric_terms(h6Session& s, Pair& pair, const Vec6& f) {
   pair.Kba.bottomRightCorner<3, 3>() += T + cross_matrix(a.x - b.x) * F;
 }
 
-void sum_wrench(h6Session& s, Pair& pair) {
-  pair.Kab.setZero();
-  pair.Kba.setZero();
-  pair.Dab.setZero();
-  pair.Dba.setZero();
-  if (pair.begin == pair.end) return;
+void spread_wrench(h6Session& s, Pair& pair, const kernels::WrenchSum& sum) {
   Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Mat6 S = arm_shift(s, pair);
-  kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
-  Vec6::Map(p.velocity) = pair_velocity(s, pair);
-  const kernels::WrenchSum sum = sum_slices(s, s.contacts[pair.a], pair, p);
-
   const Vec6 f = Vec6::Map(sum.force);
-  const Mat6 K = row_major(sum.stiffness), D = s.contact.damping * row_major(sum.damping);
+  pair.f = f;
+  pair.B = row_major(sum.damping);
+  const Mat6 K = row_major(sum.stiffness), D = s.contact.damping * pair.B;
   if (!a.fixed) {
     a.f += f;
     a.K -= K;
@@ -90,6 +83,19 @@ void sum_wrench(h6Session& s, Pair& pair) {
     pair.Dba = S * D;
   }
   if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, Vec6::Map(sum.elastic));
+}
+
+void sum_wrench(h6Session& s, Pair& pair) {
+  pair.Kab.setZero();
+  pair.Kba.setZero();
+  pair.Dab.setZero();
+  pair.Dba.setZero();
+  pair.f.setZero();
+  pair.B.setZero();
+  if (pair.begin == pair.end) return;
+  kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
+  Vec6::Map(p.velocity) = pair_velocity(s, pair);
+  spread_wrench(s, pair, sum_slices(s, s.contacts[pair.a], pair, p));
 }
 
 }  // namespace h6

@@ -166,6 +166,11 @@ TEST_CASE("a session that cannot run is refused with a sentence that names the v
       {[](Scene& s) { s.def.contact.damping = -1e-3; }, "damping"},
       {[](Scene& s) { s.def.contact.epsilon = 0; }, "epsilon"},
       {[](Scene& s) { s.def.contact.epsilon_normal = 3; }, "epsilon_normal"},
+      {[](Scene& s) { s.def.contact.epsilon_normal = 0; }, "epsilon_normal"},
+      {[](Scene& s) { s.def.contact.epsilon_torque = 0; }, "epsilon_torque"},
+      {[](Scene& s) { s.def.contact.epsilon = NAN; }, "epsilon"},
+      {[](Scene& s) { s.def.contact.stiffness = 0; }, "stiffness"},
+      {[](Scene& s) { s.def.contact.torque_length = -1e-3; }, "torque_length"},
       {[](Scene& s) { s.def.contact.global_n0 = 0.5; }, "global_n0"},
       {[](Scene& s) { s.def.contact.series_c = 2; }, "series_c"},
       {[](Scene& s) { s.def.contact.series_c = NAN; }, "series_c"},
@@ -173,6 +178,15 @@ TEST_CASE("a session that cannot run is refused with a sentence that names the v
       {[](Scene& s) { s.def.contact.cluster_voxels = 0; }, "cluster_voxels"},
       {[](Scene& s) { s.def.contact.method = static_cast<h6Method>(77); }, "method"},
       {[](Scene& s) { s.bodies[1].mass = 0; }, "mass"},
+      {[](Scene& s) { s.bodies[1].mass = -0.1; }, "mass"},
+      {[](Scene& s) { s.bodies[1].mass = NAN; }, "mass"},
+      {[](Scene& s) { s.def.rate = NAN; }, "rate"},
+      {[](Scene& s) { s.def.rate = -1000; }, "rate"},
+      {[](Scene& s) { s.hand.coupling.stiffness = -1e3; }, "coupling stiffness"},
+      {[](Scene& s) { s.hand.coupling.rotational_stiffness = -1; }, "rotational_stiffness"},
+      {[](Scene& s) { s.hand.coupling.max_torque = NAN; }, "max_torque"},
+      {[](Scene& s) { s.hand.coupling.damping_ratio = -1; }, "damping_ratio"},
+      {[](Scene& s) { s.def.gravity.z = NAN; }, "gravity"},
       {[](Scene& s) { s.bodies[1].inertia[0] = 1; }, "inertia"},
       {[](Scene& s) { s.bodies[1].pose.p.x = NAN; }, "finite"},
       {[](Scene& s) { s.bodies[1].pose.q.w = 3; }, "quaternion"},
@@ -277,6 +291,6 @@ TEST_CASE("every name has its value and back") {
        {"", "gauss", "gauss66", "robust+", "robust+nothing", "+facing", "Robust"})
     CHECK_MESSAGE(h6MethodFromName(wrong, &method, &pieces) != 0, wrong);
   CHECK(h6MethodFromName(nullptr, &method, &pieces) != 0);
-  for (std::uint32_t bit = 1; bit <= H6_LATE; bit <<= 1) CHECK(h6StatusName(bit) != nullptr);
+  for (std::uint32_t bit = 1; bit <= H6_PASSIVITY; bit <<= 1) CHECK(h6StatusName(bit) != nullptr);
   CHECK(h6StatusName(3) == nullptr);
 }

@@ -38,16 +38,18 @@ enum {
   H6_COUPLING_SATURATED = 1u << 3,
   /* The 6x6 system could not be solved: this body took an explicit step. */
   H6_SOLVE_FAILED = 1u << 4,
-  /* The wrench was cut to the device's rating. */
+  /* The wrench was cut to the device's rating; admittance: the pose to its workspace. */
   H6_OUTPUT_CLAMPED = 1u << 5,
-  /* The wrench changed faster than the slew limit and was slowed down. */
+  /* The wrench changed faster than the slew limit and was slowed down; admittance: the motion. */
   H6_OUTPUT_SLEWED = 1u << 6,
-  /* The output is held at zero by a fault until h6Rearm. */
+  /* The output is held by a fault until h6Rearm: the wrench at zero; admittance: the pose. */
   H6_OUTPUT_FAULT = 1u << 7,
   /* A device could not be read or written in this frame. */
   H6_DEVICE_LOST = 1u << 8,
   /* The frame before this one ended after its deadline. */
-  H6_LATE = 1u << 9
+  H6_LATE = 1u << 9,
+  /* Energy would have been made at a hand or a contact: the passivity controller damped it. */
+  H6_PASSIVITY = 1u << 10
 };
 
 /* The name of one status bit ("contacts dropped"), or NULL when the bit has no name. */

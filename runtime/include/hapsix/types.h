@@ -187,8 +187,8 @@ typedef struct h6HandDef {
                                          same ratio as the masses; default 0.1               [kg]  */
   double          driver_stiffness;   /* pseudo-admittance: what the driver's coupling has, so that */
   double          driver_damping;     /* the step can be implicit in it; 0: not known  [N/m, N s/m] */
-  double          admittance_damping; /* admittance: of the free body, >= 0; 0: derived, see
-                                         METHOD.md; rotation in the ratio inertia/mass     [N s/m] */
+  double          admittance_damping; /* admittance: of the free body, >= 0; 0: derived; rotation:
+                                         see METHOD.md                                     [N s/m] */
   bool            passivity;          /* observe the energy that leaves through this hand and take
                                          back by damping what was never put in
                                          (Hannaford & Ryu 2002)                                    */
