@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <random>
+#include <string>
 #include <vector>
 
 #include "hapsix/hapsix.h"
@@ -115,6 +117,117 @@ TEST_CASE("the filter weighs a session's contacts as the session does") {
     REQUIRE(c.count > 100);
     for (std::size_t i = 0; i < c.count; ++i) CHECK(a.weight[i] == near(c.weight[i]).epsilon(1e-3));
     h6DestroySession(s);
+  }
+}
+
+namespace {
+
+struct Rule {
+  h6Method method;
+  std::uint32_t pieces;
+};
+// Every rule, and every option of the Gauss ones.
+constexpr Rule kRules[] = {{H6_METHOD_NONE, 0},
+                           {H6_METHOD_GLOBAL, 0},
+                           {H6_METHOD_CLUSTER, 0},
+                           {H6_METHOD_GAUSS3, 0},
+                           {H6_METHOD_GAUSS3, H6_PIECE_FACING | H6_PIECE_DEPTH},
+                           {H6_METHOD_GAUSS3, H6_PIECE_PRINTED},
+                           {H6_METHOD_GAUSS3, H6_PIECE_CLUSTER},
+                           {H6_METHOD_GAUSS6, 0},
+                           {H6_METHOD_GAUSS6, H6_PIECE_PRODUCT},
+                           {H6_METHOD_GAUSS6, H6_PIECE_GEODESIC},
+                           {H6_METHOD_GAUSS6, H6_PIECE_HANDLES},
+                           {H6_METHOD_ROBUST, 0},
+                           {H6_METHOD_ROBUST, H6_PIECE_CLUSTER},
+                           {H6_METHOD_SERIES, 0}};
+
+// A patch of a ball with neighbours near enough to cluster, and gradients that are not the normals.
+// Not about the ball's own centre: there r is parallel to N, and a direction of r x N is rounding
+// noise.
+Rows crowded_cap() {
+  std::mt19937_64 random(31);
+  const auto uniform = [&] { return std::ldexp(static_cast<double>(random() >> 11), -52) - 1; };
+  const Rows base = cap(120);
+  Rows rows;
+  for (std::size_t i = 0; i < 120; ++i)
+    for (int twin = 0; twin < (i % 3 ? 1 : 2); ++twin) {
+      const float *n = &base.n[3 * i], *r = &base.r[3 * i];
+      rows.add({n[0], n[1], n[2]}, {r[0] + (3 + twin * 0.2) * mm, r[1] - 5 * mm, r[2] + 2 * mm},
+               base.d[i] + twin * 0.03 * mm);
+      Eigen::Vector3d g(n[0] + 0.9 * uniform(), n[1] + 0.9 * uniform(), n[2] + 0.9 * uniform());
+      g.normalize();
+      for (int a = 0; a < 3; ++a) rows.g.push_back(static_cast<float>(g[a]));
+    }
+  return rows;
+}
+
+h6ContactDef wide(const Rule& rule) {
+  h6ContactDef def = method(rule.method, rule.pieces);
+  def.epsilon = def.epsilon_normal = 0.3;  // so that neighbours see one another
+  return def;
+}
+
+}  // namespace
+
+TEST_CASE("weights of every method turn with the scene, and so do wrench and stiffness") {
+  const Rows rows = crowded_cap();
+  const Eigen::Matrix3d Q =
+      Eigen::AngleAxisd(1.9, Eigen::Vector3d(0.4, -0.7, 0.6).normalized()).toRotationMatrix();
+  const auto turned = [&](const std::vector<float>& v) {
+    std::vector<float> out;
+    for (std::size_t i = 0; i < v.size(); i += 3) {
+      const Eigen::Vector3d w = Q * Eigen::Vector3d(v[i], v[i + 1], v[i + 2]);
+      for (int a = 0; a < 3; ++a) out.push_back(static_cast<float>(w[a]));
+    }
+    return out;
+  };
+  const Rows other{turned(rows.n), turned(rows.r), rows.d, turned(rows.g)};
+  for (const Rule& rule : kRules) {
+    CAPTURE(std::string(h6MethodName(rule.method)));
+    CAPTURE(rule.pieces);
+    const Answer a(wide(rule), rows.arrays()), b(wide(rule), other.arrays());
+    REQUIRE_MESSAGE(a.code == 0, a.error.message);
+    REQUIRE(b.code == 0);
+    float most = 0;
+    for (float w : a.weight) most = std::max(most, w);
+    REQUIRE(most > 0);
+    for (std::size_t i = 0; i < rows.d.size(); ++i)
+      CHECK(std::fabs(a.weight[i] - b.weight[i]) <= 1e-3f * most);
+    const Eigen::Vector3d fa(a.wrench.force.x, a.wrench.force.y, a.wrench.force.z),
+        fb(b.wrench.force.x, b.wrench.force.y, b.wrench.force.z);
+    CHECK((Q * fa - fb).norm() <= 1e-3 * fa.norm());
+    Mat6 R = Mat6::Zero();
+    R.topLeftCorner<3, 3>() = R.bottomRightCorner<3, 3>() = Q;
+    CHECK((R * a.K * R.transpose() - b.K).norm() <= 1e-3 * a.K.norm());
+  }
+}
+
+TEST_CASE("weights of every method follow the points when these are put in another order") {
+  const Rows rows = crowded_cap();
+  const std::size_t n = rows.d.size();
+  std::mt19937_64 random(8);
+  std::vector<std::size_t> order(n);
+  for (std::size_t i = 0; i < n; ++i) order[i] = i;
+  for (std::size_t i = n; i > 1; --i) std::swap(order[i - 1], order[random() % i]);
+  Rows other;
+  for (const std::size_t i : order) {
+    const float *v = &rows.n[3 * i], *r = &rows.r[3 * i];
+    other.add({v[0], v[1], v[2]}, {r[0], r[1], r[2]}, rows.d[i]);
+    other.g.insert(other.g.end(), &rows.g[3 * i], &rows.g[3 * i] + 3);
+  }
+  for (const Rule& rule : kRules) {
+    CAPTURE(std::string(h6MethodName(rule.method)));
+    CAPTURE(rule.pieces);
+    const Answer a(wide(rule), rows.arrays()), b(wide(rule), other.arrays());
+    REQUIRE(a.code == 0);
+    REQUIRE(b.code == 0);
+    float most = 0;
+    for (float w : a.weight) most = std::max(most, w);
+    for (std::size_t i = 0; i < n; ++i)
+      CHECK(std::fabs(b.weight[i] - a.weight[order[i]]) <= 1e-4f * most);
+    CHECK(a.wrench.force.z == near(b.wrench.force.z).epsilon(1e-4));
+    CHECK((a.K - b.K).norm() <= 1e-4 * a.K.norm());
   }
 }
 
@@ -231,7 +344,17 @@ TEST_CASE("nothing is nothing, every output may be left out, and wrong input is 
   h6ContactDef bad = good;
   bad.series_c = 2;
   CHECK(Answer(bad, in).code == -1);
-  bad = good, bad.stiffness = 0;
+  for (const double wrong : {0.0, -1e4, static_cast<double>(NAN), HUGE_VAL}) {
+    bad = good, bad.stiffness = wrong;
+    CHECK(Answer(bad, in).code == -1);
+  }
+  for (double h6ContactDef::*width :
+       {&h6ContactDef::epsilon, &h6ContactDef::epsilon_normal, &h6ContactDef::epsilon_torque})
+    for (const double wrong : {0.0, -0.1, static_cast<double>(NAN)}) {
+      bad = good, bad.*width = wrong;
+      CHECK(Answer(bad, in).code == -1);
+    }
+  bad = good, bad.damping = -1e-3;
   CHECK(Answer(bad, in).code == -1);
   h6ContactArrays missing = in;
   missing.depths = nullptr;
