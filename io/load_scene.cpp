@@ -27,7 +27,7 @@ class Loader {
       if (Outcome done = add(body); !done)
         return Failure{"body '" + body.name + "': " + done.error()};
     for (const SceneHand& hand : out_.scene.hands) {
-      h6HandDef def = h6DefaultHandDef();
+      h6HandDef def = hand.def;
       def.body = out_.body_index(hand.body);
       def.coupling = out_.scene.coupling;
       out_.hands.push_back(def);
@@ -42,6 +42,7 @@ class Loader {
     def.pose = body.pose;
     def.fixed = body.fixed;
     def.mass = body.mass;
+    def.translation_only = body.translation_only;
     if (body.field) {
       Result<int> index = field(body);
       if (!index) return index.failure();
@@ -232,6 +233,7 @@ h6SessionDef LoadedScene::session_def() const {
   def.integrator = scene.integrator;
   def.gradient = scene.gradient;
   def.rate = scene.rate;
+  def.net_stiffness = scene.net_stiffness;
   return def;
 }
 

@@ -18,6 +18,8 @@ static_assert(sizeof(h6Pose) == 7 * sizeof(double) && offsetof(h6Pose, q) == 3 *
 static_assert(sizeof(h6Velocity) == 6 * sizeof(double) && sizeof(h6Wrench) == 6 * sizeof(double));
 static_assert(sizeof(h6Cause) == 4 && sizeof(h6Status) == 4);
 static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 10, "names below, format version");
+static_assert(offsetof(h6FrameReport, net_stiffness_max) ==
+              offsetof(h6FrameReport, net_stiffness_min) + sizeof(double));
 
 const std::vector<Column>& columns() {
   using R = h6FrameRecord;
@@ -29,23 +31,30 @@ const std::vector<Column>& columns() {
   const auto n32 = Cell::natural32, n64 = Cell::natural64;
   const char* pose = "x y z qw qx qy qz";
   const char* speed = "vx vy vz wx wy wz";
+  const char* wrench = "fx fy fz tx ty tz";
   static const std::vector<Column> all = {
       {"t", real, 1, offsetof(R, time), 0, "s", "t"},
       {"hand_pose", real, 7, hand + offsetof(h6DeviceSample, pose), hands, "m, 1", pose},
       {"hand_velocity", real, 6, hand + offsetof(h6DeviceSample, velocity), hands, "m/s, rad/s",
        speed},
       {"buttons", n32, 1, hand + offsetof(h6DeviceSample, buttons), hands, "bits", "buttons"},
+      {"hand_wrench", real, 6, hand + offsetof(h6DeviceSample, wrench), hands, "N, N m", wrench,
+       true},
       {"body_pose", real, 7, body + offsetof(h6BodyState, pose), bodies, "m, 1", pose},
       {"body_velocity", real, 6, body + offsetof(h6BodyState, velocity), bodies, "m/s, rad/s",
        speed},
       {"wrench", real, 6, command + offsetof(h6DeviceCommand, wrench), commands, "N, N m",
-       "fx fy fz tx ty tz"},
+       wrench},
+      {"command_pose", real, 7, command + offsetof(h6DeviceCommand, pose), commands, "m, 1", pose,
+       true},
       {"cause", n32, 1, command + offsetof(h6DeviceCommand, cause), commands,
        "index into /config cause_names", "cause"},
       {"contacts", n32, 1, report + offsetof(h6FrameReport, contacts), 0, "1", "contacts"},
       {"max_depth", real, 1, report + offsetof(h6FrameReport, max_depth), 0, "m", "max_depth"},
       {"max_depth_voxels", real, 1, report + offsetof(h6FrameReport, max_depth_voxels), 0,
        "voxel", "max_depth_voxels"},
+      {"net_stiffness", real, 2, report + offsetof(h6FrameReport, net_stiffness_min), 0, "N/m",
+       "min max", true},
       {"stage_us", real, H6_STAGE_COUNT, report + offsetof(h6FrameReport, stage_us), 0, "us",
        "traverse contacts weights wrench coupling integrate output"},
       {"frame_us", real, 1, report + offsetof(h6FrameReport, frame_us), 0, "us", "frame_us"},
@@ -67,7 +76,8 @@ const std::vector<std::string>& stage_names() {
 
 const std::vector<std::string>& cause_names() {
   static const std::vector<std::string> names = {
-      "none", "clamped", "slewed", "not finite", "late", "device lost", "stopped"};
+      "none",        "clamped", "slewed", "not finite", "late",
+      "device lost", "stopped", "speed",  "clutched",   "passivity"};
   return names;
 }
 

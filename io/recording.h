@@ -5,10 +5,10 @@
 // A file that was there before stays as OUT.h5.before until the new recording is finished; it is
 // then replaced. A run that is killed, fails or records nothing never costs an older file.
 //
-// /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, stage_us, frame_us,
-// wakeup_us} (n) or (n, width), /frames/{hand_pose, hand_velocity, buttons, body_pose,
-// body_velocity, wrench, cause} (n, hands) or (n, hands, width), with units and column names as
-// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit.
+// /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, net_stiffness,
+// stage_us, frame_us, wakeup_us} (n) or (n, width), /frames/{hand_pose, hand_velocity, hand_wrench,
+// buttons, body_pose, body_velocity, wrench, command_pose, cause} (n, hands) or (n, hands, width),
+// with units and column names as attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit.
 // /config and /summary keep their attributes a second time, as the text that read_recording takes.
 #pragma once
 #include <cstdint>
@@ -71,6 +71,8 @@ struct Recording {
   bool whole = true;         // false: the run was killed; frames up to the last flush are here
   std::string remark;        // what was repaired or is missing, one sentence; empty: nothing
   std::uint64_t frame_count = 0;  // in the file; `frames` has those of the range asked for
+  // Of /frames that the file has: older ones lack some, and `frames` has zeros there.
+  std::vector<std::string> columns;
 };
 
 // A frame takes over 2 kB in memory: long recordings can be read in pieces.

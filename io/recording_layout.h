@@ -36,6 +36,7 @@ struct Column {
   std::size_t width, offset, stride;
   const char* units;
   const char* labels;  // of the cells in a row, separated by blanks
+  bool later = false;  // older recordings do without: zeros then
   bool per_hand() const { return stride != 0; }
 };
 

@@ -143,11 +143,16 @@ hsize_t most_frames_in_memory() {
   return static_cast<hsize_t>(pages) / 2 * static_cast<hsize_t>(bytes) / sizeof(h6FrameRecord);
 }
 
+// In the order of columns(); without a dataset where an older file has none.
 Result<std::vector<Stored>> open_columns(const Source& source, std::size_t hands) {
   const Result<Handle> group = open_group(source, "/frames");
   if (!group) return group.failure();
   std::vector<Stored> open;
   for (const Column& column : columns()) {
+    if (column.later && H5Lexists(*group, column.name, H5P_DEFAULT) == 0) {
+      open.emplace_back();
+      continue;
+    }
     Result<Stored> stored =
         open_stored(source, *group, "/frames", column.name, cell_type(column.cell));
     if (!stored) return stored.failure();
@@ -172,11 +177,14 @@ Outcome read_frames(const Source& source, FrameRange range, Recording& out) {
                    " frames, more than fit into half of this machine's memory: read it in pieces"};
   out.frame_count = rows;
   out.frames.resize(wanted, h6FrameRecord{});
-  for (std::size_t i = 0; i < open->size(); ++i)
+  for (std::size_t i = 0; i < open->size(); ++i) {
+    if (!(*open)[i].dataset.ok()) continue;
+    out.columns.push_back(columns()[i].name);
     if (Outcome read = read_column(source, columns()[i], (*open)[i], out.head.hands, first,
                                    out.frames);
         !read)
       return read;
+  }
   return Done{};
 }
 

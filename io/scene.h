@@ -46,16 +46,49 @@ struct SceneBody {
   std::optional<h6Vec3> com;  // mesh frame [m]; default: a solid if closed, else its points
   std::optional<std::array<double, 6>> inertia;  // xx yy zz xy xz yz about com [kg m^2]
   h6Pose pose;
+  bool translation_only = false;
   std::optional<FieldSource> field;
   std::optional<ShellSource> shell;
 };
 
+// The simulated arm of the device "arm", and the person who holds it. What the figures mean, and
+// their ranges: device/simulated_arm.h.
+struct SceneArm {
+  int delay_frames = 0;
+  double mass = 0.3, inertia = 3e-4;               // [kg], [kg m^2]
+  double damping = 1, rotational_damping = 1e-3;   // [N s/m], [N m s/rad]
+  double position_step = 1e-5, angle_step = 1e-4;  // [m], [rad]
+  double force_step = 0.01, torque_step = 1e-3;    // [N], [N m]
+  bool exact_velocity = false;
+  double velocity_filter = 200;                           // [Hz]
+  h6Vec3 workspace_min{0, 0, 0}, workspace_max{0, 0, 0};  // world frame; equal: no stops [m]
+  double stop_stiffness = 2e4;                            // [N/m]
+  double max_force = 30, max_torque = 3;                  // [N], [N m]
+  double max_velocity = 2;                                // [m/s]
+  double servo_frequency = 100;                           // [Hz]
+  double person_mass = 0.4, person_inertia = 1e-3;        // [kg], [kg m^2]
+  double person_stiffness = 500, person_damping = 20;     // [N/m], [N s/m]
+  double person_rotational_stiffness = 3, person_rotational_damping = 0.1;  // [N m/rad] ...
+  double grip_stiffness = 1500, grip_damping = 8;                           // [N/m], [N s/m]
+  double grip_rotational_stiffness = 5, grip_rotational_damping = 0.02;     // [N m/rad] ...
+};
+
+// What a scene starts from: the engine's defaults, with the driver's coupling of an arm that says
+// nothing else, 2000 N/m and 5 N s/m.
+inline h6HandDef default_scene_hand() {
+  h6HandDef def = h6DefaultHandDef();
+  def.driver_stiffness = 2000;
+  def.driver_damping = 5;
+  return def;
+}
+
 struct SceneHand {
   std::string body;
-  std::string device = "path";      // "path", "simulated", or what the program knows
-  Path path;                        // rows, read or generated
-  std::filesystem::path path_file;  // where they came from
-  std::string mode = "impedance";   // what the device gives and takes: pose in, wrench out
+  std::string device = "path";           // "path", "simulated", "arm", or what the program knows
+  Path path;                             // rows, read or generated
+  std::filesystem::path path_file;       // where they came from
+  h6HandDef def = default_scene_hand();  // `body` and `coupling` are filled in by load_scene
+  std::optional<SceneArm> arm;           // default figures where there is none
 };
 
 struct Box {
@@ -78,7 +111,8 @@ struct Scene {
   h6Integrator integrator = H6_IMPLICIT;
   h6Gradient gradient = H6_SYMMETRIC;
   double rate = 1000;
-  double duration = 0;  // [s]; 0: to the end of the longest path
+  double duration = 0;         // [s]; 0: to the end of the longest path
+  bool net_stiffness = false;  // reported in every frame
   std::vector<SceneHand> hands;
   SceneVerdict verdict;
 };

@@ -3,6 +3,9 @@
 #pragma once
 #include <cstddef>
 #include <limits>
+#include <vector>
+
+#include "io/scene.h"
 
 namespace h6::io {
 
@@ -44,6 +47,14 @@ struct SceneKeys {
 };
 
 const SceneKeys& scene_keys();  // of the file itself
+
+// The keys of `arm` that are plain numbers, and where their values go.
+struct ArmNumber {
+  const char* name;
+  double SceneArm::*value;
+  bool length = false;  // in the scene's units
+};
+const std::vector<ArmNumber>& arm_numbers();
 
 // Largest coordinate, in the scene's units: numbers stay far from overflow whatever is done with
 // them.

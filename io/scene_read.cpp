@@ -1,14 +1,13 @@
 // scene_read.cpp - scene files: text -> checked JSON -> Scene.
 //
 //   check_json_text   is it JSON, and of a sane size                 (scene_json.cpp)
-//   check             every key known, of its kind, in its range     (by the table of scene_keys.h)
+//   check             every key known, of its kind, in its range     (scene_check.cpp)
 //   SceneReader       numbers to metres, names to bodies, files to paths; what the table cannot say
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "io/scene_check.h"
 #include "io/scene_file.h"
 #include "io/scene_json.h"
 #include "io/scene_keys.h"
@@ -20,208 +19,6 @@ using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
-
-// ---- against the table -------------------------------------------------------------------------
-
-// Thrown inside this file only, from any depth of the tree; read_scene turns it into its sentence.
-struct Complaint {
-  std::string where, what;
-};
-
-// Edits (insert, drop, change a letter) that turn one word into the other.
-std::size_t edits_between(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i - 1] != b[j - 1]);
-      diagonal = row[j];
-      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row[b.size()];
-}
-
-std::string nearest_key(const SceneKeys& keys, const std::string& name) {
-  const SceneKey* best = keys.begin();
-  std::size_t fewest = static_cast<std::size_t>(-1);
-  for (const SceneKey& key : keys) {
-    const std::size_t edits = edits_between(name, key.name);
-    if (edits < fewest) fewest = edits, best = &key;
-  }
-  return best->name;
-}
-
-// A foreign name inside our sentence.
-std::string shown(const std::string& text) {
-  std::string out;
-  for (const char c : text.substr(0, 80)) out += static_cast<unsigned char>(c) >= ' ' ? c : '?';
-  return out;
-}
-
-std::string inside(const std::string& path, const std::string& key) {
-  return path.empty() ? key : path + "." + key;
-}
-
-std::string number_text(double value) {
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
-  out.precision(10);
-  out << value;
-  return out.str();
-}
-
-std::string range_text(const SceneKey& key) {
-  const std::string low = (key.above_low ? "above " : "at least ") + number_text(key.low);
-  const std::string high = "at most " + number_text(key.high);
-  if (key.high == kNoLimit) return low;
-  return key.low == -kNoLimit ? high : low + " and " + high;
-}
-
-void check_number(const Json& value, const SceneKey& key, const std::string& at) {
-  if (!value.is_number()) throw Complaint{at, "must be a number"};
-  const double x = value.get<double>();
-  const bool whole = key.kind != KeyKind::whole || std::floor(x) == x;
-  if (!whole) throw Complaint{at, "must be a whole number"};
-  const bool in_range = (key.above_low ? x > key.low : x >= key.low) && x <= key.high;
-  if (!in_range) throw Complaint{at, "is " + number_text(x) + " but must be " + range_text(key)};
-}
-
-void check_numbers(const Json& value, std::size_t count, const SceneKey& key,
-                   const std::string& at) {
-  if (!value.is_array() || value.size() != count)
-    throw Complaint{at, "must be a list of " + std::to_string(count) + " numbers"};
-  for (std::size_t i = 0; i < count; ++i)
-    check_number(value[i], key, at + "[" + std::to_string(i) + "]");
-}
-
-void check_text(const Json& value, const std::string& at) {
-  if (!value.is_string()) throw Complaint{at, "must be a text in quotes"};
-  const auto& text = value.get_ref<const std::string&>();
-  if (text.empty() || text.size() > 4096) throw Complaint{at, "must have 1 to 4096 letters"};
-  for (const char c : text)
-    if (static_cast<unsigned char>(c) < ' ') throw Complaint{at, "holds a control character"};
-}
-
-void check_choice(const Json& value, const SceneKey& key, const std::string& at) {
-  const std::string all = std::string("|") + key.choices + "|";
-  const std::string name = value.is_string() ? value.get<std::string>() : "";
-  if (!name.empty() && name.find('|') == std::string::npos &&
-      all.find("|" + name + "|") != std::string::npos)
-    return;
-  std::string known = key.choices;
-  for (std::size_t bar; (bar = known.find('|')) != std::string::npos;) known.replace(bar, 1, ", ");
-  throw Complaint{at, "must be one of: " + known};
-}
-
-void check_method(const Json& value, const std::string& at) {
-  check_text(value, at);
-  h6Method method;
-  std::uint32_t pieces;
-  const auto& name = value.get_ref<const std::string&>();
-  if (h6MethodFromName(name.c_str(), &method, &pieces) != 0)
-    throw Complaint{at, "\"" + shown(name) +
-                            "\" is no method; known: none, global, cluster, gauss3, gauss6, robust, "
-                            "series, and with pieces: gauss3+facing+depth, robust+cluster"};
-}
-
-void check_quaternion(const Json& value, const SceneKey& key, const std::string& at) {
-  check_numbers(value, 4, key, at);
-  double norm2 = 0;
-  for (const Json& x : value) norm2 += x.get<double>() * x.get<double>();
-  if (!(std::abs(std::sqrt(norm2) - 1) <= 1e-3))
-    throw Complaint{at, "is not a unit quaternion w x y z (its length is " +
-                            number_text(std::sqrt(norm2)) + ")"};
-}
-
-// A real body's tensor: Sylvester's criterion on xx yy zz xy xz yz.
-void check_inertia(const Json& value, const SceneKey& key, const std::string& at) {
-  check_numbers(value, 6, key, at);
-  double i[6];
-  for (int n = 0; n < 6; ++n) i[n] = value[n].get<double>();
-  const double minor2 = i[0] * i[1] - i[3] * i[3];
-  const double minor3 = i[0] * (i[1] * i[2] - i[5] * i[5]) - i[3] * (i[3] * i[2] - i[5] * i[4]) +
-                        i[4] * (i[3] * i[5] - i[1] * i[4]);
-  if (!(i[0] > 0 && minor2 > 0 && minor3 > 0 && std::isfinite(minor3)))
-    throw Complaint{at, "is not positive definite (xx yy zz xy xz yz)"};
-}
-
-void check(const Json& value, const SceneKey& key, const std::string& at);
-
-void check(const Json& value, const SceneKeys& keys, const std::string& at) {
-  if (!value.is_object()) throw Complaint{at, "must be an object { ... }"};
-  for (const auto& [name, item] : value.items()) {
-    const auto key = std::find_if(keys.begin(), keys.end(),
-                                  [&, &n = name](const SceneKey& k) { return n == k.name; });
-    if (key == keys.end())
-      throw Complaint{inside(at, shown(name)), "no such key; the nearest known one is \"" +
-                                                   nearest_key(keys, shown(name)) + "\""};
-    check(item, *key, inside(at, name));
-  }
-  for (const SceneKey& key : keys)
-    if (key.required && !value.contains(key.name))
-      throw Complaint{inside(at, key.name), std::string("is missing (") + key.about + ")"};
-}
-
-void check_corners(const Json& value, const SceneKey& key, const std::string& at) {
-  if (!value.is_array() || value.size() != 2)
-    throw Complaint{at, "must be two corners [[x,y,z],[x,y,z]]"};
-  for (int i = 0; i < 2; ++i) check_numbers(value[i], 3, key, at + "[" + std::to_string(i) + "]");
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(value[0][axis].get<double>() < value[1][axis].get<double>()))
-      throw Complaint{at, "the first corner must be lower than the second on every axis"};
-}
-
-void check_list(const Json& value, const SceneKey& key, const std::string& at) {
-  if (!value.is_array()) throw Complaint{at, "must be a list [ ... ]"};
-  const auto count = static_cast<double>(value.size());
-  if (count < key.low) throw Complaint{at, "must not be empty"};
-  if (count > key.high)
-    throw Complaint{at, "may have " + number_text(key.high) + " entries at most"};
-  for (std::size_t i = 0; i < value.size(); ++i)
-    check(value[i], *key.keys, at + "[" + std::to_string(i) + "]");
-}
-
-void check(const Json& value, const SceneKey& key, const std::string& at) {
-  switch (key.kind) {
-    case KeyKind::boolean:
-      if (!value.is_boolean()) throw Complaint{at, "must be true or false"};
-      break;
-    case KeyKind::number:
-    case KeyKind::whole:
-      check_number(value, key, at);
-      break;
-    case KeyKind::text:
-      check_text(value, at);
-      break;
-    case KeyKind::choice:
-      check_choice(value, key, at);
-      break;
-    case KeyKind::method:
-      check_method(value, at);
-      break;
-    case KeyKind::vec3:
-      check_numbers(value, 3, key, at);
-      break;
-    case KeyKind::inertia:
-      check_inertia(value, key, at);
-      break;
-    case KeyKind::quaternion:
-      check_quaternion(value, key, at);
-      break;
-    case KeyKind::corners:
-      check_corners(value, key, at);
-      break;
-    case KeyKind::object:
-      check(value, *key.keys, at);
-      break;
-    case KeyKind::list:
-      check_list(value, key, at);
-      break;
-  }
-}
 
 // ---- into a Scene ------------------------------------------------------------------------------
 // Only checked JSON comes here: kinds and ranges hold.
@@ -271,6 +68,7 @@ class SceneReader {
     if (o.contains("hands"))
       for (std::size_t i = 0; i < o["hands"].size(); ++i)
         read_hand(o["hands"][i], "hands[" + std::to_string(i) + "]");
+    scene_.net_stiffness = o.value("net_stiffness", false);
     if (o.contains("verdict")) read_verdict(o["verdict"]);
     return std::move(scene_);
   }
@@ -346,6 +144,7 @@ class SceneReader {
     if (find_body(body.name))
       throw Complaint{inside(at, "name"), "there is another body \"" + shown(body.name) + "\""};
     body.fixed = o.value("fixed", false);
+    body.translation_only = o.value("translation_only", false);
     body.mass = number(o, "mass", body.mass);
     if (o.contains("com")) body.com = vec3(o["com"], scale_);
     if (o.contains("inertia")) body.inertia = o["inertia"].get<std::array<double, 6>>();
@@ -379,16 +178,55 @@ class SceneReader {
     c.series_c = number(o, "series_c", c.series_c);
     c.margin_voxels = number(o, "margin_voxels", c.margin_voxels);
     c.cluster_voxels = number(o, "cluster_voxels", c.cluster_voxels);
+    c.passivity = o.value("passivity", false);
   }
 
   void read_coupling(const Json& o) {
     h6CouplingDef& c = scene_.coupling = h6DefaultCouplingDef();
+    const std::string mode = text(o, "mode", "dynamic");
+    c.mode = mode == "static"   ? H6_COUPLING_STATIC
+             : mode == "direct" ? H6_COUPLING_DIRECT
+                                : H6_COUPLING_DYNAMIC;
     c.stiffness = number(o, "stiffness", c.stiffness);
     c.rotational_stiffness = number(o, "rotational_stiffness", c.rotational_stiffness);
     c.damping_ratio = number(o, "damping_ratio", c.damping_ratio);
     c.max_depth_voxels = number(o, "max_depth_voxels", c.max_depth_voxels);
     c.max_force = number(o, "max_force", c.max_force);
     c.max_torque = number(o, "max_torque", c.max_torque);
+    c.max_step_voxels = number(o, "max_step_voxels", c.max_step_voxels);
+  }
+
+  void read_hand_def(const Json& o, h6HandDef& def) const {
+    const std::string mode = text(o, "mode", "impedance");
+    def.mode = mode == "admittance"          ? H6_ADMITTANCE
+               : mode == "pseudo-admittance" ? H6_PSEUDO_ADMITTANCE
+                                             : H6_IMPEDANCE;
+    h6HandFilterDef& f = def.filter;
+    f.motion_scale = number(o, "motion_scale", f.motion_scale);
+    f.rotation_scale = number(o, "rotation_scale", f.rotation_scale);
+    f.force_scale = number(o, "force_scale", f.force_scale);
+    f.relative = o.value("relative", false);
+    f.clutch_buttons = static_cast<std::uint32_t>(number(o, "clutch_buttons", 0));
+    def.manipulandum_mass = number(o, "manipulandum_mass", def.manipulandum_mass);
+    def.driver_stiffness = number(o, "driver_stiffness", def.driver_stiffness);
+    def.driver_damping = number(o, "driver_damping", def.driver_damping);
+    def.admittance_damping = number(o, "admittance_damping", def.admittance_damping);
+    def.passivity = o.value("passivity", false);
+  }
+
+  SceneArm read_arm(const Json& o) const {
+    SceneArm arm;
+    arm.delay_frames = static_cast<int>(number(o, "delay_frames", arm.delay_frames));
+    for (const ArmNumber& key : arm_numbers()) {
+      const double scale = key.length ? scale_ : 1;
+      arm.*key.value = number(o, key.name, arm.*key.value / scale) * scale;
+    }
+    arm.exact_velocity = text(o, "velocity", "filtered") == "exact";
+    if (o.contains("workspace")) {
+      arm.workspace_min = vec3(o["workspace"][0], scale_);
+      arm.workspace_max = vec3(o["workspace"][1], scale_);
+    }
+    return arm;
   }
 
   void read_hand(const Json& o, const std::string& at) {
@@ -404,7 +242,8 @@ class SceneReader {
         throw Complaint{inside(at, "body"),
                         "another hand holds \"" + shown(hand.body) + "\" already"};
     hand.device = text(o, "device", hand.device);
-    hand.mode = text(o, "mode", hand.mode);
+    read_hand_def(o, hand.def);
+    if (o.contains("arm")) hand.arm = read_arm(o["arm"]);
     if (o.contains("path")) {
       hand.path_file = existing(o, "path", at);
       Result<Path> path = read_path(hand.path_file, scene_.unit);
@@ -461,7 +300,7 @@ Result<Scene> read_scene(const fs::path& file) {
     if (!text) return text.failure();
     if (const Outcome json = check_json_text(*text, name); !json) return json.failure();
     const Json root = Json::parse(*text);
-    check(root, scene_keys(), "");
+    check_scene_json(root);
     Scene scene = SceneReader(file).read(root);
     if (scene.name.empty()) scene.name = file.stem().string();
     return scene;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/scene_file.h"
+#include "io/scene_keys.h"
 #include "io/shell_file.h"
 #include "io/write_aside.h"
 
@@ -63,6 +64,7 @@ class SceneWriter {
     out["gradient"] = scene_.gradient == H6_EXACT ? "exact" : "symmetric";
     out["rate"] = scene_.rate;
     out["duration"] = scene_.duration;
+    if (scene_.net_stiffness) out["net_stiffness"] = true;
     out["hands"] = Json::array();
     for (const SceneHand& hand : scene_.hands) out["hands"].push_back(hand_json(hand));
     const Json verdict = verdict_json();
@@ -172,6 +174,7 @@ class SceneWriter {
       out["fixed"] = true;
     else
       out["mass"] = body.mass;
+    if (body.translation_only) out["translation_only"] = true;
     if (body.com) out["com"] = lengths(*body.com);
     if (body.inertia) out["inertia"] = *body.inertia;
     out["pose"] = pose_json(body.pose);
@@ -195,28 +198,34 @@ class SceneWriter {
     if (c.pieces & H6_PIECE_GEODESIC) method += "+geodesic";
     if (c.pieces & H6_PIECE_HANDLES) method += "+handles";
     if (c.pieces & H6_PIECE_PRINTED) method += "+printed";
-    return {{"method", method},
-            {"stiffness", c.stiffness},
-            {"damping", c.damping},
-            {"global_n0", c.global_n0},
-            {"epsilon", c.epsilon},
-            {"epsilon_normal", c.epsilon_normal},
-            {"epsilon_torque", c.epsilon_torque},
-            {"torque_length", c.torque_length / scale_},
-            {"series_c", c.series_c},
-            {"margin_voxels", c.margin_voxels},
-            {"cluster_voxels", c.cluster_voxels}};
+    Json out = {{"method", method},
+                {"stiffness", c.stiffness},
+                {"damping", c.damping},
+                {"global_n0", c.global_n0},
+                {"epsilon", c.epsilon},
+                {"epsilon_normal", c.epsilon_normal},
+                {"epsilon_torque", c.epsilon_torque},
+                {"torque_length", c.torque_length / scale_},
+                {"series_c", c.series_c},
+                {"margin_voxels", c.margin_voxels},
+                {"cluster_voxels", c.cluster_voxels}};
+    if (c.passivity) out["passivity"] = true;
+    return out;
   }
 
   Json coupling_json() const {
     const h6CouplingDef& c = scene_.coupling;
-    return {{"mode", "dynamic"},
+    const char* modes[] = {"dynamic", "static", "direct"};
+    if (c.mode < 0 || c.mode > H6_COUPLING_DIRECT)
+      throw WriteFailed{{"the scene's coupling mode is out of range"}};
+    return {{"mode", modes[c.mode]},
             {"stiffness", c.stiffness},
             {"rotational_stiffness", c.rotational_stiffness},
             {"damping_ratio", c.damping_ratio},
             {"max_depth_voxels", c.max_depth_voxels},
             {"max_force", c.max_force},
-            {"max_torque", c.max_torque}};
+            {"max_torque", c.max_torque},
+            {"max_step_voxels", c.max_step_voxels}};
   }
 
   Json hand_json(const SceneHand& hand) {
@@ -226,7 +235,35 @@ class SceneWriter {
       if (files_) must(write_path(folder_ / name, hand.path, scene_.unit));
       out["path"] = name;
     }
-    out["mode"] = hand.mode;
+    add_hand_def(hand.def, out);
+    if (hand.arm) out["arm"] = arm_json(*hand.arm);
+    return out;
+  }
+
+  static void add_hand_def(const h6HandDef& def, Json& out) {
+    const h6HandFilterDef& f = def.filter;
+    out["mode"] = def.mode == H6_ADMITTANCE           ? "admittance"
+                  : def.mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance"
+                                                     : "impedance";
+    out["motion_scale"] = f.motion_scale;
+    out["rotation_scale"] = f.rotation_scale;
+    out["force_scale"] = f.force_scale;
+    if (f.relative) out["relative"] = true;
+    out["clutch_buttons"] = f.clutch_buttons;
+    out["manipulandum_mass"] = def.manipulandum_mass;
+    out["driver_stiffness"] = def.driver_stiffness;
+    out["driver_damping"] = def.driver_damping;
+    out["admittance_damping"] = def.admittance_damping;
+    if (def.passivity) out["passivity"] = true;
+  }
+
+  Json arm_json(const SceneArm& arm) const {
+    Json out = {{"delay_frames", arm.delay_frames}};
+    for (const ArmNumber& key : arm_numbers())
+      out[key.name] = arm.*key.value / (key.length ? scale_ : 1);
+    out["velocity"] = arm.exact_velocity ? "exact" : "filtered";
+    if (arm.workspace_min.x < arm.workspace_max.x)
+      out["workspace"] = {lengths(arm.workspace_min), lengths(arm.workspace_max)};
     return out;
   }
 

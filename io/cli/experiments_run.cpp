@@ -11,8 +11,6 @@
 #include <thread>
 
 #include "io/recording.h"
-#include "io/scene_file.h"
-#include "kernels/targets.h"
 
 namespace h6::cli {
 namespace {
@@ -71,23 +69,29 @@ class Tally {
   std::size_t touching_ = 0, late_ = 0;
 };
 
-Result<std::unique_ptr<io::Recorder>> open_recording(const io::LoadedScene& loaded,
-                                                     const h6SessionDef& def,
-                                                     const RunChange& change) {
-  io::Scene scene = loaded.scene;  // as it was run
-  scene.contact = def.contact;
-  scene.coupling = def.hands[0].coupling;
-  scene.integrator = def.integrator;
-  scene.rate = def.rate;
-  io::RecordingHead head;
-  head.scene_json = io::scene_text(scene);
-  for (const io::LoadedAsset& a : loaded.assets) head.asset_hashes.push_back(a.hash);
-  head.simd_target = kernels::target_name();
-  head.rate = def.rate;
-  head.hands = def.hand_count;
-  head.program = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." +
-                 std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH);
-  return io::Recorder::create(change.record, head);
+// The definitions of a run: the scene's, with what is to be different.
+Outcome open(const RunChange& change, RunSetup& run) {
+  for (h6HandDef& hand : run.hand_defs) {
+    h6CouplingDef& c = hand.coupling;
+    c.stiffness *= change.force, c.rotational_stiffness *= change.force;
+    c.max_depth_voxels *= change.force;  // the bound that a max_force of 0 derives
+    if (change.max_force >= 0) c.max_force = change.max_force;
+    c.max_force *= change.force, c.max_torque *= change.force;
+  }
+  change.method.apply(run.def.contact);
+  if (change.stiffness > 0) run.def.contact.stiffness = change.stiffness;
+  if (change.damping >= 0) run.def.contact.damping = change.damping;
+  if (change.integrator >= 0) run.def.integrator = static_cast<h6Integrator>(change.integrator);
+  if (change.rate > 0) run.def.rate = change.rate;
+  if (change.also)
+    for (h6HandDef& hand : run.hand_defs) change.also(run.def, hand);
+  for (io::SceneHand& hand : run.hands) {
+    hand.device = change.device;
+    if (change.arm) hand.arm = change.arm;
+  }
+  if (change.path) run.hands[0].path = *change.path;
+  run.record = change.record;
+  return run.open();
 }
 
 }  // namespace
@@ -124,32 +128,14 @@ h6Wrench elastic_wrench(const h6Contacts& c, double stiffness) {
 
 RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change) {
   RunFigures out;
-  h6SessionDef def = loaded.session_def();
-  std::vector<h6HandDef> hands = loaded.hands;
-  for (h6HandDef& hand : hands) {
-    h6CouplingDef& c = hand.coupling;
-    c.stiffness *= change.force, c.rotational_stiffness *= change.force;
-    c.max_depth_voxels *= change.force;  // the bound that a max_force of 0 derives
-    c.max_force *= change.force, c.max_torque *= change.force;
-  }
-  def.hands = hands.data();
-  change.method.apply(def.contact);
-  if (change.stiffness > 0) def.contact.stiffness = change.stiffness;
-  if (change.damping >= 0) def.contact.damping = change.damping;
-  if (change.integrator >= 0) def.integrator = static_cast<h6Integrator>(change.integrator);
-  if (change.rate > 0) def.rate = change.rate;
+  RunSetup run(loaded);
+  if (Outcome opened = open(change, run); !opened) return out.error = opened.error(), out;
+  const h6SessionDef& def = run.def;
+  io::Recorder* recorder = run.recorder.get();
+  const h6HandDef& first = run.hand_defs[0];
+  const bool has_shell = loaded.bodies[static_cast<std::size_t>(first.body)].shell >= 0;
 
-  h6Error error{};
-  const SessionPtr session(h6CreateSession(loaded.model.get(), &def, &error));
-  if (!session) return out.error = error.message, out;
-  std::unique_ptr<io::Recorder> recorder;
-  if (!change.record.empty()) {
-    auto opened = open_recording(loaded, def, change);
-    if (!opened) return out.error = opened.error(), out;
-    recorder = std::move(*opened);
-  }
-
-  const double duration = loaded.duration();
+  const double duration = change.path ? change.path->back().t : loaded.duration();
   Tally tally(loaded, def.rate, duration, out);
   const auto frames = static_cast<std::uint64_t>(duration * def.rate + 0.5);
   std::vector<h6FrameRecord> rows;
@@ -157,20 +143,14 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
     h6FrameRecord& r = rows.emplace_back();
     r = {};
     r.time = static_cast<double>(i) / def.rate;
-    for (std::size_t h = 0; h < hands.size(); ++h) {
-      const io::Path& path = loaded.scene.hands[h].path;
-      r.hand[h].pose = io::sample_path(path, r.time);
-      r.hand[h].velocity = io::sample_path_velocity(path, r.time);
-    }
-    h6Step(session.get(), r.hand, r.command);
-    r.report = h6GetFrame(session.get());
-    h6Vec3 force{};
-    for (std::size_t h = 0; h < hands.size(); ++h)
-      r.body[h] = h6GetBody(session.get(), hands[h].body);
-    if (loaded.bodies[static_cast<std::size_t>(hands[0].body)].shell >= 0)
-      force =
-          elastic_wrench(h6GetContacts(session.get(), hands[0].body), def.contact.stiffness).force;
+    if (Outcome done = run.step(r); !done) return out.error = done.error(), out;
+    const h6Vec3 force =
+        has_shell ? elastic_wrench(h6GetContacts(run.session.get(), first.body),
+                                   def.contact.stiffness)
+                        .force
+                  : h6Vec3{};
     tally.frame(r, force);
+    out.final_pose = r.body[0].pose;
     if (!recorder)
       rows.clear();
     else if (rows.size() == 100) {

@@ -2,11 +2,13 @@
 // say about it; many of them side by side.
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "io/cli/console.h"
 #include "io/cli/histogram.h"
+#include "io/cli/run_setup.h"
 #include "io/load_scene.h"
 #include "io/verdict.h"
 
@@ -25,12 +27,18 @@ std::vector<MethodColumn> method_columns();
 
 struct RunChange {
   MethodColumn method;
-  double force = 1;      // multiple of the coupling's stiffness and bounds
-  double stiffness = 0;  // of contacts, 0: the scene's [N/m]
-  double damping = -1;   // of contacts, < 0: the scene's [s]
-  int integrator = -1;   // < 0: the scene's
-  double rate = 0;       // 0: the scene's [Hz]
-  std::string record;    // .h5 file, empty: none
+  double force = 1;                // multiple of the coupling's stiffness and bounds
+  double stiffness = 0;            // of contacts, 0: the scene's [N/m]
+  double damping = -1;             // of contacts, < 0: the scene's [s]
+  int integrator = -1;             // < 0: the scene's
+  double rate = 0;                 // 0: the scene's [Hz]
+  double max_force = -1;           // of the coupling [N]; 0: half a voxel's, < 0: the scene's
+  const io::Path* path = nullptr;  // of the first hand, null: the scene's
+  std::string device = "path";     // of every hand, as `hapsix run --device` takes it
+  std::optional<io::SceneArm> arm; // of every hand, none: the scene's
+  // Has the last word on the definitions, once for every hand: modes, filters, ...
+  std::function<void(h6SessionDef&, h6HandDef&)> also;
+  std::string record;              // .h5 file, empty: none
 };
 
 struct RunFigures {
@@ -43,6 +51,7 @@ struct RunFigures {
   double late_speed = 0;        // RMS of the body's centre over the last 0.2 s [m/s]
   double late_depth_swing = 0;  // peak to peak over the last 0.2 s [voxel]
   double frame_us_p50 = 0, frame_us_p99 = 0;
+  h6Pose final_pose{};  // of the first hand's body
   h6Status status = 0;
   std::string error;       // the run could not be made
   bool moved_on() const {  // what a scene of the paper calls held
@@ -60,10 +69,5 @@ h6Wrench elastic_wrench(const h6Contacts& contacts, double stiffness);
 // share done go to the progress bar.
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
               const std::string& label);
-
-struct SessionRelease {
-  void operator()(h6Session* session) const { h6DestroySession(session); }
-};
-using SessionPtr = std::unique_ptr<h6Session, SessionRelease>;
 
 }  // namespace h6::cli

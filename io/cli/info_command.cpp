@@ -128,7 +128,8 @@ Result<ordered_json> recording_info(const Console& console, const std::string& f
                     {"program", r->head.program},
                     {"simd_target", r->head.simd_target},
                     {"asset_hashes", r->head.asset_hashes},
-                    {"events", r->events.size()}};
+                    {"events", r->events.size()},
+                    {"columns", r->columns}};
   if (!r->summary_json.empty())
     json["summary"] = ordered_json::parse(r->summary_json, nullptr, false);
   if (json.contains("summary") && json["summary"].is_discarded()) json["summary"] = nullptr;

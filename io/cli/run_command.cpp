@@ -7,6 +7,7 @@
 
 #include "io/cli/checks.h"
 #include "io/cli/commands.h"
+#include "io/cli/hands.h"
 #include "io/cli/run_scene.h"
 #include "io/cli/tables.h"
 #include "io/scene_file.h"
@@ -76,8 +77,8 @@ void add_run(CLI::App& app, Program& program) {
       ->required()
       ->option_text("FILE|NAME");
   run->add_option("--device", o->device,
-                  "For every hand: path (follows the scene's path exactly) or simulated (a person "
-                  "who yields)")
+                  "For every hand: path (follows the scene's path exactly), simulated (a person "
+                  "who yields) or arm (a simulated force-feedback arm that a person holds)")
       ->option_text("NAME");
   run->add_option("--duration", o->duration, "Default: as the scene says")
       ->option_text("SECONDS")

@@ -7,9 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "device/path_device.h"
-#include "device/simulated_hand.h"
-#include "io/scene_file.h"
+#include "io/cli/run_setup.h"
 #include "kernels/targets.h"
 
 namespace h6::cli {
@@ -17,55 +15,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-struct SessionDeleter {
-  void operator()(h6Session* s) const { h6DestroySession(s); }
-};
 struct LoopDeleter {
   void operator()(h6Loop* l) const { h6DestroyLoop(l); }
 };
-
-// The devices of a run, alive as long as it.
-struct Hands {
-  std::vector<std::unique_ptr<device::PathDevice>> paths;
-  std::vector<std::unique_ptr<device::SimulatedHand>> people;
-  std::vector<h6Device> devices;
-};
-
-device::HandPath hand_path(const io::SceneHand& hand, const h6Pose& start) {
-  device::HandPath path;
-  for (const io::PathRow& row : hand.path) {
-    path.time.push_back(row.t);
-    path.pose.push_back(row.pose);
-  }
-  if (path.time.empty()) {  // a hand without a path holds the body where it is
-    path.time.push_back(0);
-    path.pose.push_back(start);
-  }
-  return path;
-}
-
-Outcome open_hands(const io::LoadedScene& loaded, const RunOptions& options, Hands& out) {
-  for (const io::SceneHand& hand : loaded.scene.hands) {
-    const std::string name = options.device.empty() ? hand.device : options.device;
-    const h6BodyDef& body = loaded.bodies[static_cast<std::size_t>(loaded.body_index(hand.body))];
-    if (name == "path") {
-      auto device = device::PathDevice::open(hand_path(hand, body.pose));
-      if (!device) return Failure{"hand of '" + hand.body + "': " + device.error()};
-      out.devices.push_back((*device)->device());
-      out.paths.push_back(std::move(*device));
-    } else if (name == "simulated") {
-      device::Arm arm;
-      arm.grip = body.com;
-      auto device = device::SimulatedHand::open(hand_path(hand, body.pose), arm);
-      if (!device) return Failure{"hand of '" + hand.body + "': " + device.error()};
-      out.devices.push_back((*device)->device());
-      out.people.push_back(std::move(*device));
-    } else {
-      return check_device(name);
-    }
-  }
-  return Done{};
-}
 
 double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
@@ -104,6 +56,7 @@ class Watcher {
     summary_.max_depth_voxels = std::max(summary_.max_depth_voxels, f.max_depth_voxels);
     summary_.frame_us.add(f.frame_us);
     summary_.wakeup_us.add(r.wakeup_us);
+    summary_.net_stiffness_max = std::max(summary_.net_stiffness_max, f.net_stiffness_max);
     for (int s = 0; s < H6_STAGE_COUNT; ++s)
       summary_.stage_us[static_cast<std::size_t>(s)].add(f.stage_us[s]);
     for (const h6DeviceCommand& c : r.command) {
@@ -126,7 +79,7 @@ class Watcher {
   // An event when a status bit or a cause comes up, not while it stays.
   void note_changes(const h6FrameRecord& r) {
     const h6Status status = r.report.status & ~static_cast<h6Status>(H6_COUPLING_SATURATED);
-    for (h6Status bit = 1; bit && bit <= H6_LATE; bit <<= 1)
+    for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
       if ((status & bit) && !(last_status_ & bit))
         event({r.time, h6StatusName(bit), "frame " + std::to_string(r.report.frame)});
     last_status_ = status;
@@ -149,27 +102,7 @@ class Watcher {
   h6Status last_status_ = 0;
 };
 
-Result<std::unique_ptr<io::Recorder>> open_recording(const io::LoadedScene& loaded,
-                                                     const RunOptions& options,
-                                                     const h6SessionDef& def) {
-  io::RecordingHead head;
-  head.scene_json = io::scene_text(loaded.scene);
-  for (const io::LoadedAsset& a : loaded.assets) head.asset_hashes.push_back(a.hash);
-  head.simd_target = kernels::target_name();
-  head.rate = def.rate;
-  head.hands = def.hand_count;
-  head.program = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." +
-                 std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH);
-  return io::Recorder::create(options.record, head);
-}
-
 }  // namespace
-
-Outcome check_device(const std::string& name) {
-  if (name == "path" || name == "simulated") return Done{};
-  return Failure{"no device is called '" + name +
-                 "': 'path' follows the scene's path exactly, 'simulated' is a person who yields"};
-}
 
 Outcome check_options(const RunOptions& options) {
   h6Method method;
@@ -183,24 +116,17 @@ Outcome check_options(const RunOptions& options) {
 
 Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& options,
                              const Console& console) {
-  h6SessionDef def = loaded.session_def();
   if (Outcome known = check_options(options); !known) return known.failure();
+  RunSetup run(loaded);
+  h6SessionDef& def = run.def;
   if (!options.method.empty())
     h6MethodFromName(options.method.c_str(), &def.contact.method, &def.contact.pieces);
   def.threads = options.threads;
-  h6Error error{};
-  std::unique_ptr<h6Session, SessionDeleter> session(
-      h6CreateSession(loaded.model.get(), &def, &error));
-  if (!session) return Failure{error.message};
-  Hands hands;
-  if (Outcome opened = open_hands(loaded, options, hands); !opened) return opened.failure();
-
-  std::unique_ptr<io::Recorder> recorder;
-  if (!options.record.empty()) {
-    auto created = open_recording(loaded, options, def);
-    if (!created) return created.failure();
-    recorder = std::move(*created);
-  }
+  if (!options.device.empty())
+    for (io::SceneHand& hand : run.hands) hand.device = options.device;
+  run.record = options.record;
+  if (Outcome opened = run.open(); !opened) return opened.failure();
+  io::Recorder* recorder = run.recorder.get();
 
   RunSummary summary;
   summary.method = options.method.empty() ? h6MethodName(def.contact.method) : options.method;
@@ -212,15 +138,16 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   loop_def.ring_frames = 4096;
   summary.seconds = loop_def.duration;
   summary.virtual_time = options.virtual_time;
-  Watcher watcher(loaded, summary, loop_def.duration, recorder.get());
+  Watcher watcher(loaded, summary, loop_def.duration, recorder);
+  h6Error error{};
   std::unique_ptr<h6Loop, LoopDeleter> loop(
-      h6StartLoop(session.get(), hands.devices.data(), &loop_def, &error));
+      h6StartLoop(run.session.get(), run.devices.devices.data(), &loop_def, &error));
   if (!loop) return Failure{error.message};
   // A signal ends the loop after its frame; the devices are stopped from the handler already.
   struct Stop {
     h6Loop* loop;
     const Hands* hands;
-  } stop{loop.get(), &hands};
+  } stop{loop.get(), &run.devices};
   set_signal_hook(
       [](void* context) {
         const auto& s = *static_cast<Stop*>(context);
@@ -261,7 +188,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
     for (std::size_t b = 0; b < def.body_count; ++b)
       if (!def.bodies[b].fixed) {
         summary.final_pose = summary.hand_pose =
-            h6GetBody(session.get(), static_cast<int32_t>(b)).pose;
+            h6GetBody(run.session.get(), static_cast<int32_t>(b)).pose;
         break;
       }
   if (recorder)
@@ -291,7 +218,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
                assets = ordered_json::array();
   for (const io::RecordingEvent& e : s.events)
     events.push_back({{"t", e.time}, {"what", e.what}, {"detail", e.detail}});
-  for (h6Status bit = 1; bit <= H6_LATE; bit <<= 1)
+  for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
     if (s.loop.status & bit) status.push_back(h6StatusName(bit));
   for (const io::LoadedAsset& a : loaded.assets) {
     ordered_json asset{{"body", a.body},
@@ -337,6 +264,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
                     {"events", events},
                     {"events_dropped", s.events_dropped},
                     {"interrupted", s.interrupted}};
+  if (loaded.scene.net_stiffness) json["net_stiffness"] = {{"max", s.net_stiffness_max}};
   if (!s.recording.empty()) json["recording"] = s.recording;
   return json;
 }

@@ -31,6 +31,7 @@ struct RunSummary {
   double contacts_mean = 0;
   std::uint32_t contacts_max = 0;
   double max_depth_voxels = 0;
+  double net_stiffness_max = 0;  // when the scene asks for it [N/m]
   Histogram frame_us, wakeup_us;
   std::array<Histogram, H6_STAGE_COUNT> stage_us;
   h6Pose final_pose{}, hand_pose{};
@@ -47,7 +48,6 @@ struct RunSummary {
 
 // A method or device that nothing here has: told before anything is read or baked.
 Outcome check_options(const RunOptions& options);
-Outcome check_device(const std::string& name);
 
 Result<RunSummary> run_scene(const io::LoadedScene& scene, const RunOptions& options,
                              const Console& console);

@@ -81,7 +81,7 @@ TEST_CASE("run says all that a run is judged by") {
   const Json real_run = result_of(box, {"run", "box-on-wall", "--duration", "0.2"});
   is_a_run(real_run);
   CHECK(real_run["frames"] == 200);
-  for (const char* device : {"path", "simulated"})
+  for (const char* device : {"path", "simulated", "arm"})
     is_a_run(result_of(
         box, {"run", "box-on-wall", "--virtual-time", "--duration", "0.1", "--device", device}));
   for (const char* method :
@@ -91,6 +91,38 @@ TEST_CASE("run says all that a run is judged by") {
     is_a_run(run);
     CHECK(run["method"] == method);
   }
+}
+
+TEST_CASE("a scene says how its arm talks, and what telemetry it wants") {
+  Sandbox box;
+  REQUIRE(run(box, {"scene", "export", "box-on-wall", "scene"}).code == 0);
+  Json scene = Json::parse(slurp(box.file("scene/scene.json")));
+  CHECK(!result_of(box, {"run", "scene/scene.json", "--virtual-time", "--duration", "0.1"})
+             .contains("net_stiffness"));
+  scene["net_stiffness"] = true;
+  std::vector<std::string> hashes;
+  for (const char* mode : {"impedance", "admittance", "pseudo-admittance"}) {
+    CAPTURE(mode);
+    scene["hands"][0]["mode"] = mode;
+    scene["hands"][0]["arm"]["delay_frames"] = 1;
+    spill(box.file("scene/scene.json"), scene.dump());
+    const Json json = result_of(box, {"run", "scene/scene.json", "--device", "arm",
+                                      "--virtual-time", "--record", "run.h5"});
+    is_a_run(json);
+    CHECK(json["verdict"] == "held");
+    CHECK(json["contacts"]["max"] > 20);
+    CHECK(json["net_stiffness"]["max"] > 1000);
+    hashes.push_back(json["state_hash"]);
+    const Json info = result_of(box, {"info", "run.h5"});
+    for (const char* column : {"hand_wrench", "command_pose", "net_stiffness"})
+      CHECK(std::count(info["columns"].begin(), info["columns"].end(), column) == 1);
+  }
+  CHECK(hashes[0] != hashes[1]);
+  CHECK(hashes[1] != hashes[2]);
+  // Only an arm does more than impedance.
+  const Ended refused = run(box, {"run", "scene/scene.json", "--device", "path", "--json"});
+  CHECK(refused.code == 1);
+  CHECK(refused.err.find("impedance mode only") != std::string::npos);
 }
 
 TEST_CASE("info knows every kind of file the program reads or writes") {

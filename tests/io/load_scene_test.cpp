@@ -155,6 +155,34 @@ TEST_CASE("what the scene states wins over what could be derived") {
   CHECK((*loaded)->bodies[1].inertia[1] == 2e-5);
 }
 
+TEST_CASE("what a scene says of hands, bodies and telemetry reaches the session's definition") {
+  Scene scene = two_boxes();
+  scene.bodies[1].translation_only = true;
+  scene.coupling.mode = H6_COUPLING_STATIC;
+  scene.contact.passivity = true;
+  scene.net_stiffness = true;
+  h6HandDef& hand = scene.hands[0].def;
+  hand.mode = H6_PSEUDO_ADMITTANCE;
+  hand.filter.motion_scale = 2, hand.filter.clutch_buttons = 4;
+  hand.driver_stiffness = 700;
+  hand.passivity = true;
+  auto loaded = load_scene(scene);
+  REQUIRE_MESSAGE(loaded, loaded.error());
+  const h6SessionDef def = (*loaded)->session_def();
+  CHECK(def.net_stiffness);
+  CHECK(def.contact.passivity);
+  CHECK(def.bodies[1].translation_only);
+  CHECK(!def.bodies[0].translation_only);
+  CHECK(def.hands[0].body == 1);
+  CHECK(def.hands[0].coupling.mode == H6_COUPLING_STATIC);
+  CHECK(def.hands[0].mode == H6_PSEUDO_ADMITTANCE);
+  CHECK(def.hands[0].filter.motion_scale == 2);
+  CHECK(def.hands[0].filter.clutch_buttons == 4);
+  CHECK(def.hands[0].driver_stiffness == 700);
+  CHECK(def.hands[0].manipulandum_mass == h6DefaultHandDef().manipulandum_mass);
+  CHECK(def.hands[0].passivity);
+}
+
 TEST_CASE("trouble with a body's files names the body and the file") {
   Scene scene = two_boxes();
   scene.bodies[1].shell->mesh_data.reset();

@@ -59,6 +59,8 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
   r.report.contacts = natural();
   fill(&r.report.max_depth, 1);
   fill(&r.report.max_depth_voxels, 1);
+  fill(&r.report.net_stiffness_min, 1);
+  fill(&r.report.net_stiffness_max, 1);
   fill(r.report.stage_us, H6_STAGE_COUNT);
   fill(&r.report.frame_us, 1);
   fill(&r.report.state_hash, 1);
@@ -67,8 +69,10 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
   for (std::size_t h = 0; h < hands; ++h) {
     fill(&r.hand[h].pose, 7);
     fill(&r.hand[h].velocity, 6);
+    fill(&r.hand[h].wrench, 6);
     r.hand[h].buttons = natural();
     fill(&r.command[h].wrench, 6);
+    fill(&r.command[h].pose, 7);
     r.command[h].cause = static_cast<h6Cause>(natural() % H6_CAUSE_COUNT);
     fill(&r.body[h], 13);
   }
@@ -82,14 +86,18 @@ inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
              a.report.contacts == b.report.contacts &&
              equal(a.report.max_depth, b.report.max_depth) &&
              equal(a.report.max_depth_voxels, b.report.max_depth_voxels) &&
+             equal(a.report.net_stiffness_min, b.report.net_stiffness_min) &&
+             equal(a.report.net_stiffness_max, b.report.net_stiffness_max) &&
              equal(a.report.stage_us, b.report.stage_us) &&
              equal(a.report.frame_us, b.report.frame_us) &&
              a.report.state_hash == b.report.state_hash;
   for (std::size_t h = 0; h < H6_MAX_HANDS; ++h)
     all = all && equal(a.hand[h].pose, b.hand[h].pose) &&
           equal(a.hand[h].velocity, b.hand[h].velocity) &&
+          equal(a.hand[h].wrench, b.hand[h].wrench) &&
           a.hand[h].buttons == b.hand[h].buttons && equal(a.body[h], b.body[h]) &&
           equal(a.command[h].wrench, b.command[h].wrench) &&
+          equal(a.command[h].pose, b.command[h].pose) &&
           a.command[h].cause == b.command[h].cause;
   return all;
 }

@@ -6,6 +6,7 @@
 #include <doctest/doctest.h>
 #include <hdf5.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "tests/io/recorded_frames.h"
@@ -73,6 +74,9 @@ TEST_CASE("the HDF5 library alone sees the documented datasets") {
   CHECK(plain_shape(file, "/frames/body_pose") == Shape{600, 2, 7});
   CHECK(plain_shape(file, "/frames/wrench") == Shape{600, 2, 6});
   CHECK(plain_shape(file, "/frames/cause") == Shape{600, 2});
+  CHECK(plain_shape(file, "/frames/hand_wrench") == Shape{600, 2, 6});
+  CHECK(plain_shape(file, "/frames/command_pose") == Shape{600, 2, 7});
+  CHECK(plain_shape(file, "/frames/net_stiffness") == Shape{600, 2});
   CHECK(plain_shape(file, "/frames/stage_us") == Shape{600, H6_STAGE_COUNT});
   CHECK(plain_shape(file, "/frames/hash") == Shape{600});
   CHECK(plain_shape(file, "/events/t") == Shape{0});
@@ -90,6 +94,31 @@ TEST_CASE("the HDF5 library alone sees the documented datasets") {
   CHECK(H5Aexists(data, "units") > 0);
   H5Dclose(data);
   H5Fclose(h5);
+}
+
+TEST_CASE("a recording from before a column was added opens, with zeros in its place") {
+  const Folder folder;
+  const fs::path file = folder / "run.h5";
+  record(file, 300);
+  const std::vector<std::string> all = read(file).columns;
+  CHECK(std::count(all.begin(), all.end(), "hand_wrench") == 1);
+  const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const char* later[] = {"hand_wrench", "command_pose", "net_stiffness"};
+  for (const char* name : later)
+    REQUIRE(H5Ldelete(h5, (std::string("/frames/") + name).c_str(), H5P_DEFAULT) >= 0);
+  H5Fclose(h5);
+  const Recording r = read(file);
+  REQUIRE(r.frames.size() == 300);
+  CHECK(r.columns.size() + 3 == all.size());
+  for (const char* name : later)
+    CHECK(std::count(r.columns.begin(), r.columns.end(), name) == 0);
+  for (std::size_t i = 0; i < 300; ++i) {
+    h6FrameRecord expected = frame(i);
+    expected.hand[0].wrench = {};
+    expected.command[0].pose = {};
+    expected.report.net_stiffness_min = expected.report.net_stiffness_max = 0;
+    REQUIRE(same(r.frames[i], expected));
+  }
 }
 
 TEST_CASE("what is not a recording is not replaced, and impossible heads are refused") {
@@ -167,6 +196,10 @@ TEST_CASE("lying sizes and wrong shapes and types are refused before memory is t
   CHECK(mentions(change([&](hid_t h5) { grow(h5, "/events/t", {hsize_t{1} << 50}); }), "/events"));
   CHECK(mentions(change([](hid_t h5) { H5Ldelete(h5, "/frames/wrench", H5P_DEFAULT); }),
                  "/frames/wrench is missing"));
+  CHECK(mentions(change([&](hid_t h5) {
+                   replace(h5, "/frames/net_stiffness", H5T_IEEE_F64LE, {0, 3});
+                 }),
+                 "shape"));
   CHECK(mentions(change([](hid_t h5) { H5Ldelete(h5, "/config/whole", H5P_DEFAULT); }),
                  "/config/whole is missing"));
   CHECK(mentions(change([](hid_t h5) { H5Ldelete(h5, "/events", H5P_DEFAULT); }),

@@ -30,6 +30,11 @@ TEST_CASE("a scene with only what is needed has the engine's defaults for the re
   CHECK(scene->bodies[0].field->bake.voxels == FieldBake{}.voxels);
   CHECK(!scene->bodies[0].field->unit);
   CHECK(scene->hands[0].device == "path");
+  check_same(scene->hands[0].def, default_scene_hand());
+  CHECK(scene->hands[0].def.mode == H6_IMPEDANCE);
+  CHECK(!scene->hands[0].arm);
+  CHECK(!scene->net_stiffness);
+  CHECK(!scene->bodies[1].translation_only);
   REQUIRE(scene->hands[0].path.size() == 2);
   check_same(scene->hands[0].path[1].pose, h6Pose{{0.01, 0, -0.02}, {0, 1, 0, 0}});
   CHECK(scene->verdict.forbidden.empty());
@@ -89,12 +94,76 @@ TEST_CASE("every key arrives, lengths in metres") {
   CHECK(s.gradient == H6_EXACT);
   CHECK(s.rate == 2000);
   CHECK(s.duration == 1.25);
+  CHECK(s.contact.passivity);
+  CHECK(s.coupling.mode == H6_COUPLING_STATIC);
+  check_close(s.coupling.max_step_voxels, 0.3);
+  CHECK(s.net_stiffness);
+  CHECK(s.bodies[4].translation_only);
+  CHECK(!s.bodies[3].translation_only);
+  const h6HandDef& hand = s.hands[0].def;
+  CHECK(hand.mode == H6_PSEUDO_ADMITTANCE);
+  check_close(hand.filter.motion_scale, 2);
+  check_close(hand.filter.rotation_scale, 1.5);
+  check_close(hand.filter.force_scale, 0.5);
+  CHECK(hand.filter.relative);
+  CHECK(hand.filter.clutch_buttons == 5);
+  check_close(hand.manipulandum_mass, 0.2);
+  check_close(hand.driver_stiffness, 900);
+  check_close(hand.driver_damping, 4);
+  check_close(hand.admittance_damping, 6);
+  CHECK(hand.passivity);
+  CHECK(s.hands[0].device == "arm");
+  REQUIRE(s.hands[0].arm);
+  const SceneArm& arm = *s.hands[0].arm;
+  CHECK(arm.delay_frames == 2);
+  CHECK(arm.exact_velocity);
+  check_same(arm.workspace_min, h6Vec3{-0.09, -0.08, -0.07});
+  check_same(arm.workspace_max, h6Vec3{0.1, 0.11, 0.12});
+  for (const ArmNumber& key : arm_numbers()) {
+    const double said = full_scene()["hands"][0]["arm"][key.name].get<double>();
+    INFO(key.name);
+    check_close(arm.*key.value, key.length ? 1e-3 * said : said);
+    CHECK(arm.*key.value != SceneArm{}.*key.value);  // no default can stand in for what was read
+  }
   CHECK(s.hands[1].device == "simulated");
   CHECK(s.hands[1].path.empty());
   check_same(s.verdict.forbidden[0].low, h6Vec3{-1e-3, -2e-3, -3e-3});
   check_same(s.verdict.target->p, h6Vec3{5e-3, 6e-3, 7e-3});
   check_close(s.verdict.tolerance, 2e-3);
   check_close(s.verdict.tolerance_angle, 0.1);
+}
+
+TEST_CASE("coupling modes and hand modes are known by their names, and the names come back") {
+  const Bench bench;
+  const std::pair<const char*, h6CouplingMode> couplings[] = {{"dynamic", H6_COUPLING_DYNAMIC},
+                                                              {"static", H6_COUPLING_STATIC},
+                                                              {"direct", H6_COUPLING_DIRECT}};
+  const std::pair<const char*, std::uint32_t> hands[] = {
+      {"impedance", H6_IMPEDANCE},
+      {"admittance", H6_ADMITTANCE},
+      {"pseudo-admittance", H6_PSEUDO_ADMITTANCE}};
+  for (const auto& [coupling, coupling_mode] : couplings)
+    for (const auto& [hand, hand_mode] : hands) {
+      Json json = small_scene();
+      json["coupling"]["mode"] = coupling;
+      json["hands"][0]["mode"] = hand;
+      const Result<Scene> scene = bench.read(json);
+      REQUIRE_MESSAGE(scene, scene.error());
+      CHECK(scene->coupling.mode == coupling_mode);
+      CHECK(scene->hands[0].def.mode == hand_mode);
+      const Json text = Json::parse(scene_text(*scene));
+      CHECK(text["coupling"]["mode"] == coupling);
+      CHECK(text["hands"][0]["mode"] == hand);
+    }
+}
+
+TEST_CASE("switches that are off and an arm that is not described are not written") {
+  const Bench bench;
+  const Json text = Json::parse(scene_text(*bench.read(small_scene())));
+  CHECK(!text.contains("net_stiffness"));
+  CHECK(!text["contact"].contains("passivity"));
+  CHECK(!text["bodies"][1].contains("translation_only"));
+  for (const char* key : {"relative", "passivity", "arm"}) CHECK(!text["hands"][0].contains(key));
 }
 
 TEST_CASE("units scale every length and nothing else") {
@@ -107,6 +176,9 @@ TEST_CASE("units scale every length and nothing else") {
   check_close(in_m.bodies[1].field->bake.voxel_size, 1000 * in_mm.bodies[1].field->bake.voxel_size);
   check_close(in_m.contact.torque_length, 1000 * in_mm.contact.torque_length);
   check_close(in_m.hands[0].path[1].pose.p.x, 1000 * in_mm.hands[0].path[1].pose.p.x);
+  check_close(in_m.hands[0].arm->workspace_max.x, 1000 * in_mm.hands[0].arm->workspace_max.x);
+  check_close(in_m.hands[0].arm->position_step, 1000 * in_mm.hands[0].arm->position_step);
+  check_close(in_m.hands[0].arm->grip_stiffness, in_mm.hands[0].arm->grip_stiffness);
   check_close(in_m.contact.stiffness, in_mm.contact.stiffness);
   check_same(in_m.coupling, in_mm.coupling);
 }
@@ -204,7 +276,12 @@ TEST_CASE("every wrong value is refused with the path of its key") {
       {"/contact", "{\"series_c\": 2}", "contact.series_c"},
       {"/contact", "{\"margin_voxels\": 3}", "contact.margin_voxels"},
       {"/contact", "{\"cluster_voxels\": 0}", "contact.cluster_voxels"},
-      {"/coupling", "{\"mode\": \"static\"}", "coupling.mode"},
+      {"/contact", "{\"passivity\": 1}", "contact.passivity: must be true or false"},
+      {"/coupling", "{\"mode\": \"statics\"}",
+       "coupling.mode: must be one of: dynamic, static, direct"},
+      {"/coupling", "{\"max_step_voxels\": 0}", "coupling.max_step_voxels"},
+      {"/bodies/1/translation_only", "3", "bodies[1].translation_only: must be true or false"},
+      {"/net_stiffness", "\"yes\"", "net_stiffness: must be true or false"},
       {"/coupling", "{\"stiffness\": 0}", "coupling.stiffness"},
       {"/coupling", "{\"damping_ratio\": 11}", "coupling.damping_ratio"},
       {"/coupling", "{\"max_depth_voxels\": 0}", "coupling.max_depth_voxels"},
@@ -218,7 +295,25 @@ TEST_CASE("every wrong value is refused with the path of its key") {
       {"/hands/0/body", "\"prat\"", "hands[0].body: there is no body \"prat\""},
       {"/hands/0/body", "\"bay\"", "hands[0].body: \"bay\" is fixed"},
       {"/hands/0/path", "\"gone.csv\"", "hands[0].path: there is no file \"gone.csv\""},
-      {"/hands/0/mode", "\"admittance\"", "hands[0].mode"},
+      {"/hands/0/mode", "\"admitance\"",
+       "hands[0].mode: must be one of: impedance, admittance, pseudo-admittance"},
+      {"/hands/0/motion_scale", "0", "hands[0].motion_scale: is 0 but must be above 0"},
+      {"/hands/0/rotation_scale", "-1", "hands[0].rotation_scale"},
+      {"/hands/0/force_scale", "1e7", "hands[0].force_scale"},
+      {"/hands/0/relative", "1", "hands[0].relative: must be true or false"},
+      {"/hands/0/clutch_buttons", "0.5", "hands[0].clutch_buttons: must be a whole number"},
+      {"/hands/0/clutch_buttons", "4294967296", "hands[0].clutch_buttons"},
+      {"/hands/0/manipulandum_mass", "0", "hands[0].manipulandum_mass"},
+      {"/hands/0/driver_stiffness", "-1", "hands[0].driver_stiffness"},
+      {"/hands/0/driver_damping", "51", "hands[0].driver_damping"},
+      {"/hands/0/admittance_damping", "-1", "hands[0].admittance_damping"},
+      {"/hands/0/passivity", "null", "hands[0].passivity"},
+      {"/hands/0/arm", "[]", "hands[0].arm: must be an object"},
+      {"/hands/0/arm", "{\"delay\": 1}", "hands[0].arm.delay: no such key"},
+      {"/hands/0/arm", "{\"delay_frames\": 3}", "hands[0].arm.delay_frames: is 3"},
+      {"/hands/0/arm", "{\"delay_frames\": 0.5}", "hands[0].arm.delay_frames: must be a whole"},
+      {"/hands/0/arm", "{\"velocity\": true}", "hands[0].arm.velocity: must be one of: filtered"},
+      {"/hands/0/arm", "{\"workspace\": [[0, 0, 0], [1, 1, 0]]}", "hands[0].arm.workspace"},
       {"/hands/1", "{\"body\": \"part\", \"device\": \"simulated\"}",
        "hands[1].body: another hand"},
       {"/verdict", "{\"forbidden\": [{}]}", "verdict.forbidden[0].box: is missing"},
@@ -237,6 +332,18 @@ TEST_CASE("every wrong value is refused with the path of its key") {
     CHECK(says(error, wrong.said));
     CHECK(says(error, "scene.json"));
   }
+}
+
+TEST_CASE("every figure of an arm has a range, and the key is named where it is left") {
+  const Bench bench;
+  for (const ArmNumber& key : arm_numbers())
+    for (const double wrong : {-1.0, 1e8}) {
+      Json json = small_scene();
+      json["hands"][0]["arm"][key.name] = wrong;
+      const std::string error = bench.error(json);
+      INFO(error);
+      CHECK(says(error, std::string("hands[0].arm.") + key.name + ": is "));
+    }
 }
 
 TEST_CASE("what a scene needs and does not have is named") {

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "io/scene_file.h"
+#include "io/scene_keys.h"
 
 namespace h6::io {
 
@@ -84,16 +85,31 @@ inline Json full_scene() {
        "inertia": [3e-4, 2e-4, 4e-4, 1e-5, -2e-5, 3e-5],
        "pose": {"p": [10, -20, 30], "q": [0, 0.6, 0.8, 0]},
        "shell": {"mesh": "bay.stl", "points": 777, "levels": 5, "seed": 42, "units": "cm"}},
-      {"name": "other", "shell": {"mesh": "bay.stl", "spacing": 0.75}},
+      {"name": "other", "translation_only": true, "shell": {"mesh": "bay.stl", "spacing": 0.75}},
       {"name": "third", "shell": {"file": "part.ply"}}],
     "contact": {"method": "gauss6+facing+product+geodesic", "stiffness": 2e4, "damping": 2e-3,
                 "global_n0": 7, "epsilon": 0.02, "epsilon_normal": 0.03,
                 "epsilon_torque": 0.9, "torque_length": 1.5,
-                "series_c": 3, "margin_voxels": 0.25, "cluster_voxels": 0.75},
-    "coupling": {"mode": "dynamic", "stiffness": 1500, "rotational_stiffness": 0.7,
-                 "damping_ratio": 0.8, "max_depth_voxels": 0.4, "max_force": 3, "max_torque": 0.2},
+                "series_c": 3, "margin_voxels": 0.25, "cluster_voxels": 0.75,
+                "passivity": true},
+    "coupling": {"mode": "static", "stiffness": 1500, "rotational_stiffness": 0.7,
+                 "damping_ratio": 0.8, "max_depth_voxels": 0.4, "max_force": 3, "max_torque": 0.2,
+                 "max_step_voxels": 0.3},
     "integrator": "explicit", "gradient": "exact", "rate": 2000, "duration": 1.25,
-    "hands": [{"body": "part", "device": "path", "path": "hand.csv", "mode": "impedance"},
+    "net_stiffness": true,
+    "hands": [{"body": "part", "device": "arm", "path": "hand.csv", "mode": "pseudo-admittance",
+               "motion_scale": 2, "rotation_scale": 1.5, "force_scale": 0.5, "relative": true,
+               "clutch_buttons": 5, "manipulandum_mass": 0.2, "driver_stiffness": 900,
+               "driver_damping": 4, "admittance_damping": 6, "passivity": true,
+               "arm": {"delay_frames": 2, "mass": 0.31, "inertia": 4e-4, "damping": 1.1,
+                 "rotational_damping": 2e-3, "position_step": 0.02, "angle_step": 2e-4,
+                 "force_step": 0.03, "torque_step": 2e-3, "velocity": "exact",
+                 "velocity_filter": 150, "workspace": [[-90, -80, -70], [100, 110, 120]],
+                 "stop_stiffness": 1e4, "max_force": 20, "max_torque": 2, "max_velocity": 1.5,
+                 "servo_frequency": 80, "person_mass": 0.5, "person_inertia": 2e-3,
+                 "person_stiffness": 400, "person_damping": 15, "person_rotational_stiffness": 2,
+                 "person_rotational_damping": 0.2, "grip_stiffness": 1400, "grip_damping": 7,
+                 "grip_rotational_stiffness": 4, "grip_rotational_damping": 0.03}},
               {"body": "other", "device": "simulated"}],
     "verdict": {"forbidden": [{"box": [[-1, -2, -3], [1, 2, 3]]}],
                 "target": {"pose": {"p": [5, 6, 7], "q": [1, 0, 0, 0]}, "tolerance": 2,
@@ -120,6 +136,7 @@ inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
   const double xs[] = {a.stiffness,      a.damping,        a.global_n0,    a.epsilon,
                        a.epsilon_normal, a.epsilon_torque, a.torque_length,
                        a.series_c,       a.margin_voxels,  a.cluster_voxels};
+  CHECK(a.passivity == b.passivity);
   const double ys[] = {b.stiffness,      b.damping,        b.global_n0,    b.epsilon,
                        b.epsilon_normal, b.epsilon_torque, b.torque_length,
                        b.series_c,       b.margin_voxels,  b.cluster_voxels};
@@ -129,11 +146,40 @@ inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
 inline void check_same(const h6CouplingDef& a, const h6CouplingDef& b) {
   const double xs[] = {a.stiffness,     a.rotational_stiffness,
                        a.damping_ratio, a.max_depth_voxels,
-                       a.max_force,     a.max_torque};
+                       a.max_force,     a.max_torque,
+                       a.max_step_voxels};
   const double ys[] = {b.stiffness,     b.rotational_stiffness,
                        b.damping_ratio, b.max_depth_voxels,
-                       b.max_force,     b.max_torque};
-  for (int i = 0; i < 6; ++i) check_close(xs[i], ys[i]);
+                       b.max_force,     b.max_torque,
+                       b.max_step_voxels};
+  CHECK(a.mode == b.mode);
+  for (int i = 0; i < 7; ++i) check_close(xs[i], ys[i]);
+}
+
+inline void check_same(const SceneArm& a, const SceneArm& b) {
+  CHECK(a.delay_frames == b.delay_frames);
+  CHECK(a.exact_velocity == b.exact_velocity);
+  for (const ArmNumber& key : arm_numbers()) {
+    INFO(key.name);
+    check_close(a.*key.value, b.*key.value);
+  }
+  check_same(a.workspace_min, b.workspace_min);
+  check_same(a.workspace_max, b.workspace_max);
+}
+
+// What the scene says of a hand: body and coupling stand elsewhere.
+inline void check_same(const h6HandDef& a, const h6HandDef& b) {
+  CHECK(a.mode == b.mode);
+  CHECK(a.passivity == b.passivity);
+  CHECK(a.filter.relative == b.filter.relative);
+  CHECK(a.filter.clutch_buttons == b.filter.clutch_buttons);
+  check_close(a.filter.motion_scale, b.filter.motion_scale);
+  check_close(a.filter.rotation_scale, b.filter.rotation_scale);
+  check_close(a.filter.force_scale, b.filter.force_scale);
+  check_close(a.manipulandum_mass, b.manipulandum_mass);
+  check_close(a.driver_stiffness, b.driver_stiffness);
+  check_close(a.driver_damping, b.driver_damping);
+  check_close(a.admittance_damping, b.admittance_damping);
 }
 
 inline void check_same(const SceneVerdict& a, const SceneVerdict& b) {
@@ -152,6 +198,7 @@ inline void check_same(const SceneBody& a, const SceneBody& b) {
   CHECK(a.name == b.name);
   CHECK(a.fixed == b.fixed);
   if (!a.fixed) check_close(a.mass, b.mass);
+  CHECK(a.translation_only == b.translation_only);
   check_same(a.pose, b.pose);
   REQUIRE(a.com.has_value() == b.com.has_value());
   if (a.com) check_same(*a.com, *b.com);
@@ -192,12 +239,15 @@ inline void check_same(const Scene& a, const Scene& b) {
   CHECK(a.gradient == b.gradient);
   check_close(a.rate, b.rate);
   check_close(a.duration, b.duration);
+  CHECK(a.net_stiffness == b.net_stiffness);
   REQUIRE(a.hands.size() == b.hands.size());
   for (std::size_t i = 0; i < a.hands.size(); ++i) {
     const SceneHand &x = a.hands[i], &y = b.hands[i];
     CHECK(x.body == y.body);
     CHECK(x.device == y.device);
-    CHECK(x.mode == y.mode);
+    check_same(x.def, y.def);
+    REQUIRE(x.arm.has_value() == y.arm.has_value());
+    if (x.arm) check_same(*x.arm, *y.arm);
     REQUIRE(x.path.size() == y.path.size());
     for (std::size_t r = 0; r < x.path.size(); ++r) {
       check_close(x.path[r].t, y.path[r].t);

@@ -1,0 +1,30 @@
+// hands.h - the devices of a scene's hands, by name.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hapsix/result.h"
+#include "io/load_scene.h"
+
+namespace h6::cli {
+
+// Devices and what they live in.
+struct Hands {
+  std::vector<h6Device> devices;
+  std::vector<std::shared_ptr<void>> alive;
+};
+
+// A name that nothing here has is one sentence.
+Outcome check_device(const std::string& name);
+
+// Opens what `hands` names, one for each hand of the session, and tells the session their ratings:
+//   path       follows the hand's path exactly, whatever is felt
+//   simulated  a person who follows it and yields
+//   arm        a simulated force-feedback arm, held by such a person; in the mode of `def`, with
+//              the figures of `arm`
+// `hands` are the scene's, changed at will; their `def` must be what the session was made of.
+Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,
+                         h6Session* session);
+
+}  // namespace h6::cli
