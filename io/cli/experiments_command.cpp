@@ -10,6 +10,7 @@
 #include "io/cli/checks.h"
 #include "io/cli/commands.h"
 #include "io/cli/experiments_studies.h"
+#include "io/cli/experiments_weighing.h"
 #include "io/write_aside.h"
 
 namespace h6::cli {
@@ -95,6 +96,12 @@ int experiments_command(const Console& console, const Options& o) {
         failed = std::string(row.scene->name) + ": " + run.error;
   }
   for (const Study& study : done) json["studies"][study.name] = study.json;
+  if (o.names.empty()) {  // with everything there
+    done.push_back(weigh_series(rows, columns, done));
+    json[done.back().name] = done.back().json;
+    if (!console.json)
+      std::printf("%s\n%s\n", done.back().title.c_str(), plain(done.back().table).c_str());
+  }
   if (!o.folder.empty()) {
     const std::string file = (std::filesystem::path(o.folder) / "EXPERIMENTS.md").string();
     const std::string text = markdown_report(rows, columns, done, seconds);

@@ -157,8 +157,10 @@ std::string markdown_report(const std::vector<SceneRow>& rows,
     for (const SceneRow& row : rows) out += scene_section(row, columns);
   }
   if (!studies.empty()) out += "## Studies\n\n";
-  for (const Study& study : studies)
+  for (const Study& study : studies) {
     out += "### " + study.title + "\n\n" + study.about + "\n\n" + markdown(study.table) + "\n";
+    if (!study.after.empty()) out += study.after + "\n\n";
+  }
   return out;
 }
 

@@ -15,6 +15,7 @@ std::string markdown(const TextTable& table);
 struct Study {
   std::string name, title, about;
   TextTable table;
+  std::string after;  // what follows from the table; may be empty
   nlohmann::ordered_json json;
 };
 

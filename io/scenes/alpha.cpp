@@ -6,16 +6,11 @@
 //              / \                other (their crossing segments, at right angles: axes then pass
 //             |   |  loop         14 / sqrt(2) = 9.9 mm apart, more than 8).
 //              \_/
-//
-// alpha-shortcut: the tool's loop hangs around the lower strand of the static alpha, and the hand
-// slides it along that strand like a ring, out of the loop, through the gap, off the tail's free
-// end. The way is free everywhere but in the gap; tubes 6 mm thick would pass.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "io/scenes/alpha.h"
-#include "io/scenes/list.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
 
@@ -100,79 +95,6 @@ Mesh strand(const Mesh& mesh, bool upper) {
   return out;
 }
 
-std::string millimetres(double metres) {
-  const auto hundredths = std::lround(metres / kMm * 100);
-  const auto cents = hundredths % 100;
-  return std::to_string(hundredths / 100) + "." + (cents < 10 ? "0" : "") + std::to_string(cents) +
-         " mm";
-}
-
-// ---- the shortcut ------------------------------------------------------------------------------
-
-// The static alpha's lower strand runs from the loop (t = -0.8) through the crossing (t = -1) to
-// its tail's end (t = -kEnd). The tool stands across it: its tip above the strand, its own crossing
-// and tails hanging below.
-constexpr double kStart = 0.8;
-constexpr double kSpeed = 50 * kMm;  // [m/s]
-
-// The strand's direction in the xy view where it crosses: outward.
-h6Vec3 outward() { return unit({kLoopLength, -kWidth, 0}); }
-
-h6Quat tool_orientation() {
-  const h6Vec3 u = outward(), down = {0, 0, -1};
-  // Tool axes in the world: x (tip to tails) down, z along the strand, y across it.
-  return from_axes(down, cross(u, down), u);
-}
-
-// The tip is the middle of a straight piece of tube, a little inside of the curve.
-h6Vec3 tip_of_tube() {
-  static const std::vector<double> parameters = equal_lengths(kSegments);
-  return 0.5 *
-         (alpha_point(parameters[kSegments / 2]) + alpha_point(parameters[kSegments / 2 + 1]));
-}
-
-h6Pose tool_with_tip_at(const h6Vec3& tip) {
-  const h6Quat q = tool_orientation();
-  return {tip - rotate(q, tip_of_tube()), q};
-}
-
-// Where the tip's axis is when the tool has come to t: midway between the strands at the crossing,
-// where it needs all the room there is, clear of the lower strand before and behind it.
-h6Vec3 tip_over_strand(double t) {
-  const double clear = 9.3 * kMm;
-  const double away = std::clamp(std::abs(t - 1) / 0.15, 0.0, 1.0);
-  return alpha_point(-t) + h6Vec3{0, 0, kLift + (clear - kLift) * away};
-}
-
-Path shortcut_path() {
-  HandPath hand(tool_with_tip_at(tip_over_strand(kStart)));
-  hand.wait(0.3);
-  h6Vec3 tip = tip_over_strand(kStart);
-  const auto slide_to = [&](const h6Vec3& next) {
-    hand.go_to(tool_with_tip_at(next), length(next - tip) / kSpeed);
-    tip = next;
-  };
-  constexpr int kSteps = 55;
-  for (int i = 1; i <= kSteps; ++i)
-    slide_to(tip_over_strand(kStart + (kEnd - kStart) * i / kSteps));
-  slide_to(tip + 88 * kMm * unit({1, -1, 0}));
-
-  // Twisting while it pulls: about each axis in turn.
-  const h6Pose end = hand.pose();
-  constexpr int kTwists = 150;
-  for (int i = 1; i <= kTwists; ++i) {
-    const double phase = 2 * std::numbers::pi * 3 * i / kTwists;
-    const double swing = 0.1 * std::sin(phase);
-    const int axis = (i - 1) / (kTwists / 3);
-    const h6Vec3 turn = {axis == 0 ? swing : 0, axis == 1 ? swing : 0, axis == 2 ? swing : 0};
-    hand.go_to({end.p, product(turn_by(turn), end.q)}, 0.01);
-  }
-  // Pulled with a constant force along a frictionless strand the tool swings like a pendulum; only
-  // the contacts damp it, with a time constant of two thirds of a second. Long enough to settle.
-  hand.wait(2.4);
-  return hand.rows();
-}
-
 }  // namespace
 
 h6Vec3 alpha_point(double t) {
@@ -180,6 +102,14 @@ h6Vec3 alpha_point(double t) {
 }
 
 double alpha_end() { return kEnd; }
+
+h6Vec3 alpha_outward() { return unit({kLoopLength, -kWidth, 0}); }
+
+h6Vec3 alpha_tip() {
+  static const std::vector<double> parameters = equal_lengths(kSegments);
+  return 0.5 *
+         (alpha_point(parameters[kSegments / 2]) + alpha_point(parameters[kSegments / 2 + 1]));
+}
 
 AlphaShape make_alpha() {
   AlphaShape out{sweep_tube(), kTubeRadius, 0};
@@ -208,30 +138,6 @@ Scene alpha_pair(const std::string& name, const std::string& about, const h6Pose
   tool.shell->bake.points = 25269;
   tool.shell->bake.levels = 7;
   scene.bodies.push_back(std::move(tool));
-  return scene;
-}
-
-Scene alpha_shortcut() {
-  const AlphaShape alpha = make_alpha();
-  Scene scene = alpha_pair(
-      "alpha-shortcut",
-      "Two alphas of 1,008 triangles, tube " + millimetres(2 * alpha.tube_radius) +
-          " thick, hooked together. The hand slides the tool's loop along a strand of the other, "
-          "through the gap between its crossing strands, which is only " +
-          millimetres(alpha.gap) +
-          " wide, then twists and pulls with 20 N, 3.7 times the force for which half a voxel is "
-          "promised. Forbidden: a region that no point of the tool reaches while the loops are "
-          "linked.",
-      tool_with_tip_at(tip_over_strand(kStart)));
-  scene.hands.push_back(path_hand("tool", shortcut_path()));
-
-  // Call the loops, closed by the straight segment across their gaps, rings. Linked rings: the
-  // static ring crosses the convex hull of the tool's ring, so every point of the tool is within
-  // 117 mm (its greatest distance from a point of its own ring) of a point of the static ring. No
-  // point of the static ring is within 120 mm of this box: a tool that touches it is no longer
-  // linked.
-  scene.verdict.forbidden.push_back(
-      {{88 * kMm, -300 * kMm, -300 * kMm}, {300 * kMm, -88 * kMm, 300 * kMm}});
   return scene;
 }
 

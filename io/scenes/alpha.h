@@ -10,4 +10,10 @@ namespace h6::io {
 // with 20 N at most. Without a hand and without a verdict.
 Scene alpha_pair(const std::string& name, const std::string& about, const h6Pose& tool);
 
+// The lower strand's direction in the xy view where the strands cross: out of the loop.
+h6Vec3 alpha_outward();
+// The tip of the loop, mesh frame: the middle of a straight piece of tube, a little inside of the
+// curve.
+h6Vec3 alpha_tip();
+
 }  // namespace h6::io

@@ -32,8 +32,11 @@ void press_box(Scene& scene, const Sampling& sampling, int nu, int nv) {
       {{10 * kMm, -12 * kMm, -30 * kMm}, {30 * kMm, 12 * kMm, -1.2 * kMm}});
 }
 
+void add_plate(Scene& scene, const char* name, double x0, double x1, double y0, double y1) {
+  scene.bodies.push_back(obstacle(name, box_mesh({x0, y0, -2 * kMm}, {x1, y1, 0}), kMm));
+}
 void add_plate(Scene& scene, const char* name, double x0, double x1, double half_y) {
-  scene.bodies.push_back(obstacle(name, box_mesh({x0, -half_y, -2 * kMm}, {x1, half_y, 0}), kMm));
+  add_plate(scene, name, x0, x1, -half_y, half_y);
 }
 
 }  // namespace
@@ -60,12 +63,24 @@ Scene box_on_plates_share(double share) {
   scene.coupling.rotational_stiffness = 0.05;
   scene.coupling.max_torque = 0.5;
   add_plate(scene, "large", -20 * kMm, -15 * kMm, 11 * kMm);
-  // 40 x 20 points, one a millimetre: rows of five at y = +-0.5, +-1.5, ... An even number of rows,
-  // the plate's edge between two of them.
-  const int pairs = std::max(1, static_cast<int>(std::lround(10 * share)));
-  // Shares below one pair of rows: only some of the points of each row.
-  const int per_row = std::max(1, static_cast<int>(std::lround(100 * share / (2 * pairs))));
-  add_plate(scene, "small", (20 - per_row) * kMm, 20 * kMm, pairs * kMm);
+  // 40 x 20 points, one a millimetre: rows of five at y = +-0.5, +-1.5, ... The plate's edges lie
+  // between rows, and its field must have an inside.
+  const int contacts = std::max(1, static_cast<int>(std::lround(100 * share)));
+  if (contacts > 5) {
+    const int pairs = std::max(1, static_cast<int>(std::lround(10 * share)));
+    const int per_row = static_cast<int>(std::lround(contacts / (2.0 * pairs)));
+    add_plate(scene, "small", (20 - per_row) * kMm, 20 * kMm, -pairs * kMm, pairs * kMm);
+  } else {
+    // Part of one row: the plate is 1 mm wide, and a field of 1 mm has its samples on both sides
+    // and nothing in between. Four samples instead; what counts in voxels stays as long as it was.
+    add_plate(scene, "small", (20 - contacts) * kMm, 20 * kMm, 0, kMm);
+    const double voxel = 0.25 * kMm;
+    for (SceneBody& plate : scene.bodies) plate.field->bake.voxel_size = voxel;
+    scene.contact.torque_length = kMm;
+    scene.contact.margin_voxels *= kMm / voxel;
+    scene.contact.cluster_voxels *= kMm / voxel;
+    scene.coupling.max_force = 5;
+  }
   press_box(scene, Sampling{}, 40, 20);
   return scene;
 }

@@ -20,4 +20,9 @@ Scene box_on_wall_explicit(int nu, int nv);         // Fig. 2: nu x nv points on
 // contact points, 1 or less.
 Scene box_on_plates_share(double share);
 
+// Fig. 8: alpha-shortcut for hands that push in other directions, and turn, where it is narrow.
+// Push 0, 1, ...: a path of the tool's hand; the same index is the same push anywhere.
+Scene alpha_pushes();
+Path alpha_push(int index);
+
 }  // namespace h6::io

@@ -77,7 +77,8 @@ TEST_CASE("studies say what they measured for every method") {
     CHECK(studies["smoothness"]["tilt to flat"].contains(method));
     CHECK(studies["net-stiffness"]["wall, 144"][method].contains("derivative"));
   }
-  CHECK(studies["plate-share"]["0.10"]["robust"]["verdict"] == "held");
+  for (const char* share : {"0.10", "0.05", "0.02", "0.01"})
+    CHECK(studies["plate-share"][share]["robust"]["verdict"] == "held");
   // A continuous force changes a tenth as much in a tenth of the time; a jump does not.
   const Json& edge = studies["smoothness"]["slide off an edge"];
   const auto shrinks = [&](const char* method) {
@@ -91,6 +92,33 @@ TEST_CASE("studies say what they measured for every method") {
   CHECK(std::abs(wall["gauss3"]["derivative"].get<double>() - 1) < 0.02);
   CHECK(wall["gauss6"]["derivative"].get<double>() < 2.01);
   CHECK(wall["robust"]["derivative"].get<double>() < 5);
+}
+
+TEST_CASE("two inclined planes are as stiff as their normals say, whatever the weights") {
+  Sandbox box;
+  const Json planes = result_of(box, {"experiments", "two-planes"})["studies"]["two-planes"];
+  CHECK(planes["alpha"].size() == 9);
+  // Each plane's contacts are one for the paper's weights: 2 sin^2 and 2 cos^2, and as many times
+  // that as the shares of 64 add up to for the others.
+  CHECK(std::abs(planes["per_plane"]["gauss3"].get<double>() - 1) < 0.01);
+  CHECK(std::abs(planes["per_plane"]["none"].get<double>() - 64) < 0.1);
+  for (const char* method : {"none", "global", "gauss3", "gauss6", "robust"})
+    CHECK(planes["deviation"][method].get<double>() < 0.01);
+  const Json& steep = planes["alpha"]["75"]["gauss3"];
+  CHECK(std::abs(steep["x"].get<double>() - 1.866) < 0.01);
+  CHECK(std::abs(steep["z"].get<double>() - 0.134) < 0.01);
+}
+
+TEST_CASE("global scaling fails where it is said to, and with less stiffness where it does not") {
+  Sandbox box;
+  const Json found = result_of(box, {"experiments", "global"})["studies"]["global"];
+  for (const char* scene : {"cone-in-gap", "rod-between-tubes", "peg-in-hole", "box-over-post"})
+    CHECK(found[scene]["n0 = 10"]["fails"] == true);
+  for (const auto& [scene, row] : found.items()) {
+    CAPTURE(scene);
+    CHECK(row["n0 = 1"]["fails"] == true);
+    CHECK(row["robust"]["fails"] == false);
+  }
 }
 
 TEST_CASE("an experiment that does not exist is told, with the nearest name") {

@@ -178,7 +178,7 @@ TEST_CASE("integrated explicitly, the unscaled penalty is unstable where the sca
 }
 
 TEST_CASE("the second plate's contacts are the share of the first one's that was asked for") {
-  for (const double share : {1.0, 0.6, 0.4, 0.2, 0.1, 0.02}) {
+  for (const double share : {1.0, 0.6, 0.4, 0.2, 0.1, 0.06, 0.05, 0.02, 0.01}) {
     const Scene scene = box_on_plates_share(share);
     const PointCloud& c = points_of(scene);
     const auto over = [&](const std::string& name) {
