@@ -33,7 +33,10 @@ using Session = std::unique_ptr<h6Session, SessionDeleter>;
 
 h6DeviceSample sample_at(double t) {
   const io::Path& path = alpha()->scene.hands[0].path;
-  return {io::sample_path(path, t), io::sample_path_velocity(path, t), 0};
+  h6DeviceSample sample{};
+  sample.pose = io::sample_path(path, t);
+  sample.velocity = io::sample_path_velocity(path, t);
+  return sample;
 }
 
 // Follows the scene's hand until the tool has `contacts`, at most to the path's end.
