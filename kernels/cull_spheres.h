@@ -24,19 +24,32 @@ inline constexpr float cull_reach(float s, bool wide) {
   return (s < kShortReach && !wide ? kSqrt3 * s : s + kSqrt3) + kReachRounding;
 }
 
+// How far something may move, at least, before a point that samples `distance` above the margin can
+// come within it: cull_reach turned round. Negative when it may touch already.
+inline constexpr float cull_clearance(float distance, bool wide) {
+  const float d = distance - kReachRounding;
+  const float long_form = d - kSqrt3;
+  if (wide) return long_form;
+  const float short_form = d * (1.0f / kSqrt3);
+  return short_form < kShortReach ? short_form
+         : long_form > kShortReach ? long_form
+                                   : kShortReach - 1e-4f;
+}
+
 // Writes to `survivors` (room for `count`; may be `rows` itself) every row r among rows[0..count-1]
 // (or first..first+count-1 when rows is null), in that order, with
 //     distance(r) <= cull_reach(radius[r] * radius_scale, wide) + margin        [voxels]
-// distance as sample_field says. Returns how many were written. When `distances` (room for
-// `count`) is not null it gets the distance of each survivor. Rows past the survivors hold nothing
-// of use.
+// distance as sample_field says. Returns how many were written. When `clearance` (room for `count`)
+// is not null, entry k says how far the shell may move in the field's frame before sphere rows[k]
+// may hold a contact: cull_clearance(distance - margin) - radius; <= 0 of survivors. Rows past the
+// survivors hold nothing of use.
 std::size_t cull_spheres(const FieldView& field, const Affine& to_field, const SpheresView& spheres,
                          float radius_scale, bool wide, float margin, const std::uint32_t* rows,
                          std::uint32_t first, std::size_t count, std::uint32_t* survivors,
-                         float* distances);
+                         float* clearance);
 std::size_t cull_spheres_ref(const FieldView& field, const Affine& to_field,
                              const SpheresView& spheres, float radius_scale, bool wide,
                              float margin, const std::uint32_t* rows, std::uint32_t first,
-                             std::size_t count, std::uint32_t* survivors, float* distances);
+                             std::size_t count, std::uint32_t* survivors, float* clearance);
 
 }  // namespace h6::kernels

@@ -1,19 +1,24 @@
 // find_contacts.cpp - which points of a shell are inside a field, and what their contacts are.
 //
-// Xu & Barbic 2016, Sec. 3 after McNeely 1999: breadth first over nested levels; a node whose
-// signed distance exceeds its sphere is dropped with all its descendants. METHOD.md, Sec. 6.
+// Xu & Barbic 2016, Sec. 3 after McNeely 1999: a sphere whose signed distance exceeds its radius is
+// dropped with all its points. Here in flat tiers, and a sphere that was dropped stays so until the
+// shell has moved as far as it was clear. METHOD.md, Sec. 6.
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "kernels/cull_spheres.h"
-#include "kernels/sample_field.h"
+#include "kernels/expiry.h"
+#include "kernels/touch_groups.h"
 #include "runtime/stages.h"
 
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSlice = 2048;         // rows of a frontier culled at a time
-constexpr std::size_t kWorthSharing = 8192;  // rows from which the helper is asked
+constexpr std::size_t kSlice = 64;           // groups sampled at a time: some 2 us
+constexpr std::size_t kWorthSharing = 256;   // groups from which the helper is asked: some 8 us
+constexpr float kSlack = 1e-3f;              // [voxel]
+constexpr double kLongestWay = 256;          // [voxel] float has 3e-5 left there
 
 // Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
 kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
@@ -48,74 +53,128 @@ bool is_sampled(const kernels::FieldView& field, const kernels::Affine& to_field
   return field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]] >= 0;
 }
 
-struct Cull {
+kernels::Touching candidates_from(const h6Session& s, std::size_t at) {
+  return {s.candidate + at, s.candidate_distance + at, s.gradient_x + at, s.gradient_y + at,
+          s.gradient_z + at};
+}
+
+void move_candidates(h6Session& s, std::size_t to, std::size_t from, std::size_t count) {
+  if (to == from) return;
+  std::memmove(s.candidate + to, s.candidate + from, count * sizeof *s.candidate);
+  for (float* c : {s.candidate_distance, s.gradient_x, s.gradient_y, s.gradient_z})
+    std::memmove(c + to, c + from, count * sizeof *c);
+}
+
+// What one traversal needs of a pair.
+struct Search {
   const kernels::FieldView& field;
-  kernels::Affine affine;
-  kernels::SpheresView spheres;
-  float scale;
+  const Shell& shell;
+  kernels::Affine place;
+  float scale;  // voxels a metre
   bool wide;
   float margin;  // [voxel]
 
-  std::size_t operator()(const std::uint32_t* rows, std::uint32_t first, std::size_t count,
-                         std::uint32_t* out, float* distance) const {
-    return kernels::cull_spheres(field, affine, spheres, scale, wide, margin, rows, first, count,
-                                 out, distance);
+  std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
+                   std::uint32_t* survivors, float* clearance) const {
+    return kernels::cull_spheres(
+        field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
+        wide, margin, rows, 0, count, survivors, clearance);
+  }
+  std::size_t touch(const std::uint32_t* groups, std::size_t count,
+                    const kernels::Touching& out, float* least) const {
+    return kernels::touch_groups(field, place,
+                                 {shell.x.data, shell.y.data, shell.z.data, shell.points}, groups,
+                                 count, margin, out, least);
   }
 };
 
-// Rows that may touch, in order, whatever runs the slices.
-std::size_t cull(h6Session& s, const Cull& cull, const std::uint32_t* rows, std::uint32_t first,
-                 std::size_t count, std::uint32_t* out, float* distance) {
+// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`.
+std::size_t touch(h6Session& s, const Search& search, const std::uint32_t* groups,
+                  std::size_t count, std::size_t used) {
   if (count < kWorthSharing || s.team->threads() == 1)
-    return cull(rows, first, count, out, distance);
+    return search.touch(groups, count, candidates_from(s, used), s.clearance);
   const std::size_t slices = (count + kSlice - 1) / kSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
     const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
-    s.slice_count[i] = cull(rows ? rows + at : nullptr, first + static_cast<std::uint32_t>(at), n,
-                            out + at, distance ? distance + at : nullptr);
+    s.slice_count[i] = search.touch(
+        groups + at, n, candidates_from(s, used + at * kGroupRows), s.clearance + at);
   });
   std::size_t kept = s.slice_count[0];
   for (std::size_t i = 1; i < slices; ++i) {
-    std::memmove(out + kept, out + i * kSlice, s.slice_count[i] * sizeof *out);
-    if (distance)
-      std::memmove(distance + kept, distance + i * kSlice, s.slice_count[i] * sizeof *distance);
+    move_candidates(s, used + kept, used + i * kSlice * kGroupRows, s.slice_count[i]);
     kept += s.slice_count[i];
   }
   return kept;
 }
 
-std::size_t expand(const Shell& shell, const std::uint32_t* nodes, std::size_t count,
-                   std::uint32_t* out) {
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t child = shell.first_child[nodes[i]],
-                        end = child + shell.child_count[nodes[i]];
-    for (std::uint32_t c = child; c < end; ++c) out[n++] = c;
+// How far [voxel] any point within `radius` of the shell's centre moved between two places: never
+// less.
+double motion_bound(const kernels::Affine& from, const kernels::Affine& to, double radius) {
+  double turn = 0, shift = 0;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      const double d = double(to.m[r][c]) - from.m[r][c];
+      turn += d * d;
+    }
+    const double d = double(to.m[r][3]) - from.m[r][3];
+    shift += d * d;
   }
-  return n;
+  return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
 }
 
-// Candidates of one pair go behind `used`; returns how many there are.
-std::size_t traverse_pair(h6Session& s, const Pair& pair, std::size_t used) {
+// When what is clear by this much may touch. kSlack takes up the rounding of both to float.
+float expiry_of(float now, float clearance) { return now + std::max(clearance - kSlack, 0.0f); }
+
+// Where the shell has got to, as length of the way; starts anew when that becomes too long for
+// float, or nothing is known.
+float travel(Pair& pair, const Search& search) {
+  const Shell& shell = search.shell;
+  if (pair.travelled >= 0)
+    pair.travelled += motion_bound(pair.last_place, search.place, shell.radius * (1 + 1e-6));
+  if (!(pair.travelled >= 0 && pair.travelled < kLongestWay)) {
+    pair.travelled = 0;
+    std::fill_n(pair.group_expiry, shell.groups.count, 0.0f);
+    std::fill(pair.group_expiry + shell.groups.count, pair.group_expiry + 16 * shell.blocks.count,
+              HUGE_VALF);
+    std::fill_n(pair.block_expiry, shell.blocks.count, 0.0f);
+    std::fill(pair.block_expiry + shell.blocks.count, pair.block_expiry + shell.blocks.x.count,
+              HUGE_VALF);
+  }
+  pair.last_place = search.place;
+  return static_cast<float>(pair.travelled);
+}
+
+// Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
+// points; of each only what may have come within reach since it was last looked at.
+std::size_t traverse_pair(h6Session& s, Pair& pair, std::size_t used) {
   const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Shell& shell = s.model->shells[a.shell];
   const Field& field = s.model->fields[b.field];
   const float margin = margin_of(s);
-  const Cull test{field.view,
-                  shell_to_field(a, shell, b, field),
-                  {shell.x.data, shell.y.data, shell.z.data, shell.node_radius.data, shell.nodes},
-                  static_cast<float>(1.0 / field.voxel),
-                  // The short form of culling is proved up to half a voxel of margin.
-                  field.wide || margin > 0.5f,
-                  margin};
-  const std::uint32_t* rows = nullptr;  // the whole first level
-  std::size_t count = shell.level_first[1];
-  for (std::uint32_t level = 0; level + 1 < shell.levels && count; ++level) {
-    const std::size_t kept = cull(s, test, rows, 0, count, s.survivors, nullptr);
-    count = expand(shell, s.survivors, kept, s.frontier);
-    rows = s.frontier;
-  }
-  return cull(s, test, rows, 0, count, s.candidate + used, s.candidate_distance + used);
+  // The short form of culling is proved up to half a voxel of margin.
+  const Search search{field.view, shell, shell_to_field(a, shell, b, field),
+                      static_cast<float>(1.0 / field.voxel), field.wide || margin > 0.5f, margin};
+  const float now = travel(pair, search);
+
+  std::size_t count =
+      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, s.frontier);
+  if (count == 0) return 0;
+  const std::size_t blocks = search.cull(shell.blocks, s.frontier, count, s.survivors, s.clearance);
+  for (std::size_t k = 0; k < count; ++k)
+    pair.block_expiry[s.frontier[k]] = expiry_of(now, s.clearance[k]);
+  if (blocks == 0) return 0;
+
+  count = kernels::expired(pair.group_expiry, s.survivors, blocks, now, s.frontier);
+  std::copy_n(s.survivors, blocks, s.open_blocks);
+  const std::size_t groups = search.cull(shell.groups, s.frontier, count, s.survivors, s.clearance);
+  for (std::size_t k = 0; k < count; ++k)
+    pair.group_expiry[s.frontier[k]] = expiry_of(now, s.clearance[k]);
+  const std::size_t found = touch(s, search, s.survivors, groups, used);
+  for (std::size_t k = 0; k < groups; ++k)
+    pair.group_expiry[s.survivors[k]] =
+        expiry_of(now, kernels::cull_clearance(s.clearance[k] - margin, search.wide));
+  kernels::least_of_blocks(pair.group_expiry, s.open_blocks, blocks, pair.block_expiry);
+  return found;
 }
 
 // Keeps the `most` deepest of `count` candidates, in their order. Ties go to the first.
@@ -133,13 +192,26 @@ std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair
       const float d = s.candidate_distance[i];
       if (d > limit || (d == limit && ties == 0)) continue;
       ties -= d == limit;
-      s.candidate[n] = s.candidate[i];
-      s.candidate_distance[n++] = d;
+      move_candidates(s, n++, i, 1);
     }
     pairs[p].candidates = n - first;
     pairs[p].first = first;
   }
   return n;
+}
+
+// Points that are only about to touch count where their gap is a sample.
+void drop_unsampled(h6Session& s, Pair& pair, const Shell& shell, const Field& field,
+                    const kernels::Affine& to_field) {
+  std::size_t n = pair.first;
+  for (std::size_t i = pair.first; i < pair.first + pair.candidates; ++i) {
+    const std::uint32_t row = s.candidate[i];
+    if (!(s.candidate_distance[i] < 0) &&
+        !is_sampled(field.view, to_field, shell.x[row], shell.y[row], shell.z[row]))
+      continue;
+    move_candidates(s, n++, i, 1);
+  }
+  pair.candidates = n - pair.first;
 }
 
 }  // namespace
@@ -162,51 +234,31 @@ void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
 void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   Contacts& c = s.contacts[s.pairs[first_pair].a];
   c.count = 0;
+  const float margin = margin_of(s);
   for (std::size_t p = first_pair; p < end_pair; ++p) {
     Pair& pair = s.pairs[p];
     const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
     const Shell& shell = s.model->shells[a.shell];
     const Field& field = s.model->fields[b.field];
-    const std::uint32_t* rows = s.candidate + pair.first;
-    const kernels::Affine to_field = shell_to_field(a, shell, b, field);
-    const float margin = margin_of(s);
-    kernels::sample_field(field.view, to_field,
-                          {shell.x.data, shell.y.data, shell.z.data, shell.nodes}, rows,
-                          pair.candidates, s.candidate_distance + pair.first, s.gradient_x,
-                          s.gradient_y, s.gradient_z);
-    const Eigen::Matrix3f Ra = a.R.cast<float>(), Rb = b.R.cast<float>();
-    const Eigen::Vector3f arm0 = (a.R * (shell.centre - a.com)).cast<float>();
-    const float voxel = static_cast<float>(field.voxel);
-    pair.begin = c.count;
-    for (std::size_t k = 0; k < pair.candidates; ++k) {
-      const float d = s.candidate_distance[pair.first + k];
-      // Exactly on the surface: no depth, no force.
-      if (!(d < 0) && !(d < margin)) continue;
-      const std::uint32_t row = rows[k], point = shell.node_point[row];
-      if (!(d < 0) && !is_sampled(field.view, to_field, shell.x[row], shell.y[row], shell.z[row]))
-        continue;
-      const Eigen::Vector3f n =
-          Ra * Eigen::Vector3f(shell.nx[point], shell.ny[point], shell.nz[point]);
-      Eigen::Vector3f g = Rb * Eigen::Vector3f(s.gradient_x[k], s.gradient_y[k], s.gradient_z[k]);
-      const float length = g.norm();
-      // Where the gradient vanishes (a medial sheet) it has no direction: take the point's own.
-      g = length > 1e-6f ? Eigen::Vector3f(g / length) : n;
-      const Eigen::Vector3f r =
-          Ra * Eigen::Vector3f(shell.x[row], shell.y[row], shell.z[row]) + arm0;
-      const std::size_t i = c.count++;
-      c.depth[i] = -d * voxel;
-      c.nx[i] = n.x();
-      c.ny[i] = n.y();
-      c.nz[i] = n.z();
-      c.gx[i] = g.x();
-      c.gy[i] = g.y();
-      c.gz[i] = g.z();
-      c.rx[i] = r.x();
-      c.ry[i] = r.y();
-      c.rz[i] = r.z();
-      c.point[i] = point;
-      c.field_body[i] = pair.b;
+    if (margin > 0) drop_unsampled(s, pair, shell, field, shell_to_field(a, shell, b, field));
+    const std::size_t first = c.count;
+    kernels::ContactFrame frame;
+    const Vec3 arm = a.R * (shell.centre - a.com);
+    for (int k = 0; k < 9; ++k) {
+      frame.Ra[k] = static_cast<float>(a.R(k / 3, k % 3));
+      frame.Rb[k] = static_cast<float>(b.R(k / 3, k % 3));
     }
+    for (int k = 0; k < 3; ++k) frame.arm[k] = static_cast<float>(arm[k]);
+    frame.voxel = static_cast<float>(field.voxel);
+    kernels::make_contacts({shell.x.data, shell.y.data, shell.z.data, shell.nx.data, shell.ny.data,
+                            shell.nz.data, shell.point.data},
+                           candidates_from(s, pair.first), pair.candidates, frame,
+                           {c.depth + first, c.nx + first, c.ny + first, c.nz + first,
+                            c.gx + first, c.gy + first, c.gz + first, c.rx + first, c.ry + first,
+                            c.rz + first, c.point + first});
+    c.count += pair.candidates;
+    pair.begin = first;
+    std::fill_n(c.field_body + first, pair.candidates, pair.b);
     pair.end = c.count;
   }
 }

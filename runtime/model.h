@@ -17,19 +17,25 @@ struct Field {
   std::size_t bytes() const { return table.count * 4 + bricks.count * 2 + far.count * 2; }
 };
 
-// Coordinates are relative to `centre`, so that float serves meshes far from their origin. Node
-// columns repeat the point's coordinates: traversal reads them in order.
-struct Shell {
-  Vec3 centre;        // mesh frame [m]
-  double radius = 0;  // farthest point from the centre [m]
-  std::size_t points = 0, nodes = 0;
-  std::uint32_t levels = 0;
-  Buffer<float> x, y, z, node_radius;                          // (nodes)
-  Buffer<float> nx, ny, nz;                                    // (points) inward
-  Buffer<std::uint32_t> node_point, first_child, child_count;  // (nodes)
-  Buffer<std::uint32_t> level_first;                           // (levels + 1)
-  std::size_t bytes() const { return nodes * 28 + points * 12; }
+// Spheres around equal runs of points; the radius is rounded up.
+struct Tier {
+  std::size_t count = 0;
+  Buffer<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
 };
+
+// A shell's points in three flat tiers. Rows are sorted so that those next to each other are near
+// each other (split at medians): 16 rows are a group, 16 groups a block, each with its smallest
+// sphere. Coordinates are relative to `centre`, so that float serves meshes far from their origin.
+struct Shell {
+  Vec3 centre;             // mesh frame [m]
+  double radius = 0;       // farthest point from the centre [m]
+  std::size_t points = 0;  // rows; columns repeat the last one up to a whole block
+  Buffer<float> x, y, z, nx, ny, nz;  // normals point inward
+  Buffer<std::uint32_t> point;        // of the definition
+  Tier groups, blocks;
+  std::size_t bytes() const { return x.count * 28 + (groups.x.count + blocks.x.count) * 16; }
+};
+inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;
 
 // Convert one definition; false with a sentence when it is not valid or memory is out.
 bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field, h6Error* error);

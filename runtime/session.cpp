@@ -39,8 +39,7 @@ std::vector<h6PairDef> pairs_of(const h6SessionDef& def) {
 // Each point an equal share of the mass; a little is added where points lie on a line or a spot.
 Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) {
   Mat3 I = Mat3::Zero();
-  const std::uint32_t first = shell.level_first[shell.levels - 1];
-  for (std::size_t r = first; r < shell.nodes; ++r) {
+  for (std::size_t r = 0; r < shell.points; ++r) {
     const Vec3 p = Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - com;
     I += mass / static_cast<double>(shell.points) *
          (p.squaredNorm() * Mat3::Identity() - p * p.transpose());
@@ -67,7 +66,7 @@ void set_body(h6Session& s, std::size_t i, const h6BodyDef& def,
   body.voxel = voxel < HUGE_VAL ? voxel : 1e-3;
   if (body.shell >= 0) {
     const Shell& shell = s.model->shells[body.shell];
-    for (std::size_t r = shell.level_first[shell.levels - 1]; r < shell.nodes; ++r)
+    for (std::size_t r = 0; r < shell.points; ++r)
       body.radius = std::max(
           body.radius, (Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - body.com).norm());
   }
@@ -153,7 +152,9 @@ std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>&
 }
 
 struct Sizes {
-  std::size_t bodies, pairs, hands, nodes, points;
+  std::size_t bodies, pairs, hands;
+  std::size_t groups, blocks;  // of the largest shell, and (all) of all pairs together
+  std::size_t all_groups, all_blocks;
   std::vector<bool> touches;  // (bodies) the body is the shell of a pair
 };
 
@@ -170,29 +171,36 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
     if (n.touches[i]) take_columns(columns, arena, s.max_contacts);
     if (s.contacts) s.contacts[i] = columns;
   }
-  s.candidate_capacity = s.max_contacts + n.points;
-  s.frontier = arena.take<std::uint32_t>(n.nodes);
-  s.survivors = arena.take<std::uint32_t>(n.nodes);
+  s.candidate_capacity = s.max_contacts + kGroupRows * n.groups;
+  s.frontier = arena.take<std::uint32_t>(n.groups);
+  s.survivors = arena.take<std::uint32_t>(n.groups);
+  s.open_blocks = arena.take<std::uint32_t>(n.blocks);
+  s.clearance = arena.take<float>(n.groups);
+  s.group_expiry = arena.take<float>(n.all_groups);
+  s.block_expiry = arena.take<float>(n.all_blocks);
   s.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
   for (float** column : {&s.candidate_distance, &s.scratch_depth})
     *column = arena.take<float>(s.candidate_capacity);
   for (float** column : {&s.gradient_x, &s.gradient_y, &s.gradient_z})
-    *column = arena.take<float>(s.max_contacts);
+    *column = arena.take<float>(s.candidate_capacity);
   const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
   s.cluster_order = arena.take<std::uint32_t>(merged);
   s.cluster_root = arena.take<std::uint32_t>(merged);
   s.cluster_cell = arena.take<std::uint64_t>(merged);
-  s.slice_count = arena.take<std::size_t>(n.nodes / 1024 + 1);
+  s.slice_count = arena.take<std::size_t>(n.groups / 64 + 1);
   s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / 1024 + 1);
 }
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const std::vector<h6PairDef> pairs = pairs_of(def);
-  Sizes n{def.body_count, pairs.size(), def.hand_count, 1, 1, std::vector<bool>(def.body_count)};
+  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0,
+          std::vector<bool>(def.body_count)};
   for (const h6PairDef& p : pairs) {
     const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
-    n.nodes = std::max(n.nodes, shell.nodes);
-    n.points = std::max(n.points, shell.points);
+    n.groups = std::max(n.groups, 16 * shell.blocks.count);
+    n.blocks = std::max(n.blocks, shell.blocks.x.count);
+    n.all_groups += 16 * shell.blocks.count;
+    n.all_blocks += shell.blocks.x.count;
     n.touches[p.shell_body] = true;
   }
   Arena count;
@@ -214,10 +222,16 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   }
   for (std::size_t i = 0; i < n.bodies; ++i) set_body(s, i, def.bodies[i], pairs);
   s.pair_count = n.pairs;
+  float *group_expiry = s.group_expiry, *block_expiry = s.block_expiry;
   for (std::size_t i = 0; i < n.pairs; ++i) {
     new (&s.pairs[i]) Pair();
     s.pairs[i].a = pairs[i].shell_body;
     s.pairs[i].b = pairs[i].field_body;
+    s.pairs[i].group_expiry = group_expiry;
+    s.pairs[i].block_expiry = block_expiry;
+    const Shell& shell = s.model->shells[s.bodies[s.pairs[i].a].shell];
+    group_expiry += 16 * shell.blocks.count;
+    block_expiry += shell.blocks.x.count;
   }
   s.hand_count = n.hands;
   for (std::size_t i = 0; i < n.hands; ++i) {

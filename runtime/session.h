@@ -50,6 +50,11 @@ struct Pair {
   std::int32_t a = -1, b = -1;
   std::size_t begin = 0, end = 0;         // its rows among a's contacts
   std::size_t candidates = 0, first = 0;  // its rows among the candidates
+  // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch before
+  // `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
+  float *group_expiry = nullptr, *block_expiry = nullptr;
+  double travelled = -1;         // < 0: nothing is known
+  kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
   // When both move: how each one's motion changes the other's wrench.
   Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
   // `series` lets the field bodies of one shell body feel one another: pair p's wrench on b_p
@@ -114,8 +119,11 @@ struct h6Session {
   h6::Contacts* contacts = nullptr;  // (bodies); capacity 0 without a shell
 
   // Scratch of one pair's traversal and one shell body's contacts.
-  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's nodes)
-  std::uint32_t* candidate = nullptr;                       // rows of the last level that touch
+  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's groups)
+  std::uint32_t* open_blocks = nullptr;                     // (largest shell's blocks)
+  float* clearance = nullptr;                               // (largest shell's groups) [voxel]
+  float *group_expiry = nullptr, *block_expiry = nullptr;   // of all pairs
+  std::uint32_t* candidate = nullptr;                       // rows of the shell that touch
   float* candidate_distance = nullptr;                      // [voxel]
   float* scratch_depth = nullptr;                           // to find the deepest
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;

@@ -1,4 +1,4 @@
-// shell.cpp - checks a shell's tree and lays its nodes out for traversal.
+// shell.cpp - checks a shell and its tree, and lays its points out for traversal: METHOD.md, Sec. 6.
 #include <algorithm>
 #include <cmath>
 
@@ -84,48 +84,110 @@ bool check_spheres(const h6ShellDef& def, h6Error* error) {
   return true;
 }
 
+// Splits rows [begin, end) at medians of the longest axis until they fit in `unit`; parts before the
+// last are whole multiples of it.
+void split_at_medians(std::uint32_t* rows, std::size_t begin, std::size_t end, std::size_t unit,
+                      const float* const axes[3]) {
+  if (end - begin <= unit) return;
+  int axis = 0;
+  float longest = -1;
+  for (int k = 0; k < 3; ++k) {
+    float low = axes[k][rows[begin]], high = low;
+    for (std::size_t i = begin; i < end; ++i) {
+      low = std::min(low, axes[k][rows[i]]);
+      high = std::max(high, axes[k][rows[i]]);
+    }
+    if (high - low > longest) longest = high - low, axis = k;
+  }
+  const std::size_t units = (end - begin + unit - 1) / unit;
+  const std::size_t middle = begin + units / 2 * unit;
+  const float* column = axes[axis];
+  // Ties by number: the order does not depend on the library.
+  std::nth_element(rows + begin, rows + middle, rows + end,
+                   [column](std::uint32_t a, std::uint32_t b) {
+                     return column[a] != column[b] ? column[a] < column[b] : a < b;
+                   });
+  split_at_medians(rows, begin, middle, unit, axes);
+  split_at_medians(rows, middle, end, unit, axes);
+}
+
+// Nearly the smallest sphere of rows [begin, end): steps towards the farthest point, ever shorter
+// (Badoiu & Clarkson 2003). Whatever the centre, the radius holds them all.
+void enclose(const Shell& shell, std::size_t begin, std::size_t end, Tier& tier, std::size_t at) {
+  Vec3 c = Vec3::Zero();
+  for (std::size_t i = begin; i < end; ++i) c += Vec3(shell.x[i], shell.y[i], shell.z[i]);
+  c /= static_cast<double>(end - begin);
+  for (int step = 0; step < 64; ++step) {
+    std::size_t farthest = begin;
+    double most = -1;
+    for (std::size_t i = begin; i < end; ++i) {
+      const double d = (Vec3(shell.x[i], shell.y[i], shell.z[i]) - c).squaredNorm();
+      if (d > most) most = d, farthest = i;
+    }
+    c += (Vec3(shell.x[farthest], shell.y[farthest], shell.z[farthest]) - c) / (step + 2);
+  }
+  const Eigen::Vector3f f = c.cast<float>();
+  double radius = 0;
+  for (std::size_t i = begin; i < end; ++i)
+    radius = std::max(
+        radius, (Vec3(shell.x[i], shell.y[i], shell.z[i]) - f.cast<double>()).norm());
+  tier.x[at] = f.x(), tier.y[at] = f.y(), tier.z[at] = f.z();
+  tier.radius[at] = static_cast<float>(radius * 1.000001);
+}
+
+bool make_tier(const Shell& shell, std::size_t rows, const h6Allocator& allocator, Tier& tier) {
+  tier.count = (shell.points + rows - 1) / rows;
+  const std::size_t padded = (tier.count + 15) / 16 * 16;
+  for (Buffer<float>* column : {&tier.x, &tier.y, &tier.z, &tier.radius})
+    if (!column->reserve(allocator, padded)) return false;
+  for (std::size_t i = 0; i < tier.count; ++i)
+    enclose(shell, i * rows, std::min((i + 1) * rows, shell.points), tier, i);
+  for (std::size_t i = tier.count; i < padded; ++i)
+    for (Buffer<float>* column : {&tier.x, &tier.y, &tier.z, &tier.radius})
+      (*column)[i] = (*column)[tier.count - 1];
+  return true;
+}
+
 }  // namespace
 
 bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
                    h6Error* error) {
   if (!check_points(def, error) || !check_tree(def, error) || !check_spheres(def, error))
     return false;
-  shell->points = def.point_count;
-  shell->levels = def.level_count;
-  shell->nodes = def.level_first[def.level_count];
-  bool reserved = shell->level_first.reserve(allocator, def.level_count + 1);
-  for (Buffer<float>* b : {&shell->x, &shell->y, &shell->z, &shell->node_radius})
-    reserved = b->reserve(allocator, shell->nodes) && reserved;
-  for (Buffer<float>* b : {&shell->nx, &shell->ny, &shell->nz})
-    reserved = b->reserve(allocator, shell->points) && reserved;
-  for (Buffer<std::uint32_t>* b : {&shell->node_point, &shell->first_child, &shell->child_count})
-    reserved = b->reserve(allocator, shell->nodes) && reserved;
-  if (!reserved) return fail(error, "no memory for %zu nodes", shell->nodes);
+  const std::size_t n = shell->points = def.point_count;
+  const std::size_t padded = (n + kBlockRows - 1) / kBlockRows * kBlockRows;
+  bool reserved = shell->point.reserve(allocator, padded);
+  for (Buffer<float>* b : {&shell->x, &shell->y, &shell->z, &shell->nx, &shell->ny, &shell->nz})
+    reserved = b->reserve(allocator, padded) && reserved;
+  if (!reserved) return fail(error, "no memory for %zu points", n);
+
+  std::uint32_t* rows = shell->point.data;
+  for (std::size_t i = 0; i < n; ++i) rows[i] = static_cast<std::uint32_t>(i);
+  const float* const axes[3] = {def.x, def.y, def.z};
+  split_at_medians(rows, 0, n, kBlockRows, axes);
+  for (std::size_t first = 0; first < n; first += kBlockRows)
+    split_at_medians(rows, first, std::min(n, first + kBlockRows), kGroupRows, axes);
+  for (std::size_t i = n; i < padded; ++i) rows[i] = rows[n - 1];
 
   Vec3 low = Vec3::Constant(HUGE_VAL), high = -low;
-  for (std::size_t i = 0; i < def.point_count; ++i) {
+  for (std::size_t i = 0; i < n; ++i) {
     const Vec3 p(def.x[i], def.y[i], def.z[i]);
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
   shell->centre = 0.5 * (low + high);
-  for (std::size_t r = 0; r < shell->nodes; ++r) {
-    const std::uint32_t p = def.node_point[r];
+  for (std::size_t i = 0; i < padded; ++i) {
+    const std::uint32_t p = rows[i];
     const Vec3 q = Vec3(def.x[p], def.y[p], def.z[p]) - shell->centre;
-    shell->x[r] = static_cast<float>(q.x());
-    shell->y[r] = static_cast<float>(q.y());
-    shell->z[r] = static_cast<float>(q.z());
+    shell->x[i] = static_cast<float>(q.x());
+    shell->y[i] = static_cast<float>(q.y());
+    shell->z[i] = static_cast<float>(q.z());
+    shell->nx[i] = def.nx[p], shell->ny[i] = def.ny[p], shell->nz[i] = def.nz[p];
     shell->radius = std::max(shell->radius, q.norm());
-    // Rounded up: moving the points to the centre rounds them by an ulp each.
-    shell->node_radius[r] = def.node_radius[r] * 1.00001f;
-    shell->node_point[r] = p;
-    shell->first_child[r] = def.node_first_child[r];
-    shell->child_count[r] = def.node_child_count[r];
   }
-  std::copy_n(def.nx, def.point_count, shell->nx.data);
-  std::copy_n(def.ny, def.point_count, shell->ny.data);
-  std::copy_n(def.nz, def.point_count, shell->nz.data);
-  std::copy_n(def.level_first, def.level_count + 1, shell->level_first.data);
+  if (!make_tier(*shell, kGroupRows, allocator, shell->groups) ||
+      !make_tier(*shell, kBlockRows, allocator, shell->blocks))
+    return fail(error, "no memory for the spheres of %zu points", n);
   return true;
 }
 
