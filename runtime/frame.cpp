@@ -13,12 +13,19 @@
 namespace h6 {
 namespace {
 
-template <class F>
-void timed(h6Session& s, h6Stage stage, F&& work) {
-  const std::int64_t start = sched::now_ns();
-  work();
-  s.report.stage_us[stage] += 1e-3 * static_cast<double>(sched::now_ns() - start);
-}
+// A stage begins where the one before it ended: one reading of the clock each, not two.
+struct Stopwatch {
+  h6Session& s;
+  std::int64_t last;
+
+  template <class F>
+  void timed(h6Stage stage, F&& work) {
+    work();
+    const std::int64_t now = sched::now_ns();
+    s.report.stage_us[stage] += 1e-3 * static_cast<double>(now - last);
+    last = now;
+  }
+};
 
 void begin(h6Session& s, const h6DeviceSample* samples) {
   s.report = {};
@@ -58,20 +65,21 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   const std::int64_t start = sched::now_ns();
   s.team->begin_frame();
   begin(s, samples);
+  Stopwatch watch{s, sched::now_ns()};
   for (std::size_t first = 0, end; first < s.pair_count; first = end) {
     end = pairs_of_shell(s, first);
-    timed(s, H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
-    timed(s, H6_STAGE_CONTACTS, [&] {
+    watch.timed(H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
+    watch.timed(H6_STAGE_CONTACTS, [&] {
       gather_contacts(s, first, end);
       note_depths(s, first, end);
     });
-    timed(s, H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
-    timed(s, H6_STAGE_WRENCH, [&] {
+    watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
+    watch.timed(H6_STAGE_WRENCH, [&] {
       if (s.contact.method == H6_METHOD_SERIES) return sum_series(s, first, end);
       for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]);
     });
   }
-  timed(s, H6_STAGE_COUPLING, [&] {
+  watch.timed(H6_STAGE_COUPLING, [&] {
     for (std::size_t h = 0; h < s.hand_count; ++h) {
       couple(s, s.hands[h]);
       observe_hand(s, s.hands[h]);
@@ -79,11 +87,11 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
     if (s.contact.passivity) damp_contacts(s);
     if (s.net_stiffness) report_net_stiffness(s);
   });
-  timed(s, H6_STAGE_INTEGRATE, [&] {
+  watch.timed(H6_STAGE_INTEGRATE, [&] {
     step_bodies(s);
     if (s.contact.passivity) observe_contacts(s);
   });
-  timed(s, H6_STAGE_OUTPUT, [&] {
+  watch.timed(H6_STAGE_OUTPUT, [&] {
     for (std::size_t h = 0; h < s.hand_count; ++h)
       send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
