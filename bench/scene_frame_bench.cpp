@@ -3,8 +3,8 @@
 //
 // Clutter: most of the part's surface is free. Conforming: a socket with 0.25 voxel of clearance.
 // The part is moved from where it is free until it has about the contacts asked for. Slow: 0.01
-// voxel a frame; fast: the frame before stood far outside the field. Contacts of the timed poses are
-// compared with all points of the shell before a time is reported.
+// voxel a frame; fast: the frame before stood far outside the field, so nothing is remembered.
+// Contacts of the timed poses are compared with all points before a time is reported.
 #include <benchmark/benchmark.h>
 
 #include <cstdio>

@@ -49,12 +49,15 @@ void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
     const Pair& pair = s.pairs[p];
     const double voxel = s.model->fields[s.bodies[pair.b].field].voxel;
     const Contacts& c = s.contacts[pair.a];
+    float deepest = 0;
+    std::uint32_t inside = 0;  // the others are about to touch
     for (std::size_t i = pair.begin; i < pair.end; ++i) {
-      if (!(c.depth[i] > 0)) continue;  // about to touch
-      ++s.report.contacts;
-      s.report.max_depth = std::max<double>(s.report.max_depth, c.depth[i]);
-      s.report.max_depth_voxels = std::max<double>(s.report.max_depth_voxels, c.depth[i] / voxel);
+      deepest = std::max(deepest, c.depth[i]);
+      inside += c.depth[i] > 0;
     }
+    s.report.contacts += inside;
+    s.report.max_depth = std::max<double>(s.report.max_depth, deepest);
+    s.report.max_depth_voxels = std::max<double>(s.report.max_depth_voxels, deepest / voxel);
   }
 }
 

@@ -50,8 +50,8 @@ struct Pair {
   std::int32_t a = -1, b = -1;
   std::size_t begin = 0, end = 0;         // its rows among a's contacts
   std::size_t candidates = 0, first = 0;  // its rows among the candidates
-  // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch before
-  // `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
+  // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch
+  // before `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
   float *group_expiry = nullptr, *block_expiry = nullptr;
   double travelled = -1;         // < 0: nothing is known
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed

@@ -1,4 +1,5 @@
-// shell.cpp - checks a shell and its tree, and lays its points out for traversal: METHOD.md, Sec. 6.
+// shell.cpp - checks a shell and its tree, and lays its points out for traversal. METHOD.md,
+// Sec. 6.
 #include <algorithm>
 #include <cmath>
 
@@ -84,8 +85,8 @@ bool check_spheres(const h6ShellDef& def, h6Error* error) {
   return true;
 }
 
-// Splits rows [begin, end) at medians of the longest axis until they fit in `unit`; parts before the
-// last are whole multiples of it.
+// Splits rows [begin, end) at medians of the longest axis until they fit in `unit`; parts before
+// the last are whole multiples of it.
 void split_at_medians(std::uint32_t* rows, std::size_t begin, std::size_t end, std::size_t unit,
                       const float* const axes[3]) {
   if (end - begin <= unit) return;

@@ -7,8 +7,9 @@
 
 namespace h6 {
 
-// A x = b by LDL^T without pivots or square roots, which positive matrices do not need. Of the lower
-// triangle; loops of a known length, which the compiler unrolls. False when a pivot is not positive.
+// A x = b by LDL^T without pivots or square roots, which positive matrices do not need. Of the
+// lower triangle; loops of a known length, which the compiler unrolls. False when a pivot is not
+// positive.
 template <int N>
 bool solve_positive(const Eigen::Matrix<double, N, N>& A, const Eigen::Matrix<double, N, 1>& b,
                     Eigen::Matrix<double, N, 1>& x) {
