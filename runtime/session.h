@@ -130,6 +130,7 @@ struct h6Session {
   std::size_t candidate_capacity = 0;
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)
   std::uint64_t* cluster_cell = nullptr;                            // (max_contacts)
+  char* weigh_scratch = nullptr;  // weigh_scratch_bytes of max_contacts, or null
   std::size_t* slice_count = nullptr;                               // (slices) survivors of each
   h6::kernels::WrenchSum* slice_sum = nullptr;                      // (slices)
 

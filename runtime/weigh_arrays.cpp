@@ -15,6 +15,7 @@ struct Work {
   Contacts contacts{};
   ClusterScratch cluster{};
   std::uint32_t* source = nullptr;  // (rows) the contact that a row was, before clusters
+  char* scratch = nullptr;          // of weigh_columns, for any rule
 };
 
 void lay_out(Work& work, Arena& arena, std::size_t count) {
@@ -22,6 +23,9 @@ void lay_out(Work& work, Arena& arena, std::size_t count) {
   work.cluster = {arena.take<std::uint32_t>(count), arena.take<std::uint32_t>(count),
                   arena.take<std::uint64_t>(count)};
   work.source = arena.take<std::uint32_t>(count);
+  h6ContactDef hungriest{};  // two trees, from the fewest contacts on
+  hungriest.method = H6_METHOD_GAUSS6;
+  work.scratch = arena.take<char>(weigh_scratch_bytes(hungriest, count));
 }
 
 std::size_t bytes_of(std::size_t count) {
@@ -203,7 +207,7 @@ int h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts
     solve_series(c, *contact, lever, y);
     sums = sum_series_weighted(c, *contact, lever, exact);
   } else {
-    weigh_columns(c, *contact, voxel, lever, nullptr);
+    weigh_columns(c, *contact, voxel, lever, nullptr, work.scratch);
     sums = sum_weighted(c, *contact, u, exact);
   }
   if (weights) hand_out_weights(in, rows, uses_clusters(*contact), work, weights);

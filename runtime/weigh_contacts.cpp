@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/gauss_weights.h"
+#include "kernels/gauss_tree.h"
 #include "runtime/stages.h"
 #include "runtime/weighing.h"
 
@@ -93,7 +93,26 @@ void fill_facing(Contacts& c, bool filter) {
 
 namespace {
 
-void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team) {
+void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
+                     void* scratch, float* weight) {
+  const kernels::GaussTree tree = kernels::gauss_tree(view, rule.hat, rule.widths, scratch, weight);
+  for (int stage = 0; stage < kernels::kGaussStages; ++stage) {
+    const std::size_t slices = kernels::gauss_tree_slices(tree, stage);
+    const auto run = [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); };
+    if (team) {
+      team->for_slices(slices, run);
+    } else {
+      for (std::size_t i = 0; i < slices; ++i) run(i);
+    }
+  }
+}
+
+// The angle in the chord's place is no quadratic.
+bool tree_fits(const Rule& rule, std::size_t count) {
+  return rule.gauss && !rule.widths.geodesic && count >= kernels::gauss_tree_from(rule.hat);
+}
+
+void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
   const kernels::DirectionsView view{c.nx,
                                      c.ny,
                                      c.nz,
@@ -103,7 +122,9 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team) {
                                      rule.facing ? c.facing : nullptr,
                                      rule.depth ? c.depth : nullptr,
                                      c.count};
-  if (c.count < kWorthSharing || !team) {
+  if (scratch && tree_fits(rule, c.count)) {
+    weigh_with_tree(view, rule, team, scratch, c.weight);
+  } else if (c.count < kWorthSharing || !team) {
     kernels::gauss_weights(view, rule.hat, rule.widths, 0, c.count, c.weight);
   } else {
     const std::size_t slices = (c.count + kSlice - 1) / kSlice;
@@ -133,13 +154,18 @@ void merge_clusters(h6Session& s, std::size_t first_pair, std::size_t end_pair) 
 
 }  // namespace
 
+std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
+  const Rule rule = rule_of(def, 1.0);
+  return tree_fits(rule, count) ? kernels::gauss_tree_bytes(count, rule.hat) : 0;
+}
+
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
-                   sched::FrameTeam* team) {
+                   sched::FrameTeam* team, void* scratch) {
   const Rule rule = rule_of(def, voxel);
   fill_facing(c, rule.facing);
   torque_directions(c, rule.l0, rule.handles, static_cast<float>(lever));
   if (rule.gauss) {
-    weigh_gauss(c, rule, team);
+    weigh_gauss(c, rule, team, scratch);
   } else {
     const double n = static_cast<double>(c.count);
     const float w = def.method == H6_METHOD_GLOBAL && n > def.global_n0
@@ -156,8 +182,8 @@ void weigh_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) 
   if (s.contacts[a].count == 0) return;
   if (uses_clusters(s.contact)) merge_clusters(s, first_pair, end_pair);
   const Body& body = s.bodies[a];
-  weigh_columns(s.contacts[a], s.contact, body.voxel, series_lever(body.radius, body.voxel),
-                s.team);
+  weigh_columns(s.contacts[a], s.contact, body.voxel, series_lever(body.radius, body.voxel), s.team,
+                s.weigh_scratch);
 }
 
 }  // namespace h6

@@ -10,9 +10,12 @@
 namespace h6 {
 
 // Shares of stiffness of all rows, for every rule but `series`. `lever`: the body's radius [m].
-// `team` may be null.
+// `team` may be null. `scratch`: weigh_scratch_bytes of any count from c.count on, or null, which
+// costs time where contacts are many.
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
-                   sched::FrameTeam* team);
+                   sched::FrameTeam* team, void* scratch = nullptr);
+// What weigh_columns can use for up to `count` contacts; 0 where the rule has no use for it.
+std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
 
 // Fills facing: clamp(N.g / 0.25, 0, 1), or 1 without the filter.
 void fill_facing(Contacts& c, bool filter);

@@ -322,6 +322,26 @@ TEST_CASE("given scratch of any alignment serves as well as the heap; too little
   CHECK(std::strstr(refused.error.message, "scratch") != nullptr);
 }
 
+TEST_CASE("each contact twenty times over: the copies share what one had, in tens and thousands") {
+  const Rows once = cap(100);
+  Rows many;
+  for (std::size_t i = 0; i < 2000; ++i) {
+    const std::size_t k = i * 37 % 100;
+    many.n.insert(many.n.end(), &once.n[3 * k], &once.n[3 * k] + 3);
+    many.r.insert(many.r.end(), &once.r[3 * k], &once.r[3 * k] + 3);
+    many.d.push_back(once.d[k]);
+  }
+  for (const h6ContactDef& def :
+       {method(H6_METHOD_GAUSS3), method(H6_METHOD_GAUSS6), method(H6_METHOD_ROBUST),
+        method(H6_METHOD_GAUSS6, H6_PIECE_PRODUCT | H6_PIECE_DEPTH | H6_PIECE_FACING)}) {
+    const Answer few(def, once.arrays()), all(def, many.arrays());
+    REQUIRE(few.code == 0);
+    REQUIRE(all.code == 0);
+    for (std::size_t i = 0; i < 2000; ++i)
+      CHECK(all.weight[i] == near(few.weight[i * 37 % 100] / 20).epsilon(1e-5));
+  }
+}
+
 TEST_CASE("nothing is nothing, every output may be left out, and wrong input is refused") {
   const Answer none(method(H6_METHOD_ROBUST), h6ContactArrays{});
   CHECK(none.code == 0);
