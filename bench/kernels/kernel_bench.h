@@ -57,14 +57,16 @@ inline void run(benchmark::State& state, const std::function<Case()>& make, cons
   force_target(nullptr);
 }
 
-// `make` builds the data when the benchmark runs, not when it is registered.
-inline void add(const std::string& name, std::size_t items, const std::function<Case()>& make) {
+// `make` builds the data when the benchmark runs, not when it is registered. Without `reference`:
+// SIMD targets only.
+inline void add(const std::string& name, std::size_t items, const std::function<Case()>& make,
+                bool reference = true) {
   const auto one = [&](const std::string& what, const char* target) {
     benchmark::RegisterBenchmark((name + "/" + what).c_str(), [=](benchmark::State& state) {
       run(state, make, target, items);
     })->Unit(benchmark::kMicrosecond);
   };
-  one("ref", nullptr);
+  if (reference) one("ref", nullptr);
   const char* names[32];
   const std::size_t count = supported_targets(names, 32);
   for (std::size_t k = 0; k < count; ++k) one(names[k], names[k]);
