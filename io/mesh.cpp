@@ -16,6 +16,7 @@ Mesh weld(const Mesh& mesh) {
   Mesh out;
   out.part = mesh.part;
   out.part_names = mesh.part_names;
+  out.remarks = mesh.remarks;
   out.vertices.reserve(welded.vertices.size());
   out.triangles.reserve(mesh.triangles.size());
   for (const auto& triangle : mesh.triangles) {

@@ -1,5 +1,5 @@
 // mesh_file.cpp - from a file or from bytes to a mesh, and back to a binary STL. The formats are in
-// mesh_stl.cpp, mesh_obj.cpp and mesh_ply.cpp.
+// mesh_stl.cpp, mesh_obj.cpp, mesh_ply.cpp, mesh_gltf.cpp and mesh_collada.cpp.
 #include "io/mesh_file.h"
 
 #include <fcntl.h>
@@ -20,6 +20,7 @@
 
 #include "io/gunzip.h"
 #include "io/mesh_formats.h"
+#include "io/text_scan.h"
 #include "io/write_aside.h"
 
 namespace h6::io {
@@ -50,7 +51,8 @@ struct Format {
   Reader read;
 };
 // Another format is one more line here and one more reader.
-constexpr Format kFormats[] = {{".stl", read_stl}, {".obj", read_obj}, {".ply", read_ply}};
+constexpr Format kFormats[] = {{".stl", read_stl},   {".obj", read_obj},  {".ply", read_ply},
+                               {".gltf", read_gltf}, {".glb", read_gltf}, {".dae", read_collada}};
 
 std::string lower_case(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -72,7 +74,7 @@ Named format_of(const std::string& name) {
     if (ending == format.ending) return {&format, gz};
   const std::string what = ending.empty() ? "the name has no ending that says what it is"
                                           : "'" + ending + "' files are not read";
-  throw BadMesh{name + ": " + what + "; export the mesh as .stl, .obj or .ply (.gz is fine too)."};
+  throw BadMesh{name + ": " + what + "; export the mesh as .stl, .obj, .ply, .glb or .dae (.gz is fine too)."};
 }
 
 // Mistakes that look the same in every format.
@@ -84,8 +86,9 @@ void check_start(std::string_view bytes, const MeshSource& source) {
     source.fail("this is a Git LFS pointer, not the mesh; fetch it with 'git lfs pull'");
 }
 
-Mesh parse(std::string_view bytes, const std::string& name, const Format& format, Unit unit) {
-  const MeshSource source{bytes, name, metres(unit)};
+Mesh parse(std::string_view bytes, const std::string& name, const Format& format, Unit unit,
+           const fs::path* folder) {
+  const MeshSource source{bytes, name, metres(unit), folder};
   check_start(bytes, source);
   Mesh mesh = format.read(source);
   if (mesh.triangles.empty()) source.fail("there is no triangle in it");
@@ -182,11 +185,11 @@ std::string read_bytes(const fs::path& path, const MeshSource& source, const Nam
 }
 
 Result<Mesh> parse_named(const std::string& bytes, const std::string& name, const Named& named,
-                         Unit unit) {
-  if (!named.gz) return parse(bytes, name, *named.format, unit);
+                         Unit unit, const fs::path* folder = nullptr) {
+  if (!named.gz) return parse(bytes, name, *named.format, unit, folder);
   const Result<std::string> inflated = gunzip(bytes, name, most_bytes());
   if (!inflated) return inflated.failure();
-  return parse(*inflated, name, *named.format, unit);
+  return parse(*inflated, name, *named.format, unit, folder);
 }
 
 // ---- binary STL out -----------------------------------------------------------------------------
@@ -269,6 +272,25 @@ Outcome write_triangles(const fs::path& file, const Mesh& mesh, Unit unit) {
 
 }  // namespace
 
+std::string read_beside(const MeshSource& source, const std::string& name, std::uint64_t count) {
+  const std::string shown = io::quoted(name);
+  if (!source.folder)
+    source.fail("it names the file " + shown + " beside it, which is out of reach here");
+  const fs::path path(name);
+  bool inside = !name.empty() && !path.has_root_path() && name.find('\0') == std::string::npos &&
+                name.find('\\') == std::string::npos && name.find(':') == std::string::npos;
+  for (const fs::path& step : path) inside = inside && step != "..";
+  if (!inside)
+    source.fail("it names the file " + shown + "; only files in its own folder are read");
+  const MeshSource other{{}, (*source.folder / path).string(), 1};
+  OpenFile file(other.name, other);
+  const std::uint64_t size = std::min(file.size(), count);
+  if (size > most_bytes()) other.fail("it has more bytes than can be read here");
+  std::string bytes;
+  file.read_more(bytes, static_cast<std::size_t>(size));
+  return bytes;
+}
+
 const char* unit_name(Unit unit) {
   static constexpr const char* kNames[] = {"m", "mm", "cm", "in"};
   return kNames[static_cast<int>(unit)];
@@ -299,7 +321,8 @@ Result<Mesh> read_mesh(const fs::path& file, Unit unit) {
     // A file that is not there is the nearer mistake than an ending that is not known.
     OpenFile(file, source).size();
     const Named named = format_of(name);
-    return parse_named(read_bytes(file, source, named), name, named, unit);
+    const fs::path folder = file.parent_path();
+    return parse_named(read_bytes(file, source, named), name, named, unit, &folder);
   });
 }
 

@@ -1,4 +1,4 @@
-// mesh_polygons.cpp - cuts the faces of OBJ and PLY into triangles, and welds.
+// mesh_polygons.cpp - cuts the faces of all formats but STL into triangles, and welds.
 #include <cmath>
 #include <span>
 
