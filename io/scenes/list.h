@@ -15,5 +15,7 @@ Scene cone_in_gap();
 Scene rod_between_tubes();
 Scene alpha_shortcut();
 Scene alpha_solution();
+Scene engine_bay();
+Scene landing_gear();
 
 }  // namespace h6::io

@@ -31,6 +31,9 @@ constexpr Entry kScenes[] = {
      "one alpha forced through the gap of another, narrower than its tube (Fig. 8)",
      alpha_shortcut},
     {"alpha-solution", "the way that does take the alphas apart, without contact", alpha_solution},
+    {"engine-bay", "a starter motor in a car's engine bay, 505,276 broken triangles", engine_bay},
+    {"landing-gear", "an actuator in an airliner's landing gear, 1,789,551 broken triangles",
+     landing_gear},
 };
 
 }  // namespace

@@ -18,6 +18,8 @@ using namespace h6::io;
 
 TEST_CASE("every generated scene, exported and read back, is the same scene") {
   for (const SceneName& entry : scene_names()) {
+    // Soups, 25 and 90 MB as files: industrial_scenes_test.cpp exports them.
+    if (entry.name == "engine-bay" || entry.name == "landing-gear") continue;
     CAPTURE(entry.name);
     const Folder folder;
     const Scene made = *make_scene(entry.name);
