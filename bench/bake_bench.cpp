@@ -1,19 +1,34 @@
 // bake_bench.cpp - mesh in memory to asset in memory: bake/MESH/voxels:N/threads:T and
-// bake/MESH/points:N/threads:T. Meshes are made here; the files of $HAPSIX_BENCH_MESHES (a list
-// separated by colons) are baked too.
+// bake/MESH/points:N/threads:T; bake/openvdb/... is OpenVDB's meshToLevelSet on the same mesh and
+// voxel, in the same run. Meshes are made here; the files of $HAPSIX_BENCH_MESHES (a list separated
+// by colons) are baked too, and with HAPSIX_BENCH_SOUPS=1 the engine bay and the landing gear.
+//
+// A field is checked before its time is told: distances at nodes outside against all triangles in
+// double, sides where a generated input says what is solid. peak_MB is that of the process while it
+// baked, the mesh and what the benchmark holds included.
 #include <benchmark/benchmark.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "io/bake_field.h"
 #include "io/bake_shell.h"
 #include "io/mesh_file.h"
+#include "io/scenes/industrial.h"
 #include "io/scenes/scenes.h"
+#include "kernels/triangle_distance.h"
+#include "level_set_peer.h"
 
 namespace {
 
@@ -42,18 +57,132 @@ io::Mesh gear(int around, int across) {
   return mesh;
 }
 
-void bake_field(benchmark::State& state, const MeshPtr& mesh, int voxels, unsigned threads) {
+// Linux: forgets the peak, and what earlier benchmarks left with the allocator; reads it [MB].
+void forget_peak() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+double peak_megabytes() {
+  std::ifstream in("/proc/self/status");
+  for (std::string word; in >> word;)
+    if (word == "VmHWM:") {
+      double kilobytes = 0;
+      in >> kilobytes;
+      return kilobytes / 1000;
+    }
+  return 0;
+}
+
+struct Input {
+  io::Mesh mesh;
+  std::vector<io::IndustrialTruth::Probe> inside, outside;
+};
+using InputPtr = std::shared_ptr<const Input>;
+
+double distance_to_all(const io::Mesh& mesh, const double (&p)[3]) {
+  double least = 1e300;
+  for (const auto& t : mesh.triangles) {
+    double c[3][3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const io::Vec3& v = mesh.vertices[t[i]];
+      c[i][0] = v.x, c[i][1] = v.y, c[i][2] = v.z;
+    }
+    least = std::min(least, kernels::point_triangle_squared(p, c[0], c[1], c[2]));
+  }
+  return std::sqrt(least);
+}
+
+// Worst error at some nodes of the band outside [voxel].
+double worst_error(const io::FieldData& f, const io::Mesh& mesh) {
+  constexpr std::size_t kNodes = 24;
+  double worst = 0;
+  std::size_t checked = 0, cell = 0;
+  for (std::size_t n = 0; checked < kNodes && n < 100 * kNodes; ++n) {
+    cell = (cell + 7919 * f.brick_index.size() / 65536 + 1) % f.brick_index.size();
+    while (f.brick_index[cell] < 0) cell = (cell + 1) % f.brick_index.size();
+    const std::size_t node = n * 37 % 512, bx = std::size_t(f.bricks[0]),
+                      by = std::size_t(f.bricks[1]);
+    const double d = double(f.samples[std::size_t(f.brick_index[cell]) * 512 + node]);
+    if (d <= 0 || d > f.band) continue;
+    const double h = f.voxel_size;
+    const double p[3] = {f.origin.x + h * double(8 * (cell % bx) + node % 8),
+                         f.origin.y + h * double(8 * (cell / bx % by) + node / 8 % 8),
+                         f.origin.z + h * double(8 * (cell / bx / by) + node / 64)};
+    worst = std::max(worst, std::fabs(d + f.offset - distance_to_all(mesh, p)) / h);
+    ++checked;
+  }
+  return checked > 0 ? worst : 1e9;
+}
+
+bool is_inside(const io::FieldData& f, const h6Vec3& p) {
+  const double c[3] = {p.x - f.origin.x, p.y - f.origin.y, p.z - f.origin.z};
+  std::size_t node[3], coarse[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    node[k] = std::size_t(std::clamp(std::round(c[k] / f.voxel_size), 0.0, 8.0 * f.bricks[k] - 1));
+    coarse[k] = std::size_t(std::round(double(node[k]) / 8));
+  }
+  const std::size_t bx = std::size_t(f.bricks[0]), by = std::size_t(f.bricks[1]);
+  const std::int32_t row =
+      f.brick_index[(node[2] / 8 * by + node[1] / 8) * bx + node[0] / 8];
+  if (row >= 0)
+    return f.samples[std::size_t(row) * 512 + (node[2] % 8 * 8 + node[1] % 8) * 8 +
+                     node[0] % 8] < 0;
+  return f.far_grid[(coarse[2] * (by + 1) + coarse[1]) * (bx + 1) + coarse[0]] < 0;
+}
+
+// Probes with so much room that the offset and the voxel do not matter.
+std::size_t wrong_sides(const io::FieldData& f, const Input& input) {
+  const double room = f.offset + 8 * f.voxel_size;
+  std::size_t wrong = 0;
+  for (const auto& probe : input.inside)
+    wrong += probe.clearance > room && !is_inside(f, probe.p);
+  for (const auto& probe : input.outside)
+    wrong += probe.clearance > room && is_inside(f, probe.p);
+  return wrong;
+}
+
+void bake_field(benchmark::State& state, const InputPtr& input, int voxels, unsigned threads) {
   io::FieldBake options;
   options.voxels = voxels;
   options.threads = threads;
-  std::size_t bricks = 0;
+  io::FieldData last;
+  forget_peak();
+  double peak = 0;
   for (auto _ : state) {
-    auto field = io::bake_field(*mesh, options, nullptr);
+    auto field = io::bake_field(input->mesh, options, nullptr);
+    state.PauseTiming();
+    peak = peak_megabytes();
     if (!field) return state.SkipWithError(field.error().c_str());
-    bricks = field->brick_count();
+    last = {};
+    last = std::move(*field);
+    state.ResumeTiming();
   }
+  const double error = worst_error(last, input->mesh);
+  const std::size_t wrong = wrong_sides(last, *input);
+  if (error > 1e-3) return state.SkipWithError("distances are wrong by more than 1e-3 voxel");
+  if (wrong > 0) return state.SkipWithError("a place that is known is on the wrong side");
+  state.counters["bricks"] = static_cast<double>(last.brick_count());
+  state.counters["triangles"] = static_cast<double>(input->mesh.triangles.size());
+  state.counters["peak_MB"] = peak;
+  state.counters["worst_voxel"] = error;
+}
+
+void level_set(benchmark::State& state, const InputPtr& input, int voxels, unsigned threads) {
+  io::Vec3 low = input->mesh.vertices[0], high = low;
+  for (const io::Vec3& v : input->mesh.vertices) {
+    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+  }
+  const double side = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  std::size_t bricks = 0;
+  forget_peak();
+  for (auto _ : state)
+    bricks = bench::mesh_to_level_set(input->mesh, side / (voxels - 16), threads);
   state.counters["bricks"] = static_cast<double>(bricks);
-  state.counters["triangles"] = static_cast<double>(mesh->triangles.size());
+  state.counters["triangles"] = static_cast<double>(input->mesh.triangles.size());
+  state.counters["peak_MB"] = peak_megabytes();
 }
 
 void bake_shell(benchmark::State& state, const MeshPtr& mesh, std::size_t points,
@@ -69,33 +198,70 @@ void bake_shell(benchmark::State& state, const MeshPtr& mesh, std::size_t points
   state.counters["triangles"] = static_cast<double>(mesh->triangles.size());
 }
 
-void add(const std::string& name, const MeshPtr& mesh) {
-  for (const unsigned threads : {1u, 2u}) {
-    const std::string end = "/threads:" + std::to_string(threads);
-    for (const int voxels : {256, 512})
-      benchmark::RegisterBenchmark(
-          ("bake/" + name + "/voxels:" + std::to_string(voxels) + end).c_str(), bake_field, mesh,
-          voxels, threads)
+void add_fields(const std::string& name, const InputPtr& input, const std::vector<int>& sizes,
+                bool peer) {
+  for (const int voxels : sizes)
+    for (const unsigned threads : {1u, 2u}) {
+      const std::string end =
+          name + "/voxels:" + std::to_string(voxels) + "/threads:" + std::to_string(threads);
+      benchmark::RegisterBenchmark(("bake/" + end).c_str(), bake_field, input, voxels, threads)
           ->Unit(benchmark::kMillisecond)
           ->UseRealTime();
+      if (peer)
+        benchmark::RegisterBenchmark(("bake/openvdb/" + end).c_str(), level_set, input, voxels,
+                                     threads)
+            ->Unit(benchmark::kMillisecond)
+            ->Iterations(1)
+            ->UseRealTime();
+    }
+}
+
+void add_shells(const std::string& name, const InputPtr& input) {
+  const MeshPtr mesh(input, &input->mesh);
+  for (const unsigned threads : {1u, 2u})
     for (const std::size_t points : {std::size_t{25269}, std::size_t{56823}})
-      benchmark::RegisterBenchmark(
-          ("bake/" + name + "/points:" + std::to_string(points) + end).c_str(), bake_shell, mesh,
-          points, threads)
+      benchmark::RegisterBenchmark(("bake/" + name + "/points:" + std::to_string(points) +
+                                    "/threads:" + std::to_string(threads)).c_str(),
+                                   bake_shell, mesh, points, threads)
           ->Unit(benchmark::kMillisecond)
           ->UseRealTime();
-  }
+}
+
+InputPtr plain(io::Mesh mesh) {
+  auto input = std::make_shared<Input>();
+  input->mesh = std::move(mesh);
+  return input;
+}
+InputPtr industrial(io::IndustrialInput&& made) {
+  auto input = std::make_shared<Input>();
+  input->mesh = std::move(made.mesh);
+  input->inside = std::move(made.truth.inside);
+  input->outside = std::move(made.truth.outside);
+  return input;
 }
 
 [[maybe_unused]] const bool registered = [] {
-  add("alpha", std::make_shared<io::Mesh>(io::make_alpha().mesh));
-  add("gear100k", std::make_shared<io::Mesh>(gear(1000, 50)));
+  const InputPtr alpha = plain(io::make_alpha().mesh), ring = plain(gear(1000, 50));
+  add_fields("alpha", alpha, {256, 512}, false);
+  add_shells("alpha", alpha);
+  add_fields("gear100k", ring, {256, 512}, true);
+  add_shells("gear100k", ring);
+  // Large inputs take seconds to make: only when asked for.
+  const char* which = std::getenv("HAPSIX_BENCH_SOUPS");
+  if (which != nullptr && *which != '\0' && *which != '0') {
+    constexpr std::size_t kProbes = 400;
+    add_fields("soup500k", industrial(io::make_engine_bay(kProbes)), {512, 1024}, true);
+    add_fields("soup1800k", industrial(io::make_landing_gear(kProbes)), {1024}, true);
+  }
   if (const char* list = std::getenv("HAPSIX_BENCH_MESHES")) {
     std::stringstream files(list);
     for (std::string file; std::getline(files, file, ':');)
-      if (auto mesh = io::read_mesh(file))
-        add(std::filesystem::path(file).stem().string(),
-            std::make_shared<io::Mesh>(std::move(*mesh)));
+      if (auto mesh = io::read_mesh(file)) {
+        const std::string name = std::filesystem::path(file).stem().string();
+        const InputPtr input = plain(std::move(*mesh));
+        add_fields(name, input, {256, 512, 1024}, true);
+        add_shells(name, input);
+      }
   }
   return true;
 }();

@@ -1,8 +1,9 @@
 // bake_bins.cpp - which triangles come within reach of which bricks.
 //
-// A triangle visits the bricks of its box. Where that is many, the range is halved and each half is
-// kept only if no plane of the triangle separates it (face normal and the edges' normals in the
-// coordinate planes), so a long diagonal sliver costs as much as the bricks it passes.
+// A triangle visits the tiles of its box, and in each all 64 bricks at once. Where tiles are many,
+// the range is halved and each half is kept only if no plane of the triangle separates it (face
+// normal and the edges' normals in the coordinate planes), so a long diagonal sliver costs as much
+// as the tiles it passes.
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -14,15 +15,14 @@ namespace h6::io::bake {
 namespace {
 
 constexpr std::size_t kMaxBricks = 1'400'000;
-constexpr std::size_t kMaxPairs = 600'000'000;
+constexpr std::size_t kMaxPairs = 200'000'000;
 constexpr std::size_t kSlice = 1024;  // triangles
-// Up to this size a triangle's box tells enough, and it touches at most 4 bricks along an axis as
-// long as the reach is moderate.
-constexpr double kSmall = 4;          // [voxel]
-constexpr double kSmallReach = 10;    // [voxel]; 2 * 10 + 4 < 3 * 8 + 1
+constexpr int kTile = 8 * kernels::kTileBricks;  // nodes along a side
+constexpr long kFew = 12;             // tiles
+constexpr double kRounding = 4e-3;    // float at 2048 voxels, several times over
 
 struct Range {
-  int low[3], high[3];  // bricks, inclusive
+  int low[3], high[3];  // tiles, inclusive
   long size() const {
     return long(high[0] - low[0] + 1) * (high[1] - low[1] + 1) * (high[2] - low[2] + 1);
   }
@@ -78,8 +78,8 @@ Separators make_separators(const double (&p)[3][3]) {
 bool within_reach(const Separators& s, const Range& r, double reach) {
   double middle[3], half[3];
   for (int k = 0; k < 3; ++k) {
-    middle[k] = 4.0 * (r.low[k] + r.high[k]) + 3.5;
-    half[k] = 4.0 * (r.high[k] - r.low[k]) + 3.5;
+    middle[k] = 0.5 * (kTile * (r.low[k] + r.high[k]) + kTile - 1);
+    half[k] = 0.5 * (kTile * (r.high[k] - r.low[k]) + kTile - 1);
   }
   for (int i = 0; i < s.count; ++i) {
     const double* n = s.n[i];
@@ -108,10 +108,34 @@ void visit(const Separators& s, const Range& r, double reach, F&& found) {
 }
 
 struct Pair {
-  std::uint32_t cell, triangle;
+  std::uint64_t near;
+  std::uint32_t tile, triangle;
 };
 
-void bin_triangle(const Surface& surface, const Grid& grid, std::size_t t, std::vector<Pair>& out) {
+// The same facet as seen from `by` further on.
+kernels::DistanceFacet moved(const kernels::DistanceFacet& facet, const float (&by)[3]) {
+  kernels::DistanceFacet f = facet;
+  for (std::size_t k = 0; k < 7; ++k)
+    f.c[k] += f.gx[k] * by[0] + f.gy[k] * by[1] + f.gz[k] * by[2];
+  for (std::size_t k = 0; k < 3; ++k) {
+    f.low[k] -= by[k];
+    f.high[k] -= by[k];
+  }
+  return f;
+}
+
+// Bricks of a tile that lie in the grid.
+std::uint64_t bricks_there(const Grid& grid, const int (&tile)[3]) {
+  std::uint64_t there = 0;
+  for (int b = 0; b < 64; ++b)
+    if (4 * tile[0] + b % 4 < grid.bricks[0] && 4 * tile[1] + b / 4 % 4 < grid.bricks[1] &&
+        4 * tile[2] + b / 16 < grid.bricks[2])
+      there |= std::uint64_t{1} << b;
+  return there;
+}
+
+void bin_triangle(const Surface& surface, const Grid& grid, const Tiles& tiles, std::size_t t,
+                  std::vector<Pair>& out) {
   double p[3][3];
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3& v = surface.vertices[surface.triangles[t][i]];
@@ -121,32 +145,36 @@ void bin_triangle(const Surface& surface, const Grid& grid, std::size_t t, std::
   }
   const double reach = grid.reach();
   Range r;
-  double low[3], high[3], longest = 0;
   for (std::size_t k = 0; k < 3; ++k) {
-    low[k] = std::min({p[0][k], p[1][k], p[2][k]});
-    high[k] = std::max({p[0][k], p[1][k], p[2][k]});
-    longest = std::max(longest, high[k] - low[k]);
-    r.low[k] = std::max(0, int(std::ceil((low[k] - reach - 7) / 8)));
-    r.high[k] = std::min(grid.bricks[k] - 1, int(std::floor((high[k] + reach) / 8)));
+    const double low = std::min({p[0][k], p[1][k], p[2][k]});
+    const double high = std::max({p[0][k], p[1][k], p[2][k]});
+    r.low[k] = std::max(0, int(std::ceil((low - reach - (kTile - 1)) / kTile)));
+    r.high[k] = std::min(tiles.size[k] - 1, int(std::floor((high + reach) / kTile)));
+    if (r.low[k] > r.high[k]) return;
   }
-  if (r.size() <= 0) return;
+  for (auto& corner : p)
+    for (int k = 0; k < 3; ++k) corner[k] -= kTile * r.low[k];
+  const kernels::DistanceFacet facet = kernels::make_distance_facet(p[0]);
   const auto add = [&](int a, int b, int c) {
-    out.push_back({std::uint32_t(grid.cell(a, b, c)), std::uint32_t(t)});
+    const int tile[3] = {a, b, c};
+    const float by[3] = {float(kTile * (a - r.low[0])), float(kTile * (b - r.low[1])),
+                         float(kTile * (c - r.low[2]))};
+    std::uint64_t near =
+        kernels::bricks_within_reach(moved(facet, by), float(reach + kRounding));
+    if (near == 0) return;
+    if (4 * a + 4 > grid.bricks[0] || 4 * b + 4 > grid.bricks[1] || 4 * c + 4 > grid.bricks[2])
+      near &= bricks_there(grid, tile);
+    if (near != 0)
+      out.push_back({near, std::uint32_t(tiles.of({4 * a, 4 * b, 4 * c})), std::uint32_t(t)});
   };
-  if (longest > kSmall || reach > kSmallReach) return visit(make_separators(p), r, reach, add);
-  double gap2[3][4];  // of the triangle's box to each layer of bricks, squared
-  for (int k = 0; k < 3; ++k)
-    for (int b = r.low[k]; b <= r.high[k]; ++b) {
-      const double gap = std::max({0.0, low[k] - (8.0 * b + 7), 8.0 * b - high[k]});
-      gap2[k][b - r.low[k]] = gap * gap;
-    }
+  if (r.size() > kFew) {
+    for (auto& corner : p)
+      for (int k = 0; k < 3; ++k) corner[k] += kTile * r.low[k];
+    return visit(make_separators(p), r, reach, add);
+  }
   for (int c = r.low[2]; c <= r.high[2]; ++c)
-    for (int b = r.low[1]; b <= r.high[1]; ++b) {
-      const double left = reach * reach - gap2[2][c - r.low[2]] - gap2[1][b - r.low[1]];
-      if (left < 0) continue;
-      for (int a = r.low[0]; a <= r.high[0]; ++a)
-        if (gap2[0][a - r.low[0]] <= left) add(a, b, c);
-    }
+    for (int b = r.low[1]; b <= r.high[1]; ++b)
+      for (int a = r.low[0]; a <= r.high[0]; ++a) add(a, b, c);
 }
 
 Failure too_many(const Grid& grid, double excess) {
@@ -162,42 +190,57 @@ Failure too_many(const Grid& grid, double excess) {
 
 Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
                         NarrowBand& band) {
+  Tiles& tiles = band.tiles;
+  for (std::size_t k = 0; k < 3; ++k) tiles.size[k] = (grid.bricks[k] + 3) / 4;
+  const std::size_t tile_count =
+      std::size_t(tiles.size[0]) * std::size_t(tiles.size[1]) * std::size_t(tiles.size[2]);
   const std::size_t slices = (surface.triangles.size() + kSlice - 1) / kSlice;
   std::vector<std::vector<Pair>> pairs(slices);
-  std::vector<std::atomic<std::uint32_t>> count(grid.cells());
+  std::vector<std::atomic<std::uint32_t>> count(tile_count);
+  std::vector<std::atomic<std::uint64_t>> used(tile_count);  // bricks
   std::atomic<std::size_t> total{0};
   sched::parallel_for(slices, threads, [&](std::size_t s) {
     const std::size_t end = std::min(surface.triangles.size(), (s + 1) * kSlice);
     for (std::size_t t = s * kSlice; t < end; ++t) {
       if (total.load(std::memory_order_relaxed) > kMaxPairs) return;
       const std::size_t before = pairs[s].size();
-      bin_triangle(surface, grid, t, pairs[s]);
-      for (std::size_t i = before; i < pairs[s].size(); ++i)
-        count[pairs[s][i].cell].fetch_add(1, std::memory_order_relaxed);
-      total.fetch_add(pairs[s].size() - before, std::memory_order_relaxed);
+      bin_triangle(surface, grid, tiles, t, pairs[s]);
+      for (std::size_t i = before; i < pairs[s].size(); ++i) {
+        count[pairs[s][i].tile].fetch_add(1, std::memory_order_relaxed);
+        used[pairs[s][i].tile].fetch_or(pairs[s][i].near, std::memory_order_relaxed);
+      }
+      if (pairs[s].size() != before)
+        total.fetch_add(pairs[s].size() - before, std::memory_order_relaxed);
     }
   });
   if (total > kMaxPairs) return too_many(grid, 4.0);
 
   band.row.assign(grid.cells(), -1);
-  band.first.assign(1, 0);
   for (std::size_t c = 0; c < grid.cells(); ++c) {
-    if (count[c] == 0) continue;
+    const std::array<int, 3> at = grid.place(c);
+    if (!(used[tiles.of(at)] >> Tiles::bit(at) & 1)) continue;
     band.row[c] = std::int32_t(band.cell.size());
     band.cell.push_back(std::uint32_t(c));
-    band.first.push_back(band.first.back() + count[c]);
-    count[c] = 0;  // from here on: how many are in place
   }
   if (band.rows() > kMaxBricks) return too_many(grid, double(band.rows()) / kMaxBricks);
-  band.triangle.resize(band.first.back());
+
+  tiles.first.assign(tile_count + 1, 0);
+  for (std::size_t t = 0; t < tile_count; ++t) {
+    tiles.first[t + 1] = tiles.first[t] + count[t];
+    count[t] = 0;  // from here on: how many are in place
+  }
+  tiles.triangle.resize(total);
+  tiles.near.resize(total);
   sched::parallel_for(slices, threads, [&](std::size_t s) {
     for (const Pair& p : pairs[s]) {
-      const std::uint32_t at = count[p.cell].fetch_add(1, std::memory_order_relaxed);
-      band.triangle[band.first[std::size_t(band.row[p.cell])] + at] = p.triangle;
+      const std::size_t at =
+          tiles.first[p.tile] + count[p.tile].fetch_add(1, std::memory_order_relaxed);
+      tiles.triangle[at] = p.triangle;
+      tiles.near[at] = p.near;
     }
     std::vector<Pair>().swap(pairs[s]);
   });
-  return Done{};  // threads filled the lists in any order: measure_row sorts them, row by row
+  return Done{};
 }
 
 }  // namespace h6::io::bake

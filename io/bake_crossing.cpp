@@ -84,24 +84,48 @@ void draw(const Point (&p)[3], std::size_t axis, Crossing& crossing) {
 
 }  // namespace
 
-void cross_row(const Surface& surface, const Grid& grid, std::size_t row, NarrowBand& band) {
-  Crossing& crossing = band.crossing[row];
-  const std::array<int, 3> place = grid.place(band.cell[row]);
-  for (std::size_t at = band.first[row]; at < band.first[row + 1]; ++at) {
-    Point p[3];
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vec3& vertex = surface.vertices[surface.triangles[band.triangle[at]][i]];
-      const double c[3] = {vertex.x, vertex.y, vertex.z};
+void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band) {
+  const Tiles& tiles = band.tiles;
+  const std::array<int, 3> first = tiles.first_brick(tile);
+  for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
+    Point p[3];  // tile-local
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Vec3& vertex = surface.vertices[surface.triangles[tiles.triangle[i]][c]];
+      const double at[3] = {vertex.x, vertex.y, vertex.z};
       for (std::size_t k = 0; k < 3; ++k)
-        p[i][k] = std::llround(c[k] * double(kVoxel)) - 8 * place[k] * kVoxel;
+        p[c][k] = std::llround(at[k] * double(kVoxel)) - 8 * first[k] * kVoxel;
     }
-    bool apart = false;
-    for (std::size_t k = 0; k < 3; ++k)
-      apart |= std::max({p[0][k], p[1][k], p[2][k]}) < 0 ||
-               std::min({p[0][k], p[1][k], p[2][k]}) > 8 * kVoxel;
-    if (apart) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis) draw(p, axis, crossing);
+    int low[3], high[3];  // bricks the box meets; a brick's edges run from node 0 to node 8
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [least, most] = std::minmax({p[0][k], p[1][k], p[2][k]});
+      low[k] = int(std::max<std::int64_t>(0, (least + 8 * kVoxel - 1) / (8 * kVoxel) - 1));
+      high[k] = int(std::min<std::int64_t>(3, most < 0 ? -1 : most / (8 * kVoxel)));
+      high[k] = std::min(high[k], grid.bricks[k] - 1 - first[k]);
+    }
+    for (int c = low[2]; c <= high[2]; ++c)
+      for (int b = low[1]; b <= high[1]; ++b)
+        for (int a = low[0]; a <= high[0]; ++a) {
+          const std::int32_t r = band.row[grid.cell(first[0] + a, first[1] + b, first[2] + c)];
+          if (r < 0) continue;
+          const std::array<std::int64_t, 3> by = {8 * a * kVoxel, 8 * b * kVoxel, 8 * c * kVoxel};
+          Point q[3];
+          for (std::size_t corner = 0; corner < 3; ++corner)
+            for (std::size_t k = 0; k < 3; ++k) q[corner][k] = p[corner][k] - by[k];
+          for (std::size_t axis = 0; axis < 3; ++axis)
+            draw(q, axis, band.crossing[std::size_t(r)]);
+        }
   }
+  const std::array<int, 3> end = {std::min(first[0] + 4, int(grid.bricks[0])),
+                                  std::min(first[1] + 4, int(grid.bricks[1])),
+                                  std::min(first[2] + 4, int(grid.bricks[2]))};
+  for (int c = first[2]; c < end[2]; ++c)
+    for (int b = first[1]; b < end[1]; ++b)
+      for (int a = first[0]; a < end[0]; ++a) {
+        const std::int32_t r = band.row[grid.cell(a, b, c)];
+        if (r < 0) continue;
+        for (std::size_t z = 0; z < 8; ++z)
+          band.free[std::size_t(r)].z[z] &= ~band.crossing[std::size_t(r)].on.z[z];
+      }
 }
 
 }  // namespace h6::io::bake

@@ -17,15 +17,16 @@ namespace bake {
 
 bool Steps::run(const std::string& what, double from, double to, std::size_t count,
                 unsigned threads, const std::function<void(std::size_t)>& body) const {
-  constexpr std::size_t kSlices = 16, kGrain = 16;
-  const std::size_t blocks = (count + kGrain - 1) / kGrain;
+  constexpr std::size_t kSlices = 16;
+  const std::size_t grain = count < 4096 ? 1 : 16;
+  const std::size_t blocks = (count + grain - 1) / grain;
   const std::size_t slices =
       progress_ ? std::min(kSlices, blocks) : std::min<std::size_t>(1, blocks);
   for (std::size_t s = 0; s < slices; ++s) {
     if (!tell(what, from + (to - from) * double(s) / double(slices))) return false;
     const std::size_t begin = blocks * s / slices, end = blocks * (s + 1) / slices;
     sched::parallel_for(end - begin, threads, [&](std::size_t i) {
-      const std::size_t first = (begin + i) * kGrain, last = std::min(count, first + kGrain);
+      const std::size_t first = (begin + i) * grain, last = std::min(count, first + grain);
       for (std::size_t k = first; k < last; ++k) body(k);
     });
   }
@@ -35,8 +36,6 @@ bool Steps::run(const std::string& what, double from, double to, std::size_t cou
 }  // namespace bake
 
 namespace {
-
-constexpr std::size_t kMaxBricks = 1'400'000;
 
 std::string plural(std::size_t n, const std::string& one, const std::string& many) {
   return std::to_string(n) + " " + (n == 1 ? one : many);
@@ -49,7 +48,7 @@ std::string millimetres(double metres) {
 }
 
 void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Inside& inside,
-          FieldBakeReport& report) {
+          double seal, FieldBakeReport& report) {
   auto& out = report.warnings;
   if (surface.duplicates > 0)
     out.push_back(plural(surface.duplicates, "triangle is", "triangles are") +
@@ -62,8 +61,18 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
                   " have one); it is taken as a soup");
   if (offset > 0)
     out.push_back("the surface is moved out by " + millimetres(offset) +
-                  ": open sheets become " + millimetres(2 * offset) + " thick and gaps below " +
-                  millimetres(2 * offset) + " close; more voxels make this smaller");
+                  ": open sheets become " + millimetres(2 * offset) +
+                  " thick, wires as much thicker, and gaps below " + millimetres(2 * offset) +
+                  " close; more voxels make this smaller");
+  if (surface.closed && seal > 0)
+    out.push_back("the mesh is closed: there is no hole to seal");
+  if (report.sealed_area > 0) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "holes and gaps narrower than %s that lead deeper than that were closed: "
+                  "%.4g mm2 in all", millimetres(seal).c_str(), report.sealed_area * 1e6);
+    out.push_back(text);
+  }
   if (!surface.closed && grid.offset < 0.5)
     out.push_back("the offset is below half a voxel and the mesh is open: the outside leaks in "
                   "through every hole");
@@ -76,27 +85,25 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
                   " are no obstacles there; bake with more voxels, or with an offset");
 }
 
-// Kept rows become the bricks of the result, in the order of cells.
-bool write_samples(const bake::Grid& grid, const bake::NarrowBand& band,
-                   const bake::Inside& inside, unsigned threads, FieldData& field) {
-  field.brick_index.assign(grid.cells(), -1);
-  std::vector<std::uint32_t> kept;
-  for (std::size_t r = 0; r < band.rows(); ++r) {
-    if (!inside.needed[r]) continue;
-    field.brick_index[band.cell[r]] = std::int32_t(kept.size());
-    kept.push_back(std::uint32_t(r));
-  }
-  if (kept.size() > kMaxBricks) return false;
-  field.samples.resize(kept.size() * bake::kBrickSamples);
-  if (!band.part.empty()) field.part.resize(kept.size());
-  sched::parallel_for(kept.size(), threads, [&](std::size_t i) {
-    const float* from = band.nodes(kept[i]);
-    float* to = field.samples.data() + i * bake::kBrickSamples;
-    for (std::size_t n = 0; n < bake::kBrickSamples; ++n)
-      to[n] = float(double(from[n]) * grid.voxel);
-    if (!band.part.empty()) field.part[i] = band.part[kept[i]];
-  });
-  return true;
+// Distances of all bricks near the surface.
+Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned threads,
+                const bake::Steps& steps, double from, double to, bake::NarrowBand& band) {
+  using namespace bake;
+  band = {};
+  if (!steps.tell("bricks", from)) return Failure{"cancelled"};
+  if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
+  band.u.resize(band.rows() * kBrickSamples);
+  band.free.resize(band.rows());
+  band.first_node.resize(band.rows());
+  band.towards.resize(band.rows());
+  if (grid.offset < 0.5) band.crossing.resize(band.rows());
+  if (!surface.part.empty()) band.part.resize(band.rows());
+  if (!steps.run("distance", from + 0.05, to, band.tiles.count(), threads, [&](std::size_t tile) {
+        measure_tile(surface, grid, tile, band);
+        if (!band.crossing.empty()) cross_tile(surface, grid, tile, band);
+      }))
+    return Failure{"cancelled"};
+  return Done{};
 }
 
 Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
@@ -109,29 +116,33 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   if (!prepared) return prepared.failure();
   Surface& surface = *prepared;
   const bool sealed = surface.closed && options.sign == SignMode::automatic;
-  const Result<Grid> grid = choose_grid(surface, options, sealed);
+  Result<Grid> grid = choose_grid(surface, options, sealed);
   if (!grid) return grid.failure();
   const unsigned threads = options.threads;
   to_grid(surface, *grid, threads);
 
   NarrowBand band;
-  if (!steps.tell("bricks", 0.05)) return cancelled;
-  if (const Outcome found = find_candidates(surface, *grid, threads, band); !found)
-    return found.failure();
-  band.u.reset(new float[band.rows() * kBrickSamples]);
-  if (grid->offset < 0.5) band.crossing.resize(band.rows());
-  if (!surface.part.empty() && mesh.part_names.size() > 1) band.part.resize(band.rows());
-  else surface.part.clear();
-  if (!steps.run("distance", 0.1, 0.6, band.rows(), threads, [&](std::size_t r) {
-        measure_row(surface, *grid, r, band);
-        if (!band.crossing.empty()) cross_row(surface, *grid, r, band);
-      }))
-    return cancelled;
+  const bool parts = !surface.part.empty() && mesh.part_names.size() > 1;
+  if (!parts) surface.part.clear();
+  const double measured = grid->seal > 0 ? 0.3 : 0.6;
+  if (const Outcome done = measure(surface, *grid, threads, steps, 0.05, measured, band); !done)
+    return done.failure();
+  std::size_t plugs = 0;
+  if (grid->seal > 0) {
+    plugs = plug_holes(*grid, band, threads, surface);
+    const double reach = grid->reach();
+    grid->seal = 0;
+    if (plugs > 0 || grid->reach() < reach)
+      if (const Outcome done = measure(surface, *grid, threads, steps, 0.35, 0.6, band); !done)
+        return done.failure();
+  }
 
   if (!steps.tell("flood", 0.6)) return cancelled;
   const Reached reached = flood(surface, *grid, band, options.cavities, threads);
+  std::vector<std::uint32_t>().swap(band.tiles.triangle);
+  std::vector<std::uint64_t>().swap(band.tiles.near);
   Inside inside;
-  if (!sign_rows(*grid, band, reached, threads, steps, inside)) return cancelled;
+  if (!look_inside(*grid, band, reached, threads, steps, inside)) return cancelled;
 
   FieldData field;
   field.origin = grid->origin();
@@ -142,8 +153,9 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   field.sign_mode = sealed ? "closed" : "flood";
   field.triangles = mesh.triangles.size();
   if (!band.part.empty()) field.part_names = mesh.part_names;
-  if (!write_samples(*grid, band, inside, threads, field))
-    return Failure{"the surface fills too many bricks of 8x8x8 nodes: choose larger voxels"};
+  if (!steps.tell("samples", 0.8)) return cancelled;
+  write_samples(*grid, band, reached, inside, threads, field);
+  inside.chains.reset();
   if (const Outcome far =
           far_distances(surface, *grid, band, reached, threads, steps, field.far_grid);
       !far)
@@ -151,7 +163,8 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   field.input_hash = content_hash(mesh, options);
   if (report) {
     report->closed = surface.closed;
-    warn(surface, *grid, inside, *report);
+    report->sealed_area = double(plugs) * grid->voxel * grid->voxel;
+    warn(surface, *grid, inside, options.seal, *report);
   }
   return field;
 }

@@ -23,6 +23,10 @@ struct FieldBake {
   double offset = -1;           // sigma [m]; < 0: chosen (0 when closed, else 0.9 voxel)
   SignMode sign = SignMode::automatic;
   Cavities cavities = Cavities::solid;
+  // > 0: holes of an open mesh up to this width [m] are closed, so that a part with missing
+  // triangles does not drain. Gaps narrower than this that lead to anything deeper are closed too;
+  // concave corners stay open. Closed meshes have no holes: nothing changes.
+  double seal = 0;
   double band_voxels = 3;       // every cell nearer than this to the surface gets samples
   int padding_voxels = 8;       // empty cells around the mesh
   unsigned threads = 0;         // 0: all
@@ -31,6 +35,7 @@ struct FieldBake {
 // What a bake found that a user should hear: "12 holes ...", one sentence each.
 struct FieldBakeReport {
   bool closed = false;
+  double sealed_area = 0;               // [m^2] put across holes
   std::vector<std::string> warnings;
 };
 

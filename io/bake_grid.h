@@ -6,6 +6,7 @@
 //   surface -> grid -> bins -> narrow band (unsigned u, crossings) -> flood -> inside -> samples
 //                                                                             far grid ----^
 #pragma once
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -33,8 +34,12 @@ struct Grid {
   std::array<std::int32_t, 3> bricks{};
   double offset = 0;                    // sigma [voxel]
   double band = 0;                      // [voxel]
+  double seal = 0;                      // width of holes to close [voxel]; 0 once they are closed
 
-  double reach() const { return offset + band + 2.0; }  // u is exact up to here
+  // u is exact up to here.
+  double reach() const { return std::max(offset + band + 2.0, seal / 2 + 1.0); }
+  // A cell with a point within band of the zero set has a corner at most half a cell further off.
+  double near_zero_set() const { return offset + band + 0.8661 + 1e-3; }
   std::size_t cells() const {
     return std::size_t(bricks[0]) * std::size_t(bricks[1]) * std::size_t(bricks[2]);
   }
@@ -91,18 +96,43 @@ struct Crossing {
   NodeMask on;
 };
 
+// Triangles are kept by tiles of 4^3 bricks. `near` says which bricks of the tile a triangle may be
+// within reach of; the order within a tile means nothing.
+struct Tiles {
+  std::array<int, 3> size{};
+  std::vector<std::size_t> first;       // (tiles + 1) into the lists
+  std::vector<std::uint32_t> triangle;
+  std::vector<std::uint64_t> near;      // bit (c*4 + b)*4 + a
+  std::size_t count() const { return first.size() - 1; }
+  std::size_t of(const std::array<int, 3>& brick) const {
+    return (std::size_t(brick[2] / 4) * std::size_t(size[1]) + std::size_t(brick[1] / 4)) *
+               std::size_t(size[0]) +
+           std::size_t(brick[0] / 4);
+  }
+  static int bit(const std::array<int, 3>& brick) {
+    return (brick[2] % 4 * 4 + brick[1] % 4) * 4 + brick[0] % 4;
+  }
+  std::array<int, 3> first_brick(std::size_t tile) const {
+    const std::size_t x = std::size_t(size[0]), y = std::size_t(size[1]);
+    return {int(tile % x) * 4, int(tile / x % y) * 4, int(tile / x / y) * 4};
+  }
+};
+
 // Bricks that a triangle comes near to, and what is known of their nodes. Rows are candidates, in
 // the order of cells.
 struct NarrowBand {
+  Tiles tiles;
   std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
   std::vector<std::uint32_t> cell;     // (rows)
-  std::vector<std::size_t> first;      // (rows + 1) into `triangle`
-  std::vector<std::uint32_t> triangle; // triangles within reach of the row's nodes, increasing
-  std::unique_ptr<float[]> u;          // (rows x 512) unsigned distance, at most reach [voxel]
+  Samples u;                           // (rows x 512) unsigned distance, at most reach [voxel]
+  std::vector<NodeMask> free;          // (rows) u > offset, and not on the surface
+  std::vector<float> first_node;       // (rows) u of the row's first node
+  std::vector<std::uint32_t> towards;  // (rows) bit i: near neighbour i is the zero set
   std::vector<Crossing> crossing;      // (rows), or empty where offset >= 0.5: not needed there
   std::vector<std::int32_t> part;      // (rows) or empty
   std::size_t rows() const { return cell.size(); }
-  const float* nodes(std::size_t r) const { return u.get() + r * kBrickSamples; }
+  float* nodes(std::size_t r) { return u.data() + r * kBrickSamples; }
+  const float* nodes(std::size_t r) const { return u.data() + r * kBrickSamples; }
 };
 
 // Steps report through this; false: cancelled.
@@ -120,12 +150,16 @@ class Steps {
   const Progress& progress_;
 };
 
-// bake_bins.cpp: rows, cells and triangle lists. A sentence when there are too many.
+// bake_bins.cpp: tiles, cells and rows. A sentence when there are too many.
 Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
                         NarrowBand& band);
-// bake_distance.cpp, bake_crossing.cpp: u, part and crossings of one row.
-void measure_row(const Surface& surface, const Grid& grid, std::size_t row, NarrowBand& band);
-void cross_row(const Surface& surface, const Grid& grid, std::size_t row, NarrowBand& band);
+// bake_distance.cpp, bake_crossing.cpp: what is known of the rows of one tile.
+void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band);
+void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band);
+
+// bake_seal.cpp: facets across holes up to grid.seal wide; returns how many, a square voxel each.
+std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads,
+                       Surface& surface);
 
 // bake_sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
 struct Reached {
@@ -139,14 +173,29 @@ std::vector<NodeMask> reachable(const Surface& surface, const Grid& grid, const 
                                 const std::vector<NodeMask>& candidates,
                                 const std::vector<NodeMask>& wet, unsigned threads);
 
-// bake_inside.cpp: signed distances [voxel] of all rows, in place of u; says which rows are needed.
+class Chains;  // bake_chains.h
+
+// bake_inside.cpp: what the signed distances need besides u, and which rows are needed at all.
 struct Inside {
   std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within band of the zero set
+  std::vector<NodeMask> in_sight;    // (rows) not reached, yet R is on this side of the sheet
+  // Where sheets are buried: lengths of the ways out; a row that has them may be corrected by them.
+  std::shared_ptr<const Chains> chains;
+  std::vector<std::uint8_t> corrected;  // (rows)
+  // Other nodes whose depth is not told by u alone, by row: below cracks.
+  struct Depth {
+    std::uint32_t node;
+    float depth;  // [voxel]
+  };
+  std::vector<std::vector<Depth>> depths;
   std::size_t thin_edges = 0;        // surface between two outside nodes with no inside node near
   std::size_t inside_nodes = 0;
 };
-bool sign_rows(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
-               const Steps& steps, Inside& inside);
+bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached,
+                 unsigned threads, const Steps& steps, Inside& inside);
+// bake_samples.cpp: the needed rows' signed distances [m], in place of u, and where they are.
+void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached,
+                   const Inside& inside, unsigned threads, FieldData& field);
 
 // bake_far.cpp: lower bounds [m] with sign at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,

@@ -43,9 +43,25 @@ class View {
        const std::vector<NodeMask>& wet)
       : surface_(surface), grid_(grid), band_(band), wet_(wet) {}
 
-  bool reaches_outside(std::size_t row, const std::array<int, 3>& p) const {
+  // The facets that nodes of a row can have near them.
+  std::vector<Facet> facets_of(std::size_t row) const {
+    const Tiles& tiles = band_.tiles;
+    const std::array<int, 3> brick = grid_.place(band_.cell[row]);
+    const std::size_t tile = tiles.of(brick);
+    std::vector<Facet> facets;
+    for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
+      if (!(tiles.near[i] >> Tiles::bit(brick) & 1)) continue;
+      const auto& t = surface_.triangles[tiles.triangle[i]];
+      const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
+                 &c = surface_.vertices[t[2]];
+      facets.push_back({a, sub(b, a), sub(c, a)});
+    }
+    return facets;
+  }
+
+  bool reaches_outside(const std::vector<Facet>& facets, const std::array<int, 3>& p) const {
     const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
-    const std::vector<Facet> near = facets_near(row, eye);
+    const std::vector<Facet> near = facets_near(facets, eye);
     int odd = 0, looks = 0;
     for (int i = 0; i < 125; ++i) {
       const std::array<int, 3> d = {i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2};
@@ -101,20 +117,15 @@ class View {
     return false;
   }
 
-  std::vector<Facet> facets_near(std::size_t row, const Vec3& eye) const {
+  static std::vector<Facet> facets_near(const std::vector<Facet>& facets, const Vec3& eye) {
     std::vector<Facet> near;
-    for (std::size_t i = band_.first[row]; i < band_.first[row + 1]; ++i) {
-      const auto& t = surface_.triangles[band_.triangle[i]];
-      const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
-                 &c = surface_.vertices[t[2]];
-      const auto apart = [](double p, double q, double r, double at) {
-        return std::min({p, q, r}) > at + kView || std::max({p, q, r}) < at - kView;
-      };
-      if (apart(a.x, b.x, c.x, eye.x) || apart(a.y, b.y, c.y, eye.y) ||
-          apart(a.z, b.z, c.z, eye.z))
-        continue;
-      near.push_back({a, sub(b, a), sub(c, a)});
-    }
+    const auto apart = [](double p, double e, double f, double at) {
+      return p + std::min({0.0, e, f}) > at + kView || p + std::max({0.0, e, f}) < at - kView;
+    };
+    for (const Facet& t : facets)
+      if (!apart(t.a.x, t.e.x, t.f.x, eye.x) && !apart(t.a.y, t.e.y, t.f.y, eye.y) &&
+          !apart(t.a.z, t.e.z, t.f.z, eye.z))
+        near.push_back(t);
     return near;
   }
 
@@ -132,11 +143,13 @@ std::vector<NodeMask> reachable(const Surface& surface, const Grid& grid, const 
   std::vector<NodeMask> seen(band.rows());
   const View view(surface, grid, band, wet);
   sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
+    if (!candidates[r].any()) return;
     const std::array<int, 3> place = grid.place(band.cell[r]);
+    const std::vector<Facet> facets = view.facets_of(r);
     for (std::size_t z = 0; z < 8; ++z)
       for (std::uint64_t bits = candidates[r].z[z]; bits != 0; bits &= bits - 1) {
         const int n = std::countr_zero(bits);
-        if (view.reaches_outside(r, {8 * place[0] + n % 8, 8 * place[1] + n / 8,
+        if (view.reaches_outside(facets, {8 * place[0] + n % 8, 8 * place[1] + n / 8,
                                   8 * place[2] + int(z)}))
           seen[r].set(64 * z + std::size_t(n));
       }

@@ -1,104 +1,25 @@
 // bake_shell.cpp - points on the surface, then levels and tree.
 //
-// Many candidates, spread evenly over the area, are thinned out to the number asked for (see
-// blue_noise.h); build_tree makes the levels of those. Normals are those of the triangles.
-//
-// All of the surface is sampled, also what lies inside the body or cannot be reached from outside:
-// such points are never in contact, but they take their share of the number.
+// Many candidates, spread evenly over the area that can be reached from outside, are thinned out to
+// the number asked for (see blue_noise.h); build_tree makes the levels of those. What is reached is
+// what a field says, baked here for that: of a mesh that is one closed piece all is, without
+// asking.
 #include "io/bake_shell.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <new>
+#include <optional>
 
 #include "io/cache.h"
-#include "io/inward_normals.h"
+#include "io/shell_candidates.h"
 #include "io/shell_tree.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
 namespace {
-
-// Candidates for each point: few leave gaps, many take time. A fixed spacing has no second round to
-// fill its gaps and needs more. Very large shells get fewer: theirs alone fill gigabytes.
-double candidates_for(double points, bool by_spacing) {
-  const double each = points > 2e6 ? 4 : by_spacing ? 24 : 12;
-  return std::max(4096.0, each * points);
-}
-
-// A number in [0, 1) of the top bits.
-double unit(std::uint64_t bits) { return double(bits >> 11) * 0x1p-53; }
-
-struct Surface {
-  FaceTable faces;
-  std::vector<double> reach;  // (triangles + 1) running sum of weights
-  double area = 0;            // [m^2]
-};
-
-// Candidates fall in proportion to area, but wires and slivers get more: along a strip far narrower
-// than the spacing, area alone leaves holes. `spacing` is a rough one [m].
-void weigh(const Mesh& mesh, double spacing, Surface& surface) {
-  const std::size_t count = mesh.triangles.size();
-  surface.reach.assign(count + 1, 0);
-  for (std::size_t t = 0; t < count; ++t) {
-    const double area = surface.faces.area[t];
-    double longest2 = 0;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 &a = mesh.vertices[mesh.triangles[t][k]],
-                 &b = mesh.vertices[mesh.triangles[t][(k + 1) % 3]];
-      const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-      longest2 = std::max(longest2, dx * dx + dy * dy + dz * dz);
-    }
-    const double longest = std::sqrt(longest2);
-    double weight = area;
-    if (area > 0 && longest > spacing) {
-      const double width = 2 * area / longest;
-      weight *= std::clamp(0.5 * spacing / width, 1.0, 8.0);
-    }
-    surface.reach[t + 1] = surface.reach[t] + weight;
-  }
-}
-
-// Candidate i lies in the i-th of `count` equal parts of the running weight, within its triangle by
-// the R2 sequence (additive recurrence with the plastic number): even in large triangles, even over
-// many small ones, and a function of i alone, so that threads do not matter.
-struct Candidates {
-  std::vector<OrientedPoint> points;
-  std::vector<std::uint32_t> source;
-};
-
-Candidates scatter(const Mesh& mesh, const Surface& surface, std::size_t count, std::uint64_t seed,
-                   unsigned threads) {
-  Candidates out;
-  out.points.resize(count);
-  out.source.resize(count);
-  constexpr std::size_t slice = 4096;
-  const double step = surface.reach.back() / double(count);
-  const std::uint64_t start_u = mix(seed, 1), start_v = mix(seed, 2);
-  sched::parallel_for((count + slice - 1) / slice, threads, [&](std::size_t s) {
-    const std::size_t from = s * slice, to = std::min(count, from + slice);
-    const auto first =
-        std::upper_bound(surface.reach.begin(), surface.reach.end(), double(from) * step);
-    std::size_t t = std::size_t(std::max<std::ptrdiff_t>(first - surface.reach.begin() - 1, 0));
-    for (std::size_t i = from; i < to; ++i) {
-      const double at = (double(i) + unit(mix(seed ^ 0xA5A5, i))) * step;
-      while (t + 1 < mesh.triangles.size() && surface.reach[t + 1] <= at) ++t;
-      while (surface.faces.area[t] == 0) --t;  // rounding at the very end
-      double u = unit(start_u + i * 0xC13FA9A902A6328Fu),
-             v = unit(start_v + i * 0x91E10DA5C79E7B1Du);
-      if (u + v > 1) u = 1 - u, v = 1 - v;
-      const auto& f = mesh.triangles[t];
-      const Vec3 &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
-      const Vec3& n = surface.faces.inward[t];
-      out.points[i] = {{float(a.x + u * (b.x - a.x) + v * (c.x - a.x)),
-                        float(a.y + u * (b.y - a.y) + v * (c.y - a.y)),
-                        float(a.z + u * (b.z - a.z) + v * (c.z - a.z))},
-                       {float(n.x), float(n.y), float(n.z)}};
-      out.source[i] = std::uint32_t(t);
-    }
-  });
-  return out;
-}
 
 Outcome check_mesh(const Mesh& mesh) {
   if (mesh.triangles.empty())
@@ -145,88 +66,245 @@ Outcome check_options(const ShellBake& options) {
   return Done{};
 }
 
-// Random darts that keep a distance r from one another cover 0.547 of a plane with discs of radius
-// r/2 when no more fit: r = 0.83 sqrt(area / points).
-double points_at(double spacing, double area) { return 0.70 * area / (spacing * spacing); }
-
-// Progress from several steps, heard from the calling thread only.
-std::function<bool(double)> part_of(const Progress& progress, const char* what, double from,
-                                    double to) {
-  if (!progress) return {};
-  return [&progress, what, from, to](double done) {
-    return progress(what, from + (to - from) * std::clamp(done, 0.0, 1.0));
-  };
+std::string millimetres(double metres) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3g mm", metres * 1e3);
+  return text;
 }
 
-Result<ShellData> bake(const Mesh& mesh, const ShellBake& options,
-                       std::vector<std::string>* warnings, const Progress& progress) {
-  if (progress && !progress("reading the surface", 0)) return Failure{"cancelled"};
-  Surface surface;
-  surface.faces = face_table(mesh);
-  for (const double area : surface.faces.area) surface.area += area;
-  if (!(surface.area > 0)) {
-    return Failure{"The mesh has no area: all its triangles are lines or points."};
-  }
-  const bool by_spacing = options.spacing > 0;
-  const double wanted =
-      by_spacing ? std::max(1.0, points_at(options.spacing, surface.area)) : double(options.points);
-  if (wanted > double(max_shell_points)) {
-    return Failure{"A spacing of " + std::to_string(options.spacing) + " m gives about " +
-                   std::to_string(std::llround(wanted / 1e6)) + " million points" + too_many +
-                   "a wider spacing."};
-  }
-  const double guess = by_spacing ? options.spacing : std::sqrt(surface.area / wanted);
-  weigh(mesh, guess, surface);
-  const double boost = std::min(surface.reach.back() / surface.area, 3.0);
-  const auto count = std::size_t(candidates_for(wanted, by_spacing) * boost);
-  const Candidates candidates = scatter(mesh, surface, count, options.seed, options.threads);
+// The field's complaints stand after the name of a file; these here stand alone.
+std::string sentence(std::string text) {
+  if (text == "cancelled" || text.empty()) return text;
+  text[0] = char(std::toupper(static_cast<unsigned char>(text[0])));
+  return text.back() == '.' ? text : text + ".";
+}
 
-  Thinning thinning;
-  thinning.target = by_spacing ? max_shell_points : options.points;
-  thinning.first_radius = by_spacing ? options.spacing : 0.93 * guess;
-  thinning.fixed_radius = by_spacing;
-  thinning.both_sides = true;
-  thinning.seed = options.seed;
-  thinning.threads = options.threads;
-  thinning.keep_going = part_of(progress, "spreading points", 0.1, 0.8);
-  const Thinned thinned = thin_out(candidates.points, thinning);
-  if (thinned.cancelled) return Failure{"cancelled"};
-  if (thinned.chosen.size() > max_shell_points) {
-    return Failure{"This spacing gives " + std::to_string(thinned.chosen.size()) + " points" +
-                   too_many + "a wider spacing."};
+using Warnings = std::vector<std::string>;
+
+// Points to be thinned out, and what makes a point of the shell out of each.
+class Bake {
+ public:
+  Bake(const Mesh& mesh, const ShellBake& options, Warnings& warnings, Pulse& pulse)
+      : mesh_(mesh), options_(options), warnings_(warnings), pulse_(pulse) {}
+
+  Result<ShellData> run() {
+    if (!pulse_.step("reading the surface", 0, 0.05)) return cancelled_;
+    surface_ = options_.surface;
+    if (surface_ == ShellSurface::automatic) surface_ = ShellSurface::triangles;
+    if (!pulse_.alive()) return cancelled_;
+    Result<Candidates> samples = surface_ == ShellSurface::triangles ? on_triangles() : on_field();
+    if (!samples) return samples.failure();
+    return thin_and_build(*samples);
   }
 
-  std::vector<OrientedPoint> points;
-  std::vector<std::uint32_t> source;
-  points.reserve(thinned.chosen.size());
-  source.reserve(thinned.chosen.size());
-  for (const auto id : thinned.chosen) {
-    points.push_back(candidates.points[id]);
-    source.push_back(candidates.source[id]);
+ private:
+  // Candidates of a field count in its voxels.
+  double unit() const { return surface_ == ShellSurface::field ? field_->voxel_size : 1; }
+  Demand demand() const {
+    return {options_.points, options_.spacing / unit(), options_.seed, options_.threads};
   }
-  TreeOptions tree;
-  tree.levels = options.levels;
-  tree.spacing = thinned.spacing;
-  tree.seed = options.seed;
-  tree.threads = options.threads;
-  tree.keep_going = part_of(progress, "building levels", 0.8, 1);
-  Result<ShellData> shell = build_tree(points, source, tree);
-  if (!shell) return shell;
-  shell->input_hash = content_hash(mesh, options);
-  if (warnings) {
-    warnings->insert(warnings->end(), surface.faces.warnings.begin(), surface.faces.warnings.end());
+
+  // Of a sound mesh only what the outside reaches is asked for. Half a voxel of offset is the least
+  // that no step from node to node can cross, and spares the field its search for gaps narrower
+  // than a voxel: seconds, where many parts lie on one another.
+  static void step_off(const Mesh& mesh, FieldBake& options) {
+    if (options.offset >= 0) return;
+    Vec3 low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
+    for (const auto& triangle : mesh.triangles) {
+      for (const std::uint32_t v : triangle) {
+        const Vec3& p = mesh.vertices[v];
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+      }
+    }
+    const double longest = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    const double padding = std::min(double(options.padding_voxels), options.voxels / 4.0);
+    if (options.voxel_size <= 0) options.voxel_size = longest / (options.voxels - 2 * padding);
+    options.offset = 0.5001 * options.voxel_size;
   }
-  return shell;
+
+  Outcome bake_the_field(bool sound) {
+    FieldBake options = options_.field;
+    if (sound) step_off(mesh_, options);
+    options.threads = options_.threads;
+    options.cavities = Cavities::solid;  // a shell is touched from outside
+    pulse_.step("finding the outside", 0.05, 0.4);
+    Result<FieldData> field = bake_field(mesh_, options, &report_, pulse_.part());
+    if (!field) return Failure{sentence(field.error())};
+    field_ = std::move(*field);
+    return Done{};
+  }
+
+  Result<Candidates> on_triangles() {
+    const FaceTable faces = face_table(mesh_, &pulse_);
+    if (!pulse_.alive()) return cancelled_;
+    double area = 0;
+    for (const double a : faces.area) area += a;
+    if (!(area > 0)) {
+      return Failure{"The mesh has no area: all its triangles are lines or points."};
+    }
+    const bool all_outside = faces.pieces == 1 && faces.sheets == 0;
+    Reach reach;
+    reach.hide = !all_outside;
+    reach.field_normals = options_.normals == ShellNormals::field;
+    std::optional<FieldView> view;
+    if (reach.hide || reach.field_normals) {
+      if (Outcome baked = bake_the_field(faces.sheets == 0); !baked) return baked.failure();
+      reach.field = &view.emplace(*field_);
+      reach.offset = field_->offset / field_->voxel_size;
+    }
+    pulse_.step("spreading points", 0.4, 0.8);
+    Result<Candidates> samples = sample_triangles(mesh_, faces, reach, demand(), pulse_);
+    if (!samples) return samples;
+    warnings_.insert(warnings_.end(), faces.warnings.begin(), faces.warnings.end());
+    if (faces.sheets > 0) {
+      warnings_.push_back(std::to_string(faces.sheets) +
+                          (faces.sheets == 1 ? " piece" : " pieces") +
+                          " of the mesh not closed: both sides have points wherever the outside "
+                          "reaches both.");
+    }
+    if (samples->hidden > 0.005) {
+      warnings_.push_back(
+          std::to_string(std::lround(100 * samples->hidden)) +
+          " % of the mesh's area cannot be reached from outside and has no points.");
+    }
+    return samples;
+  }
+
+  Result<Candidates> on_field() {
+    if (Outcome baked = bake_the_field(false); !baked) return baked.failure();
+    pulse_.step("spreading points", 0.4, 0.8);
+    Result<Candidates> samples = sample_zero_set(*field_, demand(), pulse_);
+    if (!samples) return samples;
+    // Half as many again as are wanted, where the grid has them; then exactly there.
+    const Thinned some = thinned(*samples, demand().spacing * 0.8, options_.points * 3 / 2);
+    if (some.cancelled) return cancelled_;
+    for (std::size_t i = 0; i < some.chosen.size(); ++i) {
+      samples->points[i] = samples->points[some.chosen[i]];
+    }
+    samples->points.resize(some.chosen.size());
+    const NearestTriangle nearest(mesh_, options_.threads, &pulse_);
+    if (!pulse_.alive()) return cancelled_;
+    settle({&mesh_, &*field_, &nearest, options_.normals == ShellNormals::triangles},
+           options_.threads, pulse_, *samples);
+    if (!pulse_.alive()) return cancelled_;
+    if (field_->offset > 0) {
+      warnings_.push_back(
+          std::string(report_.closed ? "" : "The mesh is not closed. ") +
+          "Its points lie where its field has its surface, " + millimetres(field_->offset) +
+          " outside of the triangles; more voxels or a smaller offset bring them nearer, and "
+          "\"triangles\" as surface puts them on the triangles.");
+    }
+    return samples;
+  }
+
+  // By spacing when there is one, else the number.
+  Thinned thinned(const Candidates& samples, double spacing, std::size_t number) {
+    Thinning thinning;
+    thinning.fixed_radius = spacing > 0;
+    thinning.target = thinning.fixed_radius ? max_shell_points : number;
+    thinning.first_radius =
+        thinning.fixed_radius ? spacing : 0.93 * std::sqrt(samples.area / double(number));
+    thinning.both_sides = true;
+    thinning.seed = options_.seed;
+    thinning.threads = options_.threads;
+    thinning.pulse = &pulse_;
+    return thin_out(samples.points, thinning);
+  }
+
+  Result<ShellData> thin_and_build(const Candidates& samples) {
+    const Thinned thinned = this->thinned(samples, demand().spacing, options_.points);
+    if (thinned.cancelled) return cancelled_;
+    if (thinned.chosen.size() > max_shell_points) {
+      return Failure{"This spacing gives " + std::to_string(thinned.chosen.size()) + " points" +
+                     too_many + "a wider spacing."};
+    }
+    std::vector<OrientedPoint> points(thinned.chosen.size());
+    std::vector<std::uint32_t> source(thinned.chosen.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (i % 65536 == 0 && !pulse_.alive()) return cancelled_;
+      points[i] = in_metres(samples.points[thinned.chosen[i]]);
+      source[i] = samples.source[thinned.chosen[i]];
+    }
+    if (!pulse_.step("building levels", 0.8, 1)) return cancelled_;
+    TreeOptions tree;
+    tree.levels = options_.levels;
+    tree.spacing = thinned.spacing * unit();
+    tree.seed = options_.seed;
+    tree.threads = options_.threads;
+    tree.pulse = &pulse_;
+    Result<ShellData> shell = build_tree(points, source, tree);
+    if (shell) shell->input_hash = content_hash(mesh_, options_);
+    return shell;
+  }
+
+  OrientedPoint in_metres(OrientedPoint q) const {
+    if (surface_ == ShellSurface::triangles) return q;
+    const Vec3 p = FieldView(*field_).to_metres({q.p[0], q.p[1], q.p[2]});
+    q.p[0] = float(p.x), q.p[1] = float(p.y), q.p[2] = float(p.z);
+    return q;
+  }
+
+  const Mesh& mesh_;
+  const ShellBake& options_;
+  Warnings& warnings_;
+  Pulse& pulse_;
+  const Failure cancelled_{"cancelled"};
+  ShellSurface surface_ = ShellSurface::automatic;
+  std::optional<FieldData> field_;
+  FieldBakeReport report_;
+};
+
+constexpr const char* mode_names[] = {"auto", "triangles", "field"};  // of both enums, in order
+
+template <class Mode>
+std::optional<Mode> mode_from_name(const std::string& name) {
+  for (int i = 0; i < 3; ++i) {
+    if (name == mode_names[i]) return Mode(i);
+  }
+  return {};
 }
 
 }  // namespace
+
+std::optional<ShellSurface> surface_from_name(const std::string& name) {
+  return mode_from_name<ShellSurface>(name);
+}
+std::optional<ShellNormals> normals_from_name(const std::string& name) {
+  return mode_from_name<ShellNormals>(name);
+}
+const char* name_of(ShellSurface surface) { return mode_names[int(surface)]; }
+const char* name_of(ShellNormals normals) { return mode_names[int(normals)]; }
+
+double candidates_for(double points, bool by_spacing) {
+  // A fixed spacing has no second round to fill its gaps and needs more. Very large shells get
+  // fewer: theirs alone fill gigabytes.
+  const double each = points > 2e6 ? 4 : by_spacing ? 24 : 12;
+  return std::max(4096.0, each * points);
+}
+
+Result<double> Demand::wanted(double area) const {
+  if (!by_spacing()) return double(points);
+  // Random darts that keep a distance r from one another cover 0.547 of a plane with discs of
+  // radius r/2 when no more fit: r = 0.83 sqrt(area / points).
+  const double count = std::max(1.0, 0.70 * area / (spacing * spacing));
+  if (count <= double(max_shell_points)) return count;
+  return Failure{"This spacing gives about " + std::to_string(std::llround(count / 1e6)) +
+                 " million points" + too_many + "a wider spacing."};
+}
+
+double Demand::guess(double area, double count) const {
+  return by_spacing() ? spacing : std::sqrt(area / count);
+}
 
 Result<ShellData> bake_shell(const Mesh& mesh, const ShellBake& options,
                              std::vector<std::string>* warnings, const Progress& progress) {
   if (Outcome fine = check_options(options); !fine) return fine.failure();
   if (Outcome fine = check_mesh(mesh); !fine) return fine.failure();
   try {
-    return bake(mesh, options, warnings, progress);
+    Warnings unheard;
+    Pulse pulse(progress);
+    return Bake(mesh, options, warnings ? *warnings : unheard, pulse).run();
   } catch (const std::bad_alloc&) {
     return Failure{"Not enough memory for this shell: ask for fewer points or a wider spacing."};
   }

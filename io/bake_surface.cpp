@@ -153,6 +153,8 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
   if (options.padding_voxels < 0 || options.padding_voxels > 512)
     return Failure{"the padding must be 0 to 512 voxels, not " +
                    std::to_string(options.padding_voxels)};
+  if (!(options.seal >= 0) || !std::isfinite(options.seal))
+    return Failure{"the width of holes to seal must be a length, or 0 for none"};
   if (!std::isfinite(options.offset)) return Failure{"the offset must be a length, or -1 for auto"};
 
   Grid grid;
@@ -167,20 +169,29 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
   const double auto_offset = sealed ? 0.0 : 0.9;  // [voxel]
   const double margin = grid.band + 2 + (automatic ? auto_offset : 0.0);
   const double extra = automatic ? 0.0 : options.offset;  // [m], on each side
+  const double seal = sealed ? 0.0 : options.seal;        // [m]; a ball of it passes all around
   double padding = options.padding_voxels;
   if (options.voxel_size > 0) {
     grid.voxel = options.voxel_size;
-    padding = std::max(padding, margin + extra / grid.voxel);
+    padding = std::max({padding, margin + extra / grid.voxel, 0.5 * seal / grid.voxel + 2});
   } else {
     const double n = options.voxels;
     padding = std::max(std::min(padding, n / 4), margin);
-    grid.voxel = std::max(longest / (n - 2 * padding), (longest + 2 * extra) / (n - 2 * margin));
-    padding = std::max(padding, margin + extra / grid.voxel);
+    grid.voxel = std::max({longest / (n - 2 * padding), (longest + 2 * extra) / (n - 2 * margin),
+                           (longest + seal) / (n - 4)});
+    padding = std::max({padding, margin + extra / grid.voxel, 0.5 * seal / grid.voxel + 2});
   }
   grid.offset = automatic ? auto_offset : options.offset / grid.voxel;
   if (grid.offset > 64)
     return Failure{"the offset of " + number(options.offset) + " m is " + number(grid.offset) +
                    " voxels; at most 64 are possible: choose larger voxels"};
+  grid.seal = seal / grid.voxel;
+  if (grid.seal > 0 && grid.offset < 0.6)
+    return Failure{"sealing holes needs an offset of at least 0.6 voxel (" +
+                   number(0.6 * grid.voxel) + " m)"};
+  if (grid.seal > 32)
+    return Failure{"holes of " + number(options.seal) + " m are " + number(grid.seal) +
+                   " voxels wide; at most 32 can be sealed: choose larger voxels"};
   for (std::size_t k = 0; k < 3; ++k) {
     const double nodes = side[k] / grid.voxel + 2 * padding;
     if (!(nodes <= 2048 + 1e-6)) {

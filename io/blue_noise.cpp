@@ -21,10 +21,13 @@ constexpr std::size_t cells_a_slice = 256;
 // Cosine between normals that count as two sides: 134 degrees, a wedge of 46. Thread flanks (60)
 // and blunter edges keep their distance as on one surface; sharper ones would starve one another.
 constexpr float opposed = -0.7f;
+// They still keep this share of the distance: the points of all sides together are blue noise, and
+// those of a sheet's two sides do not coincide.
+constexpr float across = 0.75f;
 
 struct Spot {  // 32 bytes: a cell's points lie together
   float p[3], n[3];
-  float gap;  // an accepted point is known to be this near [m]
+  float gap;  // an accepted point is known to be this near [m]; on another side, / `across`
   std::uint32_t id;
 };
 
@@ -72,7 +75,8 @@ class Thrower {
   Thinned run();
 
  private:
-  void build_grid(double radius);
+  bool alive() const { return io::alive(options_.pulse); }
+  bool build_grid(double radius);
   void find_cells();
   void link_cells();
   void colour_cells();
@@ -96,19 +100,20 @@ class Thrower {
   std::size_t chosen_ = 0;
   std::vector<std::uint32_t> fresh_;  // accepted in the last round
   double cell_ = 0;
-  std::vector<Spot> spots_;
+  RawVector<Spot> spots_;
   std::vector<float> gap_;  // by point, kept over rebuilt grids; empty: not known
   std::vector<Cell> cells_;
   std::vector<std::uint64_t> keys_;  // of cells, ascending
   std::vector<std::array<Row, 9>> rows_;
   std::array<std::vector<std::uint32_t>, 27> colours_;
-  std::vector<KeyedIndex> order_, spare_;
+  KeyedIndices order_, spare_;
 };
 
 template <class Body>
 void Thrower::slices(std::size_t count, const Body& body) const {
   const std::size_t pieces = (count + cells_a_slice - 1) / cells_a_slice;
   const auto piece = [&](std::size_t i) {
+    if (!alive()) return;
     body(i, i * cells_a_slice, std::min(count, (i + 1) * cells_a_slice));
   };
   if (pieces < 2) {
@@ -118,13 +123,17 @@ void Thrower::slices(std::size_t count, const Body& body) const {
   }
 }
 
-void Thrower::build_grid(double radius) {
+// False: cancelled, and the grid is of no use.
+bool Thrower::build_grid(double radius) {
   // A little wider than the radius: distances are compared in float.
   cell_ = std::max(radius * 1.0001, box_.extent / cells_across);
   find_cells();
+  if (!alive()) return false;
   link_cells();
+  if (!alive()) return false;
   colour_cells();
   place_spots();
+  return alive();
 }
 
 // Points grouped by cell; cells in ascending order of key: z, then y, then x.
@@ -135,10 +144,11 @@ void Thrower::find_cells() {
       order_[i] = {key_at(box_, 1 / cell_, points_[i].p), std::uint32_t(i)};
     }
   });
-  radix_sort(order_, spare_);
+  radix_sort(order_, spare_, options_.threads, options_.pulse);
   cells_.clear();
   keys_.clear();
   for (std::size_t i = 0; i < order_.size(); ++i) {
+    if (i % 65536 == 0 && !alive()) return;
     if (i == 0 || order_[i].key != order_[i - 1].key) {
       keys_.push_back(order_[i].key);
       cells_.push_back({std::uint32_t(i), 0, 0, 0});
@@ -172,6 +182,7 @@ void Thrower::colour_cells() {
   constexpr std::uint64_t mask = (1u << axis_bits) - 1;
   for (auto& list : colours_) list.clear();
   for (std::size_t c = 0; c < keys_.size(); ++c) {
+    if (c % 65536 == 0 && !alive()) return;
     const std::uint64_t key = keys_[c];
     const std::uint64_t x = key & mask, y = (key >> axis_bits) & mask, z = key >> (2 * axis_bits);
     colours_[(x % 3) + 3 * (y % 3) + 9 * (z % 3)].push_back(std::uint32_t(c));
@@ -215,11 +226,12 @@ float Thrower::nearest_blocker(std::size_t cell_index, const Spot& spot, float r
       for (const Spot* end = other + cells_[c].accepted; other != end; ++other) {
         const float dx = other->p[0] - spot.p[0], dy = other->p[1] - spot.p[1],
                     dz = other->p[2] - spot.p[2];
-        const float d2 = dx * dx + dy * dy + dz * dz;
+        float d2 = dx * dx + dy * dy + dz * dz;
         if (!(d2 < best2)) continue;
         if (options_.both_sides &&
             other->n[0] * spot.n[0] + other->n[1] * spot.n[1] + other->n[2] * spot.n[2] < opposed) {
-          continue;
+          d2 *= 1 / (across * across);
+          if (!(d2 < best2)) continue;
         }
         best2 = d2;
         if (best2 < enough2) return std::sqrt(best2);
@@ -272,6 +284,7 @@ void Thrower::round(double radius) {
           }
         }
       });
+      if (!alive()) return;
       for (const auto& part : fresh) fresh_.insert(fresh_.end(), part.begin(), part.end());
     }
     done = step;
@@ -300,12 +313,14 @@ void Thrower::drop_excess() {
 
 // Points that coincide: no distance tells them apart, any will do.
 void Thrower::fill_up() {
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> rest;
+  order_.clear();
   for (std::uint32_t id = 0; id < accepted_.size(); ++id) {
-    if (!accepted_[id]) rest.push_back({mix(options_.seed, id), id});
+    if (id % 65536 == 0 && !alive()) return;
+    if (!accepted_[id]) order_.push_back({mix(options_.seed, id), id});
   }
-  std::sort(rest.begin(), rest.end());
-  for (std::size_t i = 0; chosen_ < options_.target; ++i, ++chosen_) accepted_[rest[i].second] = 1;
+  radix_sort(order_, spare_, options_.threads, options_.pulse);
+  if (!alive()) return;
+  for (std::size_t i = 0; chosen_ < options_.target; ++i, ++chosen_) accepted_[order_[i].index] = 1;
 }
 
 // On a surface the count grows with 1/r^2; less than that at a time, so that the last round adds
@@ -319,10 +334,13 @@ Thinned Thrower::finish(double spacing, bool cancelled) const {
   Thinned out;
   out.spacing = spacing;
   out.cancelled = cancelled;
+  if (cancelled) return out;
   out.chosen.reserve(chosen_);
   for (std::uint32_t id = 0; id < accepted_.size(); ++id) {
+    if (id % 65536 == 0 && !alive()) break;
     if (accepted_[id]) out.chosen.push_back(id);
   }
+  out.cancelled = !alive();
   return out;
 }
 
@@ -331,20 +349,21 @@ Thinned Thrower::run() {
   double radius =
       options_.fixed_radius ? options_.first_radius : std::max(options_.first_radius, 2 * smallest);
   for (;;) {
-    if (options_.keep_going &&
-        !options_.keep_going(double(chosen_) / double(std::max<std::size_t>(options_.target, 1)))) {
-      return finish(0, true);
+    if (options_.pulse) {
+      options_.pulse->share(double(chosen_) / double(std::max<std::size_t>(options_.target, 1)));
     }
+    if (!alive()) return finish(0, true);
     if (!options_.fixed_radius && !(radius > smallest)) break;
     if (cell_ == 0 || radius > cell_ || radius < 0.5 * cell_) {
       if (chosen_ > 0) {
         gap_.resize(points_.size());
         for (const Spot& spot : spots_) gap_[spot.id] = spot.gap;
       }
-      build_grid(radius);
+      if (!build_grid(radius)) return finish(0, true);
     }
     const bool first = chosen_ == 0;
     round(radius);
+    if (!alive()) return finish(0, true);
     if (options_.fixed_radius || chosen_ == options_.target) return finish(radius);
     if (chosen_ < options_.target) {
       radius = next_radius(radius);
@@ -359,7 +378,7 @@ Thinned Thrower::run() {
     }
   }
   fill_up();
-  return finish(0);
+  return finish(0, !alive());
 }
 
 }  // namespace

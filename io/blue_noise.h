@@ -7,9 +7,10 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
+
+#include "io/pulse.h"
 
 namespace h6::io {
 
@@ -23,11 +24,11 @@ struct Thinning {
   double first_radius = 0;    // where to start [m], any guess > 0; too large costs rounds,
                               // too small is noticed and repaired
   bool fixed_radius = false;  // one round at first_radius, whatever number that gives
-  bool both_sides = false;    // points whose normals differ by more than 134 degrees do not
-                              // exclude one another: the two faces of a thin plate
+  bool both_sides = false;    // points whose normals differ by more than 134 degrees, as on the two
+                              // faces of a thin plate, only keep 0.75 of the radius
   std::uint64_t seed = 1;
-  unsigned threads = 0;                    // 0: all; the choice is the same for any number
-  std::function<bool(double)> keep_going;  // done in [0, 1]; false cancels. May be empty
+  unsigned threads = 0;    // 0: all; the choice is the same for any number
+  Pulse* pulse = nullptr;  // told the share that is chosen; may be null
 };
 
 struct Thinned {

@@ -23,7 +23,7 @@ std::uint64_t avalanche(std::uint64_t h) {
 }
 
 // Change these when the baked result of the same input changes: old files are then baked again.
-constexpr std::uint32_t field_bake_version = 1, shell_bake_version = 1;
+constexpr std::uint32_t field_bake_version = 3, shell_bake_version = 2;
 
 // A key is the hash of a list: every entry with its own length, so that no two lists run together.
 class KeyWriter {
@@ -63,6 +63,18 @@ void add_mesh(KeyWriter& key, const Mesh& mesh) {
   for (const std::string& name : mesh.part_names) key.text(name);
 }
 
+// `threads` is left out, here and below: it does not change the result.
+void add_options(KeyWriter& key, const FieldBake& options) {
+  key.value(options.voxels);
+  key.value(options.voxel_size);
+  key.value(options.offset);
+  key.value(options.sign);
+  key.value(options.cavities);
+  key.value(options.seal);
+  key.value(options.band_voxels);
+  key.value(options.padding_voxels);
+}
+
 }  // namespace
 
 Hash128 hash_bytes(const void* bytes, std::size_t size) {
@@ -97,19 +109,12 @@ std::string hex(const Hash128& hash) {
   return text;
 }
 
-// `threads` is left out: it does not change the result.
 std::string content_hash(const Mesh& mesh, const FieldBake& options) {
   KeyWriter key;
   key.text("field");
   key.value(field_bake_version);
   add_mesh(key, mesh);
-  key.value(options.voxels);
-  key.value(options.voxel_size);
-  key.value(options.offset);
-  key.value(options.sign);
-  key.value(options.cavities);
-  key.value(options.band_voxels);
-  key.value(options.padding_voxels);
+  add_options(key, options);
   return key.key();
 }
 
@@ -122,6 +127,9 @@ std::string content_hash(const Mesh& mesh, const ShellBake& options) {
   key.value(options.spacing);
   key.value(options.levels);
   key.value(options.seed);
+  key.value(options.surface);
+  key.value(options.normals);
+  add_options(key, options.field);
   return key.key();
 }
 

@@ -7,6 +7,7 @@
 
 #include "hapsix/types.h"
 #include "io/mesh.h"
+#include "io/samples.h"
 
 namespace h6::io {
 
@@ -15,7 +16,7 @@ struct FieldData {
   double voxel_size = 0;                // [m]
   std::array<std::int32_t, 3> bricks{}; // along x, y, z
   std::vector<std::int32_t> brick_index;// rows rise with the cells
-  std::vector<float> samples;           // (brick_count x 512) [m]
+  Samples samples;                      // (brick_count x 512) [m]
   std::vector<float> far_grid;          // ((bz+1) x (by+1) x (bx+1)) signed [m]
   double band = 0;                      // [m]
   std::vector<std::int32_t> part;       // (brick_count) or empty

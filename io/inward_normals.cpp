@@ -23,16 +23,17 @@ Vec3 cross(const Vec3& a, const Vec3& b) {
 double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // For each vertex the first one with the same place.
-std::vector<std::uint32_t> weld(const std::vector<Vec3>& vertices) {
-  std::vector<KeyedIndex> order(vertices.size()), spare;
+std::vector<std::uint32_t> weld(const std::vector<Vec3>& vertices, Pulse* pulse) {
+  KeyedIndices order(vertices.size()), spare;
   const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v + 0.0); };  // -0 is 0
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const Vec3& v = vertices[i];
     order[i] = {mix(mix(bits(v.x), bits(v.y)), bits(v.z)), std::uint32_t(i)};
   }
-  radix_sort(order, spare);
+  radix_sort(order, spare, 0, pulse);
   std::vector<std::uint32_t> same(vertices.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i % 65536 == 0 && !alive(pulse)) return same;
     same[order[i].index] = order[i].index;
     // Equal keys are almost always equal places; another place with the same key is stepped over.
     for (std::size_t k = i; k-- > 0 && order[k].key == order[i].key;) {
@@ -59,7 +60,7 @@ struct Piece {  // triangles joined by edges that exactly two of them share
 
 class Orientation {
  public:
-  explicit Orientation(const Mesh& mesh) : mesh_(mesh) {}
+  Orientation(const Mesh& mesh, Pulse* pulse) : mesh_(mesh), pulse_(pulse) {}
   FaceTable run();
 
  private:
@@ -75,10 +76,11 @@ class Orientation {
   const Vec3& corner(std::uint32_t t, int k) const { return mesh_.vertices[faces_[t][k]]; }
 
   const Mesh& mesh_;
+  Pulse* pulse_;
   FaceTable table_;
   std::vector<Triangle> faces_;        // welded
   std::vector<std::uint32_t> across_;  // (3 x triangles) half edge 3t+k's other half, or none
-  std::vector<KeyedIndex> edges_;      // half edges by edge
+  KeyedIndices edges_;                 // half edges by edge
   std::vector<char> reversed_;         // against the piece's one winding
   std::vector<std::uint32_t> piece_of_;
   std::vector<Piece> pieces_;
@@ -86,7 +88,7 @@ class Orientation {
 };
 
 void Orientation::measure() {
-  const std::vector<std::uint32_t> same = weld(mesh_.vertices);
+  const std::vector<std::uint32_t> same = weld(mesh_.vertices, pulse_);
   faces_.resize(mesh_.triangles.size());
   table_.area.assign(faces_.size(), 0);
   table_.inward.assign(faces_.size(), Vec3{0, 0, 0});
@@ -103,7 +105,8 @@ void Orientation::measure() {
 // The same three corners in any order: one surface, sampled once. Degenerate triangles stay in the
 // edge table: they may carry the edge between two others.
 void Orientation::drop_duplicates() {
-  std::vector<KeyedIndex> order, spare;
+  KeyedIndices order, spare;
+  order.reserve(faces_.size());
   const auto sorted = [&](std::uint32_t t) {
     Triangle f = faces_[t];
     std::sort(f.begin(), f.end());
@@ -113,7 +116,8 @@ void Orientation::drop_duplicates() {
     const Triangle f = sorted(t);
     order.push_back({mix(mix(f[0], f[1]), f[2]), t});
   }
-  radix_sort(order, spare);
+  radix_sort(order, spare, 0, pulse_);
+  if (!alive(pulse_)) return;
   std::vector<std::uint32_t> again;
   for (std::size_t i = 1; i < order.size(); ++i) {
     for (std::size_t k = i; k-- > 0 && order[k].key == order[i].key;) {
@@ -130,8 +134,10 @@ void Orientation::drop_duplicates() {
 }
 
 void Orientation::pair_edges() {
-  std::vector<KeyedIndex> spare;
+  KeyedIndices spare;
+  edges_.reserve(3 * faces_.size());
   for (std::uint32_t t = 0; t < faces_.size(); ++t) {
+    if (t % 65536 == 0 && !alive(pulse_)) return;
     const Triangle& f = faces_[t];
     if (f[0] == f[1] || f[1] == f[2] || f[2] == f[0]) continue;  // a line, or dropped
     for (std::uint32_t k = 0; k < 3; ++k) {
@@ -140,7 +146,7 @@ void Orientation::pair_edges() {
       edges_.push_back({key, 3 * t + k});
     }
   }
-  radix_sort(edges_, spare);
+  radix_sort(edges_, spare, 0, pulse_);
   across_.assign(3 * faces_.size(), none);
   for (std::size_t i = 0; i + 1 < edges_.size(); ++i) {
     const bool pair = edges_[i].key == edges_[i + 1].key &&
@@ -160,6 +166,7 @@ void Orientation::spread(std::uint32_t start) {
   piece_of_[start] = id;
   piece.triangles.push_back(start);
   for (std::size_t i = 0; i < piece.triangles.size(); ++i) {
+    if (i % 65536 == 65535 && !alive(pulse_)) break;
     const std::uint32_t t = piece.triangles[i];
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t other = across_[3 * t + k];
@@ -270,6 +277,7 @@ bool Orientation::hollow(std::size_t c) const {
 
 void Orientation::settle_signs() {
   for (std::size_t c = 0; c < pieces_.size(); ++c) {
+    if (!alive(pulse_)) return;
     Piece& piece = pieces_[c];
     if (piece.closed) {
       const bool inside = hollow(c);
@@ -289,10 +297,12 @@ void Orientation::warn() {
   std::size_t open = 0, mixed = 0, twisted = 0;
   for (const Piece& piece : pieces_) {
     if (piece.area == 0) continue;
+    ++table_.pieces;
     open += !piece.closed;
     mixed += piece.turned;
     twisted += piece.twisted;
   }
+  table_.sheets = open;
   const auto pieces = [](std::size_t n) {
     return std::to_string(n) + (n == 1 ? " piece" : " pieces");
   };
@@ -308,12 +318,6 @@ void Orientation::warn() {
   if (mixed > 0) {
     out.push_back(pieces(mixed) + " of the mesh with mixed winding; one winding was made of it.");
   }
-  if (open > 0) {
-    out.push_back(pieces(open) +
-                  " of the mesh not closed: there the inside was guessed from the "
-                  "shape or, for flat sheets, taken from the winding; check the normals, or close "
-                  "the holes.");
-  }
   if (twisted > 0) {
     out.push_back(
         pieces(twisted) +
@@ -325,15 +329,19 @@ FaceTable Orientation::run() {
   measure();
   drop_duplicates();
   pair_edges();
+  if (!alive(pulse_)) return {};
   reversed_.assign(faces_.size(), 0);
   piece_of_.assign(faces_.size(), none);
   for (std::uint32_t t = 0; t < faces_.size(); ++t) {
     if (piece_of_[t] == none && faces_[t][0] != none) spread(t);
   }
+  if (!alive(pulse_)) return {};
   find_open_pieces();
   settle_signs();
+  table_.sheet.assign(faces_.size(), 0);
   for (std::uint32_t t = 0; t < faces_.size(); ++t) {
     if (piece_of_[t] == none) continue;
+    table_.sheet[t] = !pieces_[piece_of_[t]].closed;
     if (bool(reversed_[t]) == pieces_[piece_of_[t]].flip) continue;
     Vec3& n = table_.inward[t];
     n = {-n.x, -n.y, -n.z};
@@ -344,6 +352,6 @@ FaceTable Orientation::run() {
 
 }  // namespace
 
-FaceTable face_table(const Mesh& mesh) { return Orientation(mesh).run(); }
+FaceTable face_table(const Mesh& mesh, Pulse* pulse) { return Orientation(mesh, pulse).run(); }
 
 }  // namespace h6::io

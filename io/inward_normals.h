@@ -5,18 +5,22 @@
 #include <vector>
 
 #include "io/mesh.h"
+#include "io/pulse.h"
 
 namespace h6::io {
 
 struct FaceTable {
   std::vector<Vec3> inward;  // (triangles) unit; zero where area is 0
   std::vector<double> area;  // (triangles) [m^2]; 0: degenerate, or again a triangle seen before
+  std::vector<char> sheet;   // (triangles) of a piece that does not close: it has two outer sides
+  std::size_t pieces = 0, sheets = 0;  // with area; those of them that do not close
   std::vector<std::string> warnings;  // a sentence each: what was repaired or is not certain
 };
 
 // Indices must be in range and vertices finite. Closed pieces are oriented by their volume, hollows
 // inside them by their winding against the piece around them. Open pieces: by the volume they
 // nearly enclose; sheets that enclose none keep the winding most of their area has.
-FaceTable face_table(const Mesh& mesh);
+// After the pulse stopped the table is of no use.
+FaceTable face_table(const Mesh& mesh, Pulse* pulse = nullptr);
 
 }  // namespace h6::io

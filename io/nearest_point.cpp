@@ -20,10 +20,12 @@ double distance2(const float a[3], const float b[3]) {
 }
 }  // namespace
 
-NearestPoint::NearestPoint(std::span<const OrientedPoint> points, std::vector<std::uint32_t> ids)
-    : points_(points), ids_(std::move(ids)) {
+NearestPoint::NearestPoint(std::span<const OrientedPoint> points, std::vector<std::uint32_t> ids,
+                           Pulse* pulse)
+    : points_(points), pulse_(pulse), ids_(std::move(ids)) {
   nodes_.reserve(ids_.size() / 2 + 1);
   build(0, std::uint32_t(ids_.size()));
+  if (!alive(pulse_)) return;
   leaves_.reserve(ids_.size());
   for (const std::uint32_t id : ids_) {
     const float* p = points_[id].p;
@@ -34,7 +36,7 @@ NearestPoint::NearestPoint(std::span<const OrientedPoint> points, std::vector<st
 std::uint32_t NearestPoint::build(std::uint32_t first, std::uint32_t count) {
   const auto at = std::uint32_t(nodes_.size());
   nodes_.push_back({0, first, count, 0, 0});
-  if (count <= leaf_size) return at;
+  if (count <= leaf_size || (count > 4096 && !alive(pulse_))) return at;
   int axis = 0;
   float widest = -1;
   for (int a = 0; a < 3; ++a) {

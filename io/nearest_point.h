@@ -12,7 +12,9 @@ namespace h6::io {
 class NearestPoint {
  public:
   // Of points[ids[0]], points[ids[1]], ...; `points` must outlive this.
-  NearestPoint(std::span<const OrientedPoint> points, std::vector<std::uint32_t> ids);
+  // After the pulse stopped it must not be asked.
+  NearestPoint(std::span<const OrientedPoint> points, std::vector<std::uint32_t> ids,
+               Pulse* pulse = nullptr);
   // The id of a point nearest to points[query]; there must be at least one.
   std::uint32_t operator()(const float query[3]) const;
 
@@ -25,6 +27,7 @@ class NearestPoint {
   };
   std::uint32_t build(std::uint32_t first, std::uint32_t count);
   std::span<const OrientedPoint> points_;
+  Pulse* pulse_;
   std::vector<std::uint32_t> ids_;
   std::vector<Node> nodes_;
   struct Leaf {

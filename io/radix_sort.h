@@ -2,7 +2,9 @@
 // sort never depends on the machine or on the number of threads.
 #pragma once
 #include <cstdint>
-#include <vector>
+
+#include "io/pulse.h"
+#include "io/raw_vector.h"
 
 namespace h6::io {
 
@@ -10,8 +12,11 @@ struct KeyedIndex {
   std::uint64_t key;
   std::uint32_t index;
 };
+using KeyedIndices = RawVector<KeyedIndex>;
 
-// Ascending by key, stable. `spare` is scratch space of any size.
-void radix_sort(std::vector<KeyedIndex>& items, std::vector<KeyedIndex>& spare);
+// Ascending by key, stable. `spare` is scratch space of any size. When the pulse stops, the items
+// are left in some order, not all of them.
+void radix_sort(KeyedIndices& items, KeyedIndices& spare, unsigned threads = 1,
+                Pulse* pulse = nullptr);
 
 }  // namespace h6::io

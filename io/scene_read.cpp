@@ -119,6 +119,7 @@ class SceneReader {
     out.bake.sign = text(o, "sign", "auto") == "flood" ? SignMode::flood : SignMode::automatic;
     out.bake.cavities =
         text(o, "cavities", "solid") == "hollow" ? Cavities::hollow : Cavities::solid;
+    out.bake.seal = number(o, "seal", 0) * scale_;
     out.bake.band_voxels = number(o, "band_voxels", out.bake.band_voxels);
     out.bake.padding_voxels =
         static_cast<int>(number(o, "padding_voxels", out.bake.padding_voxels));
@@ -135,6 +136,13 @@ class SceneReader {
     out.bake.levels = static_cast<int>(number(o, "levels", out.bake.levels));
     out.bake.seed =
         static_cast<std::uint64_t>(number(o, "seed", static_cast<double>(out.bake.seed)));
+    not_both(o, "voxels", "voxel_size", at);
+    out.bake.surface = *surface_from_name(text(o, "surface", "auto"));  // the schema has checked
+    out.bake.normals = *normals_from_name(text(o, "normals", "auto"));
+    out.bake.field.voxels = static_cast<int>(number(o, "voxels", out.bake.field.voxels));
+    out.bake.field.voxel_size = number(o, "voxel_size", 0) * scale_;
+    if (o.contains("offset")) out.bake.field.offset = number(o, "offset", 0) * scale_;
+    out.bake.field.seal = number(o, "seal", 0) * scale_;
     return out;
   }
 

@@ -142,6 +142,7 @@ class SceneWriter {
     if (bake.offset >= 0) out["offset"] = bake.offset / scale_;
     out["sign"] = bake.sign == SignMode::flood ? "flood" : "auto";
     out["cavities"] = bake.cavities == Cavities::hollow ? "hollow" : "solid";
+    if (bake.seal > 0) out["seal"] = bake.seal / scale_;
     out["band_voxels"] = bake.band_voxels;
     out["padding_voxels"] = bake.padding_voxels;
     return out;
@@ -165,6 +166,15 @@ class SceneWriter {
       out["points"] = shell.bake.points;
     out["levels"] = shell.bake.levels;
     out["seed"] = shell.bake.seed;
+    out["surface"] = name_of(shell.bake.surface);
+    out["normals"] = name_of(shell.bake.normals);
+    const FieldBake& field = shell.bake.field;
+    if (field.voxel_size > 0)
+      out["voxel_size"] = field.voxel_size / scale_;
+    else
+      out["voxels"] = field.voxels;
+    if (field.offset >= 0) out["offset"] = field.offset / scale_;
+    if (field.seal > 0) out["seal"] = field.seal / scale_;
     return out;
   }
 

@@ -16,6 +16,7 @@
 
 #include "io/bake_shell.h"
 #include "io/nearest_point.h"
+#include "io/radix_sort.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
@@ -75,12 +76,14 @@ std::vector<Ids> choose_levels(std::span<const OrientedPoint> points, const Tree
     thinning.first_radius = radius;
     thinning.seed = options.seed + std::uint64_t(level) + 1;
     thinning.threads = options.threads;
-    thinning.keep_going = options.keep_going;
+    thinning.pulse = options.pulse;
     const Thinned thinned = thin_out(finer, thinning);
     if (thinned.cancelled) return {};
     if (thinned.spacing > 0) radius = thinned.spacing;
     Ids& ids = levels[std::size_t(level)];
     std::vector<OrientedPoint> kept;
+    ids.reserve(thinned.chosen.size());
+    kept.reserve(thinned.chosen.size());
     for (const std::uint32_t row : thinned.chosen) {
       ids.push_back(below[row]);
       kept.push_back(finer[row]);
@@ -92,7 +95,7 @@ std::vector<Ids> choose_levels(std::span<const OrientedPoint> points, const Tree
 
 // The first level in Morton order; all finer ones follow their parents, so neighbours in space stay
 // neighbours in memory.
-void sort_along_curve(std::span<const OrientedPoint> points, Ids& ids) {
+void sort_along_curve(std::span<const OrientedPoint> points, const TreeOptions& options, Ids& ids) {
   float low[3] = {INFINITY, INFINITY, INFINITY}, extent = 0;
   for (int a = 0; a < 3; ++a) {
     float high = -INFINITY;
@@ -111,10 +114,15 @@ void sort_along_curve(std::span<const OrientedPoint> points, Ids& ids) {
     }
     return bits;
   };
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> coded;
-  for (const auto id : ids) coded.push_back({code(id), id});
-  std::sort(coded.begin(), coded.end());
-  for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = coded[i].second;
+  KeyedIndices coded(ids.size()), spare;
+  constexpr std::size_t slice = 4096;
+  sched::parallel_for((ids.size() + slice - 1) / slice, options.threads, [&](std::size_t s) {
+    for (std::size_t i = s * slice; i < std::min(ids.size(), (s + 1) * slice); ++i) {
+      coded[i] = {code(ids[i]), ids[i]};
+    }
+  });
+  radix_sort(coded, spare, options.threads, options.pulse);
+  for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = coded[i].index;
 }
 
 // The points of a level that are not in the coarser one, and for each the point it hangs from.
@@ -123,15 +131,16 @@ struct NewPoints {
 };
 
 NewPoints hang_new_points(std::span<const OrientedPoint> points, const Ids& coarse, const Ids& fine,
-                          const std::vector<std::uint32_t>& row_of, unsigned threads) {
+                          const std::vector<std::uint32_t>& row_of, const TreeOptions& options) {
   NewPoints fresh;
   for (const auto id : fine) {
     if (row_of[id] == no_row) fresh.ids.push_back(id);
   }
   fresh.parents.resize(fresh.ids.size());
-  const NearestPoint nearest(points, coarse);
+  const NearestPoint nearest(points, coarse, options.pulse);
   constexpr std::size_t slice = 1024;
-  sched::parallel_for((fresh.ids.size() + slice - 1) / slice, threads, [&](std::size_t s) {
+  sched::parallel_for((fresh.ids.size() + slice - 1) / slice, options.threads, [&](std::size_t s) {
+    if (!alive(options.pulse)) return;
     for (std::size_t i = s * slice; i < std::min(fresh.ids.size(), (s + 1) * slice); ++i) {
       fresh.parents[i] = nearest(points[fresh.ids[i]].p);
     }
@@ -165,14 +174,14 @@ NextRows next_rows(const Ids& rows, const NewPoints& fresh,
   return next;
 }
 
-// True distance, then up by more than any float evaluation of it can be off (METHOD.md, Sec. 6: culling must
-// never lose a descendant).
+// True distance, then up by more than any float evaluation of it can be off (METHOD.md, Sec. 6:
+// culling must never lose a descendant).
 float rounded_up(double distance) {
   if (distance == 0) return 0;
   return std::nextafter(float(distance * (1 + 1e-6)), INFINITY);
 }
 
-void add_radii(ShellData& shell) {
+void add_radii(ShellData& shell, Pulse* pulse) {
   const std::size_t levels = shell.level_points.size(), first_leaf = shell.level_first[levels - 1];
   std::vector<std::uint32_t> parent(shell.node_point.size(), no_row);
   for (std::uint32_t row = 0; row < first_leaf; ++row) {
@@ -182,6 +191,7 @@ void add_radii(ShellData& shell) {
   }
   std::vector<double> reach2(shell.node_point.size(), 0);
   for (std::size_t leaf = first_leaf; leaf < shell.node_point.size(); ++leaf) {
+    if (leaf % 65536 == 0 && !alive(pulse)) return;
     const std::uint32_t p = shell.node_point[leaf];
     for (std::uint32_t row = parent[leaf]; row != no_row; row = parent[row]) {
       const std::uint32_t c = shell.node_point[row];
@@ -218,17 +228,19 @@ void add_points(ShellData& shell, std::span<const OrientedPoint> points,
 Result<ShellData> build_tree(std::span<const OrientedPoint> points,
                              std::span<const std::uint32_t> source, const TreeOptions& options) {
   std::vector<Ids> levels = choose_levels(points, options);
-  if (levels.empty()) return Failure{"cancelled"};
+  const Failure cancelled{"cancelled"};
+  if (levels.empty()) return cancelled;
   ShellData shell;
   Ids order;                                                 // new place -> id
   std::vector<std::uint32_t> row_of(points.size(), no_row);  // id -> row in the level at hand
   std::vector<std::uint32_t> place(points.size());           // id -> new place
   Ids rows = levels[0];
-  sort_along_curve(points, rows);
+  sort_along_curve(points, options, rows);
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const auto first = std::uint32_t(shell.node_point.size());
     shell.level_first.push_back(first);
     shell.level_points.push_back(std::uint32_t(rows.size()));
+    if (!alive(options.pulse)) return cancelled;
     for (const auto id : rows) {  // points that are new here have no row yet
       if (row_of[id] != no_row) continue;
       place[id] = std::uint32_t(order.size());
@@ -240,7 +252,8 @@ Result<ShellData> build_tree(std::span<const OrientedPoint> points,
     }
     if (level + 1 == levels.size()) break;
     const NewPoints fresh =
-        hang_new_points(points, levels[level], levels[level + 1], row_of, options.threads);
+        hang_new_points(points, levels[level], levels[level + 1], row_of, options);
+    if (!alive(options.pulse)) return cancelled;
     NextRows next = next_rows(rows, fresh, row_of);
     const auto next_first = first + std::uint32_t(rows.size());
     for (const auto child : next.first) shell.node_first_child.push_back(next_first + child);
@@ -251,8 +264,11 @@ Result<ShellData> build_tree(std::span<const OrientedPoint> points,
   shell.level_first.push_back(std::uint32_t(shell.node_point.size()));
   shell.node_first_child.resize(shell.node_point.size(), 0);
   shell.node_child_count.resize(shell.node_point.size(), 0);
+  if (!alive(options.pulse)) return cancelled;
   add_points(shell, points, source, order);
-  add_radii(shell);
+  if (!alive(options.pulse)) return cancelled;
+  add_radii(shell, options.pulse);
+  if (!alive(options.pulse)) return cancelled;
   return shell;
 }
 

@@ -1,6 +1,5 @@
 // shell_tree.h - private to this box: the tree of points that are already laid out and checked.
 #pragma once
-#include <functional>
 #include <span>
 
 #include "hapsix/result.h"
@@ -14,7 +13,7 @@ struct TreeOptions {
   double spacing = 0;  // of the points, when known [m]; 0: guessed
   std::uint64_t seed = 1;
   unsigned threads = 0;
-  std::function<bool(double)> keep_going;
+  Pulse* pulse = nullptr;  // may be null
 };
 
 // At least one point. Fails only by "cancelled".

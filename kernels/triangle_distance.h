@@ -1,20 +1,48 @@
 // triangle_distance.h - how far the nodes of a brick are from triangles.
 //
-// A brick is 8 x 8 x 8 nodes at unit spacing, node (i,j,k) at (i,j,k), x fastest in arrays. Corners
-// are brick-local, in voxels and in double; the work runs in float, which is exact to about 1e-5
-// voxel as long as corners lie within 128 voxels of the brick: cut larger triangles first.
+// A brick is 8 x 8 x 8 nodes at unit spacing, node (i,j,k) at (i,j,k), x fastest in arrays; a tile
+// is 4 x 4 x 4 bricks, brick (a,b,c) at (8a, 8b, 8c), x fastest too. Corners are in voxels and in
+// double; the work runs in float, which is exact to about 2e-5 voxel as long as corners lie within
+// 128 voxels of the nodes: cut larger triangles first.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 
 namespace h6::kernels {
 
 inline constexpr std::size_t kBrickSamples = 512;
+inline constexpr int kTileBricks = 4;  // along an axis
 
-// distance[n] = min(reach, distance of node n to the nearest of `count` triangles). `corners` is
-// (count x 3 corners x 3 coordinates). A triangle without area counts as its edges. The order of
-// triangles may change the last bit: keep it fixed where bits matter.
+// One triangle, ready for float work: seven functions of the place p, g.p + c, all in voxels.
+// 0..2: along edge e, from its start; 3..5: off edge e in the plane, positive on the triangle's
+// side; 6: off the plane; 7 is not used. Made in double: on a long sliver a float cross product is
+// wrong by whole voxels at the far end.
+struct DistanceFacet {
+  float gx[8], gy[8], gz[8], c[8];
+  float length[3];     // of the edges
+  float inside_from;   // a point is over the triangle when all of 3..5 are at least this
+  float low[3], high[3];
+};
+
+// `corners` is 3 corners x 3 coordinates. A triangle without area becomes its longest edge.
+DistanceFacet make_distance_facet(const double* corners);
+
+// Bit (c*4 + b)*4 + a: brick (a,b,c) of the tile may have a node within reach of the triangle.
+// Certain where it says no; where it says yes, wrong only around edges and corners.
+std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach);
+
+// distance[n] = min(reach, distance of node n to the nearest of facets[list[0..count)]), for the
+// brick whose first node is at `origin`. The order of the list does not change a bit.
+void facet_distance(const DistanceFacet* facets, const std::uint32_t* list, std::size_t count,
+                    const float origin[3], float reach, float* distance);
+
+// The same from corners (count x 3 corners x 3 coordinates), for the brick at (0,0,0).
 void triangle_distance(const double* corners, std::size_t count, float reach, float* distance);
 void triangle_distance_ref(const double* corners, std::size_t count, float reach, float* distance);
+
+// Bit n % 64 of word n / 64: distance[n] > level.
+void nodes_above(const float* distance, float level, std::uint64_t words[8]);
+void nodes_above_ref(const float* distance, float level, std::uint64_t words[8]);
 
 // The squared distance of one point to one triangle, in double: what the reference is made of.
 double point_triangle_squared(const double p[3], const double a[3], const double b[3],

@@ -53,4 +53,10 @@ void triangle_distance_ref(const double* corners, std::size_t count, float reach
   }
 }
 
+void nodes_above_ref(const float* distance, float level, std::uint64_t words[8]) {
+  std::fill_n(words, 8, 0);
+  for (std::size_t n = 0; n < kBrickSamples; ++n)
+    words[n / 64] |= std::uint64_t(distance[n] > level) << (n % 64);
+}
+
 }  // namespace h6::kernels

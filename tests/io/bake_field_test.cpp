@@ -365,6 +365,41 @@ TEST_CASE("bake_field: a plate thinner than a voxel is said to be one") {
   CHECK(inside > 1000);
 }
 
+TEST_CASE("bake_field: wires and sheets thinner than a voxel stay obstacles along their whole "
+          "length, and the user is told") {
+  const double h = 1.0 / 48;
+  FieldBake options = small_bake();
+  options.voxel_size = h;
+  const auto tube = [&](double radius) {
+    return patch(40, 8, [&](double s, double t) {
+      return Vec3{s, 0.3 + radius * std::cos(2 * M_PI * t), 0.2 + radius * std::sin(2 * M_PI * t)};
+    });
+  };
+  for (const double radius : {0.02 * h, 0.3 * h}) {  // open at its ends
+    FieldBakeReport report;
+    Mesh mesh = tube(radius);
+    add(mesh, patch(4, 4, [](double s, double t) { return Vec3{s, t, 0.7}; }));
+    const FieldData field = must_bake(turned(h6::io::weld(mesh), 0.3, 0.6), options, &report);
+    const Mesh places = turned([] {
+      Mesh points;
+      for (int i = 0; i <= 400; ++i) {
+        points.vertices.push_back({i / 400.0, 0.3, 0.2});
+        points.vertices.push_back({i / 400.0, 0.45, 0.7});
+      }
+      return points;
+    }(), 0.3, 0.6);
+    std::size_t lost = 0;
+    for (const Vec3& p : places.vertices) {
+      double value = 1;
+      lost += !interpolate(field, p, value) || value >= 0;
+    }
+    CHECK(lost == 0);
+    CHECK(std::any_of(report.warnings.begin(), report.warnings.end(), [](const std::string& w) {
+      return w.find("sheets become") != std::string::npos && w.find("wires") != std::string::npos;
+    }));
+  }
+}
+
 TEST_CASE("bake_field: far from the origin nothing is lost") {
   const Mesh here = turned(l_shape(0.01), 0.4, 0.3);
   const Vec3 there{1e5, -1e5, 1e5};

@@ -38,22 +38,22 @@ struct Folder {
   }
 };
 
-FieldData baked() {
+FieldData baked(int voxels = 48) {
   Mesh mesh = turned(l_shape(0.02), 0.4, 0.3);
   mesh.part.assign(mesh.triangles.size(), 0);
   for (std::size_t i = 0; i < mesh.part.size(); i += 2) mesh.part[i] = 1;
   mesh.part_names = {"left half", "right\nhalf"};
   FieldBake options;
-  options.voxels = 48;
+  options.voxels = voxels;
   auto field = bake_field(mesh, options, nullptr);
   REQUIRE_MESSAGE(field, field.error());
   return *field;
 }
 
-template <class T>
-bool same(const std::vector<T>& a, const std::vector<T>& b) {
+template <class Array>
+bool same(const Array& a, const Array& b) {
   return a.size() == b.size() &&
-         (a.empty() || !std::memcmp(a.data(), b.data(), a.size() * sizeof(T)));
+         (a.empty() || !std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]));
 }
 
 void check_same(const FieldData& a, const FieldData& b) {
@@ -112,6 +112,21 @@ TEST_CASE("field_file: OpenVDB's own reader sees a level set in world units") {
   REQUIRE(grid);
   CHECK(grid->getGridClass() == openvdb::GRID_LEVEL_SET);
   CHECK(grid->tree().leafCount() == field.brick_count());
+  CHECK(grid->activeVoxelCount() == 512 * field.brick_count());
+  CHECK(grid->transform().isLinear());
+  CHECK(grid->voxelSize().x() == h6::test::near(field.voxel_size));  // [m]
+  CHECK(grid->voxelSize().z() == h6::test::near(field.voxel_size));
+  // Outside of all leaves is as far as the band reaches, so that programs that clip at the
+  // background, as OpenVDB's own tools do, draw the surface and nothing else.
+  CHECK(grid->background() == h6::test::near(field.band).epsilon(1e-6));
+  std::size_t band = 0, missing = 0;
+  for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf)
+    for (auto value = leaf->cbeginValueAll(); value; ++value) {
+      band += std::fabs(*value) < field.band;
+      missing += std::fabs(*value) < field.band && !value.isValueOn();
+    }
+  CHECK(band > 1000);
+  CHECK(missing == 0);
   const Vec3 p = node_position(field, {20, 21, 22});
   const openvdb::Vec3d at = grid->worldToIndex(openvdb::Vec3d(p.x, p.y, p.z));
   CHECK(at.x() == h6::test::near(20));

@@ -54,6 +54,7 @@ TEST_CASE("every key arrives, lengths in metres") {
   check_close(field.bake.offset, 0.5e-3);
   CHECK(field.bake.sign == SignMode::flood);
   CHECK(field.bake.cavities == Cavities::hollow);
+  check_close(field.bake.seal, 2.5e-3);
   CHECK(field.unit == Unit::in);
   CHECK(field.bake.band_voxels == 4);
   CHECK(field.bake.padding_voxels == 9);
@@ -69,6 +70,12 @@ TEST_CASE("every key arrives, lengths in metres") {
   CHECK(part.shell->bake.points == 777);
   CHECK(part.shell->bake.levels == 5);
   CHECK(part.shell->bake.seed == 42);
+  CHECK(part.shell->bake.surface == ShellSurface::field);
+  CHECK(part.shell->bake.normals == ShellNormals::triangles);
+  CHECK(part.shell->bake.field.voxels == 96);
+  check_close(part.shell->bake.field.offset, 0.5e-3);
+  check_close(part.shell->bake.field.seal, 1.5e-3);
+  check_close(s.bodies[4].shell->bake.field.voxel_size, 0.25e-3);
   CHECK(part.shell->unit == Unit::cm);
   check_close(s.bodies[4].shell->bake.spacing, 0.75e-3);
   CHECK(s.bodies[5].shell->file == bench.path / "part.ply");
@@ -257,6 +264,8 @@ TEST_CASE("every wrong value is refused with the path of its key") {
       {"/bodies/1/shell/points", "100000000000", "bodies[1].shell.points"},
       {"/bodies/1/shell/spacing", "0", "bodies[1].shell.spacing"},
       {"/bodies/1/shell/levels", "17", "bodies[1].shell.levels"},
+      {"/bodies/1/shell/surface", "\"inside\"", "bodies[1].shell.surface"},
+      {"/bodies/1/shell/voxels", "8", "bodies[1].shell.voxels"},
       {"/bodies/0/field/voxels", "15", "bodies[0].field.voxels"},
       {"/bodies/0/field/voxels", "4096", "at most 2048"},
       {"/bodies/0/field/voxel_size", "-1", "bodies[0].field.voxel_size"},

@@ -78,14 +78,16 @@ inline Json full_scene() {
     "bodies": [
       {"name": "bay", "fixed": true,
        "field": {"mesh": "bay.stl", "voxels": 1024, "offset": 0.5, "sign": "flood",
-                 "cavities": "hollow", "units": "in", "band_voxels": 4, "padding_voxels": 9}},
+                 "cavities": "hollow", "seal": 2.5, "units": "in", "band_voxels": 4, "padding_voxels": 9}},
       {"name": "wall", "fixed": true, "field": {"mesh": "bay.stl", "voxel_size": 0.25}},
       {"name": "old", "fixed": true, "field": {"file": "baked.vdb"}},
       {"name": "part", "mass": 0.25, "com": [1, 2, 3],
        "inertia": [3e-4, 2e-4, 4e-4, 1e-5, -2e-5, 3e-5],
        "pose": {"p": [10, -20, 30], "q": [0, 0.6, 0.8, 0]},
-       "shell": {"mesh": "bay.stl", "points": 777, "levels": 5, "seed": 42, "units": "cm"}},
-      {"name": "other", "translation_only": true, "shell": {"mesh": "bay.stl", "spacing": 0.75}},
+       "shell": {"mesh": "bay.stl", "points": 777, "levels": 5, "seed": 42, "units": "cm",
+                 "surface": "field", "normals": "triangles", "voxels": 96, "offset": 0.5,
+                 "seal": 1.5}},
+      {"name": "other", "translation_only": true, "shell": {"mesh": "bay.stl", "spacing": 0.75, "voxel_size": 0.25}},
       {"name": "third", "shell": {"file": "part.ply"}}],
     "contact": {"method": "gauss6+facing+product+geodesic", "stiffness": 2e4, "damping": 2e-3,
                 "global_n0": 7, "epsilon": 0.02, "epsilon_normal": 0.03,
@@ -223,6 +225,12 @@ inline void check_same(const SceneBody& a, const SceneBody& b) {
     check_close(x.spacing, y.spacing);
     CHECK(x.levels == y.levels);
     CHECK(x.seed == y.seed);
+    CHECK(x.surface == y.surface);
+    CHECK(x.normals == y.normals);
+    if (x.field.voxel_size == 0) CHECK(x.field.voxels == y.field.voxels);
+    check_close(x.field.voxel_size, y.field.voxel_size);
+    check_close(x.field.offset, y.field.offset);
+    check_close(x.field.seal, y.field.seal);
   }
 }
 

@@ -125,3 +125,65 @@ TEST_CASE("triangle_distance: the winding and the first corner do not matter") {
     }
   }
 }
+
+TEST_CASE("facet_distance: the order of the list does not change a bit, nor a brick's place much") {
+  on_every_target([] {
+    Random random;
+    const Triangles t = random_triangles(60, 3.0, random);
+    std::vector<DistanceFacet> facets;
+    std::vector<std::uint32_t> up, down;
+    for (std::uint32_t i = 0; i < 60; ++i) {
+      facets.push_back(make_distance_facet(t.data() + 9 * i));
+      up.push_back(i);
+      down.insert(down.begin(), i);
+    }
+    for (const float at : {0.0f, 8.0f, 24.0f}) {
+      const float origin[3] = {at, 0, 8};
+      std::vector<float> a(kBrickSamples), b(kBrickSamples), exact(kBrickSamples);
+      facet_distance(facets.data(), up.data(), 60, origin, 20.0f, a.data());
+      facet_distance(facets.data(), down.data(), 60, origin, 20.0f, b.data());
+      CHECK(a == b);
+      Triangles there = t;
+      for (std::size_t i = 0; i < there.size(); ++i) there[i] -= origin[i % 3];
+      triangle_distance_ref(there.data(), 60, 20.0f, exact.data());
+      for (std::size_t n = 0; n < kBrickSamples; ++n) CHECK(std::fabs(a[n] - exact[n]) < 3e-5);
+    }
+  });
+}
+
+TEST_CASE("bricks_within_reach: never misses a brick that has a node within reach") {
+  on_every_target([] {
+    Random random;
+    std::size_t named = 0, real = 0;
+    for (int i = 0; i < 60; ++i) {
+      Triangles t = random_triangles(1, i % 2 ? 3.0 : 15.0, random);
+      for (double& c : t) c = 2.5 * c + 6;
+      const std::uint64_t near = bricks_within_reach(make_distance_facet(t.data()), 5.0f);
+      for (int b = 0; b < 64; ++b) {
+        Triangles there = t;
+        const double at[3] = {8.0 * (b % 4), 8.0 * (b / 4 % 4), 8.0 * (b / 16)};
+        for (std::size_t k = 0; k < 9; ++k) there[k] -= at[k % 3];
+        std::vector<float> exact(kBrickSamples);
+        triangle_distance_ref(there.data(), 1, 5.0f, exact.data());
+        const bool within = *std::min_element(exact.begin(), exact.end()) < 5.0f;
+        if (within) CHECK((near >> b & 1) == 1);
+        real += within;
+        named += near >> b & 1;
+      }
+    }
+    CHECK(real > 100);
+    CHECK(double(named) < 1.3 * double(real));  // and seldom names one that has none
+  });
+}
+
+TEST_CASE("nodes_above: a bit for each node that is farther, the level itself is not") {
+  on_every_target([] {
+    Random random;
+    std::vector<float> u(kBrickSamples);
+    for (std::size_t n = 0; n < u.size(); ++n) u[n] = n % 5 == 0 ? 0.75f : float(random(0, 1.5));
+    std::uint64_t fast[8], exact[8];
+    nodes_above(u.data(), 0.75f, fast);
+    nodes_above_ref(u.data(), 0.75f, exact);
+    for (int z = 0; z < 8; ++z) CHECK(fast[z] == exact[z]);
+  });
+}

@@ -1,0 +1,12 @@
+// level_set_peer.h - the same job done by OpenVDB's meshToLevelSet, for comparison.
+#pragma once
+#include <cstddef>
+
+#include "io/mesh.h"
+
+namespace h6::bench {
+
+// Half-width 3 voxels, on so many threads of this process. Returns the number of leaf bricks.
+std::size_t mesh_to_level_set(const io::Mesh& mesh, double voxel_size, unsigned threads);
+
+}  // namespace h6::bench

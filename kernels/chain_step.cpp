@@ -1,0 +1,103 @@
+// chain_step.cpp - the fast twin of chain_step_ref.
+//
+// The padded brick is read as one flat array, whatever a vector's length: first what every place
+// gives to its own line, to the four lines beside it and to the four across, neighbours along x
+// included; then each place takes the least of nine. Places outside the brick are computed and
+// dropped.
+#include "kernels/chain_step.h"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/chain_step.cpp"
+#include "kernels/simd.h"
+// After simd.h.
+#include <hwy/foreach_target.h>
+// After foreach_target.h.
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr std::size_t kLine = 16, kLayer = 10 * kLine, kAll = 10 * kLayer, kPad = 64;
+
+void ChainStepOnce(const ChainBrick& brick, Chain* out) {
+  const hn::CappedTag<Chain, 32> d;
+  const std::size_t lanes = hn::Lanes(d);
+  alignas(64) Chain from[kPad + kAll + kPad], give[3][kAll + kPad];
+  std::copy_n(&brick.v[0][0][0], kAll, from + kPad);
+  from[kPad - 1] = from[kPad + kAll] = kChainFar;
+  const auto straight = hn::Set(d, Chain(kChainStep[1])), aside = hn::Set(d, Chain(kChainStep[2])),
+             across = hn::Set(d, Chain(kChainStep[3]));
+  for (std::size_t i = 0; i < kAll; i += lanes) {
+    const auto own = hn::Load(d, from + kPad + i);
+    const auto side = hn::Min(hn::LoadU(d, from + kPad + i - 1), hn::LoadU(d, from + kPad + i + 1));
+    hn::Store(hn::Min(own, hn::Add(side, straight)), d, give[0] + i);
+    hn::Store(hn::Min(hn::Add(own, straight), hn::Add(side, aside)), d, give[1] + i);
+    hn::Store(hn::Min(hn::Add(own, aside), hn::Add(side, across)), d, give[2] + i);
+  }
+  const auto far = hn::Set(d, kChainFar);
+  alignas(64) Chain took[8 * kLine + kPad];
+  for (std::size_t z = 0; z < 8; ++z) {
+    const std::size_t first = (z + 1) * kLayer + kLine;
+    for (std::size_t i = 0; i < 8 * kLine; i += lanes) {
+      const std::size_t at = first + i;
+      const auto get = [&](std::size_t k, std::size_t where) HWY_ATTR {
+        return hn::LoadU(d, give[k] + where);
+      };
+      auto least = hn::Min(far, get(0, at));
+      least = hn::Min(least, hn::Min(get(1, at - kLayer), get(1, at + kLayer)));
+      least = hn::Min(least, hn::Min(get(1, at - kLine), get(1, at + kLine)));
+      least = hn::Min(least, hn::Min(get(2, at - kLayer - kLine), get(2, at - kLayer + kLine)));
+      least = hn::Min(least, hn::Min(get(2, at + kLayer - kLine), get(2, at + kLayer + kLine)));
+      hn::Store(least, d, took + i);
+    }
+    for (std::size_t y = 0; y < 8; ++y)
+      std::copy_n(took + y * kLine + 1, 8, out + 64 * z + 8 * y);
+  }
+}
+
+void ChainSeeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
+                Chain* out) {
+  const hn::CappedTag<float, 8> d;
+  const hn::Rebind<std::int32_t, decltype(d)> d32;
+  const hn::Rebind<Chain, decltype(d)> d16;
+  const std::size_t lanes = hn::Lanes(d);
+  const auto scale = hn::Set(d, 1 / kChainUnit), at = hn::Set(d, level);
+  for (std::size_t line = 0; line < lines; ++line) {
+    Chain* to = out + 8 * line;
+    if (mask[line] == 0) {
+      std::fill_n(to, 8, kChainFar);
+      continue;
+    }
+    for (std::size_t x = 0; x < 8; x += lanes) {
+      const auto length = hn::Ceil(hn::Mul(hn::Sub(at, hn::LoadU(d, u + 8 * line + x)), scale));
+      hn::StoreU(hn::DemoteTo(d16, hn::ConvertTo(d32, length)), d16, to + x);
+    }
+    if (mask[line] != 0xff)
+      for (std::size_t x = 0; x < 8; ++x)
+        if (!(mask[line] >> x & 1)) to[x] = kChainFar;
+  }
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(ChainStepOnce);
+HWY_EXPORT(ChainSeeds);
+
+void chain_step(const ChainBrick& brick, Chain* out) {
+  HWY_DYNAMIC_DISPATCH(ChainStepOnce)(brick, out);
+}
+
+void chain_seeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
+                 Chain* out) {
+  HWY_DYNAMIC_DISPATCH(ChainSeeds)(u, mask, lines, level, out);
+}
+
+}  // namespace h6::kernels
+#endif

@@ -1,0 +1,32 @@
+// chain_step.h - lengths of chains of neighbouring nodes, one step at a time, in 16-bit numbers.
+//
+// Lengths are in 1/256 voxel, and steps of 1, sqrt 2 and sqrt 3 voxels are rounded up: a chain is
+// never said to be shorter than it is. A brick is 8 x 8 x 8 nodes, x fastest.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+namespace h6::kernels {
+
+using Chain = std::int16_t;
+inline constexpr float kChainUnit = 1.0f / 256;  // [voxel]
+inline constexpr Chain kChainFar = 24000;
+inline constexpr int kChainStep[4] = {0, 256, 363, 444};
+
+// A brick and one layer around it: node (x,y,z) at v[z+1][y+1][x+1].
+struct ChainBrick {
+  alignas(64) Chain v[10][10][16];
+};
+
+// out[n] = the least of the node's own length and its 26 neighbours' plus a step, at most far.
+void chain_step(const ChainBrick& brick, Chain* out);
+void chain_step_ref(const ChainBrick& brick, Chain* out);
+
+// `lines` times 8 nodes: level - u [voxel] rounded up where the mask has a bit, else far.
+// |level - u| < 90.
+void chain_seeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
+                 Chain* out);
+void chain_seeds_ref(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
+                     Chain* out);
+
+}  // namespace h6::kernels

@@ -1,0 +1,30 @@
+// chain_step_ref.cpp - the specification of chain_step and chain_seeds.
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/chain_step.h"
+
+namespace h6::kernels {
+
+void chain_step_ref(const ChainBrick& brick, Chain* out) {
+  for (int n = 0; n < 512; ++n) {
+    int least = kChainFar;
+    for (int i = 0; i < 27; ++i) {
+      const int d[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      const int apart = (d[0] != 0) + (d[1] != 0) + (d[2] != 0);
+      least = std::min(least, brick.v[n / 64 + 1 + d[2]][n / 8 % 8 + 1 + d[1]][n % 8 + 1 + d[0]] +
+                                  kChainStep[apart]);
+    }
+    out[n] = static_cast<Chain>(least);
+  }
+}
+
+void chain_seeds_ref(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
+                     Chain* out) {
+  for (std::size_t n = 0; n < 8 * lines; ++n)
+    out[n] = mask[n / 8] >> (n % 8) & 1
+                 ? static_cast<Chain>(std::ceil((level - u[n]) * (1 / kChainUnit)))
+                 : kChainFar;
+}
+
+}  // namespace h6::kernels

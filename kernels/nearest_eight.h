@@ -1,0 +1,27 @@
+// nearest_eight.h - one point against eight boxes or eight triangles: the inner loops of a
+// closest-point search. Float, and never more than the truth: what passes is looked at in double.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+namespace h6::kernels {
+
+struct EightBoxes {
+  alignas(32) float low[3][8], high[3][8];
+};
+// squared[i] <= squared distance of p to box i. An empty box (low > high) is far away. Returns a
+// bit for each that is below `most`.
+std::uint32_t eight_boxes(const EightBoxes& boxes, const float p[3], float most, float squared[8]);
+void eight_boxes_ref(const EightBoxes& boxes, const float p[3], float squared[8]);
+
+struct EightTriangles {
+  alignas(32) float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
+};
+// squared[i] <= squared distance of p to triangle i: by less than 1e-4 of it, save for slivers and
+// for triangles a thousand times as large as their distance.
+// Returns a bit for each that is below `most`.
+std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3], float most,
+                              float squared[8]);
+void eight_triangles_ref(const EightTriangles& triangles, const float p[3], float squared[8]);
+
+}  // namespace h6::kernels

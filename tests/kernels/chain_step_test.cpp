@@ -1,0 +1,88 @@
+// Chains of nodes: SIMD against the reference, and against the straight line.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "kernels/chain_step.h"
+
+using namespace h6::kernels;
+
+namespace {
+
+template <class F>
+void on_every_target(F&& check) {
+  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    INFO("target " << hwy::TargetName(target));
+    check();
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+Chain& node(ChainBrick& brick, int n) {
+  return brick.v[n / 64 + 1][n / 8 % 8 + 1][n % 8 + 1];
+}
+
+}  // namespace
+
+TEST_CASE("chain_step: every target says what the reference says") {
+  on_every_target([] {
+    std::mt19937_64 random(3);
+    for (int i = 0; i < 40; ++i) {
+      ChainBrick brick;
+      for (auto& layer : brick.v)
+        for (auto& line : layer)
+          for (Chain& c : line)
+            c = random() % 3 ? kChainFar : Chain(int(random() % 3000) - 1500);
+      std::vector<Chain> fast(512), exact(512);
+      chain_step(brick, fast.data());
+      chain_step_ref(brick, exact.data());
+      CHECK(fast == exact);
+    }
+  });
+}
+
+TEST_CASE("chain_seeds: every target says what the reference says, never less than the truth") {
+  on_every_target([] {
+    std::mt19937_64 random(4);
+    for (std::size_t lines = 0; lines <= 67; ++lines) {
+      std::vector<float> u(8 * lines);
+      std::vector<std::uint8_t> mask(lines);
+      for (float& v : u) v = float(random() % 100000) * 1e-4f;
+      for (std::uint8_t& m : mask) m = std::uint8_t(random() % 4 ? random() : random() % 2 * 255);
+      std::vector<Chain> fast(8 * lines), exact(8 * lines);
+      chain_seeds(u.data(), mask.data(), lines, 0.9f, fast.data());
+      chain_seeds_ref(u.data(), mask.data(), lines, 0.9f, exact.data());
+      CHECK(fast == exact);
+      for (std::size_t n = 0; n < fast.size(); ++n)
+        if (fast[n] != kChainFar) CHECK(fast[n] * kChainUnit >= 0.9f - u[n]);
+    }
+  });
+}
+
+TEST_CASE("chain_step: steps from one node are at least the distance, at most 13.5 % more") {
+  for (const int seed : {0, 73, 511, 292}) {
+    ChainBrick brick;
+    std::fill_n(&brick.v[0][0][0], sizeof brick.v / sizeof(Chain), kChainFar);
+    node(brick, seed) = 0;
+    std::vector<Chain> out(512);
+    for (int step = 0; step < 8; ++step) {
+      chain_step(brick, out.data());
+      for (int n = 0; n < 512; ++n) node(brick, n) = out[std::size_t(n)];
+    }
+    for (int n = 0; n < 512; ++n) {
+      const double d[3] = {double(n % 8 - seed % 8), double(n / 8 % 8 - seed / 8 % 8),
+                           double(n / 64 - seed / 64)};
+      const double straight = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+      const double chain = double(out[std::size_t(n)]) * kChainUnit;
+      CHECK(chain >= straight - 1e-9);
+      CHECK(chain <= 1.135 * straight);
+    }
+  }
+}
