@@ -8,6 +8,7 @@
 
 #include "io/field_file.h"
 #include "io/shell_file.h"
+#include "io/single_precision.h"
 
 namespace h6::io {
 namespace {
@@ -55,7 +56,7 @@ Result<Data> through_cache(const std::string& key, const char* ending, Cached* r
                            const Read& read, const Bake& bake, const Write& write) {
   Cached unheard;
   Cached& cached = report ? *report : unheard;
-  cached.hit = false;
+  cached.hit = cached.rebuilt = false;
   cached.file = cached_file(key, ending, cached);
   std::error_code error;
   if (!cached.file.empty() && fs::exists(cached.file, error)) {
@@ -64,6 +65,7 @@ Result<Data> through_cache(const std::string& key, const char* ending, Cached* r
       cached.hit = true;
       return found;
     }
+    cached.rebuilt = true;
   }
   Result<Data> baked = bake(cached);
   if (!baked) return baked;
@@ -105,7 +107,10 @@ Result<ShellData> cached_shell(const Mesh& mesh, const ShellBake& options, Cache
   return through_cache<ShellData>(
       content_hash(mesh, options), ".ply", cached,
       [](const fs::path& file) { return read_shell(file); },
-      [&](Cached& told) { return bake_shell(mesh, options, &told.warnings, progress); },
+      [&](Cached& told) {
+        if (std::string far = too_far_for_floats(mesh); !far.empty()) told.warnings.push_back(far);
+        return bake_shell(mesh, options, &told.warnings, progress);
+      },
       [](const fs::path& file, const ShellData& shell) { return write_shell(file, shell); });
 }
 

@@ -23,6 +23,7 @@ std::string content_hash(const Mesh& mesh, const ShellBake& options);
 // `warnings`; a cache that cannot be written is a warning, not an error.
 struct Cached {
   bool hit = false;
+  bool rebuilt = false;  // a file was there, but of no use
   std::filesystem::path file;
   std::vector<std::string> warnings;
 };

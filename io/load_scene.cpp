@@ -68,6 +68,7 @@ class Loader {
     if (found == meshes_.end()) {
       Result<Mesh> mesh = read_mesh(source.mesh, unit);
       if (!mesh) return mesh.failure();
+      out_.warnings.insert(out_.warnings.end(), mesh->remarks.begin(), mesh->remarks.end());
       found = meshes_.emplace(key, std::make_unique<Mesh>(std::move(*mesh))).first;
     }
     return static_cast<const Mesh*>(found->second.get());
@@ -104,6 +105,7 @@ class Loader {
       out_.warnings.push_back("body '" + body.name + "': " + w);
     asset.hash = mesh ? key : data->input_hash;
     asset.from_cache = cached.hit;
+    asset.rebuilt = cached.rebuilt;
     asset.seconds = since(start);
     describe(*data, asset);
     out_.assets.push_back(asset);

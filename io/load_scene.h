@@ -18,6 +18,7 @@ struct LoadedAsset {
   bool is_field = false;
   std::string hash;  // of content and bake parameters
   bool from_cache = false;
+  bool rebuilt = false;        // the cache had a file for it, but damaged or of something else
   double seconds = 0;          // to bake or to read
   double voxel_size = 0;       // field [m]
   std::array<int, 3> nodes{};  // field: per axis

@@ -117,10 +117,21 @@ void sync_folder(const fs::path& folder) {
   close(fd);
 }
 
+// The writer's sentence; it names the file that was asked for, not the temporary one.
+Failure about(const fs::path& file, const fs::path& temporary, std::string why) {
+  const std::string asked = file.string(), other = temporary.string();
+  for (std::size_t at = 0; (at = why.find(other, at)) != std::string::npos; at += asked.size())
+    why.replace(at, other.size(), asked);
+  if (why.find(asked) == std::string::npos) why = "Cannot write " + asked + ": " + why;
+  return {why};
+}
+
 Outcome call(const std::function<Outcome(const fs::path&)>& write, const fs::path& temporary,
              const fs::path& file) {
   try {
-    return write(temporary);
+    const Outcome written = write(temporary);
+    if (!written) return about(file, temporary, written.error());
+    return written;
   } catch (const std::exception& e) {
     return cannot_write(file, e.what());
   }

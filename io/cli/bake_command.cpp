@@ -15,6 +15,7 @@
 #include "io/field_file.h"
 #include "io/mesh_file.h"
 #include "io/shell_file.h"
+#include "io/single_precision.h"
 
 namespace h6::cli {
 namespace {
@@ -39,14 +40,15 @@ struct Common {
 };
 
 void add_common(CLI::App* command, Common& c, const char* ending) {
-  command->add_option("MESH", c.mesh, "STL, OBJ or PLY, also .gz")->required()->option_text("FILE");
+  command->add_option("MESH", c.mesh, "STL, OBJ, PLY, glTF or COLLADA, also .gz")->required()->option_text("FILE");
   command->add_option("-o,--output", c.out, std::string("The ") + ending + " to write")
       ->required()
       ->option_text("FILE")
       ->check(ends_with(ending));
   command
       ->add_option("--units", c.units,
-                   "Unit of the mesh file and of lengths here: m, mm, cm or in; default m")
+                   "Unit of the mesh file (glTF and COLLADA have their own) and of lengths here: "
+                   "m, mm, cm or in; default m")
       ->option_text("UNIT")
       ->check(one_of({"m", "mm", "cm", "in"}));
   command->add_option("--threads", c.threads, "Default: all of the machine's")
@@ -81,6 +83,17 @@ Result<Input> read_input(const Common& c) {
   return input;
 }
 
+void add_unless_empty(std::vector<std::string>& all, std::string sentence) {
+  if (!sentence.empty()) all.push_back(std::move(sentence));
+}
+
+// Why a bake failed, and where the mesh's place has to do with it.
+int bake_failed(const Console& console, const Common& c, const Input& input, std::string why) {
+  const std::string far = io::too_far_for_floats(input.audit.low, input.audit.high);
+  if (!far.empty() && why.ends_with('.')) why.pop_back();
+  return console.fail(c.mesh + ": " + why + (far.empty() ? "" : "; " + far));
+}
+
 ordered_json timings(double read, double bake, double write) {
   return {{"read", read}, {"bake", bake}, {"write", write}};
 }
@@ -101,15 +114,21 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   // Lengths on the command line are in the mesh's unit.
   o.bake.voxel_size *= io::metres(*unit);
   if (o.bake.offset > 0) o.bake.offset *= io::metres(*unit);
+  o.bake.seal *= io::metres(*unit);
 
+  const EndsAtOnce asked(console, o.common.mesh + ": cancelled");
   Result<Input> input = read_input(o.common);
   if (!input) return console.fail(input.error());
+  console.warn(input->mesh.remarks);
   auto start = Clock::now();
   io::FieldBakeReport report;
   Result<io::FieldData> field = io::bake_field(input->mesh, o.bake, &report, console.progress());
-  if (!field) return console.fail(o.common.mesh + ": " + field.error());
+  if (!field) return bake_failed(console, o.common, *input, field.error());
+  // Its samples hold wherever it lies, but the file may have lost the shape already.
+  if (const std::string name = o.common.mesh; name.ends_with("stl") || name.ends_with("STL") ||
+                                              name.ends_with("stl.gz"))
+    add_unless_empty(report.warnings, io::too_far_for_floats(input->audit.low, input->audit.high));
   field->input_hash = io::content_hash(input->mesh, o.bake);
-  if (interrupted.load()) return console.fail(o.common.mesh + ": cancelled");
   const double baked = since(start);
   start = Clock::now();
   const auto compression = o.no_compression ? io::Compression::none : io::Compression::blosc;
@@ -129,6 +148,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                     {"closed", report.closed},
                     {"sign_mode", field->sign_mode},
                     {"offset", field->offset},
+                    {"sealed_area", report.sealed_area},
                     {"warnings", report.warnings}};
   console.result(json);
   if (!console.json) {
@@ -149,6 +169,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
 struct ShellOptions {
   Common common;
   io::ShellBake bake;
+  std::string surface = "auto", normals = "auto";
 };
 
 int bake_shell_command(const Console& console, ShellOptions& o) {
@@ -156,14 +177,21 @@ int bake_shell_command(const Console& console, ShellOptions& o) {
   Result<io::Unit> unit = io::unit_from_name(o.common.units);
   if (!unit) return console.fail(unit.error(), kUsage);
   o.bake.spacing *= io::metres(*unit);
+  o.bake.surface = *io::surface_from_name(o.surface);  // checked by the parser
+  o.bake.normals = *io::normals_from_name(o.normals);
+  o.bake.field.voxel_size *= io::metres(*unit);
+  if (o.bake.field.offset > 0) o.bake.field.offset *= io::metres(*unit);
+  o.bake.field.seal *= io::metres(*unit);
+  const EndsAtOnce asked(console, o.common.mesh + ": cancelled");
   Result<Input> input = read_input(o.common);
   if (!input) return console.fail(input.error());
+  console.warn(input->mesh.remarks);
   auto start = Clock::now();
   std::vector<std::string> warnings;
   Result<io::ShellData> shell = io::bake_shell(input->mesh, o.bake, &warnings, console.progress());
-  if (!shell) return console.fail(o.common.mesh + ": " + shell.error());
+  if (!shell) return bake_failed(console, o.common, *input, shell.error());
+  add_unless_empty(warnings, io::too_far_for_floats(input->audit.low, input->audit.high));
   shell->input_hash = io::content_hash(input->mesh, o.bake);
-  if (interrupted.load()) return console.fail(o.common.mesh + ": cancelled");
   const double baked = since(start);
   start = Clock::now();
   if (Outcome done = io::write_shell(o.common.out, *shell); !done)
@@ -224,6 +252,11 @@ void add_bake(CLI::App& app, Program& program) {
   field->add_option("--cavities", f->cavities, "Enclosed hollows: solid (default) or hollow")
       ->option_text("MODE")
       ->check(one_of({"solid", "hollow"}));
+  field
+      ->add_option("--seal", f->bake.seal,
+                   "Closes holes of an open mesh up to this width; default 0: none")
+      ->option_text("WIDTH")
+      ->check(number_within(0, 1e6));
   field->add_flag("--no-compression", f->no_compression, "Larger file, faster to load");
   field->callback([&program, f] {
     program.work = [&program, f] { return bake_field_command(program.console, *f); };
@@ -246,6 +279,39 @@ void add_bake(CLI::App& app, Program& program) {
   shell->add_option("--levels", s->bake.levels, "Nested levels, 1 to 16; default 7")
       ->option_text("N")
       ->check(whole_within(1, 16));
+  shell
+      ->add_option("--surface", s->surface,
+                   "Where points lie: triangles, field (where the mesh's field is zero: in a soup "
+                   "that is the offset outside of its triangles) or auto (default; triangles)")
+      ->option_text("MODE")
+      ->check(one_of({"auto", "triangles", "field"}));
+  shell
+      ->add_option("--normals", s->normals,
+                   "Of the triangles, of the field (they turn evenly over edges) or auto (default; "
+                   "as the points)")
+      ->option_text("MODE")
+      ->check(one_of({"auto", "triangles", "field"}));
+  auto* outside = shell
+                      ->add_option("--voxels", s->bake.field.voxels,
+                                   "Of the field that tells what the outside reaches, on the longest "
+                                   "padded side, 16 to 2048; default 256")
+                      ->option_text("N")
+                      ->check(whole_within(16, 2048));
+  shell->add_option("--voxel-size", s->bake.field.voxel_size, "Edge of a voxel, instead of --voxels")
+      ->option_text("S")
+      ->excludes(outside)
+      ->check(number_above(0));
+  shell
+      ->add_option("--offset", s->bake.field.offset,
+                   "How far that field's surface is pushed out; default: 0 when closed, else 0.9 "
+                   "voxel")
+      ->option_text("S")
+      ->check(number_within(0, 1e6));
+  shell
+      ->add_option("--seal", s->bake.field.seal,
+                   "Holes of an open mesh up to this width lead nowhere; default 0: all do")
+      ->option_text("WIDTH")
+      ->check(number_within(0, 1e6));
   shell->callback([&program, s] {
     program.work = [&program, s] { return bake_shell_command(program.console, *s); };
   });

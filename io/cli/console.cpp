@@ -40,6 +40,7 @@ void install_signal_handlers() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a file over the limit is a failed write, with a sentence
 }
 
 void set_signal_hook(void (*hook)(void*), void* context) {
@@ -47,6 +48,35 @@ void set_signal_hook(void (*hook)(void*), void* context) {
   signal_context.store(context);
   signal_hook.store(hook);
 }
+
+namespace {
+
+// In a handler: what cannot be written is lost.
+void write_all(int to, const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t some = write(to, text.data() + done, text.size() - done);
+    if (some <= 0) return;
+    done += static_cast<std::size_t>(some);
+  }
+}
+
+}  // namespace
+
+EndsAtOnce::EndsAtOnce(const Console& console, const std::string& sentence) {
+  static std::string error, result;  // the handler may not allocate, nor find them gone
+  error = (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("hapsix: " + sentence) + "\n";
+  result = console.json ? Console::text({{"error", sentence}}, 2) + "\n" : "";
+  set_signal_hook(
+      [](void*) {
+        io::remove_unfinished();
+        write_all(STDERR_FILENO, error);
+        write_all(STDOUT_FILENO, result);
+        _exit(kFailed);
+      },
+      nullptr);
+}
+
+EndsAtOnce::~EndsAtOnce() { set_signal_hook(nullptr, nullptr); }
 
 void Console::log(const std::string& text) const { std::fprintf(stderr, "%s\n", text.c_str()); }
 
@@ -78,32 +108,60 @@ int Console::finish(int code) const {
   return code == kOk ? kFailed : code;
 }
 
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// "about 3 s left", as if the rest went like what is done; empty while that says little.
+std::string time_left(double seconds, double share) {
+  if (seconds < 1 || share < 0.02 || share >= 1) return "";
+  const double left = seconds * (1 - share) / share;
+  const double minutes = left / 60, hours = minutes / 60;
+  char text[32];
+  if (left < 99.5)
+    std::snprintf(text, sizeof text, " about %.0f s left", std::max(left, 1.0));
+  else if (minutes < 99.5)
+    std::snprintf(text, sizeof text, " about %.0f min left", minutes);
+  else
+    std::snprintf(text, sizeof text, " about %.0f h left", std::min(hours, 999.0));
+  return text;
+}
+
+struct Bar {
+  Clock::time_point start = Clock::now(), shown = start, began = start;
+  double share = 0;
+  bool drawn = false;
+  ~Bar() { clear(); }
+  void clear() {
+    if (drawn) std::fprintf(stderr, "\r\033[K");
+    drawn = false;
+  }
+  // A line of at most 80 columns: a longer one would wrap and could not be wiped.
+  void draw(const std::string& what, Clock::time_point now) {
+    constexpr int width = 20;
+    const int full = static_cast<int>(width * share);
+    const double worked = std::chrono::duration<double>(now - began).count();
+    std::fprintf(stderr, "\r\033[K%-28.28s [%s%s] %3.0f %%%s", what.c_str(),
+                 std::string(full, '#').c_str(), std::string(width - full, ' ').c_str(),
+                 100 * share, time_left(worked, share).c_str());
+    std::fflush(stderr);
+    drawn = true;
+    shown = now;
+  }
+};
+
+}  // namespace
+
 io::Progress Console::progress() const {
-  using Clock = std::chrono::steady_clock;
-  struct Bar {
-    Clock::time_point start = Clock::now(), shown = start;
-    bool drawn = false;
-    ~Bar() { clear(); }
-    void clear() {
-      if (drawn) std::fprintf(stderr, "\r\033[K");
-      drawn = false;
-    }
-  };
   const bool terminal = isatty(STDERR_FILENO) != 0;
   return [terminal, bar = std::make_shared<Bar>()](const std::string& what, double done) {
     const auto now = Clock::now();
+    const double share = done > 0 ? std::min(done, 1.0) : 0;  // NaN is 0
+    if (share < bar->share) bar->began = now;                 // the next work
+    bar->share = share;
     if (terminal && now - bar->start > std::chrono::milliseconds(500) &&
-        now - bar->shown > std::chrono::milliseconds(80)) {
-      constexpr int width = 30;
-      const double share = done > 0 ? std::min(done, 1.0) : 0;  // NaN is 0
-      const int full = static_cast<int>(width * share);
-      std::fprintf(stderr, "\r\033[K%-28.28s [%s%s] %3.0f %%", what.c_str(),
-                   std::string(full, '#').c_str(), std::string(width - full, ' ').c_str(),
-                   100 * share);
-      std::fflush(stderr);
-      bar->drawn = true;
-      bar->shown = now;
-    }
+        now - bar->shown > std::chrono::milliseconds(80))
+      bar->draw(what, now);
     if (done >= 1) bar->clear();
     return !interrupted.load();
   };

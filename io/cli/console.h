@@ -28,8 +28,21 @@ class Console {
   void result(const nlohmann::ordered_json& object) const;
   // After all work: `code`, or kFailed where stdout took not everything (a full disk).
   int finish(int code) const;
-  // A bar on the terminal for work over half a second; returns false once the user interrupts.
+  // A bar on the terminal for work over half a second, with an estimate of the time that is left;
+  // returns false once the user interrupts.
   io::Progress progress() const;
+};
+
+// While it lives, SIGINT and SIGTERM end the program where it stands, within milliseconds: files in
+// the making are removed, `sentence` is told as by Console::fail, exit kFailed. For work that asks
+// nobody whether to go on - reading a mesh of any size, writing a field to a slow disk - and whose
+// only traces are files written aside. One at a time.
+class EndsAtOnce {
+ public:
+  EndsAtOnce(const Console& console, const std::string& sentence);
+  ~EndsAtOnce();
+  EndsAtOnce(const EndsAtOnce&) = delete;
+  EndsAtOnce& operator=(const EndsAtOnce&) = delete;
 };
 
 // Set by SIGINT and SIGTERM: work ends soon and leaves nothing half made.

@@ -27,7 +27,10 @@ int demo_command(const Console& console, DemoOptions o) {
     return console.fail("the folder " + o.folder + " cannot be made (" + failed.message() +
                         "): choose another with -o");
   console.log(scene->about + "\n");
-  auto loaded = io::load_scene(std::move(*scene), console.progress());
+  auto loaded = [&] {
+    const EndsAtOnce asked(console, o.scene + ": cancelled");
+    return io::load_scene(std::move(*scene), console.progress());
+  }();
   if (!loaded) return console.fail(loaded.error());
   console.warn((*loaded)->warnings);
   console.log(assets(**loaded));

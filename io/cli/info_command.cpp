@@ -13,6 +13,7 @@
 #include "io/recording.h"
 #include "io/scene_file.h"
 #include "io/shell_file.h"
+#include "io/single_precision.h"
 
 namespace h6::cli {
 namespace {
@@ -64,10 +65,22 @@ int show(const Console& console, const ordered_json& object) {
 
 ordered_json vec(const io::Vec3& v) { return {v.x, v.y, v.z}; }
 
-Result<ordered_json> mesh_info(const std::string& file, io::Unit unit) {
+// Every part and how many triangles it has; none for a mesh of one part.
+ordered_json part_list(const io::Mesh& mesh) {
+  std::vector<std::size_t> count(mesh.part_names.size());
+  for (const std::int32_t part : mesh.part) ++count[static_cast<std::size_t>(part)];
+  ordered_json list = ordered_json::array();
+  for (std::size_t i = 0; !mesh.part.empty() && i < count.size(); ++i)
+    list.push_back({{"name", mesh.part_names[i]}, {"triangles", count[i]}});
+  return list;
+}
+
+Result<ordered_json> mesh_info(const Console& console, const std::string& file, io::Unit unit) {
   Result<io::Mesh> mesh = io::read_mesh(file, unit);
   if (!mesh) return mesh.failure();
   const io::MeshAudit a = io::audit(*mesh);
+  if (const std::string far = io::too_far_for_floats(a.low, a.high); !far.empty())
+    console.warn({far});
   return ordered_json{{"kind", "mesh"},
                       {"triangles", a.triangles},
                       {"vertices", a.vertices},
@@ -82,7 +95,9 @@ Result<ordered_json> mesh_info(const std::string& file, io::Unit unit) {
                       {"degenerate", a.degenerate},
                       {"low_m", vec(a.low)},
                       {"high_m", vec(a.high)},
-                      {"volume_m3", a.closed ? ordered_json(a.volume) : ordered_json()}};
+                      {"volume_m3", a.closed ? ordered_json(a.volume) : ordered_json()},
+                      {"part_list", part_list(*mesh)},
+                      {"remarks", mesh->remarks}};
 }
 
 Result<ordered_json> field_info(const std::string& file) {
@@ -176,8 +191,8 @@ bool has_faces(const std::string& file) {
 }
 
 // A .ply without faces is a shell, or wants to be one.
-Result<ordered_json> ply_info(const std::string& file, io::Unit unit) {
-  return has_faces(file) ? mesh_info(file, unit) : shell_info(file);
+Result<ordered_json> ply_info(const Console& console, const std::string& file, io::Unit unit) {
+  return has_faces(file) ? mesh_info(console, file, unit) : shell_info(file);
 }
 
 int info_command(const Console& console, const std::string& file, const std::string& units) {
@@ -185,6 +200,7 @@ int info_command(const Console& console, const std::string& file, const std::str
   if (!unit) return console.fail(unit.error(), kUsage);
   if (Outcome there = check_input(file); !there) return console.fail(there.error());
   const std::string ending = lower(std::filesystem::path(file).extension().string());
+  const EndsAtOnce asked(console, file + ": cancelled");
   Result<ordered_json> facts = Failure{""};
   if (ending == ".vdb")
     facts = field_info(file);
@@ -195,9 +211,9 @@ int info_command(const Console& console, const std::string& file, const std::str
   else if (ending == ".csv")
     facts = path_info(file, *unit);
   else if (ending == ".ply")
-    facts = ply_info(file, *unit);
+    facts = ply_info(console, file, *unit);
   else
-    facts = mesh_info(file, *unit);
+    facts = mesh_info(console, file, *unit);
   if (!facts) return console.fail(facts.error());
   ordered_json object{{"file", file}};
   object.update(*facts);
@@ -212,7 +228,7 @@ void add_info(CLI::App& app, Program& program) {
   auto file = std::make_shared<std::string>(), units = std::make_shared<std::string>("m");
   auto schema = std::make_shared<bool>(false);
   auto* option =
-      info->add_option("FILE", *file, "STL, OBJ, PLY (also .gz), .vdb, .json, .csv or .h5")
+      info->add_option("FILE", *file, "STL, OBJ, PLY, glTF, COLLADA (also .gz), .vdb, .json, .csv or .h5")
           ->option_text("FILE");
   info->add_option("--units", *units, "Unit of a mesh or path: m, mm, cm or in; default m")
       ->option_text("UNIT")

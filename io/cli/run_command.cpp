@@ -43,7 +43,10 @@ int run_command(const Console& console, const std::string& name, const RunOption
     for (const io::SceneHand& hand : scene->hands)
       if (Outcome known = check_device(hand.device); !known)
         return console.fail(name + ": hand of '" + hand.body + "': " + known.error());
-  auto loaded = io::load_scene(std::move(*scene), console.progress());
+  auto loaded = [&] {
+    const EndsAtOnce asked(console, name + ": cancelled");
+    return io::load_scene(std::move(*scene), console.progress());
+  }();
   if (!loaded) return console.fail(name + ": " + loaded.error());
   console.warn((*loaded)->warnings);
   if (!console.json) console.log(assets(**loaded));

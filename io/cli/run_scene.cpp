@@ -224,6 +224,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
     ordered_json asset{{"body", a.body},
                        {"kind", a.is_field ? "field" : "shell"},
                        {"from_cache", a.from_cache},
+                       {"rebuilt", a.rebuilt},
                        {"seconds", a.seconds},
                        {"hash", a.hash}};
     if (a.is_field)

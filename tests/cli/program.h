@@ -86,10 +86,11 @@ class Sandbox {
 };
 
 // A started program. `terminal` >= 0 (an end of a pty) becomes its stderr and
-// is closed here.
+// is closed here. `most_bytes` > 0: no file of it may become larger, as on a full disk.
 class Process {
  public:
-  Process(Sandbox& box, const Args& args, const std::string& cache = "", int terminal = -1)
+  Process(Sandbox& box, const Args& args, const std::string& cache = "", int terminal = -1,
+          rlim_t most_bytes = 0)
       : out_(box.stream()), err_(box.stream()), start_(Clock::now()) {
     std::vector<char*> argv;
     static std::string program = HAPSIX_PROGRAM;
@@ -109,6 +110,8 @@ class Process {
     redirect(open(out_.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
     redirect(terminal >= 0 ? terminal : open(err_.c_str(), O_WRONLY | O_CREAT, 0600),
              STDERR_FILENO);
+    const rlimit limit{most_bytes, most_bytes};
+    if (most_bytes > 0) setrlimit(RLIMIT_FSIZE, &limit);
     if (chdir(folder.c_str()) == 0) execv(argv[0], argv.data());
     _exit(127);
   }
@@ -119,6 +122,17 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   void send(int number) const { kill(pid_, number); }
+  // Whether it has come so far as to handle the signal itself.
+  bool handles(int number) const {
+    std::error_code gone;  // before exec it is a copy of this process, with the handlers of this
+    if (!fs::equivalent("/proc/" + std::to_string(pid_) + "/exe", HAPSIX_PROGRAM, gone))
+      return false;
+    std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
+    for (std::string line; std::getline(status, line);)
+      if (line.starts_with("SigCgt:"))
+        return std::stoull(line.substr(7), nullptr, 16) >> (number - 1) & 1;
+    return false;
+  }
   // Its end, or SIGKILL after `limit` seconds.
   Ended wait(double limit = 30) {
     Ended ended;

@@ -7,6 +7,12 @@ using namespace h6::test;
 
 namespace {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr double kSlower = 15;
+#else
+constexpr double kSlower = 1;
+#endif
+
 void pause_seconds(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
 
 // A pseudo terminal; what was written to it can be read once all its writers are gone.
@@ -116,6 +122,60 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
   CHECK(fs::is_empty(box.cache()));
 }
 
+namespace {
+
+// Started, interrupted after a while: it ends soon, with one sentence, and leaves nothing.
+void check_interrupted(Sandbox& box, const Args& args, double after) {
+  CAPTURE(args[1]);
+  CAPTURE(after);
+  const std::set<std::string> before = box.files();
+  Process process(box, args);
+  REQUIRE(soon([&] { return process.handles(SIGINT); }));
+  pause_seconds(after);
+  const auto asked = std::chrono::steady_clock::now();
+  process.send(SIGINT);
+  const Ended ended = process.wait(10);
+  CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - asked).count() <
+        0.5 * kSlower);
+  CHECK(ended.code == 1);
+  CHECK(ended.err == "hapsix: " + args.back() + ": cancelled\n");
+  CHECK(ended.out.empty());
+  CHECK(box.files() == before);
+}
+
+}  // namespace
+
+TEST_CASE("Ctrl-C ends bakes of fields and of millions of points within half a second") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
+  for (const double after : {0.2, 0.9}) {
+    check_interrupted(box, {"bake", "field", "-o", "ball.vdb", "--voxels", "2048", "ball.stl"},
+                      after);
+    check_interrupted(box, {"bake", "shell", "-o", "ball.ply", "--points", "2000000", "ball.stl"},
+                      after);
+  }
+}
+
+TEST_CASE("Ctrl-C ends the reading of a large mesh within half a second") {
+  Sandbox box;
+  // Two million triangles, every corner another one.
+  std::string bytes(80, '\0');
+  const std::uint32_t count = 2'000'000;
+  bytes.append(reinterpret_cast<const char*>(&count), 4);
+  bytes.resize(84 + 50 * std::size_t{count});
+  for (std::size_t t = 0; t < count; ++t)
+    for (std::size_t k = 0; k < 9; ++k) {
+      const float value = static_cast<float>((t * 9 + k) * 2654435761u % 999983);
+      std::memcpy(&bytes[84 + 50 * t + 12 + 4 * k], &value, 4);
+    }
+  spill(box.file("large.stl"), bytes);
+  bytes = {};
+  for (const double after : {0.02, 0.25}) {
+    check_interrupted(box, {"info", "large.stl"}, after);
+    check_interrupted(box, {"bake", "shell", "-o", "large.ply", "large.stl"}, after);
+  }
+}
+
 TEST_CASE("a second Ctrl-C does not wait") {
   Sandbox box;
   spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
@@ -139,15 +199,43 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
       MESSAGE("skipped: this machine gives no pseudo-terminal");
       return;
     }
-    Process process(box, {"run", "box-on-wall", "--duration", "1.5"}, "", dup(terminal.theirs));
+    Process process(box, {"run", "box-on-wall", "--duration", "1.8"}, "", dup(terminal.theirs));
     CHECK(process.wait().code == 0);
     const std::string seen = terminal.read_all();
     CHECK(count(seen, "running box-on-wall") >= 3);
     CHECK(count(seen, "%") >= 3);
     // Every bar is wiped before the next line: nothing of it stays on the screen.
-    CHECK(seen.rfind("\033[K") > seen.rfind('%'));
-    for (std::size_t at = seen.find('%'); at != std::string::npos; at = seen.find('%', at + 1))
-      CHECK(seen.substr(at + 1, 4) == "\r\033[K");
+    const std::string wipe = "\r\033[K";
+    CHECK(seen.rfind(wipe) > seen.rfind('%'));
+    for (std::size_t at = seen.find('%'); at != std::string::npos; at = seen.find('%', at + 1)) {
+      const std::size_t end = seen.find(wipe, at);
+      REQUIRE(end != std::string::npos);
+      CHECK(seen.find('\n', at) > end);
+      CHECK(end - seen.rfind(wipe, at) - wipe.size() <= 80);  // a longer line would wrap
+    }
+    // After a second, what is left of 1.8.
+    CHECK(count(seen, "about 1 s left") >= 1);
+  }
+  {
+    // A bake tells the same: a share that only grows, and an estimate.
+    Terminal terminal;
+    spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
+    Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "2048"}, "",
+                    dup(terminal.theirs));
+    pause_seconds(2.5);
+    process.send(SIGINT);
+    CHECK(process.wait(10).code == 1);
+    const std::string seen = terminal.read_all();
+    CAPTURE(seen);
+    CHECK(count(seen, " s left") + count(seen, " min left") >= 1);
+    int share = 0;
+    for (std::size_t at = seen.find('%'); at != std::string::npos; at = seen.find('%', at + 1)) {
+      const int now = std::atoi(seen.c_str() + at - 4);
+      CHECK(now >= share);
+      share = now;
+    }
+    CHECK(share > 0);
+    CHECK(seen.ends_with("\r\033[Khapsix: ball.stl: cancelled\r\n"));
   }
   {
     Terminal terminal;

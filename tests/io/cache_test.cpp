@@ -135,6 +135,12 @@ TEST_CASE("every parameter and every part of the mesh makes another key, threads
   shell([](ShellBake& o) { o.spacing = 1e-3; });
   shell([](ShellBake& o) { o.levels = 6; });
   shell([](ShellBake& o) { o.seed = 2; });
+  shell([](ShellBake& o) { o.surface = ShellSurface::field; });
+  shell([](ShellBake& o) { o.normals = ShellNormals::field; });
+  shell([](ShellBake& o) { o.field.voxels = 128; });
+  shell([](ShellBake& o) { o.field.voxel_size = 1e-3; });
+  shell([](ShellBake& o) { o.field.offset = 0; });
+  shell([](ShellBake& o) { o.field.seal = 1e-3; });
   const auto field = [&](auto change) {
     FieldBake options;
     change(options);
@@ -146,6 +152,7 @@ TEST_CASE("every parameter and every part of the mesh makes another key, threads
   field([](FieldBake& o) { o.offset = 1e-4; });
   field([](FieldBake& o) { o.sign = SignMode::flood; });
   field([](FieldBake& o) { o.cavities = Cavities::hollow; });
+  field([](FieldBake& o) { o.seal = 1e-3; });
   field([](FieldBake& o) { o.band_voxels = 4; });
   field([](FieldBake& o) { o.padding_voxels = 9; });
   const auto other_mesh = [&](auto change) {
