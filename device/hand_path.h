@@ -2,8 +2,10 @@
 //
 // Devices receive arrays; files are read elsewhere.
 #pragma once
+#include <memory>
 #include <vector>
 
+#include "device/steering.h"
 #include "hapsix/device.h"
 
 namespace h6::device {
@@ -14,8 +16,13 @@ struct HandPath {
   std::vector<double> time;  // [s], strictly increasing, at least one
   std::vector<h6Pose> pose;  // mesh frame of the body -> world, unit quaternions
 
+  // Who may take the hand away from it; empty: nobody.
+  std::shared_ptr<Steering> steering{};
+
   double duration() const { return time.empty() ? 0 : time.back(); }
-  h6DeviceSample at(double t) const;  // pose and velocity, no buttons
+  // Where it should be at t, which does not fall: pose and velocity; buttons only when steered.
+  h6DeviceSample at(double t) const { return steering ? steering->at(*this, t) : keyframe(t); }
+  h6DeviceSample keyframe(double t) const;
 };
 
 }  // namespace h6::device

@@ -27,7 +27,7 @@ h6Quat slerp(const h6Quat& a, h6Quat b, double s) {
 
 }  // namespace
 
-h6DeviceSample HandPath::at(double t) const {
+h6DeviceSample HandPath::keyframe(double t) const {
   h6DeviceSample sample{};
   const auto after = std::upper_bound(time.begin(), time.end(), t);
   if (after == time.begin() || after == time.end()) {  // still at either end

@@ -125,7 +125,7 @@ Result<std::unique_ptr<SimulatedArm>> SimulatedArm::open(HandPath path, const Ar
 
 SimulatedArm::SimulatedArm(HandPath path, const ArmFigures& figures, std::uint32_t mode)
     : path_(std::move(path)), arm_(figures), mode_(mode) {
-  const h6Pose start = path_.at(path_.time.front()).pose;
+  const h6Pose start = path_.keyframe(path_.time.front()).pose;
   handle_.q = start.q;
   handle_.x = start.p + rotate(start.q, arm_.person.grip);
   hand_ = measured_ = handle_;

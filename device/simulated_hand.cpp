@@ -18,7 +18,7 @@ Result<std::unique_ptr<SimulatedHand>> SimulatedHand::open(HandPath path, const 
 }
 
 SimulatedHand::SimulatedHand(HandPath path, const Arm& arm) : path_(std::move(path)), arm_(arm) {
-  const h6DeviceSample start = path_.at(path_.time.front());
+  const h6DeviceSample start = path_.keyframe(path_.time.front());
   q_ = start.pose.q;
   x_ = start.pose.p + rotate(q_, arm_.grip);
 }

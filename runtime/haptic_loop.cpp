@@ -1,11 +1,16 @@
 // haptic_loop.cpp - devices, session and clock joined: what runs on the haptic thread.
 //
 //   deadline -> read every device -> frame -> write every device -> record into the ring
+//
+// Between two frames the loop hands poses and contacts to a viewer, and takes another session when
+// one is offered: runtime/loop_view.h.
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <exception>
 #include <memory>
 
+#include "runtime/loop_view.h"
 #include "runtime/session.h"
 #include "runtime/stages.h"
 #include "sched/clock.h"
@@ -19,15 +24,25 @@ struct h6Loop {
   h6DeviceSample samples[H6_MAX_HANDS] = {};
   h6DeviceCommand commands[H6_MAX_HANDS] = {};
   std::uint64_t frames = 0;  // to run; 0: no end
+  std::uint64_t begun = 0;   // frames so far
+  double due = 1;            // of the next frame; it runs when this reaches 1
+  bool ran = false;          // the last tick was a frame
   std::unique_ptr<h6::sched::SpscRing<h6FrameRecord>> ring;
   h6FrameRecord record{};
   h6LoopReport report{};  // the haptic thread's until it has ended
   std::atomic<bool> stop{false};
+  std::atomic<double> pace{1};
+  std::unique_ptr<h6::LoopView> view;
+  std::uint64_t view_step = 1;  // the viewer sees every so-many-th frame
+  // Another session on its way in, and the one before on its way out.
+  std::atomic<h6Session*> offered{nullptr}, given_back{nullptr};
   std::unique_ptr<h6::sched::PeriodicThread> thread;
 };
 
 namespace h6 {
 namespace {
+
+constexpr double kViewRate = 125;  // of what a viewer is given, at most [Hz]
 
 void stop_devices(h6Loop& loop) {
   for (std::size_t h = 0; h < loop.session->hand_count; ++h)
@@ -40,7 +55,29 @@ void lose(h6Loop& loop) {
   h6Fault(loop.session, H6_CAUSE_DEVICE_LOST);
 }
 
-bool tick(h6Loop& loop, std::uint64_t number, const sched::TickTiming& before, double wakeup_us) {
+void change_session(h6Loop& loop) {
+  if (!loop.offered.load(std::memory_order_relaxed)) return;
+  h6Session* next = loop.offered.exchange(nullptr, std::memory_order_acquire);
+  if (!next) return;  // it was withdrawn
+  take_over(*next, *loop.session);
+  loop.given_back.store(loop.session, std::memory_order_release);
+  loop.session = next;
+}
+
+// Slow motion: a frame every so many periods. Whoever lives on the frames' time sees no difference.
+bool frame_due(h6Loop& loop) {
+  loop.due += loop.pace.load(std::memory_order_relaxed);
+  if (loop.due < 1) return false;
+  loop.due -= 1;
+  if (loop.due >= 1) loop.due = 0;
+  return true;
+}
+
+bool tick(h6Loop& loop, const sched::TickTiming& before, double wakeup_us) {
+  change_session(loop);
+  loop.ran = frame_due(loop);
+  if (!loop.ran) return true;
+  const std::uint64_t number = loop.begun++;
   h6Session& s = *loop.session;
   const double time = static_cast<double>(number) * s.dt;
   bool lost = false;
@@ -75,11 +112,13 @@ std::uint32_t late_bit(sched::Late late) {
 void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   h6Session& s = *loop.session;
   h6LoopReport& r = loop.report;
+  if (!loop.ran) return;
   ++r.frames;
   r.late_compute += timing.late == sched::Late::compute;
   r.late_stolen += timing.late == sched::Late::stolen;
   r.late_wakeup += timing.late == sched::Late::wakeup;
   if (timing.wakeup_us > r.wakeup_us_max) r.wakeup_us_max = timing.wakeup_us;
+  if (loop.view && s.report.frame % loop.view_step == 0) loop.view->write(s, loop.record.time);
   if (!loop.ring) return;
   h6FrameRecord& row = loop.record;
   row.report = s.report;
@@ -128,6 +167,8 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
     return fail(error, "spin_us must be in 0..10000, it is %g", def.spin_us);
   if (def.ring_frames > 10000000)
     return fail(error, "ring_frames must be at most 10000000, it is %zu", def.ring_frames);
+  if (def.view_contacts > 1000000)
+    return fail(error, "view_contacts must be at most 1000000, it is %zu", def.view_contacts);
   return true;
 }
 
@@ -155,6 +196,10 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
     if (used.ring_frames)
       loop->ring = std::make_unique<sched::SpscRing<h6FrameRecord>>(used.ring_frames);
+    if (used.view_contacts) {
+      loop->view = std::make_unique<LoopView>(session->body_count, used.view_contacts);
+      loop->view_step = static_cast<std::uint64_t>(std::max(1.0, 1 / (kViewRate * session->dt)));
+    }
     sched::PeriodicThreadOptions options;
     options.rate = 1 / session->dt;
     options.spin_us = used.spin_us;
@@ -168,8 +213,8 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
             [raw](const sched::RealtimeGrant& grant) {
               std::snprintf(raw->report.granted, sizeof raw->report.granted, "%s", grant.text);
             },
-            [raw](std::uint64_t n, const sched::TickTiming& before, double wakeup) {
-              return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, n, before, wakeup);
+            [raw](std::uint64_t, const sched::TickTiming& before, double wakeup) {
+              return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, before, wakeup);
             },
             [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
     return loop.release();
@@ -182,6 +227,31 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
 size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity) {
   return loop->ring ? loop->ring->pop(out, capacity) : 0;
 }
+bool h6ReadView(h6Loop* loop, h6LoopView* out) { return loop->view && loop->view->read(out); }
+
+void h6SetPace(h6Loop* loop, double pace) {
+  loop->pace.store(pace >= 0 && pace <= 1 ? pace : 1, std::memory_order_relaxed);
+}
+
+h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
+  const h6Session& now = *loop->session;
+  if (!next || next->model != now.model || next->body_count != now.body_count ||
+      next->hand_count != now.hand_count || next->dt != now.dt)
+    return fail(error, "a loop goes on with a session of the same model, bodies, hands and rate"),
+           nullptr;
+  for (std::size_t h = 0; h < next->hand_count; ++h)
+    if (next->hands[h].body != now.hands[h].body || next->hands[h].mode != now.hands[h].mode)
+      return fail(error, "a loop goes on with hands on the same bodies, in the same modes"), nullptr;
+  loop->offered.store(next, std::memory_order_release);
+  while (true) {
+    if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire))
+      return before;
+    if (!loop->thread->running() && loop->offered.exchange(nullptr))
+      return fail(error, "the loop has ended"), nullptr;
+    sched::sleep_until_ns(sched::now_ns() + 100000);
+  }
+}
+
 bool h6LoopRunning(const h6Loop* loop) { return loop->thread->running(); }
 void h6RequestStop(h6Loop* loop) { loop->stop.store(true, std::memory_order_relaxed); }
 

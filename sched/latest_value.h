@@ -1,7 +1,8 @@
 // latest_value.h - hands the newest value from one writer to one reader; neither ever waits.
 //
 // Three slots: the writer owns one, the reader owns one, the third is the exchange. `middle_` holds
-// the index of the exchange slot and whether it is newer than what the reader has.
+// the index of the exchange slot and whether it is newer than what the reader has. Large values are
+// written and read where they lie: next() and publish(), newest().
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -14,15 +15,30 @@ class LatestValue {
   // Writer.
   void publish(const T& value) {
     slots_[back_] = value;
+    publish();
+  }
+  // Writer. The slot to fill, with whatever it held; then it is the newest.
+  T& next() { return slots_[back_]; }
+  void publish() {
     back_ = middle_.exchange(back_ | kNew, std::memory_order_acq_rel) & kIndex;
   }
   // Reader. True when there is a value newer than that of the last call; `out` is left alone if
   // not.
   bool take(T& out) {
-    if (!(middle_.load(std::memory_order_relaxed) & kNew)) return false;
+    const T* value = newest();
+    if (value) out = *value;
+    return value != nullptr;
+  }
+  // Reader. A value newer than that of the last call, or nullptr; it stays until the next call.
+  const T* newest() {
+    if (!(middle_.load(std::memory_order_relaxed) & kNew)) return nullptr;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;
-    out = slots_[front_];
-    return true;
+    return &slots_[front_];
+  }
+  // Before anyone writes or reads.
+  template <class F>
+  void prepare(F&& each) {
+    for (T& slot : slots_) each(slot);
   }
 
  private:

@@ -22,10 +22,11 @@ const std::map<std::string, std::set<std::string>> below = {
     {"kernels", {"contract"}},
     {"sched", {"contract"}},
     {"runtime", {"contract", "kernels", "sched"}},
-    {"device", {"contract"}},
+    {"device", {"contract", "sched"}},
     {"io", {"contract", "runtime", "kernels", "sched"}},
-    {"io/cli", {"contract", "runtime", "kernels", "sched", "io", "device"}},
-    {"tests", {"contract", "runtime", "kernels", "sched", "io", "device", "io/cli"}},
+    {"io/view", {"contract", "io"}},
+    {"io/cli", {"contract", "runtime", "kernels", "sched", "io", "io/view", "device"}},
+    {"tests", {"contract", "runtime", "kernels", "sched", "io", "io/view", "device", "io/cli"}},
     {"bench", {"contract", "runtime", "kernels", "sched", "io", "device", "tests"}},
 };
 
@@ -41,10 +42,11 @@ const std::vector<std::pair<std::string, std::set<std::string>>> packages = {
     {"assimp/", {"io"}},
     {"hdf5", {"io"}},
     {"H5", {"io"}},
-    {"nlohmann/", {"io", "io/cli"}},
+    {"nlohmann/", {"io", "io/view", "io/cli"}},
     {"CLI/", {"io/cli"}},
-    {"boost/", {"io"}},
-    {"zlib.h", {"io"}},
+    {"boost/", {"io/view"}},
+    {"meshoptimizer", {"io/view"}},
+    {"zlib.h", {"io", "io/view"}},
     {"hidapi", {"device"}},
     {"doctest/", {"tests"}},
     {"benchmark/", {"bench"}},
@@ -53,13 +55,15 @@ const std::vector<std::pair<std::string, std::set<std::string>>> packages = {
 std::string box_of(const fs::path& file) {
   const std::string path = fs::relative(file, root).generic_string();
   if (path.rfind("runtime/include/", 0) == 0) return "contract";
-  if (path.rfind("io/cli/", 0) == 0) return "io/cli";
+  for (const char* box : {"io/cli", "io/view"})
+    if (path.rfind(std::string(box) + "/", 0) == 0) return box;
   return path.substr(0, path.find('/'));
 }
 
 std::string box_of_include(const std::string& name) {
   if (name.rfind("hapsix/", 0) == 0) return "contract";
-  if (name.rfind("io/cli/", 0) == 0) return "io/cli";
+  for (const char* box : {"io/cli", "io/view"})
+    if (name.rfind(std::string(box) + "/", 0) == 0) return box;
   const std::string first = name.substr(0, name.find('/'));
   return below.count(first) ? first : "";
 }

@@ -107,6 +107,7 @@ typedef struct h6LoopDef {
   int32_t  core;          /* -1: the last one                                                      */
   double   spin_us;       /* poll the clock this long before each deadline instead of sleeping [us]*/
   size_t   ring_frames;   /* records kept for a slow reader; overruns are counted. 0: none         */
+  size_t   view_contacts; /* rows of contacts kept for a viewer; 0: no viewer                      */
 } h6LoopDef;
 H6_API h6LoopDef h6DefaultLoopDef(void);  /* real time, realtime asked for, 1000 records           */
 
@@ -128,6 +129,33 @@ H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6
                            h6Error* error);
 /* Takes up to `capacity` records, oldest first; call from one reader thread. Never blocks the loop. */
 H6_API size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity);
+/* For one viewer on a thread of its own: bodies and contacts of the newest frame, about 125 times a
+ * second. False when there is nothing newer than at the last call. The arrays stay until the next
+ * call that gives true; what was not fetched in time is gone, the loop never waits. World frame. */
+typedef struct h6ViewContact {
+  float   position[3];         /*                                                             [m]  */
+  float   normal[3];           /* inward unit normal of the point                                  */
+  float   torque_direction[3]; /* T                                                                */
+  float   weight, depth;       /* share of the stiffness; > 0 inside                          [m]  */
+  int32_t shell_body, field_body;
+} h6ViewContact;
+typedef struct h6LoopView {
+  uint64_t frame;
+  double   time;               /* since the loop began                                        [s]  */
+  size_t   body_count;    const h6Pose* bodies;         /* mesh frame -> world, after the step     */
+  size_t   contact_count;                               /* all there are                           */
+  size_t   row_count;     const h6ViewContact* contacts;/* all, or evenly picked ones              */
+} h6LoopView;
+H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
+/* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused). Devices are given the time of the
+ * frames; for hands that live on it, not for a real arm. Any thread. */
+H6_API void   h6SetPace(h6Loop* loop, double pace);
+/* Other settings while it runs: `next` has the same model, bodies, hands and rate. Between two frames
+ * it takes over poses, velocities, hands and the state of their safety chains, and what the bodies
+ * did before is forgotten otherwise (coherence, warm starts). Returns the session before, to be
+ * destroyed by the caller; NULL with `error` filled: nothing has changed. Waits for the frame in
+ * progress; one thread at a time, not the haptic one. */
+H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);
 H6_API bool   h6LoopRunning(const h6Loop* loop);
 /* Asks it to end after the current frame; any thread, and a signal handler. */
 H6_API void   h6RequestStop(h6Loop* loop);

@@ -1,0 +1,209 @@
+// What a viewer sees of a running loop, and what it may change: settings, pace.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "tests/support/analytic.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr double mm = 1e-3;
+
+// A block held 2 mm below a floor's surface by its hand.
+struct Scene {
+  FieldArrays field = sample_analytic([](double, double, double z) { return z; },
+                                      {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
+  ShellArrays shell = bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
+  Model model{{def_of(field)}, {shell.def()}};
+  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
+  h6HandDef hand = h6DefaultHandDef();
+  h6SessionDef def = h6DefaultSessionDef();
+  h6Session* session = nullptr;
+
+  Scene() {
+    bodies[0].fixed = true, bodies[0].field = 0;
+    bodies[1].shell = 0, bodies[1].pose = pose(0, 0, 5.2 * mm);
+    hand.body = 1;
+    hand.coupling.max_force = 20;  // whatever the contacts' stiffness
+    def.bodies = bodies.data(), def.body_count = 2;
+    def.hands = &hand, def.hand_count = 1;
+    session = h6CreateSession(model.handle, &def, nullptr);
+    REQUIRE(session);
+  }
+  ~Scene() { h6DestroySession(session); }
+  static h6Device device() {
+    h6Device d{};
+    d.capabilities.max_force = 20, d.capabilities.max_torque = 2;
+    d.read = [](void*, double t, h6DeviceSample* out) {
+      *out = hand_at(pose(0, 0, (5.2 - 2 * std::min(1.0, 10 * t)) * mm));
+      return 0;
+    };
+    d.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+    d.stop = [](void*) {};
+    return d;
+  }
+};
+
+struct Running {
+  h6Device device = Scene::device();
+  h6Loop* loop;
+  explicit Running(Scene& scene, std::size_t view_contacts = 4096) {
+    h6LoopDef def = h6DefaultLoopDef();
+    def.duration = 0;
+    def.realtime = false;
+    def.view_contacts = view_contacts;
+    def.ring_frames = 100000;
+    loop = h6StartLoop(scene.session, &device, &def, nullptr);
+    REQUIRE(loop);
+  }
+  ~Running() { h6DestroyLoop(loop); }
+  // The newest view at or after `time`; what it points at stays until the next call.
+  h6LoopView view_after(double time) const {
+    h6LoopView view{};
+    for (int i = 0; i < 30000; ++i) {
+      if (h6ReadView(loop, &view) && view.time >= time) return view;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    FAIL("no view within 30 s");
+    return view;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a viewer sees the poses and contacts of a frame") {
+  Scene scene;
+  const Running run(scene);
+  const h6LoopView view = run.view_after(0.4);
+  REQUIRE(view.body_count == 2);
+  REQUIRE(view.contact_count > 100);
+  CHECK(view.row_count == view.contact_count);
+  CHECK(view.bodies[1].p.z < 5 * mm);
+  for (std::size_t i = 0; i < view.row_count; ++i) {
+    const h6ViewContact& c = view.contacts[i];
+    // Each lies on the block's bottom, under the floor by its depth, and is pushed up.
+    CHECK(std::fabs(c.position[2] + c.depth) < 2e-5);
+    CHECK(std::fabs(c.position[0]) <= 10.001 * mm);
+    CHECK(std::fabs(c.normal[2] - 1) < 1e-3);
+    CHECK(c.shell_body == 1);
+    CHECK(c.field_body == 0);
+    CHECK(c.weight > 0);
+  }
+}
+
+TEST_CASE("where there are more contacts than rows, rows are picked from all over") {
+  Scene scene;
+  const Running run(scene, 20);
+  const h6LoopView view = run.view_after(0.4);
+  CHECK(view.contact_count > 100);
+  CHECK(view.row_count <= 20);
+  CHECK(view.row_count >= 10);
+  float low = 1, high = -1;
+  for (std::size_t i = 0; i < view.row_count; ++i) {
+    low = std::min(low, view.contacts[i].position[0]);
+    high = std::max(high, view.contacts[i].position[0]);
+  }
+  CHECK(high - low > 10 * mm);
+}
+
+TEST_CASE("a viewer that stands still costs the loop no frame, and sees the newest then") {
+  Scene scene;
+  const Running run(scene);
+  (void)run.view_after(0.05);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  h6LoopView view{};
+  REQUIRE(h6ReadView(run.loop, &view));
+  CHECK(view.time > 0.2);
+  const std::uint64_t frame = view.frame;
+  CHECK(run.view_after(view.time + 0.01).frame > frame);
+}
+
+TEST_CASE("without room for contacts there is nothing to see") {
+  Scene scene;
+  const Running run(scene, 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  h6LoopView view;
+  CHECK(!h6ReadView(run.loop, &view));
+}
+
+TEST_CASE("another session goes on where the one before was, with its own settings") {
+  Scene scene;
+  Running run(scene);
+  const double before = run.view_after(0.5).bodies[1].p.z;
+  h6SessionDef softer = scene.def;
+  softer.contact.stiffness = scene.def.contact.stiffness / 10;
+  h6Session* next = h6CreateSession(scene.model.handle, &softer, nullptr);
+  REQUIRE(next);
+  std::vector<h6FrameRecord> rows(100000);
+  (void)h6ReadRecords(run.loop, rows.data(), rows.size());
+  h6Session* old = h6ChangeSession(run.loop, next, nullptr);
+  CHECK(old == scene.session);
+  scene.session = next;
+  h6DestroySession(old);
+  const double time = run.view_after(0).time;
+  const h6LoopView view = run.view_after(time + 0.2);
+  // 1e3 N/m of coupling against 1e4, then 1e3 N/m of contact: 0.16 mm, then 0.9 mm of 1.8.
+  CHECK(view.bodies[1].p.z < before - 0.5 * mm);
+  // No frame was left out and nothing jumped.
+  const std::size_t n = h6ReadRecords(run.loop, rows.data(), rows.size());
+  REQUIRE(n > 100);
+  for (std::size_t i = 1; i < n; ++i) {
+    CHECK(rows[i].report.frame == rows[i - 1].report.frame + 1);
+    CHECK(std::fabs(rows[i].body[0].pose.p.z - rows[i - 1].body[0].pose.p.z) < 0.1 * mm);
+  }
+}
+
+TEST_CASE("a session of something else is refused, and nothing changes") {
+  Scene scene, other;
+  Running run(scene);
+  h6Error error{};
+  CHECK(h6ChangeSession(run.loop, other.session, &error) == nullptr);
+  CHECK(std::string(error.message).find("same model") != std::string::npos);
+  h6SessionDef faster = scene.def;
+  faster.rate = 2000;
+  h6Session* next = h6CreateSession(scene.model.handle, &faster, nullptr);
+  CHECK(h6ChangeSession(run.loop, next, &error) == nullptr);
+  h6DestroySession(next);
+  const h6LoopView view = run.view_after(0);
+  CHECK(run.view_after(view.time + 0.02).frame > view.frame);
+}
+
+TEST_CASE("a loop that has ended takes no session") {
+  Scene scene;
+  Running run(scene);
+  h6RequestStop(run.loop);
+  (void)h6JoinLoop(run.loop);
+  h6Session* next = h6CreateSession(scene.model.handle, &scene.def, nullptr);
+  CHECK(h6ChangeSession(run.loop, next, nullptr) == nullptr);
+  h6DestroySession(next);
+}
+
+TEST_CASE("paused, time stands still; slow, devices see the time of the frames") {
+  Scene scene;
+  Running run(scene);
+  (void)run.view_after(0.1);
+  h6SetPace(run.loop, 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  std::vector<h6FrameRecord> rows(100000);
+  (void)h6ReadRecords(run.loop, rows.data(), rows.size());
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  CHECK(h6ReadRecords(run.loop, rows.data(), rows.size()) == 0);
+  h6SetPace(run.loop, 0.25);
+  const auto start = std::chrono::steady_clock::now();
+  std::size_t n = 0;
+  while (n < 50) n += h6ReadRecords(run.loop, rows.data() + n, 50 - n);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  CHECK(seconds > 0.15);  // 50 frames at a quarter of the pace take 0.2 s; less only if it ran ahead
+  for (std::size_t i = 1; i < n; ++i)
+    CHECK(std::fabs(rows[i].time - rows[i - 1].time - 1e-3) < 1e-9);
+}
