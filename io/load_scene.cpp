@@ -123,6 +123,7 @@ class Loader {
                   [](const FieldData& data, LoadedAsset& asset) {
                     asset.is_field = true;
                     asset.voxel_size = data.voxel_size;
+                    asset.origin = {data.origin.x, data.origin.y, data.origin.z};
                     for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
                     asset.bricks = data.brick_count();
                   });

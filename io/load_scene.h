@@ -21,6 +21,7 @@ struct LoadedAsset {
   bool rebuilt = false;        // the cache had a file for it, but damaged or of something else
   double seconds = 0;          // to bake or to read
   double voxel_size = 0;       // field [m]
+  h6Vec3 origin{};             // field: its first node, mesh frame [m]
   std::array<int, 3> nodes{};  // field: per axis
   std::size_t bricks = 0;      // field
   std::size_t points = 0;      // shell

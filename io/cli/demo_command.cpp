@@ -8,6 +8,7 @@
 #include "io/cli/commands.h"
 #include "io/cli/run_scene.h"
 #include "io/cli/tables.h"
+#include "io/cli/view_run.h"
 #include "io/scenes/scenes.h"
 
 namespace h6::cli {
@@ -16,9 +17,21 @@ namespace {
 struct DemoOptions {
   std::string scene = "alpha-shortcut", folder = "hapsix-demo";
   RunOptions run;
+  ViewOptions view;
 };
 
+void print(const std::vector<RunSummary>& runs, bool virtual_time) {
+  std::printf("\n%s", table(runs).c_str());
+  for (const RunSummary& run : runs)
+    std::printf("\ndeepest contact over time, %s [voxel]\n%s", run.method.c_str(),
+                depth_strip(run).c_str());
+  if (!virtual_time) std::printf("\nreal time: %s\n", runs.back().loop.granted);
+  for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
+}
+
 int demo_command(const Console& console, DemoOptions o) {
+  if (o.view.on && o.run.virtual_time)
+    return console.fail("--view shows a run in real time: leave --virtual-time out", kUsage);
   Result<io::Scene> scene = io::make_scene(o.scene);
   if (!scene) return console.fail(scene.error(), kUsage);
   std::error_code failed;
@@ -50,14 +63,15 @@ int demo_command(const Console& console, DemoOptions o) {
     runs.push_back(std::move(*summary));
     if (runs.back().interrupted) return console.fail("interrupted");
   }
+  if (!console.json) print(runs, o.run.virtual_time);
+  if (o.view.on) {
+    o.view.folder = o.folder;
+    o.run = {};  // a run without an end, by the scene's own settings, nothing recorded unasked
+    const Outcome viewed =
+        view_scene(**loaded, o.run, o.view, console, [](const RunSummary&) {});
+    if (!viewed) return console.fail(viewed.error());
+  }
   console.result(json);
-  if (console.json) return kOk;
-  std::printf("\n%s", table(runs).c_str());
-  for (const RunSummary& run : runs)
-    std::printf("\ndeepest contact over time, %s [voxel]\n%s", run.method.c_str(),
-                depth_strip(run).c_str());
-  if (!o.run.virtual_time) std::printf("\nreal time: %s\n", runs.back().loop.granted);
-  for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
   return kOk;
 }
 
@@ -79,6 +93,7 @@ void add_demo(CLI::App& app, Program& program) {
   demo->add_option("--threads", o->run.threads, "1 (default), or 2 for a helper on the other core")
       ->option_text("N")
       ->check(whole_within(1, 2));
+  add_view_options(*demo, o->view);
   demo->callback([&program, o] {
     program.work = [&program, o] { return demo_command(program.console, *o); };
   });

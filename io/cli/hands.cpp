@@ -7,8 +7,10 @@
 namespace h6::cli {
 namespace {
 
-device::HandPath hand_path(const io::SceneHand& hand, const h6Pose& start) {
+device::HandPath hand_path(const io::SceneHand& hand, const h6Pose& start,
+                           std::shared_ptr<device::Steering> steering) {
   device::HandPath path;
+  path.steering = std::move(steering);
   for (const io::PathRow& row : hand.path) {
     path.time.push_back(row.t);
     path.pose.push_back(row.pose);
@@ -65,21 +67,22 @@ Outcome keep(Result<std::unique_ptr<Device>> opened, Hands& out) {
 }
 
 Outcome open_hand(const io::SceneHand& hand, const h6BodyDef& body, const h6CouplingDef& coupling,
-                  Hands& out) {
+                  std::shared_ptr<device::Steering> steering, Hands& out) {
   if (Outcome known = check_device(hand.device); !known) return known;
+  device::HandPath path = hand_path(hand, body.pose, std::move(steering));
   // A body that never turns hangs on the origin of its mesh frame.
   const h6Vec3 grip = body.translation_only ? h6Vec3{} : body.com;
   if (hand.device == "arm")
-    return keep(device::SimulatedArm::open(hand_path(hand, body.pose),
-                                           arm_figures(hand, coupling, grip), hand.def.mode),
+    return keep(device::SimulatedArm::open(std::move(path), arm_figures(hand, coupling, grip),
+                                           hand.def.mode),
                 out);
   if (hand.def.mode != H6_IMPEDANCE)
     return Failure{"the device '" + hand.device +
                    "' works in impedance mode only, choose that mode or the device 'arm'"};
-  if (hand.device == "path") return keep(device::PathDevice::open(hand_path(hand, body.pose)), out);
+  if (hand.device == "path") return keep(device::PathDevice::open(std::move(path)), out);
   device::Arm person;
   person.grip = grip;
-  return keep(device::SimulatedHand::open(hand_path(hand, body.pose), person), out);
+  return keep(device::SimulatedHand::open(std::move(path), person), out);
 }
 
 }  // namespace
@@ -92,13 +95,14 @@ Outcome check_device(const std::string& name) {
 }
 
 Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,
-                         h6Session* session) {
+                         h6Session* session, std::shared_ptr<device::Steering> steering) {
   Hands out;
   for (std::size_t i = 0; i < hands.size(); ++i) {
     const auto index = static_cast<std::int32_t>(i);
     const auto body = static_cast<std::size_t>(loaded.body_index(hands[i].body));
     if (Outcome opened =
-            open_hand(hands[i], loaded.bodies[body], h6GetCoupling(session, index), out);
+            open_hand(hands[i], loaded.bodies[body], h6GetCoupling(session, index),
+                      i == 0 ? steering : nullptr, out);
         !opened)
       return Failure{"hand of '" + hands[i].body + "': " + opened.error()};
     h6SetRating(session, index, &out.devices[i].capabilities);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "device/steering.h"
 #include "hapsix/result.h"
 #include "io/load_scene.h"
 
@@ -24,7 +25,9 @@ Outcome check_device(const std::string& name);
 //   arm        a simulated force-feedback arm, held by such a person; in the mode of `def`, with
 //              the figures of `arm`
 // `hands` are the scene's, changed at will; their `def` must be what the session was made of.
+// `steering` may take the first hand off its path.
 Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,
-                         h6Session* session);
+                         h6Session* session,
+                         std::shared_ptr<device::Steering> steering = nullptr);
 
 }  // namespace h6::cli

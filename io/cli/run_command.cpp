@@ -10,6 +10,7 @@
 #include "io/cli/hands.h"
 #include "io/cli/run_scene.h"
 #include "io/cli/tables.h"
+#include "io/cli/view_run.h"
 #include "io/scene_file.h"
 #include "io/scenes/scenes.h"
 
@@ -33,7 +34,10 @@ Result<io::Scene> find_scene(const std::string& name) {
   return io::read_scene(name);
 }
 
-int run_command(const Console& console, const std::string& name, const RunOptions& options) {
+int run_command(const Console& console, const std::string& name, const RunOptions& options,
+                const ViewOptions& view) {
+  if (view.on && options.virtual_time)
+    return console.fail("--view shows a run in real time: leave --virtual-time out", kUsage);
   if (Outcome known = check_options(options); !known) return console.fail(known.error(), kUsage);
   if (!options.record.empty())
     if (Outcome place = check_output(options.record); !place) return console.fail(place.error());
@@ -50,7 +54,14 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (!loaded) return console.fail(name + ": " + loaded.error());
   console.warn((*loaded)->warnings);
   if (!console.json) console.log(assets(**loaded));
-  Result<RunSummary> summary = run_scene(**loaded, options, console);
+  Result<RunSummary> summary = Failure{"nothing was run"};
+  if (view.on) {
+    const Outcome viewed = view_scene(**loaded, options, view, console,
+                                      [&](const RunSummary& last) { summary = last; });
+    if (!viewed) return console.fail(name + ": " + viewed.error());
+  } else {
+    summary = run_scene(**loaded, options, console);
+  }
   if (!summary) return console.fail(name + ": " + summary.error());
   const std::string stopped =
       "interrupted after " + std::to_string(summary->loop.frames) + " frames";
@@ -75,6 +86,7 @@ void add_run(CLI::App& app, Program& program) {
   CLI::App* run = app.add_subcommand("run", "Run a scene: forces and a verdict out");
   auto name = std::make_shared<std::string>();
   auto o = std::make_shared<RunOptions>();
+  auto view = std::make_shared<ViewOptions>();
   run->add_option("SCENE", *name,
                   "A scene file, or the name of a generated scene ('hapsix scene list')")
       ->required()
@@ -102,8 +114,11 @@ void add_run(CLI::App& app, Program& program) {
   run->add_option("--record", o->record, "Record every frame to this .h5 file")
       ->option_text("FILE")
       ->check(ends_with(".h5"));
-  run->callback([&program, name, o] {
-    program.work = [&program, name, o] { return run_command(program.console, *name, *o); };
+  add_view_options(*run, *view);
+  run->callback([&program, name, o, view] {
+    program.work = [&program, name, o, view] {
+      return run_command(program.console, *name, *o, *view);
+    };
   });
 }
 

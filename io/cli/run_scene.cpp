@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "io/cli/run_observer.h"
 #include "io/cli/run_setup.h"
 #include "kernels/targets.h"
 
@@ -39,6 +40,10 @@ class Watcher {
   Outcome rows(const h6FrameRecord* rows, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) row(rows[i]);
     return recorder_ ? recorder_->frames(rows, count) : Outcome(Done{});
+  }
+  // Something that the frames do not say themselves.
+  void note(const std::string& what, const std::string& detail) {
+    event({last_time_, what, "after frame " + std::to_string(frames_) + ": " + detail});
   }
   void finish() {
     if (summary_.interrupted)
@@ -125,6 +130,8 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   if (!options.device.empty())
     for (io::SceneHand& hand : run.hands) hand.device = options.device;
   run.record = options.record;
+  RunObserver* const observer = options.observer;
+  if (observer) observer->prepare(run);
   if (Outcome opened = run.open(); !opened) return opened.failure();
   io::Recorder* recorder = run.recorder.get();
 
@@ -136,9 +143,11 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   loop_def.virtual_time = options.virtual_time;
   loop_def.spin_us = options.spin_us;
   loop_def.ring_frames = 4096;
+  loop_def.view_contacts = options.view_contacts;
   summary.seconds = loop_def.duration;
+  if (observer && options.duration <= 0) loop_def.duration = 0;
   summary.virtual_time = options.virtual_time;
-  Watcher watcher(loaded, summary, loop_def.duration, recorder);
+  Watcher watcher(loaded, summary, summary.seconds, recorder);
   h6Error error{};
   std::unique_ptr<h6Loop, LoopDeleter> loop(
       h6StartLoop(run.session.get(), run.devices.devices.data(), &loop_def, &error));
@@ -158,15 +167,21 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   if (interrupted.load()) h6RequestStop(loop.get());
 
   std::vector<h6FrameRecord> rows(256);
-  const io::Progress progress = console.progress();
+  const io::Progress progress = observer ? io::Progress{} : console.progress();
   Outcome watched = Done{};
+  if (observer)
+    observer->begin(run, loop.get(), [&](const std::string& what, const std::string& detail) {
+      watcher.note(what, detail);
+    });
   const auto drain = [&] {
     while (const std::size_t n = h6ReadRecords(loop.get(), rows.data(), rows.size())) {
       if (watched)
         watched = watcher.rows(rows.data(), n);
       else
         (void)watcher.rows(nullptr, 0);
-      progress("running " + loaded.scene.name, rows[n - 1].time / loop_def.duration);
+      if (observer) observer->rows(rows.data(), n);
+      if (progress)
+        progress("running " + loaded.scene.name, rows[n - 1].time / loop_def.duration);
     }
     if (watched && recorder)
       watched = recorder->frames(nullptr, 0);  // what is old enough goes to disk
@@ -174,15 +189,18 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   };
   while (h6LoopRunning(loop.get())) {
     drain();
+    if (observer && !observer->turn()) h6RequestStop(loop.get());
     std::this_thread::sleep_for(std::chrono::milliseconds(options.virtual_time ? 1 : 5));
   }
   summary.loop = h6JoinLoop(loop.get());
   set_signal_hook(nullptr, nullptr);
   drain();
-  progress("running", 1);
+  if (progress) progress("running", 1);
+  if (observer) observer->end();
   if (!watched) return watched.failure();
-  summary.interrupted = interrupted.load() && static_cast<double>(summary.loop.frames) <
-                                                  loop_def.duration * def.rate - 0.5;
+  const bool endless = loop_def.duration == 0;  // then that is how it ends
+  summary.interrupted = !endless && interrupted.load() && static_cast<double>(summary.loop.frames) <
+                                                  summary.seconds * def.rate - 0.5;
   watcher.finish();
   if (def.hand_count == 0)  // nobody holds anything: the first body that moves
     for (std::size_t b = 0; b < def.body_count; ++b)

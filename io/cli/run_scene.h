@@ -14,6 +14,8 @@
 
 namespace h6::cli {
 
+class RunObserver;
+
 struct RunOptions {
   std::string device;   // empty: what the scene says for each hand
   double duration = 0;  // 0: the scene's [s]
@@ -22,6 +24,8 @@ struct RunOptions {
   unsigned threads = 1;
   double spin_us = 0;
   std::string record;  // empty: none
+  RunObserver* observer = nullptr;  // with one the run has no end of its own
+  std::size_t view_contacts = 0;    // rows of contacts kept for the observer
 };
 
 struct RunSummary {

@@ -15,7 +15,7 @@ Outcome RunSetup::open() {
   session.reset(h6CreateSession(loaded.model.get(), &def, &error));
   if (!session) return Failure{error.message};
   for (std::size_t i = 0; i < hands.size(); ++i) hands[i].def = hand_defs[i];
-  Result<Hands> opened = open_hands(loaded, hands, session.get());
+  Result<Hands> opened = open_hands(loaded, hands, session.get(), steering);
   if (!opened) return opened.failure();
   devices = std::move(*opened);
   return record.empty() ? Outcome(Done{}) : open_recording();

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "device/steering.h"
 #include "hapsix/result.h"
 #include "io/cli/hands.h"
 #include "io/load_scene.h"
@@ -28,6 +29,7 @@ struct RunSetup {
   std::vector<h6HandDef> hand_defs;
   std::vector<io::SceneHand> hands;  // device, path and figures; `def` is taken from hand_defs
   std::string record;                // .h5 file, empty: none
+  std::shared_ptr<device::Steering> steering;  // who may take the first hand off its path
 
   SessionPtr session;
   Hands devices;

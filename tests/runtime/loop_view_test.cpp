@@ -61,7 +61,7 @@ struct Running {
     def.duration = 0;
     def.realtime = false;
     def.view_contacts = view_contacts;
-    def.ring_frames = 100000;
+    def.ring_frames = 2000;
     loop = h6StartLoop(scene.session, &device, &def, nullptr);
     REQUIRE(loop);
   }
@@ -143,7 +143,7 @@ TEST_CASE("another session goes on where the one before was, with its own settin
   softer.contact.stiffness = scene.def.contact.stiffness / 10;
   h6Session* next = h6CreateSession(scene.model.handle, &softer, nullptr);
   REQUIRE(next);
-  std::vector<h6FrameRecord> rows(100000);
+  std::vector<h6FrameRecord> rows(2000);
   (void)h6ReadRecords(run.loop, rows.data(), rows.size());
   h6Session* old = h6ChangeSession(run.loop, next, nullptr);
   CHECK(old == scene.session);
@@ -151,8 +151,8 @@ TEST_CASE("another session goes on where the one before was, with its own settin
   h6DestroySession(old);
   const double time = run.view_after(0).time;
   const h6LoopView view = run.view_after(time + 0.2);
-  // 1e3 N/m of coupling against 1e4, then 1e3 N/m of contact: 0.16 mm, then 0.9 mm of 1.8.
-  CHECK(view.bodies[1].p.z < before - 0.5 * mm);
+  // A tenth of the contacts' stiffness, the same hand.
+  CHECK(5 * mm - view.bodies[1].p.z > 4 * (5 * mm - before));
   // No frame was left out and nothing jumped.
   const std::size_t n = h6ReadRecords(run.loop, rows.data(), rows.size());
   REQUIRE(n > 100);
@@ -193,7 +193,7 @@ TEST_CASE("paused, time stands still; slow, devices see the time of the frames")
   (void)run.view_after(0.1);
   h6SetPace(run.loop, 0);
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  std::vector<h6FrameRecord> rows(100000);
+  std::vector<h6FrameRecord> rows(2000);
   (void)h6ReadRecords(run.loop, rows.data(), rows.size());
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   CHECK(h6ReadRecords(run.loop, rows.data(), rows.size()) == 0);

@@ -1,0 +1,304 @@
+#include "io/cli/view_run.h"
+
+#include <CLI/CLI.hpp>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <deque>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "device/steering.h"
+#include "io/cli/checks.h"
+#include "io/cli/run_observer.h"
+#include "io/view/live_state.h"
+#include "io/view/page.h"
+#include "io/view/view_request.h"
+#include "io/view/view_server.h"
+
+namespace h6::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using io::view::ViewRequest;
+
+constexpr auto kPicture = std::chrono::microseconds(16000);
+constexpr std::size_t kWaiting = 256;         // wishes not looked at yet
+constexpr std::size_t kViewContacts = 2000;   // arrows
+
+// From the server's thread to ours.
+class Wishes {
+ public:
+  void add(std::string_view text) {
+    Result<ViewRequest> request = io::view::parse_request(text);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!request) {
+      refused_ = request.error();
+      return;
+    }
+    // Of the hand's places only the last counts.
+    if (std::holds_alternative<io::view::MoveHand>(*request) && !waiting_.empty() &&
+        std::holds_alternative<io::view::MoveHand>(waiting_.back()))
+      waiting_.pop_back();
+    if (waiting_.size() < kWaiting) waiting_.push_back(*request);
+  }
+  std::deque<ViewRequest> take(std::string* refused) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::deque<ViewRequest> all;
+    all.swap(waiting_);
+    refused->swap(refused_);
+    refused_.clear();
+    return all;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::deque<ViewRequest> waiting_;
+  std::string refused_;
+};
+
+// The browser of the person at this screen, if there is one; it lives on by itself.
+bool open_browser(const std::string& address) {
+  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
+  const pid_t child = fork();
+  if (child < 0) return false;
+  if (child == 0) {
+    if (fork() == 0) {
+      setsid();
+      if (!std::freopen("/dev/null", "w", stdout) || !std::freopen("/dev/null", "w", stderr))
+        _exit(1);
+      execlp("xdg-open", "xdg-open", address.c_str(), static_cast<char*>(nullptr));
+    }
+    _exit(0);
+  }
+  int status;
+  waitpid(child, &status, 0);
+  return true;
+}
+
+class Viewer : public RunObserver {
+ public:
+  Viewer(const io::LoadedScene& loaded, const ViewOptions& options, const Console& console)
+      : loaded_(loaded), options_(options), console_(console), state_(loaded) {}
+
+  Outcome open(const h6ContactDef& contact, const h6CouplingDef& coupling) {
+    const std::string_view page = io::view::live_page();
+    if (page.empty()) return Failure{io::view::no_page()};
+    io::view::ServerOptions options;
+    options.port = static_cast<std::uint16_t>(options_.port);
+    Result<std::unique_ptr<io::view::ViewServer>> server = io::view::ViewServer::open(
+        options, std::string(page), [this](std::string_view text) { wishes_.add(text); });
+    if (!server) return server.failure();
+    server_ = std::move(*server);
+    contact_ = contact;
+    coupling_ = coupling;
+    state_.settings(contact_, coupling_);
+    std::vector<std::string> remarks;
+    server_->greet(state_.scene_message(remarks));
+    console_.warn(remarks);
+    const bool shown = options_.open && open_browser(server_->address());
+    console_.log("view: " + server_->address() + (shown ? "" : "  (open it in a browser here)"));
+    return Done{};
+  }
+
+  bool again() const { return again_; }
+  const std::string& record() const { return record_; }
+
+  void prepare(RunSetup& setup) override {
+    again_ = false;
+    steering_ = std::make_shared<device::Steering>();
+    setup.steering = steering_;
+    for (h6HandDef& hand : setup.hand_defs) hand.filter.clutch_buttons |= 1;
+    apply(setup);
+  }
+
+  void begin(RunSetup& setup, h6Loop* loop, Note note) override {
+    setup_ = &setup;
+    loop_ = loop;
+    note_ = std::move(note);
+    wish_ = {};
+    pace_ = 1;
+    offset_ = {};
+    state_.begin();
+    state_.recording(setup.recorder != nullptr);
+    next_ = Clock::now();
+  }
+
+  void rows(const h6FrameRecord* rows, std::size_t count) override { state_.rows(rows, count); }
+
+  bool turn() override {
+    std::string refused;
+    for (const ViewRequest& wish : wishes_.take(&refused))
+      std::visit([this](const auto& w) { act(w); }, wish);
+    if (!refused.empty()) server_->say(io::view::LiveState::note(refused));
+    h6LoopView view;
+    if (h6ReadView(loop_, &view)) state_.contacts(view);
+    if (Clock::now() >= next_ && state_.any() && server_->clients() > 0) {
+      next_ = Clock::now() + kPicture;
+      server_->publish(state_.state_message());
+    }
+    return !again_;
+  }
+
+  void end() override {
+    loop_ = nullptr;
+    setup_ = nullptr;
+    note_ = nullptr;
+  }
+
+ private:
+  void act(const io::view::Grab& grab) {
+    wish_.held = grab.on;
+    wish_.placed = false;
+    steering_->wish(wish_);
+  }
+  // The page speaks of the scene; the device may be elsewhere, after the clutch.
+  void act(const io::view::MoveHand& move) {
+    if (!wish_.held) return;
+    if (!wish_.clutched && state_.any()) {
+      const h6FrameRecord& r = state_.last();
+      const h6Vec3 &d = r.hand[0].pose.p, &s = r.command[0].pose.p;
+      offset_ = {d.x - s.x, d.y - s.y, d.z - s.z};
+    }
+    wish_.placed = true;
+    wish_.pose = move.pose;
+    wish_.pose.p = {move.pose.p.x + offset_.x, move.pose.p.y + offset_.y,
+                    move.pose.p.z + offset_.z};
+    steering_->wish(wish_);
+  }
+  void act(const io::view::Clutch& clutch) {
+    wish_.clutched = clutch.on;
+    steering_->wish(wish_);
+  }
+  void act(const io::view::SetContact& set) {
+    const h6ContactDef before = contact_;
+    const h6CouplingDef coupling_before = coupling_;
+    if (!set.method.empty())
+      h6MethodFromName(set.method.c_str(), &contact_.method, &contact_.pieces);
+    if (set.stiffness > 0) contact_.stiffness = set.stiffness;
+    if (set.epsilon > 0) {
+      const double torque_to_normal = contact_.epsilon_torque / contact_.epsilon_normal;
+      if (contact_.method == H6_METHOD_ROBUST) {
+        contact_.epsilon_normal = set.epsilon;
+        contact_.epsilon_torque = std::min(2.0, set.epsilon * torque_to_normal);
+      } else {
+        contact_.epsilon = set.epsilon;
+      }
+    }
+    if (set.max_depth_voxels > 0) {
+      coupling_.max_depth_voxels = set.max_depth_voxels;
+      coupling_.max_force = coupling_.max_torque = 0;  // derived from it
+    }
+    apply(*setup_);
+    h6Error error{};
+    SessionPtr next(h6CreateSession(loaded_.model.get(), &setup_->def, &error));
+    h6Session* old = next ? h6ChangeSession(loop_, next.get(), &error) : nullptr;
+    if (!old) {
+      contact_ = before;
+      coupling_ = coupling_before;
+      apply(*setup_);
+      server_->say(io::view::LiveState::note(error.message));
+      return;
+    }
+    (void)setup_->session.release();  // it is `old`
+    h6DestroySession(old);
+    setup_->session = std::move(next);
+    state_.settings(contact_, coupling_);
+    note_("settings", std::string("method ") + h6MethodName(contact_.method) + ", stiffness " +
+                          number(contact_.stiffness, 0) + " N/m, saturation " +
+                          number(coupling_.max_depth_voxels, 2) + " voxels");
+  }
+  void act(const io::view::SetPace& set) {
+    h6SetPace(loop_, set.pace);
+    pace_ = set.pace;
+  }
+  void act(const io::view::Reset&) {
+    record_.clear();
+    again_ = true;
+  }
+  void act(const io::view::Record& record) {
+    if (record.on == !record_.empty()) return;
+    again_ = true;
+    if (!record.on) {
+      server_->say(io::view::LiveState::note("recorded: " + record_));
+      record_.clear();
+      return;
+    }
+    struct stat exists;
+    int n = 1;
+    do record_ = options_.folder + "/" + loaded_.scene.name + "-view-" + std::to_string(n++) + ".h5";
+    while (stat(record_.c_str(), &exists) == 0 && n < 10000);
+    server_->say(io::view::LiveState::note("recording from the start: " + record_));
+  }
+  void act(const io::view::Slice& slice) {
+    if (const auto message = state_.slice_message(slice)) server_->say(message);
+  }
+
+  void apply(RunSetup& setup) const {
+    setup.def.contact = contact_;
+    for (h6HandDef& hand : setup.hand_defs) hand.coupling = coupling_;
+  }
+
+  const io::LoadedScene& loaded_;
+  const ViewOptions& options_;
+  const Console& console_;
+  io::view::LiveState state_;
+  Wishes wishes_;
+  std::unique_ptr<io::view::ViewServer> server_;  // after what its thread calls
+  h6ContactDef contact_{};
+  h6CouplingDef coupling_{};
+  std::shared_ptr<device::Steering> steering_;
+  device::Steering::Wish wish_;
+  h6Vec3 offset_{};
+  RunSetup* setup_ = nullptr;
+  h6Loop* loop_ = nullptr;
+  Note note_;
+  std::string record_;
+  bool again_ = false;
+  double pace_ = 1;
+  Clock::time_point next_;
+};
+
+}  // namespace
+
+void add_view_options(CLI::App& command, ViewOptions& view) {
+  command.add_flag("--view", view.on,
+                   "Show it live in a browser, where the part can be taken in hand; ends with "
+                   "Ctrl-C, or after --duration");
+  command.add_option("--port", view.port, "Of the view, on 127.0.0.1; default: any free one")
+      ->option_text("NUMBER")
+      ->check(whole_within(0, 65535));
+  command.add_flag("--no-browser{false}", view.open, "Only print the view's address");
+}
+
+Outcome view_scene(const io::LoadedScene& loaded, const RunOptions& given, const ViewOptions& view,
+                   const Console& console,
+                   const std::function<void(const RunSummary&)>& done) {
+  RunOptions options = given;
+  Viewer viewer(loaded, view, console);
+  h6ContactDef contact = loaded.session_def().contact;
+  if (!options.method.empty())
+    h6MethodFromName(options.method.c_str(), &contact.method, &contact.pieces);
+  options.method.clear();  // the viewer's from now on
+  const h6CouplingDef coupling =
+      loaded.hands.empty() ? h6DefaultCouplingDef() : loaded.hands[0].coupling;
+  if (Outcome opened = viewer.open(contact, coupling); !opened) return opened;
+  options.observer = &viewer;
+  options.view_contacts = kViewContacts;
+  do {
+    if (!viewer.record().empty()) options.record = viewer.record();
+    Result<RunSummary> summary = run_scene(loaded, options, console);
+    if (!summary) return summary.failure();
+    done(*summary);
+    options.record.clear();
+    if (summary->interrupted || interrupted.load()) break;
+  } while (viewer.again());
+  return Done{};
+}
+
+}  // namespace h6::cli

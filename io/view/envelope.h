@@ -1,0 +1,41 @@
+// envelope.h - one message to the page: what it is as JSON, and its numbers as they are in memory.
+//
+//   u32 bytes of JSON | JSON, padded with blanks to 4 | arrays, each padded with zeros to 4
+//
+// The JSON has `kind` and `arrays`: [{"name", "type": "f32" | "u32" | "i16" | "u8", "count"}], in
+// the order in which they follow. All little-endian. io/view/page/src/envelope.ts reads it.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+namespace h6::io::view {
+
+using Message = std::shared_ptr<const std::string>;  // shared by all clients, never changed
+
+class Envelope {
+ public:
+  Envelope();
+  ~Envelope();
+  Envelope(const Envelope&) = delete;
+  Envelope& operator=(const Envelope&) = delete;
+
+  void add(const std::string& name, const std::vector<float>& values);
+  void add(const std::string& name, const std::vector<std::uint32_t>& values);
+  void add(const std::string& name, const std::vector<std::int16_t>& values);
+  void add(const std::string& name, const std::vector<std::uint8_t>& values);
+  // `head` without `arrays`: those are written from what was added.
+  std::string pack(nlohmann::ordered_json head) const;
+  Message message(nlohmann::ordered_json head) const;
+
+ private:
+  void append(const std::string& name, const char* type, const void* data, std::size_t count,
+              std::size_t bytes);
+  std::unique_ptr<nlohmann::ordered_json> arrays_;
+  std::string payload_;
+};
+
+}  // namespace h6::io::view

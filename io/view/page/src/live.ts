@@ -1,0 +1,207 @@
+// The page of `hapsix run --view`: shows what comes, sends what the person does.
+import * as THREE from 'three';
+import { floats, unpack, type Packet } from './envelope';
+import { GaussSphere } from './gauss';
+import { drawHistogram, percentile, short } from './histogram';
+import { Strips } from './strips';
+import { View3D } from './view3d';
+import { Drag } from './drag';
+
+const $ = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
+const input = (id: string) => $<HTMLInputElement>(id);
+
+const view = new View3D($('space'));
+const gauss = new GaussSphere($<HTMLCanvasElement>('gauss'));
+const strips = new Strips($('strips'), ['now'], 148);
+const width = 6, windowSeconds = 12;
+let rows = new Float32Array(0);
+let socket: WebSocket;
+let scene: any = null;
+let newest: Packet | null = null;
+let drag: Drag | null = null;
+let paused = false, clutched = false;
+let pace = 1;
+
+function ask(request: object) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
+}
+
+function chip(id: string, text: string, kind: string) {
+  const e = $(id);
+  e.textContent = text;
+  e.className = `chip ${kind}`;
+}
+
+function load(packet: Packet) {
+  if (scene) { location.reload(); return; }  // another run at the same address
+  scene = packet.head;
+  $('scene').textContent = scene.name;
+  $('lag-unit').textContent = scene.unit;
+  document.title = `hapsix - ${scene.name}`;
+  view.load(packet);
+  const choice = $<HTMLSelectElement>('method');
+  for (const name of scene.methods) choice.add(new Option(name, name));
+  const com = scene.hand_body >= 0 ? scene.bodies[scene.hand_body].com : [0, 0, 0];
+  let waiting = false;
+  drag = new Drag(view, new THREE.Vector3(...(com as [number, number, number])), {
+    begin() { ask({ do: 'grab', on: true }); },
+    move(p, q) {
+      view.handAt([p.x, p.y, p.z, q.w, q.x, q.y, q.z]);
+      if (waiting) return;
+      waiting = true;
+      setTimeout(() => {
+        waiting = false;
+        ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] });
+      }, 12);
+    },
+    end() { ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] }); },
+  });
+  settings(scene.contact);
+}
+
+// What is in force, shown on the controls (also after another client changed it).
+function settings(c: any) {
+  $<HTMLSelectElement>('method').value = c.method;
+  if ($<HTMLSelectElement>('method').value !== c.method) {
+    $<HTMLSelectElement>('method').add(new Option(c.method, c.method));
+    $<HTMLSelectElement>('method').value = c.method;
+  }
+  const put = (id: string, value: number, text: string) => {
+    if (document.activeElement !== input(id)) input(id).value = String(Math.log10(value));
+    $(`${id}-out`).textContent = text;
+  };
+  put('stiffness', c.stiffness, `${c.stiffness.toPrecision(3)} N/m`);
+  put('epsilon', c.epsilon, c.epsilon.toPrecision(2));
+  put('saturation', c.max_depth_voxels, `${c.max_depth_voxels.toPrecision(2)} voxel`);
+}
+
+function show(packet: Packet) {
+  const h = packet.head;
+  view.poses(floats(packet, 'poses'));
+  const hand = floats(packet, 'hands');
+  if (!drag?.held) view.handAt(hand);
+  const contacts = {
+    p: floats(packet, 'contact_p'), n: floats(packet, 'contact_n'), t: floats(packet, 'contact_t'),
+    w: floats(packet, 'contact_w'), d: floats(packet, 'contact_d'),
+  };
+  view.contacts(contacts, scene.voxel);
+  view.stiffness(h.stiffness, h.contact.stiffness, input('ellipsoid').checked);
+  gauss.draw(contacts.n, contacts.t, contacts.w, view.camera.quaternion);
+  $('n-contacts').textContent = String(h.contacts);
+  $('n-depth').textContent = h.depth_voxels.toFixed(2);
+  $('n-force').textContent = h.force.toFixed(2);
+  $('n-lag').textContent = h.lag * scene.per_metre < 1e-3 ? '0' : (h.lag * scene.per_metre).toPrecision(3);
+  const frame = packet.arrays.get('frame_bins')!, wake = packet.arrays.get('wake_bins')!;
+  drawHistogram($<HTMLCanvasElement>('frame-bins'), frame, '#e08a3c', h.budget_us);
+  drawHistogram($<HTMLCanvasElement>('wake-bins'), wake, '#53a6d6', h.budget_us);
+  $('frame-text').textContent = `p50 ${short(percentile(frame, 0.5))}, p99 ${short(percentile(frame, 0.99))}`;
+  const late = h.late;
+  $('wake-text').textContent = `p99 ${short(percentile(wake, 0.99))}, late ${late.compute} / ${late.wakeup} / ${late.stolen}`;
+  $('wake-text').title = 'late frames: through their own computation / late wake-up / time stolen by the machine';
+  $('safety').innerHTML = '';
+  const chips: [string, string][] = h.fault !== 'none' ? [[`fault: ${h.fault}`, 'bad']] : [];
+  if (h.cause !== 'none') chips.push([h.cause, 'warn']);
+  for (const bit of h.status) chips.push([bit, 'warn']);
+  if (!chips.length) chips.push(['output as asked', 'good']);
+  for (const [text, kind] of chips) {
+    const e = document.createElement('span');
+    e.textContent = text;
+    e.className = `chip ${kind}`;
+    $('safety').append(e, ' ');
+  }
+  chip('state', h.ended ? `ended: ${h.verdict}` : paused ? 'paused' : `${h.time.toFixed(1)} s`, h.ended ? 'warn' : 'good');
+  settings(h.contact);
+  $('record').classList.toggle('on', h.recording);
+}
+
+function keep(packet: Packet) {
+  const fresh = floats(packet, 'rows');
+  if (!fresh.length) return;
+  const end = fresh[fresh.length - width];
+  let all = new Float32Array(rows.length + fresh.length);
+  if (rows.length && end < rows[rows.length - width]) rows = new Float32Array(0);  // a reset
+  all = new Float32Array(rows.length + fresh.length);
+  all.set(rows);
+  all.set(fresh, rows.length);
+  let first = 0;
+  while (first < all.length && all[first] < end - windowSeconds) first += width;
+  rows = all.slice(first);
+}
+
+function connect() {
+  const url = new URL(location.href);
+  socket = new WebSocket(`ws://${url.host}/live?token=${url.searchParams.get('token')}`);
+  socket.binaryType = 'arraybuffer';
+  socket.onmessage = (event) => {
+    const packet = unpack(event.data as ArrayBuffer);
+    if (packet.head.kind === 'scene') load(packet);
+    else if (packet.head.kind === 'slice') view.showSlice(input('slice-on').checked ? packet : null);
+    else if (packet.head.kind === 'state') { keep(packet); newest = packet; }
+    else if (packet.head.kind === 'note') $('hint').textContent = packet.head.text;
+  };
+  socket.onclose = () => chip('state', 'the program has ended', 'bad');
+}
+
+function changeContact(change: object) { ask({ do: 'contact', ...change }); }
+function setPace(value: number) { ask({ do: 'pace', pace: value }); }
+function pause() {
+  paused = !paused;
+  $('pause').textContent = paused ? 'go on' : 'pause';
+  $('pause').classList.toggle('on', paused);
+  setPace(paused ? 0 : pace);
+}
+function clutch(on: boolean) {
+  clutched = on;
+  $('clutch').classList.toggle('on', on);
+  ask({ do: 'clutch', on });
+}
+function askSlice() {
+  if (!input('slice-on').checked) { view.showSlice(null); return; }
+  ask({ do: 'slice', axis: Number($<HTMLSelectElement>('slice-axis').value), at: Number(input('slice-at').value) });
+}
+
+$('method').onchange = () => changeContact({ method: $<HTMLSelectElement>('method').value });
+for (const [id, key] of [['stiffness', 'stiffness'], ['epsilon', 'epsilon'], ['saturation', 'max_depth_voxels']])
+  input(id).onchange = () => changeContact({ [key]: 10 ** Number(input(id).value) });
+$('path').onclick = () => ask({ do: 'grab', on: false });
+$('clutch').onclick = () => clutch(!clutched);
+$('pause').onclick = pause;
+input('pace').oninput = () => { pace = Number(input('pace').value); if (!paused) setPace(pace); };
+$('reset').onclick = () => ask({ do: 'reset' });
+$('record').onclick = () => ask({ do: 'record', on: !$('record').classList.contains('on') });
+input('opacity').oninput = () => view.environmentOpacity(Number(input('opacity').value));
+for (const id of ['slice-on', 'slice-axis', 'slice-at']) $(id).oninput = askSlice;
+addEventListener('keydown', (e) => {
+  if (e.target instanceof HTMLSelectElement || e.repeat) return;
+  if (e.key === ' ') { e.preventDefault(); pause(); }
+  if (e.key === 'c') clutch(true);
+});
+addEventListener('keyup', (e) => { if (e.key === 'c') clutch(false); });
+
+let drawn: Packet | null = null, strips_at = 0;
+function tick(now: number) {
+  if (scene && newest && newest !== drawn) {
+    drawn = newest;
+    show(newest);
+    if (now - strips_at > 90) {
+      strips_at = now;
+      strips.show([{ rows, width }]);
+    }
+  }
+  view.render();
+  requestAnimationFrame(tick);
+}
+connect();
+requestAnimationFrame(tick);
+// What a test looks at: numbers, not pixels.
+(window as any).hapsix = {
+  view, ask, state: () => newest?.head,
+  // The deepest contact of the last so many seconds [voxel].
+  deepest(seconds: number) {
+    let most = 0;
+    const end = rows.length ? rows[rows.length - width] : 0;
+    for (let i = 0; i < rows.length; i += width) if (rows[i] > end - seconds) most = Math.max(most, rows[i + 4]);
+    return most;
+  },
+  pointOn: (body: number) => view.visiblePoint(body),
+};

@@ -1,0 +1,100 @@
+// Strips over time, as in the paper's Fig. 10: contacts, force, torque, penetration depth.
+import uPlot from 'uplot';
+import { series as colours } from './colours';
+
+export interface StripSpec {
+  title: string;
+  column: number;  // of a row: time, contacts, force, torque, depth, frame time
+  line?: number;   // a level worth a line of its own
+}
+
+export const specs: StripSpec[] = [
+  { title: 'contacts', column: 1 },
+  { title: 'force [N]', column: 2 },
+  { title: 'torque [mN m]', column: 3 },
+  { title: 'depth [voxel]', column: 4, line: 0.5 },
+];
+
+// Rows of `width` numbers, time first.
+export class Strips {
+  private plots: uPlot[] = [];
+  private marker = Number.NaN;
+
+  constructor(private where: HTMLElement, labels: string[], private height: number,
+              private onTime?: (time: number) => void) {
+    const sync = uPlot.sync('strips');
+    for (const spec of specs) {
+      const plot = new uPlot({
+        title: spec.title, width: this.width(), height, legend: { show: false },
+        cursor: { sync: { key: sync.key }, y: false, drag: { x: false, y: false } },
+        scales: { x: { time: false }, y: { range: (_u, _low, high) => [0, Math.max(high * 1.08, spec.line ? 2 * spec.line : 1e-3)] } },
+        axes: [{ stroke: '#8b96a8', grid: { stroke: '#232b38' }, size: 24 },
+               { stroke: '#8b96a8', grid: { stroke: '#232b38' }, size: 46 }],
+        series: [{}, ...labels.map((label, i) => ({
+          label, stroke: colours[i % colours.length], width: 1.4, points: { show: false },
+        }))],
+        hooks: { draw: [(u: uPlot) => this.lines(u, spec)] },
+      }, [[], ...labels.map(() => [])] as uPlot.AlignedData, where);
+      if (onTime) plot.over.addEventListener('click', () => {
+        const at = plot.posToVal(plot.cursor.left ?? 0, 'x');
+        if (Number.isFinite(at)) this.onTime?.(at);
+      });
+      this.plots.push(plot);
+    }
+    new ResizeObserver(() => this.plots.forEach(
+      (p) => p.setSize({ width: this.width(), height: this.height }))).observe(where);
+  }
+
+  // One table of rows a label, all on the same times or joined onto them.
+  show(tables: { rows: Float32Array; width: number }[]) {
+    const joined = tables.length === 1 ? null : tables;
+    specs.forEach((spec, i) => {
+      const data = (joined ?? tables).map(({ rows, width }) => {
+        const n = Math.floor(rows.length / width);
+        const t = new Float64Array(n), y = new Float64Array(n);
+        for (let k = 0; k < n; ++k) {
+          t[k] = rows[k * width];
+          y[k] = rows[k * width + spec.column];
+        }
+        return [t, y] as unknown as uPlot.AlignedData;
+      });
+      this.plots[i].setData(data.length === 1 ? data[0] : uPlot.join(data));
+    });
+  }
+
+  mark(time: number) {
+    this.marker = time;
+    this.plots.forEach((p) => p.redraw(false));
+  }
+
+  private width() {  // of one column of the grid they stand in
+    const columns = getComputedStyle(this.where).gridTemplateColumns.split(' ').length;
+    return Math.max(160, Math.floor(this.where.clientWidth / columns) - 4);
+  }
+
+  private lines(u: uPlot, spec: StripSpec) {
+    const g = u.ctx, { left, top, width, height } = u.bbox;
+    g.save();
+    if (spec.line !== undefined) {
+      const y = u.valToPos(spec.line, 'y', true);
+      g.strokeStyle = '#e05545';
+      g.setLineDash([6, 4]);
+      g.beginPath();
+      g.moveTo(left, y);
+      g.lineTo(left + width, y);
+      g.stroke();
+    }
+    if (Number.isFinite(this.marker)) {
+      const x = u.valToPos(this.marker, 'x', true);
+      if (x >= left && x <= left + width) {
+        g.strokeStyle = '#f5f7fa';
+        g.setLineDash([]);
+        g.beginPath();
+        g.moveTo(x, top);
+        g.lineTo(x, top + height);
+        g.stroke();
+      }
+    }
+    g.restore();
+  }
+}

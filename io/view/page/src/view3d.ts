@@ -1,0 +1,277 @@
+// The scene in space: environment, part, the hand's ghost, contacts as arrows, the deepest point,
+// the net-stiffness ellipsoid, a slice of the field. World frame in metres, shrunk to the scene's
+// size so that the camera's depth range fits any part.
+import * as THREE from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import type { Packet } from './envelope';
+import { floats } from './envelope';
+import { weightColour } from './colours';
+import { principalAxes } from './stiffness';
+
+export interface BodyHead {
+  name: string;
+  fixed: boolean;
+  pose: number[];      // p, q (w x y z)
+  com: number[];
+  origin?: number[];   // of quantised positions [m]
+  step?: number;
+}
+
+export interface Contacts {
+  p: Float32Array;  // (3 n) world [m]
+  n: Float32Array;
+  t: Float32Array;
+  w: Float32Array;  // share of the stiffness
+  d: Float32Array;  // depth [m]
+}
+
+const maxArrows = 2000;
+
+function setPose(object: THREE.Object3D, pose: ArrayLike<number>, at = 0) {
+  object.position.set(pose[at], pose[at + 1], pose[at + 2]);
+  object.quaternion.set(pose[at + 4], pose[at + 5], pose[at + 6], pose[at + 3]);
+}
+
+function arrowShape(): THREE.BufferGeometry {
+  // Along +z, tip at 1: a shaft and a head as one lathe.
+  const line = [[0, 0], [0.035, 0], [0.035, 0.68], [0.1, 0.68], [0, 1]];
+  const shape = new THREE.LatheGeometry(line.map(([x, y]) => new THREE.Vector2(x, y)), 8);
+  shape.rotateX(Math.PI / 2);
+  return shape;
+}
+
+export class View3D {
+  readonly camera = new THREE.PerspectiveCamera(40, 1, 0.01, 100);
+  readonly renderer: THREE.WebGLRenderer;
+  readonly orbit: OrbitControls;
+  readonly root = new THREE.Group();
+  readonly bodies: THREE.Group[] = [];
+  ghost: THREE.Object3D | null = null;
+  hand = -1;                                // the body that the first hand moves
+  radius = 1;
+  private scene = new THREE.Scene();
+  private arrows: THREE.InstancedMesh;
+  private deepest: THREE.Mesh;
+  private ellipsoid: THREE.Mesh;
+  private slice: THREE.Mesh | null = null;
+  private environment: THREE.MeshStandardMaterial[] = [];
+  private matrix = new THREE.Matrix4();
+  private colour = new THREE.Color();
+  private heads: BodyHead[] = [];
+
+  constructor(private where: HTMLElement) {
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
+    where.appendChild(this.renderer.domElement);
+    this.scene.background = new THREE.Color('#10141b');
+    this.scene.add(new THREE.HemisphereLight('#dfe8f5', '#3a3f4a', 1.6));
+    const sun = new THREE.DirectionalLight('#ffffff', 1.8);
+    sun.position.set(2, -3, 4);
+    this.camera.up.set(0, 0, 1);
+    this.camera.add(new THREE.DirectionalLight('#ffffff', 0.7));
+    this.scene.add(sun, this.camera, this.root);
+    this.arrows = new THREE.InstancedMesh(arrowShape(), new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }), maxArrows);
+    this.arrows.frustumCulled = false;
+    this.arrows.renderOrder = 5;
+    this.arrows.count = 0;
+    this.deepest = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12),
+      new THREE.MeshBasicMaterial({ color: '#ff3b30', depthTest: false, transparent: true }));
+    this.deepest.renderOrder = 6;
+    this.deepest.visible = false;
+    this.ellipsoid = new THREE.Mesh(new THREE.SphereGeometry(1, 24, 16),
+      new THREE.MeshBasicMaterial({ color: '#9fe8ff', wireframe: true, transparent: true, opacity: 0.22 }));
+    this.ellipsoid.visible = false;
+    this.ellipsoid.matrixAutoUpdate = false;
+    this.root.add(this.arrows, this.deepest, this.ellipsoid);
+    this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
+    this.orbit.enableDamping = true;
+    new ResizeObserver(() => this.resize()).observe(where);
+    this.resize();
+  }
+
+  load(packet: Packet) {
+    this.heads = packet.head.bodies;
+    this.hand = packet.head.hand_body ?? -1;
+    const box = new THREE.Box3(), part = new THREE.Box3();
+    this.heads.forEach((head, i) => {
+      const group = new THREE.Group();
+      setPose(group, head.pose);
+      const shape = this.shapeOf(packet, head, i);
+      if (shape) {
+        const paint = new THREE.MeshStandardMaterial({
+          color: head.fixed ? '#8795ab' : '#e08a3c', roughness: 0.65, metalness: 0.1, flatShading: true,
+          side: THREE.DoubleSide,
+        });
+        if (head.fixed) this.environment.push(paint);
+        group.add(new THREE.Mesh(shape, paint));
+        shape.computeBoundingBox();
+        group.updateMatrix();
+        const here = shape.boundingBox!.clone().applyMatrix4(group.matrix);
+        box.union(here);
+        if (i === this.hand) part.union(here);
+      } else {
+        const points = floats(packet, `points${i}`);
+        if (points.length) {
+          const cloud = new THREE.BufferGeometry();
+          cloud.setAttribute('position', new THREE.BufferAttribute(points, 3));
+          group.add(new THREE.Points(cloud, new THREE.PointsMaterial({ color: '#e08a3c', size: 2, sizeAttenuation: false })));
+          cloud.computeBoundingBox();
+          group.updateMatrix();
+          box.union(cloud.boundingBox!.clone().applyMatrix4(group.matrix));
+        }
+      }
+      this.bodies.push(group);
+      this.root.add(group);
+    });
+    const moved = this.bodies[this.hand];
+    if (moved) {
+      this.ghost = moved.clone();
+      this.ghost.traverse((o) => {
+        if (o instanceof THREE.Mesh)
+          o.material = new THREE.MeshBasicMaterial({ color: '#53d6ff', transparent: true, opacity: 0.16, depthWrite: false, wireframe: o.geometry.index ? o.geometry.index.count < 120000 : false });
+      });
+      this.root.add(this.ghost);
+    }
+    if (box.isEmpty()) box.set(new THREE.Vector3(-0.05, -0.05, -0.05), new THREE.Vector3(0.05, 0.05, 0.05));
+    this.radius = 0.5 * box.getSize(new THREE.Vector3()).length();
+    this.root.scale.setScalar(1 / this.radius);
+    // Near enough to see the part, far enough to know where it is.
+    const focus = (part.isEmpty() ? box : part).getCenter(new THREE.Vector3()).divideScalar(this.radius);
+    const near = part.isEmpty() ? 1 : Math.max(0.3, 0.7 * part.getSize(new THREE.Vector3()).length() / this.radius);
+    this.orbit.target.copy(focus);
+    this.camera.position.copy(focus).add(new THREE.Vector3(1.2, -1.9, 1.3).multiplyScalar(1.25 * near));
+    this.orbit.update();
+  }
+
+  private shapeOf(packet: Packet, head: BodyHead, i: number): THREE.BufferGeometry | null {
+    const stored = packet.arrays.get(`position${i}`), index = packet.arrays.get(`index${i}`);
+    if (!stored || !index || !head.origin || !head.step) return null;
+    const position = new Float32Array(stored.length);
+    for (let k = 0; k < stored.length; ++k) position[k] = head.origin[k % 3] + head.step * (stored[k] + 32768);
+    const shape = new THREE.BufferGeometry();
+    shape.setAttribute('position', new THREE.BufferAttribute(position, 3));
+    shape.setIndex(new THREE.BufferAttribute(index, 1));
+    return shape;
+  }
+
+  poses(all: Float32Array) {
+    this.bodies.forEach((body, i) => { if (7 * i + 6 < all.length) setPose(body, all, 7 * i); });
+  }
+  handAt(pose: ArrayLike<number>, at = 0) {
+    if (this.ghost && pose.length >= at + 7) setPose(this.ghost, pose, at);
+  }
+
+  contacts(c: Contacts, voxel: number) {
+    const n = Math.min(maxArrows, c.w.length);
+    const from = new THREE.Vector3(), along = new THREE.Vector3(), z = new THREE.Vector3(0, 0, 1);
+    const turn = new THREE.Quaternion(), size = new THREE.Vector3();
+    let deepest = -1;
+    for (let i = 0; i < n; ++i) {
+      from.set(c.p[3 * i], c.p[3 * i + 1], c.p[3 * i + 2]);
+      along.set(c.n[3 * i], c.n[3 * i + 1], c.n[3 * i + 2]);
+      const length = this.radius * (0.05 + 0.1 * Math.min(1, c.d[i] / voxel));
+      turn.setFromUnitVectors(z, along);
+      size.setScalar(length);
+      this.matrix.compose(from, turn, size);
+      this.arrows.setMatrixAt(i, this.matrix);
+      this.arrows.setColorAt(i, this.colour.setRGB(...weightColour(c.w[i])));
+      if (deepest < 0 || c.d[i] > c.d[deepest]) deepest = i;
+    }
+    this.arrows.count = n;
+    this.arrows.instanceMatrix.needsUpdate = true;
+    if (this.arrows.instanceColor) this.arrows.instanceColor.needsUpdate = true;
+    this.deepest.visible = deepest >= 0;
+    if (deepest >= 0) {
+      this.deepest.position.set(c.p[3 * deepest], c.p[3 * deepest + 1], c.p[3 * deepest + 2]);
+      this.deepest.scale.setScalar(0.009 * this.radius);
+    }
+  }
+
+  // Net stiffness (xx yy zz xy xz yz), as long as the part where it is `full` or more.
+  stiffness(m: ArrayLike<number>, full: number, shown: boolean) {
+    const body = this.bodies[this.hand];
+    this.ellipsoid.visible = shown && !!body && m.length === 6 && m[0] + m[1] + m[2] > 0;
+    if (!this.ellipsoid.visible || !body) return;
+    const { values, axes } = principalAxes(m);
+    const size = values.map((v) => 0.12 * this.radius * Math.min(3, Math.max(0.01, v / full)));
+    const com = new THREE.Vector3(...(this.heads[this.hand].com as [number, number, number]));
+    com.applyQuaternion(body.quaternion).add(body.position);
+    this.ellipsoid.matrix.makeTranslation(com).multiply(axes)
+      .multiply(new THREE.Matrix4().makeScale(size[0], size[1], size[2]));
+  }
+
+  // A slice through a field: 128 + 2 d in voxels, rows along v of its plane. Blue outside, red
+  // inside, a line every eight voxels, the surface white.
+  showSlice(packet: Packet | null) {
+    if (this.slice) {
+      this.root.remove(this.slice);
+      (this.slice.material as THREE.MeshBasicMaterial).map?.dispose();
+      this.slice = null;
+    }
+    if (!packet) return;
+    const { width, height, corner, u, v } = packet.head;
+    const values = packet.arrays.get('values')!;
+    const pixels = new Uint8Array(4 * width * height);
+    for (let i = 0; i < width * height; ++i) {
+      const d = (values[i] - 128) / 2;  // voxels
+      const right = i % width + 1 < width ? values[i + 1] : values[i], up = i + width < values.length ? values[i + width] : values[i];
+      const step = (value: number) => Math.floor((value - 128) / 16), here = step(values[i]);
+      const surface = (values[i] < 128) !== (right < 128) || (values[i] < 128) !== (up < 128);
+      const line = surface ? 1 : step(right) !== here || step(up) !== here ? 0.2 : 0;
+      const near = Math.exp(-Math.abs(d) / 20);
+      const base = d < 0 ? [0.85, 0.32, 0.2] : [0.2, 0.45, 0.85];
+      for (let k = 0; k < 3; ++k)
+        pixels[4 * i + k] = 255 * Math.min(1, base[k] * (0.25 + 0.6 * near) + line);
+      pixels[4 * i + 3] = 235;
+    }
+    const map = new THREE.DataTexture(pixels, width, height);
+    map.magFilter = THREE.LinearFilter;
+    map.colorSpace = THREE.SRGBColorSpace;
+    map.needsUpdate = true;
+    const shape = new THREE.BufferGeometry();
+    const at = [[0, 0], [1, 0], [1, 1], [0, 1]].flatMap(([a, b]) => [0, 1, 2].map((k) => corner[k] + a * u[k] + b * v[k]));
+    shape.setAttribute('position', new THREE.Float32BufferAttribute(at, 3));
+    shape.setAttribute('uv', new THREE.Float32BufferAttribute([0, 0, 1, 0, 1, 1, 0, 1], 2));
+    shape.setIndex([0, 1, 2, 0, 2, 3]);
+    this.slice = new THREE.Mesh(shape, new THREE.MeshBasicMaterial({ map, side: THREE.DoubleSide, transparent: true, depthWrite: false }));
+    this.root.add(this.slice);
+  }
+
+  hasSlice() { return this.slice !== null; }
+
+  // Where on the canvas (0 .. 1) a body can be pointed at, or null.
+  visiblePoint(body: number): { x: number; y: number } | null {
+    const ray = new THREE.Raycaster(), n = 40;
+    this.camera.updateMatrixWorld();
+    this.root.updateMatrixWorld(true);
+    const hits: { x: number; y: number }[] = [];
+    for (let i = 1; i < n; ++i)
+      for (let j = 1; j < n; ++j) {
+        ray.setFromCamera(new THREE.Vector2((2 * i) / n - 1, 1 - (2 * j) / n), this.camera);
+        if (ray.intersectObject(this.bodies[body], true).length) hits.push({ x: i / n, y: j / n });
+      }
+    return hits.length ? hits[hits.length >> 1] : null;
+  }
+
+  // 1: solid, below: seen through.
+  environmentOpacity(value: number) {
+    for (const paint of this.environment) {
+      paint.transparent = value < 1;
+      paint.opacity = value;
+      paint.depthWrite = value >= 0.999;
+      paint.needsUpdate = true;
+    }
+  }
+
+  render() {
+    this.orbit.update();
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  private resize() {
+    const w = Math.max(64, this.where.clientWidth), h = Math.max(64, this.where.clientHeight);
+    this.renderer.setSize(w, h);
+    this.camera.aspect = w / h;
+    this.camera.updateProjectionMatrix();
+  }
+}

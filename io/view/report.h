@@ -1,0 +1,80 @@
+// report.h - recordings as one HTML file that opens from disk: strips as in Fig. 10 of Xu & Barbic
+// 2016, a replay in space with the Gauss sphere, the time of a frame by stage, late frames, events,
+// configuration, hashes, verdict. Several recordings are laid over one another.
+//
+// Size: strips keep the least and the greatest value of each of 3,000 spans, the replay 60 poses a
+// second (4,000 at most) and the 64 deepest contacts of each, bodies 60,000 triangles in all: below
+// 10 MB for any recording.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hapsix/result.h"
+#include "io/load_scene.h"
+#include "io/recording.h"
+
+namespace h6::io::view {
+
+// One contact at one instant, world frame.
+struct ReportContact {
+  std::array<float, 3> position, normal, torque_direction;  // [m], unit, unit
+  float weight, depth;                                      // share, [m]
+};
+
+// A recording on its way into a report: hand it over in pieces, in order.
+class ReportRun {
+ public:
+  // `frames` it will have in all.
+  ReportRun(std::string label, RecordingHead head, std::uint64_t frames);
+  void add(const std::vector<h6FrameRecord>& frames);
+  void events(std::vector<RecordingEvent> events, std::string summary_json);
+
+  // The frames of which the replay shows contacts, rising; contacts(i, ...) fills the i-th.
+  const std::vector<std::uint64_t>& replay_frames() const { return replay_frames_; }
+  void contacts(std::size_t sample, std::vector<ReportContact> all);
+
+ private:
+  friend class ReportWriter;
+  friend Result<std::string> make_report(const std::vector<ReportRun>& runs,
+                                         const LoadedScene* scene, const std::string& why);
+  struct Late {
+    double time;
+    std::uint64_t frame;
+    const char* cause;
+    double frame_us, wakeup_us;
+  };
+  struct Span {
+    std::uint64_t frames = 0;
+    double time = 0;
+    std::array<float, 5> low{}, high{};
+  };
+  void row(const h6FrameRecord& r);
+  void close_span();
+
+  std::string label_;
+  RecordingHead head_;
+  std::string summary_;
+  std::uint64_t frames_, span_frames_, seen_ = 0, late_[3] = {};
+  std::size_t late_left_out_ = 0;
+  Span span_;
+  std::vector<float> rows_, replay_t_, replay_body_, replay_hand_;
+  std::vector<std::uint64_t> replay_frames_;
+  std::vector<std::vector<ReportContact>> contacts_;
+  std::array<std::vector<float>, H6_STAGE_COUNT> stage_us_;
+  std::vector<float> frame_us_;
+  std::vector<Late> late_frames_;
+  std::vector<RecordingEvent> events_;
+  double contacts_sum_ = 0, depth_max_ = 0, force_max_ = 0, end_ = 0;
+  std::uint32_t contacts_max_ = 0;
+  std::uint64_t hash_ = 0;
+};
+
+// `scene` draws the bodies, nullptr: the replay has none, and `why` says so to the reader.
+// Fails when this build has no pages, or with no run.
+Result<std::string> make_report(const std::vector<ReportRun>& runs, const LoadedScene* scene,
+                                const std::string& why);
+
+}  // namespace h6::io::view

@@ -1,0 +1,83 @@
+#include "io/view/trace.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <string>
+
+#include "io/write_aside.h"
+
+namespace h6::io::view {
+namespace {
+
+const char* late_name(std::uint32_t late) {
+  if (late & H6_LATE_COMPUTE) return "late: own computation";
+  if (late & H6_LATE_STOLEN) return "late: stolen";
+  return "late: wake-up";
+}
+
+template <class... Values>
+void print(std::string& to, const char* format, Values... values) {
+  char text[320];
+  std::snprintf(text, sizeof text, format, values...);
+  to += text;
+}
+
+}  // namespace
+
+void Trace::add(const h6FrameRecord* rows, std::size_t count) {
+  for (std::size_t i = count > most_ ? count - most_ : 0; i < count; ++i) {
+    const h6FrameRecord& r = rows[i];
+    Row row{r.time, r.wakeup_us, r.report.frame_us, {}, r.report.max_depth_voxels, r.report.frame,
+            r.report.contacts, r.late, r.report.status};
+    std::copy_n(r.report.stage_us, H6_STAGE_COUNT, row.stage_us);
+    if (rows_.size() == most_) rows_.pop_front();
+    rows_.push_back(row);
+  }
+}
+
+Outcome Trace::write(const std::filesystem::path& file) const {
+  std::string text =
+      "{\"displayTimeUnit\":\"ms\",\"traceEvents\":[\n"
+      "{\"ph\":\"M\",\"pid\":1,\"name\":\"process_name\",\"args\":{\"name\":\"hapsix\"}},\n"
+      "{\"ph\":\"M\",\"pid\":1,\"tid\":1,\"name\":\"thread_name\",\"args\":{\"name\":\"haptic "
+      "thread\"}}";
+  for (const Row& r : rows_) {
+    // Microseconds; a frame begins at its deadline, then wakes up, then works.
+    const double deadline = 1e6 * r.time, start = deadline + std::max(0.0, r.wakeup_us);
+    if (r.wakeup_us > 0)
+      print(text, ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"wake-up\",\"ts\":%.3f,\"dur\":%.3f}",
+            deadline, r.wakeup_us);
+    print(text,
+          ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"frame\",\"ts\":%.3f,\"dur\":%.3f,"
+          "\"args\":{\"frame\":%llu,\"contacts\":%u,\"depth_voxels\":%.4f,\"status\":%u}}",
+          start, r.frame_us, static_cast<unsigned long long>(r.frame), r.contacts, r.depth_voxels,
+          static_cast<unsigned>(r.status));
+    double stages = 0;
+    for (const double us : r.stage_us) stages += us;
+    // What is not a stage (reading samples, hashing) stands before them and after them.
+    double at = start + std::max(0.0, 0.5 * (r.frame_us - stages));
+    for (int s = 0; s < H6_STAGE_COUNT; ++s) {
+      print(text, ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"%s\",\"ts\":%.3f,\"dur\":%.3f}",
+            h6StageName(static_cast<h6Stage>(s)), at, r.stage_us[s]);
+      at += r.stage_us[s];
+    }
+    if (r.late)
+      print(text, ",\n{\"ph\":\"i\",\"s\":\"t\",\"pid\":1,\"tid\":1,\"name\":\"%s\",\"ts\":%.3f}",
+            late_name(r.late), start + r.frame_us);
+    print(text, ",\n{\"ph\":\"C\",\"pid\":1,\"name\":\"contacts\",\"ts\":%.3f,\"args\":{\"n\":%u}}",
+          deadline, r.contacts);
+    print(text, ",\n{\"ph\":\"C\",\"pid\":1,\"name\":\"depth [voxel]\",\"ts\":%.3f,\"args\":{\"d\":%.4f}}",
+          deadline, r.depth_voxels);
+  }
+  text += "\n]}\n";
+  return write_aside(file, [&](const std::filesystem::path& place) -> Outcome {
+    std::ofstream out(place, std::ios::binary);
+    out << text;
+    out.flush();
+    if (!out) return Failure{file.string() + ": the trace could not be written (disk full?)"};
+    return Done{};
+  });
+}
+
+}  // namespace h6::io::view

@@ -1,0 +1,31 @@
+// trace.h - the last seconds of a run as a timeline that chrome://tracing and ui.perfetto.dev open:
+// each frame with its stages, its wake-up, late frames and their cause, contacts and depth.
+#pragma once
+#include <deque>
+#include <filesystem>
+
+#include "hapsix/hapsix.h"
+#include "hapsix/result.h"
+
+namespace h6::io::view {
+
+class Trace {
+ public:
+  // The newest `frames` are kept.
+  explicit Trace(std::size_t frames) : most_(frames) {}
+  void add(const h6FrameRecord* rows, std::size_t count);
+  // JSON in the Trace Event Format, written aside and put in place.
+  Outcome write(const std::filesystem::path& file) const;
+
+ private:
+  struct Row {
+    double time, wakeup_us, frame_us, stage_us[H6_STAGE_COUNT], depth_voxels;
+    std::uint64_t frame;
+    std::uint32_t contacts, late;
+    h6Status status;
+  };
+  std::size_t most_;
+  std::deque<Row> rows_;
+};
+
+}  // namespace h6::io::view

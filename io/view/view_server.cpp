@@ -1,0 +1,319 @@
+#include "io/view/view_server.h"
+
+#include <atomic>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <cstdio>
+#include <deque>
+#include <optional>
+#include <random>
+#include <set>
+#include <thread>
+
+namespace h6::io::view {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using tcp = asio::ip::tcp;
+using beast::error_code;
+
+constexpr std::size_t kOutstanding = 64;
+constexpr auto kRequestTime = std::chrono::seconds(10);
+
+// As long for a wrong guess as for a right one.
+bool same(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned char differ = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    differ = static_cast<unsigned char>(differ | (a[i] ^ b[i]));
+  return differ == 0;
+}
+
+std::string random_token() {
+  std::random_device random;
+  char text[33];
+  std::snprintf(text, sizeof text, "%08x%08x%08x%08x", random(), random(), random(), random());
+  return text;
+}
+
+// The value of `token` in "/path?a=b&token=T"; empty without one.
+std::string_view token_of(std::string_view target) {
+  const auto query = target.find('?');
+  if (query == std::string_view::npos) return {};
+  std::string_view rest = target.substr(query + 1);
+  while (!rest.empty()) {
+    const std::string_view part = rest.substr(0, rest.find('&'));
+    if (part.substr(0, 6) == "token=") return part.substr(6);
+    rest.remove_prefix(std::min(rest.size(), part.size() + 1));
+  }
+  return {};
+}
+
+std::string_view view_of(beast::string_view s) { return {s.data(), s.size()}; }
+
+}  // namespace
+
+struct ViewServer::Body {
+  class Client;
+  class Connection;
+
+  ServerOptions options;
+  std::string page, port_text;
+  Receive receive;
+  std::size_t connections = 0;  // outlives io: what io still holds counts down
+  asio::io_context io{1};
+  tcp::acceptor acceptor{io};
+  Message greeting;
+  std::set<std::shared_ptr<Client>> watching;
+  std::atomic<std::size_t> client_count{0};
+  std::atomic<std::uint64_t> refused_count{0};
+  std::thread thread;
+
+  void accept();
+  bool known_host(std::string_view host) const {
+    return host == "127.0.0.1:" + port_text || host == "localhost:" + port_text;
+  }
+  bool known_origin(std::string_view origin) const {
+    return origin.substr(0, 7) == "http://" && known_host(origin.substr(7));
+  }
+};
+
+// A page that is open: one message on its way, the newest live one behind it.
+class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
+ public:
+  Client(Body& body, tcp::socket socket) : body_(body), stream_(std::move(socket)) {}
+
+  void start(const http::request<http::empty_body>& request) {
+    websocket::stream_base::timeout limits{};
+    limits.handshake_timeout = kRequestTime;
+    limits.idle_timeout = std::chrono::seconds(body_.options.stall_seconds);
+    limits.keep_alive_pings = true;
+    stream_.set_option(limits);
+    stream_.read_message_max(body_.options.max_request);
+    stream_.binary(true);
+    stream_.async_accept(request, [self = shared_from_this()](error_code failed) {
+      if (failed) return self->end();
+      self->open_ = true;
+      self->body_.watching.insert(self);
+      self->body_.client_count = self->body_.watching.size();
+      if (self->body_.greeting) self->say(self->body_.greeting);
+      self->read();
+    });
+  }
+  void say(const Message& message) {
+    if (!open_) return;
+    if (queue_.size() >= kOutstanding) return end();
+    queue_.push_back(message);
+    write();
+  }
+  void live(const Message& message) {
+    if (!open_) return;
+    live_ = message;
+    write();
+  }
+  void end() {
+    open_ = false;
+    error_code ignored;
+    stream_.next_layer().socket().close(ignored);
+    if (body_.watching.erase(shared_from_this())) body_.client_count = body_.watching.size();
+  }
+
+ private:
+  void read() {
+    stream_.async_read(buffer_, [self = shared_from_this()](error_code failed, std::size_t) {
+      if (failed) return self->end();  // closed, too long, or not a WebSocket's frame
+      if (!self->stream_.got_text()) return self->end();
+      const auto data = self->buffer_.cdata();
+      self->body_.receive({static_cast<const char*>(data.data()), data.size()});
+      self->buffer_.consume(self->buffer_.size());
+      self->read();
+    });
+  }
+  void write() {
+    if (sending_) return;
+    if (!queue_.empty()) {
+      sending_ = queue_.front();
+      queue_.pop_front();
+    } else {
+      sending_.swap(live_);
+    }
+    if (!sending_) return;
+    stream_.async_write(asio::buffer(*sending_),
+                        [self = shared_from_this()](error_code failed, std::size_t) {
+                          self->sending_.reset();
+                          if (failed) return self->end();
+                          self->write();
+                        });
+  }
+
+  Body& body_;
+  websocket::stream<beast::tcp_stream> stream_;
+  beast::flat_buffer buffer_;
+  std::deque<Message> queue_;
+  Message live_, sending_;
+  bool open_ = false;
+};
+
+// A request: answered, refused, or made into a client.
+class ViewServer::Body::Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(Body& body, tcp::socket socket) : body_(body), stream_(std::move(socket)) {
+    ++body_.connections;
+  }
+  ~Connection() { --body_.connections; }
+
+  void start() {
+    parser_.emplace();
+    parser_->header_limit(8192);
+    parser_->body_limit(0);
+    stream_.expires_after(kRequestTime);
+    http::async_read(stream_, buffer_, *parser_,
+                     [self = shared_from_this()](error_code failed, std::size_t) {
+                       if (!failed) return self->answer();
+                       if (failed != http::error::end_of_stream) ++self->body_.refused_count;
+                     });
+  }
+
+ private:
+  void answer() {
+    const auto& request = parser_->get();
+    const std::string_view target = view_of(request.target());
+    const std::string_view path = target.substr(0, target.find('?'));
+    if (!body_.known_host(view_of(request[http::field::host])))
+      return reply(http::status::forbidden, "not this host");
+    if (path != "/" && path != "/live")
+      return reply(http::status::not_found, "there is only one page here");
+    if (!same(token_of(target), body_.options.token))
+      return reply(http::status::forbidden,
+                   "the token is missing: open the whole address that hapsix printed");
+    const bool upgrade = websocket::is_upgrade(request);
+    if (path == "/live") {
+      if (!upgrade) return reply(http::status::upgrade_required, "a WebSocket is wanted here");
+      if (!body_.known_origin(view_of(request[http::field::origin])))
+        return reply(http::status::forbidden, "not from this page");
+      if (body_.watching.size() >= body_.options.max_clients)
+        return reply(http::status::service_unavailable, "enough clients are watching already");
+      stream_.expires_never();
+      std::make_shared<Client>(body_, stream_.release_socket())->start(request);
+      return;
+    }
+    if (request.method() != http::verb::get && request.method() != http::verb::head)
+      return reply(http::status::method_not_allowed, "GET is all there is");
+    reply(http::status::ok, {});
+  }
+
+  // Without `refusal` the page.
+  void reply(http::status status, std::string_view refusal) {
+    response_.emplace(status, 11);
+    http::response<http::string_body>& r = *response_;
+    const bool good = status == http::status::ok;
+    if (!good) ++body_.refused_count;
+    r.set(http::field::content_type, good ? "text/html; charset=utf-8" : "text/plain");
+    r.set(http::field::cache_control, "no-store");
+    r.set("X-Content-Type-Options", "nosniff");
+    r.set("Referrer-Policy", "no-referrer");  // the address has the token
+    r.set("X-Frame-Options", "DENY");
+    r.set("Content-Security-Policy",
+          "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+          "img-src data: blob:; connect-src 'self' ws://127.0.0.1:" +
+              body_.port_text + " ws://localhost:" + body_.port_text + "; frame-ancestors 'none'");
+    r.body() = good ? body_.page : std::string(refusal) + "\n";
+    r.keep_alive(false);
+    r.prepare_payload();
+    if (parser_->get().method() == http::verb::head) r.body().clear();
+    stream_.expires_after(kRequestTime);
+    http::async_write(stream_, r, [self = shared_from_this()](error_code, std::size_t) {
+      error_code ignored;
+      self->stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    });
+  }
+
+  Body& body_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{16384};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<http::response<http::string_body>> response_;
+};
+
+void ViewServer::Body::accept() {
+  acceptor.async_accept([this](error_code failed, tcp::socket socket) {
+    if (failed == asio::error::operation_aborted) return;
+    if (!failed) {
+      if (connections < options.max_connections)
+        std::make_shared<Connection>(*this, std::move(socket))->start();
+      else
+        ++refused_count;  // the socket closes as it goes
+    }
+    accept();
+  });
+}
+
+ViewServer::ViewServer(std::unique_ptr<Body> body) : body_(std::move(body)) {}
+
+Result<std::unique_ptr<ViewServer>> ViewServer::open(const ServerOptions& options,
+                                                     std::string page, Receive receive) {
+  auto body = std::make_unique<Body>();
+  body->options = options;
+  if (body->options.token.empty()) body->options.token = random_token();
+  body->page = std::move(page);
+  body->receive = std::move(receive);
+  error_code failed;
+  const tcp::endpoint place(asio::ip::address_v4::loopback(), options.port);
+  body->acceptor.open(place.protocol(), failed);
+  if (!failed) body->acceptor.set_option(tcp::acceptor::reuse_address(true), failed);
+  if (!failed) body->acceptor.bind(place, failed);
+  if (!failed) body->acceptor.listen(16, failed);
+  if (failed)
+    return Failure{"the view cannot listen on 127.0.0.1:" + std::to_string(options.port) + " (" +
+                   failed.message() + "): choose another port with --port"};
+  body->port_text = std::to_string(body->acceptor.local_endpoint().port());
+  Body* raw = body.get();
+  raw->accept();
+  raw->thread = std::thread([raw] { raw->io.run(); });
+  return std::unique_ptr<ViewServer>(new ViewServer(std::move(body)));
+}
+
+ViewServer::~ViewServer() {
+  asio::post(body_->io, [this] {
+    error_code ignored;
+    body_->acceptor.close(ignored);
+    while (!body_->watching.empty()) {
+      const auto client = *body_->watching.begin();
+      client->end();
+    }
+    body_->io.stop();
+  });
+  body_->thread.join();
+}
+
+std::string ViewServer::address() const {
+  return "http://127.0.0.1:" + body_->port_text + "/?token=" + body_->options.token;
+}
+
+void ViewServer::greet(Message message) {
+  asio::post(body_->io, [this, message] { body_->greeting = message; });
+}
+void ViewServer::publish(Message live) {
+  asio::post(body_->io, [this, live] {
+    const auto clients = body_->watching;  // sending may end one
+    for (const auto& client : clients) client->live(live);
+  });
+}
+void ViewServer::say(Message message) {
+  asio::post(body_->io, [this, message] {
+    const auto clients = body_->watching;
+    for (const auto& client : clients) client->say(message);
+  });
+}
+
+std::size_t ViewServer::clients() const { return body_->client_count.load(); }
+std::uint64_t ViewServer::refused() const { return body_->refused_count.load(); }
+
+}  // namespace h6::io::view

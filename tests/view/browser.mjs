@@ -1,0 +1,88 @@
+// Chromium without a screen, over its DevTools protocol: open a page, look into it, use the mouse.
+import { spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import WebSocket from 'ws';
+
+export const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+
+// Polls `what` until it is truthy; throws with `sentence` after `seconds`.
+export async function until(what, sentence, seconds = 60) {
+  const end = Date.now() + 1000 * seconds;
+  for (;;) {
+    const value = await what();
+    if (value) return value;
+    if (Date.now() > end) throw new Error(`not within ${seconds} s: ${sentence}`);
+    await wait(100);
+  }
+}
+
+export class Browser {
+  problems = [];  // console errors and exceptions of the page
+  #waiting = new Map();
+  #next = 1;
+
+  static async open(program) {
+    const b = new Browser();
+    b.folder = mkdtempSync(join(tmpdir(), 'hapsix-view-'));
+    // Software GL: the machine may have no graphics card. /dev/shm may be small.
+    b.process = spawn(program, ['--headless=new', '--no-sandbox', '--disable-dev-shm-usage',
+      '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars',
+      '--no-first-run', '--disable-extensions', '--disable-background-networking',
+      '--window-size=1280,860', '--remote-debugging-port=0', `--user-data-dir=${b.folder}`,
+      'about:blank'], { stdio: 'ignore' });
+    const file = join(b.folder, 'DevToolsActivePort');
+    await until(() => existsSync(file) && readFileSync(file, 'utf8').includes('\n'), 'Chromium starts');
+    const port = readFileSync(file, 'utf8').split('\n')[0];
+    const page = await until(async () => (await (await fetch(`http://127.0.0.1:${port}/json`)).json())
+      .find((t) => t.type === 'page'), 'Chromium has a page');
+    b.socket = new WebSocket(page.webSocketDebuggerUrl);
+    await new Promise((done, failed) => { b.socket.on('open', done); b.socket.on('error', failed); });
+    b.socket.on('message', (data) => b.#heard(JSON.parse(data)));
+    for (const domain of ['Page', 'Runtime', 'Log']) await b.send(`${domain}.enable`);
+    await b.send('Emulation.setDeviceMetricsOverride', { width: 1280, height: 860, deviceScaleFactor: 1, mobile: false });
+    return b;
+  }
+
+  #heard(message) {
+    if (message.id) {
+      const { done, failed } = this.#waiting.get(message.id);
+      this.#waiting.delete(message.id);
+      if (message.error) failed(new Error(message.error.message)); else done(message.result);
+      return;
+    }
+    const p = message.params;
+    if (message.method === 'Runtime.exceptionThrown') this.problems.push(p.exceptionDetails.exception?.description ?? p.exceptionDetails.text);
+    if (message.method === 'Runtime.consoleAPICalled' && p.type === 'error') this.problems.push(p.args.map((a) => a.value ?? a.description).join(' '));
+    if (message.method === 'Log.entryAdded' && p.entry.level === 'error') this.problems.push(`${p.entry.text} ${p.entry.url ?? ''}`);
+  }
+
+  send(method, params = {}) {
+    const id = this.#next++;
+    this.socket.send(JSON.stringify({ id, method, params }));
+    return new Promise((done, failed) => this.#waiting.set(id, { done, failed }));
+  }
+  async go(url) { await this.send('Page.navigate', { url }); }
+  // The value of an expression in the page; promises are waited for.
+  async value(expression) {
+    const r = await this.send('Runtime.evaluate', { expression, returnByValue: true, awaitPromise: true });
+    if (r.exceptionDetails) throw new Error(r.exceptionDetails.exception?.description ?? r.exceptionDetails.text);
+    return r.result.value;
+  }
+  async mouse(type, x, y, more = {}) {
+    await this.send('Input.dispatchMouseEvent', { type, x, y, button: 'left', buttons: type === 'mouseReleased' ? 0 : 1, clickCount: 1, ...more });
+  }
+  async picture(file) {
+    const { data } = await this.send('Page.captureScreenshot', { format: 'png' });
+    const bytes = Buffer.from(data, 'base64');
+    writeFileSync(file, bytes);
+    return bytes;
+  }
+  async close() {
+    this.socket.close();
+    this.process.kill('SIGKILL');
+    await new Promise((done) => (this.process.exitCode !== null || this.process.signalCode !== null ? done() : this.process.on('exit', done)));
+    rmSync(this.folder, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
+  }
+}

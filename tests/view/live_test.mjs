@@ -1,0 +1,116 @@
+// The live view, used as a person uses it: node --test with HAPSIX_PROGRAM, HAPSIX_CHROMIUM and
+// HAPSIX_PICTURES (a folder for screenshots) set. `./dev test-view` does that.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { Browser, until, wait } from './browser.mjs';
+
+const program = process.env.HAPSIX_PROGRAM, pictures = process.env.HAPSIX_PICTURES ?? '.';
+mkdirSync(pictures, { recursive: true });
+let browser, run, folder;
+const state = () => browser.value('window.hapsix.state()');
+
+before(async () => {
+  browser = await Browser.open(process.env.HAPSIX_CHROMIUM);
+  folder = mkdtempSync(join(tmpdir(), 'hapsix-view-run-'));
+  run = spawn(program, ['demo', '--view', '--no-browser', '--duration', '0.5', '-o', folder], { stdio: ['ignore', 'ignore', 'pipe'] });
+  let said = '';
+  run.stderr.on('data', (text) => { said += text; });
+  const address = await until(() => said.match(/view: (http:\/\/\S+)/)?.[1], 'the demo prints an address', 120);
+  await browser.go(address);
+}, { timeout: 180000 });
+
+after(async () => {
+  run?.kill('SIGTERM');
+  await browser?.close();
+  if (folder) rmSync(folder, { recursive: true, force: true });
+});
+
+// The hand is taken and moved until something touches.
+async function push() {
+  // Where the part is on the screen.
+  const at = await browser.value(`(() => {
+    const v = window.hapsix.view, part = v.bodies[v.hand];
+    const box = v.renderer.domElement.getBoundingClientRect();
+    const hit = window.hapsix.pointOn(v.hand);
+    return hit && { x: box.left + hit.x * box.width, y: box.top + hit.y * box.height };
+  })()`);
+  assert.ok(at, 'the part can be seen');
+  await browser.mouse('mousePressed', at.x, at.y);
+  for (const [dx, dy] of [[1, 0], [0, 1], [-1, 0], [0, -1]]) {
+    for (let i = 1; i <= 30; ++i) {
+      await browser.mouse('mouseMoved', at.x + 6 * i * dx, at.y + 6 * i * dy);
+      await wait(20);
+    }
+    await wait(400);
+    const s = await state();
+    if (s.contacts > 0 && s.lag > 0) return { x: at.x + 180 * dx, y: at.y + 180 * dy, state: s };
+  }
+  return null;
+}
+
+test('the page loads and draws the scene', async () => {
+  await until(async () => await browser.value('Boolean(window.hapsix?.state())'), 'a state arrives');
+  await wait(1500);
+  // Not one colour all over: the canvas shows something.
+  const colours = await browser.value(`(() => {
+    const c = window.hapsix.view.renderer.domElement, g = document.createElement('canvas');
+    g.width = 200; g.height = 120;
+    const p = g.getContext('2d'); p.drawImage(c, 0, 0, 200, 120);
+    return new Set(new Uint32Array(p.getImageData(0, 0, 200, 120).data.buffer)).size;
+  })()`);
+  assert.ok(colours > 50, `${colours} colours`);
+  await browser.picture(join(pictures, 'live-path.png'));
+});
+
+test('pictures follow one another, and time goes on', async () => {
+  const first = (await state()).time;
+  await wait(1000);
+  const second = (await state()).time;
+  assert.ok(second > first, `${first} then ${second}`);
+});
+
+test('dragging the part into the obstacle makes contacts, and the part lags behind the hand', async () => {
+  const pushed = await push();
+  assert.ok(pushed, 'some drag touches');
+  await wait(600);
+  await browser.picture(join(pictures, 'live-contact.png'));
+  const robust = await browser.value('window.hapsix.deepest(0.4)');
+  assert.ok((await state()).contacts > 0);
+  assert.ok((await state()).lag > 0);
+  // The same hand, another method: global scaling gives way.
+  await browser.value(`window.hapsix.ask({ do: 'contact', method: 'global' })`);
+  await until(async () => (await state()).contact.method === 'global', 'global is in force');
+  await wait(900);
+  await browser.picture(join(pictures, 'live-global.png'));
+  const global = await browser.value('window.hapsix.deepest(1.2)');
+  assert.ok(global > 1.5 * robust, `${global} voxels deep, ${robust} before`);
+  await browser.mouse('mouseReleased', pushed.x, pushed.y);
+});
+
+test('pause stands still, reset begins again, recording leaves a file', async () => {
+  await browser.value(`document.getElementById('pause').click()`);
+  await wait(500);
+  const first = (await state()).time;
+  await wait(700);
+  assert.equal((await state()).time, first);
+  await browser.value(`document.getElementById('pause').click()`);
+  await browser.value(`document.getElementById('record').click()`);
+  await until(async () => (await state()).recording, 'it records');
+  assert.ok((await state()).time < first);
+  await wait(800);
+  await browser.value(`document.getElementById('record').click()`);
+  await until(async () => !(await state()).recording, 'it does not record any more');
+});
+
+test('a slice of the field is shown', async () => {
+  await browser.value(`(() => { const b = document.getElementById('slice-on'); b.checked = true; b.dispatchEvent(new Event('input')); })()`);
+  await wait(1200);
+  assert.ok(await browser.value('window.hapsix.view.hasSlice()'));
+  await browser.picture(join(pictures, 'live-slice.png'));
+});
+
+test('the browser had nothing to complain about', () => assert.deepEqual(browser.problems, []));
