@@ -37,6 +37,13 @@ struct FieldBakeReport {
   bool closed = false;
   double sealed_area = 0;               // [m^2] put across holes
   std::vector<std::string> warnings;
+  // Where the time went, in the order of work. Stages that run side by side with others count only
+  // while nothing else is waited for.
+  struct Stage {
+    std::string name;
+    double seconds;
+  };
+  std::vector<Stage> stages;
 };
 
 // What the samples are. Outside: distance to the surface less offset, exact up to band + 2 voxels

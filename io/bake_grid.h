@@ -143,11 +143,17 @@ class Steps {
   bool run(const std::string& what, double from, double to, std::size_t count, unsigned threads,
            const std::function<void(std::size_t)>& body) const;
   bool tell(const std::string& what, double done) const {
+    clock(what);
     return !progress_ || progress_(what, done);
   }
+  // From now on it is this that takes the time.
+  void clock(const std::string& what) const;
+  std::vector<FieldBakeReport::Stage> stages() const;
 
  private:
   const Progress& progress_;
+  mutable std::vector<FieldBakeReport::Stage> stages_;  // the last one is running
+  mutable std::int64_t since_ns_ = 0;
 };
 
 // bake_bins.cpp: tiles, cells and rows. A sentence when there are too many.
