@@ -132,8 +132,8 @@ class Look {
     if (!steps_.tell("sign", 0.65)) return false;
     inspect_rows();
     find_corrected();
-    std::vector<NodeMask>().swap(band_.free);  // not needed any more, and it is large
-    inside_.in_sight.resize(band_.rows());
+    Masks().swap(band_.free);  // not needed any more, and it is large
+    inside_.in_sight.assign(band_.rows(), NodeMask{});
     inside_.depths.resize(band_.rows());
     if (!lay_chains()) return false;
     const std::vector<std::vector<std::uint32_t>> tiles = rows_by_tile(grid_, band_, live_);
@@ -177,7 +177,7 @@ class Look {
   // With an offset, what lies within it of a sheet and farther from R than the far side of a sheet
   // that borders R is buried. Depths are corrected there and one brick around.
   void find_corrected() {
-    std::vector<NodeMask> wide = beside_, last;
+    Masks wide = beside_, last;
     for (int hop = 1; hop < hops_across() && !wide.empty(); ++hop) {
       last = wide;
       sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
@@ -271,7 +271,7 @@ class Look {
   Inside& inside_;
   float offset_;
   std::vector<std::uint8_t> buried_, live_, corrected_;  // (rows)
-  std::vector<NodeMask> beside_;                         // (rows) one step from R
+  Masks beside_;                                         // (rows) one step from R
   std::shared_ptr<Chains> chains_;
 };
 
