@@ -136,7 +136,7 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   const Steps steps(progress);
   const Failure cancelled{"cancelled"};
   if (!steps.tell("surface", 0)) return cancelled;
-  Result<Surface> prepared = prepare_surface(mesh);
+  Result<Surface> prepared = prepare_surface(mesh, options.threads);
   if (!prepared) return prepared.failure();
   Surface& surface = *prepared;
   const bool sealed = surface.closed && options.sign == SignMode::automatic;

@@ -76,7 +76,7 @@ struct Surface {
   std::size_t odd_edges = 0;       // of an odd number of faces
   bool closed = false;             // every edge has an even number of faces
 };
-Result<Surface> prepare_surface(const Mesh& mesh);
+Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
 
