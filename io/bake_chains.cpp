@@ -20,8 +20,7 @@ std::array<std::uint8_t, 64> lines_of(const NodeMask& nodes) {
 Around::Around(const Grid& grid, const NarrowBand& band, const Reached& reached, std::size_t r) {
   const std::array<int, 3> at = grid.place(band.cell[r]);
   const std::size_t cell = band.cell[r];
-  const std::ptrdiff_t up[3] = {1, grid.bricks[0],
-                                std::ptrdiff_t(grid.bricks[0]) * grid.bricks[1]};
+  const std::ptrdiff_t up[3] = {1, grid.bricks[0], std::ptrdiff_t(grid.bricks[0]) * grid.bricks[1]};
   bool inner = true;
   for (std::size_t k = 0; k < 3; ++k) inner &= at[k] > 0 && at[k] + 1 < grid.bricks[k];
   for (int i = 0; i < 27; ++i) {
@@ -39,55 +38,69 @@ Around::Around(const Grid& grid, const NarrowBand& band, const Reached& reached,
   }
 }
 
-void gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
+bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
                    const Chains* chains, const Around& around, std::uint32_t wanted,
                    kernels::ChainBrick& out) {
   const float offset = float(grid.offset), reach = float(grid.reach());
   constexpr int kBegin[3] = {-1, 0, 8}, kEnd[3] = {0, 8, 9};
+  constexpr std::uint64_t kLines[3] = {std::uint64_t{0xff} << 56, ~std::uint64_t{0}, 0xff};
+  constexpr std::uint64_t kColumns[3] = {0x8080808080808080, ~std::uint64_t{0}, 0x0101010101010101};
   const auto seed = [&](float u) {
     return Chain(int((offset - u) * (1 / kChainUnit) + 30000) - 29999);  // rounded up
   };
   const Chain clear = seed(reach);
   std::fill_n(&out.v[0][0][0], 10 * 10 * 16, kChainFar);
+  bool any = false;
   for (std::size_t i = 0; i < 27; ++i) {
     if (!(wanted >> i & 1)) continue;
     const std::size_t dx = i % 3, dy = i / 3 % 3, dz = i / 9;
+    const bool middle = dx == 1;
+    const std::size_t x_in = dx == 0 ? 0 : 9, x_there = dx == 0 ? 7 : 0;
+    // Calls f(place of the line in `out`, line of the neighbour).
+    const auto each_line = [&](auto&& f) {
+      for (int z = kBegin[dz]; z < kEnd[dz]; ++z)
+        for (int y = kBegin[dy]; y < kEnd[dy]; ++y)
+          f(out.v[z + 1][y + 1], std::size_t((z & 7) * 8 + (y & 7)));
+    };
     const std::size_t r = std::size_t(around.row[i]);
-    const bool none = around.row[i] < 0;
-    if (none && !around.outside[i]) continue;
-    const Chain* held =
-        !none && chains != nullptr && chains->holds(r) ? chains->nodes(r) : nullptr;
-    if (!none && held == nullptr && !reached.node[r].any()) continue;
-    Chain seeds[kBrickSamples];
-    if (i == 13 && held == nullptr) {
-      kernels::chain_seeds(band.nodes(r), lines_of(reached.node[r]).data(), 64, offset, seeds);
-      held = seeds;
-    }
-    for (int z = kBegin[dz]; z < kEnd[dz]; ++z)
-      for (int y = kBegin[dy]; y < kEnd[dy]; ++y) {
-        Chain* to = out.v[z + 1][y + 1];
-        const std::size_t line = std::size_t((z & 7) * 8 + (y & 7));
-        if (dx == 1) {
-          if (none) {
-            std::fill_n(to + 1, 8, clear);
-          } else if (held != nullptr) {
-            std::copy_n(held + 8 * line, 8, to + 1);
-          } else if (const auto wet = std::uint8_t(reached.node[r].z[line / 8] >> (8 * (line % 8)));
-                     wet != 0) {
-            kernels::chain_seeds(band.nodes(r) + 8 * line, &wet, 1, offset, to + 1);
+    if (around.row[i] < 0) {
+      if (!around.outside[i]) continue;
+      any = true;
+      if (middle)
+        each_line([&](Chain* to, std::size_t) { std::fill_n(to + 1, 8, clear); });
+      else
+        each_line([&](Chain* to, std::size_t) { to[x_in] = clear; });
+    } else if (chains != nullptr && chains->holds(r)) {
+      if (!chains->some(r)) continue;
+      any = true;
+      const Chain* from = chains->nodes(r);
+      if (middle)
+        each_line([&](Chain* to, std::size_t line) { std::copy_n(from + 8 * line, 8, to + 1); });
+      else
+        each_line([&](Chain* to, std::size_t line) { to[x_in] = from[8 * line + x_there]; });
+    } else {
+      const float* u = band.nodes(r);
+      for (int z = kBegin[dz]; z < kEnd[dz]; ++z) {
+        const std::size_t layer = std::size_t(z & 7);
+        const std::uint64_t wet = reached.node[r].z[layer] & kLines[dy] & kColumns[dx];
+        if (wet == 0) continue;
+        any = true;
+        if (middle) {
+          for (int y = kBegin[dy]; y < kEnd[dy]; ++y)
+            if (const auto mask = std::uint8_t(wet >> (8 * (y & 7))); mask != 0)
+              kernels::chain_seeds(u + 64 * layer + 8 * (y & 7), &mask, 1, offset,
+                                   out.v[z + 1][y + 1] + 1);
+        } else {
+          for (std::uint64_t bits = wet; bits != 0; bits &= bits - 1) {
+            const std::size_t n = std::size_t(std::countr_zero(bits));
+            const std::size_t y = dy == 1 ? n / 8 + 1 : dy == 0 ? 0 : 9;
+            out.v[z + 1][y][x_in] = seed(u[64 * layer + n]);
           }
-          continue;
         }
-        const std::size_t n = 8 * line + (dx == 0 ? 7 : 0);
-        Chain& side = to[dx == 0 ? 0 : 9];
-        if (none)
-          side = clear;
-        else if (held != nullptr)
-          side = held[n];
-        else if (reached.node[r].get(n))
-          side = seed(band.nodes(r)[n]);
       }
+    }
   }
+  return any;
 }
 
 Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
@@ -105,12 +118,14 @@ Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
     tiles_[std::size_t((at[0] / 4 & 1) + 2 * (at[1] / 4 & 1) + 4 * (at[2] / 4 & 1))].push_back(
         std::uint32_t(tile));
   }
-  chain_.reset(new Chain[std::size_t(slots) * kBrickSamples]);
+  chain_.resize(std::size_t(slots) * kBrickSamples);
+  some_.resize(std::size_t(slots));
   sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
     if (slot_[r] < 0) return;
-    Chain* to = chain_.get() + std::size_t(slot_[r]) * kBrickSamples;
-    kernels::chain_seeds(band_.nodes(r), lines_of(reached_.node[r]).data(), 64,
-                         float(grid_.offset), to);
+    Chain* to = chain_.data() + std::size_t(slot_[r]) * kBrickSamples;
+    kernels::chain_seeds(band_.nodes(r), lines_of(reached_.node[r]).data(), 64, float(grid_.offset),
+                         to);
+    some_[std::size_t(slot_[r])] = reached_.node[r].any();
   });
 }
 
@@ -120,9 +135,11 @@ void Chains::pass() {
       each_row(grid_, band_, tiles[i], [&](std::size_t r) {
         if (slot_[r] < 0) return;
         kernels::ChainBrick padded;
-        gather_chains(grid_, band_, reached_, this, Around(grid_, band_, reached_, r), kAround,
-                      padded);
-        Chain* own = chain_.get() + std::size_t(slot_[r]) * kBrickSamples;
+        if (!gather_chains(grid_, band_, reached_, this, Around(grid_, band_, reached_, r), kAround,
+                           padded))
+          return;  // nothing reached anywhere near, as yet
+        some_[std::size_t(slot_[r])] = 1;
+        Chain* own = chain_.data() + std::size_t(slot_[r]) * kBrickSamples;
         for (int step = 0; step < kStepsAPass; ++step) {
           if (step > 0)
             for (std::size_t line = 0; line < 64; ++line)

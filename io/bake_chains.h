@@ -75,8 +75,9 @@ class Chains {
          const std::vector<std::uint8_t>& rows, unsigned threads);
   void pass();
   bool holds(std::size_t row) const { return slot_[row] >= 0; }
+  bool some(std::size_t row) const { return some_[std::size_t(slot_[row])] != 0; }
   const Chain* nodes(std::size_t row) const {
-    return chain_.get() + std::size_t(slot_[row]) * kBrickSamples;
+    return chain_.data() + std::size_t(slot_[row]) * kBrickSamples;
   }
 
  private:
@@ -85,14 +86,16 @@ class Chains {
   const Reached& reached_;
   unsigned threads_;
   std::vector<std::int32_t> slot_;  // (rows) or -1
-  std::unique_ptr<Chain[]> chain_;
+  std::vector<Chain, SampleAllocator<Chain>> chain_;
+  std::vector<std::uint8_t> some_;  // (slots) whether the row may have a chain at all
   std::array<std::vector<std::uint32_t>, 8> tiles_;  // that have such rows, by parity
 };
 
 // What is known around a brick: chains of rows that are held, and of the others the reached nodes.
-// `wanted`: bit i for neighbour i; the others' nodes are as if nothing were reached there.
+// `wanted`: bit i for neighbour i; the others' nodes are as if nothing were reached there. False:
+// there is no chain at all, all is far.
 inline constexpr std::uint32_t kAround = (1u << 27) - 1;
-void gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
+bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
                    const Chains* chains, const Around& around, std::uint32_t wanted,
                    kernels::ChainBrick& out);
 

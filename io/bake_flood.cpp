@@ -44,8 +44,15 @@ NodeMask border_nodes(const Grid& grid, const std::array<int, 3>& at) {
 
 Flood::Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges,
              unsigned threads)
-    : grid_(grid), band_(band), free_(free), edges_(edges), threads_(threads), wet_(band.rows()),
-      new_(band.rows()), queued_(grid.cells(), 0), cell_(grid.cells(), 0) {
+    : grid_(grid),
+      band_(band),
+      free_(free),
+      edges_(edges),
+      threads_(threads),
+      wet_(band.rows()),
+      new_(band.rows()),
+      queued_(grid.cells(), 0),
+      cell_(grid.cells(), 0) {
   const int layers = grid.bricks[2], thick = (layers + kSlabs - 1) / kSlabs;
   for (int first = 0; first < layers; first += thick) {
     Slab slab;
@@ -97,7 +104,8 @@ bool Flood::from_nodes(const Masks& seeds, std::uint8_t tag) {
       if (seeds[r].any()) offer(slab, band_.cell[r], seeds[r]);
     }
   });
-  const bool any = std::any_of(slabs_.begin(), slabs_.end(), [](const Slab& s) { return s.busy(); });
+  const bool any =
+      std::any_of(slabs_.begin(), slabs_.end(), [](const Slab& s) { return s.busy(); });
   run();
   return any;
 }
@@ -230,8 +238,7 @@ void Flood::spill(Slab& slab, std::size_t cell, const NodeMask& wet, const Cross
       const NodeMask in = through(wet, edges, axis, step);
       if (leaves) {
         const std::uint64_t bits = in.z[step > 0 ? 0 : 7];
-        if (bits != 0)
-          (step < 0 ? slab.down : slab.up).push_back({std::uint32_t(next), bits});
+        if (bits != 0) (step < 0 ? slab.down : slab.up).push_back({std::uint32_t(next), bits});
       } else if (r < 0) {
         if (in.any()) offer_all(slab, next);
       } else {

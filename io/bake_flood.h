@@ -74,8 +74,7 @@ class Flood {
  public:
   enum class Edges { cut, open };
   // `free` must outlive the flood.
-  Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges,
-        unsigned threads);
+  Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges, unsigned threads);
 
   // From all around: the border of the grid is outside, and connected.
   void from_border();
@@ -97,9 +96,9 @@ class Flood {
     std::uint64_t bits;  // nodes of the layer next to the slab it comes from
   };
   struct Slab {
-    int first = 0, end = 0;                      // layers
+    int first = 0, end = 0;  // layers
     std::size_t first_row = 0, end_row = 0;
-    std::vector<std::uint32_t> coarse, queue;    // cells without and with a row
+    std::vector<std::uint32_t> coarse, queue;  // cells without and with a row
     std::vector<Drop> down, up;
     bool busy() const { return !coarse.empty() || !queue.empty(); }
   };

@@ -16,14 +16,14 @@
 #include <algorithm>
 #include <atomic>
 
-#include "io/bake_grid.h"
 #include "io/bake_chains.h"
+#include "io/bake_grid.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
 namespace {
 
-constexpr int kDeepPasses = 6;       // how far buried sheets are corrected [nodes]
+constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
 
 // A brick is kept when a cell of its own, or one that shares its nodes, has a point within band of
 // the zero set. Only where R is near.
@@ -75,8 +75,7 @@ std::uint32_t neighbours_of(const NodeMask& nodes) {
 // A node so close to a sheet that chains cannot tell the side: the nearest way to R goes through q;
 // R's side is where u grows, so q is farther from the sheet than its mirror image.
 bool faces_outside(const Grid& grid, const NarrowBand& band, const Around& around,
-                   const kernels::ChainBrick& d,
-                   int x, int y, int z) {
+                   const kernels::ChainBrick& d, int x, int y, int z) {
   int nearest = kChainFar, at[3] = {0, 0, 0};
   for (int dz = -1; dz <= 1; ++dz)
     for (int dy = -1; dy <= 1; ++dy)
@@ -100,9 +99,16 @@ class Look {
  public:
   Look(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
        const Steps& steps, Inside& inside)
-      : grid_(grid), band_(band), reached_(reached), threads_(threads), steps_(steps),
-        inside_(inside), offset_(float(grid.offset)), buried_(band.rows(), 0),
-        live_(band.rows(), 0), corrected_(band.rows(), 0) {}
+      : grid_(grid),
+        band_(band),
+        reached_(reached),
+        threads_(threads),
+        steps_(steps),
+        inside_(inside),
+        offset_(float(grid.offset)),
+        buried_(band.rows(), 0),
+        live_(band.rows(), 0),
+        corrected_(band.rows(), 0) {}
 
   bool run() {
     if (!steps_.tell("sign", 0.65)) return false;
@@ -171,8 +177,7 @@ class Look {
     const NodeMask near = beside_.empty() ? beside_any(around, reached_.node) : beside_[r];
     std::uint64_t buried = 0;
     for (std::size_t z = 0; z < 8; ++z)
-      buried |=
-          (c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z]) & ~near.z[z];
+      buried |= (c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z]) & ~near.z[z];
     buried_[r] = buried != 0;
     if (offset_ > 0) return;
     const NodeMask dry = beside_dry(around, reached_);
@@ -287,8 +292,8 @@ class Look {
 
 }  // namespace
 
-bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached,
-                 unsigned threads, const Steps& steps, Inside& inside) {
+bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
+                 const Steps& steps, Inside& inside) {
   return Look(grid, band, reached, threads, steps, inside).run();
 }
 

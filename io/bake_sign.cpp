@@ -44,8 +44,7 @@ Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& fre
 
 // Dry nodes that hang together with no roomy place, a node with six free edges to dry nodes:
 // bottoms of grooves, and tips of solids.
-Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry,
-                    unsigned threads) {
+Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry, unsigned threads) {
   Masks roomy(dry.size());
   sched::parallel_for(dry.size(), threads, [&](std::size_t r) {
     roomy[r] = dry[r];

@@ -73,7 +73,8 @@ void by_vertex(std::size_t vertices, std::size_t triangles, unsigned threads, Ma
       make(i, [&](const Item& item) { items[place[s][item.vertex >> shift]++] = item; });
   });
   sched::parallel_for(kRanges, threads, [&](std::size_t k) {
-    std::vector<std::uint32_t> next((std::size_t{1} << shift) + 1, 0), sorted(first[k + 1] - first[k]);
+    std::vector<std::uint32_t> next((std::size_t{1} << shift) + 1, 0),
+        sorted(first[k + 1] - first[k]);
     const std::uint32_t low = std::uint32_t(k << shift);
     for (std::size_t i = first[k]; i < first[k + 1]; ++i) ++next[items[i].vertex - low + 1];
     for (std::size_t v = 1; v < next.size(); ++v) next[v] += next[v - 1];
@@ -97,14 +98,14 @@ std::vector<std::uint8_t> find_duplicates(const Mesh& mesh, unsigned threads) {
   };
   by_vertex(mesh.vertices.size(), count, threads, lowest,
             [&](std::size_t, const std::uint32_t* begin, const std::uint32_t* end) {
-    if (end - begin < 2) return;
-    thread_local std::vector<std::pair<Triangle, std::uint32_t>> fan;
-    fan.clear();
-    for (; begin != end; ++begin) fan.push_back({sorted(mesh.triangles[*begin]), *begin});
-    std::sort(fan.begin(), fan.end());
-    for (std::size_t i = 1; i < fan.size(); ++i)
-      if (fan[i].first == fan[i - 1].first) duplicate[fan[i].second] = 1;
-  });
+              if (end - begin < 2) return;
+              thread_local std::vector<std::pair<Triangle, std::uint32_t>> fan;
+              fan.clear();
+              for (; begin != end; ++begin) fan.push_back({sorted(mesh.triangles[*begin]), *begin});
+              std::sort(fan.begin(), fan.end());
+              for (std::size_t i = 1; i < fan.size(); ++i)
+                if (fan[i].first == fan[i - 1].first) duplicate[fan[i].second] = 1;
+            });
   return duplicate;
 }
 
@@ -124,13 +125,13 @@ void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, u
   };
   by_vertex(mesh.vertices.size(), mesh.triangles.size(), threads, edges,
             [&](std::size_t range, std::uint32_t* begin, std::uint32_t* end) {
-    std::sort(begin, end);
-    for (std::uint32_t* next; begin != end; begin = next) {
-      next = std::find_if(begin, end, [&](std::uint32_t v) { return v != *begin; });
-      found[range].open += next - begin == 1;
-      found[range].odd += std::size_t(next - begin) % 2;
-    }
-  });
+              std::sort(begin, end);
+              for (std::uint32_t* next; begin != end; begin = next) {
+                next = std::find_if(begin, end, [&](std::uint32_t v) { return v != *begin; });
+                found[range].open += next - begin == 1;
+                found[range].odd += std::size_t(next - begin) % 2;
+              }
+            });
   for (const Count& c : found) {
     surface.open_edges += c.open;
     surface.odd_edges += c.odd;
