@@ -259,23 +259,26 @@ class Look {
       kernels::chain_step(d, stepped);
     }
     const float* u = band_.nodes(r);
-    const float close = 0.5f * (kSlack + (kCrooked - 1) * offset_);
-    for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t bits = todo.z[z]; bits != 0; bits &= bits - 1) {
+    const kernels::ChainLimits limits{offset_, kSlack, kCrooked,
+                                      0.5f * (kSlack + (kCrooked - 1) * offset_)};
+    kernels::ChainSides sides;
+    kernels::chain_sides(chain, u, limits, sides);
+    NodeMask& in_sight = inside_.in_sight[r];
+    for (std::size_t z = 0; z < 8; ++z) {
+      in_sight.z[z] |= todo.z[z] & sides.in_sight[z];
+      for (std::uint64_t bits = held ? 0 : todo.z[z] & sides.dented[z]; bits != 0;
+           bits &= bits - 1) {
         const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
-        if (chain[n] >= kChainFar) continue;
-        const float there = float(chain[n]) * kChainUnit;
-        if (there < u[n] + offset_) {
-          inside_.in_sight[r].set(n);
-          const float dent = (there - kSlack) / kCrooked;
-          if (!held && dent > std::max(offset_ - u[n], 0.0f))
-            inside_.depths[r].push_back({std::uint32_t(n), dent});
-        } else if (u[n] <= close) {
-          gather();
-          if (faces_outside(grid_, band_, around, d, int(n % 8), int(n / 8 % 8), int(z)))
-            inside_.in_sight[r].set(n);
-        }
+        const float dent = (float(chain[n]) * kChainUnit - kSlack) / kCrooked;
+        inside_.depths[r].push_back({std::uint32_t(n), dent});
       }
+      for (std::uint64_t bits = todo.z[z] & sides.close[z]; bits != 0; bits &= bits - 1) {
+        const int n = std::countr_zero(bits);
+        gather();
+        if (faces_outside(grid_, band_, around, d, n % 8, n / 8, int(z)))
+          in_sight.z[z] |= std::uint64_t{1} << n;
+      }
+    }
   }
 
   const Grid& grid_;
