@@ -27,15 +27,19 @@ constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
 
 // A brick is kept when a cell of its own, or one that shares its nodes, has a point within band of
 // the zero set. Only where R is near.
-bool is_needed(const NarrowBand& band, const Reached& reached, const Around& around) {
-  bool near_surface = false, near_outside = false;
+bool near_zero_set(const NarrowBand& band, const Around& around) {
+  bool near = false;
   for (std::size_t i = 0; i < 27; ++i) {
     const std::int32_t row = around.row[i];
-    near_surface |= row >= 0 && (band.towards[std::size_t(row)] >> (26 - i) & 1);
-    near_outside |=
-        row >= 0 ? !near_outside && reached.node[std::size_t(row)].any() : around.outside[i];
+    near |= row >= 0 && (band.towards[std::size_t(row)] >> (26 - i) & 1);
   }
-  return near_surface && near_outside;
+  return near;
+}
+bool near_outside(const Reached& reached, const Around& around) {
+  for (std::size_t i = 0; i < 27; ++i)
+    if (around.row[i] < 0 ? around.outside[i] : reached.node[std::size_t(around.row[i])].any())
+      return true;
+  return false;
 }
 
 constexpr NodeMask kNoNodes{};
@@ -148,13 +152,17 @@ class Look {
       std::size_t thin_here = 0, dry_here = 0;
       for (std::size_t r = slice * kSlice; r < end; ++r) {
         const Around around(grid_, band_, reached_, r);
-        inside_.needed[r] = is_needed(band_, reached_, around);
+        const bool outside = near_outside(reached_, around);
+        inside_.needed[r] = outside && near_zero_set(band_, around);
         inside_.in_sight[r] = {};
         std::size_t wet = 0;
         for (std::uint64_t w : reached_.node[r].z) wet += std::size_t(std::popcount(w));
         dry_here += kBrickSamples - wet;
         live_[r] = inside_.needed[r] && wet < kBrickSamples;
-        if (!beside_.empty()) beside_[r] = beside_any(around, reached_.node);
+        if (!beside_.empty())
+          beside_[r] = wet == kBrickSamples ? kAllNodes
+                       : outside            ? beside_any(around, reached_.node)
+                                            : kNoNodes;
         if (!band_.crossing.empty()) inspect_crossings(around, r, thin_here);
       }
       thin.fetch_add(thin_here, std::memory_order_relaxed);
