@@ -97,7 +97,9 @@ Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, 
   const Masks& free = band.free;
   Flood outside(grid, band, free, Flood::Edges::cut, threads);
   outside.from_border();
-  if (!band.crossing.empty()) reach_pockets(surface, grid, band, free, threads, outside);
+  // In a soup every crack is a pocket, and parity tells nothing: there they stay inside.
+  if (!band.crossing.empty() && surface.closed)
+    reach_pockets(surface, grid, band, free, threads, outside);
   if (cavities == Cavities::hollow) return open_cavities(grid, band, free, threads, outside);
   return {outside.take_wet(), std::move(outside.cells())};
 }
