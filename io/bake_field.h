@@ -45,7 +45,7 @@ struct FieldBakeReport {
 // distance - offset between that sheet and the zero set. Where sheets lie buried in the solid
 // (parts that run into each other) the way out is up to 0.74 voxel + 13 % too short, never too
 // long.
-// far_grid: outside tight to 0.01 voxel; inside a lower bound.
+// far_grid: outside tight to 0.03 voxel; inside a lower bound.
 Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                              const Progress& progress = {});
 

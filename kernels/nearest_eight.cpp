@@ -1,4 +1,4 @@
-// nearest_eight.cpp - the fast twins of eight_boxes_ref and eight_triangles_ref.
+// nearest_eight.cpp - the fast twins of nearest_eight_ref.cpp.
 #include "kernels/nearest_eight.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -55,6 +55,24 @@ std::uint32_t Boxes(const EightBoxes& boxes, const float* p, float most, float* 
       sum = hn::MulAdd(gap, gap, sum);
     }
     below |= keep(hn::Mul(sum, hn::Set(d, 1 - 1e-6f)), most, i, squared);
+  }
+  return below;
+}
+
+std::uint32_t TurnedBoxes(const EightTurnedBoxes& boxes, const float* p, float most,
+                          float* squared) {
+  const D d;
+  std::uint32_t below = 0;
+  const VF zero = hn::Zero(d);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
+    VF sum = zero;
+    for (int k = 0; k < 3; ++k) {
+      const VF along = hn::Sub(dot(load(boxes.axis[k], i), at), hn::Load(d, boxes.middle[k] + i));
+      const VF gap = hn::Max(hn::Sub(hn::Abs(along), hn::Load(d, boxes.half[k] + i)), zero);
+      sum = hn::MulAdd(gap, gap, sum);
+    }
+    below |= keep(hn::Mul(sum, hn::Set(d, 1 - 2e-6f)), most, i, squared);
   }
   return below;
 }
@@ -121,11 +139,16 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(Boxes);
+HWY_EXPORT(TurnedBoxes);
 HWY_EXPORT(Triangles);
 
 std::uint32_t eight_boxes(const EightBoxes& boxes, const float p[3], float most,
                           float squared[8]) {
   return HWY_DYNAMIC_DISPATCH(Boxes)(boxes, p, most, squared);
+}
+std::uint32_t eight_turned_boxes(const EightTurnedBoxes& boxes, const float p[3], float most,
+                                 float squared[8]) {
+  return HWY_DYNAMIC_DISPATCH(TurnedBoxes)(boxes, p, most, squared);
 }
 std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3], float most,
                               float squared[8]) {
