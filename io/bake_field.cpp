@@ -92,6 +92,7 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
   band = {};
   if (!steps.tell("bricks", from)) return Failure{"cancelled"};
   if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
+  find_features(surface, threads, band.features);
   band.u.resize(band.rows() * kBrickSamples);
   band.free.resize(band.rows());
   band.first_node.resize(band.rows());
@@ -103,6 +104,7 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
         if (!band.crossing.empty()) cross_tile(surface, grid, tile, band);
       }))
     return Failure{"cancelled"};
+  band.features = {};
   return Done{};
 }
 

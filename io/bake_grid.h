@@ -118,10 +118,21 @@ struct Tiles {
   }
 };
 
+// What neighbours say about where a triangle may be the nearest (kernels::FacetRegion).
+struct Features {
+  using Gradient = std::array<float, 3>;  // of unit length, or zero: nothing is known
+  std::vector<std::uint8_t> owned;        // (triangles) bit e: edge e, bit 3 + v: corner v
+  std::vector<Gradient> across;           // (3 triangles) into another triangle of an owned edge
+  std::vector<Gradient> from;             // (4 vertices) along edges that leave it
+};
+// bake_features.cpp
+void find_features(const Surface& surface, unsigned threads, Features& out);
+
 // Bricks that a triangle comes near to, and what is known of their nodes. Rows are candidates, in
 // the order of cells.
 struct NarrowBand {
   Tiles tiles;
+  Features features;                   // of the surface, for measure_tile
   std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
   std::vector<std::uint32_t> cell;     // (rows)
   Samples u;                           // (rows x 512) unsigned distance, at most reach [voxel]

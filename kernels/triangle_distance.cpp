@@ -1,10 +1,11 @@
 // triangle_distance.cpp - the fast twin of triangle_distance_ref.
 //
-// Nodes are visited in Morton order, so that 16 in a row are a compact block of 4 x 2 x 2 nodes,
-// no node farther than kRadius from its middle. First the exact distance of the 32 middles to every
-// triangle: the smallest at a block, plus kRadius, bounds all its nodes. Then a block looks only at
-// triangles that may come below that, which are two or three. Both steps are minima over the whole
-// list, so its order does not matter.
+// A brick is 32 blocks of 4 x 2 x 2 nodes. A triangle is weighed at the nodes of a block only where
+// it may be the nearest of one: the block meets the region that its FacetRegion names, and the
+// triangle's plane comes nearer than the farthest of the block's nodes is so far. Both are tested on
+// the middles of all blocks at once: an affine function differs from its value there by at most what
+// it gains over half a block. Neither test can drop what would have lowered a distance, so the order
+// of the triangles does not change a bit.
 //
 // In the frame of a triangle the distance is h^2 + min over edges (w^2 + beyond^2), where beyond is
 // how far the point lies past the ends of the edge; h^2 alone over the inside. All seven functions
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #undef HWY_TARGET_INCLUDE
@@ -33,38 +35,35 @@ inline constexpr std::size_t kBlocks = kBrickSamples / kBlock;
 inline constexpr float kBlockHalf[3] = {1.5f, 0.5f, 0.5f};
 inline constexpr float kRadius = 1.6584f;  // |kBlockHalf|, rounded up
 inline constexpr std::size_t kFunctions = 7;
+inline constexpr std::size_t kPlanes = 16;
 inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
+inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [voxel]
 
-struct MortonNodes {
+// x fastest within a block and among blocks.
+struct BlockNodes {
   alignas(64) float middle_x[kBlocks], middle_y[kBlocks], middle_z[kBlocks];
   alignas(64) float first_x[kBlocks], first_y[kBlocks], first_z[kBlocks];
   alignas(64) float in_x[kBlock], in_y[kBlock], in_z[kBlock];  // from the first node of a block
-  std::array<std::uint16_t, kBrickSamples> row;                // Morton -> x fastest
 };
 
-constexpr MortonNodes morton_nodes() {
-  MortonNodes m{};
-  for (std::size_t n = 0; n < kBrickSamples; ++n) {
-    std::size_t c[3] = {0, 0, 0};
-    for (std::size_t bit = 0; bit < 9; ++bit) c[bit % 3] |= (n >> bit & 1) << (bit / 3);
-    m.row[n] = static_cast<std::uint16_t>((c[2] * 8 + c[1]) * 8 + c[0]);
-    if (n < kBlock) {
-      m.in_x[n] = float(c[0]);
-      m.in_y[n] = float(c[1]);
-      m.in_z[n] = float(c[2]);
-    }
-    if (n % kBlock != 0) continue;
-    const std::size_t b = n / kBlock;
-    m.first_x[b] = float(c[0]);
-    m.first_y[b] = float(c[1]);
-    m.first_z[b] = float(c[2]);
+constexpr BlockNodes block_nodes() {
+  BlockNodes m{};
+  for (std::size_t n = 0; n < kBlock; ++n) {
+    m.in_x[n] = float(n % 4);
+    m.in_y[n] = float(n / 4 % 2);
+    m.in_z[n] = float(n / 8);
+  }
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    m.first_x[b] = float(4 * (b % 2));
+    m.first_y[b] = float(2 * (b / 2 % 4));
+    m.first_z[b] = float(2 * (b / 8));
     m.middle_x[b] = m.first_x[b] + kBlockHalf[0];
     m.middle_y[b] = m.first_y[b] + kBlockHalf[1];
     m.middle_z[b] = m.first_z[b] + kBlockHalf[2];
   }
   return m;
 }
-inline constexpr MortonNodes kNodes = morton_nodes();
+inline constexpr BlockNodes kNodes = block_nodes();
 
 // Middles of the 64 bricks of a tile.
 struct TileBricks {
@@ -80,11 +79,6 @@ constexpr TileBricks tile_bricks() {
   return t;
 }
 inline constexpr TileBricks kTile = tile_bricks();
-
-// For one brick's list; kept by the thread.
-struct Room {
-  std::vector<float> middle, constant;
-};
 
 }  // namespace h6::kernels
 #endif
@@ -109,45 +103,17 @@ HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF 
   return hn::IfThenZeroElse(hn::Ge(inner, hn::Set(d, f.inside_from)), nearest);
 }
 
-// Distances of the 32 middles to one triangle, and what they say about each block.
-HWY_INLINE void measure_middles(const DistanceFacet& f, const float* constant, float* middle,
-                                float* most) {
-  const D d;
-  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
-    const VF x = hn::Load(d, kNodes.middle_x + b), y = hn::Load(d, kNodes.middle_y + b),
-             z = hn::Load(d, kNodes.middle_z + b);
-    const auto at = [&](std::size_t k) HWY_ATTR {
-      return hn::MulAdd(x, hn::Set(d, f.gx[k]),
-                        hn::MulAdd(y, hn::Set(d, f.gy[k]),
-                                   hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, constant[k]))));
-    };
-    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
-    const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared(f, s, w)));
-    hn::Store(away, d, middle + b);
-    hn::Store(hn::Min(hn::Load(d, most + b), away), d, most + b);
-  }
-}
-
-HWY_INLINE std::uint32_t blocks_below(const float* middle, const float* limit) {
-  const D d;
-  std::uint32_t live = 0;
-  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::Lt(hn::Load(d, middle + b), hn::Load(d, limit + b)), bits);
-    live |= (std::uint32_t{bits[0]} | std::uint32_t{bits[1]} << 8) << b;
-  }
-  return live;
-}
-
-// The functions of a triangle on the nodes of a block, less their value at its first node.
+// The functions of a triangle at places given from a first one, less their value there.
+template <std::size_t kCount>
 struct Pattern {
-  alignas(64) float v[kFunctions][kBlock];
+  alignas(64) float v[kFunctions][kCount];
 };
-HWY_INLINE void make_pattern(const DistanceFacet& f, Pattern& pattern) {
+template <std::size_t kCount>
+HWY_INLINE void make_pattern(const DistanceFacet& f, const float* px, const float* py,
+                             const float* pz, Pattern<kCount>& pattern) {
   const D d;
-  for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
-    const VF x = hn::Load(d, kNodes.in_x + n), y = hn::Load(d, kNodes.in_y + n),
-             z = hn::Load(d, kNodes.in_z + n);
+  for (std::size_t n = 0; n < kCount; n += hn::Lanes(d)) {
+    const VF x = hn::Load(d, px + n), y = hn::Load(d, py + n), z = hn::Load(d, pz + n);
     for (std::size_t k = 0; k < kFunctions; ++k)
       hn::Store(hn::MulAdd(x, hn::Set(d, f.gx[k]),
                            hn::MulAdd(y, hn::Set(d, f.gy[k]), hn::Mul(z, hn::Set(d, f.gz[k])))),
@@ -155,63 +121,169 @@ HWY_INLINE void make_pattern(const DistanceFacet& f, Pattern& pattern) {
   }
 }
 
-// Lowers the squared distances of the blocks in `live`.
-HWY_INLINE void lower_blocks(const DistanceFacet& f, const float* constant, std::uint32_t live,
-                             float* best) {
+// c + g.p of `count` functions at once.
+HWY_INLINE void values_at(const float* gx, const float* gy, const float* gz, const float* c,
+                          std::size_t count, float px, float py, float pz, float* out) {
+  const hn::CappedTag<float, 8> d;
+  const auto x = hn::Set(d, px), y = hn::Set(d, py), z = hn::Set(d, pz);
+  for (std::size_t k = 0; k < count; k += hn::Lanes(d))
+    hn::Store(hn::MulAdd(x, hn::LoadU(d, gx + k),
+                         hn::MulAdd(y, hn::LoadU(d, gy + k),
+                                    hn::MulAdd(z, hn::LoadU(d, gz + k), hn::LoadU(d, c + k)))),
+              d, out + k);
+}
+
+// What functions gain over half a block at most, and the leeway.
+HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::size_t count,
+                      float* out) {
+  const hn::CappedTag<float, 8> d;
+  for (std::size_t k = 0; k < count; k += hn::Lanes(d))
+    hn::Store(hn::MulAdd(hn::Set(d, kBlockHalf[0]), hn::Abs(hn::LoadU(d, gx + k)),
+                         hn::MulAdd(hn::Set(d, kBlockHalf[1]), hn::Abs(hn::LoadU(d, gy + k)),
+                                    hn::MulAdd(hn::Set(d, kBlockHalf[2]),
+                                               hn::Abs(hn::LoadU(d, gz + k)),
+                                               hn::Set(d, kLeeway)))),
+              d, out + k);
+}
+
+// One triangle, prepared for all bricks of its tile.
+struct Ready {
+  Ready(const DistanceFacet& facet, const FacetRegion& where) : f(facet), region(where) {}
+  const DistanceFacet& f;
+  const FacetRegion& region;
+  Pattern<kBlock> nodes;
+  Pattern<kBlocks> middles;
+  alignas(64) float gain[8], plane_gain[kPlanes];
+};
+
+// The blocks of a brick where the triangle may lower a distance. `first` and `plane` are its
+// functions and the planes of its region at the first node, `most` the farthest squares so far.
+HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const float* plane,
+                                     const float* most) {
   const D d;
-  const hn::CappedTag<float, 4> d4;
-  Pattern pattern;
-  make_pattern(f, pattern);
+  const DistanceFacet& f = t.f;
+  std::uint32_t live = 0;
+  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
+    const auto at = [&](std::size_t k) HWY_ATTR {
+      return hn::Add(hn::Load(d, t.middles.v[k] + b), hn::Set(d, first[k]));
+    };
+    const auto below = [&](VF value, float level) HWY_ATTR {
+      return hn::Le(value, hn::Set(d, level));
+    };
+    const auto above = [&](VF value, float level) HWY_ATTR {
+      return hn::Ge(value, hn::Set(d, level));
+    };
+    const VF h = at(6), farthest = hn::Load(d, most + b);
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
+    const VF gap = hn::Max(hn::Sub(hn::Abs(h), hn::Set(d, t.gain[6])), hn::Zero(d));
+    auto in = hn::Le(hn::Mul(gap, gap), farthest);
+    if (hn::AllFalse(d, in)) continue;
+    if (t.region.everywhere) {
+      const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared(f, s, w)));
+      in = hn::And(in, hn::Le(hn::Sub(away, hn::Set(d, kRadius + kRounding)), hn::Sqrt(farthest)));
+    } else {
+      auto there = hn::And(hn::And(above(w[0], -t.gain[3]), above(w[1], -t.gain[4])),
+                           above(w[2], -t.gain[5]));
+      const VF x = hn::Load(d, kNodes.middle_x + b), y = hn::Load(d, kNodes.middle_y + b),
+               z = hn::Load(d, kNodes.middle_z + b);
+      const auto below_plane = [&](std::size_t k) HWY_ATTR {
+        const FacetRegion& r = t.region;
+        return below(hn::MulAdd(x, hn::Set(d, r.gx[k]),
+                                hn::MulAdd(y, hn::Set(d, r.gy[k]),
+                                           hn::MulAdd(z, hn::Set(d, r.gz[k]),
+                                                      hn::Set(d, plane[k])))),
+                     t.plane_gain[k]);
+      };
+      for (std::size_t e = 0; e < 3; ++e)
+        if (t.region.edges >> e & 1)
+          there = hn::Or(there,
+                         hn::And(hn::And(below(w[e], t.gain[3 + e]), below_plane(e)),
+                                 hn::And(above(s[e], -t.gain[e]),
+                                         below(s[e], f.length[e] + t.gain[e]))));
+      for (std::size_t v = 0; v < 3; ++v)
+        if (t.region.corners >> v & 1) {
+          const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
+          there = hn::Or(there,
+                         hn::And(hn::And(hn::And(below(s[v], t.gain[v]),
+                                                 above(s[u], f.length[u] - t.gain[u])),
+                                         hn::And(below_plane(p), below_plane(p + 1))),
+                                 hn::And(below_plane(p + 2), below_plane(p + 3))));
+        }
+      in = hn::And(in, there);
+    }
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, in, bits);
+    live |= (std::uint32_t{bits[0]} | std::uint32_t{bits[1]} << 8) << b;
+  }
+  return live;
+}
+
+// Lowers the squared distances of the blocks in `live`, and what is the farthest in them.
+HWY_INLINE void lower_blocks(const Ready& t, const float* at_brick, std::uint32_t live,
+                             float* best, float* most) {
+  const D d;
+  const DistanceFacet& f = t.f;
   for (; live != 0; live &= live - 1) {
     const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(live);
     alignas(32) float first[8];
-    for (std::size_t k = 0; k < 8; k += hn::Lanes(d4)) {
-      const auto x = hn::Set(d4, kNodes.first_x[b]), y = hn::Set(d4, kNodes.first_y[b]),
-                 z = hn::Set(d4, kNodes.first_z[b]);
-      hn::Store(hn::MulAdd(x, hn::LoadU(d4, f.gx + k),
-                           hn::MulAdd(y, hn::LoadU(d4, f.gy + k),
-                                      hn::MulAdd(z, hn::LoadU(d4, f.gz + k),
-                                                 hn::LoadU(d4, constant + k)))),
-                d4, first + k);
-    }
+    values_at(f.gx, f.gy, f.gz, at_brick, 8, kNodes.first_x[b], kNodes.first_y[b],
+              kNodes.first_z[b], first);
+    VF farthest = hn::Zero(d);
     for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
       const auto at = [&](std::size_t k) HWY_ATTR {
-        return hn::Add(hn::Load(d, pattern.v[k] + n), hn::Set(d, first[k]));
+        return hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
       };
       const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
       float* to = best + b * kBlock + n;
-      hn::Store(hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w))), d, to);
+      const VF lower = hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w)));
+      hn::Store(lower, d, to);
+      farthest = hn::Max(farthest, lower);
+    }
+    most[b] = hn::GetLane(hn::MaxOfLanes(d, farthest));
+  }
+}
+
+void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
+                  const std::uint64_t* near, std::size_t count, float reach, TileRoom& room) {
+  std::uint64_t used = 0;
+  for (std::size_t i = 0; i < count; ++i) used |= near[i];
+  for (; used != 0; used &= used - 1) {
+    const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(used);
+    std::fill_n(room.squared + b * kBrickSamples, kBrickSamples, reach * reach);
+    std::fill_n(room.most + b * kBlocks, kBlocks, reach * reach);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (near[i] == 0) continue;
+    const DistanceFacet& f = facets[i];
+    const FacetRegion& r = regions[i];
+    Ready t(f, r);
+    make_pattern(f, kNodes.in_x, kNodes.in_y, kNodes.in_z, t.nodes);
+    make_pattern(f, kNodes.middle_x, kNodes.middle_y, kNodes.middle_z, t.middles);
+    gains(f.gx, f.gy, f.gz, 8, t.gain);
+    if ((r.edges | r.corners) != 0) gains(r.gx, r.gy, r.gz, kPlanes, t.plane_gain);
+    for (std::uint64_t bricks = near[i]; bricks != 0; bricks &= bricks - 1) {
+      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(bricks);
+      const float x = float(8 * (b % 4)), y = float(8 * (b / 4 % 4)), z = float(8 * (b / 16));
+      alignas(64) float first[8], plane[kPlanes];
+      values_at(f.gx, f.gy, f.gz, f.c, 8, x, y, z, first);
+      if ((r.edges | r.corners) != 0) values_at(r.gx, r.gy, r.gz, r.c, kPlanes, x, y, z, plane);
+      float* most = room.most + b * kBlocks;
+      if (const std::uint32_t live = live_blocks(t, first, plane, most); live != 0)
+        lower_blocks(t, first, live, room.squared + b * kBrickSamples, most);
     }
   }
 }
 
-void FacetDistance(const DistanceFacet* facets, const std::uint32_t* list, std::size_t count,
-                   const float* origin, float reach, Room& room, float* distance) {
-  const D d;
-  alignas(64) float best[kBrickSamples], limit[kBlocks];
-  std::fill(best, best + kBrickSamples, reach * reach);
-  std::fill(limit, limit + kBlocks, reach);
-  room.middle.resize(count * kBlocks + 16);
-  room.constant.resize(count * 8);
-  float* middle = room.middle.data();
-  middle += (64 - reinterpret_cast<std::uintptr_t>(middle) % 64) % 64 / sizeof(float);
-  for (std::size_t i = 0; i < count; ++i) {
-    const DistanceFacet& f = facets[list[i]];
-    float* constant = room.constant.data() + 8 * i;
-    for (std::size_t k = 0; k < 8; ++k)
-      constant[k] = f.c[k] + (origin[0] * f.gx[k] + origin[1] * f.gy[k] + origin[2] * f.gz[k]);
-    measure_middles(f, constant, middle + i * kBlocks, limit);
-  }
-  // A node is at most kRadius farther than its block's middle, so the nearest triangle of any node
-  // is at most 2 kRadius farther from the middle than the nearest one there.
+void BrickDistance(const TileRoom& room, std::size_t brick, float* distance) {
+  const hn::CappedTag<float, 4> d;
+  const float* from = room.squared + brick * kBrickSamples;
   for (std::size_t b = 0; b < kBlocks; ++b)
-    limit[b] = std::min(limit[b] + kRadius, reach) + kRadius + kRounding;
-  for (std::size_t i = 0; i < count; ++i)
-    if (const std::uint32_t live = blocks_below(middle + i * kBlocks, limit); live != 0)
-      lower_blocks(facets[list[i]], room.constant.data() + 8 * i, live, best);
-  for (std::size_t n = 0; n < kBrickSamples; n += hn::Lanes(d))
-    hn::Store(hn::Sqrt(hn::Load(d, best + n)), d, best + n);
-  for (std::size_t n = 0; n < kBrickSamples; ++n) distance[kNodes.row[n]] = best[n];
+    for (std::size_t row = 0; row < 4; ++row) {
+      const std::size_t x = 4 * (b % 2), y = 2 * (b / 2 % 4) + row % 2, z = 2 * (b / 8) + row / 2;
+      for (std::size_t n = 0; n < 4; n += hn::Lanes(d))
+        hn::StoreU(hn::Sqrt(hn::LoadU(d, from + b * kBlock + 4 * row + n)), d,
+                   distance + (z * 8 + y) * 8 + x + n);
+    }
 }
 
 std::uint64_t BricksWithinReach(const DistanceFacet& f, float reach) {
@@ -265,7 +337,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace h6::kernels {
 
-HWY_EXPORT(FacetDistance);
+HWY_EXPORT(TileDistance);
+HWY_EXPORT(BrickDistance);
 HWY_EXPORT(BricksWithinReach);
 HWY_EXPORT(NodesAbove);
 
@@ -352,10 +425,13 @@ std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach) {
   return HWY_DYNAMIC_DISPATCH(BricksWithinReach)(facet, reach);
 }
 
-void facet_distance(const DistanceFacet* facets, const std::uint32_t* list, std::size_t count,
-                    const float origin[3], float reach, float* distance) {
-  thread_local Room room;
-  HWY_DYNAMIC_DISPATCH(FacetDistance)(facets, list, count, origin, reach, room, distance);
+void tile_distance(const DistanceFacet* facets, const FacetRegion* regions,
+                   const std::uint64_t* near, std::size_t count, float reach, TileRoom& room) {
+  HWY_DYNAMIC_DISPATCH(TileDistance)(facets, regions, near, count, reach, room);
+}
+
+void brick_distance(const TileRoom& room, std::size_t brick, float* distance) {
+  HWY_DYNAMIC_DISPATCH(BrickDistance)(room, brick, distance);
 }
 
 void nodes_above(const float* distance, float level, std::uint64_t words[8]) {
@@ -364,13 +440,13 @@ void nodes_above(const float* distance, float level, std::uint64_t words[8]) {
 
 void triangle_distance(const double* corners, std::size_t count, float reach, float* distance) {
   std::vector<DistanceFacet> facets(count);
-  std::vector<std::uint32_t> list(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    facets[i] = make_distance_facet(corners + 9 * i);
-    list[i] = static_cast<std::uint32_t>(i);
-  }
-  const float origin[3] = {0, 0, 0};
-  facet_distance(facets.data(), list.data(), count, origin, reach, distance);
+  const std::vector<FacetRegion> regions(count);
+  const std::vector<std::uint64_t> near(std::max<std::size_t>(count, 1), 1);
+  for (std::size_t i = 0; i < count; ++i) facets[i] = make_distance_facet(corners + 9 * i);
+  const auto room = std::make_unique<TileRoom>();
+  if (count == 0) std::fill_n(room->squared, kBrickSamples, reach * reach);
+  tile_distance(facets.data(), regions.data(), near.data(), count, reach, *room);
+  brick_distance(*room, 0, distance);
 }
 
 }  // namespace h6::kernels
