@@ -42,24 +42,20 @@ inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [
 // x fastest within a block and among blocks.
 struct BlockNodes {
   alignas(64) float middle_x[kBlocks], middle_y[kBlocks], middle_z[kBlocks];
-  alignas(64) float first_x[kBlocks], first_y[kBlocks], first_z[kBlocks];
-  alignas(64) float in_x[kBlock], in_y[kBlock], in_z[kBlock];  // from the first node of a block
+  alignas(64) float in_x[kBlock], in_y[kBlock], in_z[kBlock];  // from the middle of a block
 };
 
 constexpr BlockNodes block_nodes() {
   BlockNodes m{};
   for (std::size_t n = 0; n < kBlock; ++n) {
-    m.in_x[n] = float(n % 4);
-    m.in_y[n] = float(n / 4 % 2);
-    m.in_z[n] = float(n / 8);
+    m.in_x[n] = float(n % 4) - kBlockHalf[0];
+    m.in_y[n] = float(n / 4 % 2) - kBlockHalf[1];
+    m.in_z[n] = float(n / 8) - kBlockHalf[2];
   }
   for (std::size_t b = 0; b < kBlocks; ++b) {
-    m.first_x[b] = float(4 * (b % 2));
-    m.first_y[b] = float(2 * (b / 2 % 4));
-    m.first_z[b] = float(2 * (b / 8));
-    m.middle_x[b] = m.first_x[b] + kBlockHalf[0];
-    m.middle_y[b] = m.first_y[b] + kBlockHalf[1];
-    m.middle_z[b] = m.first_z[b] + kBlockHalf[2];
+    m.middle_x[b] = float(4 * (b % 2)) + kBlockHalf[0];
+    m.middle_y[b] = float(2 * (b / 2 % 4)) + kBlockHalf[1];
+    m.middle_z[b] = float(2 * (b / 8)) + kBlockHalf[2];
   }
   return m;
 }
@@ -94,8 +90,7 @@ HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF 
   const D d;
   const VF zero = hn::Zero(d);
   const auto edge = [&](int e) HWY_ATTR {
-    const VF beyond =
-        hn::Max(hn::Max(hn::Sub(s[e], hn::Set(d, f.length[e])), hn::Neg(s[e])), zero);
+    const VF beyond = hn::Max(hn::Sub(hn::Abs(s[e]), hn::Set(d, f.half[e])), zero);
     return hn::MulAdd(beyond, beyond, hn::Mul(w[e], w[e]));
   };
   const VF nearest = hn::Min(hn::Min(edge(0), edge(1)), edge(2));
@@ -198,14 +193,13 @@ HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const f
         if (t.region.edges >> e & 1)
           there = hn::Or(there,
                          hn::And(hn::And(below(w[e], t.gain[3 + e]), below_plane(e)),
-                                 hn::And(above(s[e], -t.gain[e]),
-                                         below(s[e], f.length[e] + t.gain[e]))));
+                                 below(hn::Abs(s[e]), f.half[e] + t.gain[e])));
       for (std::size_t v = 0; v < 3; ++v)
         if (t.region.corners >> v & 1) {
           const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
           there = hn::Or(there,
-                         hn::And(hn::And(hn::And(below(s[v], t.gain[v]),
-                                                 above(s[u], f.length[u] - t.gain[u])),
+                         hn::And(hn::And(hn::And(below(s[v], t.gain[v] - f.half[v]),
+                                                 above(s[u], f.half[u] - t.gain[u])),
                                          hn::And(below_plane(p), below_plane(p + 1))),
                                  hn::And(below_plane(p + 2), below_plane(p + 3))));
         }
@@ -219,27 +213,26 @@ HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const f
 }
 
 // Lowers the squared distances of the blocks in `live`, and what is the farthest in them.
-HWY_INLINE void lower_blocks(const Ready& t, const float* at_brick, std::uint32_t live,
-                             float* best, float* most) {
+HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t live, float* best,
+                             float* most) {
   const D d;
   const DistanceFacet& f = t.f;
-  for (; live != 0; live &= live - 1) {
-    const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(live);
-    alignas(32) float first[8];
-    values_at(f.gx, f.gy, f.gz, at_brick, 8, kNodes.first_x[b], kNodes.first_y[b],
-              kNodes.first_z[b], first);
-    VF farthest = hn::Zero(d);
-    for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
+  for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
+    VF node[kFunctions];  // at the nodes of a block whose middle is the brick's first node
+    for (std::size_t k = 0; k < kFunctions; ++k)
+      node[k] = hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
+    for (std::uint32_t left = live; left != 0; left &= left - 1) {
+      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
       const auto at = [&](std::size_t k) HWY_ATTR {
-        return hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
+        return hn::Add(node[k], hn::Set(d, t.middles.v[k][b]));
       };
       const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
       float* to = best + b * kBlock + n;
       const VF lower = hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w)));
       hn::Store(lower, d, to);
-      farthest = hn::Max(farthest, lower);
+      const float farthest = hn::GetLane(hn::MaxOfLanes(d, lower));
+      most[b] = n == 0 ? farthest : std::max(most[b], farthest);
     }
-    most[b] = hn::GetLane(hn::MaxOfLanes(d, farthest));
   }
 }
 
@@ -372,10 +365,12 @@ Row any_normal(const Row& a) {
 // Three times the segment from `from` along the unit vector `along`; nothing lies over it.
 void set_segment(DistanceFacet& f, const Row& from, const Row& along, double length) {
   const Row n = any_normal(along), in = cross(n, along);
+  const Row middle = {from[0] + length / 2 * along[0], from[1] + length / 2 * along[1],
+                      from[2] + length / 2 * along[2]};
   for (std::size_t e = 0; e < 3; ++e) {
-    set_function(f, e, along, from);
+    set_function(f, e, along, middle);
     set_function(f, 3 + e, in, from);
-    f.length[e] = float(length);
+    f.half[e] = float(length / 2);
   }
   set_function(f, 6, n, from);
   f.inside_from = 1e30f;
@@ -410,9 +405,10 @@ DistanceFacet make_distance_facet(const double* t) {
   const Row normal = times(1 / n_length, n);
   for (std::size_t e = 0; e < 3; ++e) {
     const Row along = times(1 / length[e], edge[e]);
-    set_function(f, e, along, corner[e]);
+    const Row &a = corner[e], &b = corner[(e + 1) % 3];
+    set_function(f, e, along, {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2});
     set_function(f, 3 + e, cross(normal, along), corner[e]);
-    f.length[e] = float(length[e]);
+    f.half[e] = float(length[e] / 2);
   }
   set_function(f, 6, normal, corner[0]);
   // Points on an edge are over the triangle whatever float says, but on a sliver that must not

@@ -14,12 +14,12 @@ inline constexpr std::size_t kBrickSamples = 512;
 inline constexpr int kTileBricks = 4;  // along an axis
 
 // One triangle, ready for float work: seven functions of the place p, g.p + c, all in voxels.
-// 0..2: along edge e, from its start; 3..5: off edge e in the plane, positive on the triangle's
+// 0..2: along edge e, from its middle; 3..5: off edge e in the plane, positive on the triangle's
 // side; 6: off the plane; 7 is not used. Made in double: on a long sliver a float cross product is
 // wrong by whole voxels at the far end.
 struct DistanceFacet {
   float gx[8], gy[8], gz[8], c[8];
-  float length[3];     // of the edges
+  float half[3];       // lengths of the edges
   float inside_from;   // a point is over the triangle when all of 3..5 are at least this
   float low[3], high[3];
 };
