@@ -27,6 +27,26 @@ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   return apart(x) | apart(y) << 1 | apart(z) << 2;
 }
 
+// The place of a cell on Hilbert's curve, which leaves no cube before it has been everywhere in it and
+// never jumps: what follows each other lies together (J. Skilling, "Programming the Hilbert curve",
+// 2004: reflect and exchange axes from the largest cube down, then undo the Gray code).
+std::uint32_t hilbert(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  std::uint32_t c[3] = {x, y, z};
+  for (std::uint32_t half = 512; half > 1; half /= 2)
+    for (std::uint32_t& axis : c) {
+      const std::uint32_t upper = 0 - std::uint32_t((axis & half) != 0), low = half - 1;
+      const std::uint32_t exchange = (c[0] ^ axis) & low & ~upper;
+      c[0] ^= exchange | (low & upper);
+      axis ^= exchange;
+    }
+  c[1] ^= c[0];
+  c[2] ^= c[1];
+  std::uint32_t flip = 0;
+  for (std::uint32_t half = 512; half > 1; half /= 2)
+    if ((c[2] & half) != 0) flip ^= half - 1;
+  return morton(c[2] ^ flip, c[1] ^ flip, c[0] ^ flip);
+}
+
 // By the upper half of the words, which has 30 bits; equal ones keep their order.
 void sort_by_code(std::vector<std::uint64_t>& words) {
   std::vector<std::uint64_t> other(words.size());
@@ -130,7 +150,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
       const auto cell = [](double sum) {  // 2 voxels; the grid has at most 2048
         return std::uint32_t(std::clamp(sum / 6, 0.0, 1023.0));
       };
-      words[i] = std::uint64_t(morton(cell(a.x + b.x + c.x), cell(a.y + b.y + c.y),
+      words[i] = std::uint64_t(hilbert(cell(a.x + b.x + c.x), cell(a.y + b.y + c.y),
                                       cell(a.z + b.z + c.z))) << 32 | i;
     }
   });
@@ -188,6 +208,19 @@ double TriangleTree::squared_to(const double (&p)[3], std::uint32_t place) const
   return kernels::point_triangle_squared(p, pa, pb, pc);
 }
 
+// The same for corners as rounded to float, which are at hand.
+double TriangleTree::squared_about(const float (&at)[3], std::uint32_t place) const {
+  const kernels::EightTriangles& t = leaf_[place / 8];
+  double p[3], a[3], b[3], c[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    p[k] = at[k];
+    a[k] = t.a[k][place % 8];
+    b[k] = a[k] + t.ab[k][place % 8];
+    c[k] = a[k] + t.ac[k][place % 8];
+  }
+  return kernels::point_triangle_squared(p, a, b, c);
+}
+
 void TriangleTree::weigh(std::uint32_t leaf, const float (&at)[3], Found& found) const {
   float near[8];
   std::uint32_t hits = kernels::eight_triangles(leaf_[leaf], at, found.squared, near);
@@ -240,11 +273,11 @@ double TriangleTree::search(const double (&p)[3], Found& found) const {
   const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
                        float(p[2] - middle_[2])};
   walk(at, found.squared, [&](std::uint32_t leaf) { weigh(leaf, at, found); });
-  const double least = std::max(0.0, std::sqrt(double(found.squared)) - double(kRounded));
   if (found.nearest == kNone) return search_exactly(p, 1e18, found.nearest);
-  const double best2 = squared_to(p, found.nearest);
-  if (best2 <= (least + kTight) * (least + kTight)) return least;
-  return search_exactly(p, best2, found.nearest);  // slivers are weighed far too low
+  const double least = std::sqrt(double(found.squared));
+  if (std::sqrt(squared_about(at, found.nearest)) <= least + kTight - 2 * double(kRounded))
+    return std::max(0.0, least - double(kRounded));
+  return search_exactly(p, squared_to(p, found.nearest), found.nearest);  // a sliver, weighed low
 }
 
 double TriangleTree::search_exactly(const double (&p)[3], double best2,

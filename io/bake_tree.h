@@ -26,6 +26,7 @@ class TriangleTree {
 
  private:
   double squared_to(const double (&p)[3], std::uint32_t place) const;
+  double squared_about(const float (&at)[3], std::uint32_t place) const;
   void weigh(std::uint32_t leaf, const float (&at)[3], Found& found) const;
   template <class Look>
   void walk(const float (&at)[3], const float& most, Look&& look) const;

@@ -90,11 +90,12 @@ HWY_INLINE VF to_segment(const V3& q, const V3& e, VF length2) {
 // Over the inside (barycentric v, w, 1 - v - w all positive) the height, else the nearest edge.
 // Rounding makes the normal of a long triangle wrong by an angle of |b||c|/area times that of float,
 // and the height by that times how far the first corner is; v and w likewise. A point that may be
-// over the inside is taken to be: the height is never more than the distance. A sliver is no wider
-// than kSliver of its length, and its edges are as near as that.
+// over the inside is taken to be: the height is never more than the distance. On a
+// sliver, whose inside cannot be told like that, the foot of the height is nowhere farther from an
+// edge than the radius of the circle inside, which is twice the area over the girth.
 std::uint32_t Triangles(const EightTriangles& triangles, const float* p, float most,
                         float* squared) {
-  constexpr float kDigits = 4e-6f, kSliver2 = 1e-4f, kSliver = 0.01f;
+  constexpr float kDigits = 4e-6f, kSliver2 = 1e-4f;
   const D d;
   const VF zero = hn::Zero(d);
   std::uint32_t below = 0;
@@ -117,12 +118,13 @@ std::uint32_t Triangles(const EightTriangles& triangles, const float* p, float m
     const auto inside = hn::And(hn::Ge(hn::Add(hn::Min(v, w), fuzz), zero),
                                 hn::Le(hn::Add(v, w), hn::Add(area, fuzz)));
     const VF over = hn::Mul(hn::Set(d, kDigits), hn::Mul(away, sides));
-    const VF high = hn::Max(hn::Div(hn::Sub(hn::Abs(dot(q, n)), over),
-                                    hn::Sqrt(hn::Max(area, hn::Set(d, 1e-20f)))), zero);
+    const VF root = hn::Sqrt(hn::Max(area, hn::Set(d, 1e-20f)));
+    const VF high = hn::Max(hn::Div(hn::Sub(hn::Abs(dot(q, n)), over), root), zero);
     const VF height = hn::Mul(high, high);
     // (edge - width)^2 >= edge^2 - 2 edge width
-    const VF sliver = hn::NegMulAdd(hn::Mul(longest, hn::Set(d, 2 * kSliver)), hn::Sqrt(edges),
-                                    edges);
+    const VF within = hn::Div(hn::MulAdd(hn::Set(d, kDigits), sides, root),
+                              hn::Max(hn::Add(longest, longest), hn::Set(d, 1e-10f)));
+    const VF sliver = hn::NegMulAdd(within, within, edges);
     const auto thin = hn::Lt(area, hn::Mul(hn::Set(d, kSliver2), hn::Mul(longest2, longest2)));
     const VF slack = hn::Mul(hn::Set(d, kDigits), hn::Add(qq, longest2));
     const VF beside = hn::Sub(hn::IfThenElse(thin, sliver, edges), slack);

@@ -29,8 +29,8 @@ void eight_turned_boxes_ref(const EightTurnedBoxes& boxes, const float p[3], flo
 struct EightTriangles {
   alignas(32) float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
 };
-// squared[i] <= squared distance of p to triangle i: by less than 1e-4 of it, save for slivers and
-// for triangles a thousand times as large as their distance.
+// squared[i] <= squared distance of p to triangle i: by less than 1e-4 of it, save for
+// triangles a thousand times as large as their distance, and on slivers a little more.
 // Returns a bit for each that is below `most`.
 std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3], float most,
                               float squared[8]);
