@@ -2,10 +2,10 @@
 //
 // A brick is 32 blocks of 4 x 2 x 2 nodes. A triangle is weighed at the nodes of a block only where
 // it may be the nearest of one: the block meets the region that its FacetRegion names, and the
-// triangle's plane comes nearer than the farthest of the block's nodes is so far. Both are tested on
-// the middles of all blocks at once: an affine function differs from its value there by at most what
-// it gains over half a block. Neither test can drop what would have lowered a distance, so the order
-// of the triangles does not change a bit.
+// triangle's plane comes nearer than the farthest of the block's nodes is so far. Both are tested
+// on the middles of all blocks at once: an affine function differs from its value there by at most
+// what it gains over half a block. Neither test can drop what would have lowered a distance, so the
+// order of the triangles does not change a bit.
 //
 // In the frame of a triangle the distance is h^2 + min over edges (w^2 + beyond^2), where beyond is
 // how far the point lies past the ends of the edge; h^2 alone over the inside. All seven functions
@@ -34,6 +34,7 @@ inline constexpr std::size_t kBlock = 16;  // nodes: 4 x 2 x 2
 inline constexpr std::size_t kBlocks = kBrickSamples / kBlock;
 inline constexpr float kBlockHalf[3] = {1.5f, 0.5f, 0.5f};
 inline constexpr float kRadius = 1.6584f;  // |kBlockHalf|, rounded up
+inline constexpr float kBrickRadius = 6.0622f;  // 3.5 sqrt(3), rounded up
 inline constexpr std::size_t kFunctions = 7;
 inline constexpr std::size_t kPlanes = 16;
 inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
@@ -293,16 +294,24 @@ std::uint64_t BricksWithinReach(const DistanceFacet& f, float reach) {
       box2 = hn::MulAdd(apart, apart, box2);
     }
     auto in = hn::Le(box2, hn::Mul(within, within));
+    if (hn::AllFalse(d, in)) continue;
+    VF value[kFunctions];
+    for (std::size_t k = 0; k < kFunctions; ++k)
+      value[k] = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
+                            hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
+                                       hn::MulAdd(p[2], hn::Set(d, f.gz[k]),
+                                                  hn::Set(d, f.c[k]))));
     // Planes: of the triangle, both sides, and through its edges, away from it.
     for (std::size_t k = 3; k < kFunctions; ++k) {
-      const VF at = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
-                               hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
-                                          hn::MulAdd(p[2], hn::Set(d, f.gz[k]),
-                                                     hn::Set(d, f.c[k]))));
       const float extent = 3.5f * (std::fabs(f.gx[k]) + std::fabs(f.gy[k]) + std::fabs(f.gz[k]));
-      const VF away = k == 6 ? hn::Abs(at) : hn::Neg(at);
+      const VF away = k == 6 ? hn::Abs(value[k]) : hn::Neg(value[k]);
       in = hn::And(in, hn::Le(away, hn::Set(d, extent + reach + kRounding)));
     }
+    // The ball around the brick.
+    const VF s[3] = {value[0], value[1], value[2]}, w[3] = {value[3], value[4], value[5]};
+    const VF ball = hn::Set(d, reach + kBrickRadius + kRounding);
+    in = hn::And(in, hn::Le(hn::MulAdd(value[6], value[6], beside_squared(f, s, w)),
+                            hn::Mul(ball, ball)));
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, in, bits);
     near |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;

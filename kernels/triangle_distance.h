@@ -36,10 +36,10 @@ std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach);
 // below planes 3 + 4 v ... 6 + 4 v (see FacetRegion). Planes are g.p + c <= 0; one of zeros says
 // nothing.
 //
-// The nearest point of a mesh lies inside a triangle, inside an edge or on a corner. On an edge, the
-// place is beyond it as seen in the plane of EACH triangle that has the edge; on a corner, behind the
-// start of EACH edge that leaves it. So it is enough when one triangle answers for each edge and
-// corner, and a plane for another triangle's edge or another edge keeps its region small.
+// The nearest point of a mesh lies inside a triangle, inside an edge or on a corner. On an edge,
+// the place is beyond it as seen in the plane of EACH triangle that has the edge; on a corner,
+// behind the start of EACH edge that leaves it. So it is enough when one triangle answers for each
+// edge and corner, and planes for another triangle's edge or other edges keep its region small.
 struct FacetRegion {
   float gx[16] = {}, gy[16] = {}, gz[16] = {}, c[16] = {};
   std::uint8_t edges = 0, corners = 0;  // bits: those it answers for
