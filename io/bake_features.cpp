@@ -1,5 +1,7 @@
-// bake_features.cpp - which triangle answers for an edge or corner, and what the others that share it
-// say about where it may be nearest (see kernels::FacetRegion).
+// bake_features.cpp - which triangle answers for an edge or corner, and what the others that share
+// it say about where it may be nearest (see kernels::FacetRegion).
+#include <algorithm>
+
 #include "io/bake_grid.h"
 #include "sched/parallel_for.h"
 
@@ -12,17 +14,27 @@ constexpr std::uint32_t kLook = 48;  // triangles around a vertex; more are not 
 Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-// The triangles around each vertex, in order.
+// The triangles around each vertex, in order. Every thread reads all triangles and takes those at
+// its range of vertices.
 struct Rings {
   std::vector<std::uint32_t> first, triangle;
-  explicit Rings(const Surface& surface)
+  Rings(const Surface& surface, unsigned threads)
       : first(surface.vertices.size() + 1, 0), triangle(3 * surface.triangles.size()) {
-    for (const auto& t : surface.triangles)
-      for (std::uint32_t v : t) ++first[v];
+    constexpr std::size_t kRanges = 4;
+    const std::size_t vertices = surface.vertices.size();
+    const auto corners = [&](auto&& take) {
+      sched::parallel_for(kRanges, threads, [&](std::size_t range) {
+        const auto low = std::uint32_t(vertices * range / kRanges);
+        const auto count = std::uint32_t(vertices * (range + 1) / kRanges) - low;
+        for (std::size_t i = surface.triangles.size(); i-- > 0;)
+          for (std::uint32_t v : surface.triangles[i])
+            if (v - low < count) take(v, std::uint32_t(i));
+      });
+    };
+    corners([&](std::uint32_t v, std::uint32_t) { ++first[v]; });
     std::uint32_t sum = 0;
     for (std::uint32_t& f : first) f = sum += f;  // ends, which go down to starts
-    for (std::size_t i = surface.triangles.size(); i-- > 0;)
-      for (std::uint32_t v : surface.triangles[i]) triangle[--first[v]] = std::uint32_t(i);
+    corners([&](std::uint32_t v, std::uint32_t i) { triangle[--first[v]] = i; });
   }
   std::uint32_t count(std::uint32_t v) const { return first[v + 1] - first[v]; }
 };
@@ -89,8 +101,8 @@ void look_at_corner(const Surface& surface, const Rings& rings, std::uint32_t ve
       d = {d.x / length, d.y / length, d.z / length};
       if (i == begin) {
         sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
-      } else if (!has(own, v) && std::find(end_of.begin(), end_of.begin() + std::ptrdiff_t(count), v) ==
-                                     end_of.begin() + std::ptrdiff_t(count)) {
+      } else if (const auto stop = end_of.begin() + std::ptrdiff_t(count);
+                 !has(own, v) && std::find(end_of.begin(), stop, v) == stop) {
         direction[count] = d;
         end_of[count++] = v;
       }
@@ -109,7 +121,7 @@ void look_at_corner(const Surface& surface, const Rings& rings, std::uint32_t ve
 }  // namespace
 
 void find_features(const Surface& surface, unsigned threads, Features& out) {
-  const Rings rings(surface);
+  const Rings rings(surface, threads);
   const std::size_t triangles = surface.triangles.size(), vertices = surface.vertices.size();
   out.owned.assign(triangles, 0);
   out.across.assign(3 * triangles, {});

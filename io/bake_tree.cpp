@@ -27,9 +27,9 @@ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   return apart(x) | apart(y) << 1 | apart(z) << 2;
 }
 
-// The place of a cell on Hilbert's curve, which leaves no cube before it has been everywhere in it and
-// never jumps: what follows each other lies together (J. Skilling, "Programming the Hilbert curve",
-// 2004: reflect and exchange axes from the largest cube down, then undo the Gray code).
+// The place of a cell on Hilbert's curve, which leaves no cube before it has been everywhere in it
+// and never jumps: what follows each other lies together (J. Skilling, "Programming the Hilbert
+// curve", 2004: reflect and exchange axes from the largest cube down, then undo the Gray code).
 std::uint32_t hilbert(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   std::uint32_t c[3] = {x, y, z};
   for (std::uint32_t half = 512; half > 1; half /= 2)

@@ -90,8 +90,9 @@ TEST_CASE("bake_field: distances are exact beside slivers and where corners lie 
     strip.triangles.push_back({2 * i + 1, 2 * i + 3, 2 * i + 2});
   }
   CHECK(worst_outside(strip, 64) < 1e-3);
-  const Mesh junction = {{{-1, 0, 0}, {1, 0, 0}, {0, 1, 0.3}, {0, 0, 0}, {0.3, -1, 0.2}, {-0.7, -0.9, 0}},
-                         {{0, 1, 2}, {3, 1, 4}, {0, 3, 5}, {3, 4, 5}},
-                         {}, {}, {}};
+  Mesh junction;
+  junction.vertices = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0.3}, {0, 0, 0}, {0.3, -1, 0.2},
+                       {-0.7, -0.9, 0}};
+  junction.triangles = {{0, 1, 2}, {3, 1, 4}, {0, 3, 5}, {3, 4, 5}};
   CHECK(worst_outside(junction, 64) < 1e-3);
 }
