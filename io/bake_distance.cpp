@@ -51,7 +51,7 @@ void add_part_near(std::vector<double>& corners, const Corner (&t)[3], double re
 // The triangles of a tile, cut and ready.
 struct Facets {
   std::vector<kernels::DistanceFacet> facet;
-  std::vector<kernels::FacetRegion> region;
+  std::vector<kernels::FacetRegion> region;  // at least as many; only what is in use is set
   std::vector<std::uint64_t> near;  // bricks
   std::vector<double> corners;      // 9 each, tile-local
   std::vector<std::uint32_t> owner; // triangle
@@ -83,7 +83,6 @@ void set_region(const Features& features, const Surface& surface, std::uint32_t 
 void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles,
              const Features& features, std::size_t tile, Facets& out) {
   out.facet.clear();
-  out.region.clear();
   out.near.clear();
   out.corners.clear();
   out.owner.clear();
@@ -105,41 +104,63 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles,
       out.facet.push_back(kernels::make_distance_facet(out.corners.data() + 9 * f));
       out.near.push_back(tiles.near[i]);
       out.owner.push_back(t);
-      out.region.emplace_back();
+      if (out.region.size() < out.facet.size()) out.region.emplace_back();
+      kernels::FacetRegion& region = out.region[out.facet.size() - 1];
+      region.edges = region.corners = 0;
+      region.everywhere = true;
     }
     // A triangle cut, or without area, is weighed everywhere.
     if (farthest < kFar && out.facet.back().inside_from <= 0)
-      set_region(features, surface, t, corner, out.region.back());
+      set_region(features, surface, t, corner, out.region[out.facet.size() - 1]);
   }
 }
 
+bool has_several_parts(const Surface& surface, const Facets& facets) {
+  for (const std::uint32_t t : facets.owner)
+    if (surface.part[t] != surface.part[facets.owner[0]]) return true;
+  return false;
+}
+
 // The part of the mesh nearest to the middle of the brick; of equals that of the first triangle.
+// `u` are the distances of the brick's nodes, exact below reach.
 std::int32_t nearest_part(const Surface& surface, const Facets& facets, int brick,
-                          const float (&origin)[3]) {
-  const double middle[3] = {origin[0] + 3.5, origin[1] + 3.5, origin[2] + 3.5};
-  double nearest = std::numeric_limits<double>::max();
-  std::uint32_t owner = 0;
+                          const float (&origin)[3], const float* u, float reach) {
   thread_local std::vector<std::uint32_t> list;
   list.resize(facets.near.size());
   std::size_t count = 0;
-  bool several = false;
   for (std::size_t i = 0; i < facets.near.size(); ++i) {
     list[count] = std::uint32_t(i);
     count += facets.near[i] >> brick & 1;
   }
   if (count == 0) return 0;
   const std::int32_t part = surface.part[facets.owner[list[0]]];
+  bool several = false;
   for (std::size_t i = 1; i < count; ++i) several |= surface.part[facets.owner[list[i]]] != part;
   if (!several) return part;
+
+  const double middle[3] = {origin[0] + 3.5, origin[1] + 3.5, origin[2] + 3.5};
+  const float at[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
+  float around = reach;  // the eight nodes around the middle are less than 0.8661 away
+  for (const std::size_t n : {219u, 220u, 227u, 228u, 283u, 284u, 291u, 292u})
+    around = std::min(around, u[n]);
+  float most = around < reach ? around + 0.8661f + 1e-3f : 1e9f;
+  double nearest = std::numeric_limits<double>::max();
+  std::uint32_t owner = 0;
   for (const std::uint32_t i : std::span(list.data(), count)) {
     const kernels::DistanceFacet& f = facets.facet[i];
-    const double off = f.gx[6] * middle[0] + f.gy[6] * middle[1] + f.gz[6] * middle[2] + f.c[6];
-    if ((std::fabs(off) - 1e-3) * std::fabs(off) > nearest) continue;  // off its plane already
+    // Off its plane, or beyond one of its edges.
+    float least = 0;
+    for (std::size_t k = 3; k < 7; ++k) {
+      const float v = f.gx[k] * at[0] + f.gy[k] * at[1] + f.gz[k] * at[2] + f.c[k];
+      least = std::max(least, k == 6 ? std::fabs(v) : -v);
+    }
+    if (least > most) continue;
     const double* t = facets.corners.data() + 9 * i;
     const double d2 = kernels::point_triangle_squared(middle, t, t + 3, t + 6);
     if (d2 > nearest || (d2 == nearest && facets.owner[i] >= owner)) continue;
     nearest = d2;
     owner = facets.owner[i];
+    most = std::min(most, float(std::sqrt(nearest)) + 1e-3f);
   }
   return surface.part[owner];
 }
@@ -177,6 +198,8 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
   std::uint64_t used = 0, weighed = 0;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) used |= tiles.near[i];
   for (std::uint64_t near : facets.near) weighed |= near;
+  const bool several_parts =
+      !band.part.empty() && (facets.owner.empty() || has_several_parts(surface, facets));
   for (; used != 0; used &= used - 1) {
     const int b = std::countr_zero(used);
     const int in[3] = {b % 4, b / 4 % 4, b / 16};
@@ -193,7 +216,10 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
     NodeMask near = above(u, std::nextafter(zero_set, 0.0f));
     for (std::uint64_t& z : near.z) z = ~z;
     band.towards[r] = looked_at_by(near);
-    if (!band.part.empty()) band.part[r] = nearest_part(surface, facets, b, origin);
+    if (band.part.empty()) continue;
+    band.part[r] = several_parts
+                       ? nearest_part(surface, facets, b, origin, u, float(grid.reach()))
+                       : surface.part[facets.owner[0]];
   }
 }
 

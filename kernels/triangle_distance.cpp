@@ -129,17 +129,86 @@ HWY_INLINE void values_at(const float* gx, const float* gy, const float* gz, con
               d, out + k);
 }
 
-// What functions gain over half a block at most, and the leeway.
+// What functions gain over half a box at most, and the leeway.
 HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::size_t count,
-                      float* out) {
+                      const float (&half)[3], float* out) {
   const hn::CappedTag<float, 8> d;
   for (std::size_t k = 0; k < count; k += hn::Lanes(d))
-    hn::Store(hn::MulAdd(hn::Set(d, kBlockHalf[0]), hn::Abs(hn::LoadU(d, gx + k)),
-                         hn::MulAdd(hn::Set(d, kBlockHalf[1]), hn::Abs(hn::LoadU(d, gy + k)),
-                                    hn::MulAdd(hn::Set(d, kBlockHalf[2]),
+    hn::Store(hn::MulAdd(hn::Set(d, half[0]), hn::Abs(hn::LoadU(d, gx + k)),
+                         hn::MulAdd(hn::Set(d, half[1]), hn::Abs(hn::LoadU(d, gy + k)),
+                                    hn::MulAdd(hn::Set(d, half[2]),
                                                hn::Abs(hn::LoadU(d, gz + k)),
                                                hn::Set(d, kLeeway)))),
               d, out + k);
+}
+
+// Boxes of one size, as a triangle's functions and the planes of its region see them.
+struct Gains {
+  alignas(64) float function[8], plane[kPlanes];
+};
+HWY_INLINE void set_gains(const DistanceFacet& f, const FacetRegion& r, const float (&half)[3],
+                          Gains& gain) {
+  gains(f.gx, f.gy, f.gz, 8, half, gain.function);
+  if ((r.edges | r.corners) != 0) gains(r.gx, r.gy, r.gz, kPlanes, half, gain.plane);
+}
+
+// Whether boxes may meet the region: their middles are at (x, y, z), where the functions are s and
+// w; `plane` is what the planes are at (0, 0, 0).
+HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains& gain,
+                      const float* plane, VF x, VF y, VF z, const VF (&s)[3], const VF (&w)[3]) {
+  const D d;
+  const auto below = [&](VF value, float level) HWY_ATTR {
+    return hn::Le(value, hn::Set(d, level));
+  };
+  const auto above = [&](VF value, float level) HWY_ATTR {
+    return hn::Ge(value, hn::Set(d, level));
+  };
+  const auto below_plane = [&](std::size_t k) HWY_ATTR {
+    return below(hn::MulAdd(x, hn::Set(d, r.gx[k]),
+                            hn::MulAdd(y, hn::Set(d, r.gy[k]),
+                                       hn::MulAdd(z, hn::Set(d, r.gz[k]), hn::Set(d, plane[k])))),
+                 gain.plane[k]);
+  };
+  const float* g = gain.function;
+  auto there = hn::And(hn::And(above(w[0], -g[3]), above(w[1], -g[4])), above(w[2], -g[5]));
+  for (std::size_t e = 0; e < 3; ++e)
+    if (r.edges >> e & 1)
+      there = hn::Or(there, hn::And(hn::And(below(w[e], g[3 + e]), below_plane(e)),
+                                    below(hn::Abs(s[e]), f.half[e] + g[e])));
+  for (std::size_t v = 0; v < 3; ++v)
+    if (r.corners >> v & 1) {
+      const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
+      there = hn::Or(there, hn::And(hn::And(hn::And(below(s[v], g[v] - f.half[v]),
+                                                    above(s[u], f.half[u] - g[u])),
+                                            hn::And(below_plane(p), below_plane(p + 1))),
+                                    hn::And(below_plane(p + 2), below_plane(p + 3))));
+    }
+  return there;
+}
+
+// Those of the bricks that may meet the region.
+HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r,
+                                    std::uint64_t bricks) {
+  constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
+  const D d;
+  Gains gain = {};
+  set_gains(f, r, kBrickHalf, gain);
+  std::uint64_t met = 0;
+  for (std::size_t b = 0; b < 64; b += hn::Lanes(d)) {
+    if ((bricks >> b & ((std::uint64_t{1} << hn::Lanes(d)) - 1)) == 0) continue;
+    const VF x = hn::Load(d, kTile.x + b), y = hn::Load(d, kTile.y + b),
+             z = hn::Load(d, kTile.z + b);
+    const auto at = [&](std::size_t k) HWY_ATTR {
+      return hn::MulAdd(x, hn::Set(d, f.gx[k]),
+                        hn::MulAdd(y, hn::Set(d, f.gy[k]),
+                                   hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
+    };
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, meets(f, r, gain, r.c, x, y, z, s, w), bits);
+    met |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;
+  }
+  return bricks & met;
 }
 
 // One triangle, prepared for all bricks of its tile.
@@ -149,7 +218,7 @@ struct Ready {
   const FacetRegion& region;
   Pattern<kBlock> nodes;
   Pattern<kBlocks> middles;
-  alignas(64) float gain[8], plane_gain[kPlanes];
+  Gains gain = {};
 };
 
 // The blocks of a brick where the triangle may lower a distance. `first` and `plane` are its
@@ -163,48 +232,18 @@ HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const f
     const auto at = [&](std::size_t k) HWY_ATTR {
       return hn::Add(hn::Load(d, t.middles.v[k] + b), hn::Set(d, first[k]));
     };
-    const auto below = [&](VF value, float level) HWY_ATTR {
-      return hn::Le(value, hn::Set(d, level));
-    };
-    const auto above = [&](VF value, float level) HWY_ATTR {
-      return hn::Ge(value, hn::Set(d, level));
-    };
     const VF h = at(6), farthest = hn::Load(d, most + b);
-    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
-    const VF gap = hn::Max(hn::Sub(hn::Abs(h), hn::Set(d, t.gain[6])), hn::Zero(d));
+    const VF gap = hn::Max(hn::Sub(hn::Abs(h), hn::Set(d, t.gain.function[6])), hn::Zero(d));
     auto in = hn::Le(hn::Mul(gap, gap), farthest);
     if (hn::AllFalse(d, in)) continue;
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
     if (t.region.everywhere) {
       const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared(f, s, w)));
       in = hn::And(in, hn::Le(hn::Sub(away, hn::Set(d, kRadius + kRounding)), hn::Sqrt(farthest)));
     } else {
-      auto there = hn::And(hn::And(above(w[0], -t.gain[3]), above(w[1], -t.gain[4])),
-                           above(w[2], -t.gain[5]));
-      const VF x = hn::Load(d, kNodes.middle_x + b), y = hn::Load(d, kNodes.middle_y + b),
-               z = hn::Load(d, kNodes.middle_z + b);
-      const auto below_plane = [&](std::size_t k) HWY_ATTR {
-        const FacetRegion& r = t.region;
-        return below(hn::MulAdd(x, hn::Set(d, r.gx[k]),
-                                hn::MulAdd(y, hn::Set(d, r.gy[k]),
-                                           hn::MulAdd(z, hn::Set(d, r.gz[k]),
-                                                      hn::Set(d, plane[k])))),
-                     t.plane_gain[k]);
-      };
-      for (std::size_t e = 0; e < 3; ++e)
-        if (t.region.edges >> e & 1)
-          there = hn::Or(there,
-                         hn::And(hn::And(below(w[e], t.gain[3 + e]), below_plane(e)),
-                                 below(hn::Abs(s[e]), f.half[e] + t.gain[e])));
-      for (std::size_t v = 0; v < 3; ++v)
-        if (t.region.corners >> v & 1) {
-          const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
-          there = hn::Or(there,
-                         hn::And(hn::And(hn::And(below(s[v], t.gain[v] - f.half[v]),
-                                                 above(s[u], f.half[u] - t.gain[u])),
-                                         hn::And(below_plane(p), below_plane(p + 1))),
-                                 hn::And(below_plane(p + 2), below_plane(p + 3))));
-        }
-      in = hn::And(in, there);
+      in = hn::And(in, meets(f, t.region, t.gain, plane, hn::Load(d, kNodes.middle_x + b),
+                             hn::Load(d, kNodes.middle_y + b), hn::Load(d, kNodes.middle_z + b), s,
+                             w));
     }
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, in, bits);
@@ -247,15 +286,16 @@ void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
     std::fill_n(room.most + b * kBlocks, kBlocks, reach * reach);
   }
   for (std::size_t i = 0; i < count; ++i) {
-    if (near[i] == 0) continue;
     const DistanceFacet& f = facets[i];
     const FacetRegion& r = regions[i];
+    std::uint64_t bricks = near[i];
+    if (!r.everywhere && (bricks & (bricks - 1)) != 0) bricks = bricks_met(f, r, bricks);
+    if (bricks == 0) continue;
     Ready t(f, r);
     make_pattern(f, kNodes.in_x, kNodes.in_y, kNodes.in_z, t.nodes);
     make_pattern(f, kNodes.middle_x, kNodes.middle_y, kNodes.middle_z, t.middles);
-    gains(f.gx, f.gy, f.gz, 8, t.gain);
-    if ((r.edges | r.corners) != 0) gains(r.gx, r.gy, r.gz, kPlanes, t.plane_gain);
-    for (std::uint64_t bricks = near[i]; bricks != 0; bricks &= bricks - 1) {
+    set_gains(f, r, kBlockHalf, t.gain);
+    for (; bricks != 0; bricks &= bricks - 1) {
       const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(bricks);
       const float x = float(8 * (b % 4)), y = float(8 * (b / 4 % 4)), z = float(8 * (b / 16));
       alignas(64) float first[8], plane[kPlanes];
@@ -343,88 +383,6 @@ HWY_EXPORT(TileDistance);
 HWY_EXPORT(BrickDistance);
 HWY_EXPORT(BricksWithinReach);
 HWY_EXPORT(NodesAbove);
-
-namespace {
-
-using Row = std::array<double, 3>;
-double dot(const Row& a, const Row& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Row cross(const Row& a, const Row& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Row times(double s, const Row& a) { return {s * a[0], s * a[1], s * a[2]}; }
-
-void set_function(DistanceFacet& f, std::size_t k, const Row& g, const Row& zero_at) {
-  f.gx[k] = float(g[0]);
-  f.gy[k] = float(g[1]);
-  f.gz[k] = float(g[2]);
-  f.c[k] = float(-dot(g, zero_at));
-}
-
-// Unit, across a.
-Row any_normal(const Row& a) {
-  std::size_t least = 0;
-  for (std::size_t k = 1; k < 3; ++k)
-    if (std::fabs(a[k]) < std::fabs(a[least])) least = k;
-  Row e{};
-  e[least] = 1;
-  const Row n = cross(a, e);
-  return times(1 / std::sqrt(dot(n, n)), n);
-}
-
-// Three times the segment from `from` along the unit vector `along`; nothing lies over it.
-void set_segment(DistanceFacet& f, const Row& from, const Row& along, double length) {
-  const Row n = any_normal(along), in = cross(n, along);
-  const Row middle = {from[0] + length / 2 * along[0], from[1] + length / 2 * along[1],
-                      from[2] + length / 2 * along[2]};
-  for (std::size_t e = 0; e < 3; ++e) {
-    set_function(f, e, along, middle);
-    set_function(f, 3 + e, in, from);
-    f.half[e] = float(length / 2);
-  }
-  set_function(f, 6, n, from);
-  f.inside_from = 1e30f;
-}
-
-}  // namespace
-
-DistanceFacet make_distance_facet(const double* t) {
-  DistanceFacet f;
-  f.gx[7] = f.gy[7] = f.gz[7] = f.c[7] = 0;
-  const Row corner[3] = {{t[0], t[1], t[2]}, {t[3], t[4], t[5]}, {t[6], t[7], t[8]}};
-  Row edge[3];
-  double length[3];
-  std::size_t longest = 0;
-  for (std::size_t e = 0; e < 3; ++e) {
-    const Row &a = corner[e], &b = corner[(e + 1) % 3];
-    edge[e] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    length[e] = std::sqrt(dot(edge[e], edge[e]));
-    if (length[e] > length[longest]) longest = e;
-    f.low[e] = float(std::min({corner[0][e], corner[1][e], corner[2][e]}));
-    f.high[e] = float(std::max({corner[0][e], corner[1][e], corner[2][e]}));
-  }
-  const Row n = cross(edge[2], edge[0]);
-  const double n_length = std::sqrt(dot(n, n)), height_over = n_length / length[longest];
-  // Below a height of 1e-4 voxel the longest edge alone is right to that.
-  if (!(height_over > 1e-4)) {
-    const Row along = length[longest] > 1e-9 ? times(1 / length[longest], edge[longest])
-                                             : Row{1, 0, 0};
-    set_segment(f, corner[longest], along, length[longest]);
-    return f;
-  }
-  const Row normal = times(1 / n_length, n);
-  for (std::size_t e = 0; e < 3; ++e) {
-    const Row along = times(1 / length[e], edge[e]);
-    const Row &a = corner[e], &b = corner[(e + 1) % 3];
-    set_function(f, e, along, {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2});
-    set_function(f, 3 + e, cross(normal, along), corner[e]);
-    f.half[e] = float(length[e] / 2);
-  }
-  set_function(f, 6, normal, corner[0]);
-  // Points on an edge are over the triangle whatever float says, but on a sliver that must not
-  // reach past its tips.
-  f.inside_from = -float(std::min(2e-6, 1e-5 * height_over / length[longest]));
-  return f;
-}
 
 std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach) {
   return HWY_DYNAMIC_DISPATCH(BricksWithinReach)(facet, reach);
