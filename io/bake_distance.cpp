@@ -84,9 +84,9 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, std::
   }
 }
 
-// The part of the mesh nearest to the middle of the brick; of equals that of the first triangle.
-std::int32_t nearest_part(const Surface& surface, const Facets& facets,
-                          std::span<const std::uint32_t> list, const float (&origin)[3]) {
+// The triangle of the surface nearest to the middle of the brick; of equals the first.
+std::uint32_t nearest_owner(const Facets& facets, std::span<const std::uint32_t> list,
+                            const float (&origin)[3]) {
   const double middle[3] = {origin[0] + 3.5, origin[1] + 3.5, origin[2] + 3.5};
   double nearest = std::numeric_limits<double>::max();
   std::uint32_t owner = 0;
@@ -100,7 +100,7 @@ std::int32_t nearest_part(const Surface& surface, const Facets& facets,
     nearest = d2;
     owner = facets.owner[i];
   }
-  return list.empty() ? 0 : surface.part[owner];
+  return owner;
 }
 
 NodeMask above(const float* u, float level) {
@@ -153,7 +153,10 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
     NodeMask near = above(u, std::nextafter(zero_set, 0.0f));
     for (std::uint64_t& z : near.z) z = ~z;
     band.towards[r] = looked_at_by(near);
-    if (!band.part.empty()) band.part[r] = nearest_part(surface, facets, {list.data(), count}, origin);
+    if (count == 0) continue;
+    const std::uint32_t owner = nearest_owner(facets, {list.data(), count}, origin);
+    band.triangle[r] = surface.source[owner];
+    if (!band.part.empty()) band.part[r] = surface.part[owner];
   }
 }
 

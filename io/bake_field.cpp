@@ -98,6 +98,7 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
   band.towards.resize(band.rows());
   if (grid.offset < 0.5) band.crossing.resize(band.rows());
   if (!surface.part.empty()) band.part.resize(band.rows());
+  band.triangle.resize(band.rows(), -1);
   if (!steps.run("distance", from + 0.05, to, band.tiles.count(), threads, [&](std::size_t tile) {
         measure_tile(surface, grid, tile, band);
         if (!band.crossing.empty()) cross_tile(surface, grid, tile, band);

@@ -67,6 +67,7 @@ struct Surface {
   std::vector<Vec3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::int32_t> part;  // (triangles) or empty
+  std::vector<std::int32_t> source;// (triangles) of the mesh; -1: a plug
   Vec3 low{}, high{};              // [m]
   std::size_t duplicates = 0, flat = 0;
   std::size_t open_edges = 0;      // of one face
@@ -130,6 +131,7 @@ struct NarrowBand {
   std::vector<std::uint32_t> towards;  // (rows) bit i: near neighbour i is the zero set
   std::vector<Crossing> crossing;      // (rows), or empty where offset >= 0.5: not needed there
   std::vector<std::int32_t> part;      // (rows) or empty
+  std::vector<std::int32_t> triangle;  // (rows) of the mesh, nearest to the brick's middle; or -1
   std::size_t rows() const { return cell.size(); }
   float* nodes(std::size_t r) { return u.data() + r * kBrickSamples; }
   const float* nodes(std::size_t r) const { return u.data() + r * kBrickSamples; }

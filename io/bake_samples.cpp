@@ -80,6 +80,7 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached,
     kept.push_back(std::uint32_t(r));
   }
   if (!band.part.empty()) field.part.resize(kept.size());
+  field.triangle.resize(kept.size());
   Samples buffer(std::min(kept.size(), kBatch) * kBrickSamples);
   for (std::size_t begin = 0; begin < kept.size(); begin += kBatch) {
     const std::size_t count = std::min(kBatch, kept.size() - begin);
@@ -87,6 +88,7 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached,
       const std::size_t r = kept[begin + i];
       sign_row(grid, band, reached, inside, r, buffer.data() + i * kBrickSamples);
       if (!band.part.empty()) field.part[begin + i] = band.part[r];
+      field.triangle[begin + i] = band.triangle[r];
     });
     sched::parallel_for(count, threads, [&](std::size_t i) {
       std::copy_n(buffer.data() + i * kBrickSamples, kBrickSamples, band.nodes(begin + i));

@@ -134,6 +134,7 @@ class Plugs {
     }
     surface_.triangles.push_back({v[0], v[1], v[2]});
     surface_.triangles.push_back({v[0], v[2], v[3]});
+    surface_.source.insert(surface_.source.end(), 2, -1);
     if (!surface_.part.empty()) surface_.part.insert(surface_.part.end(), 2, part);
   }
 

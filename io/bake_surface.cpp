@@ -132,6 +132,7 @@ Result<Surface> prepare_surface(const Mesh& mesh) {
                       std::max(surface.high.z, p.z)};
     }
     surface.triangles.push_back(t);
+    surface.source.push_back(std::int32_t(i));
     if (parts) surface.part.push_back(mesh.part[i]);
   }
   if (surface.triangles.empty())

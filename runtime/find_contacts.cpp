@@ -35,6 +35,18 @@ kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
   return affine;
 }
 
+// The same for arms: from a's centre of mass, along the axes of the world.
+kernels::Affine arms_to_field(const Body& a, const Body& b, const Field& field) {
+  const Mat3 m = b.R.transpose() / field.voxel;
+  const Vec3 t = m * (a.x - (b.x - b.R * b.com)) - field.origin / field.voxel;
+  kernels::Affine affine;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
+    affine.m[r][3] = static_cast<float>(t[r]);
+  }
+  return affine;
+}
+
 // `series` needs the points that are about to touch. [voxel]
 float margin_of(const h6Session& s) {
   return s.contact.method == H6_METHOD_SERIES ? static_cast<float>(s.contact.margin_voxels) : 0.0f;
@@ -257,6 +269,7 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
                             c.gx + first, c.gy + first, c.gz + first, c.rx + first, c.ry + first,
                             c.rz + first, c.point + first});
     c.count += pair.candidates;
+    if (pair.candidates > 0) pair.arms = arms_to_field(a, b, field);
     pair.begin = first;
     std::fill_n(c.field_body + first, pair.candidates, pair.b);
     pair.end = c.count;

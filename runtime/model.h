@@ -14,7 +14,10 @@ struct Field {
   kernels::FieldView view{};
   Buffer<std::int32_t> table;
   Buffer<std::int16_t> bricks, far;
-  std::size_t bytes() const { return table.count * 4 + bricks.count * 2 + far.count * 2; }
+  Buffer<std::int32_t> part, triangle;  // (bricks) or empty
+  std::size_t bytes() const {
+    return (table.count + part.count + triangle.count) * 4 + (bricks.count + far.count) * 2;
+  }
 };
 
 // Spheres around equal runs of points; the radius is rounded up.

@@ -55,6 +55,7 @@ struct Pair {
   float *group_expiry = nullptr, *block_expiry = nullptr;
   double travelled = -1;         // < 0: nothing is known
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
+  kernels::Affine arms{};        // the same for arms of contacts [m], when they were gathered
   // When both move: how each one's motion changes the other's wrench.
   Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
   // `series` lets the field bodies of one shell body feel one another: pair p's wrench on b_p

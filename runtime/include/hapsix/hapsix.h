@@ -73,6 +73,12 @@ H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6Devi
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
+/* What the contacts of h6GetContacts are with: for each row the `part` and the `triangle` that the
+ * field names for the brick (8 voxels wide) in which the contact is, -1 where it names none, or
+ * the contact is deeper than all bricks. Each array has room for `count` rows, or is NULL. Until
+ * the next step, like the contacts; a frame spends nothing on it. */
+H6_API void          h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
+                                    int32_t* triangle);
 H6_API h6FrameReport h6GetFrame(const h6Session* session);
 /* What the zeros of the defs became: coupling in use by a hand, the voxel of a body [m]. */
 H6_API h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand);

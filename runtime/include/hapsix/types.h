@@ -38,6 +38,7 @@ typedef struct h6FieldDef {
   double         band;         /* every unit cell with a point nearer than this to the surface
                                   has all of its 8 nodes in bricks                             [m] */
   const int32_t* part;         /* (brick_count) nearest part of the mesh, or NULL                  */
+  const int32_t* triangle;     /* (brick_count) nearest triangle of the mesh, -1: none; or NULL    */
 } h6FieldDef;
 
 /* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs
