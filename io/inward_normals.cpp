@@ -56,6 +56,7 @@ struct Piece {  // triangles joined by edges that exactly two of them share
   double area = 0, area_kept = 0;  // [m^2]; the part whose winding is as read
   Vec3 low{}, high{};
   bool flip = false;  // of its one winding, so that normals point out
+  bool bowl = false;  // open, but it holds a volume
 };
 
 class Orientation {
@@ -288,8 +289,8 @@ void Orientation::settle_signs() {
     }
     // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; a twentieth of it is a
     // bowl, less is a sheet.
-    const bool bowl = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
-    piece.flip = bowl ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
+    piece.bowl = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
+    piece.flip = piece.bowl ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
   }
 }
 
@@ -339,9 +340,11 @@ FaceTable Orientation::run() {
   find_open_pieces();
   settle_signs();
   table_.sheet.assign(faces_.size(), 0);
+  table_.bowl.assign(faces_.size(), 0);
   for (std::uint32_t t = 0; t < faces_.size(); ++t) {
     if (piece_of_[t] == none) continue;
     table_.sheet[t] = !pieces_[piece_of_[t]].closed;
+    table_.bowl[t] = pieces_[piece_of_[t]].bowl;
     if (bool(reversed_[t]) == pieces_[piece_of_[t]].flip) continue;
     Vec3& n = table_.inward[t];
     n = {-n.x, -n.y, -n.z};
