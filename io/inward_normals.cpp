@@ -251,29 +251,40 @@ int Orientation::crossings(const Piece& piece, const Vec3& from, const Vec3& alo
   return count;
 }
 
-// Inside an odd number of closed pieces that are wound the other way (or mixed, or it is). A piece
-// wound like the one around it is a part inside a part, not a hollow.
+// Whether there is a body around the piece and none in it. Windings of closed pieces tell where
+// bodies are: where as many are entered as left there is none. A piece wound like the one around it
+// is a part inside a part, not a hollow; one more within the hollow is a body again. Where a
+// winding was mixed it tells nothing: hollow is then what an odd number of pieces is around.
 bool Orientation::hollow(std::size_t c) const {
   const Piece& piece = pieces_[c];
-  const std::uint32_t t = piece.triangles[0];
-  const Vec3 &a = corner(t, 0), &b = corner(t, 1), &d = corner(t, 2);
-  const Vec3 from{(a.x + b.x + d.x) / 3, (a.y + b.y + d.y) / 3, (a.z + b.z + d.z) / 3};
-  constexpr Vec3 rays[3] = {
-      {0.8017, 0.5323, 0.2719}, {-0.3571, 0.8929, 0.2741}, {0.1873, -0.4561, 0.87}};
-  int around = 0;
+  std::vector<std::size_t> maybe;
+  bool unlike = false, mixed = piece.turned;
   for (std::size_t o = 0; o < pieces_.size(); ++o) {
     const Piece& outer = pieces_[o];
     const bool holds = outer.low.x < piece.low.x && outer.high.x > piece.high.x &&
                        outer.low.y < piece.low.y && outer.high.y > piece.high.y &&
                        outer.low.z < piece.low.z && outer.high.z > piece.high.z;
     if (o == c || !outer.closed || !holds) continue;
-    const bool alike = !outer.turned && !piece.turned && (outer.volume < 0) == (piece.volume < 0);
-    if (alike) continue;
-    int votes = 0;
-    for (const Vec3& ray : rays) votes += crossings(outer, from, ray) % 2;
-    around += votes >= 2;
+    maybe.push_back(o);
+    mixed |= outer.turned;
+    unlike |= outer.turned || (outer.volume < 0) != (piece.volume < 0);
   }
-  return around % 2 == 1;
+  if (!unlike && !piece.turned) return false;
+  const std::uint32_t t = piece.triangles[0];
+  const Vec3 &a = corner(t, 0), &b = corner(t, 1), &d = corner(t, 2);
+  const Vec3 from{(a.x + b.x + d.x) / 3, (a.y + b.y + d.y) / 3, (a.z + b.z + d.z) / 3};
+  constexpr Vec3 rays[3] = {
+      {0.8017, 0.5323, 0.2719}, {-0.3571, 0.8929, 0.2741}, {0.1873, -0.4561, 0.87}};
+  int around = 0, bodies = 0;
+  for (const std::size_t o : maybe) {
+    int votes = 0;
+    for (const Vec3& ray : rays) votes += crossings(pieces_[o], from, ray) % 2;
+    if (votes < 2) continue;
+    ++around;
+    bodies += pieces_[o].volume < 0 ? -1 : 1;
+  }
+  if (mixed) return around % 2 == 1;
+  return bodies != 0 && bodies + (piece.volume < 0 ? -1 : 1) == 0;
 }
 
 void Orientation::settle_signs() {
