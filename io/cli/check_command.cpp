@@ -5,8 +5,10 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "io/bake_plan.h"
+#include "io/clearance.h"
 #include "io/cli/checks.h"
 #include "io/cli/commands.h"
 #include "io/exact_check.h"
@@ -36,6 +38,7 @@ struct Subject {
   std::string name;
   io::Mesh mesh;
   io::FieldBake bake;
+  h6Pose pose = {{0, 0, 0}, {1, 0, 0, 0}};
 };
 
 ordered_json spread(const std::vector<double>& lengths, double voxel) {
@@ -218,22 +221,45 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
   return m;
 }
 
+// The mesh of a field or a shell; none of a baked file or of given points.
+template <class Source>
+Result<io::Mesh> mesh_of(const Source& source, const io::Scene& scene) {
+  if (source.mesh_data) return *source.mesh_data;
+  if (source.mesh.empty()) return io::Mesh{};
+  return io::read_mesh(source.mesh, source.unit.value_or(scene.unit));
+}
+
 // The bodies of a scene that are touched as fields.
 Result<std::vector<Subject>> subjects_of_scene(const io::Scene& scene) {
   std::vector<Subject> out;
   for (const io::SceneBody& b : scene.bodies) {
-    if (!b.field || !b.field->file.empty()) continue;  // a baked file has no mesh to look at
-    Subject s{b.name, {}, b.field->bake};
-    if (b.field->mesh_data) {
-      s.mesh = *b.field->mesh_data;
-    } else {
-      Result<io::Mesh> mesh = io::read_mesh(b.field->mesh, b.field->unit.value_or(scene.unit));
-      if (!mesh) return mesh.failure();
-      s.mesh = std::move(*mesh);
-    }
-    out.push_back(std::move(s));
+    if (!b.field) continue;
+    Result<io::Mesh> mesh = mesh_of(*b.field, scene);
+    if (!mesh) return mesh.failure();
+    if (mesh->triangles.empty()) continue;
+    out.push_back({b.name, std::move(*mesh), b.field->bake, b.pose});
   }
   return out;
+}
+
+// How far every shell is from a field where the scene begins, less the field's offset.
+Result<ordered_json> clearances(const Console& console, const io::Scene& scene, const Subject& s,
+                                const ordered_json& m, unsigned threads) {
+  ordered_json list = ordered_json::array();
+  for (const io::SceneBody& b : scene.bodies) {
+    if (!b.shell || b.name == s.name) continue;
+    const Result<io::Mesh> mesh = mesh_of(*b.shell, scene);
+    if (!mesh) return mesh.failure();
+    const Result<double> gap = io::clearance(*mesh, b.pose, s.mesh, s.pose, threads);
+    if (!gap) return gap.failure();
+    if (!std::isfinite(*gap)) continue;
+    const double voxels = (*gap - m["offset"].get<double>()) / m["voxel_size"].get<double>();
+    list.push_back({{"shell", b.name}, {"distance_m", *gap}, {"voxels", voxels}});
+    if (!console.json)
+      std::printf("  start   %s is %.3g mm away: %.3g voxels from contact\n", b.name.c_str(),
+                  1e3 * *gap, voxels);
+  }
+  return list;
 }
 
 int check_command(const Console& console, CheckOptions& o) {
@@ -254,9 +280,11 @@ int check_command(const Console& console, CheckOptions& o) {
     if (Outcome there = check_input(file); !there) return console.fail(there.error());
     std::vector<Subject> subjects;
     double stiffness = o.stiffness;
+    std::optional<io::Scene> scene;
     if (file.ends_with(".json")) {
-      const Result<io::Scene> scene = io::read_scene(file);
-      if (!scene) return console.fail(scene.error());
+      Result<io::Scene> read = io::read_scene(file);
+      if (!read) return console.fail(read.error());
+      scene = std::move(*read);
       Result<std::vector<Subject>> found = subjects_of_scene(*scene);
       if (!found) return console.fail(found.error());
       subjects = std::move(*found);
@@ -264,11 +292,16 @@ int check_command(const Console& console, CheckOptions& o) {
     } else {
       Result<io::Mesh> mesh = io::read_mesh(file, *unit);
       if (!mesh) return console.fail(mesh.error());
-      subjects.push_back({file, std::move(*mesh), o.bake});
+      subjects.push_back({file, std::move(*mesh), o.bake, {{0, 0, 0}, {1, 0, 0, 0}}});
     }
     for (const Subject& s : subjects) {
       Result<ordered_json> m = check_one(console, o, s, stiffness, verified);
       if (!m) return console.fail(m.error());
+      if (scene) {
+        Result<ordered_json> start = clearances(console, *scene, s, *m, o.bake.threads);
+        if (!start) return console.fail(start.error());
+        (*m)["clearances"] = std::move(*start);
+      }
       list.push_back(std::move(*m));
     }
   }

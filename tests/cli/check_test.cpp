@@ -97,6 +97,28 @@ TEST_CASE(
   for (const Json& m : all["meshes"]) CHECK(m["triangles"].get<int>() > 0);
 }
 
+TEST_CASE("how far a scene's shells are from its fields at the start is told in voxels") {
+  Sandbox box;
+  spill(box.file("cube.stl"), stl(box_facets(10)));
+  const Json body{{"mesh", "cube.stl"}};
+  Json field = body;
+  field["voxel_size"] = 0.5;
+  const Json scene{{"hapsix", 1},
+                   {"units", "mm"},
+                   {"bodies",
+                    {{{"name", "floor"}, {"fixed", true}, {"field", field}},
+                     {{"name", "part"},
+                      {"shell", {{"mesh", "cube.stl"}, {"points", 500}}},
+                      {"pose", {{"p", {2, 1, 12}}, {"q", {1, 0, 0, 0}}}}}}}};
+  spill(box.file("scene.json"), scene.dump());
+  const Json all = result_of(box, {"check", "scene.json"});
+  const Json start = all["meshes"][0]["clearances"];
+  REQUIRE(start.size() == 1);
+  CHECK(start[0]["shell"] == "part");
+  CHECK(near(start[0]["distance_m"].get<double>(), 2e-3, 1e-8));
+  CHECK(near(start[0]["voxels"].get<double>(), 4, 1e-4));
+}
+
 TEST_CASE("wrong input gets one sentence and the right code") {
   Sandbox box;
   spill(box.file("ball.stl"), stl(sphere_facets(50, 10)));
