@@ -56,6 +56,7 @@ struct Piece {  // triangles joined by edges that exactly two of them share
   double area = 0, area_kept = 0;  // [m^2]; the part whose winding is as read
   Vec3 low{}, high{};
   bool flip = false;  // of its one winding, so that normals point out
+  double lid = 0;     // open: area of a flat lid over it [m^2]
   bool bowl = false;  // open, but it holds a volume
 };
 
@@ -228,11 +229,16 @@ void Orientation::find_open_pieces() {
     const Vec3 middle{(piece.low.x + piece.high.x) / 2, (piece.low.y + piece.high.y) / 2,
                       (piece.low.z + piece.high.z) / 2};
     piece.volume = 0;
+    Vec3 across{};  // of all vector areas, twice: that of the lids that are missing
     for (const std::uint32_t t : piece.triangles) {
       const double six = dot(minus(corner(t, 0), middle),
                              cross(minus(corner(t, 1), middle), minus(corner(t, 2), middle)));
       piece.volume += (reversed_[t] ? -six : six) / 6;
+      const Vec3 n = cross(minus(corner(t, 1), corner(t, 0)), minus(corner(t, 2), corner(t, 0)));
+      const double sign = reversed_[t] ? -1 : 1;
+      across = {across.x + sign * n.x, across.y + sign * n.y, across.z + sign * n.z};
     }
+    piece.lid = std::sqrt(dot(across, across)) / 2;
   }
 }
 
@@ -298,10 +304,11 @@ void Orientation::settle_signs() {
       inside_out_ += !piece.turned && !inside && piece.volume < 0;
       continue;
     }
-    // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; a twentieth of it is a
-    // bowl, less is a sheet.
-    piece.bowl = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
-    piece.flip = piece.bowl ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
+    // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; with a twentieth of it
+    // the volume tells the sides, with less it is a sheet.
+    const bool holds = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
+    piece.flip = holds ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
+    piece.bowl = holds && piece.lid < 0.35 * piece.area;  // a box without a lid: 0.2
   }
 }
 

@@ -263,6 +263,12 @@ SurfacePlaces::SurfacePlaces(const Mesh& mesh) : mesh_(mesh) {
   }
 }
 
+SurfacePlaces::SurfacePlaces(const Mesh& mesh, const std::vector<double>& area) : mesh_(mesh) {
+  sum_.reserve(area.size());
+  double sum = 0;
+  for (const double a : area) sum_.push_back(sum += a);
+}
+
 SurfacePlaces::Place SurfacePlaces::operator()(Dice& dice) const {
   const auto found = std::upper_bound(sum_.begin(), sum_.end(), dice.within(0, sum_.back()));
   const auto t = std::min(std::size_t(found - sum_.begin()), sum_.size() - 1);

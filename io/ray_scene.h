@@ -73,10 +73,11 @@ class Dice {
   std::uint64_t state_;
 };
 
-// Places spread over the triangles, evenly by area.
+// Places spread over the triangles, evenly by area, or by given areas (triangles).
 class SurfacePlaces {
  public:
   explicit SurfacePlaces(const Mesh& mesh);
+  SurfacePlaces(const Mesh& mesh, const std::vector<double>& area);
   double area() const { return sum_.empty() ? 0 : sum_.back(); }  // [m^2]
   struct Place {
     std::uint32_t triangle;

@@ -29,7 +29,6 @@ class Probe {
     found.bowl = faces_.bowl[at.triangle];
     if (found.sheet) return found;
     const Vec3& in = faces_.inward[at.triangle];
-    if (faces_.area[at.triangle] == 0) return found;  // a line, or there twice
     // Solids that a step out of the place's own ends in: left less entered on the way to infinity.
     std::vector<Crossing> way;
     cross(at, {-in.x, -in.y, -in.z}, way);
@@ -76,7 +75,7 @@ Result<Walls> measure_walls(const Mesh& mesh, const WallOptions& options) {
   const Result<std::unique_ptr<RayScene>> rays = RayScene::make(mesh);
   if (!rays) return rays.failure();
   const FaceTable faces = face_table(mesh);
-  const SurfacePlaces places(mesh);
+  const SurfacePlaces places(mesh, faces.area);  // what is there twice counts once
   Walls walls;
   if (!(places.area() > 0) || options.places == 0) return walls;
   const Probe probe(**rays, faces);

@@ -92,6 +92,16 @@ TEST_CASE("sheets have no thickness; a box with a small hole is measured as if i
   CHECK(sheet.thickness.empty());
   CHECK(sheet.gap.empty());
 
+  Mesh shards;  // one triangle each, anywhere: sheets, and each counts once
+  Random random(3);
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    for (int k = 0; k < 3; ++k)
+      shards.vertices.push_back({random(-1, 1), random(-1, 1), random(-1, 1)});
+    for (int twice = 0; twice < 2; ++twice)
+      shards.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  CHECK(measure(shards).sheets == 1);
+
   Mesh holed = box({0, 0, 0}, {4, 4, 0.5}, 8);
   holed.triangles.resize(holed.triangles.size() - 1);
   const Walls w = measure(holed);
