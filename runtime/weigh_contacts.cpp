@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/gauss_sweep.h"
 #include "kernels/gauss_tree.h"
 #include "runtime/stages.h"
 #include "runtime/weighing.h"
@@ -93,23 +94,32 @@ void fill_facing(Contacts& c, bool filter) {
 
 namespace {
 
+template <class Run>
+void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
+  if (team) return team->for_slices(slices, run);
+  for (std::size_t i = 0; i < slices; ++i) run(i);
+}
+
 void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
                      void* scratch, float* weight) {
   const kernels::GaussTree tree = kernels::gauss_tree(view, rule.hat, rule.widths, scratch, weight);
-  for (int stage = 0; stage < kernels::kGaussStages; ++stage) {
-    const std::size_t slices = kernels::gauss_tree_slices(tree, stage);
-    const auto run = [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); };
-    if (team) {
-      team->for_slices(slices, run);
-    } else {
-      for (std::size_t i = 0; i < slices; ++i) run(i);
-    }
-  }
+  for (int stage = 0; stage < kernels::kGaussStages; ++stage)
+    for_slices(kernels::gauss_tree_slices(tree, stage), team,
+               [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); });
 }
 
-// The angle in the chord's place is no quadratic.
-bool tree_fits(const Rule& rule, std::size_t count) {
-  return rule.gauss && !rule.widths.geodesic && count >= kernels::gauss_tree_from(rule.hat);
+// False, and nothing weighed, where contacts crowd so that the tree is faster.
+bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
+                      void* scratch, float* weight) {
+  if (view.count > kernels::kGaussSweepMost) return false;
+  const kernels::GaussSweep sweep =
+      kernels::gauss_sweep(view, rule.hat, rule.widths, scratch, weight);
+  for (int stage = 0; stage < kernels::kGaussSweepStages; ++stage) {
+    if (stage == 1 && !kernels::gauss_sweep_pays(sweep)) return false;
+    for_slices(kernels::gauss_sweep_slices(sweep, stage), team,
+               [&](std::size_t i) { kernels::gauss_sweep_run(sweep, stage, i); });
+  }
+  return true;
 }
 
 void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
@@ -122,13 +132,13 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
                                      rule.facing ? c.facing : nullptr,
                                      rule.depth ? c.depth : nullptr,
                                      c.count};
-  if (scratch && tree_fits(rule, c.count)) {
-    weigh_with_tree(view, rule, team, scratch, c.weight);
-  } else if (c.count < kWorthSharing || !team) {
-    kernels::gauss_weights(view, rule.hat, rule.widths, 0, c.count, c.weight);
+  if (c.count < kWorthSharing) team = nullptr;
+  // The angle in the chord's place is no quadratic, and reaches farther.
+  if (scratch && !rule.widths.geodesic) {
+    if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
+      weigh_with_tree(view, rule, team, scratch, c.weight);
   } else {
-    const std::size_t slices = (c.count + kSlice - 1) / kSlice;
-    team->for_slices(slices, [&](std::size_t i) {
+    for_slices((c.count + kSlice - 1) / kSlice, team, [&](std::size_t i) {
       kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice,
                              std::min((i + 1) * kSlice, c.count), c.weight);
     });
@@ -156,7 +166,9 @@ void merge_clusters(h6Session& s, std::size_t first_pair, std::size_t end_pair) 
 
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
   const Rule rule = rule_of(def, 1.0);
-  return tree_fits(rule, count) ? kernels::gauss_tree_bytes(count, rule.hat) : 0;
+  if (!rule.gauss || rule.widths.geodesic) return 0;
+  return std::max(kernels::gauss_tree_bytes(count, rule.hat),
+                  kernels::gauss_sweep_bytes(std::min(count, kernels::kGaussSweepMost), rule.hat));
 }
 
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
