@@ -81,13 +81,29 @@ HWY_INLINE Buckets buckets_of(const GaussLine& g, std::size_t count, float* alon
           reach < static_cast<float>(buckets) ? static_cast<std::size_t>(reach) + 1 : buckets};
 }
 
-HWY_INLINE void place_rows(const GaussSweep& sweep, const GaussLine& g) {
-  const std::size_t count = sweep.contacts.count;
-  const std::uint32_t* const place = g.place;
-  for (int k = 0; k < g.axes; ++k) {
-    const float* const from = g.column[k];
-    float* const to = g.at[k];
-    for (std::size_t i = 0; i < count; ++i) to[place[i]] = from[i];
+// Columns in the order of `source`, with their padding. `source` may be where the shares go.
+HWY_INLINE void gather_rows(const GaussSweep& sweep, const GaussLine& g, float per_share,
+                            const std::uint32_t* source) {
+  const DF d;
+  const DI di;
+  const DirectionsView& c = sweep.contacts;
+  for (std::size_t i = 0; i < c.count; i += kLanes) {
+    const auto row = hn::Load(di, reinterpret_cast<const std::int32_t*>(source) + i);
+    const auto real = hn::FirstN(d, c.count - i);
+    for (int k = 0; k < g.axes; ++k) {
+      const VF v = hn::GatherIndex(d, g.column[k], row);
+      hn::Store(hn::IfThenElse(real, v, hn::Set(d, kNowhere)), d, g.at[k] + i);
+    }
+    if (c.facing == nullptr && c.depth == nullptr) continue;
+    VF share = hn::Set(d, per_share);
+    if (c.depth != nullptr) share = hn::Mul(share, hn::GatherIndex(d, c.depth, row));
+    if (c.facing != nullptr) share = hn::Mul(share, hn::GatherIndex(d, c.facing, row));
+    hn::Store(hn::IfThenElseZero(real, share), d, g.share + i);
+  }
+  const std::size_t padded = whole_tiles(c.count);
+  for (std::size_t i = (c.count + kLanes - 1) / kLanes * kLanes; i < padded; i += kLanes) {
+    for (int k = 0; k < g.axes; ++k) hn::Store(hn::Set(d, kNowhere), d, g.at[k] + i);
+    hn::Store(hn::Zero(d), d, g.share + i);
   }
 }
 
@@ -95,19 +111,19 @@ void sort_line(const GaussSweep& sweep, std::size_t density) {
   const GaussLine& g = sweep.line[density];
   const DirectionsView& c = sweep.contacts;
   const std::size_t count = c.count, padded = whole_tiles(count);
+  const std::size_t groups = (count + kRows - 1) / kRows;
   const bool weighted = c.facing != nullptr || c.depth != nullptr;
   const float per_share = weighted ? gauss_per_share(c) : 1.0f;
   if (density == 0) *sweep.per_share = per_share;
 
   std::uint64_t pairs = 0;
+  std::uint32_t* const source = reinterpret_cast<std::uint32_t*>(g.share);
   if (count < kSorted) {
-    for (std::size_t i = 0; i < count; ++i) g.place[i] = static_cast<std::uint32_t>(i);
-    for (std::size_t q = 0; q < (count + kRows - 1) / kRows; ++q)
-      g.end[q] = static_cast<std::uint32_t>(count);
+    for (std::size_t i = 0; i < count; ++i) g.place[i] = source[i] = static_cast<std::uint32_t>(i);
+    for (std::size_t q = 0; q < groups; ++q) g.end[q] = static_cast<std::uint32_t>(count);
   } else {
     std::uint32_t start[kMostBuckets + 1];
     std::uint32_t* const bucket = reinterpret_cast<std::uint32_t*>(g.row);
-    std::uint32_t* const sorted = reinterpret_cast<std::uint32_t*>(g.share);
     const Buckets buckets = buckets_of(g, count, g.at[0], bucket);
     std::fill_n(start, buckets.count + 1, 0u);
     for (std::size_t i = 0; i < count; ++i) g.place[i] = start[bucket[i]]++;
@@ -118,37 +134,26 @@ void sort_line(const GaussSweep& sweep, std::size_t density) {
       sum += here;
     }
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t to = g.place[i] += start[bucket[i]];
-      sorted[to] = bucket[i];
+      const std::uint32_t to = g.place[i] + start[bucket[i]];
+      g.place[i] = to;
+      source[to] = static_cast<std::uint32_t>(i);
     }
-    for (std::size_t first = 0; first < count; first += kRows) {
-      const std::uint32_t last = sorted[HWY_MIN(first + kRows, count) - 1];
-      g.end[first / kRows] = start[HWY_MIN(last + buckets.reach + 1, buckets.count)];
-      pairs += g.end[first / kRows] - first;
+    for (std::size_t q = 0; q < groups; ++q) {
+      const std::uint32_t last = bucket[source[HWY_MIN(q * kRows + kRows, count) - 1]];
+      g.end[q] = start[HWY_MIN(last + buckets.reach + 1, buckets.count)];
+      pairs += g.end[q] - q * kRows;
     }
   }
+  std::fill_n(source + count, padded - count, 0u);
   sweep.pairs[density] = pairs * kRows;
-  place_rows(sweep, g);
-  for (int k = 0; k < g.axes; ++k) std::fill_n(g.at[k] + count, padded - count, kNowhere);
-  if (weighted) {
-    for (std::size_t i = 0; i < count; ++i) {
-      float s = per_share;
-      if (c.depth != nullptr) s *= c.depth[i];
-      if (c.facing != nullptr) s *= c.facing[i];
-      g.share[g.place[i]] = s;
-    }
-    std::fill_n(g.share + count, padded - count, 0.0f);
-  }
+  gather_rows(sweep, g, per_share, source);
   // Half of the pairs to each part.
+  g.split[0] = 0, g.split[1] = g.split[2] = groups * kRows;
+  if (count < kSorted) return;
   std::uint64_t seen = 0;
-  std::size_t at = (count + kRows - 1) / kRows;
-  g.split[0] = 0, g.split[2] = at * kRows;
-  if (count < kSorted) {
-    g.split[1] = at * kRows;
-  } else {
-    for (at = 0; 2 * seen < pairs; ++at) seen += g.end[at] - at * kRows;
-    g.split[1] = at * kRows;
-  }
+  std::size_t q = 0;
+  for (; 2 * seen < pairs; ++q) seen += g.end[q] - q * kRows;
+  g.split[1] = q * kRows;
 }
 
 // ---- pairs
@@ -156,7 +161,7 @@ void sort_line(const GaussSweep& sweep, std::size_t density) {
 // Rows i .. i + kRows - 1.
 template <int kAxes>
 struct Group {
-  VF at[kRows][kAxes], share[kRows], sum[kRows], total[kRows];
+  VF at[kRows][3], share[kRows], sum[kRows];
 };
 
 template <int kAxes, bool kWeighted, bool kMasked>
@@ -170,7 +175,9 @@ HWY_INLINE void add_tile(const GaussLine& g, const VF* width2, std::size_t i, st
     VF v = width2[s];
     HWY_UNROLL(3)
     for (int k = 3 * s; k < 3 * s + 3; ++k) {
-      const VF gap = hn::Sub(x[k], rows.at[r][k]);
+      // Registers hold one sphere's; the other's come with the subtraction.
+      const VF at = s == 0 ? rows.at[r][k] : hn::Set(d, g.at[k][i + r]);
+      const VF gap = hn::Sub(x[k], at);
       v = hn::NegMulAdd(gap, gap, v);
     }
     return hn::Max(v, zero);
@@ -207,6 +214,45 @@ HWY_INLINE void add_tile(const GaussLine& g, const VF* width2, std::size_t i, st
   hn::Store(sum, d, column + j);
 }
 
+// Sums of four vectors' lanes, to to[0..3].
+HWY_INLINE void store_sums(const VF* sum, float* to) {
+  const DF d;
+#if HWY_TARGET == HWY_SCALAR
+  for (std::size_t r = 0; r < kRows; ++r) to[r] = hn::GetLane(hn::SumOfLanes(d, sum[r]));
+#else
+  const auto fold = [&](VF a, VF b) HWY_ATTR {
+    return hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b));
+  };
+  // In every block of four: rows 0 1 2 3.
+  const VF rows = fold(fold(sum[0], sum[2]), fold(sum[1], sum[3]));
+  const hn::CappedTag<float, 4> d4;
+  HWY_ALIGN float blocks[kTile];
+  hn::Store(rows, d, blocks);
+  auto total = hn::Load(d4, blocks);
+  for (std::size_t block = 4; block < kLanes; block += 4)
+    total = hn::Add(total, hn::Load(d4, blocks + block));
+  hn::StoreU(total, d4, to);
+#endif
+}
+
+// A group's rows from `i` on, with columns from `j` to `end`; returns where it stopped.
+template <int kAxes, bool kWeighted>
+HWY_INLINE std::size_t add_group(const GaussLine& g, const VF* width2, std::size_t i, std::size_t j,
+                                 std::size_t end, float* fresh) {
+  const DF d;
+  Group<kAxes> rows;
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) {
+    for (int k = 0; k < 3; ++k) rows.at[r][k] = hn::Set(d, g.at[k][i + r]);
+    if (kWeighted) rows.share[r] = hn::Set(d, g.share[i + r]);
+    rows.sum[r] = hn::Zero(d);
+  }
+  for (; j < i + kRows; j += kLanes) add_tile<kAxes, kWeighted, true>(g, width2, i, j, fresh, rows);
+  for (; j < end; j += kLanes) add_tile<kAxes, kWeighted, false>(g, width2, i, j, fresh, rows);
+  store_sums(rows.sum, g.row + i);
+  return j;
+}
+
 template <int kAxes, bool kWeighted>
 HWY_INLINE void add_pairs(const GaussLine& g, std::size_t count, std::size_t part) {
   const DF d;
@@ -220,30 +266,16 @@ HWY_INLINE void add_pairs(const GaussLine& g, std::size_t count, std::size_t par
     const std::size_t behind = HWY_MIN(first + kFresh, end);
     std::size_t farthest = 0;
     for (std::size_t i = first; i < behind; i += kRows) {
-      Group<kAxes> rows;
-      HWY_UNROLL(4)
-      for (std::size_t r = 0; r < kRows; ++r) {
-        for (int k = 0; k < kAxes; ++k) rows.at[r][k] = hn::Set(d, g.at[k][i + r]);
-        if (kWeighted) rows.share[r] = hn::Set(d, g.share[i + r]);
-        rows.sum[r] = rows.total[r] = hn::Zero(d);
-      }
       const std::size_t window = g.end[i / kRows];
       std::size_t j = i / kLanes * kLanes;
-      for (; j < i + kRows; j += kLanes)
-        add_tile<kAxes, kWeighted, true>(g, width2, i, j, fresh, rows);
-      while (j < window) {
-        const std::size_t stop = HWY_MIN(window, j + kRun);
-        for (; j < stop; j += kLanes)
-          add_tile<kAxes, kWeighted, false>(g, width2, i, j, fresh, rows);
-        HWY_UNROLL(4)
-        for (std::size_t r = 0; r < kRows; ++r) {
-          rows.total[r] = hn::Add(rows.total[r], rows.sum[r]);
-          rows.sum[r] = hn::Zero(d);
-        }
+      j = add_group<kAxes, kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
+      while (HWY_UNLIKELY(j < window)) {
+        float before[kRows];
+        std::copy_n(g.row + i, kRows, before);
+        j = add_group<kAxes, kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
+        for (std::size_t r = 0; r < kRows; ++r) g.row[i + r] += before[r];
       }
       farthest = HWY_MAX(farthest, j);
-      for (std::size_t r = 0; r < kRows; ++r)
-        g.row[i + r] = hn::GetLane(hn::SumOfLanes(d, hn::Add(rows.total[r], rows.sum[r])));
     }
     for (std::size_t j = first / kLanes * kLanes; j < farthest; j += kLanes) {
       hn::Store(hn::Add(hn::Load(d, total + j), hn::Load(d, fresh + j)), d, total + j);
