@@ -17,21 +17,6 @@ constexpr std::size_t kSlice = 128;         // rows of the density sum at a time
 constexpr std::size_t kWorthSharing = 256;  // contacts from which the helper is asked
 constexpr float kFacingEdge = 0.25f;        // N.g from which a contact counts in full
 
-// T = (r x N) / sqrt(|r x N|^2 + l0^2): Eq. (10), with l0 against blow-up where r is parallel to N.
-// As handles, Eq. (13): T = r x F/|F| over `lever`; F/|F| = N.
-void torque_directions(Contacts& c, float l0, bool handles, float lever) {
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const float x = c.ry[i] * c.nz[i] - c.rz[i] * c.ny[i];
-    const float y = c.rz[i] * c.nx[i] - c.rx[i] * c.nz[i];
-    const float z = c.rx[i] * c.ny[i] - c.ry[i] * c.nx[i];
-    const float length = handles ? lever : std::sqrt(x * x + y * y + z * z + l0 * l0);
-    const float scale = length > 0 ? 1.0f / length : 0.0f;
-    c.tx[i] = x * scale;
-    c.ty[i] = y * scale;
-    c.tz[i] = z * scale;
-  }
-}
-
 struct Rule {
   bool gauss = false, facing = false, depth = false, handles = false, printed = false;
   kernels::Hat hat = kernels::Hat::normal;
@@ -84,12 +69,9 @@ void weigh_as_printed(Contacts& c, const Rule& rule) {
 
 }  // namespace
 
-// A contact whose normal opposes the field's gradient would pull the body in.
 void fill_facing(Contacts& c, bool filter) {
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const float dot = c.nx[i] * c.gx[i] + c.ny[i] * c.gy[i] + c.nz[i] * c.gz[i];
-    c.facing[i] = filter ? std::clamp(dot / kFacingEdge, 0.0f, 1.0f) : 1.0f;
-  }
+  if (filter) return kernels::contact_facing(kernel_columns(c, 0, c.count), kFacingEdge, c.facing);
+  std::fill_n(c.facing, c.count, 1.0f);
 }
 
 namespace {
@@ -175,7 +157,8 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
                    sched::FrameTeam* team, void* scratch) {
   const Rule rule = rule_of(def, voxel);
   fill_facing(c, rule.facing);
-  torque_directions(c, rule.l0, rule.handles, static_cast<float>(lever));
+  kernels::torque_directions(kernel_columns(c, 0, c.count), rule.l0,
+                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx, c.ty, c.tz);
   if (rule.gauss) {
     weigh_gauss(c, rule, team, scratch);
   } else {
