@@ -22,7 +22,7 @@ const std::map<std::string, std::set<std::string>> below = {
     {"kernels", {"contract"}},
     {"sched", {"contract"}},
     {"runtime", {"contract", "kernels", "sched"}},
-    {"device", {"contract"}},
+    {"device", {"contract", "sched"}},
     {"io", {"contract", "runtime", "kernels", "sched"}},
     {"io/cli", {"contract", "runtime", "kernels", "sched", "io", "device"}},
     {"tests", {"contract", "runtime", "kernels", "sched", "io", "device", "io/cli"}},
