@@ -26,8 +26,9 @@ typedef struct Device {
   int socket;
   uint32_t number;
   UdpArmSample newest;
-  double heard; /* when `newest` came [s] */
-  double waits; /* since when a command has had no answer; 0: none has not [s] */
+  double heard;    /* when `newest` came [s] */
+  double waits;    /* since when a command has had no answer; 0: none has not [s] */
+  double patience; /* how long a command may have none [s] */
   atomic_int stopped;
 } Device;
 
@@ -80,6 +81,7 @@ static int fail(char* error, size_t size, const char* what, const char* which) {
 
 static int open_device(const h6PluginStart* start, h6PluginCapabilities* can, void** device,
                        char* error, size_t error_size) {
+  double patience = 1e-3 * UDP_ARM_SILENCE;
   struct sockaddr_in to;
   memset(&to, 0, sizeof to);
   to.sin_family = AF_INET;
@@ -96,13 +98,18 @@ static int open_device(const h6PluginStart* start, h6PluginCapabilities* can, vo
       if (*value == '\0' || *end != '\0' || port < 1 || port > 65535)
         return fail(error, error_size, "port must be 1 to 65535, not ", value);
       to.sin_port = htons((uint16_t)port);
+    } else if (strcmp(key, "timeout") == 0) {
+      patience = 1e-3 * atof(value);
+      if (!(patience >= 1e-3 && patience <= 10))
+        return fail(error, error_size, "timeout must be 1 to 10000 ms, not ", value);
     } else {
-      return fail(error, error_size, "the options are host and port, not ", key);
+      return fail(error, error_size, "the options are host, port and timeout, not ", key);
     }
   }
   Device* d = calloc(1, sizeof *d);
   if (!d) return fail(error, error_size, "out of memory", "");
   d->start = *start;
+  d->patience = patience;
   d->start.options = NULL, d->start.option_count = 0;
   atomic_init(&d->stopped, 0);
   d->socket = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -141,7 +148,7 @@ static int read_device(void* device, double time, h6PluginSample* out) {
   (void)time;
   Device* d = device;
   take_samples(d);
-  if (d->waits != 0 && now() - d->waits > 1e-3 * UDP_ARM_SILENCE) return 1;
+  if (d->waits != 0 && now() - d->waits > d->patience) return 1;
   const UdpArmSample* s = &d->newest;
   const double *a = s->turned, *b = d->start.home_orientation;
   double* q = out->orientation;
@@ -196,7 +203,7 @@ static void close_device(void* device) {
 const h6DevicePluginV1 h6_device_plugin_v1 = {
     H6_PLUGIN_ABI,
     sizeof(h6DevicePluginV1),
-    "An arm behind UDP (hapsix_udp_arm simulates one); options: host, port.",
+    "An arm behind UDP (hapsix_udp_arm simulates one); options: host, port, timeout [ms].",
     open_device,
     read_device,
     write_device,

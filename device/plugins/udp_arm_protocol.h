@@ -11,8 +11,8 @@
 #include <stdint.h>
 
 enum { UDP_ARM_COMMAND = 0x31433668, UDP_ARM_SAMPLE = 0x31533668, UDP_ARM_PORT = 47806 };
-/* The arm gives no force when no command came for so long; the plug-in takes it for lost when no
- * sample did. [ms] */
+/* The arm gives no force when no command came for so long; the plug-in takes it for lost when a
+ * command has no answer for so long, unless it is told otherwise. [ms] */
 enum { UDP_ARM_SILENCE = 20 };
 
 typedef struct UdpArmCommand {

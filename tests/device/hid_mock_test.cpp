@@ -3,8 +3,11 @@
 #define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <thread>
+#include <vector>
 
 #include "device/spacemouse.h"
 #include "tests/device/mock_hid.h"
@@ -128,6 +131,53 @@ TEST_CASE("pulled out it is lost; plugged in again at another node it goes on, a
   CHECK((*mouse)->status().replugs == 1);
   REQUIRE(machine().send(cap, Bytes{1} + int16s({0, 0, -350})));
   CHECK(soon([&] { return read() == 0 && s.pose.p.z > there; }));
+  mouse->reset();
+  machine().unplug(cap);
+}
+
+TEST_CASE(
+    "from a report to the hand that a frame at 1 kHz reads: every one arrives; the time is "
+    "printed") {
+  MockCap cap;
+  REQUIRE(machine().plug(cap));
+  SpaceMouseOptions options;
+  options.rate.smoothing = 0;
+  auto mouse = SpaceMouse::open(system_hid(), options, origin, {});
+  REQUIRE(mouse);
+  h6Device device = (*mouse)->device();
+  using Clock = std::chrono::steady_clock;
+  std::atomic<bool> ending{false};
+  std::atomic<std::int64_t> seen_ns[2] = {0, 0};  // when the hand first went to and fro
+  std::thread frames([&] {
+    auto deadline = Clock::now();
+    double time = 0;
+    int before = 0;
+    while (!ending.load()) {
+      std::this_thread::sleep_until(deadline += std::chrono::milliseconds(1));
+      h6DeviceSample s{};
+      (void)device.read(device.self, time += 1e-3, &s);
+      const int now = s.velocity.linear.x > 0 ? 1 : s.velocity.linear.x < 0 ? -1 : 0;
+      if (now != 0 && now != before)
+        seen_ns[now > 0].store(Clock::now().time_since_epoch().count());
+      before = now;
+    }
+  });
+  std::vector<double> us;
+  for (int i = 0; i < 100; ++i) {
+    const int way = i % 2 ? 350 : -350;
+    std::this_thread::sleep_for(std::chrono::microseconds(9000 + 137 * (i % 17)));  // any phase
+    const auto sent = Clock::now();
+    REQUIRE(machine().send(cap, Bytes{1} + int16s({way, 0, 0})));
+    auto& seen = seen_ns[way > 0];
+    if (soon([&] { return seen.load() >= sent.time_since_epoch().count(); }))
+      us.push_back(1e-3 * static_cast<double>(seen.load() - sent.time_since_epoch().count()));
+  }
+  ending.store(true);
+  frames.join();
+  CHECK(us.size() == 100);
+  std::sort(us.begin(), us.end());
+  MESSAGE("report to hand pose: p50 ", us[us.size() / 2], " us, p95 ", us[us.size() * 95 / 100],
+          " us, max ", us.back(), " us");
   mouse->reset();
   machine().unplug(cap);
 }

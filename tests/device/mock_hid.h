@@ -72,7 +72,7 @@ struct MockCap {
   std::string serial = "A1", product = "SpaceMouse Compact";
   unsigned product_id = 0xc635;
   Bytes descriptor = spacemouse_descriptor(false);
-  std::string node;  // "hidraw0", and the port of the bus: where it was plugged last
+  std::string node{};  // "hidraw0", and the port of the bus: where it was plugged last
   int port = 0;
 };
 
