@@ -188,7 +188,7 @@ Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, do
   if (!heard.empty()) return Failure{heard.substr(1)};
   if (WIFSIGNALED(status))
     return Failure{file.path + ": crashed while it was opened (" + strsignal(WTERMSIG(status)) +
-                   "); this program goes on without it"};
+                   "): a fault of the plug-in"};
   return Failure{file.path + ": ended the process while it was opened (exit code " +
                  std::to_string(WEXITSTATUS(status)) + ")"};
 }

@@ -331,7 +331,11 @@ constexpr SceneKey kHand[] = {
      .kind = Kind::text,
      .about = "name of the moving body it holds",
      .required = true},
-    {.name = "device", .kind = Kind::text, .about = "path, simulated, arm, ...; default path"},
+    {.name = "device",
+     .kind = Kind::text,
+     .about = "path, simulated, arm, spacemouse, scripted:FILE, replay:FILE or bad-operator, with "
+              "options as ?key=value&key=value ('hapsix devices' explains each); a plug-in is given "
+              "with run --device; default path"},
     {.name = "path",
      .kind = Kind::text,
      .about = "CSV t,x,y,z,qw,qx,qy,qz of the body's mesh frame"},

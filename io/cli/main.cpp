@@ -77,6 +77,7 @@ int main(int argc, char** argv) {
   add_bake(app, program);
   add_run(app, program);
   add_info(app, program);
+  add_devices(app, program);
   add_scene(app, program);
   add_demo(app, program);
   add_experiments(app, program);

@@ -40,9 +40,13 @@ int run_command(const Console& console, const std::string& name, const RunOption
   Result<io::Scene> scene = find_scene(name);
   if (!scene) return console.fail(scene.error());
   if (options.device.empty())
-    for (const io::SceneHand& hand : scene->hands)
+    for (const io::SceneHand& hand : scene->hands) {
       if (Outcome known = check_device(hand.device); !known)
         return console.fail(name + ": hand of '" + hand.body + "': " + known.error());
+      if (hand.device.rfind("plugin:", 0) == 0)  // code; a scene may come from anyone
+        return console.fail(name + ": hand of '" + hand.body +
+                            "': a scene does not load plug-ins by itself, give it with --device");
+    }
   auto loaded = [&] {
     const EndsAtOnce asked(console, name + ": cancelled");
     return io::load_scene(std::move(*scene), console.progress());
@@ -81,7 +85,8 @@ void add_run(CLI::App& app, Program& program) {
       ->option_text("FILE|NAME");
   run->add_option("--device", o->device,
                   "For every hand: path (follows the scene's path exactly), simulated (a person "
-                  "who yields) or arm (a simulated force-feedback arm that a person holds)")
+                  "who yields), arm (a simulated force-feedback arm that a person holds), "
+                  "spacemouse, plugin:FILE, ... ('hapsix devices' shows all)")
       ->option_text("NAME");
   run->add_option("--duration", o->duration, "Default: as the scene says")
       ->option_text("SECONDS")

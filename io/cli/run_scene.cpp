@@ -126,6 +126,9 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
     for (io::SceneHand& hand : run.hands) hand.device = options.device;
   run.record = options.record;
   if (Outcome opened = run.open(); !opened) return opened.failure();
+  if (options.virtual_time && !run.devices.real_time.empty())
+    return Failure{"the device '" + run.devices.real_time +
+                   "' lives in real time: leave out --virtual-time"};
   io::Recorder* recorder = run.recorder.get();
 
   RunSummary summary;
