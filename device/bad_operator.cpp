@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "device/arm_member.h"
 #include "device/rotation.h"
 
 namespace h6::device {
@@ -152,6 +153,7 @@ h6Device BadOperator::device() {
     auto& bad = *static_cast<BadOperator*>(self);
     bad.hand_.stop(bad.hand_.self);
   };
+  set_arm(d, [](void* self) { return arm_behind(static_cast<BadOperator*>(self)->hand_); });
   return d;
 }
 

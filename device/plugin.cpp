@@ -15,6 +15,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "device/arm_member.h"
+
 namespace h6::device {
 namespace {
 
@@ -194,11 +196,6 @@ Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, do
 }
 
 // Members of the contract that came after this file was written.
-template <class Device>
-void set_arm(Device& device) {
-  if constexpr (requires { device.arm; })
-    device.arm = [](void* self) { return static_cast<PluginDevice*>(self)->arm(); };
-}
 template <class Sample>
 void set_sequence(Sample& sample, std::uint32_t sequence) {
   if constexpr (requires { sample.sequence; }) sample.sequence = sequence;
@@ -286,7 +283,7 @@ h6Device PluginDevice::device() {
     auto& plugin = *static_cast<PluginDevice*>(self);
     plugin.plugin_->stop(plugin.device_);
   };
-  set_arm(d);
+  set_arm(d, [](void* self) { return static_cast<PluginDevice*>(self)->arm(); });
   return d;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <sstream>
 
+#include "device/arm_member.h"
 #include "device/rotation.h"
 
 namespace h6::device {
@@ -131,6 +132,7 @@ h6Device ScriptedHand::device() {
     auto& hand = *static_cast<ScriptedHand*>(self);
     hand.hand_.stop(hand.hand_.self);
   };
+  set_arm(d, [](void* self) { return arm_behind(static_cast<ScriptedHand*>(self)->hand_); });
   return d;
 }
 

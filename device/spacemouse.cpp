@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "device/arm_member.h"
 #include "device/rotation.h"
 
 namespace h6::device {
@@ -202,6 +203,10 @@ h6Device SpaceMouse::device() {
   d.stop = [](void* self) {
     static_cast<SpaceMouse*>(self)->stopped_.store(true, std::memory_order_relaxed);
   };
+  set_arm(d, [](void* self) {
+    static_cast<SpaceMouse*>(self)->stopped_.store(false, std::memory_order_relaxed);
+    return 0;
+  });
   return d;
 }
 
