@@ -134,11 +134,13 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
                torque = std::min(0.1 * c.max_torque, 1.0);
   bool going = true;
   for (int i = 0; i < 500 && going; ++i) going = go_on({});
+  // What renders no force may have a light for it.
+  for (int i = 0; i < 1000 && going && c.dof_out == 0; ++i) going = go_on({{0, 0, force}, {}});
   for (const bool turn : {false, true})
     for (int axis = 0; axis < 3; ++axis)
       for (const double sign : {1.0, -1.0}) {
         const double most = turn ? torque : force;
-        const bool renders = c.dof_out == 6 || (c.dof_out == 3 && !turn) || c.dof_out == 0;
+        const bool renders = c.dof_out == 6 || (c.dof_out == 3 && !turn);
         if (going && most > 0 && renders) going = push(turn, axis, sign, most);
       }
   device.stop(device.self);

@@ -36,9 +36,10 @@ using EachFrame = std::function<bool(double time, const h6DeviceSample&, bool lo
 SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each);
 
 // Half a second of samples; then pushes of 0.4 s along and about every axis, each rising smoothly
-// to 10 % of the rating (and never more than 10 N or 1 N m) and back. Ends at zero at once when the
-// device is lost, sends what is no number, moves faster than 1 m/s or farther than 0.1 m, or `each`
-// says so; the device is then stopped.
+// to 10 % of the rating (and never more than 10 N or 1 N m) and back. A device that renders no
+// force is told of one for a second instead. Ends at zero at once when the device is lost, sends
+// what is no place, moves faster than 1 m/s or farther than 0.1 m, or `each` says so; the device is
+// then stopped.
 CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each);
 
 }  // namespace h6::cli

@@ -100,6 +100,8 @@ std::string bars(const device::SpaceMouse::Status& s) {
                   s.state.charging ? ", charging" : "");
     out += text;
   }
+  std::snprintf(text, sizeof text, "felt %.2f N ", s.felt_force);
+  out += text;
   return out + (s.led ? "light on" : "light off") + (s.present ? "" : ", unplugged");
 }
 

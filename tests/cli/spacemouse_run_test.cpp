@@ -40,6 +40,14 @@ TEST_CASE("devices lists a cap with its serial number; the check lights it and p
       result_of(box, {"devices", "spacemouse?serial=A1", "--watch", "--duration", "0.5"});
   CHECK(seen["dof_out"] == 0);
   CHECK(seen["samples"]["failed"] == 0);
+  Process check(box, {"devices", "spacemouse", "--test", "--json"});
+  CHECK(machine().received(cap, 10000) == Bytes{4, 1});
+  CHECK(machine().received(cap, 10000) == Bytes{4, 0});
+  const Ended checked = check.wait();
+  CHECK(checked.code == 0);
+  const Json told = one_object(checked);
+  CHECK(told["passed"] == true);
+  CHECK(told["pushes"].empty());
   machine().unplug(cap);
   const Ended gone = run(box, {"devices", "spacemouse"});
   CHECK(gone.code == 1);

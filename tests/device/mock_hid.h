@@ -142,13 +142,18 @@ class MockMachine {
     const ssize_t n = write(end_of(cap), report.data(), report.size());
     return n == static_cast<ssize_t>(report.size());
   }
-  // What was written to the device within `ms`.
+  // What was written to the device within `ms`, whether it is open by then or not.
   Bytes received(const MockCap& cap, int ms) {
-    pollfd wait{end_of(cap), POLLIN, 0};
     std::uint8_t bytes[64];
-    if (poll(&wait, 1, ms) != 1) return {};
-    const ssize_t n = read(wait.fd, bytes, sizeof bytes);
-    return n > 0 ? Bytes(bytes, bytes + n) : Bytes{};
+    for (;; ms -= 5) {
+      pollfd wait{end_of(cap), POLLIN, 0};
+      if (poll(&wait, 1, 0) == 1 && (wait.revents & POLLIN)) {
+        const ssize_t n = read(wait.fd, bytes, sizeof bytes);
+        if (n > 0) return Bytes(bytes, bytes + n);
+      }
+      if (ms <= 0) return {};
+      usleep(5000);
+    }
   }
 
  private:
