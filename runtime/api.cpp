@@ -93,8 +93,18 @@ void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* c
 void h6Fault(h6Session* session, h6Cause cause) {
   for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.fault(cause);
 }
-void h6Rearm(h6Session* session) {
+void h6Arm(h6Session* session) {
   for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.rearm();
+}
+void h6Rearm(h6Session* session) { h6Arm(session); }
+void h6Disarm(h6Session* session) { h6Fault(session, H6_CAUSE_DISARMED); }
+void h6LoseDevice(h6Session* session, int32_t) { h6Fault(session, H6_CAUSE_DEVICE_LOST); }
+void h6NoteInterval(h6Session*, double) {}
+h6HandSafety h6GetSafety(const h6Session* session, int32_t hand) {
+  h6HandSafety safety{};
+  safety.fault = session->hands[hand].guard.fault();
+  safety.state = safety.fault == H6_CAUSE_NONE ? H6_ACTIVE : H6_READY;
+  return safety;
 }
 
 }  // extern "C"

@@ -184,6 +184,13 @@ size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity) {
 }
 bool h6LoopRunning(const h6Loop* loop) { return loop->thread->running(); }
 void h6RequestStop(h6Loop* loop) { loop->stop.store(true, std::memory_order_relaxed); }
+void h6ArmLoop(h6Loop*) {}
+void h6DisarmLoop(h6Loop*) {}
+void h6HaltLoop(h6Loop* loop) {
+  stop_devices(*loop);
+  h6RequestStop(loop);
+}
+void h6HaltAll(void) {}
 
 h6LoopReport h6JoinLoop(h6Loop* loop) {
   loop->thread->join();

@@ -71,7 +71,7 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, double dt, h6Status* s
     *status |= H6_OUTPUT_FAULT;
     force_.setZero();
     torque_.setZero();
-    return {.wrench = {}, .pose = {{0, 0, 0}, {1, 0, 0, 0}}, .velocity = {}, .cause = fault_};
+    return {.wrench = {}, .pose = {{0, 0, 0}, {1, 0, 0, 0}}, .velocity = {}, .cause = fault_, .causes = 0};
   }
   const bool force_cut = clamp_norm(force, limits_.force),
              torque_cut = clamp_norm(torque, limits_.torque);
@@ -90,7 +90,8 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, double dt, h6Status* s
   return {.wrench = {to(force), to(torque)},
           .pose = {{0, 0, 0}, {1, 0, 0, 0}},
           .velocity = {},
-          .cause = cause};
+          .cause = cause,
+          .causes = 0};
 }
 
 h6DeviceCommand OutputGuard::pass_motion(const h6Pose& device, const h6BodyState& wanted, double dt,
@@ -108,7 +109,7 @@ h6DeviceCommand OutputGuard::pass_motion(const h6Pose& device, const h6BodyState
     fault(H6_CAUSE_NOT_FINITE);
   if (fault_ != H6_CAUSE_NONE) {
     *status |= H6_OUTPUT_FAULT;
-    return {.wrench = {}, .pose = {to(x_), to(q_)}, .velocity = {}, .cause = fault_};
+    return {.wrench = {}, .pose = {to(x_), to(q_)}, .velocity = {}, .cause = fault_, .causes = 0};
   }
   if (clamp_to_box(x, v, limits_.workspace_min, limits_.workspace_max)) {
     *status |= H6_OUTPUT_CLAMPED;
@@ -129,7 +130,7 @@ h6DeviceCommand OutputGuard::pass_motion(const h6Pose& device, const h6BodyState
     q_ = (exp_rotation(turn) * q_).normalized();
   else
     q_ = from(wanted.pose.q).norm() == 1 ? from(wanted.pose.q) : from(wanted.pose.q).normalized();
-  return {.wrench = {}, .pose = {to(x_), to(q_)}, .velocity = {to(v), to(w)}, .cause = cause};
+  return {.wrench = {}, .pose = {to(x_), to(q_)}, .velocity = {to(v), to(w)}, .cause = cause, .causes = 0};
 }
 
 }  // namespace h6

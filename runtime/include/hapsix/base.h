@@ -42,7 +42,7 @@ enum {
   H6_OUTPUT_CLAMPED = 1u << 5,
   /* The wrench changed faster than the slew limit and was slowed down; admittance: the motion. */
   H6_OUTPUT_SLEWED = 1u << 6,
-  /* The output is held by a fault until h6Rearm: the wrench at zero; admittance: the pose. */
+  /* The output is held by a fault until h6Arm: the wrench at zero; admittance: the pose. */
   H6_OUTPUT_FAULT = 1u << 7,
   /* A device could not be read or written in this frame. */
   H6_DEVICE_LOST = 1u << 8,

@@ -172,6 +172,31 @@ typedef struct h6HandFilterDef {
 
 enum { H6_IMPEDANCE = 1u << 0, H6_ADMITTANCE = 1u << 1, H6_PSEUDO_ADMITTANCE = 1u << 2 };
 
+/* The safety chain of a hand's output (METHOD.md, "The safety chain"). It is always on; what is set
+ * here can only make it tighter than the device's own ratings: a loop refuses values above them.
+ * h6DefaultSafetyDef fills in what is not zero by default. */
+typedef struct h6SafetyDef {
+  double   max_force;       /* 0: the device's rating                                         [N]  */
+  double   max_torque;      /*                                                              [N m]  */
+  double   max_force_rate;  /* slew limit; 0: the device's                                  [N/s]  */
+  double   max_torque_rate; /*                                                            [N m/s]  */
+  double   max_power;       /* that the hand may be given; 0: max_force at 1 m/s              [W]  */
+  double   max_speed;       /* admittance modes, of the motion sent; 0: the device's        [m/s]  */
+  double   derate_speed;    /* of the hand; from here on the wrench falls linearly to nothing at
+                               cut_speed; 0: half of that                                   [m/s]  */
+  double   cut_speed;       /* of the hand; zero, latched; 0: the device's max_velocity, at most
+                               5 m/s. A turn counts as the speed at 0.2 m                   [m/s]  */
+  double   soft_start;      /* from nothing to the whole output after every arming, pose jump and
+                               recovery, 0 .. 10; default 0.1                                 [s]  */
+  double   decay_time;      /* from the whole output to nothing, 0.001 .. 0.02; default 0.02  [s]  */
+  double   pose_jump;       /* a sample that is farther from the last one than this and what a hand
+                               at 5 m/s moves in a frame is a jump; so is a turn by half a radian;
+                               0.001 .. 0.05; default 0.02                                    [m]  */
+  double   freeze_time;     /* samples that stay the same for so long mean a frozen device, at most
+                               1; 0: the device's                                             [s]  */
+  uint32_t dead_man_buttons;/* nothing is rendered unless one of these is held; 0: none            */
+} h6SafetyDef;
+
 /* How an arm and the engine talk (Xu & Barbic 2016, Fig. 13; METHOD.md, Sec. 4):
  *   impedance         pose in, wrench out
  *   admittance        wrench of the person in (a force sensor), pose and velocity of the body out;
@@ -192,6 +217,7 @@ typedef struct h6HandDef {
   bool            passivity;          /* observe the energy that leaves through this hand and take
                                          back by damping what was never put in
                                          (Hannaford & Ryu 2002)                                    */
+  h6SafetyDef     safety;   /* of what goes to the device                                          */
 } h6HandDef;
 
 typedef struct h6SessionDef {
