@@ -44,6 +44,15 @@ std::uint64_t state_hash(const h6Session& s) {
   return hash;
 }
 
+void set_rating(Hand& hand, const h6DeviceCapabilities& capabilities) {
+  hand.guard.set_limits(limits_of(capabilities, hand.safety));
+  hand.watch.set(hand.safety, capabilities);
+}
+
+void note_interval(Hand& hand, double dt, double seconds) {
+  hand.overdue = seconds > 2 * dt ? seconds - dt : 0;
+}
+
 }  // namespace h6
 
 using namespace h6;
@@ -88,23 +97,28 @@ h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) {
 double h6GetVoxel(const h6Session* session, int32_t body) { return session->bodies[body].voxel; }
 
 void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities) {
-  session->hands[hand].guard.set_limits(limits_of(*capabilities));
+  set_rating(session->hands[hand], *capabilities);
 }
 void h6Fault(h6Session* session, h6Cause cause) {
   for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.fault(cause);
 }
 void h6Arm(h6Session* session) {
-  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.rearm();
+  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.arm();
 }
 void h6Rearm(h6Session* session) { h6Arm(session); }
-void h6Disarm(h6Session* session) { h6Fault(session, H6_CAUSE_DISARMED); }
-void h6LoseDevice(h6Session* session, int32_t) { h6Fault(session, H6_CAUSE_DEVICE_LOST); }
-void h6NoteInterval(h6Session*, double) {}
+void h6Disarm(h6Session* session) {
+  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.disarm();
+}
+void h6LoseDevice(h6Session* session, int32_t hand) {
+  session->hands[hand].lost = true;
+  h6Fault(session, H6_CAUSE_DEVICE_LOST);
+}
+void h6NoteInterval(h6Session* session, double seconds) {
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    note_interval(session->hands[h], session->dt, seconds);
+}
 h6HandSafety h6GetSafety(const h6Session* session, int32_t hand) {
-  h6HandSafety safety{};
-  safety.fault = session->hands[hand].guard.fault();
-  safety.state = safety.fault == H6_CAUSE_NONE ? H6_ACTIVE : H6_READY;
-  return safety;
+  return session->hands[hand].guard.report();
 }
 
 }  // extern "C"

@@ -1,16 +1,25 @@
 // haptic_loop.cpp - devices, session and clock joined: what runs on the haptic thread.
 //
-//   deadline -> read every device -> frame -> write every device -> record into the ring
+//   deadline -> what was asked meanwhile -> read every device -> frame -> write every device,
+//   unless they were stopped -> sign of life to the watchdog -> record into the ring
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <exception>
 #include <memory>
 
+#include "runtime/device_gate.h"
 #include "runtime/session.h"
 #include "runtime/stages.h"
 #include "sched/clock.h"
+#include "sched/halt_list.h"
 #include "sched/periodic_thread.h"
 #include "sched/spsc_ring.h"
+#include "sched/watchdog.h"
+
+namespace {
+enum Request { kNothing, kArm, kDisarm };
+}
 
 struct h6Loop {
   h6Session* session = nullptr;
@@ -23,39 +32,116 @@ struct h6Loop {
   h6FrameRecord record{};
   h6LoopReport report{};  // the haptic thread's until it has ended
   std::atomic<bool> stop{false};
+  std::atomic<int> request{kNothing};
+  h6::DeviceGate gate;
+  std::int64_t sent_at = 0;                       // the last commands, 0: none yet [ns]
+  std::uint64_t trips = 0;                        // of the watchdog, that are known here
+  bool stepped = false;                           // this tick was a frame
+  std::unique_ptr<h6::sched::Watchdog> watchdog;  // stops devices: goes before the gate
   std::unique_ptr<h6::sched::PeriodicThread> thread;
 };
 
 namespace h6 {
 namespace {
 
-void stop_devices(h6Loop& loop) {
-  for (std::size_t h = 0; h < loop.session->hand_count; ++h)
-    if (loop.devices[h].stop) loop.devices[h].stop(loop.devices[h].self);
+// The device first: what it still refuses must not pile up behind it.
+void arm_hands(h6Loop& loop) {
+  h6Session& s = *loop.session;
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    const h6Device& device = loop.devices[h];
+    OutputGuard& guard = s.hands[h].guard;
+    if (guard.can_arm() && (!device.arm || device.arm(device.self) == 0)) guard.arm();
+  }
+}
+
+// A session begins armed, and so do its devices; what is latched stays so.
+void begin_output(h6Loop& loop) {
+  h6Session& s = *loop.session;
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    const h6Device& device = loop.devices[h];
+    OutputGuard& guard = s.hands[h].guard;
+    guard.restart();
+    if (loop.def.disarmed || guard.fault() != H6_CAUSE_NONE) continue;
+    if (!device.arm || device.arm(device.self) == 0) guard.arm();
+  }
+  if (loop.watchdog) loop.watchdog->beat(sched::now_ns());
+}
+
+void end_output(h6Loop& loop) {
+  loop.gate.stop_all();
+  if (loop.watchdog) loop.watchdog->rest();
+}
+
+// What other threads did or want since the last frame. A fault comes after a wish to arm: nobody
+// who asked could know of it.
+void take_requests(h6Loop& loop) {
+  const int request = loop.request.exchange(kNothing);
+  if (request == kArm) arm_hands(loop);
+  if (request == kDisarm) h6Disarm(loop.session);
+  if (loop.watchdog && loop.watchdog->trips() != loop.trips) {
+    loop.trips = loop.watchdog->trips();
+    h6Fault(loop.session, H6_CAUSE_WATCHDOG);
+  }
+  if (loop.gate.halted()) h6Fault(loop.session, H6_CAUSE_STOPPED);
 }
 
 // A device that cannot be read or written is lost: all outputs go to zero and stay there.
-void lose(h6Loop& loop) {
+void lose(h6Loop& loop, std::size_t hand) {
   loop.session->report.status |= H6_DEVICE_LOST;
-  h6Fault(loop.session, H6_CAUSE_DEVICE_LOST);
+  h6LoseDevice(loop.session, static_cast<std::int32_t>(hand));
+}
+
+void read_devices(h6Loop& loop, double time) {
+  h6Session& s = *loop.session;
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    if (loop.devices[h].read(loop.devices[h].self, time, &loop.samples[h]) != 0) lose(loop, h);
+  if (loop.def.virtual_time || loop.sent_at == 0) return;
+  // To a device that lives on the frames' time no command comes late.
+  const double since = 1e-9 * static_cast<double>(sched::now_ns() - loop.sent_at);
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    if (!loop.devices[h].capabilities.frame_time) note_interval(s.hands[h], s.dt, since);
+}
+
+// In place of commands that were made before the watchdog stopped the devices.
+void hold_back(h6Loop& loop, const h6DeviceCommand* before) {
+  for (std::size_t h = 0; h < loop.session->hand_count; ++h) {
+    h6DeviceCommand& command = loop.commands[h];
+    command.wrench = {};
+    command.velocity = {};
+    if (loop.session->hands[h].mode != H6_IMPEDANCE) command.pose = before[h].pose;
+    command.cause = H6_CAUSE_WATCHDOG;
+    command.causes |= 1u << H6_CAUSE_WATCHDOG;
+  }
+}
+
+bool tripped(const h6Loop& loop) { return loop.watchdog && loop.watchdog->trips() != loop.trips; }
+
+// false: nothing is sent any more.
+bool write_devices(h6Loop& loop, double time, const h6DeviceCommand* before) {
+  if (!loop.gate.enter()) return false;
+  if (tripped(loop)) hold_back(loop, before);
+  for (std::size_t h = 0; h < loop.session->hand_count; ++h)
+    if (loop.devices[h].write(loop.devices[h].self, time, &loop.commands[h]) != 0) lose(loop, h);
+  if (tripped(loop)) loop.gate.stop_real();  // while we wrote: once more
+  loop.sent_at = sched::now_ns();
+  if (loop.watchdog) loop.watchdog->beat(loop.sent_at);
+  return loop.gate.leave();
 }
 
 bool tick(h6Loop& loop, std::uint64_t number, const sched::TickTiming& before, double wakeup_us) {
   h6Session& s = *loop.session;
   const double time = static_cast<double>(number) * s.dt;
-  bool lost = false;
-  for (std::size_t h = 0; h < s.hand_count; ++h)
-    lost = loop.devices[h].read(loop.devices[h].self, time, &loop.samples[h]) != 0 || lost;
-  if (lost) h6Fault(&s, H6_CAUSE_DEVICE_LOST);
+  h6DeviceCommand last[H6_MAX_HANDS];
+  for (std::size_t h = 0; h < s.hand_count; ++h) last[h] = loop.commands[h];
+  take_requests(loop);
+  read_devices(loop, time);
   frame(s, loop.samples, loop.commands);
-  for (std::size_t h = 0; h < s.hand_count; ++h)
-    if (loop.devices[h].write(loop.devices[h].self, time, &loop.commands[h]) != 0) lost = true;
-  if (lost) lose(loop);
+  const bool sent = write_devices(loop, time, last);
   if (before.late != sched::Late::no) s.report.status |= H6_LATE;
   loop.report.status |= s.report.status;
   loop.record.time = time;
   loop.record.wakeup_us = wakeup_us;
-  return loop.frames == 0 || number + 1 < loop.frames;
+  return sent && (loop.frames == 0 || number + 1 < loop.frames);
 }
 
 std::uint32_t late_bit(sched::Late late) {
@@ -73,6 +159,7 @@ std::uint32_t late_bit(sched::Late late) {
 
 // After the frame, before the next deadline: nothing here is timed as the frame's.
 void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
+  if (!loop.stepped) return;
   h6Session& s = *loop.session;
   h6LoopReport& r = loop.report;
   ++r.frames;
@@ -87,6 +174,7 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   for (std::size_t h = 0; h < s.hand_count; ++h) {
     row.hand[h] = loop.samples[h];
     row.command[h] = loop.commands[h];
+    row.state[h] = s.hands[h].guard.state();
     const Body& body = s.bodies[s.hands[h].body];
     row.body[h] = {mesh_pose(body), {to(body.v), to(body.w)}};
   }
@@ -100,6 +188,14 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
 const char* mode_name(std::uint32_t mode) {
   if (mode == H6_ADMITTANCE) return "admittance";
   return mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance" : "impedance";
+}
+
+// As long as a full output may take to nothing.
+double shortest_decay(const h6Session& s) {
+  double shortest = SafetyLimits{}.decay_time;
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    shortest = std::min(shortest, s.hands[h].guard.limits().decay_time);
+  return shortest;
 }
 
 // A device that does not say is an impedance device.
@@ -122,6 +218,13 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
                   "hand %zu works in %s mode, which device %zu does not offer: choose another mode "
                   "for the hand or another device",
                   h, mode_name(session->hands[h].mode), h);
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    if (const AboveRating above = above_rating(devices[h].capabilities, session->hands[h].safety);
+        above.key)
+      return fail(error,
+                  "hand %zu: safety %s, %g %s, is above what device %zu is rated for, %g %s: leave "
+                  "it out or choose less",
+                  h, above.key, above.asked, above.unit, h, above.rating, above.unit);
   if (!(def.duration >= 0) || def.duration > 1e9)
     return fail(error, "duration must be 0 (no end) to 1e9 s, it is %g", def.duration);
   if (!(def.spin_us >= 0 && def.spin_us <= 1e4))
@@ -161,15 +264,30 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     options.virtual_time = used.virtual_time;
     options.realtime = used.realtime;
     options.request.core = used.core;
+    bool real = false;
+    for (std::size_t h = 0; h < session->hand_count; ++h)
+      real = real || !devices[h].capabilities.frame_time;
+    if (!loop->gate.open(loop->devices, session->hand_count)) {
+      fail(error, "more than %zu loops at a time: end one first", sched::kMostToHalt);
+      return nullptr;
+    }
     h6Loop* raw = loop.get();
+    if (real && !used.virtual_time)
+      loop->watchdog = std::make_unique<sched::Watchdog>(
+          static_cast<std::int64_t>(1e9 * (session->dt + shortest_decay(*session))),
+          used.realtime ? options.request.priority + 1 : 0, [raw] { raw->gate.stop_real(); });
     loop->thread = std::make_unique<sched::PeriodicThread>(
         options,
         sched::PeriodicThread::Work{
             [raw](const sched::RealtimeGrant& grant) {
               std::snprintf(raw->report.granted, sizeof raw->report.granted, "%s", grant.text);
+              begin_output(*raw);
             },
             [raw](std::uint64_t n, const sched::TickTiming& before, double wakeup) {
-              return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, n, before, wakeup);
+              raw->stepped = !raw->stop.load(std::memory_order_relaxed);
+              const bool more = raw->stepped && tick(*raw, n, before, wakeup);
+              if (!more) end_output(*raw);
+              return more;
             },
             [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
     return loop.release();
@@ -184,22 +302,27 @@ size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity) {
 }
 bool h6LoopRunning(const h6Loop* loop) { return loop->thread->running(); }
 void h6RequestStop(h6Loop* loop) { loop->stop.store(true, std::memory_order_relaxed); }
-void h6ArmLoop(h6Loop*) {}
-void h6DisarmLoop(h6Loop*) {}
+void h6ArmLoop(h6Loop* loop) { loop->request.store(kArm); }
+void h6DisarmLoop(h6Loop* loop) { loop->request.store(kDisarm); }
 void h6HaltLoop(h6Loop* loop) {
-  stop_devices(*loop);
+  loop->gate.halt();
   h6RequestStop(loop);
 }
-void h6HaltAll(void) {}
+void h6HaltAll(void) { sched::halt_all(); }
 
 h6LoopReport h6JoinLoop(h6Loop* loop) {
   loop->thread->join();
-  stop_devices(*loop);
+  loop->gate.stop_all();
   h6LoopReport report = loop->report;
   report.fault = H6_CAUSE_NONE;
-  for (std::size_t h = 0; h < loop->session->hand_count; ++h)
-    if (report.fault == H6_CAUSE_NONE) report.fault = loop->session->hands[h].guard.fault();
+  for (std::size_t h = 0; h < loop->session->hand_count; ++h) {
+    OutputGuard& guard = loop->session->hands[h].guard;
+    if (loop->gate.halted()) guard.fault(H6_CAUSE_STOPPED);
+    report.hand[h] = guard.report();
+    if (report.fault == H6_CAUSE_NONE) report.fault = guard.fault();
+  }
   report.ring_overruns = loop->ring ? loop->ring->dropped() : 0;
+  report.watchdog_trips = loop->watchdog ? loop->watchdog->trips() : 0;
   return report;
 }
 

@@ -103,6 +103,11 @@ void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
   // A body that never turns hangs on the origin of its mesh frame.
   const Vec3 com = body.translation_only ? Vec3(Vec3::Zero()) : body.com;
   hand.filter.set(def.filter, com, def.mode != H6_IMPEDANCE);
+  hand.safety = def.safety;
+  h6DeviceCapabilities unknown{};
+  unknown.max_force = SafetyLimits{}.force, unknown.max_torque = SafetyLimits{}.torque;
+  unknown.frame_time = true;
+  set_rating(hand, unknown);
   hand.passivity = def.passivity;
   hand.port.set(com);
   h6CouplingDef& c = hand.coupling = def.coupling;

@@ -85,8 +85,17 @@ struct Hand {
   bool passivity = false;
   HandPort port;
   h6Wrench told{};  // to the device, in the last frame
+  // What stands last, and what it knows of the device. lost, overdue: for the next frame.
+  h6SafetyDef safety{};
+  DeviceWatch watch;
+  bool lost = false;   // it could not be read or written
+  double overdue = 0;  // a command comes so much too late [s]
   OutputGuard guard;
 };
+
+void set_rating(Hand& hand, const h6DeviceCapabilities& capabilities);
+// So many seconds lie between the last command and the next one: late, when a frame is missing.
+void note_interval(Hand& hand, double dt, double seconds);
 
 // Moving bodies that pairs connect: solved together when there are at most four.
 inline constexpr int kIslandBodies = 4;

@@ -184,8 +184,8 @@ typedef struct h6SafetyDef {
   double   max_speed;       /* admittance modes, of the motion sent; 0: the device's        [m/s]  */
   double   derate_speed;    /* of the hand; from here on the wrench falls linearly to nothing at
                                cut_speed; 0: half of that                                   [m/s]  */
-  double   cut_speed;       /* of the hand; zero, latched; 0: the device's max_velocity, at most
-                               5 m/s. A turn counts as the speed at 0.2 m                   [m/s]  */
+  double   cut_speed;       /* of the hand; zero, latched; 0: twice the device's max_velocity, at
+                               most 5 m/s. A turn counts as the speed at 0.2 m              [m/s]  */
   double   soft_start;      /* from nothing to the whole output after every arming, pose jump and
                                recovery, 0 .. 10; default 0.1                                 [s]  */
   double   decay_time;      /* from the whole output to nothing, 0.001 .. 0.02; default 0.02  [s]  */
