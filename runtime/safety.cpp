@@ -178,7 +178,7 @@ void OutputGuard::suffer(h6Cause cause, double seconds) {
 
 void OutputGuard::note(const DeviceWatch& watch, bool lost, double overdue, double dt) {
   const bool hangs = watch.seen() && watch.frozen();
-  may_arm_ = !lost && watch.seen() && !hangs;
+  may_arm_ = !lost && watch.seen() && watch.usable() && !hangs;
   speed_ = watch.speed();
   causes_ = 0;
   falling_ = H6_CAUSE_NONE;

@@ -61,7 +61,7 @@ class OutputGuard {
 
   void fault(h6Cause cause);
   // Clears a fault and starts from zero, softly; a motion from the device's own pose. Not while the
-  // device is absent, lost or frozen.
+  // device is absent, lost, frozen or sends no numbers.
   void arm();
   void disarm() { armed_ = false; }
   // Another device: not armed, nothing has been sent. A fault stays.
