@@ -44,8 +44,9 @@ void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms
 // What the two processes share: the wishes of this one.
 struct Wishes {
   std::atomic<bool> freeze{false}, no_number{false}, unplugged{false};
-  std::atomic<double> shift{0};  // of the pose [m]
-  std::atomic<int> stall_ms{0};  // once, in read; < 0: until it is 0 again
+  std::atomic<double> shift{0};        // of the pose [m]
+  std::atomic<int> stall_ms{0};        // once, in read; < 0: until it is 0 again
+  std::atomic<int> write_stall_ms{0};  // once, in write, after the command
   std::atomic<bool> arm{false}, crash{false}, exits{false}, destroys{false};
 };
 
@@ -94,6 +95,8 @@ struct Driver {
     d.write = [](void* self, double, const h6DeviceCommand* c) {
       static_cast<Driver*>(self)->send(
           {Packet::kWrite, now_seconds(), c->wrench.force, c->cause, c->causes});
+      const int stall = static_cast<Driver*>(self)->wishes->write_stall_ms.exchange(0);
+      if (stall > 0) pause_ms(stall);
       return 0;
     };
     d.stop = [](void* self) {
@@ -326,6 +329,16 @@ TEST_CASE("a stall of 200 ms: the watchdog stops the device meanwhile, latched, 
   CHECK(rig.until([&] { return rig.heard.back().kind == Packet::kStop; }));
   rig.ends_at_zero(H6_CAUSE_WATCHDOG);
   CHECK(rig.said(H6_CAUSE_LATE));
+  rig.push();
+}
+
+TEST_CASE("a device that takes a command and holds the thread for 200 ms: stopped, latched") {
+  Rig rig;
+  rig.push();
+  rig.mark();
+  rig.wishes->write_stall_ms = 200;
+  CHECK(rig.until([&] { return rig.heard.back().kind == Packet::kStop; }));
+  rig.ends_at_zero(H6_CAUSE_WATCHDOG);
   rig.push();
 }
 
