@@ -102,15 +102,17 @@ void read_devices(h6Loop& loop, double time) {
     if (!loop.devices[h].capabilities.frame_time) note_interval(s.hands[h], s.dt, since);
 }
 
-// In place of commands that were made before the watchdog stopped the devices.
-void hold_back(h6Loop& loop, const h6DeviceCommand* before) {
+// In place of commands that were made before the devices were stopped.
+void hold_back(h6Loop& loop, const h6DeviceCommand* before, h6Cause why) {
   for (std::size_t h = 0; h < loop.session->hand_count; ++h) {
     h6DeviceCommand& command = loop.commands[h];
     command.wrench = {};
     command.velocity = {};
-    if (loop.session->hands[h].mode != H6_IMPEDANCE) command.pose = before[h].pose;
-    command.cause = H6_CAUSE_WATCHDOG;
-    command.causes |= 1u << H6_CAUSE_WATCHDOG;
+    // A motion stays where it was last sent; before that, where the device is.
+    const bool moves = loop.session->hands[h].mode != H6_IMPEDANCE;
+    if (moves && loop.sent_at != 0) command.pose = before[h].pose;
+    command.cause = why;
+    command.causes |= 1u << why;
   }
 }
 
@@ -118,8 +120,11 @@ bool tripped(const h6Loop& loop) { return loop.watchdog && loop.watchdog->trips(
 
 // false: nothing is sent any more.
 bool write_devices(h6Loop& loop, double time, const h6DeviceCommand* before) {
-  if (!loop.gate.enter()) return false;
-  if (tripped(loop)) hold_back(loop, before);
+  if (!loop.gate.enter()) {
+    hold_back(loop, before, H6_CAUSE_STOPPED);
+    return false;
+  }
+  if (tripped(loop)) hold_back(loop, before, H6_CAUSE_WATCHDOG);
   for (std::size_t h = 0; h < loop.session->hand_count; ++h)
     if (loop.devices[h].write(loop.devices[h].self, time, &loop.commands[h]) != 0) lose(loop, h);
   if (tripped(loop)) loop.gate.stop_real();  // while we wrote: once more
@@ -180,7 +185,7 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   }
   // Virtual time has no deadline: it waits for its reader instead of losing rows.
   if (loop.def.virtual_time)
-    while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed))
+    while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed) && !loop.gate.halted())
       sched::sleep_until_ns(sched::now_ns() + 200000);
   loop.ring->push(row);
 }
