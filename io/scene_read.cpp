@@ -222,6 +222,22 @@ class SceneReader {
     def.passivity = o.value("passivity", false);
   }
 
+  void read_safety(const Json& o, h6SafetyDef& d) const {
+    d.max_force = number(o, "max_force", d.max_force);
+    d.max_torque = number(o, "max_torque", d.max_torque);
+    d.max_force_rate = number(o, "max_force_rate", d.max_force_rate);
+    d.max_torque_rate = number(o, "max_torque_rate", d.max_torque_rate);
+    d.max_power = number(o, "max_power", d.max_power);
+    d.max_speed = number(o, "max_speed", d.max_speed);
+    d.derate_speed = number(o, "derate_speed", d.derate_speed);
+    d.cut_speed = number(o, "cut_speed", d.cut_speed);
+    d.soft_start = number(o, "soft_start", d.soft_start);
+    d.decay_time = number(o, "decay_time", d.decay_time);
+    if (o.contains("pose_jump")) d.pose_jump = number(o, "pose_jump", 0) * scale_;
+    d.freeze_time = number(o, "freeze_time", d.freeze_time);
+    d.dead_man_buttons = static_cast<std::uint32_t>(number(o, "dead_man_buttons", 0));
+  }
+
   SceneArm read_arm(const Json& o) const {
     SceneArm arm;
     arm.delay_frames = static_cast<int>(number(o, "delay_frames", arm.delay_frames));
@@ -251,6 +267,7 @@ class SceneReader {
                         "another hand holds \"" + shown(hand.body) + "\" already"};
     hand.device = text(o, "device", hand.device);
     read_hand_def(o, hand.def);
+    if (o.contains("safety")) read_safety(o["safety"], hand.def.safety);
     if (o.contains("arm")) hand.arm = read_arm(o["arm"]);
     if (o.contains("path")) {
       hand.path_file = existing(o, "path", at);

@@ -29,11 +29,13 @@ class Watcher {
       : summary_(summary),
         recorder_(recorder),
         duration_(duration),
+        hands_(loaded.hands.size()),
         com_(loaded.hands.empty()
                  ? h6Vec3{}
                  : loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com),
         verdict_(loaded.scene.verdict, loaded.watched_points, com_, loaded.scene.rate) {
     summary_.depth_strip.assign(60, 0);
+    last_state_.fill(H6_ACTIVE);  // what needs no event
   }
 
   Outcome rows(const h6FrameRecord* rows, std::size_t count) {
@@ -76,13 +78,29 @@ class Watcher {
     last_time_ = r.time;
   }
 
-  // An event when a status bit or a cause comes up, not while it stays.
+  // An event when a status bit or a cause comes up, not while it stays. What the safety chain did
+  // says its cause, and the hand.
   void note_changes(const h6FrameRecord& r) {
-    const h6Status status = r.report.status & ~static_cast<h6Status>(H6_COUPLING_SATURATED);
+    const h6Status status =
+        r.report.status &
+        ~static_cast<h6Status>(H6_COUPLING_SATURATED | H6_OUTPUT_CLAMPED | H6_OUTPUT_SLEWED |
+                               H6_OUTPUT_FAULT | H6_DEVICE_LOST);
+    const std::string frame = "frame " + std::to_string(r.report.frame);
     for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
-      if ((status & bit) && !(last_status_ & bit))
-        event({r.time, h6StatusName(bit), "frame " + std::to_string(r.report.frame)});
+      if ((status & bit) && !(last_status_ & bit)) event({r.time, h6StatusName(bit), frame});
     last_status_ = status;
+    for (std::size_t h = 0; h < hands_; ++h) note_hand(r, h, frame);
+  }
+  void note_hand(const h6FrameRecord& r, std::size_t h, const std::string& frame) {
+    const std::string hand = "hand " + std::to_string(h) + ", " + frame;
+    const std::uint32_t causes = r.command[h].causes, fresh = causes & ~last_causes_[h];
+    for (int c = 1; c < H6_CAUSE_COUNT; ++c)
+      if (fresh >> c & 1u) event({r.time, h6CauseName(static_cast<h6Cause>(c)), hand});
+    last_causes_[h] = causes;
+    if (r.state[h] == last_state_[h]) return;
+    const std::string was = h6DeviceStateName(last_state_[h]);
+    last_state_[h] = r.state[h];
+    event({r.time, std::string("device ") + h6DeviceStateName(r.state[h]), hand + ", was " + was});
   }
   void event(const io::RecordingEvent& e) {
     if (summary_.events.size() < 1000)
@@ -95,11 +113,14 @@ class Watcher {
   RunSummary& summary_;
   io::Recorder* recorder_;
   double duration_;
+  std::size_t hands_;
   h6Vec3 com_;
   io::VerdictWatch verdict_;
   std::uint64_t frames_ = 0;
   double contacts_ = 0, last_time_ = 0;
   h6Status last_status_ = 0;
+  std::array<std::uint32_t, H6_MAX_HANDS> last_causes_{};
+  std::array<h6DeviceState, H6_MAX_HANDS> last_state_{};
 };
 
 }  // namespace
@@ -108,9 +129,10 @@ Outcome check_options(const RunOptions& options) {
   h6Method method;
   std::uint32_t pieces;
   if (!options.method.empty() && h6MethodFromName(options.method.c_str(), &method, &pieces) != 0)
-    return Failure{"no method is called '" + options.method +
-                   "': none, global, cluster, gauss3, gauss6, robust or series, the Gauss ones also "
-                   "with +facing, +depth, +product, +cluster, +geodesic, +handles, +printed"};
+    return Failure{
+        "no method is called '" + options.method +
+        "': none, global, cluster, gauss3, gauss6, robust or series, the Gauss ones also "
+        "with +facing, +depth, +product, +cluster, +geodesic, +handles, +printed"};
   return options.device.empty() ? Outcome(Done{}) : check_device(options.device);
 }
 
@@ -143,18 +165,8 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   std::unique_ptr<h6Loop, LoopDeleter> loop(
       h6StartLoop(run.session.get(), run.devices.devices.data(), &loop_def, &error));
   if (!loop) return Failure{error.message};
-  // A signal ends the loop after its frame; the devices are stopped from the handler already.
-  struct Stop {
-    h6Loop* loop;
-    const Hands* hands;
-  } stop{loop.get(), &run.devices};
-  set_signal_hook(
-      [](void* context) {
-        const auto& s = *static_cast<Stop*>(context);
-        for (const h6Device& d : s.hands->devices) d.stop(d.self);
-        h6RequestStop(s.loop);
-      },
-      &stop);
+  // A signal stops the devices from its handler and ends the loop after its frame.
+  set_signal_hook([](void* context) { h6HaltLoop(static_cast<h6Loop*>(context)); }, loop.get());
   if (interrupted.load()) h6RequestStop(loop.get());
 
   std::vector<h6FrameRecord> rows(256);
@@ -198,6 +210,27 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
       return done.failure();
   return summary;
 }
+
+namespace {
+
+// What the safety chain did for each hand: only causes that came up.
+ordered_json safety_json(const h6LoopReport& loop, std::size_t hands) {
+  ordered_json all = ordered_json::array();
+  for (std::size_t h = 0; h < hands; ++h) {
+    const h6HandSafety& s = loop.hand[h];
+    ordered_json causes = ordered_json::object();
+    for (int c = 1; c < H6_CAUSE_COUNT; ++c)
+      if (s.times[c] > 0)
+        causes[h6CauseName(static_cast<h6Cause>(c))] = {{"times", s.times[c]},
+                                                        {"frames", s.frames[c]}};
+    all.push_back({{"state", h6DeviceStateName(s.state)},
+                   {"fault", h6CauseName(s.fault)},
+                   {"causes", causes}});
+  }
+  return all;
+}
+
+}  // namespace
 
 ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool virtual_time) {
   const double scale = 1 / io::metres(loaded.scene.unit);
@@ -257,6 +290,8 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
                     {"status_bits", s.loop.status},
                     {"status", status},
                     {"fault", h6CauseName(s.loop.fault)},
+                    {"safety", safety_json(s.loop, loaded.hands.size())},
+                    {"watchdog_trips", s.loop.watchdog_trips},
                     {"state_hash", hash},
                     {"records_lost", s.loop.ring_overruns},
                     {"simd_target", kernels::target_name()},
