@@ -83,8 +83,9 @@ H6_API double        h6GetVoxel(const h6Session* session, int32_t body);
  * Without them: 100 N and 10 N m. Values above those are cut down to them. */
 H6_API void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities);
 /* A session begins armed. h6Disarm lets every output decay to zero. h6Fault latches it at zero at
- * once, for this cause. h6Arm clears faults and starts again, softly; it leaves a hand alone that is
- * absent, lost or frozen. h6Rearm is the same. While a loop runs, only its own functions below. */
+ * once, for this cause. h6Arm clears faults and starts again, softly; it leaves a hand alone whose
+ * device is absent, lost, frozen or sends no numbers. h6Rearm is the same. While a loop runs, only
+ * its own functions below. */
 H6_API void h6Arm(h6Session* session);
 H6_API void h6Disarm(h6Session* session);
 H6_API void h6Fault(h6Session* session, h6Cause cause);
