@@ -50,6 +50,8 @@ h6Pose pose(const Json& o, double scale) {
 class SceneReader {
  public:
   explicit SceneReader(const fs::path& file) : folder_(file.parent_path()) {}
+  // Of a recording: files are only named.
+  SceneReader() : recorded_(true) {}
 
   Scene read(const Json& o) {
     const std::string units = text(o, "units", "m");
@@ -78,7 +80,7 @@ class SceneReader {
     const std::string name = o[key].get<std::string>();
     const fs::path file = folder_ / fs::path(name);  // an absolute name replaces the folder
     std::error_code error;
-    if (!fs::is_regular_file(file, error))
+    if (!recorded_ && !fs::is_regular_file(file, error))
       throw Complaint{
           inside(at, key),
           "there is no file \"" + shown(name) + "\"" +
@@ -252,7 +254,9 @@ class SceneReader {
     hand.device = text(o, "device", hand.device);
     read_hand_def(o, hand.def);
     if (o.contains("arm")) hand.arm = read_arm(o["arm"]);
-    if (o.contains("path")) {
+    if (recorded_) {
+      hand.path_file = text(o, "path", "");
+    } else if (o.contains("path")) {
       hand.path_file = existing(o, "path", at);
       Result<Path> path = read_path(hand.path_file, scene_.unit);
       if (!path) throw Complaint{inside(at, "path"), path.error()};
@@ -279,6 +283,7 @@ class SceneReader {
   }
 
   fs::path folder_;
+  bool recorded_ = false;
   Scene scene_;
   double scale_ = 1;  // metres in one unit of the scene
 };
@@ -311,7 +316,22 @@ Result<Scene> read_scene(const fs::path& file) {
     check_scene_json(root);
     Scene scene = SceneReader(file).read(root);
     if (scene.name.empty()) scene.name = file.stem().string();
+    scene.file = file;
     return scene;
+  } catch (const Complaint& complaint) {
+    return Failure{name + ": " + (complaint.where.empty() ? "" : complaint.where + ": ") +
+                   complaint.what};
+  } catch (const std::exception& e) {
+    return Failure{name + ": cannot be read as a scene (" + e.what() + ")"};
+  }
+}
+
+Result<Scene> read_scene_text(const std::string& text, const std::string& name) {
+  try {
+    if (const Outcome json = check_json_text(text, name); !json) return json.failure();
+    const Json root = Json::parse(text);
+    check_scene_json(root);
+    return SceneReader().read(root);
   } catch (const Complaint& complaint) {
     return Failure{name + ": " + (complaint.where.empty() ? "" : complaint.where + ": ") +
                    complaint.what};

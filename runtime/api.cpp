@@ -20,15 +20,19 @@ void set_mesh_pose(Body& body, const h6Pose& pose) {
   body.x = from(pose.p) + body.R * body.com;
 }
 
-// Every bit of every pose and velocity, mixed in order (multiply and shift, 64 bits).
-std::uint64_t state_hash(const h6Session& s) {
+// Every bit of every pose and velocity and of what hands said, mixed in order (multiply and shift,
+// 64 bits). A changed sample shows in its own frame, felt or not.
+std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
   std::uint64_t hash = 0x9e3779b97f4a7c15u;
-  const auto mix = [&hash](const double* values, int count) {
+  const auto mix_bits = [&hash](std::uint64_t bits) {
+    hash = (hash ^ bits) * 0xd6e8feb86659fd93u;
+    hash ^= hash >> 32;
+  };
+  const auto mix = [&mix_bits](const double* values, int count) {
     for (int i = 0; i < count; ++i) {
       std::uint64_t bits;
       std::memcpy(&bits, &values[i], sizeof bits);
-      hash = (hash ^ bits) * 0xd6e8feb86659fd93u;
-      hash ^= hash >> 32;
+      mix_bits(bits);
     }
   };
   const auto mix_state = [&mix](const RigidState& state) {
@@ -41,6 +45,13 @@ std::uint64_t state_hash(const h6Session& s) {
   // Elsewhere the manipulandum is where the hand's sample says.
   for (std::size_t h = 0; h < s.hand_count; ++h)
     if (s.hands[h].mode == H6_PSEUDO_ADMITTANCE) mix_state(s.hands[h].manipulandum);
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    const h6DeviceSample& in = samples[h];
+    mix(&in.pose.p.x, 7);
+    mix(&in.velocity.linear.x, 6);
+    mix_bits(in.buttons);
+    if (s.hands[h].mode != H6_IMPEDANCE) mix(&in.wrench.force.x, 6);  // else not read
+  }
   return hash;
 }
 

@@ -99,7 +99,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
       send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
   s.report.passivity_energy = least_energy(s);
-  s.report.state_hash = state_hash(s);
+  s.report.state_hash = state_hash(s, samples);
   const std::int64_t now = sched::now_ns();
   s.report.frame_us = 1e-3 * static_cast<double>(now - start);
   s.team->end_frame(start + static_cast<std::int64_t>(1e9 * s.dt));

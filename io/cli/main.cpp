@@ -76,6 +76,7 @@ int main(int argc, char** argv) {
                                         std::to_string(H6_VERSION_PATCH));
   add_bake(app, program);
   add_run(app, program);
+  add_replay(app, program);
   add_info(app, program);
   add_scene(app, program);
   add_demo(app, program);

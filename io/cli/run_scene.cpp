@@ -125,6 +125,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   if (!options.device.empty())
     for (io::SceneHand& hand : run.hands) hand.device = options.device;
   run.record = options.record;
+  run.virtual_time = options.virtual_time;
   if (Outcome opened = run.open(); !opened) return opened.failure();
   io::Recorder* recorder = run.recorder.get();
 

@@ -28,6 +28,7 @@ struct RunSetup {
   std::vector<h6HandDef> hand_defs;
   std::vector<io::SceneHand> hands;  // device, path and figures; `def` is taken from hand_defs
   std::string record;                // .h5 file, empty: none
+  bool virtual_time = true;          // what the recording says; whoever steps knows
 
   SessionPtr session;
   Hands devices;

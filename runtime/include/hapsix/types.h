@@ -270,7 +270,7 @@ typedef struct h6FrameReport {
   double   max_depth_voxels;          /* the same in voxels of its field                           */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
-  uint64_t state_hash;                /* of poses and velocities after the step                    */
+  uint64_t state_hash;                /* of poses and velocities after the step and of the samples */
   uint32_t series_iterations;         /* `series`: Newton steps, the most of any shell body        */
   double   series_residual;           /* `series`: the largest left, of c * the deepest e          */
   /* With h6SessionDef.net_stiffness: extreme eigenvalues of S J^T w k J S over all shell bodies'
