@@ -22,6 +22,7 @@ struct RecordedRun {
   std::uint32_t threads = 1;
   bool virtual_time = false;
   std::size_t max_contacts = 0;
+  double frame_budget_us = 0;
   h6Vec3 gravity{};
   std::vector<h6BodyDef> bodies;              // as scene.bodies; shell and field stay -1
   std::vector<h6DeviceCapabilities> ratings;  // of each hand's device

@@ -15,7 +15,7 @@ constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped",     "slewed"
 constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
-    "passivity"};
+    "passivity",        "coarse contacts"};
 struct Piece {
   const char* name;
   uint32_t bit;

@@ -10,7 +10,9 @@
 #include "kernels/cull_spheres.h"
 #include "kernels/expiry.h"
 #include "kernels/touch_groups.h"
+#include "runtime/anytime.h"
 #include "runtime/stages.h"
+#include "sched/clock.h"
 
 namespace h6 {
 namespace {
@@ -80,6 +82,16 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
+  // The sample of each of the blocks' groups; `out` names rows of the shell as ever.
+  std::size_t touch_samples(const std::uint32_t* blocks, std::size_t count,
+                            const kernels::Touching& out, float* least) const {
+    const Samples& samples = shell.samples;
+    const std::size_t found = kernels::touch_groups(
+        field, place, {samples.x.data, samples.y.data, samples.z.data, shell.groups.count}, blocks,
+        count, margin, out, least);
+    for (std::size_t k = 0; k < found; ++k) out.row[k] = samples.row[out.row[k]];
+    return found;
+  }
   std::size_t touch(const std::uint32_t* groups, std::size_t count,
                     const kernels::Touching& out, float* least) const {
     return kernels::touch_groups(field, place,
@@ -144,8 +156,24 @@ float travel(Pair& pair, const Search& search) {
   return static_cast<float>(pair.travelled);
 }
 
+// One point of each group of `blocks` blocks, and how deep any of the others may be.
+std::size_t touch_coarsely(h6Session& s, const Search& search, std::size_t blocks,
+                           std::size_t used) {
+  const std::size_t found =
+      search.touch_samples(s.open_blocks, blocks, candidates_from(s, used), s.clearance);
+  float missed = 0;
+  for (std::size_t k = 0; k < blocks; ++k) {
+    const float reach = search.scale * search.shell.samples.reach[s.open_blocks[k]];
+    // The long form: cells far inside hold no samples.
+    missed = std::max(missed, kernels::cull_reach(reach, true) - s.clearance[k]);
+  }
+  s.report.missed_depth_voxels = std::max<double>(s.report.missed_depth_voxels, missed);
+  return found;
+}
+
 // Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
-// points; of each only what may have come within reach since it was last looked at.
+// points; of each only what may have come within reach since it was last looked at. Where time is
+// short it ends with the deepest tier that is complete: what was not looked at stays expired.
 std::size_t traverse_pair(h6Session& s, Pair& pair, std::size_t used) {
   const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Shell& shell = s.model->shells[a.shell];
@@ -164,12 +192,20 @@ std::size_t traverse_pair(h6Session& s, Pair& pair, std::size_t used) {
     pair.block_expiry[s.frontier[k]] = expiry_of(now, s.clearance[k]);
   if (blocks == 0) return 0;
 
-  count = kernels::expired(pair.group_expiry, s.survivors, blocks, now, s.frontier);
   std::copy_n(s.survivors, blocks, s.open_blocks);
+  const auto number = static_cast<std::size_t>(&pair - s.pairs);
+  if (must_be_coarse(s, number, used, 0)) return touch_coarsely(s, search, blocks, used);
+  count = kernels::expired(pair.group_expiry, s.open_blocks, blocks, now, s.frontier);
   const std::size_t groups = search.cull(shell.groups, s.frontier, count, s.survivors, s.clearance);
   for (std::size_t k = 0; k < count; ++k)
     pair.group_expiry[s.frontier[k]] = expiry_of(now, s.clearance[k]);
+  if (must_be_coarse(s, number, used, groups)) {
+    kernels::least_of_blocks(pair.group_expiry, s.open_blocks, blocks, pair.block_expiry);
+    return touch_coarsely(s, search, blocks, used);
+  }
+  const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(s, search, s.survivors, groups, used);
+  learn_sampling(s, groups, found, since);
   for (std::size_t k = 0; k < groups; ++k)
     pair.group_expiry[s.survivors[k]] =
         expiry_of(now, kernels::cull_clearance(s.clearance[k] - margin, search.wide));

@@ -27,9 +27,10 @@ struct Stopwatch {
   }
 };
 
-void begin(h6Session& s, const h6DeviceSample* samples) {
+void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   s.report = {};
   s.report.frame = s.frame++;
+  begin_anytime(s, start);
   for (std::size_t i = 0; i < s.body_count; ++i) {
     Body& body = s.bodies[i];
     body.f.setZero();
@@ -67,7 +68,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   const sched::FlushDenormals flush;
   const std::int64_t start = sched::now_ns();
   s.team->begin_frame();
-  begin(s, samples);
+  begin(s, samples, start);
   Stopwatch watch{s, sched::now_ns()};
   for (std::size_t first = 0, end; first < s.pair_count; first = end) {
     end = pairs_of_shell(s, first);
@@ -98,6 +99,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
     for (std::size_t h = 0; h < s.hand_count; ++h)
       send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
+  learn_frame(s);
   s.report.passivity_energy = least_energy(s);
   s.report.state_hash = state_hash(s, samples);
   const std::int64_t now = sched::now_ns();

@@ -71,6 +71,16 @@ std::uint32_t late_bit(sched::Late late) {
   }
 }
 
+void count_late(h6LoopReport& report, const sched::TickTiming& timing) {
+  h6LateHistogram* const by_cause[] = {nullptr, &report.late_us_compute, &report.late_us_stolen,
+                                       &report.late_us_wakeup};
+  h6LateHistogram* histogram = by_cause[static_cast<int>(timing.late)];
+  if (!histogram) return;
+  std::size_t bin = 0;
+  for (double most = 10; bin + 1 < H6_LATE_BINS && timing.late_us >= most; most *= 10) ++bin;
+  ++histogram->frames[bin];
+}
+
 // After the frame, before the next deadline: nothing here is timed as the frame's.
 void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   h6Session& s = *loop.session;
@@ -79,11 +89,15 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   r.late_compute += timing.late == sched::Late::compute;
   r.late_stolen += timing.late == sched::Late::stolen;
   r.late_wakeup += timing.late == sched::Late::wakeup;
+  count_late(r, timing);
+  r.coarse_frames += (s.report.status & H6_COARSE) != 0;
   if (timing.wakeup_us > r.wakeup_us_max) r.wakeup_us_max = timing.wakeup_us;
   if (!loop.ring) return;
   h6FrameRecord& row = loop.record;
   row.report = s.report;
   row.late = late_bit(timing.late);
+  row.late_us = timing.late_us;
+  row.cpu_us = timing.cpu_us;
   for (std::size_t h = 0; h < s.hand_count; ++h) {
     row.hand[h] = loop.samples[h];
     row.command[h] = loop.commands[h];
@@ -95,6 +109,16 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
     while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed))
       sched::sleep_until_ns(sched::now_ns() + 200000);
   loop.ring->push(row);
+}
+
+void note_grant(h6LoopReport& report, const sched::RealtimeGrant& grant) {
+  std::snprintf(report.granted, sizeof report.granted, "%s", grant.text);
+  h6Granted& g = report.grant;
+  g.core = grant.core;
+  g.fifo = grant.fifo;
+  g.locked = grant.locked;
+  g.isolated = grant.isolated;
+  std::snprintf(g.governor, sizeof g.governor, "%s", grant.governor);
 }
 
 const char* mode_name(std::uint32_t mode) {
@@ -151,6 +175,8 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
       loop->samples[h].pose.q.w = 1;
       h6SetRating(session, static_cast<std::int32_t>(h), &devices[h].capabilities);
     }
+    session->anytime.no_clock = used.virtual_time;
+    loop->report.grant.core = -1;
     loop->frames = static_cast<std::uint64_t>(used.duration / session->dt + 0.5);
     if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
     if (used.ring_frames)
@@ -166,7 +192,7 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
         options,
         sched::PeriodicThread::Work{
             [raw](const sched::RealtimeGrant& grant) {
-              std::snprintf(raw->report.granted, sizeof raw->report.granted, "%s", grant.text);
+              note_grant(raw->report, grant);
             },
             [raw](std::uint64_t n, const sched::TickTiming& before, double wakeup) {
               return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, n, before, wakeup);

@@ -23,6 +23,13 @@ struct Tier {
   Buffer<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
 };
 
+// One point of each group, the nearest to its centre: what is sampled where time is short.
+struct Samples {
+  Buffer<float> x, y, z;      // (groups, rounded up to whole blocks)
+  Buffer<std::uint32_t> row;  // of the shell
+  Buffer<float> reach;        // (blocks) from a group's sample to its farthest point, the longest
+};
+
 // A shell's points in three flat tiers. Rows are sorted so that those next to each other are near
 // each other (split at medians): 16 rows are a group, 16 groups a block, each with its smallest
 // sphere. Coordinates are relative to `centre`, so that float serves meshes far from their origin.
@@ -33,7 +40,10 @@ struct Shell {
   Buffer<float> x, y, z, nx, ny, nz;  // normals point inward
   Buffer<std::uint32_t> point;        // of the definition
   Tier groups, blocks;
-  std::size_t bytes() const { return x.count * 28 + (groups.x.count + blocks.x.count) * 16; }
+  Samples samples;
+  std::size_t bytes() const {
+    return x.count * 28 + (groups.x.count + blocks.x.count + samples.x.count) * 16;
+  }
 };
 inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;
 

@@ -268,6 +268,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   s->gravity = from(def->gravity);
   s->net_stiffness = def->net_stiffness;
   s->max_contacts = def->max_contacts;
+  s->anytime.budget_ns = 1e3 * def->frame_budget_us;
   bool ready = false;
   try {
     ready = fill(*s, *def, error);

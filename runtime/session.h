@@ -2,6 +2,7 @@
 #pragma once
 #include "hapsix/hapsix.h"
 #include "kernels/contact_wrench.h"
+#include "runtime/anytime.h"
 #include "runtime/arena.h"
 #include "runtime/contacts.h"
 #include "runtime/hand_filter.h"
@@ -134,6 +135,7 @@ struct h6Session {
   std::size_t* slice_count = nullptr;                               // (slices) survivors of each
   h6::kernels::WrenchSum* slice_sum = nullptr;                      // (slices)
 
+  h6::Anytime anytime;
   h6FrameReport report{};
   std::uint64_t frame = 0;
   h6::sched::FrameTeam* team = nullptr;

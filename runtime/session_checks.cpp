@@ -197,6 +197,8 @@ bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error
   if (def.threads < 1 || def.threads > 2)
     return fail(error, "threads must be 1 or 2 (the haptic thread and one helper), it is %u",
                 def.threads);
+  if (!(def.frame_budget_us >= 0 && def.frame_budget_us <= 1e6))
+    return fail(error, "frame_budget_us must be in 0..1000000, it is %g", def.frame_budget_us);
   if (!from(def.gravity).allFinite()) return fail(error, "gravity is not finite");
   if (!check_contact(def.contact, error)) return false;
   for (std::size_t i = 0; i < def.body_count; ++i)

@@ -268,6 +268,7 @@ class Replay {
     now_ = {};
     now_.time = row.time;
     std::copy(std::begin(row.hand), std::end(row.hand), now_.hand);
+    h6SetCoarse(session_.get(), row.report.coarse_pairs);  // what the clock decided then
     h6Step(session_.get(), now_.hand, now_.command);
     now_.report = h6GetFrame(session_.get());
     for (std::size_t h = 0; h < head_.hands; ++h)

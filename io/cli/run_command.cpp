@@ -61,6 +61,8 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
                 depth_strip(*summary).c_str());
+    if (const std::string late = late_table(*summary); !late.empty())
+      std::printf("\n%s", late.c_str());
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);
     if (!options.record.empty()) std::printf("recording: %s\n", options.record.c_str());
   }
@@ -88,9 +90,10 @@ void add_run(CLI::App& app, Program& program) {
       ->check(number_within(1e-3, 1e6));
   run->add_flag("--virtual-time", o->virtual_time,
                 "As fast as possible instead of in real time; same code, same bits");
-  run->add_option("--method", o->method,
-                  "none, global, cluster, gauss3, gauss6, robust or series; the Gauss ones also with "
-                  "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
+  run->add_option(
+         "--method", o->method,
+         "none, global, cluster, gauss3, gauss6, robust or series; the Gauss ones also with "
+         "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
       ->option_text("NAME");
   run->add_option("--threads", o->threads,
                   "1 (default), or 2 for a helper on the other core; same bits")
@@ -99,6 +102,12 @@ void add_run(CLI::App& app, Program& program) {
   run->add_option("--spin", o->spin_us, "Poll the clock so long before each deadline; default 0")
       ->option_text("MICROSECONDS")
       ->check(number_within(0, 10000));
+  run->add_option(
+         "--budget", o->budget_us,
+         "Anytime mode: a frame that would take longer makes do with one point in sixteen; "
+         "not in virtual time; default off")
+      ->option_text("MICROSECONDS")
+      ->check(number_within(0, 1000000));
   run->add_option("--record", o->record, "Record every frame to this .h5 file")
       ->option_text("FILE")
       ->check(ends_with(".h5"));

@@ -56,6 +56,7 @@ class Watcher {
     summary_.max_depth_voxels = std::max(summary_.max_depth_voxels, f.max_depth_voxels);
     summary_.frame_us.add(f.frame_us);
     summary_.wakeup_us.add(r.wakeup_us);
+    summary_.missed_depth_voxels = std::max(summary_.missed_depth_voxels, f.missed_depth_voxels);
     summary_.net_stiffness_max = std::max(summary_.net_stiffness_max, f.net_stiffness_max);
     for (int s = 0; s < H6_STAGE_COUNT; ++s)
       summary_.stage_us[static_cast<std::size_t>(s)].add(f.stage_us[s]);
@@ -78,11 +79,25 @@ class Watcher {
 
   // An event when a status bit or a cause comes up, not while it stays.
   void note_changes(const h6FrameRecord& r) {
-    const h6Status status = r.report.status & ~static_cast<h6Status>(H6_COUPLING_SATURATED);
+    // Late frames have an event each, of their own.
+    const h6Status status =
+        r.report.status & ~static_cast<h6Status>(H6_COUPLING_SATURATED | H6_LATE);
     for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
       if ((status & bit) && !(last_status_ & bit))
         event({r.time, h6StatusName(bit), "frame " + std::to_string(r.report.frame)});
     last_status_ = status;
+    if (r.late) late(r);
+  }
+  void late(const h6FrameRecord& r) {
+    const char* cause = r.late & H6_LATE_COMPUTE  ? "late: own computation"
+                        : r.late & H6_LATE_STOLEN ? "late: stolen"
+                                                  : "late: wake-up";
+    char detail[160];
+    std::snprintf(detail, sizeof detail,
+                  "frame %llu ended %.0f us after its deadline: began %.0f us late, used %.0f us",
+                  static_cast<unsigned long long>(r.report.frame), r.late_us, r.wakeup_us,
+                  r.cpu_us);
+    event({r.time, cause, detail});
   }
   void event(const io::RecordingEvent& e) {
     if (summary_.events.size() < 1000)
@@ -122,6 +137,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   if (!options.method.empty())
     h6MethodFromName(options.method.c_str(), &def.contact.method, &def.contact.pieces);
   def.threads = options.threads;
+  def.frame_budget_us = options.budget_us;
   if (!options.device.empty())
     for (io::SceneHand& hand : run.hands) hand.device = options.device;
   run.record = options.record;
@@ -200,6 +216,32 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   return summary;
 }
 
+namespace {
+
+// How late frames were, by cause: how many within each power of ten.
+ordered_json late_json(const h6LoopReport& report) {
+  const auto bins = [](const h6LateHistogram& h) {
+    static const char* const names[H6_LATE_BINS] = {"10",    "100",    "1000",
+                                                    "10000", "100000", "longer"};
+    ordered_json out = ordered_json::object();
+    for (int i = 0; i < H6_LATE_BINS; ++i) out[names[i]] = h.frames[i];
+    return out;
+  };
+  return {{"compute", bins(report.late_us_compute)},
+          {"wakeup", bins(report.late_us_wakeup)},
+          {"stolen", bins(report.late_us_stolen)}};
+}
+
+ordered_json grant_json(const h6Granted& g) {
+  return {{"core", g.core < 0 ? ordered_json() : ordered_json(g.core)},
+          {"fifo", g.fifo},
+          {"locked", g.locked},
+          {"isolated", g.isolated},
+          {"governor", g.governor[0] ? ordered_json(g.governor) : ordered_json()}};
+}
+
+}  // namespace
+
 ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool virtual_time) {
   const double scale = 1 / io::metres(loaded.scene.unit);
   const auto pose = [&](const h6Pose& p) {
@@ -250,7 +292,10 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
                     {"deadline",
                      {{"missed_compute", s.loop.late_compute},
                       {"missed_wakeup", s.loop.late_wakeup},
-                      {"missed_stolen", s.loop.late_stolen}}},
+                      {"missed_stolen", s.loop.late_stolen},
+                      {"late_us", late_json(s.loop)}}},
+                    {"coarse", {{"frames", s.loop.coarse_frames},
+                                {"missed_depth_voxels", s.missed_depth_voxels}}},
                     {"final_pose", pose(s.final_pose)},
                     {"hand_pose", pose(s.hand_pose)},
                     {"max_force", s.max_force},
@@ -262,6 +307,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
                     {"records_lost", s.loop.ring_overruns},
                     {"simd_target", kernels::target_name()},
                     {"realtime", s.loop.granted},
+                    {"granted", grant_json(s.loop.grant)},
                     {"assets", assets},
                     {"events", events},
                     {"events_dropped", s.events_dropped},

@@ -55,6 +55,7 @@ Outcome RunSetup::open_recording() {
   how.threads = def.threads;
   how.virtual_time = virtual_time;
   how.max_contacts = def.max_contacts;
+  how.frame_budget_us = def.frame_budget_us;
   how.gravity = def.gravity;
   how.bodies.assign(def.bodies, def.bodies + def.body_count);
   for (const h6Device& device : devices.devices) how.ratings.push_back(device.capabilities);

@@ -2,6 +2,8 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <hdf5.h>
 
+#include <algorithm>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;
@@ -82,6 +84,7 @@ TEST_CASE("real time and virtual time, people and arms: every run replays") {
   const Args runs[] = {
       {"run", "peg-in-hole", "--duration", "0.4"},
       {"run", "peg-in-hole", "--duration", "0.4", "--threads", "2"},
+      {"run", "box-on-wall", "--duration", "0.4", "--budget", "0.001"},
       {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--device", "simulated"},
       {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--device", "arm"},
       {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--method", "series"},
@@ -93,6 +96,20 @@ TEST_CASE("real time and virtual time, people and arms: every run replays") {
     const Json json = result_of(box, {"replay", "run.h5", "--verify"});
     CHECK(json["same"] == true);
     CHECK(json["frames"] == recorded["frames"]);
+    // Every late frame has an event with its cause, and a place in its histogram.
+    const Json& deadline = recorded["deadline"];
+    for (const char* cause : {"compute", "wakeup", "stolen"}) {
+      const std::string said = std::string(cause) == "compute"  ? "late: own computation"
+                               : std::string(cause) == "wakeup" ? "late: wake-up"
+                                                                : "late: stolen";
+      long events = 0, in_bins = 0;
+      for (const Json& event : recorded["events"]) events += event["what"] == said;
+      for (const Json& frames : deadline["late_us"][cause]) in_bins += frames.get<long>();
+      CHECK(in_bins == deadline[std::string("missed_") + cause]);
+      if (recorded["events_dropped"] == 0) CHECK(events == in_bins);
+    }
+    const bool coarse = std::find(args.begin(), args.end(), "--budget") != args.end();
+    CHECK((recorded["coarse"]["frames"] > 0) == coarse);
     CHECK(json["replayed"]["verdict"] == recorded["verdict"]);
     CHECK(json["replayed"]["max_depth_voxels"] == recorded["max_depth_voxels"]);
   }

@@ -49,7 +49,11 @@ enum {
   /* The frame before this one ended after its deadline. */
   H6_LATE = 1u << 9,
   /* Energy would have been made at a hand or a contact: the passivity controller damped it. */
-  H6_PASSIVITY = 1u << 10
+  H6_PASSIVITY = 1u << 10,
+  /* The frame would have overrun h6SessionDef.frame_budget_us: contacts of the last
+   * h6FrameReport.coarse_pairs pairs are those of one point in sixteen. Raise the budget, lower the
+   * rate, or give the shell fewer points. */
+  H6_COARSE = 1u << 11
 };
 
 /* The name of one status bit ("contacts dropped"), or NULL when the bit has no name. */

@@ -69,6 +69,11 @@ H6_API void       h6DestroySession(h6Session* session);
 /* One frame of 1/rate seconds: samples of each hand in, a wrench for each hand out. */
 H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
+/* For the next step only: so many pairs, the last ones in their order, are traversed coarsely,
+ * whatever the clock says. With h6FrameReport.coarse_pairs a run in anytime mode is repeated to the
+ * bit. */
+H6_API void h6SetCoarse(h6Session* session, uint32_t pairs);
+
 /* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
@@ -96,6 +101,9 @@ typedef struct h6FrameRecord {
   h6BodyState     body[H6_MAX_HANDS];          /* the body of each hand                            */
   double          wakeup_us;                   /* start after the deadline                         */
   uint32_t        late;                        /* H6_LATE_*                                        */
+  double          late_us;                     /* of a late frame: its end after the next deadline */
+  double          cpu_us;                      /* of the haptic thread in the tick, devices and all;
+                                                  0 in virtual time                                */
 } h6FrameRecord;
 
 enum { H6_LATE_COMPUTE = 1u << 0, H6_LATE_WAKEUP = 1u << 1, H6_LATE_STOLEN = 1u << 2 };
@@ -110,6 +118,19 @@ typedef struct h6LoopDef {
 } h6LoopDef;
 H6_API h6LoopDef h6DefaultLoopDef(void);  /* real time, realtime asked for, 1000 records           */
 
+/* Late frames by how long after the deadline they ended: under 10, 100 us, 1, 10, 100 ms, longer. */
+#define H6_LATE_BINS 6
+typedef struct h6LateHistogram { uint64_t frames[H6_LATE_BINS]; } h6LateHistogram;
+
+/* What of the real-time treatment that was asked for was had. `governor`: of its core, "" unknown. */
+typedef struct h6Granted {
+  int32_t core;           /* pinned to it; -1: not pinned                                          */
+  bool    fifo;           /* SCHED_FIFO                                                            */
+  bool    locked;         /* memory                                                                */
+  bool    isolated;       /* nothing else is scheduled on that core by itself (isolcpus)           */
+  char    governor[32];   /* "performance" keeps the clock up                                      */
+} h6Granted;
+
 typedef struct h6LoopReport {
   uint64_t frames;
   /* Frames that ended after the next deadline, each counted once, by cause: */
@@ -121,6 +142,9 @@ typedef struct h6LoopReport {
   h6Cause  fault;         /* why the output is latched at zero, or H6_CAUSE_NONE                   */
   double   wakeup_us_max;
   char     granted[1024]; /* what real-time support was granted, and how to get the rest           */
+  h6Granted grant;        /* the same to be read by a program                                      */
+  h6LateHistogram late_us_compute, late_us_stolen, late_us_wakeup;
+  uint64_t coarse_frames; /* with H6_COARSE                                                        */
 } h6LoopReport;
 
 /* Starts the haptic thread; `devices` has one entry per hand and must outlive the loop. */

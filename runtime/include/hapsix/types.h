@@ -207,6 +207,10 @@ typedef struct h6SessionDef {
   size_t       max_contacts;  /* a shell body; storage is reserved once                            */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
+  double       frame_budget_us; /* anytime mode: a step that would take longer stops traversal at the
+                                   deepest complete tier (H6_COARSE). It reads the clock: no two runs
+                                   leave out the same, h6SetCoarse repeats one. 0: never, and in
+                                   virtual time [us]                                               */
   h6Allocator  allocator;
 } h6SessionDef;
 
@@ -279,6 +283,9 @@ typedef struct h6FrameReport {
   double   net_stiffness_min, net_stiffness_max;
   double   passivity_energy;          /* observed at the worst port: < 0 where energy was made; 0
                                          when nothing is observed                             [J]  */
+  uint32_t coarse_pairs;             /* so many pairs, the last ones, were traversed coarsely       */
+  double   missed_depth_voxels;      /* H6_COARSE: no point that was left out is deeper, as long as
+                                        none is deeper than its field's band                        */
 } h6FrameReport;
 
 #ifdef __cplusplus
