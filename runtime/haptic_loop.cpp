@@ -111,6 +111,8 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   loop.ring->push(row);
 }
 
+constexpr int kHelperPriority = 79;  // below the haptic thread's
+
 void note_grant(h6LoopReport& report, const sched::RealtimeGrant& grant) {
   std::snprintf(report.granted, sizeof report.granted, "%s", grant.text);
   h6Granted& g = report.grant;
@@ -193,6 +195,7 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
         sched::PeriodicThread::Work{
             [raw](const sched::RealtimeGrant& grant) {
               note_grant(raw->report, grant);
+              if (grant.fifo) raw->session->team->set_realtime(kHelperPriority, grant.core);
             },
             [raw](std::uint64_t n, const sched::TickTiming& before, double wakeup) {
               return !raw->stop.load(std::memory_order_relaxed) && tick(*raw, n, before, wakeup);
@@ -214,6 +217,7 @@ void h6RequestStop(h6Loop* loop) { loop->stop.store(true, std::memory_order_rela
 h6LoopReport h6JoinLoop(h6Loop* loop) {
   loop->thread->join();
   stop_devices(*loop);
+  loop->session->team->set_realtime(0, -1);
   h6LoopReport report = loop->report;
   report.fault = H6_CAUSE_NONE;
   for (std::size_t h = 0; h < loop->session->hand_count; ++h)

@@ -2,6 +2,10 @@
 
 #include <oneapi/tbb/task_arena.h>
 
+#include <pthread.h>
+#include <sched.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <ctime>
 #include <thread>
@@ -22,7 +26,29 @@ void relax() {
 #endif
 }
 constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
-constexpr std::int64_t kNap = 50000;          // ns; how late the helper may notice an early frame
+
+// The thread belongs to TBB: it gets back what it came with.
+class Treatment {
+ public:
+  Treatment() { pthread_getaffinity_np(pthread_self(), sizeof came_with_, &came_with_); }
+  ~Treatment() { set(0, -1); }
+  void set(int priority, int haptic_core) {
+    cpu_set_t cores = came_with_;
+    if (priority > 0 && haptic_core >= 0) CPU_CLR(haptic_core, &cores);
+    // With no other core it would only stand in the way.
+    const bool alone = CPU_COUNT(&cores) == 0;
+    pthread_setaffinity_np(pthread_self(), sizeof cores, alone ? &came_with_ : &cores);
+    sched_param parameters{};
+    parameters.sched_priority = alone ? 0 : priority;
+    const int policy = parameters.sched_priority > 0 ? SCHED_FIFO : SCHED_OTHER;
+    pthread_setschedparam(pthread_self(), policy, &parameters);
+  }
+
+ private:
+  cpu_set_t came_with_{};
+};
+
+constexpr std::int64_t kNap = 50000;  // ns; how late the helper may notice an early frame
 }  // namespace
 
 // One job at a time. The ticket is the whole job in one word: its number (32 bits), how many slices
@@ -34,6 +60,7 @@ struct FrameTeam::Helper {
   std::atomic<bool> stop{false}, ended{false};
   std::atomic<bool> polling{false};         // a frame is on
   std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
+  std::atomic<int> treatment{0};            // priority + 256 * (the haptic thread's core + 1)
   alignas(64) std::atomic<std::uint64_t> ticket{0};
   alignas(64) std::atomic<std::uint32_t> done{0};  // slices of this job that are finished
   // Written before the ticket is published, read after a claim.
@@ -63,8 +90,12 @@ struct FrameTeam::Helper {
   void help() {
     (void)polling.load(std::memory_order_acquire);
     FlushDenormals flush;
+    Treatment treated;
+    int as = 0;
     while (!stop.load(std::memory_order_relaxed)) {
       if (!polling.load(std::memory_order_acquire)) {
+        if (const int asked = treatment.load(std::memory_order_relaxed); asked != as)
+          treated.set((as = asked) % 256, asked / 256 - 1);
         const std::int64_t due = next_frame.load(std::memory_order_relaxed) - kPollBefore;
         const std::int64_t now = now_ns();
         if (now < due)
@@ -99,6 +130,12 @@ FrameTeam::~FrameTeam() {
 }
 
 unsigned FrameTeam::threads() const { return helper_ ? 2 : 1; }
+
+void FrameTeam::set_realtime(int priority, int haptic_core) {
+  if (helper_)
+    helper_->treatment.store(priority > 0 ? priority + 256 * (haptic_core + 1) : 0,
+                             std::memory_order_relaxed);
+}
 
 void FrameTeam::begin_frame() {
   if (helper_) helper_->polling.store(true, std::memory_order_release);

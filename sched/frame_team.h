@@ -41,6 +41,11 @@ class FrameTeam {
   }
   unsigned threads() const;
 
+  // From the helper's next nap on: SCHED_FIFO of this priority (0: as it was made), on any core but
+  // that of the haptic thread (-1: any). Without it a busy machine takes the helper off its core in
+  // the midst of a slice, and the haptic thread waits for that slice.
+  void set_realtime(int priority, int haptic_core);
+
  private:
   struct Helper;
   std::unique_ptr<Helper> helper_;
