@@ -27,6 +27,8 @@ void relax() {
 }
 constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
 
+thread_local int this_is_helper = 0;
+
 // The thread belongs to TBB: it gets back what it came with.
 class Treatment {
  public:
@@ -91,6 +93,7 @@ struct FrameTeam::Helper {
     (void)polling.load(std::memory_order_acquire);
     FlushDenormals flush;
     Treatment treated;
+    this_is_helper = 1;
     int as = 0;
     while (!stop.load(std::memory_order_relaxed)) {
       if (!polling.load(std::memory_order_acquire)) {
@@ -108,6 +111,7 @@ struct FrameTeam::Helper {
       }
       if (!work_one()) relax();
     }
+    this_is_helper = 0;
     ended.store(true, std::memory_order_release);
   }
 };
@@ -130,6 +134,8 @@ FrameTeam::~FrameTeam() {
 }
 
 unsigned FrameTeam::threads() const { return helper_ ? 2 : 1; }
+
+int FrameTeam::here() { return this_is_helper; }
 
 void FrameTeam::set_realtime(int priority, int haptic_core) {
   if (helper_)

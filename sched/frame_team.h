@@ -40,6 +40,8 @@ class FrameTeam {
         const_cast<void*>(static_cast<const void*>(&body)));
   }
   unsigned threads() const;
+  // Whose thread this is, for scratch of its own: 0 the caller's, 1 a helper's.
+  static int here();
 
   // From the helper's next nap on: SCHED_FIFO of this priority (0: as it was made), on any core but
   // that of the haptic thread (-1: any). Without it a busy machine takes the helper off its core in

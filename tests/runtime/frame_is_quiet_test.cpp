@@ -328,6 +328,59 @@ TEST_CASE("one thread and two give the same bits, frame by frame") {
   }
 }
 
+TEST_CASE("many fields and two hands: pairs shared between threads give the same bits") {
+  // 24 bowls, one into the other, and two balls in each of them.
+  struct Bowls : BallInBowl {
+    std::vector<h6BodyDef> many;
+    std::array<h6HandDef, 2> two{h6DefaultHandDef(), h6DefaultHandDef()};
+    Bowls(unsigned threads, std::size_t most) : BallInBowl(threads, 3000) {
+      for (int i = 0; i < 26; ++i) {
+        h6BodyDef body = h6DefaultBodyDef();
+        body.fixed = i >= 2;
+        (i < 2 ? body.shell : body.field) = 0;
+        if (i >= 2) body.pose = pose(0.05 * mm * (i % 5), 0.04 * mm * (i % 7), 0.03 * mm * i);
+        many.push_back(body);
+      }
+      for (std::size_t i = 0; i < 2; ++i) two[i] = hand, two[i].body = static_cast<int>(i);
+      def.bodies = many.data(), def.body_count = many.size();
+      def.hands = two.data(), def.hand_count = 2;
+      def.max_contacts = most;
+    }
+  };
+  for (const std::size_t most : {72000u, 700u, 60u}) {
+    CAPTURE(most);
+    Bowls one(1, most), two(2, most);
+    one.open();
+    two.open();
+    std::uint32_t contacts = 0;
+    bool dropped = false;
+    for (int i = 0; i < 150; ++i) {
+      const h6DeviceSample samples[] = {one.sample(i), one.sample(i + 40)};
+      if (i % 10 == 9) h6SetCoarse(one.session, 17), h6SetCoarse(two.session, 17);
+      h6Step(one.session, samples, nullptr);
+      h6Step(two.session, samples, nullptr);
+      const h6FrameReport a = h6GetFrame(one.session), b = h6GetFrame(two.session);
+      REQUIRE(a.state_hash == b.state_hash);
+      REQUIRE(a.contacts == b.contacts);
+      REQUIRE(a.missed_depth_voxels == b.missed_depth_voxels);
+      REQUIRE(a.status == b.status);
+      for (int body = 0; body < 2; ++body) {
+        const h6Contacts c = h6GetContacts(one.session, body), d = h6GetContacts(two.session, body);
+        REQUIRE(c.count == d.count);
+        for (std::size_t k = 0; k < c.count; ++k) {
+          if (c.point[k] == d.point[k] && c.field_body[k] == d.field_body[k]) continue;
+          REQUIRE(c.point[k] == d.point[k]);
+          REQUIRE(c.field_body[k] == d.field_body[k]);
+        }
+      }
+      contacts = std::max(contacts, a.contacts);
+      dropped = dropped || (a.status & H6_CONTACTS_DROPPED);
+    }
+    CHECK(contacts >= std::min<std::size_t>(most, 800));
+    CHECK(dropped == (most < 1000));
+  }
+}
+
 TEST_CASE("a changed input changes the hash") {
   BallInBowl one(1), two(1);
   one.open();
