@@ -234,7 +234,7 @@ Result<Recording> read_recording(const fs::path& name, FrameRange range) {
   }
 }
 
-Outcome repair_recording(const fs::path& name) {
+Result<std::string> repair_recording(const fs::path& name) {
   const fs::path file = recording::followed(name);
   try {
     const recording::LibraryLock lock;
@@ -246,13 +246,23 @@ Outcome repair_recording(const fs::path& name) {
     if (!itself && copies.empty()) return itself.failure();
     // Where the file itself does not open no run is going on: it would have published a whole one.
     for (const fs::path& other : left)
-      if (itself && maybe_in_use(other)) return Done{};
+      if (itself && maybe_in_use(other)) return std::string();
+    const auto shown = [](const fs::path& path) { return path.filename().string(); };
+    std::string done;
     if (!itself) {
-      if (is_there) fs::rename(file, recording::free_name(file, ".damaged"));
+      done = shown(copies[0].file) + " with " + std::to_string(copies[0].frames) +
+             " frames, left by a killed run, is " + shown(file) + " now";
+      if (is_there) {
+        const fs::path kept = recording::free_name(file, ".damaged");
+        fs::rename(file, kept);
+        done += "; what was there does not open and is kept as " + shown(kept);
+      }
       fs::rename(copies[0].file, file);
     }
-    for (const fs::path& other : left) fs::remove(other, failed);
-    return Done{};
+    for (const fs::path& other : left)
+      if (fs::remove(other, failed))
+        done += (done.empty() ? "" : "; ") + shown(other) + ", an older copy, was removed";
+    return done;
   } catch (const std::exception& problem) {
     return Failure{"cannot repair " + file.string() + ": " + problem.what()};
   }

@@ -99,7 +99,8 @@ std::optional<RowDifference> first_difference(const h6FrameRecord& a, const h6Fr
 
 // Makes `file` the newest whole copy of a run that was killed and removes what else that run left
 // beside it. Changes nothing where there is nothing to do, or where a run may still be going on
-// (files younger than five seconds). A damaged file is kept as FILE.damaged.
-Outcome repair_recording(const std::filesystem::path& file);
+// (files younger than five seconds). A damaged file is kept as FILE.damaged. Says what it did; empty:
+// nothing.
+Result<std::string> repair_recording(const std::filesystem::path& file);
 
 }  // namespace h6::io
