@@ -244,4 +244,16 @@ TEST_CASE("what a killed run left is replayed as far as it goes") {
   CHECK(json["same"] == true);
   CHECK(json["frames"] > 100);
   CHECK(json["remarks"].size() == 1);
+  // A look at it puts in order what the run left, and says so.
+  const bool left = fs::exists(box.file("run.h5.part"));
+  if (left)
+    fs::last_write_time(box.file("run.h5.part"),
+                        fs::file_time_type::clock::now() - std::chrono::seconds(60));
+  const Json info = result_of(box, {"info", "run.h5"});
+  CHECK((info["repaired"] != "") == left);
+  CHECK(info["whole"] == false);
+  CHECK(info["run"]["scene"] == "peg-in-hole");
+  CHECK(info["run"]["virtual_time"] == false);
+  CHECK_FALSE(fs::exists(box.file("run.h5.part")));
+  CHECK(result_of(box, {"replay", "run.h5", "--verify"})["same"] == true);
 }

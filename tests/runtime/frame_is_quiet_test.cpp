@@ -354,7 +354,7 @@ TEST_CASE("many fields and two hands: pairs shared between threads give the same
     two.open();
     std::uint32_t contacts = 0;
     bool dropped = false;
-    for (int i = 0; i < 150; ++i) {
+    for (int i = 0; i < 50; ++i) {
       const h6DeviceSample samples[] = {one.sample(i), one.sample(i + 40)};
       if (i % 10 == 9) h6SetCoarse(one.session, 17), h6SetCoarse(two.session, 17);
       h6Step(one.session, samples, nullptr);
