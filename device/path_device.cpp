@@ -80,6 +80,7 @@ h6Device PathDevice::device() {
   d.capabilities.max_force = 100;
   d.capabilities.max_torque = 10;
   d.capabilities.modes = H6_IMPEDANCE;
+  d.capabilities.frame_time = true;
   d.read = [](void* self, double t, h6DeviceSample* out) {
     *out = static_cast<PathDevice*>(self)->path_.at(t);
     return 0;

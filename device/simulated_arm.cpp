@@ -242,6 +242,7 @@ h6Device SimulatedArm::device() {
   c.workspace_min = arm_.workspace_min;
   c.workspace_max = arm_.workspace_max;
   c.modes = H6_IMPEDANCE | H6_ADMITTANCE | H6_PSEUDO_ADMITTANCE;
+  c.frame_time = true;
   d.read = [](void* self, double time, h6DeviceSample* out) {
     auto& arm = *static_cast<SimulatedArm*>(self);
     arm.advance(time);

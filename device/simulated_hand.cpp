@@ -55,11 +55,12 @@ h6Device SimulatedHand::device() {
   d.capabilities.max_force = 30;  // of the order of a large desktop arm
   d.capabilities.max_torque = 3;
   d.capabilities.modes = H6_IMPEDANCE;
+  d.capabilities.frame_time = true;
   d.read = [](void* self, double time, h6DeviceSample* out) {
     auto& hand = *static_cast<SimulatedHand*>(self);
     hand.advance(time);
     const h6Vec3 lever = rotate(hand.q_, hand.arm_.grip);
-    *out = {{hand.x_ - lever, hand.q_}, {hand.v_ - cross(hand.w_, lever), hand.w_}, 0, {}};
+    *out = {{hand.x_ - lever, hand.q_}, {hand.v_ - cross(hand.w_, lever), hand.w_}, 0, {}, 0};
     return 0;
   };
   d.write = [](void* self, double, const h6DeviceCommand* command) {

@@ -53,6 +53,18 @@ NodeMask spread(const Around&, Mask&& mask) {
   return out;
 }
 
+// The rows of a tile, in order.
+template <class F>
+void each_row(const Grid& grid, const NarrowBand& band, std::size_t tile, F&& f) {
+  const std::array<int, 3> low = band.tiles.first_brick(tile);
+  int high[3];
+  for (std::size_t k = 0; k < 3; ++k) high[k] = std::min(low[k] + 4, grid.bricks[k]);
+  for (int c = low[2]; c < high[2]; ++c)
+    for (int b = low[1]; b < high[1]; ++b)
+      for (int a = low[0]; a < high[0]; ++a)
+        if (const std::int32_t r = band.row[grid.cell(a, b, c)]; r >= 0) f(std::size_t(r));
+}
+
 // Chains of some rows, tile by tile: tiles of one parity are never neighbours and the rows of a
 // tile have an order, so a pass over the eight parities gives the same result on any number of
 // threads. A pass is at least three steps.
@@ -63,8 +75,9 @@ class Chains {
          const std::vector<std::uint8_t>& rows, unsigned threads);
   void pass();
   bool holds(std::size_t row) const { return slot_[row] >= 0; }
+  bool some(std::size_t row) const { return some_[std::size_t(slot_[row])] != 0; }
   const Chain* nodes(std::size_t row) const {
-    return chain_.get() + std::size_t(slot_[row]) * kBrickSamples;
+    return chain_.data() + std::size_t(slot_[row]) * kBrickSamples;
   }
 
  private:
@@ -73,16 +86,17 @@ class Chains {
   const Reached& reached_;
   unsigned threads_;
   std::vector<std::int32_t> slot_;  // (rows) or -1
-  std::unique_ptr<Chain[]> chain_;
-  std::array<std::vector<std::vector<std::uint32_t>>, 8> rows_;  // by parity, by tile
+  std::vector<Chain, SampleAllocator<Chain>> chain_;
+  std::vector<std::uint8_t> some_;  // (slots) whether the row may have a chain at all
+  std::array<std::vector<std::uint32_t>, 8> tiles_;  // that have such rows, by parity
 };
 
-// Those of the rows for which it is true, by tile.
-std::vector<std::vector<std::uint32_t>> rows_by_tile(const Grid& grid, const NarrowBand& band,
-                                                     const std::vector<std::uint8_t>& rows);
-
 // What is known around a brick: chains of rows that are held, and of the others the reached nodes.
-void gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
-                   const Chains* chains, const Around& around, kernels::ChainBrick& out);
+// `wanted`: bit i for neighbour i; the others' nodes are as if nothing were reached there. False:
+// there is no chain at all, all is far.
+inline constexpr std::uint32_t kAround = (1u << 27) - 1;
+bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
+                   const Chains* chains, const Around& around, std::uint32_t wanted,
+                   kernels::ChainBrick& out);
 
 }  // namespace h6::io::bake

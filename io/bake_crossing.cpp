@@ -13,119 +13,129 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr int kFraction = 18;                        // bits of a voxel; 2048 voxels: 29 bits
+constexpr int kFraction = 18;  // bits of a voxel; 2048 voxels: 29 bits
 constexpr std::int64_t kVoxel = std::int64_t{1} << kFraction;
 __extension__ typedef __int128 Wide;
 
-using Point = std::array<std::int64_t, 3>;           // brick-local, 2^-18 voxel
+using Point = std::array<std::int64_t, 3>;  // tile-local, 2^-18 voxel
 
 std::int64_t floor_voxel(std::int64_t v) { return v >> kFraction; }
 std::int64_t ceil_voxel(std::int64_t v) { return -((-v) >> kFraction); }
 
-// numerator / (2^18 * area), area > 0: the node at or before the hit, and whether it is the hit.
+// To the nearest 2^-18 voxel, the same for every triangle of a vertex.
+std::int64_t rounded(double voxels) {
+  const double v = voxels * double(kVoxel);
+  return std::int64_t(v + std::copysign(0.5, v));
+}
+
+// Where a line meets a triangle, from the corners' shares of the area > 0 and their places along
+// it: the node at or before the hit, and whether it is the hit.
 struct Hit {
   std::int64_t node;
   bool exact;
 };
-Hit locate(Wide numerator, std::int64_t area) {
-  const double at = double(numerator) / (double(area) * double(kVoxel));
-  const double node = std::floor(at), rest = at - node;
-  if (rest > 1e-9 && rest < 1 - 1e-9 && std::fabs(at) < 1e5) return {std::int64_t(node), false};
+Hit locate(const std::int64_t (&share)[3], const std::int64_t (&along)[3], std::int64_t area) {
+  // Right to 1e-11 voxel, 2048 being the largest.
+  const double at = (double(share[0]) * double(along[0]) + double(share[1]) * double(along[1]) +
+                     double(share[2]) * double(along[2])) /
+                    (double(area) * double(kVoxel));
+  const std::int64_t before = std::int64_t(at) - (at < 0);
+  const double rest = at - double(before);
+  if (rest > 1e-9 && rest < 1 - 1e-9) return {before, false};
+  const Wide numerator =
+      Wide(share[0]) * along[0] + Wide(share[1]) * along[1] + Wide(share[2]) * along[2];
   const Wide whole = Wide(area) << kFraction;
   Wide quotient = numerator / whole, remainder = numerator % whole;
   if (remainder < 0) --quotient;
   return {std::int64_t(quotient), remainder == 0};
 }
 
-std::size_t node_index(std::size_t axis, std::int64_t along, std::int64_t j, std::int64_t k) {
-  std::array<std::int64_t, 3> c{};
-  c[axis] = along;
-  c[(axis + 1) % 3] = j;
-  c[(axis + 2) % 3] = k;
-  return std::size_t((c[2] * 8 + c[1]) * 8 + c[0]);
-}
+constexpr std::int64_t kSide = 8 * kernels::kTileBricks;  // nodes
 
-// Lines along `axis` through nodes (j, k) of the other two axes.
-void draw(const Point (&p)[3], std::size_t axis, Crossing& crossing) {
+// A tile's rows, by brick.
+using Rows = std::array<std::int32_t, 64>;
+
+// Lines along `axis` through nodes (j, k) of the other two axes. The edge from a node belongs to
+// the node's brick.
+void draw(const Point (&p)[3], std::size_t axis, const Rows& rows,
+          std::vector<Crossing>& crossings) {
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-  std::int64_t area = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) -
-                      (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
+  std::int64_t area =
+      (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
   if (area == 0) return;
   const std::int64_t turn = area > 0 ? 1 : -1;
   area *= turn;
   const auto range = [&](std::size_t k) {
-    return std::pair{std::max<std::int64_t>(0, ceil_voxel(std::min({p[0][k], p[1][k], p[2][k]}))),
-                     std::min<std::int64_t>(7, floor_voxel(std::max({p[0][k], p[1][k], p[2][k]})))};
+    return std::pair{
+        std::max<std::int64_t>(0, ceil_voxel(std::min({p[0][k], p[1][k], p[2][k]}))),
+        std::min<std::int64_t>(kSide - 1, floor_voxel(std::max({p[0][k], p[1][k], p[2][k]})))};
   };
   const auto [j0, j1] = range(u);
   const auto [k0, k1] = range(v);
-  for (std::int64_t k = k0; k <= k1; ++k)
+  if (j0 > j1 || k0 > k1) return;
+  const std::int64_t along[3] = {p[0][axis], p[1][axis], p[2][axis]};
+  std::int64_t line[3], per_j[3], per_k[3];  // barycentric, times area; and from line to line
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Point &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
+    const std::int64_t du = turn * (b[u] - a[u]), dv = turn * (b[v] - a[v]);
+    line[i] = du * (k0 * kVoxel - a[v]) - dv * (j0 * kVoxel - a[u]);
+    per_j[i] = -dv * kVoxel;
+    per_k[i] = du * kVoxel;
+  }
+  std::size_t to[3];
+  for (std::int64_t k = k0; k <= k1; ++k) {
+    std::int64_t share[3] = {line[0], line[1], line[2]};
     for (std::int64_t j = j0; j <= j1; ++j) {
-      const std::int64_t y = j * kVoxel, z = k * kVoxel;
-      std::int64_t share[3];  // barycentric, times area
-      bool inside = true;
-      for (std::size_t i = 0; i < 3 && inside; ++i) {
-        const Point &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
-        share[i] = turn * ((b[u] - a[u]) * (z - a[v]) - (b[v] - a[v]) * (y - a[u]));
-        inside = share[i] >= 0;
+      if ((share[0] | share[1] | share[2]) >= 0) {
+        const Hit hit = locate(share, along, area);
+        if (hit.node >= 0 && hit.node < kSide) {
+          to[axis] = std::size_t(hit.node);
+          to[u] = std::size_t(j);
+          to[v] = std::size_t(k);
+          const std::int32_t r = rows[(to[2] / 8 * 4 + to[1] / 8) * 4 + to[0] / 8];
+          const std::size_t node = ((to[2] & 7) * 8 + (to[1] & 7)) * 8 + (to[0] & 7);
+          if (r >= 0 && hit.exact) crossings[std::size_t(r)].on.set(node);
+          if (r >= 0 && !hit.exact) crossings[std::size_t(r)].edge[axis].set(node);
+        }
       }
-      if (!inside) continue;
-      const Hit hit = locate(Wide(share[0]) * p[0][axis] + Wide(share[1]) * p[1][axis] +
-                                 Wide(share[2]) * p[2][axis],
-                             area);
-      if (hit.node < 0 || hit.node > 7) continue;
-      const std::size_t node = node_index(axis, hit.node, j, k);
-      if (hit.exact)
-        crossing.on.set(node);
-      else
-        crossing.edge[axis].set(node);
+      for (std::size_t i = 0; i < 3; ++i) share[i] += per_j[i];
     }
+    for (std::size_t i = 0; i < 3; ++i) line[i] += per_k[i];
+  }
 }
 
 }  // namespace
 
 void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band) {
   const Tiles& tiles = band.tiles;
+  if (tiles.first[tile] == tiles.first[tile + 1]) return;
   const std::array<int, 3> first = tiles.first_brick(tile);
+  Rows rows;
+  for (int i = 0; i < 64; ++i) {
+    const int at[3] = {first[0] + i % 4, first[1] + i / 4 % 4, first[2] + i / 16};
+    const bool in = at[0] < grid.bricks[0] && at[1] < grid.bricks[1] && at[2] < grid.bricks[2];
+    rows[std::size_t(i)] = in ? band.row[grid.cell(at[0], at[1], at[2])] : -1;
+  }
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
-    Point p[3];  // tile-local
+    Point p[3];
+    bool meets = true;
     for (std::size_t c = 0; c < 3; ++c) {
       const Vec3& vertex = surface.vertices[surface.triangles[tiles.triangle[i]][c]];
       const double at[3] = {vertex.x, vertex.y, vertex.z};
-      for (std::size_t k = 0; k < 3; ++k)
-        p[c][k] = std::llround(at[k] * double(kVoxel)) - 8 * first[k] * kVoxel;
+      for (std::size_t k = 0; k < 3; ++k) p[c][k] = rounded(at[k]) - 8 * first[k] * kVoxel;
     }
-    int low[3], high[3];  // bricks the box meets; a brick's edges run from node 0 to node 8
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto [least, most] = std::minmax({p[0][k], p[1][k], p[2][k]});
-      low[k] = int(std::max<std::int64_t>(0, (least + 8 * kVoxel - 1) / (8 * kVoxel) - 1));
-      high[k] = int(std::min<std::int64_t>(3, most < 0 ? -1 : most / (8 * kVoxel)));
-      high[k] = std::min(high[k], grid.bricks[k] - 1 - first[k]);
-    }
-    for (int c = low[2]; c <= high[2]; ++c)
-      for (int b = low[1]; b <= high[1]; ++b)
-        for (int a = low[0]; a <= high[0]; ++a) {
-          const std::int32_t r = band.row[grid.cell(first[0] + a, first[1] + b, first[2] + c)];
-          if (r < 0) continue;
-          const std::array<std::int64_t, 3> by = {8 * a * kVoxel, 8 * b * kVoxel, 8 * c * kVoxel};
-          Point q[3];
-          for (std::size_t corner = 0; corner < 3; ++corner)
-            for (std::size_t k = 0; k < 3; ++k) q[corner][k] = p[corner][k] - by[k];
-          for (std::size_t axis = 0; axis < 3; ++axis)
-            draw(q, axis, band.crossing[std::size_t(r)]);
-        }
+    for (std::size_t k = 0; k < 3;
+         ++k)  // the tile's edges run from its first node to past its last
+      meets &= std::max({p[0][k], p[1][k], p[2][k]}) >= 0 &&
+               std::min({p[0][k], p[1][k], p[2][k]}) <= kSide * kVoxel;
+    if (!meets) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) draw(p, axis, rows, band.crossing);
   }
-  const std::array<int, 3> end = {std::min(first[0] + 4, int(grid.bricks[0])),
-                                  std::min(first[1] + 4, int(grid.bricks[1])),
-                                  std::min(first[2] + 4, int(grid.bricks[2]))};
-  for (int c = first[2]; c < end[2]; ++c)
-    for (int b = first[1]; b < end[1]; ++b)
-      for (int a = first[0]; a < end[0]; ++a) {
-        const std::int32_t r = band.row[grid.cell(a, b, c)];
-        if (r < 0) continue;
-        for (std::size_t z = 0; z < 8; ++z)
-          band.free[std::size_t(r)].z[z] &= ~band.crossing[std::size_t(r)].on.z[z];
-      }
+  for (const std::int32_t row : rows) {
+    if (row < 0) continue;
+    const std::size_t r = std::size_t(row);
+    for (std::size_t z = 0; z < 8; ++z) band.free[r].z[z] &= ~band.crossing[r].on.z[z];
+  }
 }
 
 }  // namespace h6::io::bake

@@ -51,13 +51,37 @@ void add_part_near(std::vector<double>& corners, const Corner (&t)[3], double re
 // The triangles of a tile, cut and ready.
 struct Facets {
   std::vector<kernels::DistanceFacet> facet;
+  std::vector<kernels::FacetRegion> region;  // at least as many; only what is in use is set
   std::vector<std::uint64_t> near;  // bricks
   std::vector<double> corners;      // 9 each, tile-local
   std::vector<std::uint32_t> owner; // triangle
 };
 
-void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, std::size_t tile,
-             Facets& out) {
+void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
+               const Corner& zero_at) {
+  region.gx[k] = g[0];
+  region.gy[k] = g[1];
+  region.gz[k] = g[2];
+  region.c[k] = float(-(g[0] * zero_at[0] + g[1] * zero_at[1] + g[2] * zero_at[2]));
+}
+
+void set_region(const Features& features, const Surface& surface, std::uint32_t t,
+                const Corner (&corner)[3], kernels::FacetRegion& region) {
+  region.everywhere = false;
+  region.edges = features.owned[t] & 7;
+  region.corners = std::uint8_t(features.owned[t] >> 3);
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (region.edges >> k & 1)
+      set_plane(region, k, features.across[3 * std::size_t(t) + k], corner[k]);
+    if (region.corners >> k & 1)
+      for (std::size_t i = 0; i < 4; ++i)
+        set_plane(region, 3 + 4 * k + i,
+                  features.from[4 * std::size_t(surface.triangles[t][k]) + i], corner[k]);
+  }
+}
+
+void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles,
+             const Features& features, std::size_t tile, Facets& out) {
   out.facet.clear();
   out.near.clear();
   out.corners.clear();
@@ -80,27 +104,56 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, std::
       out.facet.push_back(kernels::make_distance_facet(out.corners.data() + 9 * f));
       out.near.push_back(tiles.near[i]);
       out.owner.push_back(t);
+      if (out.region.size() < out.facet.size()) out.region.emplace_back();
+      kernels::FacetRegion& region = out.region[out.facet.size() - 1];
+      region.edges = region.corners = 0;
+      region.everywhere = true;
     }
+    // A triangle cut, or without area, is weighed everywhere.
+    if (farthest < kFar && out.facet.back().inside_from <= 0)
+      set_region(features, surface, t, corner, out.region[out.facet.size() - 1]);
   }
 }
 
-// The part of the mesh nearest to the middle of the brick; of equals that of the first triangle.
-std::int32_t nearest_part(const Surface& surface, const Facets& facets,
-                          std::span<const std::uint32_t> list, const float (&origin)[3]) {
+// The triangle of the surface nearest to the middle of the brick; of equals the first; kNobody
+// where none is near. `u` are the distances of the brick's nodes, exact below reach.
+constexpr std::uint32_t kNobody = ~0u;
+std::uint32_t nearest_owner(const Facets& facets, int brick, const float (&origin)[3],
+                            const float* u, float reach) {
+  thread_local std::vector<std::uint32_t> list;
+  list.resize(facets.near.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < facets.near.size(); ++i) {
+    list[count] = std::uint32_t(i);
+    count += facets.near[i] >> brick & 1;
+  }
+  if (count == 0) return kNobody;
+  if (count == 1) return facets.owner[list[0]];
   const double middle[3] = {origin[0] + 3.5, origin[1] + 3.5, origin[2] + 3.5};
+  const float at[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
+  float around = reach;  // the eight nodes around the middle are less than 0.8661 away
+  for (const std::size_t n : {219u, 220u, 227u, 228u, 283u, 284u, 291u, 292u})
+    around = std::min(around, u[n]);
+  float most = around < reach ? around + 0.8661f + 1e-3f : 1e9f;
   double nearest = std::numeric_limits<double>::max();
-  std::uint32_t owner = 0;
-  for (const std::uint32_t i : list) {
+  std::uint32_t owner = kNobody;
+  for (const std::uint32_t i : std::span(list.data(), count)) {
     const kernels::DistanceFacet& f = facets.facet[i];
-    const double off = f.gx[6] * middle[0] + f.gy[6] * middle[1] + f.gz[6] * middle[2] + f.c[6];
-    if ((std::fabs(off) - 1e-3) * std::fabs(off) > nearest) continue;  // off its plane already
+    // Off its plane, or beyond one of its edges.
+    float least = 0;
+    for (std::size_t k = 3; k < 7; ++k) {
+      const float v = f.gx[k] * at[0] + f.gy[k] * at[1] + f.gz[k] * at[2] + f.c[k];
+      least = std::max(least, k == 6 ? std::fabs(v) : -v);
+    }
+    if (least > most) continue;
     const double* t = facets.corners.data() + 9 * i;
     const double d2 = kernels::point_triangle_squared(middle, t, t + 3, t + 6);
     if (d2 > nearest || (d2 == nearest && facets.owner[i] >= owner)) continue;
     nearest = d2;
     owner = facets.owner[i];
+    most = std::min(most, float(std::sqrt(nearest)) + 1e-3f);
   }
-  return list.empty() ? 0 : surface.part[owner];
+  return owner;
 }
 
 NodeMask above(const float* u, float level) {
@@ -127,33 +180,35 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
   const Tiles& tiles = band.tiles;
   if (tiles.first[tile] == tiles.first[tile + 1]) return;
   thread_local Facets facets;
-  thread_local std::vector<std::uint32_t> list;
-  prepare(surface, grid, tiles, tile, facets);
+  thread_local const auto room = std::make_unique<kernels::TileRoom>();
+  prepare(surface, grid, tiles, band.features, tile, facets);
+  kernels::tile_distance(facets.facet.data(), facets.region.data(), facets.near.data(),
+                         facets.facet.size(), float(grid.reach()), *room);
   const std::array<int, 3> brick = tiles.first_brick(tile);
   const float zero_set = float(grid.near_zero_set());
-  std::uint64_t used = 0;
+  std::uint64_t used = 0, weighed = 0;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) used |= tiles.near[i];
+  for (std::uint64_t near : facets.near) weighed |= near;
   for (; used != 0; used &= used - 1) {
     const int b = std::countr_zero(used);
     const int in[3] = {b % 4, b / 4 % 4, b / 16};
-    list.resize(facets.near.size());
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < facets.near.size(); ++i) {
-      list[count] = std::uint32_t(i);
-      count += facets.near[i] >> b & 1;
-    }
     const std::size_t r = std::size_t(
         band.row[grid.cell(brick[0] + in[0], brick[1] + in[1], brick[2] + in[2])]);
     const float origin[3] = {float(8 * in[0]), float(8 * in[1]), float(8 * in[2])};
     float* u = band.nodes(r);
-    kernels::facet_distance(facets.facet.data(), list.data(), count, origin, float(grid.reach()),
-                            u);
+    if (weighed >> b & 1)
+      kernels::brick_distance(*room, std::size_t(b), u);
+    else  // of large triangles that were cut, nothing was left here
+      std::fill_n(u, kBrickSamples, float(grid.reach()));
     band.first_node[r] = u[0];
     band.free[r] = above(u, float(grid.offset));
     NodeMask near = above(u, std::nextafter(zero_set, 0.0f));
     for (std::uint64_t& z : near.z) z = ~z;
     band.towards[r] = looked_at_by(near);
-    if (!band.part.empty()) band.part[r] = nearest_part(surface, facets, {list.data(), count}, origin);
+    const std::uint32_t owner = nearest_owner(facets, b, origin, u, float(grid.reach()));
+    if (owner == kNobody) continue;
+    band.triangle[r] = surface.source[owner];
+    if (!band.part.empty()) band.part[r] = surface.part[owner];
   }
 }
 

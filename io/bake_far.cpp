@@ -1,8 +1,8 @@
-// bake_far.cpp - how far every eighth node is from the surface at least, searched in double.
+// bake_far.cpp - how far every eighth node is from the surface at least.
 //
-// Nodes near the surface are known already. The others are searched with the distance to the
-// triangle that was nearest to the node before as a start, which is nearly always the nearest again
-// or close to it: what is left is to see that no other is nearer.
+// Nodes near the surface are known already. The others are searched with the triangles around the
+// one that was nearest to the node before as a start, which nearly always have the nearest again or
+// one close to it: what is left is to see that no other is nearer.
 #include <algorithm>
 
 #include "io/bake_grid.h"
@@ -56,25 +56,26 @@ class Layer {
     // Behind in this line, and beside it in the line before: a distance grows by 8 at most.
     double most = away_[i];
     if (a > 0) most = std::min(most, away_[i - 1]);
-    most += 8 + 1e-3;
-    TriangleTree::Found found{most * most, kNone};
-    const auto try_same_as = [&](std::size_t neighbour) {
+    most += 8.1;
+    TriangleTree::Found found{float(most * most), kNone};
+    std::uint32_t tried[2] = {kNone, kNone};
+    const auto try_around = [&](std::size_t neighbour) {
       const std::uint32_t place = nearest_[neighbour];
-      if (place == kNone || place == found.nearest) return;
-      const double d2 = tree_.squared_to(p, place);
-      if (d2 < found.best2) found = {d2, place};
+      if (place == kNone || place / 8 == tried[0] || place / 8 == tried[1]) return;
+      tree_.try_around(p, place, found);
+      tried[tried[0] == kNone ? 0 : 1] = place / 8;
     };
-    if (a > 0) try_same_as(i - 1);
-    try_same_as(i);
-    if (i + 1 < nearest_.size()) try_same_as(i + 1);
-    tree_.search(p, found);
+    if (a > 0) try_around(i - 1);
+    try_around(i);
+    if (i + 1 < nearest_.size()) try_around(i + 1);
+    away_[i] = tree_.search(p, found);
     nearest_[i] = found.nearest;
-    return away_[i] = std::sqrt(found.best2);
+    return away_[i];
   }
 
  private:
   static constexpr double kUnknown = 1e5;
-  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  static constexpr std::uint32_t kNone = TriangleTree::kNone;
   const TriangleTree& tree_;
   std::vector<double> away_;            // by a: of this line so far, then of the line before
   std::vector<std::uint32_t> nearest_;  // likewise

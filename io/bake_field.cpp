@@ -10,6 +10,7 @@
 
 #include "io/bake_grid.h"
 #include "io/cache.h"
+#include "sched/clock.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
@@ -31,6 +32,29 @@ bool Steps::run(const std::string& what, double from, double to, std::size_t cou
     });
   }
   return tell(what, to);
+}
+
+void Steps::clock(const std::string& what) const {
+  if (!stages_.empty() && stages_.back().name == what) return;
+  const std::int64_t now = sched::now_ns();
+  if (!stages_.empty()) stages_.back().seconds += 1e-9 * double(now - since_ns_);
+  since_ns_ = now;
+  stages_.push_back({what, 0});
+}
+
+std::vector<FieldBakeReport::Stage> Steps::stages() const {
+  clock("");
+  std::vector<FieldBakeReport::Stage> sum;  // a stage that was left and entered again is one
+  for (const FieldBakeReport::Stage& s : stages_) {
+    if (s.name.empty()) continue;
+    const auto same = std::find_if(sum.begin(), sum.end(),
+                                   [&](const auto& other) { return other.name == s.name; });
+    if (same == sum.end())
+      sum.push_back(s);
+    else
+      same->seconds += s.seconds;
+  }
+  return sum;
 }
 
 }  // namespace bake
@@ -92,17 +116,20 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
   band = {};
   if (!steps.tell("bricks", from)) return Failure{"cancelled"};
   if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
+  find_features(surface, threads, band.features);
   band.u.resize(band.rows() * kBrickSamples);
   band.free.resize(band.rows());
   band.first_node.resize(band.rows());
   band.towards.resize(band.rows());
   if (grid.offset < 0.5) band.crossing.resize(band.rows());
   if (!surface.part.empty()) band.part.resize(band.rows());
+  band.triangle.resize(band.rows(), -1);
   if (!steps.run("distance", from + 0.05, to, band.tiles.count(), threads, [&](std::size_t tile) {
         measure_tile(surface, grid, tile, band);
         if (!band.crossing.empty()) cross_tile(surface, grid, tile, band);
       }))
     return Failure{"cancelled"};
+  band.features = {};
   return Done{};
 }
 
@@ -112,7 +139,7 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   const Steps steps(progress);
   const Failure cancelled{"cancelled"};
   if (!steps.tell("surface", 0)) return cancelled;
-  Result<Surface> prepared = prepare_surface(mesh);
+  Result<Surface> prepared = prepare_surface(mesh, options.threads);
   if (!prepared) return prepared.failure();
   Surface& surface = *prepared;
   const bool sealed = surface.closed && options.sign == SignMode::automatic;
@@ -160,8 +187,10 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
           far_distances(surface, *grid, band, reached, threads, steps, field.far_grid);
       !far)
     return far.failure();
+  steps.clock("hash");
   field.input_hash = content_hash(mesh, options);
   if (report) {
+    report->stages = steps.stages();
     report->closed = surface.closed;
     report->sealed_area = double(plugs) * grid->voxel * grid->voxel;
     warn(surface, *grid, inside, options.seal, *report);

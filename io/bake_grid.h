@@ -20,6 +20,7 @@
 #include "hapsix/result.h"
 #include "io/bake_field.h"
 #include "io/mesh.h"
+#include "io/samples.h"
 #include "kernels/triangle_distance.h"
 
 namespace h6::io::bake {
@@ -48,8 +49,10 @@ struct Grid {
            std::size_t(a);
   }
   std::array<int, 3> place(std::size_t cell) const {
-    const std::size_t x = std::size_t(bricks[0]), y = std::size_t(bricks[1]);
-    return {int(cell % x), int(cell / x % y), int(cell / x / y)};
+    // At most 256^3: 32 bits divide faster.
+    const std::uint32_t x = std::uint32_t(bricks[0]), y = std::uint32_t(bricks[1]);
+    const std::uint32_t line = std::uint32_t(cell) / x;
+    return {int(std::uint32_t(cell) - line * x), int(line % y), int(line / y)};
   }
   double middle(int axis) const { return (8.0 * bricks[std::size_t(axis)] - 1.0) / 2; }
   Vec3 from_metres(const Vec3& p) const {
@@ -67,13 +70,14 @@ struct Surface {
   std::vector<Vec3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::int32_t> part;  // (triangles) or empty
+  std::vector<std::int32_t> source;// (triangles) of the mesh; -1: a plug
   Vec3 low{}, high{};              // [m]
   std::size_t duplicates = 0, flat = 0;
   std::size_t open_edges = 0;      // of one face
   std::size_t odd_edges = 0;       // of an odd number of faces
   bool closed = false;             // every edge has an even number of faces
 };
-Result<Surface> prepare_surface(const Mesh& mesh);
+Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
 
@@ -88,6 +92,7 @@ struct NodeMask {
     return all != 0;
   }
 };
+using Masks = std::vector<NodeMask, SampleAllocator<NodeMask>>;  // (rows) not cleared
 
 // Where the surface runs between nodes: bit n of edge[k] is the edge from node n along axis k.
 // Touching counts. Nodes exactly on the surface are in `on`.
@@ -118,18 +123,30 @@ struct Tiles {
   }
 };
 
+// What neighbours say about where a triangle may be the nearest (kernels::FacetRegion).
+struct Features {
+  using Gradient = std::array<float, 3>;  // of unit length, or zero: nothing is known
+  std::vector<std::uint8_t> owned;        // (triangles) bit e: edge e, bit 3 + v: corner v
+  std::vector<Gradient> across;           // (3 triangles) into another triangle of an owned edge
+  std::vector<Gradient> from;             // (4 vertices) along edges that leave it
+};
+// bake_features.cpp
+void find_features(const Surface& surface, unsigned threads, Features& out);
+
 // Bricks that a triangle comes near to, and what is known of their nodes. Rows are candidates, in
 // the order of cells.
 struct NarrowBand {
   Tiles tiles;
+  Features features;                   // of the surface, for measure_tile
   std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
   std::vector<std::uint32_t> cell;     // (rows)
   Samples u;                           // (rows x 512) unsigned distance, at most reach [voxel]
-  std::vector<NodeMask> free;          // (rows) u > offset, and not on the surface
+  Masks free;          // (rows) u > offset, and not on the surface
   std::vector<float> first_node;       // (rows) u of the row's first node
   std::vector<std::uint32_t> towards;  // (rows) bit i: near neighbour i is the zero set
   std::vector<Crossing> crossing;      // (rows), or empty where offset >= 0.5: not needed there
   std::vector<std::int32_t> part;      // (rows) or empty
+  std::vector<std::int32_t> triangle;  // (rows) of the mesh, nearest to the brick's middle; or -1
   std::size_t rows() const { return cell.size(); }
   float* nodes(std::size_t r) { return u.data() + r * kBrickSamples; }
   const float* nodes(std::size_t r) const { return u.data() + r * kBrickSamples; }
@@ -143,11 +160,17 @@ class Steps {
   bool run(const std::string& what, double from, double to, std::size_t count, unsigned threads,
            const std::function<void(std::size_t)>& body) const;
   bool tell(const std::string& what, double done) const {
+    clock(what);
     return !progress_ || progress_(what, done);
   }
+  // From now on it is this that takes the time.
+  void clock(const std::string& what) const;
+  std::vector<FieldBakeReport::Stage> stages() const;
 
  private:
   const Progress& progress_;
+  mutable std::vector<FieldBakeReport::Stage> stages_;  // the last one is running
+  mutable std::int64_t since_ns_ = 0;
 };
 
 // bake_bins.cpp: tiles, cells and rows. A sentence when there are too many.
@@ -163,22 +186,21 @@ std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned thread
 
 // bake_sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
 struct Reached {
-  std::vector<NodeMask> node;        // (rows)
+  Masks node;        // (rows)
   std::vector<std::uint8_t> cell;    // (cells) all of it, where it has no row
 };
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads);
 // bake_pockets.cpp: those of the candidates from which a reached node can be reached after all.
-std::vector<NodeMask> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                                const std::vector<NodeMask>& candidates,
-                                const std::vector<NodeMask>& wet, unsigned threads);
+Masks reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                const Masks& candidates, const Masks& wet, unsigned threads);
 
 class Chains;  // bake_chains.h
 
 // bake_inside.cpp: what the signed distances need besides u, and which rows are needed at all.
 struct Inside {
   std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within band of the zero set
-  std::vector<NodeMask> in_sight;    // (rows) not reached, yet R is on this side of the sheet
+  Masks in_sight;    // (rows) not reached, yet R is on this side of the sheet
   // Where sheets are buried: lengths of the ways out; a row that has them may be corrected by them.
   std::shared_ptr<const Chains> chains;
   std::vector<std::uint8_t> corrected;  // (rows)

@@ -16,90 +16,70 @@
 #include <algorithm>
 #include <atomic>
 
-#include "io/bake_grid.h"
 #include "io/bake_chains.h"
+#include "io/bake_grid.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
 namespace {
 
-constexpr int kDeepPasses = 6;       // how far buried sheets are corrected [nodes]
+constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
 
 // A brick is kept when a cell of its own, or one that shares its nodes, has a point within band of
 // the zero set. Only where R is near.
-void find_needed(const Grid& grid, const NarrowBand& band, const Reached& reached,
-                 unsigned threads, std::vector<std::uint8_t>& needed) {
-  needed.assign(band.rows(), 0);
-  sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
-    const Around around(grid, band, reached, r);
-    bool near_surface = false, near_outside = false;
-    for (std::size_t i = 0; i < 27; ++i) {
-      const std::int32_t row = around.row[i];
-      near_surface |= row >= 0 && (band.towards[std::size_t(row)] >> (26 - i) & 1);
-      near_outside |= row >= 0 ? reached.node[std::size_t(row)].any() : around.outside[i];
-    }
-    needed[r] = near_surface && near_outside;
-  });
+bool near_zero_set(const NarrowBand& band, const Around& around) {
+  bool near = false;
+  for (std::size_t i = 0; i < 27; ++i) {
+    const std::int32_t row = around.row[i];
+    near |= row >= 0 && (band.towards[std::size_t(row)] >> (26 - i) & 1);
+  }
+  return near;
 }
-
-// Whether the 27 nodes around a node of the brick are all reached, or none of them is.
-class Company {
- public:
-  Company(const Around& around, const Reached& reached) : around_(around), reached_(reached) {}
-  bool all(std::size_t n, bool wet) const {
-    const int p[3] = {int(n % 8), int(n / 8 % 8), int(n / 64)};
-    for (int i = 0; i < 27; ++i)
-      if (is_wet(p[0] + i % 3 - 1, p[1] + i / 3 % 3 - 1, p[2] + i / 9 - 1) != wet) return false;
-    return true;
-  }
-
- private:
-  bool is_wet(int x, int y, int z) const {
-    const int i = 13 + (x + 8) / 8 - 1 + 3 * ((y + 8) / 8 - 1) + 9 * ((z + 8) / 8 - 1);
-    const std::int32_t row = around_.row[std::size_t(i)];
-    if (row < 0) return around_.outside[std::size_t(i)];
-    return reached_.node[std::size_t(row)].get(
-        std::size_t(((z & 7) * 8 + (y & 7)) * 8 + (x & 7)));
-  }
-  const Around& around_;
-  const Reached& reached_;
-};
-
-// Whether the surface crosses an edge, or meets a node, with nothing reached around: a sheet buried
-// in the solid. (Next to reached nodes it may be a groove narrower than a voxel.)
-bool has_buried_sheet(const Crossing& c, const Company& company) {
-  for (std::size_t z = 0; z < 8; ++z) {
-    std::uint64_t cut = c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z];
-    for (; cut != 0; cut &= cut - 1)
-      if (company.all(64 * z + std::size_t(std::countr_zero(cut)), false)) return true;
-  }
+bool near_outside(const Reached& reached, const Around& around) {
+  for (std::size_t i = 0; i < 27; ++i)
+    if (around.row[i] < 0 ? around.outside[i] : reached.node[std::size_t(around.row[i])].any())
+      return true;
   return false;
 }
 
-// Crossed edges between reached nodes without a node inside anywhere around: a wall thinner than
-// the spacing. A sharp rim has nodes inside close by and does not count.
-std::size_t count_thin(const Crossing& c, const Company& company) {
-  std::size_t thin = 0;
-  for (const NodeMask& edge : c.edge)
-    for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t cut = edge.z[z]; cut != 0; cut &= cut - 1)
-        thin += company.all(64 * z + std::size_t(std::countr_zero(cut)), true);
-  return thin;
+constexpr NodeMask kNoNodes{};
+
+// Nodes with a reached node among the 27 around them, themselves included; `nodes` tells those of a
+// row.
+template <class Nodes>
+NodeMask beside_any(const Around& around, const Nodes& nodes) {
+  return spread(around, [&](std::size_t i) -> const NodeMask& {
+    if (around.row[i] >= 0) return nodes[std::size_t(around.row[i])];
+    return around.outside[i] ? kAllNodes : kNoNodes;
+  });
 }
 
-// Nodes with a reached node among the 27 around them, themselves included.
-NodeMask beside_reached(const Around& around, const Reached& reached) {
+// Nodes with one that is not reached among the 27 around them, themselves included.
+NodeMask beside_dry(const Around& around, const Reached& reached) {
   return spread(around, [&](std::size_t i) -> NodeMask {
-    if (around.row[i] >= 0) return reached.node[std::size_t(around.row[i])];
-    return around.outside[i] ? kAllNodes : NodeMask{};
+    if (around.row[i] < 0) return around.outside[i] ? kNoNodes : kAllNodes;
+    NodeMask dry = reached.node[std::size_t(around.row[i])];
+    for (std::uint64_t& z : dry.z) z = ~z;
+    return dry;
   });
+}
+
+// Neighbours (entry 13 + dx + 3*dy + 9*dz) that one of these nodes has among the 27 around it.
+std::uint32_t neighbours_of(const NodeMask& nodes) {
+  std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};
+  for (std::uint64_t z : nodes.z) layer[1] |= z;
+  constexpr std::uint64_t kY[3] = {0xff, ~std::uint64_t{0}, std::uint64_t{0xff} << 56};
+  constexpr std::uint64_t kX[3] = {0x0101010101010101, ~std::uint64_t{0}, 0x8080808080808080};
+  std::uint32_t bits = 0;
+  for (int i = 0; i < 27; ++i)
+    bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
+  return bits;
 }
 
 // A node so close to a sheet that chains cannot tell the side: the nearest way to R goes through q;
 // R's side is where u grows, so q is farther from the sheet than its mirror image.
 bool faces_outside(const Grid& grid, const NarrowBand& band, const Around& around,
-                   const kernels::ChainBrick& d,
-                   int x, int y, int z) {
+                   const kernels::ChainBrick& d, int x, int y, int z) {
   int nearest = kChainFar, at[3] = {0, 0, 0};
   for (int dz = -1; dz <= 1; ++dz)
     for (int dy = -1; dy <= 1; ++dy)
@@ -123,22 +103,32 @@ class Look {
  public:
   Look(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
        const Steps& steps, Inside& inside)
-      : grid_(grid), band_(band), reached_(reached), threads_(threads), steps_(steps),
-        inside_(inside), offset_(float(grid.offset)), buried_(band.rows(), 0),
-        live_(band.rows(), 0), corrected_(band.rows(), 0) {}
+      : grid_(grid),
+        band_(band),
+        reached_(reached),
+        threads_(threads),
+        steps_(steps),
+        inside_(inside),
+        offset_(float(grid.offset)),
+        buried_(band.rows(), 0),
+        live_(band.rows(), 0),
+        corrected_(band.rows(), 0) {}
 
   bool run() {
-    find_needed(grid_, band_, reached_, threads_, inside_.needed);
     if (!steps_.tell("sign", 0.65)) return false;
-    inspect_rows();
-    find_corrected();
-    std::vector<NodeMask>().swap(band_.free);  // not needed any more, and it is large
+    inside_.needed.resize(band_.rows());
     inside_.in_sight.resize(band_.rows());
     inside_.depths.resize(band_.rows());
+    inspect_rows();
+    find_corrected();
+    Masks().swap(band_.free);  // not needed any more, and it is large
     if (!lay_chains()) return false;
-    const std::vector<std::vector<std::uint32_t>> tiles = rows_by_tile(grid_, band_, live_);
-    if (!steps_.run("sign", 0.7, 0.8, tiles.size(), threads_, [&](std::size_t tile) {
-          for (const std::uint32_t r : tiles[tile]) look(r);
+    if (offset_ > 0 &&
+        !steps_.run("sign", 0.7, 0.8, band_.tiles.count(), threads_, [&](std::size_t tile) {
+          if (band_.tiles.first[tile] == band_.tiles.first[tile + 1]) return;
+          each_row(grid_, band_, tile, [&](std::size_t r) {
+            if (live_[r]) look(r);
+          });
         }))
       return false;
     inside_.chains = std::move(chains_);
@@ -152,53 +142,85 @@ class Look {
   int hops_in_sight() const { return offset_ > 0 ? int(std::ceil(offset_ + 0.05f)) : 0; }
   int hops_across() const { return offset_ > 0 ? int(std::ceil(2 * offset_ + 0.2f)) : 0; }
 
-  // Which rows have nodes inside, sheets buried there, thin walls.
+  // Which rows are needed, and have nodes inside, sheets buried there, thin walls.
   void inspect_rows() {
     beside_.resize(offset_ > 0 ? band_.rows() : 0);
+    constexpr std::size_t kSlice = 1024;
     std::atomic<std::size_t> thin{0}, dry{0};
-    sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
-      std::size_t wet = 0;
-      for (std::uint64_t w : reached_.node[r].z) wet += std::size_t(std::popcount(w));
-      dry.fetch_add(kBrickSamples - wet, std::memory_order_relaxed);
-      live_[r] = inside_.needed[r] && wet < kBrickSamples;
-      if (beside_.empty() && band_.crossing.empty()) return;
-      const Around around(grid_, band_, reached_, r);
-      if (!beside_.empty()) beside_[r] = beside_reached(around, reached_);
-      if (band_.crossing.empty()) return;
-      const Company company(around, reached_);
-      buried_[r] = has_buried_sheet(band_.crossing[r], company);
-      if (offset_ == 0)
-        thin.fetch_add(count_thin(band_.crossing[r], company), std::memory_order_relaxed);
+    sched::parallel_for((band_.rows() + kSlice - 1) / kSlice, threads_, [&](std::size_t slice) {
+      const std::size_t end = std::min(band_.rows(), (slice + 1) * kSlice);
+      std::size_t thin_here = 0, dry_here = 0;
+      for (std::size_t r = slice * kSlice; r < end; ++r) {
+        const Around around(grid_, band_, reached_, r);
+        const bool outside = near_outside(reached_, around);
+        inside_.needed[r] = outside && near_zero_set(band_, around);
+        inside_.in_sight[r] = {};
+        std::size_t wet = 0;
+        for (std::uint64_t w : reached_.node[r].z) wet += std::size_t(std::popcount(w));
+        dry_here += kBrickSamples - wet;
+        live_[r] = inside_.needed[r] && wet < kBrickSamples;
+        if (!beside_.empty())
+          beside_[r] = wet == kBrickSamples ? kAllNodes
+                       : outside            ? beside_any(around, reached_.node)
+                                            : kNoNodes;
+        if (!band_.crossing.empty()) inspect_crossings(around, r, thin_here);
+      }
+      thin.fetch_add(thin_here, std::memory_order_relaxed);
+      dry.fetch_add(dry_here, std::memory_order_relaxed);
     });
     inside_.thin_edges = thin;
     inside_.inside_nodes = dry;
   }
 
+  // - Whether the surface crosses an edge, or meets a node, with nothing reached around: a sheet
+  //   buried in the solid. (Next to reached nodes it may be a groove narrower than a voxel.)
+  // - Crossed edges between reached nodes without a node inside anywhere around: a wall thinner
+  //   than the spacing. A sharp rim has nodes inside close by and does not count.
+  void inspect_crossings(const Around& around, std::size_t r, std::size_t& thin) {
+    const Crossing& c = band_.crossing[r];
+    std::uint64_t any = 0;
+    for (std::size_t z = 0; z < 8; ++z)
+      any |= c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z];
+    if (any == 0) return;
+    const NodeMask near = beside_.empty() ? beside_any(around, reached_.node) : beside_[r];
+    std::uint64_t buried = 0;
+    for (std::size_t z = 0; z < 8; ++z)
+      buried |= (c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z]) & ~near.z[z];
+    buried_[r] = buried != 0;
+    if (offset_ > 0) return;
+    const NodeMask dry = beside_dry(around, reached_);
+    for (const NodeMask& edge : c.edge)
+      for (std::size_t z = 0; z < 8; ++z) thin += std::size_t(std::popcount(edge.z[z] & ~dry.z[z]));
+  }
+
   // With an offset, what lies within it of a sheet and farther from R than the far side of a sheet
   // that borders R is buried. Depths are corrected there and one brick around.
   void find_corrected() {
-    std::vector<NodeMask> wide = beside_, last;
-    for (int hop = 1; hop < hops_across() && !wide.empty(); ++hop) {
-      last = wide;
+    Masks wide, last;
+    for (int hop = 1; hop + 1 < hops_across() && !beside_.empty(); ++hop) {
+      last = hop == 1 ? beside_ : wide;
+      wide.resize(band_.rows());
       sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
-        const Around around(grid_, band_, reached_, r);
-        wide[r] = spread(around, [&](std::size_t i) -> NodeMask {
-          if (around.row[i] >= 0) return last[std::size_t(around.row[i])];
-          return around.outside[i] ? kAllNodes : NodeMask{};
-        });
+        wide[r] = beside_any(Around(grid_, band_, reached_, r), last);
       });
     }
-    if (!wide.empty())
-      sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
-        if (!live_[r]) return;
-        std::uint64_t deep = 0;
-        for (std::size_t z = 0; z < 8; ++z) deep |= ~band_.free[r].z[z] & ~wide[r].z[z];
-        buried_[r] |= deep != 0;
-      });
+    const Masks& before = wide.empty() ? beside_ : wide;
+    const bool one_more = hops_across() > 1;
     sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
-      const Around around(grid_, band_, reached_, r);
-      for (std::int32_t next : around.row)
-        corrected_[r] |= next >= 0 && buried_[std::size_t(next)];
+      bool buried = buried_[r] != 0;
+      if (!buried && live_[r] && !before.empty()) {
+        NodeMask deep;
+        for (std::size_t z = 0; z < 8; ++z) deep.z[z] = ~band_.free[r].z[z] & ~before[r].z[z];
+        if (deep.any() && one_more) {
+          const NodeMask near = beside_any(Around(grid_, band_, reached_, r), before);
+          for (std::size_t z = 0; z < 8; ++z) deep.z[z] &= ~near.z[z];
+        }
+        buried = deep.any();
+      }
+      if (!buried) return;
+      for (const std::int32_t next : Around(grid_, band_, reached_, r).row)
+        if (next >= 0)
+          std::atomic_ref(corrected_[std::size_t(next)]).store(1, std::memory_order_relaxed);
     });
   }
 
@@ -232,7 +254,8 @@ class Look {
     kernels::ChainBrick d;
     bool gathered = false;
     const auto gather = [&] {
-      if (!gathered) gather_chains(grid_, band_, reached_, chains_.get(), around, d);
+      if (!gathered)
+        gather_chains(grid_, band_, reached_, chains_.get(), around, neighbours_of(todo), d);
       gathered = true;
     };
     Chain stepped[kBrickSamples];
@@ -244,23 +267,26 @@ class Look {
       kernels::chain_step(d, stepped);
     }
     const float* u = band_.nodes(r);
-    const float close = 0.5f * (kSlack + (kCrooked - 1) * offset_);
-    for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t bits = todo.z[z]; bits != 0; bits &= bits - 1) {
+    const kernels::ChainLimits limits{offset_, kSlack, kCrooked,
+                                      0.5f * (kSlack + (kCrooked - 1) * offset_)};
+    kernels::ChainSides sides;
+    kernels::chain_sides(chain, u, limits, sides);
+    NodeMask& in_sight = inside_.in_sight[r];
+    for (std::size_t z = 0; z < 8; ++z) {
+      in_sight.z[z] |= todo.z[z] & sides.in_sight[z];
+      for (std::uint64_t bits = held ? 0 : todo.z[z] & sides.dented[z]; bits != 0;
+           bits &= bits - 1) {
         const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
-        if (chain[n] >= kChainFar) continue;
-        const float there = float(chain[n]) * kChainUnit;
-        if (there < u[n] + offset_) {
-          inside_.in_sight[r].set(n);
-          const float dent = (there - kSlack) / kCrooked;
-          if (!held && dent > std::max(offset_ - u[n], 0.0f))
-            inside_.depths[r].push_back({std::uint32_t(n), dent});
-        } else if (u[n] <= close) {
-          gather();
-          if (faces_outside(grid_, band_, around, d, int(n % 8), int(n / 8 % 8), int(z)))
-            inside_.in_sight[r].set(n);
-        }
+        const float dent = (float(chain[n]) * kChainUnit - kSlack) / kCrooked;
+        inside_.depths[r].push_back({std::uint32_t(n), dent});
       }
+      for (std::uint64_t bits = todo.z[z] & sides.close[z]; bits != 0; bits &= bits - 1) {
+        const int n = std::countr_zero(bits);
+        gather();
+        if (faces_outside(grid_, band_, around, d, n % 8, n / 8, int(z)))
+          in_sight.z[z] |= std::uint64_t{1} << n;
+      }
+    }
   }
 
   const Grid& grid_;
@@ -271,14 +297,14 @@ class Look {
   Inside& inside_;
   float offset_;
   std::vector<std::uint8_t> buried_, live_, corrected_;  // (rows)
-  std::vector<NodeMask> beside_;                         // (rows) one step from R
+  Masks beside_;                                         // (rows) one step from R
   std::shared_ptr<Chains> chains_;
 };
 
 }  // namespace
 
-bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached,
-                 unsigned threads, const Steps& steps, Inside& inside) {
+bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
+                 const Steps& steps, Inside& inside) {
   return Look(grid, band, reached, threads, steps, inside).run();
 }
 

@@ -40,7 +40,7 @@ bool meets(const Vec3& p, const Vec3& d, const Facet& t) {
 class View {
  public:
   View(const Surface& surface, const Grid& grid, const NarrowBand& band,
-       const std::vector<NodeMask>& wet)
+       const Masks& wet)
       : surface_(surface), grid_(grid), band_(band), wet_(wet) {}
 
   // The facets that nodes of a row can have near them.
@@ -132,15 +132,14 @@ class View {
   const Surface& surface_;
   const Grid& grid_;
   const NarrowBand& band_;
-  const std::vector<NodeMask>& wet_;
+  const Masks& wet_;
 };
 
 }  // namespace
 
-std::vector<NodeMask> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                                const std::vector<NodeMask>& candidates,
-                                const std::vector<NodeMask>& wet, unsigned threads) {
-  std::vector<NodeMask> seen(band.rows());
+Masks reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                const Masks& candidates, const Masks& wet, unsigned threads) {
+  Masks seen(band.rows(), NodeMask{});
   const View view(surface, grid, band, wet);
   sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
     if (!candidates[r].any()) return;

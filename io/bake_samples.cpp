@@ -1,8 +1,9 @@
 // bake_samples.cpp - from unsigned distances to the samples of the field, in place.
 //
-// Rows become bricks in the same order, and no brick lies behind its row: so a few thousand rows at
-// a time are signed into a buffer of their own and moved down. A field of a gigabyte is never there
-// twice.
+// Rows become bricks in the same order, and no brick lies behind its row. As soon as enough rows
+// were left out, the next ones are signed right into the room of those before them; until then a
+// few thousand at a time are signed into a buffer and moved down. A field of a gigabyte is never
+// there twice.
 #include <algorithm>
 
 #include "io/bake_chains.h"
@@ -80,15 +81,22 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached,
     kept.push_back(std::uint32_t(r));
   }
   if (!band.part.empty()) field.part.resize(kept.size());
-  Samples buffer(std::min(kept.size(), kBatch) * kBrickSamples);
-  for (std::size_t begin = 0; begin < kept.size(); begin += kBatch) {
-    const std::size_t count = std::min(kBatch, kept.size() - begin);
-    sched::parallel_for(count, threads, [&](std::size_t i) {
+  field.triangle.resize(kept.size());
+  Samples buffer;
+  for (std::size_t begin = 0, end; begin < kept.size(); begin = end) {
+    const std::size_t left_out = kept[begin] - begin;
+    const bool direct = left_out >= kBatch;
+    end = std::min(kept.size(), begin + (direct ? left_out : kBatch));
+    if (!direct) buffer.resize(kBatch * kBrickSamples);
+    sched::parallel_for(end - begin, threads, [&](std::size_t i) {
       const std::size_t r = kept[begin + i];
-      sign_row(grid, band, reached, inside, r, buffer.data() + i * kBrickSamples);
+      sign_row(grid, band, reached, inside, r,
+               direct ? band.nodes(begin + i) : buffer.data() + i * kBrickSamples);
       if (!band.part.empty()) field.part[begin + i] = band.part[r];
+      field.triangle[begin + i] = band.triangle[r];
     });
-    sched::parallel_for(count, threads, [&](std::size_t i) {
+    if (direct) continue;
+    sched::parallel_for(end - begin, threads, [&](std::size_t i) {
       std::copy_n(buffer.data() + i * kBrickSamples, kBrickSamples, band.nodes(begin + i));
     });
   }

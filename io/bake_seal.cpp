@@ -61,12 +61,13 @@ Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, doubl
 }
 
 // Adds to `open` what is left over of `free` in corners; returns what is behind holes.
-Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, Masks& open) {
+Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, unsigned threads,
+                   Masks& open) {
   Masks near = open;
   // The corner of three walls is (sqrt 3 - 1) radii from a ball, and as many steps times sqrt 3.
   const int steps = int(std::ceil(1.27 * radius)) + 1;
   for (int i = 0; i < steps; ++i) {
-    const Masks next = neighbours(grid, band, near);
+    const Masks next = neighbours(grid, band, near, threads);
     for (std::size_t r = 0; r < near.size(); ++r) near[r] = near[r] | (next[r] & band.free[r]);
   }
   Masks left(band.rows()), deep(band.rows());
@@ -74,11 +75,11 @@ Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, Mask
     left[r] = band.free[r] & ~open[r];
     deep[r] = left[r] & ~near[r];
   }
-  Flood behind(grid, band, left, Flood::Edges::open);
-  std::fill(behind.cells().begin(), behind.cells().end(), std::uint8_t{1});  // rows only
+  Flood behind(grid, band, left, Flood::Edges::open, threads);
+  behind.close_cells();
   behind.from_nodes(deep, 1);
   for (std::size_t r = 0; r < left.size(); ++r) open[r] = open[r] | (left[r] & ~behind.wet()[r]);
-  return behind.wet();
+  return behind.take_wet();
 }
 
 // Edges from a node on one side to a node on the other become facets across their middles.
@@ -134,6 +135,7 @@ class Plugs {
     }
     surface_.triangles.push_back({v[0], v[1], v[2]});
     surface_.triangles.push_back({v[0], v[2], v[3]});
+    surface_.source.insert(surface_.source.end(), 2, -1);
     if (!surface_.part.empty()) surface_.part.insert(surface_.part.end(), 2, part);
   }
 
@@ -153,11 +155,11 @@ std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned thread
   const Masks roomy = for_rows(band, threads, [&](std::size_t r) {
     return farther_than(band.nodes(r), float(radius));
   });
-  Flood flood(grid, band, roomy, Flood::Edges::open);
-  flood.from_corner();
-  const Reached wide{flood.wet(), std::move(flood.cells())};
+  Flood flood(grid, band, roomy, Flood::Edges::open, threads);
+  flood.from_border();
+  const Reached wide{flood.take_wet(), std::move(flood.cells())};
   Masks open = swept(grid, band, wide, radius, threads);
-  const Masks closed = behind_holes(grid, band, radius, open);
+  const Masks closed = behind_holes(grid, band, radius, threads, open);
   Plugs plugs(grid, band, surface);
   plugs.add(open, closed);
   return plugs.facets();

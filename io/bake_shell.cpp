@@ -166,7 +166,9 @@ class Bake {
     if (samples->hidden > 0.005) {
       warnings_.push_back(
           std::to_string(std::lround(100 * samples->hidden)) +
-          " % of the mesh's area cannot be reached from outside and has no points.");
+          " % of the mesh's area cannot be reached from outside and has no points; gaps below " +
+          millimetres(2 * std::max(field_->offset, 0.5 * field_->voxel_size)) +
+          " count as closed, more voxels look into narrower ones.");
     }
     return samples;
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "io/bake_flood.h"
+#include "sched/parallel_for.h"
 
 namespace h6::io::bake {
 namespace {
@@ -13,21 +14,21 @@ namespace {
 using namespace flooding;
 
 // Regions by nesting: 0 outside, 1 behind one wall, 2 behind two, ... A wall is what the flood
-// cannot
-// pass: crossed edges and the nodes that are not passable. Even regions are empty.
-Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& free, Flood& flood) {
+// cannot pass: crossed edges and the nodes that are not passable. Even regions are empty.
+Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& free, unsigned threads,
+                      Flood& flood) {
   Reached empty{flood.wet(), {}};
   Masks last = flood.wet(), wall(band.rows());
   for (std::size_t r = 0; r < band.rows(); ++r) wall[r] = ~free[r];
-  Flood walls(grid, band, std::move(wall), Flood::Edges::open);
-  std::fill(walls.cells().begin(), walls.cells().end(), std::uint8_t{1});  // rows only
+  Flood walls(grid, band, wall, Flood::Edges::open, threads);
+  walls.close_cells();
   for (std::uint8_t depth = 1; depth < 250; ++depth) {
-    Masks seeds = neighbours(grid, band, last);
+    Masks seeds = neighbours(grid, band, last, threads);
     const Masks before_wall = walls.wet();
     walls.from_nodes(seeds, 1);
     Masks crossed = walls.wet();
     for (std::size_t r = 0; r < crossed.size(); ++r) crossed[r] = crossed[r] & ~before_wall[r];
-    const Masks behind = neighbours(grid, band, crossed);
+    const Masks behind = neighbours(grid, band, crossed, threads);
     for (std::size_t r = 0; r < seeds.size(); ++r) seeds[r] = seeds[r] | behind[r];
     last = flood.wet();
     if (!flood.from_nodes(seeds, std::uint8_t(depth + 1))) break;
@@ -43,10 +44,11 @@ Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& fre
 
 // Dry nodes that hang together with no roomy place, a node with six free edges to dry nodes:
 // bottoms of grooves, and tips of solids.
-Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry) {
-  Masks roomy(dry);
-  for (std::size_t r = 0; r < dry.size(); ++r) {
-    if (!dry[r].any()) continue;
+Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry, unsigned threads) {
+  Masks roomy(dry.size());
+  sched::parallel_for(dry.size(), threads, [&](std::size_t r) {
+    roomy[r] = dry[r];
+    if (!dry[r].any()) return;
     const std::array<int, 3> at = grid.place(band.cell[r]);
     const Crossing& own = band.crossing[r];
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -66,9 +68,9 @@ Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry) 
         linked = linked | (step > 0 ? across & ~own.edge[axis] : across);
         roomy[r] = roomy[r] & linked;
       }
-  }
-  Flood solid(grid, band, dry, Flood::Edges::cut);
-  std::fill(solid.cells().begin(), solid.cells().end(), std::uint8_t{1});  // rows only
+  });
+  Flood solid(grid, band, dry, Flood::Edges::cut, threads);
+  solid.close_cells();
   solid.from_nodes(roomy, 1);
   for (std::size_t r = 0; r < dry.size(); ++r) roomy[r] = dry[r] & ~solid.wet()[r];
   return roomy;
@@ -78,7 +80,7 @@ void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& b
                    const Masks& free, unsigned threads, Flood& outside) {
   Masks dry(band.rows());
   for (std::size_t r = 0; r < dry.size(); ++r) dry[r] = free[r] & ~outside.wet()[r];
-  const Masks candidates = cramped_nodes(grid, band, dry);
+  const Masks candidates = cramped_nodes(grid, band, dry, threads);
   constexpr int kRounds = 8;  // down a groove, a few voxels at a time
   for (int i = 0; i < kRounds; ++i) {
     Masks left(candidates);
@@ -93,11 +95,13 @@ void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& b
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads) {
   const Masks& free = band.free;
-  Flood outside(grid, band, free, Flood::Edges::cut);
-  outside.from_corner();
-  if (!band.crossing.empty()) reach_pockets(surface, grid, band, free, threads, outside);
-  if (cavities == Cavities::hollow) return open_cavities(grid, band, free, outside);
-  return {outside.wet(), std::move(outside.cells())};
+  Flood outside(grid, band, free, Flood::Edges::cut, threads);
+  outside.from_border();
+  // In a soup every crack is a pocket, and parity tells nothing: there they stay inside.
+  if (!band.crossing.empty() && surface.closed)
+    reach_pockets(surface, grid, band, free, threads, outside);
+  if (cavities == Cavities::hollow) return open_cavities(grid, band, free, threads, outside);
+  return {outside.take_wet(), std::move(outside.cells())};
 }
 
 }  // namespace h6::io::bake

@@ -1,8 +1,10 @@
 // bake_surface.cpp - which triangles of a mesh count, whether they close, and the grid around them.
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "io/bake_grid.h"
+#include "io/raw_vector.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -26,66 +28,113 @@ bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   return dot(n, n) > 1e-24 * longest2 * longest2;
 }
 
-// Rows of `count` keyed items gathered by key, in order: a counting sort.
-struct Buckets {
-  std::vector<std::uint32_t> first, item;
+constexpr std::size_t kSlice = 16384;  // triangles
+std::size_t slices_of(std::size_t count) { return (count + kSlice - 1) / kSlice; }
+
+// Calls body(slice, i) for every triangle, slices side by side.
+template <class F>
+void each_triangle(std::size_t count, unsigned threads, F&& body) {
+  sched::parallel_for(slices_of(count), threads, [&](std::size_t s) {
+    for (std::size_t i = s * kSlice; i < std::min(count, (s + 1) * kSlice); ++i) body(s, i);
+  });
+}
+
+// Something about a vertex.
+struct Item {
+  std::uint32_t vertex, what;
 };
-template <class Key>
-Buckets gather(std::size_t keys, std::size_t count, Key&& key) {
-  Buckets b;
-  b.first.assign(keys + 1, 0);
-  for (std::size_t i = 0; i < count; ++i) ++b.first[key(i) + 1];
-  for (std::size_t k = 0; k < keys; ++k) b.first[k + 1] += b.first[k];
-  b.item.resize(count);
-  std::vector<std::uint32_t> next(b.first.begin(), b.first.end() - 1);
-  for (std::size_t i = 0; i < count; ++i) b.item[next[key(i)]++] = static_cast<std::uint32_t>(i);
-  return b;
+
+// Calls `each(range, begin, end)` for the items of every vertex that has some, in order of making,
+// ranges of vertices side by side: so many fit the cache. `make(i, add)` calls add(item) for
+// triangle i, the same whenever it is asked.
+constexpr std::size_t kRanges = 128;
+template <class Make, class Each>
+void by_vertex(std::size_t vertices, std::size_t triangles, unsigned threads, Make&& make,
+               Each&& each) {
+  const std::size_t wide = std::max<std::size_t>(1, (vertices + kRanges - 1) / kRanges);
+  const auto shift = std::uint32_t(std::bit_width(wide - 1));  // ranges of a power of two
+  const std::size_t slices = slices_of(triangles);
+  std::vector<std::array<std::size_t, kRanges>> place(slices);
+  sched::parallel_for(slices, threads, [&](std::size_t s) {
+    place[s].fill(0);
+    for (std::size_t i = s * kSlice; i < std::min(triangles, (s + 1) * kSlice); ++i)
+      make(i, [&](const Item& item) { ++place[s][item.vertex >> shift]; });
+  });
+  std::array<std::size_t, kRanges + 1> first{};
+  std::size_t total = 0;
+  for (std::size_t k = 0; k < kRanges; ++k) {
+    first[k] = total;
+    for (auto& of_slice : place) total += std::exchange(of_slice[k], total);
+  }
+  first[kRanges] = total;
+  RawVector<Item> items(total);
+  sched::parallel_for(slices, threads, [&](std::size_t s) {
+    for (std::size_t i = s * kSlice; i < std::min(triangles, (s + 1) * kSlice); ++i)
+      make(i, [&](const Item& item) { items[place[s][item.vertex >> shift]++] = item; });
+  });
+  sched::parallel_for(kRanges, threads, [&](std::size_t k) {
+    std::vector<std::uint32_t> next((std::size_t{1} << shift) + 1, 0),
+        sorted(first[k + 1] - first[k]);
+    const std::uint32_t low = std::uint32_t(k << shift);
+    for (std::size_t i = first[k]; i < first[k + 1]; ++i) ++next[items[i].vertex - low + 1];
+    for (std::size_t v = 1; v < next.size(); ++v) next[v] += next[v - 1];
+    for (std::size_t i = first[k]; i < first[k + 1]; ++i)
+      sorted[next[items[i].vertex - low]++] = items[i].what;
+    std::uint32_t begin = 0;
+    for (std::size_t v = 0; v + 1 < next.size(); ++v) {
+      if (next[v] != begin) each(k, sorted.data() + begin, sorted.data() + next[v]);
+      begin = next[v];
+    }
+  });
 }
 
 // Marks every later copy of a triangle with the same three vertices, in any order.
-std::vector<std::uint8_t> find_duplicates(const Mesh& mesh) {
+std::vector<std::uint8_t> find_duplicates(const Mesh& mesh, unsigned threads) {
   const std::size_t count = mesh.triangles.size();
-  const Buckets by_lowest = gather(mesh.vertices.size(), count, [&](std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return std::min({t[0], t[1], t[2]});
-  });
   std::vector<std::uint8_t> duplicate(count, 0);
-  std::vector<std::pair<Triangle, std::uint32_t>> fan;
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    fan.clear();
-    for (std::uint32_t i = by_lowest.first[v]; i < by_lowest.first[v + 1]; ++i)
-      fan.push_back({sorted(mesh.triangles[by_lowest.item[i]]), by_lowest.item[i]});
-    std::sort(fan.begin(), fan.end());
-    for (std::size_t i = 1; i < fan.size(); ++i)
-      if (fan[i].first == fan[i - 1].first) duplicate[fan[i].second] = 1;
-  }
+  const auto lowest = [&](std::size_t i, auto&& add) {
+    const Triangle& t = mesh.triangles[i];
+    add(Item{std::min({t[0], t[1], t[2]}), std::uint32_t(i)});
+  };
+  by_vertex(mesh.vertices.size(), count, threads, lowest,
+            [&](std::size_t, const std::uint32_t* begin, const std::uint32_t* end) {
+              if (end - begin < 2) return;
+              thread_local std::vector<std::pair<Triangle, std::uint32_t>> fan;
+              fan.clear();
+              for (; begin != end; ++begin) fan.push_back({sorted(mesh.triangles[*begin]), *begin});
+              std::sort(fan.begin(), fan.end());
+              for (std::size_t i = 1; i < fan.size(); ++i)
+                if (fan[i].first == fan[i - 1].first) duplicate[fan[i].second] = 1;
+            });
   return duplicate;
 }
 
 // Flat triangles carry edges too: a T-junction closed by one is closed. Those with two equal
 // vertices carry one edge twice, which changes nothing.
-void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, Surface& surface) {
-  std::vector<std::array<std::uint32_t, 2>> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, unsigned threads,
+                 Surface& surface) {
+  struct alignas(64) Count {
+    std::size_t open = 0, odd = 0;
+  };
+  std::array<Count, kRanges> found;
+  const auto edges = [&](std::size_t i, auto&& add) {
     const Triangle& t = mesh.triangles[i];
-    if (duplicate[i] || t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+    if (duplicate[i] || t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return;
     for (std::size_t k = 0; k < 3; ++k)
-      edges.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
-  }
-  const Buckets by_lowest =
-      gather(mesh.vertices.size(), edges.size(), [&](std::size_t i) { return edges[i][0]; });
-  std::vector<std::uint32_t> ends;
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    ends.clear();
-    for (std::uint32_t i = by_lowest.first[v]; i < by_lowest.first[v + 1]; ++i)
-      ends.push_back(edges[by_lowest.item[i]][1]);
-    std::sort(ends.begin(), ends.end());
-    for (std::size_t i = 0, j = 0; i < ends.size(); i = j) {
-      while (j < ends.size() && ends[j] == ends[i]) ++j;
-      surface.open_edges += (j - i) == 1;
-      surface.odd_edges += (j - i) % 2;
-    }
+      add(Item{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+  };
+  by_vertex(mesh.vertices.size(), mesh.triangles.size(), threads, edges,
+            [&](std::size_t range, std::uint32_t* begin, std::uint32_t* end) {
+              std::sort(begin, end);
+              for (std::uint32_t* next; begin != end; begin = next) {
+                next = std::find_if(begin, end, [&](std::uint32_t v) { return v != *begin; });
+                found[range].open += next - begin == 1;
+                found[range].odd += std::size_t(next - begin) % 2;
+              }
+            });
+  for (const Count& c : found) {
+    surface.open_edges += c.open;
+    surface.odd_edges += c.odd;
   }
   surface.closed = surface.odd_edges == 0;
 }
@@ -98,44 +147,91 @@ std::string number(double value) {
 
 }  // namespace
 
-Result<Surface> prepare_surface(const Mesh& mesh) {
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
+  const std::size_t count = mesh.triangles.size(), slices = slices_of(count);
+  constexpr std::size_t kNone = ~std::size_t{0};
+  // What is found slice by slice, put together in their order.
+  struct Found {
+    std::size_t no_vertex = kNone, not_finite = kNone;  // first such triangle
+    std::size_t duplicates = 0, flat = 0, kept = 0;
+    double low[3], high[3];
+  };
+  constexpr double kHuge = std::numeric_limits<double>::max();
+  std::vector<Found> found(slices);
+  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
     for (std::uint32_t v : mesh.triangles[i])
+      if (v >= mesh.vertices.size()) found[s].no_vertex = std::min(found[s].no_vertex, i);
+  });
+  for (const Found& f : found) {
+    if (f.no_vertex == kNone) continue;
+    for (std::uint32_t v : mesh.triangles[f.no_vertex])
       if (v >= mesh.vertices.size())
-        return Failure{"triangle " + std::to_string(i) + " names vertex " + std::to_string(v) +
-                       ", but the mesh has " + std::to_string(mesh.vertices.size())};
+        return Failure{"triangle " + std::to_string(f.no_vertex) + " names vertex " +
+                       std::to_string(v) + ", but the mesh has " +
+                       std::to_string(mesh.vertices.size())};
+  }
   Surface surface;
-  const std::vector<std::uint8_t> duplicate = find_duplicates(mesh);
-  count_edges(mesh, duplicate, surface);
-  const double huge = std::numeric_limits<double>::max();
-  surface.low = {huge, huge, huge};
-  surface.high = {-huge, -huge, -huge};
-  const bool parts = mesh.part.size() == mesh.triangles.size();
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+  const std::vector<std::uint8_t> duplicate = find_duplicates(mesh, threads);
+  count_edges(mesh, duplicate, threads, surface);
+
+  std::vector<std::uint8_t> keep(count, 0);
+  for (Found& f : found) {
+    std::fill_n(f.low, 3, kHuge);
+    std::fill_n(f.high, 3, -kHuge);
+  }
+  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
+    Found& f = found[s];
     if (duplicate[i]) {
-      ++surface.duplicates;
-      continue;
+      ++f.duplicates;
+      return;
     }
     const Triangle& t = mesh.triangles[i];
     const Vec3 corner[3] = {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
     for (const Vec3& p : corner)
-      if (!std::isfinite(p.x + p.y + p.z))
-        return Failure{"triangle " + std::to_string(i) + " has a coordinate that is not finite"};
+      if (!std::isfinite(p.x + p.y + p.z)) f.not_finite = std::min(f.not_finite, i);
     if (!has_area(corner[0], corner[1], corner[2])) {
-      ++surface.flat;
-      continue;
+      ++f.flat;
+      return;
     }
     for (const Vec3& p : corner) {
-      surface.low = {std::min(surface.low.x, p.x), std::min(surface.low.y, p.y),
-                     std::min(surface.low.z, p.z)};
-      surface.high = {std::max(surface.high.x, p.x), std::max(surface.high.y, p.y),
-                      std::max(surface.high.z, p.z)};
+      const double at[3] = {p.x, p.y, p.z};
+      for (std::size_t k = 0; k < 3; ++k) {
+        f.low[k] = std::min(f.low[k], at[k]);
+        f.high[k] = std::max(f.high[k], at[k]);
+      }
     }
-    surface.triangles.push_back(t);
-    if (parts) surface.part.push_back(mesh.part[i]);
+    keep[i] = 1;
+    ++f.kept;
+  });
+  double low[3] = {kHuge, kHuge, kHuge}, high[3] = {-kHuge, -kHuge, -kHuge};
+  std::size_t kept = 0;
+  for (Found& f : found) {
+    if (f.not_finite != kNone)
+      return Failure{"triangle " + std::to_string(f.not_finite) +
+                     " has a coordinate that is not finite"};
+    surface.duplicates += f.duplicates;
+    surface.flat += f.flat;
+    kept += std::exchange(f.kept, kept);  // from here on: where the slice's go
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], f.low[k]);
+      high[k] = std::max(high[k], f.high[k]);
+    }
   }
-  if (surface.triangles.empty())
+  if (kept == 0)
     return Failure{"the mesh has no triangle with area: there is nothing to make a field of"};
+  surface.low = {low[0], low[1], low[2]};
+  surface.high = {high[0], high[1], high[2]};
+  const bool parts = mesh.part.size() == count;
+  surface.triangles.resize(kept);
+  surface.source.resize(kept);
+  if (parts) surface.part.resize(kept);
+  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
+    if (!keep[i]) return;
+    const std::size_t to = found[s].kept++;
+    surface.triangles[to] = mesh.triangles[i];
+    surface.source[to] = std::int32_t(i);
+    if (parts) surface.part[to] = mesh.part[i];
+  });
   surface.vertices = mesh.vertices;
   return surface;
 }
@@ -206,7 +302,6 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
 }
 
 void to_grid(Surface& surface, const Grid& grid, unsigned threads) {
-  constexpr std::size_t kSlice = 16384;
   sched::parallel_for((surface.vertices.size() + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
     const std::size_t end = std::min(surface.vertices.size(), (s + 1) * kSlice);
     for (std::size_t i = s * kSlice; i < end; ++i)

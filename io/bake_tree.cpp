@@ -1,8 +1,9 @@
 // bake_tree.cpp - closest-point search over triangles (see bake_tree.h).
 //
 // Boxes and triangles are weighed eight at a time in float, by bounds that are never more than the
-// truth (rounding to float included); what may be nearer than the best so far is measured in
-// double. So the result is the least of all triangles' distances in double, whatever the order.
+// truth (rounding to float included). The least of the triangles' bounds is one of the distance;
+// the triangle that gave it is measured in double, and where that tells more than a little more,
+// the search is done again with all that may be nearest measured in double.
 #include "io/bake_tree.h"
 
 #include <algorithm>
@@ -26,6 +27,26 @@ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   return apart(x) | apart(y) << 1 | apart(z) << 2;
 }
 
+// The place of a cell on Hilbert's curve, which leaves no cube before it has been everywhere in it
+// and never jumps: what follows each other lies together (J. Skilling, "Programming the Hilbert
+// curve", 2004: reflect and exchange axes from the largest cube down, then undo the Gray code).
+std::uint32_t hilbert(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  std::uint32_t c[3] = {x, y, z};
+  for (std::uint32_t half = 512; half > 1; half /= 2)
+    for (std::uint32_t& axis : c) {
+      const std::uint32_t upper = 0 - std::uint32_t((axis & half) != 0), low = half - 1;
+      const std::uint32_t exchange = (c[0] ^ axis) & low & ~upper;
+      c[0] ^= exchange | (low & upper);
+      axis ^= exchange;
+    }
+  c[1] ^= c[0];
+  c[2] ^= c[1];
+  std::uint32_t flip = 0;
+  for (std::uint32_t half = 512; half > 1; half /= 2)
+    if ((c[2] & half) != 0) flip ^= half - 1;
+  return morton(c[2] ^ flip, c[1] ^ flip, c[0] ^ flip);
+}
+
 // By the upper half of the words, which has 30 bits; equal ones keep their order.
 void sort_by_code(std::vector<std::uint64_t>& words) {
   std::vector<std::uint64_t> other(words.size());
@@ -47,6 +68,72 @@ kernels::EightBoxes no_boxes() {
   return boxes;
 }
 
+kernels::EightTurnedBoxes nothing_around() {
+  kernels::EightTurnedBoxes boxes{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::fill_n(boxes.middle[k], 8, 1e9f);
+    std::fill_n(boxes.half[k], 8, -1.0f);
+  }
+  return boxes;
+}
+
+// Around eight triangles: along the grid, or across and along their mean plane, whichever is less.
+void put_box_around(const kernels::EightTriangles& t, kernels::EightTurnedBoxes& boxes,
+                    std::size_t box) {
+  float normal[3] = {0, 0, 0};
+  for (std::size_t i = 0; i < 8; ++i) {
+    float n[3];
+    for (std::size_t k = 0; k < 3; ++k)
+      n[k] = t.ab[(k + 1) % 3][i] * t.ac[(k + 2) % 3][i] -
+             t.ab[(k + 2) % 3][i] * t.ac[(k + 1) % 3][i];
+    const float along = normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2];
+    for (std::size_t k = 0; k < 3; ++k) normal[k] += along < 0 ? -n[k] : n[k];
+  }
+  using Frame = std::array<std::array<float, 3>, 3>;
+  const auto put = [&](const Frame& axis, float largest) {
+    float middle[3], half[3], size = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      float low = 1e9f, high = -1e9f;
+      const auto& n = axis[k];
+      for (std::size_t i = 0; i < 8; ++i) {
+        const float a = n[0] * t.a[0][i] + n[1] * t.a[1][i] + n[2] * t.a[2][i];
+        const float b = n[0] * t.ab[0][i] + n[1] * t.ab[1][i] + n[2] * t.ab[2][i];
+        const float c = n[0] * t.ac[0][i] + n[1] * t.ac[1][i] + n[2] * t.ac[2][i];
+        low = std::min(low, a + std::min({b, c, 0.0f}));
+        high = std::max(high, a + std::max({b, c, 0.0f}));
+      }
+      middle[k] = (low + high) / 2;
+      half[k] = (high - low) / 2 + 4 * kRounded;
+      size *= half[k] + 0.5f;
+    }
+    if (size >= largest) return size;
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t c = 0; c < 3; ++c) boxes.axis[k][c][box] = axis[k][c];
+      boxes.middle[k][box] = middle[k];
+      boxes.half[k][box] = half[k];
+    }
+    return size;
+  };
+  const float along_grid = put({{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, 1e30f);
+  const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] +
+                                 normal[2] * normal[2]);
+  if (!(length > 1e-6f)) return;
+  for (float& c : normal) c /= length;
+  std::size_t least = 0;
+  for (std::size_t k = 1; k < 3; ++k)
+    if (std::fabs(normal[k]) < std::fabs(normal[least])) least = k;
+  const std::size_t l1 = (least + 1) % 3, l2 = (least + 2) % 3;
+  const float across = std::sqrt(normal[l1] * normal[l1] + normal[l2] * normal[l2]);
+  Frame axis{};
+  axis[0] = {normal[0], normal[1], normal[2]};
+  axis[1][l1] = -normal[l2] / across;
+  axis[1][l2] = normal[l1] / across;
+  for (std::size_t k = 0; k < 3; ++k)
+    axis[2][k] = axis[0][(k + 1) % 3] * axis[1][(k + 2) % 3] -
+                 axis[0][(k + 2) % 3] * axis[1][(k + 1) % 3];
+  put(axis, along_grid);
+}
+
 }  // namespace
 
 TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned threads)
@@ -63,7 +150,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
       const auto cell = [](double sum) {  // 2 voxels; the grid has at most 2048
         return std::uint32_t(std::clamp(sum / 6, 0.0, 1023.0));
       };
-      words[i] = std::uint64_t(morton(cell(a.x + b.x + c.x), cell(a.y + b.y + c.y),
+      words[i] = std::uint64_t(hilbert(cell(a.x + b.x + c.x), cell(a.y + b.y + c.y),
                                       cell(a.z + b.z + c.z))) << 32 | i;
     }
   });
@@ -74,6 +161,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
 
   const std::size_t leaves = (count + 7) / 8;
   leaf_.resize(leaves);
+  around_leaf_.assign((leaves + 7) / 8, nothing_around());
   level_.emplace_back((leaves + 7) / 8, no_boxes());
   sched::parallel_for(level_[0].size(), threads, [&](std::size_t node) {
     for (std::size_t l = 8 * node; l < std::min(leaves, 8 * node + 8); ++l) {
@@ -97,6 +185,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
           boxes.high[k][l % 8] = std::max(boxes.high[k][l % 8], float(high) + kRounded);
         }
       }
+      put_box_around(leaf_[l], around_leaf_[node], l % 8);
     }
   });
   while (level_.back().size() > 1) {
@@ -119,9 +208,37 @@ double TriangleTree::squared_to(const double (&p)[3], std::uint32_t place) const
   return kernels::point_triangle_squared(p, pa, pb, pc);
 }
 
-void TriangleTree::search(const double (&p)[3], Found& found) const {
+// The same for corners as rounded to float, which are at hand.
+double TriangleTree::squared_about(const float (&at)[3], std::uint32_t place) const {
+  const kernels::EightTriangles& t = leaf_[place / 8];
+  double p[3], a[3], b[3], c[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    p[k] = at[k];
+    a[k] = t.a[k][place % 8];
+    b[k] = a[k] + t.ab[k][place % 8];
+    c[k] = a[k] + t.ac[k][place % 8];
+  }
+  return kernels::point_triangle_squared(p, a, b, c);
+}
+
+void TriangleTree::weigh(std::uint32_t leaf, const float (&at)[3], Found& found) const {
+  float near[8];
+  std::uint32_t hits = kernels::eight_triangles(leaf_[leaf], at, found.squared, near);
+  for (; hits != 0; hits &= hits - 1) {
+    const std::uint32_t i = std::uint32_t(std::countr_zero(hits)), place = 8 * leaf + i;
+    if (near[i] < found.squared && place < triangle_.size()) found = {near[i], place};
+  }
+}
+
+void TriangleTree::try_around(const double (&p)[3], std::uint32_t place, Found& found) const {
   const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
                        float(p[2] - middle_[2])};
+  weigh(place / 8, at, found);
+}
+
+// Looks at every leaf whose box is nearer than `most`, which may shrink meanwhile.
+template <class Look>
+void TriangleTree::walk(const float (&at)[3], const float& most, Look&& look) const {
   struct Entry {
     float squared;  // bound of the distance
     std::uint32_t level, node;
@@ -129,42 +246,64 @@ void TriangleTree::search(const double (&p)[3], Found& found) const {
   Entry stack[128];
   int depth = 0;
   stack[depth++] = {0, std::uint32_t(level_.size()) - 1, 0};
-  // Bounds are for the point and corners as rounded to float.
-  const auto limit = [&] {
-    const double reach = std::sqrt(found.best2) + double(kRounded);
-    return float(reach * reach * (1 + 1e-6));
-  };
-  float most = limit();
   while (depth > 0) {
     const Entry entry = stack[--depth];
     if (entry.squared >= most) continue;
     // The start is nearly always the nearest: the order of what is left hardly matters.
     float squared[8];
-    std::uint32_t live =
-        kernels::eight_boxes(level_[entry.level][entry.node], at, most, squared);
     if (entry.level > 0) {
+      std::uint32_t live =
+          kernels::eight_boxes(level_[entry.level][entry.node], at, most, squared);
       for (; live != 0; live &= live - 1) {
         const std::uint32_t i = std::uint32_t(std::countr_zero(live));
         stack[depth++] = {squared[i], entry.level - 1, 8 * entry.node + i};
       }
       continue;
     }
+    std::uint32_t live =
+        kernels::eight_turned_boxes(around_leaf_[entry.node], at, most, squared);
     for (; live != 0; live &= live - 1) {
       const std::uint32_t child = std::uint32_t(std::countr_zero(live));
-      if (squared[child] >= most) continue;
-      const std::uint32_t leaf = 8 * entry.node + child;
-      float near[8];
-      std::uint32_t hits = kernels::eight_triangles(leaf_[leaf], at, most, near);
-      for (; hits != 0; hits &= hits - 1) {
-        const std::uint32_t i = std::uint32_t(std::countr_zero(hits)), place = 8 * leaf + i;
-        if (near[i] >= most || place >= triangle_.size() || place == found.nearest) continue;
-        const double d2 = squared_to(p, place);
-        if (d2 >= found.best2) continue;
-        found = {d2, place};
-        most = limit();
-      }
+      if (squared[child] < most) look(8 * entry.node + child);
     }
   }
+}
+
+double TriangleTree::search(const double (&p)[3], Found& found) const {
+  const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
+                       float(p[2] - middle_[2])};
+  walk(at, found.squared, [&](std::uint32_t leaf) { weigh(leaf, at, found); });
+  if (found.nearest == kNone) return search_exactly(p, 1e18, found.nearest);
+  const double least = std::sqrt(double(found.squared));
+  if (std::sqrt(squared_about(at, found.nearest)) <= least + kTight - 2 * double(kRounded))
+    return std::max(0.0, least - double(kRounded));
+  return search_exactly(p, squared_to(p, found.nearest), found.nearest);  // a sliver, weighed low
+}
+
+double TriangleTree::search_exactly(const double (&p)[3], double best2,
+                                    std::uint32_t& nearest) const {
+  const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
+                       float(p[2] - middle_[2])};
+  // Bounds are for the point and corners as rounded to float.
+  const auto limit = [&] {
+    const double reach = std::sqrt(best2) + double(kRounded);
+    return float(reach * reach * (1 + 1e-6));
+  };
+  float most = limit();
+  walk(at, most, [&](std::uint32_t leaf) {
+    float near[8];
+    std::uint32_t hits = kernels::eight_triangles(leaf_[leaf], at, most, near);
+    for (; hits != 0; hits &= hits - 1) {
+      const std::uint32_t i = std::uint32_t(std::countr_zero(hits)), place = 8 * leaf + i;
+      if (near[i] >= most || place >= triangle_.size() || place == nearest) continue;
+      const double d2 = squared_to(p, place);
+      if (d2 >= best2) continue;
+      best2 = d2;
+      nearest = place;
+      most = limit();
+    }
+  });
+  return std::sqrt(best2);
 }
 
 }  // namespace h6::io::bake

@@ -14,6 +14,7 @@ h6FieldDef FieldData::def() const {
   d.far_grid = far_grid.data();
   d.band = band;
   d.part = part.empty() ? nullptr : part.data();
+  d.triangle = triangle.empty() ? nullptr : triangle.data();
   return d;
 }
 

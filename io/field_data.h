@@ -21,6 +21,8 @@ struct FieldData {
   double band = 0;                      // [m]
   std::vector<std::int32_t> part;       // (brick_count) or empty
   std::vector<std::string> part_names;
+  std::vector<std::int32_t> triangle;   // (brick_count) or empty: of the mesh as it was given,
+                                        // nearest to the brick's middle; -1: a sealed hole is
   // How it was made; kept in the file's metadata.
   double offset = 0;                    // sigma [m]; 0 on closed meshes
   std::string sign_mode;                // "closed" or "flood"; "given": from another program

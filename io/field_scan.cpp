@@ -33,15 +33,29 @@ class Scan {
     at_ += sizeof value;
     return bool(in_);
   }
-  bool string() {
+  // What is longer than any name here is skipped: then `text` is empty.
+  bool string(std::string* text = nullptr) {
     std::uint32_t length = 0;
-    return take(length) && skip(length);
+    if (!take(length)) return false;
+    if (text == nullptr || length > 256) return skip(length);
+    if (length > size_ - at_) return false;
+    text->resize(length);
+    in_.read(text->data(), length);
+    at_ += length;
+    return bool(in_);
   }
-  bool metadata() {
+  // The 32-bit number of one name is taken, where it is there.
+  bool metadata(const char* wanted = "", std::optional<std::int32_t>* number = nullptr) {
     std::uint32_t count = 0;
     if (!take(count)) return false;
-    for (std::uint32_t i = 0; i < count; ++i)
-      if (!string() || !string() || !string()) return false;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      std::string name, type, value;
+      if (!string(&name) || !string(&type) || !string(&value)) return false;
+      if (number && name == wanted && type == "int32" && value.size() == sizeof(std::int32_t)) {
+        number->emplace();
+        std::memcpy(&**number, value.data(), value.size());
+      }
+    }
     return true;
   }
   bool to(std::uint64_t place) {
@@ -55,26 +69,35 @@ class Scan {
   std::uint64_t size_, at_ = 0;
 };
 
-bool grids_fit(Scan& scan, bool offsets) {
+bool grids_fit(Scan& scan, bool offsets, VdbLayout& layout) {
   std::uint32_t count = 0;
   if (!scan.take(count)) return false;
   for (std::uint32_t i = 0; i < count; ++i) {
+    VdbGrid grid;
     std::int64_t place[3] = {};
-    if (!scan.string() || !scan.string() || !scan.string()) return false;
+    if (!scan.string(&grid.name) || !scan.string(&grid.type) || !scan.string()) return false;
     for (std::int64_t& p : place)
       if (!scan.take(p)) return false;
-    std::uint32_t compression = 0;
-    if (!scan.take(compression) || !scan.metadata() || !scan.string()) return false;
+    std::string transform;
+    if (!scan.take(grid.compression) ||
+        !scan.metadata("hapsix_format", i == 0 ? &layout.format : nullptr) ||
+        !scan.string(&transform))
+      return false;
     // Without offsets the next grid begins where this one's tree ends: OpenVDB alone knows.
     if (!offsets) return true;
+    // Six vectors of three doubles.
+    if (transform == "UniformScaleTranslateMap") grid.tree = scan.at() + 6 * 3 * sizeof(double);
     if (place[2] < 0 || !scan.to(std::uint64_t(place[2]))) return false;
+    grid.block = place[1] < 0 ? 0 : std::uint64_t(place[1]);
+    grid.end = std::uint64_t(place[2]);
+    layout.grids.push_back(std::move(grid));
   }
   return true;
 }
 
 }  // namespace
 
-Outcome check_vdb_lengths(const std::filesystem::path& file) {
+Result<VdbLayout> scan_vdb(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     return Failure{"there is no file " + file.string()};
@@ -82,6 +105,8 @@ Outcome check_vdb_lengths(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (error || !in) return Failure{"cannot open " + file.string() + ": check its permissions"};
   Scan scan(in, size);
+  VdbLayout layout;
+  layout.size = size;
   char magic[8];
   std::uint32_t version = 0;
   char offsets = 0;
@@ -91,9 +116,9 @@ Outcome check_vdb_lengths(const std::filesystem::path& file) {
   if (!scan.take(version) || version < 222 || version > 1000)
     return Failure{file.string() + " is an OpenVDB file of a version that cannot be read"};
   if (!scan.skip(8) || !scan.take(offsets) || !scan.skip(36) || !scan.metadata() ||
-      !grids_fit(scan, offsets != 0))
+      !grids_fit(scan, offsets != 0, layout))
     return Failure{file.string() + " ends too early or is damaged: it is no whole OpenVDB file"};
-  return Done{};
+  return layout;
 }
 
 }  // namespace h6::io

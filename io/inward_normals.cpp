@@ -56,6 +56,8 @@ struct Piece {  // triangles joined by edges that exactly two of them share
   double area = 0, area_kept = 0;  // [m^2]; the part whose winding is as read
   Vec3 low{}, high{};
   bool flip = false;  // of its one winding, so that normals point out
+  double lid = 0;     // open: area of a flat lid over it [m^2]
+  bool bowl = false;  // open, but it holds a volume
 };
 
 class Orientation {
@@ -227,11 +229,16 @@ void Orientation::find_open_pieces() {
     const Vec3 middle{(piece.low.x + piece.high.x) / 2, (piece.low.y + piece.high.y) / 2,
                       (piece.low.z + piece.high.z) / 2};
     piece.volume = 0;
+    Vec3 across{};  // of all vector areas, twice: that of the lids that are missing
     for (const std::uint32_t t : piece.triangles) {
       const double six = dot(minus(corner(t, 0), middle),
                              cross(minus(corner(t, 1), middle), minus(corner(t, 2), middle)));
       piece.volume += (reversed_[t] ? -six : six) / 6;
+      const Vec3 n = cross(minus(corner(t, 1), corner(t, 0)), minus(corner(t, 2), corner(t, 0)));
+      const double sign = reversed_[t] ? -1 : 1;
+      across = {across.x + sign * n.x, across.y + sign * n.y, across.z + sign * n.z};
     }
+    piece.lid = std::sqrt(dot(across, across)) / 2;
   }
 }
 
@@ -250,29 +257,40 @@ int Orientation::crossings(const Piece& piece, const Vec3& from, const Vec3& alo
   return count;
 }
 
-// Inside an odd number of closed pieces that are wound the other way (or mixed, or it is). A piece
-// wound like the one around it is a part inside a part, not a hollow.
+// Whether there is a body around the piece and none in it. Windings of closed pieces tell where
+// bodies are: where as many are entered as left there is none. A piece wound like the one around it
+// is a part inside a part, not a hollow; one more within the hollow is a body again. Where a
+// winding was mixed it tells nothing: hollow is then what an odd number of pieces is around.
 bool Orientation::hollow(std::size_t c) const {
   const Piece& piece = pieces_[c];
-  const std::uint32_t t = piece.triangles[0];
-  const Vec3 &a = corner(t, 0), &b = corner(t, 1), &d = corner(t, 2);
-  const Vec3 from{(a.x + b.x + d.x) / 3, (a.y + b.y + d.y) / 3, (a.z + b.z + d.z) / 3};
-  constexpr Vec3 rays[3] = {
-      {0.8017, 0.5323, 0.2719}, {-0.3571, 0.8929, 0.2741}, {0.1873, -0.4561, 0.87}};
-  int around = 0;
+  std::vector<std::size_t> maybe;
+  bool unlike = false, mixed = piece.turned;
   for (std::size_t o = 0; o < pieces_.size(); ++o) {
     const Piece& outer = pieces_[o];
     const bool holds = outer.low.x < piece.low.x && outer.high.x > piece.high.x &&
                        outer.low.y < piece.low.y && outer.high.y > piece.high.y &&
                        outer.low.z < piece.low.z && outer.high.z > piece.high.z;
     if (o == c || !outer.closed || !holds) continue;
-    const bool alike = !outer.turned && !piece.turned && (outer.volume < 0) == (piece.volume < 0);
-    if (alike) continue;
-    int votes = 0;
-    for (const Vec3& ray : rays) votes += crossings(outer, from, ray) % 2;
-    around += votes >= 2;
+    maybe.push_back(o);
+    mixed |= outer.turned;
+    unlike |= outer.turned || (outer.volume < 0) != (piece.volume < 0);
   }
-  return around % 2 == 1;
+  if (!unlike && !piece.turned) return false;
+  const std::uint32_t t = piece.triangles[0];
+  const Vec3 &a = corner(t, 0), &b = corner(t, 1), &d = corner(t, 2);
+  const Vec3 from{(a.x + b.x + d.x) / 3, (a.y + b.y + d.y) / 3, (a.z + b.z + d.z) / 3};
+  constexpr Vec3 rays[3] = {
+      {0.8017, 0.5323, 0.2719}, {-0.3571, 0.8929, 0.2741}, {0.1873, -0.4561, 0.87}};
+  int around = 0, bodies = 0;
+  for (const std::size_t o : maybe) {
+    int votes = 0;
+    for (const Vec3& ray : rays) votes += crossings(pieces_[o], from, ray) % 2;
+    if (votes < 2) continue;
+    ++around;
+    bodies += pieces_[o].volume < 0 ? -1 : 1;
+  }
+  if (mixed) return around % 2 == 1;
+  return bodies != 0 && bodies + (piece.volume < 0 ? -1 : 1) == 0;
 }
 
 void Orientation::settle_signs() {
@@ -286,10 +304,11 @@ void Orientation::settle_signs() {
       inside_out_ += !piece.turned && !inside && piece.volume < 0;
       continue;
     }
-    // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; a twentieth of it is a
-    // bowl, less is a sheet.
-    const bool bowl = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
-    piece.flip = bowl ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
+    // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; with a twentieth of it
+    // the volume tells the sides, with less it is a sheet.
+    const bool holds = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
+    piece.flip = holds ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
+    piece.bowl = holds && piece.lid < 0.35 * piece.area;  // a box without a lid: 0.2
   }
 }
 
@@ -339,9 +358,11 @@ FaceTable Orientation::run() {
   find_open_pieces();
   settle_signs();
   table_.sheet.assign(faces_.size(), 0);
+  table_.bowl.assign(faces_.size(), 0);
   for (std::uint32_t t = 0; t < faces_.size(); ++t) {
     if (piece_of_[t] == none) continue;
     table_.sheet[t] = !pieces_[piece_of_[t]].closed;
+    table_.bowl[t] = pieces_[piece_of_[t]].bowl;
     if (bool(reversed_[t]) == pieces_[piece_of_[t]].flip) continue;
     Vec3& n = table_.inward[t];
     n = {-n.x, -n.y, -n.z};

@@ -13,6 +13,7 @@ struct FaceTable {
   std::vector<Vec3> inward;  // (triangles) unit; zero where area is 0
   std::vector<double> area;  // (triangles) [m^2]; 0: degenerate, or again a triangle seen before
   std::vector<char> sheet;   // (triangles) of a piece that does not close: it has two outer sides
+  std::vector<char> bowl;    // (triangles) of such a piece that nearly closes around a volume
   std::size_t pieces = 0, sheets = 0;  // with area; those of them that do not close
   std::vector<std::string> warnings;  // a sentence each: what was repaired or is not certain
 };

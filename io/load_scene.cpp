@@ -4,6 +4,7 @@
 #include <chrono>
 #include <map>
 
+#include "io/asset_hash.h"
 #include "io/cache.h"
 #include "io/field_file.h"
 #include "io/mass.h"
@@ -103,7 +104,7 @@ class Loader {
     if (!data) return data.failure();
     for (const std::string& w : cached.warnings)
       out_.warnings.push_back("body '" + body.name + "': " + w);
-    asset.hash = mesh ? key : data->input_hash;
+    asset.hash = mesh ? key : asset_hash(*data);
     asset.from_cache = cached.hit;
     asset.rebuilt = cached.rebuilt;
     asset.seconds = since(start);
@@ -141,6 +142,7 @@ class Loader {
     if (!built) return built.failure();
     LoadedAsset asset;
     asset.body = body.name;
+    asset.hash = asset_hash(*built);
     asset.seconds = since(start);
     describe(*built, asset);
     out_.assets.push_back(asset);

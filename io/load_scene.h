@@ -16,7 +16,7 @@ namespace h6::io {
 struct LoadedAsset {
   std::string body;  // the first that uses it
   bool is_field = false;
-  std::string hash;  // of content and bake parameters
+  std::string hash;  // mesh: of content and bake parameters; a file or points: of what they hold
   bool from_cache = false;
   bool rebuilt = false;        // the cache had a file for it, but damaged or of something else
   double seconds = 0;          // to bake or to read

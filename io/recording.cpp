@@ -17,7 +17,7 @@ namespace recording {
 static_assert(sizeof(h6Pose) == 7 * sizeof(double) && offsetof(h6Pose, q) == 3 * sizeof(double));
 static_assert(sizeof(h6Velocity) == 6 * sizeof(double) && sizeof(h6Wrench) == 6 * sizeof(double));
 static_assert(sizeof(h6Cause) == 4 && sizeof(h6Status) == 4);
-static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 10, "names below, format version");
+static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 20, "names below, format version");
 static_assert(offsetof(h6FrameReport, net_stiffness_max) ==
               offsetof(h6FrameReport, net_stiffness_min) + sizeof(double));
 
@@ -43,16 +43,15 @@ const std::vector<Column>& columns() {
       {"body_pose", real, 7, body + offsetof(h6BodyState, pose), bodies, "m, 1", pose},
       {"body_velocity", real, 6, body + offsetof(h6BodyState, velocity), bodies, "m/s, rad/s",
        speed},
-      {"wrench", real, 6, command + offsetof(h6DeviceCommand, wrench), commands, "N, N m",
-       wrench},
+      {"wrench", real, 6, command + offsetof(h6DeviceCommand, wrench), commands, "N, N m", wrench},
       {"command_pose", real, 7, command + offsetof(h6DeviceCommand, pose), commands, "m, 1", pose,
        true},
       {"cause", n32, 1, command + offsetof(h6DeviceCommand, cause), commands,
        "index into /config cause_names", "cause"},
       {"contacts", n32, 1, report + offsetof(h6FrameReport, contacts), 0, "1", "contacts"},
       {"max_depth", real, 1, report + offsetof(h6FrameReport, max_depth), 0, "m", "max_depth"},
-      {"max_depth_voxels", real, 1, report + offsetof(h6FrameReport, max_depth_voxels), 0,
-       "voxel", "max_depth_voxels"},
+      {"max_depth_voxels", real, 1, report + offsetof(h6FrameReport, max_depth_voxels), 0, "voxel",
+       "max_depth_voxels"},
       {"net_stiffness", real, 2, report + offsetof(h6FrameReport, net_stiffness_min), 0, "N/m",
        "min max", true},
       {"stage_us", real, H6_STAGE_COUNT, report + offsetof(h6FrameReport, stage_us), 0, "us",
@@ -60,6 +59,12 @@ const std::vector<Column>& columns() {
       {"frame_us", real, 1, report + offsetof(h6FrameReport, frame_us), 0, "us", "frame_us"},
       {"wakeup_us", real, 1, offsetof(R, wakeup_us), 0, "us", "wakeup_us"},
       {"late", n32, 1, offsetof(R, late), 0, "bits: 1 compute, 2 wakeup, 4 stolen", "late"},
+      {"late_us", real, 1, offsetof(R, late_us), 0, "us", "late_us", true},
+      {"cpu_us", real, 1, offsetof(R, cpu_us), 0, "us", "cpu_us", true},
+      {"coarse_pairs", n32, 1, report + offsetof(h6FrameReport, coarse_pairs), 0, "1",
+       "coarse_pairs", true},
+      {"missed_depth_voxels", real, 1, report + offsetof(h6FrameReport, missed_depth_voxels), 0,
+       "voxel", "missed_depth_voxels", true},
       {"status", n32, 1, report + offsetof(h6FrameReport, status), 0, "bits of h6Status",
        "status"},
       {"hash", n64, 1, report + offsetof(h6FrameReport, state_hash), 0, "1", "hash"},
@@ -76,8 +81,9 @@ const std::vector<std::string>& stage_names() {
 
 const std::vector<std::string>& cause_names() {
   static const std::vector<std::string> names = {
-      "none",        "clamped", "slewed", "not finite", "late",
-      "device lost", "stopped", "speed",  "clutched",   "passivity"};
+      "none",     "clamped",  "slewed",    "not finite", "late",    "device lost", "stopped",
+      "speed",    "clutched", "passivity", "power",      "derated", "overspeed",   "soft start",
+      "dead man", "disarmed", "pose jump", "bad sample", "frozen",  "watchdog"};
   return names;
 }
 
@@ -129,9 +135,7 @@ std::mutex& library_mutex() {
 }
 }  // namespace
 
-LibraryLock::LibraryLock() : lock_(library_mutex()) {
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-}
+LibraryLock::LibraryLock() : lock_(library_mutex()) { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
 std::string library_reason() {
   std::string reason;
@@ -218,8 +222,8 @@ Result<Recording> read_recording(const fs::path& name, FrameRange range) {
       return copy;
     }
     if (!read->whole)
-      read->remark = "the run was killed, or is still going on: frames" + last_time(*read) +
-                     " are here";
+      read->remark =
+          "the run was killed, or is still going on: frames" + last_time(*read) + " are here";
     return read;
   } catch (const std::bad_alloc&) {
     return Failure{file.string() + " needs more memory than there is: read it in pieces"};
@@ -228,7 +232,7 @@ Result<Recording> read_recording(const fs::path& name, FrameRange range) {
   }
 }
 
-Outcome repair_recording(const fs::path& name) {
+Result<std::string> repair_recording(const fs::path& name) {
   const fs::path file = recording::followed(name);
   try {
     const recording::LibraryLock lock;
@@ -240,13 +244,23 @@ Outcome repair_recording(const fs::path& name) {
     if (!itself && copies.empty()) return itself.failure();
     // Where the file itself does not open no run is going on: it would have published a whole one.
     for (const fs::path& other : left)
-      if (itself && maybe_in_use(other)) return Done{};
+      if (itself && maybe_in_use(other)) return std::string();
+    const auto shown = [](const fs::path& path) { return path.filename().string(); };
+    std::string done;
     if (!itself) {
-      if (is_there) fs::rename(file, recording::free_name(file, ".damaged"));
+      done = shown(copies[0].file) + " with " + std::to_string(copies[0].frames) +
+             " frames, left by a killed run, is " + shown(file) + " now";
+      if (is_there) {
+        const fs::path kept = recording::free_name(file, ".damaged");
+        fs::rename(file, kept);
+        done += "; what was there does not open and is kept as " + shown(kept);
+      }
       fs::rename(copies[0].file, file);
     }
-    for (const fs::path& other : left) fs::remove(other, failed);
-    return Done{};
+    for (const fs::path& other : left)
+      if (fs::remove(other, failed))
+        done += (done.empty() ? "" : "; ") + shown(other) + ", an older copy, was removed";
+    return done;
   } catch (const std::exception& problem) {
     return Failure{"cannot repair " + file.string() + ": " + problem.what()};
   }

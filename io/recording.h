@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,7 @@ struct RecordingHead {
   double rate = 1000;                    // [Hz]
   std::size_t hands = 1;
   std::string program;                   // name and version
+  std::string run_json;                  // how it was run, recorded_run.h; may be empty
 };
 
 struct RecordingEvent {
@@ -84,9 +86,21 @@ struct FrameRange {
 // recorder in this one waits for it. Where `file` is damaged or gone, the copy beside it is read.
 Result<Recording> read_recording(const std::filesystem::path& file, FrameRange range = {});
 
+// The first number in which two rows of one frame differ, in the order a frame makes them: contacts,
+// depths, bodies, what hands are told, the hash. Times and status are not looked at.
+struct RowDifference {
+  std::string column, cell;  // "body_pose", "qz"
+  std::size_t hand = 0;      // of columns with one row a hand
+  double a = 0, b = 0;       // as numbers; of hashes only the leading digits
+};
+// `commands` false: what hands are told is not looked at; it depends on deadlines too.
+std::optional<RowDifference> first_difference(const h6FrameRecord& a, const h6FrameRecord& b,
+                                              std::size_t hands, bool commands);
+
 // Makes `file` the newest whole copy of a run that was killed and removes what else that run left
 // beside it. Changes nothing where there is nothing to do, or where a run may still be going on
-// (files younger than five seconds). A damaged file is kept as FILE.damaged.
-Outcome repair_recording(const std::filesystem::path& file);
+// (files younger than five seconds). A damaged file is kept as FILE.damaged. Says what it did; empty:
+// nothing.
+Result<std::string> repair_recording(const std::filesystem::path& file);
 
 }  // namespace h6::io

@@ -1,6 +1,6 @@
 // recording_layout.h - what stands where in a recording, and HDF5 made safe to use. Private.
 //
-//   /config    attributes: version, json, asset_hashes, simd_target, program, rate, hands,
+//   /config    attributes: version, json, asset_hashes, simd_target, program, run, rate, hands,
 //              stage_names, cause_names, units
 //   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns
 //   /events    t, what, detail

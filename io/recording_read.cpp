@@ -94,6 +94,7 @@ Outcome read_head(const Source& source, RecordingHead& head) {
     head.asset_hashes = all.at("asset_hashes").get<std::vector<std::string>>();
     head.simd_target = all.at("simd_target").get<std::string>();
     head.program = all.at("program").get<std::string>();
+    head.run_json = all.value("run", std::string());  // older files do without
     head.rate = all.at("rate").get<double>();
     const double hands = all.at("hands").get<double>();
     if (!(head.rate > 0 && head.rate <= 1e6))

@@ -70,7 +70,8 @@ std::string whole_head(const RecordingHead& head) {
                               {"simd_target", head.simd_target},
                               {"program", head.program},
                               {"rate", head.rate},
-                              {"hands", head.hands}};
+                              {"hands", head.hands},
+                              {"run", head.run_json}};
   return all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -82,7 +83,7 @@ bool put_head(hid_t file, const RecordingHead& head) {
          put_text(config, "json", head.scene_json) &&
          put_texts(config, "asset_hashes", head.asset_hashes) &&
          put_text(config, "simd_target", head.simd_target) &&
-         put_text(config, "program", head.program) &&
+         put_text(config, "program", head.program) && put_text(config, "run", head.run_json) &&
          put_number(config, "rate", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &head.rate) &&
          put_number(config, "hands", H5T_STD_U32LE, H5T_NATIVE_UINT32, &hands) &&
          put_texts(config, "stage_names", stage_names()) &&

@@ -23,6 +23,9 @@ Outcome export_scene(const Scene& scene, const std::filesystem::path& folder);
 // The same JSON as text, without writing any file: for the head of a recording. Files keep the names
 // they were read by.
 std::string scene_text(const Scene& scene);
+// And back: nothing is looked for on disk, paths of hands stay empty. A scene in metres comes back to
+// the bit. `name` is for sentences.
+Result<Scene> read_scene_text(const std::string& text, const std::string& name);
 
 // A JSON schema of scene files, as text.
 std::string scene_schema();

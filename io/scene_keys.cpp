@@ -326,12 +326,42 @@ constexpr SceneKey kArm[] = {
     number("grip_rotational_damping", "N m s/rad; default 0.02", 0, 1e3)};
 constexpr SceneKeys kArmKeys = keys_of(kArm);
 
+constexpr SceneKey kSafety[] = {
+    number("max_force", "N; default 0: the device's rating", 0, 1e4),
+    number("max_torque", "N m; default 0: the device's rating", 0, 1e3),
+    number("max_force_rate", "slew limit, N/s; default 0: the device's", 0, 1e7),
+    number("max_torque_rate", "slew limit, N m/s; default 0: the device's", 0, 1e6),
+    number("max_power", "that the hand may be given, W; default 0: max_force at 1 m/s", 0, 1e5),
+    number("max_speed", "admittance modes, m/s; default 0: the device's", 0, 100),
+    number("derate_speed",
+           "of the hand, m/s: from here on the force falls, to nothing at cut_speed; default 0: half "
+           "of that",
+           0, 100),
+    number("cut_speed", "of the hand, m/s: zero, latched; default 0: from the device", 0, 100),
+    number("soft_start", "from nothing to the whole output after arming, s; default 0.1", 0, 10),
+    number("decay_time", "from the whole output to nothing in trouble, s; default 0.02", 0.001,
+           0.02),
+    number("pose_jump",
+           "a pose farther from the last one is a jump, 1 to 50 mm, scene units; default 20 mm", 0,
+           kFarthest),
+    number("freeze_time",
+           "samples that stay the same for so long mean a frozen device, s; default 0: the device's",
+           0, 1),
+    whole("dead_man_buttons",
+          "bits: nothing is rendered unless one of these buttons is held; default 0: none", 0,
+          4294967295.0)};
+constexpr SceneKeys kSafetyKeys = keys_of(kSafety);
+
 constexpr SceneKey kHand[] = {
     {.name = "body",
      .kind = Kind::text,
      .about = "name of the moving body it holds",
      .required = true},
-    {.name = "device", .kind = Kind::text, .about = "path, simulated, arm, ...; default path"},
+    {.name = "device",
+     .kind = Kind::text,
+     .about = "path, simulated, arm, spacemouse, scripted:FILE, replay:FILE or bad-operator, with "
+              "options as ?key=value&key=value ('hapsix devices' explains each); a plug-in is given "
+              "with run --device; default path"},
     {.name = "path",
      .kind = Kind::text,
      .about = "CSV t,x,y,z,qw,qx,qy,qz of the body's mesh frame"},
@@ -365,6 +395,10 @@ constexpr SceneKey kHand[] = {
      .kind = Kind::boolean,
      .about = "take back by damping what energy would leave through this hand unpaid; default "
               "false"},
+    {.name = "safety",
+     .kind = Kind::object,
+     .about = "limits of what goes to the device, each at most the device's own rating",
+     .keys = &kSafetyKeys},
     {.name = "arm",
      .kind = Kind::object,
      .about = "figures of the device arm: a simulated arm and the person who holds it",

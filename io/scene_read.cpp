@@ -50,6 +50,8 @@ h6Pose pose(const Json& o, double scale) {
 class SceneReader {
  public:
   explicit SceneReader(const fs::path& file) : folder_(file.parent_path()) {}
+  // Of a recording: files are only named.
+  SceneReader() : recorded_(true) {}
 
   Scene read(const Json& o) {
     const std::string units = text(o, "units", "m");
@@ -78,7 +80,7 @@ class SceneReader {
     const std::string name = o[key].get<std::string>();
     const fs::path file = folder_ / fs::path(name);  // an absolute name replaces the folder
     std::error_code error;
-    if (!fs::is_regular_file(file, error))
+    if (!recorded_ && !fs::is_regular_file(file, error))
       throw Complaint{
           inside(at, key),
           "there is no file \"" + shown(name) + "\"" +
@@ -222,6 +224,22 @@ class SceneReader {
     def.passivity = o.value("passivity", false);
   }
 
+  void read_safety(const Json& o, h6SafetyDef& d) const {
+    d.max_force = number(o, "max_force", d.max_force);
+    d.max_torque = number(o, "max_torque", d.max_torque);
+    d.max_force_rate = number(o, "max_force_rate", d.max_force_rate);
+    d.max_torque_rate = number(o, "max_torque_rate", d.max_torque_rate);
+    d.max_power = number(o, "max_power", d.max_power);
+    d.max_speed = number(o, "max_speed", d.max_speed);
+    d.derate_speed = number(o, "derate_speed", d.derate_speed);
+    d.cut_speed = number(o, "cut_speed", d.cut_speed);
+    d.soft_start = number(o, "soft_start", d.soft_start);
+    d.decay_time = number(o, "decay_time", d.decay_time);
+    if (o.contains("pose_jump")) d.pose_jump = number(o, "pose_jump", 0) * scale_;
+    d.freeze_time = number(o, "freeze_time", d.freeze_time);
+    d.dead_man_buttons = static_cast<std::uint32_t>(number(o, "dead_man_buttons", 0));
+  }
+
   SceneArm read_arm(const Json& o) const {
     SceneArm arm;
     arm.delay_frames = static_cast<int>(number(o, "delay_frames", arm.delay_frames));
@@ -251,8 +269,11 @@ class SceneReader {
                         "another hand holds \"" + shown(hand.body) + "\" already"};
     hand.device = text(o, "device", hand.device);
     read_hand_def(o, hand.def);
+    if (o.contains("safety")) read_safety(o["safety"], hand.def.safety);
     if (o.contains("arm")) hand.arm = read_arm(o["arm"]);
-    if (o.contains("path")) {
+    if (recorded_) {
+      hand.path_file = text(o, "path", "");
+    } else if (o.contains("path")) {
       hand.path_file = existing(o, "path", at);
       Result<Path> path = read_path(hand.path_file, scene_.unit);
       if (!path) throw Complaint{inside(at, "path"), path.error()};
@@ -279,6 +300,7 @@ class SceneReader {
   }
 
   fs::path folder_;
+  bool recorded_ = false;
   Scene scene_;
   double scale_ = 1;  // metres in one unit of the scene
 };
@@ -311,7 +333,22 @@ Result<Scene> read_scene(const fs::path& file) {
     check_scene_json(root);
     Scene scene = SceneReader(file).read(root);
     if (scene.name.empty()) scene.name = file.stem().string();
+    scene.file = file;
     return scene;
+  } catch (const Complaint& complaint) {
+    return Failure{name + ": " + (complaint.where.empty() ? "" : complaint.where + ": ") +
+                   complaint.what};
+  } catch (const std::exception& e) {
+    return Failure{name + ": cannot be read as a scene (" + e.what() + ")"};
+  }
+}
+
+Result<Scene> read_scene_text(const std::string& text, const std::string& name) {
+  try {
+    if (const Outcome json = check_json_text(text, name); !json) return json.failure();
+    const Json root = Json::parse(text);
+    check_scene_json(root);
+    return SceneReader().read(root);
   } catch (const Complaint& complaint) {
     return Failure{name + ": " + (complaint.where.empty() ? "" : complaint.where + ": ") +
                    complaint.what};

@@ -246,6 +246,8 @@ class SceneWriter {
       out["path"] = name;
     }
     add_hand_def(hand.def, out);
+    const Json safety = safety_json(hand.def.safety);
+    if (safety != safety_json(h6DefaultSafetyDef())) out["safety"] = safety;
     if (hand.arm) out["arm"] = arm_json(*hand.arm);
     return out;
   }
@@ -265,6 +267,22 @@ class SceneWriter {
     out["driver_damping"] = def.driver_damping;
     out["admittance_damping"] = def.admittance_damping;
     if (def.passivity) out["passivity"] = true;
+  }
+
+  Json safety_json(const h6SafetyDef& d) const {
+    return {{"max_force", d.max_force},
+            {"max_torque", d.max_torque},
+            {"max_force_rate", d.max_force_rate},
+            {"max_torque_rate", d.max_torque_rate},
+            {"max_power", d.max_power},
+            {"max_speed", d.max_speed},
+            {"derate_speed", d.derate_speed},
+            {"cut_speed", d.cut_speed},
+            {"soft_start", d.soft_start},
+            {"decay_time", d.decay_time},
+            {"pose_jump", d.pose_jump / scale_},
+            {"freeze_time", d.freeze_time},
+            {"dead_man_buttons", d.dead_man_buttons}};
   }
 
   Json arm_json(const SceneArm& arm) const {

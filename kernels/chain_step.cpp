@@ -43,9 +43,8 @@ void ChainStepOnce(const ChainBrick& brick, Chain* out) {
     const std::size_t first = (z + 1) * kLayer + kLine;
     for (std::size_t i = 0; i < 8 * kLine; i += lanes) {
       const std::size_t at = first + i;
-      const auto get = [&](std::size_t k, std::size_t where) HWY_ATTR {
-        return hn::LoadU(d, give[k] + where);
-      };
+      const auto get = [&](std::size_t k, std::size_t where)
+                           HWY_ATTR { return hn::LoadU(d, give[k] + where); };
       auto least = hn::Min(far, get(0, at));
       least = hn::Min(least, hn::Min(get(1, at - kLayer), get(1, at + kLayer)));
       least = hn::Min(least, hn::Min(get(1, at - kLine), get(1, at + kLine)));
@@ -53,8 +52,7 @@ void ChainStepOnce(const ChainBrick& brick, Chain* out) {
       least = hn::Min(least, hn::Min(get(2, at + kLayer - kLine), get(2, at + kLayer + kLine)));
       hn::Store(least, d, took + i);
     }
-    for (std::size_t y = 0; y < 8; ++y)
-      std::copy_n(took + y * kLine + 1, 8, out + 64 * z + 8 * y);
+    for (std::size_t y = 0; y < 8; ++y) std::copy_n(took + y * kLine + 1, 8, out + 64 * z + 8 * y);
   }
 }
 
@@ -81,6 +79,38 @@ void ChainSeeds(const float* u, const std::uint8_t* mask, std::size_t lines, flo
   }
 }
 
+void ChainSidesOf(const Chain* chain, const float* u, const ChainLimits& limits, ChainSides& out) {
+  const hn::CappedTag<float, 8> d;
+  const hn::Rebind<std::int32_t, decltype(d)> d32;
+  const hn::Rebind<Chain, decltype(d)> d16;
+  const std::size_t lanes = hn::Lanes(d);
+  const auto unit = hn::Set(d, kChainUnit), far = hn::Set(d, kChainFar * kChainUnit);
+  const auto offset = hn::Set(d, limits.offset), slack = hn::Set(d, limits.slack);
+  const auto crooked = hn::Set(d, limits.crooked), close = hn::Set(d, limits.close);
+  for (std::size_t z = 0; z < 8; ++z) {
+    std::uint64_t words[3] = {0, 0, 0};
+    for (std::size_t n = 0; n < 64; n += lanes) {
+      const auto away = hn::LoadU(d, u + 64 * z + n);
+      const auto steps = hn::PromoteTo(d32, hn::LoadU(d16, chain + 64 * z + n));
+      const auto length = hn::Mul(hn::ConvertTo(d, steps), unit);
+      const auto known = hn::Lt(length, far);
+      const auto short_of = hn::Lt(length, hn::Add(away, offset));
+      const auto in_sight = hn::And(known, short_of);
+      const auto dent = hn::Div(hn::Sub(length, slack), crooked);
+      const auto deeper = hn::Gt(dent, hn::Max(hn::Sub(offset, away), hn::Zero(d)));
+      const auto near = hn::AndNot(short_of, hn::And(known, hn::Le(away, close)));
+      std::uint8_t bits[3][8] = {};
+      hn::StoreMaskBits(d, in_sight, bits[0]);
+      hn::StoreMaskBits(d, hn::And(in_sight, deeper), bits[1]);
+      hn::StoreMaskBits(d, near, bits[2]);
+      for (std::size_t k = 0; k < 3; ++k) words[k] |= std::uint64_t{bits[k][0]} << n;
+    }
+    out.in_sight[z] = words[0];
+    out.dented[z] = words[1];
+    out.close[z] = words[2];
+  }
+}
+
 }  // namespace h6::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -89,6 +119,7 @@ namespace h6::kernels {
 
 HWY_EXPORT(ChainStepOnce);
 HWY_EXPORT(ChainSeeds);
+HWY_EXPORT(ChainSidesOf);
 
 void chain_step(const ChainBrick& brick, Chain* out) {
   HWY_DYNAMIC_DISPATCH(ChainStepOnce)(brick, out);
@@ -97,6 +128,10 @@ void chain_step(const ChainBrick& brick, Chain* out) {
 void chain_seeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
                  Chain* out) {
   HWY_DYNAMIC_DISPATCH(ChainSeeds)(u, mask, lines, level, out);
+}
+
+void chain_sides(const Chain* chain, const float* u, const ChainLimits& limits, ChainSides& out) {
+  HWY_DYNAMIC_DISPATCH(ChainSidesOf)(chain, u, limits, out);
 }
 
 }  // namespace h6::kernels

@@ -29,4 +29,18 @@ void chain_seeds(const float* u, const std::uint8_t* mask, std::size_t lines, fl
 void chain_seeds_ref(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
                      Chain* out);
 
+// What the chains of a brick tell of the side its nodes are on, bit 8*y + x of word z; none of it
+// where a chain is far.
+struct ChainSides {
+  std::uint64_t in_sight[8];  // length < u + offset
+  std::uint64_t dented[8];    // of those: (length - slack) / crooked > max(offset - u, 0)
+  std::uint64_t close[8];     // of the others: u <= close
+};
+struct ChainLimits {
+  float offset, slack, crooked, close;  // [voxel]; crooked: a ratio
+};
+void chain_sides(const Chain* chain, const float* u, const ChainLimits& limits, ChainSides& out);
+void chain_sides_ref(const Chain* chain, const float* u, const ChainLimits& limits,
+                     ChainSides& out);
+
 }  // namespace h6::kernels

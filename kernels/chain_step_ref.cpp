@@ -1,4 +1,4 @@
-// chain_step_ref.cpp - the specification of chain_step and chain_seeds.
+// chain_step_ref.cpp - the specification of chain_step, chain_seeds, chain_sides.
 #include <algorithm>
 #include <cmath>
 
@@ -25,6 +25,23 @@ void chain_seeds_ref(const float* u, const std::uint8_t* mask, std::size_t lines
     out[n] = mask[n / 8] >> (n % 8) & 1
                  ? static_cast<Chain>(std::ceil((level - u[n]) * (1 / kChainUnit)))
                  : kChainFar;
+}
+
+void chain_sides_ref(const Chain* chain, const float* u, const ChainLimits& limits,
+                     ChainSides& out) {
+  out = {};
+  for (std::size_t n = 0; n < 512; ++n) {
+    if (chain[n] >= kChainFar) continue;
+    const float length = float(chain[n]) * kChainUnit;
+    const std::uint64_t bit = std::uint64_t{1} << (n % 64);
+    if (length < u[n] + limits.offset) {
+      out.in_sight[n / 64] |= bit;
+      const float dent = (length - limits.slack) / limits.crooked;
+      if (dent > std::max(limits.offset - u[n], 0.0f)) out.dented[n / 64] |= bit;
+    } else if (u[n] <= limits.close) {
+      out.close[n / 64] |= bit;
+    }
+  }
 }
 
 }  // namespace h6::kernels

@@ -15,16 +15,6 @@
 
 namespace h6::kernels {
 
-// Contacts from which we take the tree. AVX-512, us, tree / gauss_weights (kernels/gauss_tree):
-//                    gauss3 400    1000      gauss6 200    400      robust 400    1000
-//     spread           7.6/10.8   17/67       7.2/6.7    15/24       14/14       35/85
-//     clump             11/11     36/63       9.6/6.5    22/24       26/23      133/137
-//     walls, in order  8.4/4.6    23/19       7.6/6.6    16/25       15/7.5      42/35
-// Contacts wall by wall let gauss_weights skip most tiles; few scenes are so kind to it.
-constexpr std::size_t gauss_tree_from(Hat hat) {
-  return hat == Hat::normal ? 512 : hat == Hat::sum ? 320 : 640;
-}
-
 inline constexpr int kGaussStages = 5;
 inline constexpr std::size_t kGaussLeaf = 16;  // contacts a leaf, children a node
 inline constexpr int kGaussLevels = 8;         // 16^8 contacts

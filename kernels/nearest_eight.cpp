@@ -1,4 +1,4 @@
-// nearest_eight.cpp - the fast twins of eight_boxes_ref and eight_triangles_ref.
+// nearest_eight.cpp - the fast twins of nearest_eight_ref.cpp.
 #include "kernels/nearest_eight.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -59,6 +59,24 @@ std::uint32_t Boxes(const EightBoxes& boxes, const float* p, float most, float* 
   return below;
 }
 
+std::uint32_t TurnedBoxes(const EightTurnedBoxes& boxes, const float* p, float most,
+                          float* squared) {
+  const D d;
+  std::uint32_t below = 0;
+  const VF zero = hn::Zero(d);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
+    VF sum = zero;
+    for (int k = 0; k < 3; ++k) {
+      const VF along = hn::Sub(dot(load(boxes.axis[k], i), at), hn::Load(d, boxes.middle[k] + i));
+      const VF gap = hn::Max(hn::Sub(hn::Abs(along), hn::Load(d, boxes.half[k] + i)), zero);
+      sum = hn::MulAdd(gap, gap, sum);
+    }
+    below |= keep(hn::Mul(sum, hn::Set(d, 1 - 2e-6f)), most, i, squared);
+  }
+  return below;
+}
+
 // To the segment from the origin to e of a point at q.
 HWY_INLINE VF to_segment(const V3& q, const V3& e, VF length2) {
   const D d;
@@ -72,11 +90,12 @@ HWY_INLINE VF to_segment(const V3& q, const V3& e, VF length2) {
 // Over the inside (barycentric v, w, 1 - v - w all positive) the height, else the nearest edge.
 // Rounding makes the normal of a long triangle wrong by an angle of |b||c|/area times that of float,
 // and the height by that times how far the first corner is; v and w likewise. A point that may be
-// over the inside is taken to be: the height is never more than the distance. A sliver is no wider
-// than kSliver of its length, and its edges are as near as that.
+// over the inside is taken to be: the height is never more than the distance. On a
+// sliver, whose inside cannot be told like that, the foot of the height is nowhere farther from an
+// edge than the radius of the circle inside, which is twice the area over the girth.
 std::uint32_t Triangles(const EightTriangles& triangles, const float* p, float most,
                         float* squared) {
-  constexpr float kDigits = 4e-6f, kSliver2 = 1e-4f, kSliver = 0.01f;
+  constexpr float kDigits = 4e-6f, kSliver2 = 1e-4f;
   const D d;
   const VF zero = hn::Zero(d);
   std::uint32_t below = 0;
@@ -99,12 +118,13 @@ std::uint32_t Triangles(const EightTriangles& triangles, const float* p, float m
     const auto inside = hn::And(hn::Ge(hn::Add(hn::Min(v, w), fuzz), zero),
                                 hn::Le(hn::Add(v, w), hn::Add(area, fuzz)));
     const VF over = hn::Mul(hn::Set(d, kDigits), hn::Mul(away, sides));
-    const VF high = hn::Max(hn::Div(hn::Sub(hn::Abs(dot(q, n)), over),
-                                    hn::Sqrt(hn::Max(area, hn::Set(d, 1e-20f)))), zero);
+    const VF root = hn::Sqrt(hn::Max(area, hn::Set(d, 1e-20f)));
+    const VF high = hn::Max(hn::Div(hn::Sub(hn::Abs(dot(q, n)), over), root), zero);
     const VF height = hn::Mul(high, high);
     // (edge - width)^2 >= edge^2 - 2 edge width
-    const VF sliver = hn::NegMulAdd(hn::Mul(longest, hn::Set(d, 2 * kSliver)), hn::Sqrt(edges),
-                                    edges);
+    const VF within = hn::Div(hn::MulAdd(hn::Set(d, kDigits), sides, root),
+                              hn::Max(hn::Add(longest, longest), hn::Set(d, 1e-10f)));
+    const VF sliver = hn::NegMulAdd(within, within, edges);
     const auto thin = hn::Lt(area, hn::Mul(hn::Set(d, kSliver2), hn::Mul(longest2, longest2)));
     const VF slack = hn::Mul(hn::Set(d, kDigits), hn::Add(qq, longest2));
     const VF beside = hn::Sub(hn::IfThenElse(thin, sliver, edges), slack);
@@ -121,11 +141,16 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(Boxes);
+HWY_EXPORT(TurnedBoxes);
 HWY_EXPORT(Triangles);
 
 std::uint32_t eight_boxes(const EightBoxes& boxes, const float p[3], float most,
                           float squared[8]) {
   return HWY_DYNAMIC_DISPATCH(Boxes)(boxes, p, most, squared);
+}
+std::uint32_t eight_turned_boxes(const EightTurnedBoxes& boxes, const float p[3], float most,
+                                 float squared[8]) {
+  return HWY_DYNAMIC_DISPATCH(TurnedBoxes)(boxes, p, most, squared);
 }
 std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3], float most,
                               float squared[8]) {

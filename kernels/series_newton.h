@@ -47,34 +47,44 @@ inline double norm2(const double v[6]) {
   return sum;
 }
 
-// sums(y) are SeriesSums at y; max_e is the largest e, above 0. Every pass over the contacts counts
-// against a bound, so that no frame can stall here.
+// `now`: sums at y, which is finite; sums(y, system) are SeriesSums at y, without the system where
+// it is not asked for; max_e is the largest e, above 0. Every pass over the contacts counts against
+// a bound, so that no frame can stall here.
 template <class Sums>
-SeriesResult newton(const SeriesParameters& p, double max_e, double y[6], const Sums& sums) {
-  if (!std::isfinite(norm2(y)))
-    for (int k = 0; k < 6; ++k) y[k] = 0;
+SeriesResult newton(const SeriesParameters& p, double max_e, double y[6], SeriesSums now,
+                    const Sums& sums) {
   constexpr int kHalvings = 6;
+  // Where no contact moves by much, few become active or cease to be: the step is likely the last.
+  const double last = 0.1 * max_e;
   const double scale = p.c * max_e;
-  SeriesSums now = sums(y);
   SeriesResult result{0, 0};
+  bool system = true;
   for (;;) {
     double gradient[6], step[6];
     for (int k = 0; k < 6; ++k) gradient[k] = now.pull[k] - p.c * y[k];
     result.residual = std::sqrt(norm2(gradient)) / scale;
     if (!(result.residual > p.tolerance) || result.iterations >= p.iterations) return result;
+    if (!system) now = sums(y, true);
     solve_spring_system(p.c, now.system, gradient, step);
+    system = norm2(step) > last * last;
     const double before = p.c * norm2(y) + now.energy;
     double trial[6], t = 1;
     SeriesSums next;
     for (int halving = 0; halving <= kHalvings; ++halving, t *= 0.5) {
       for (int k = 0; k < 6; ++k) trial[k] = y[k] + t * step[k];
-      next = sums(trial);
+      next = sums(trial, system);
       if (p.c * norm2(trial) + next.energy <= before * (1 + 1e-12)) break;
     }
     for (int k = 0; k < 6; ++k) y[k] = trial[k];
     now = next;
     ++result.iterations;
   }
+}
+
+// A start that is not finite is none.
+inline void check_start(double y[6]) {
+  if (!std::isfinite(norm2(y)))
+    for (int k = 0; k < 6; ++k) y[k] = 0;
 }
 
 }  // namespace h6::kernels

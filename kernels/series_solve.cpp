@@ -1,7 +1,8 @@
 // series_solve.cpp - the SIMD twin of series_solve_ref.cpp.
 //
 // Lanes are doubles: what a dense patch carries is a small difference of e and J.y in every
-// contact. Kappa is divided out once; a pass then reads eight columns and adds to 28 sums.
+// contact. The first pass divides kappa out. A pass reads eight columns and adds to 28 sums, or to
+// 7 where the solution is likely reached: then it leaves the slack as well, and is the last.
 #include "kernels/series_solve.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -47,74 +48,97 @@ HWY_INLINE VD slack_at(const SeriesColumns& c, const Axes& J, std::size_t i, con
   return u;
 }
 
-HWY_INLINE void sum_active(const SeriesColumns& c, double lever, const float* kappa,
-                           const double* y, SeriesSums& out) {
+// kappa_i of contacts whose axes are J.
+HWY_INLINE hn::Vec<DF> stiffness_at(const SeriesColumns& c, VD per_c, const Axes& J,
+                                    std::size_t i) {
   const DD d;
-  const VD zero = hn::Zero(d), per_lever = hn::Set(d, 1 / lever);
-  VD system[kUpper6], pull[6], energy = zero;
+  VD a = hn::Mul(J.v[0], J.v[0]);
+  for (int k = 1; k < 6; ++k) a = hn::MulAdd(J.v[k], J.v[k], a);
+  const VD soft = hn::NegMulAdd(hn::Min(a, hn::Set(d, 2.0)), per_c, hn::Set(d, 1.0));
+  const VD facing = c.facing != nullptr ? load_column(c.facing, i, c.count - i) : hn::Set(d, 1.0);
+  return hn::DemoteTo(DF(), hn::Div(facing, soft));
+}
+
+// What a pass over the contacts does besides pull and energy.
+enum Pass : int {
+  kStiffen = 1,  // fills kappa, and finds the largest e of a contact that can carry load, or 0
+  kSystem = 2,
+  kSlack = 4,  // fills slack
+};
+
+template <int kPass>
+HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const double* y,
+                       float* kappa, float* slack, SeriesSums& out) {
+  const DD d;
+  const VD zero = hn::Zero(d), per_lever = hn::Set(d, 1 / p.lever), per_c = hn::Set(d, 1 / p.c);
+  VD system[kUpper6], pull[6], energy = zero, max_e = zero;
   for (int k = 0; k < kUpper6; ++k) system[k] = zero;
   for (int k = 0; k < 6; ++k) pull[k] = zero;
   for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
     const Axes J = axes_at(c, per_lever, i);
     const VD u = slack_at(c, J, i, y);
+    hn::Vec<DF> k;
+    if constexpr (kPass & kStiffen) {
+      k = stiffness_at(c, per_c, J, i);
+      store_n(k, DF(), kappa + i, live);
+      const auto carries = hn::Gt(k, hn::Zero(DF()));
+      const auto e = hn::IfThenElseZero(carries, load_n(DF(), c.e + i, live));
+      max_e = hn::Max(max_e, hn::PromoteTo(d, e));
+    }
+    if constexpr (kPass & kSlack)
+      store_n(hn::DemoteTo(DF(), hn::Max(u, zero)), DF(), slack + i, live);
     const auto active = hn::Gt(u, zero);
     if (hn::AllFalse(d, active)) continue;
-    const VD w = hn::IfThenElseZero(active, load_column(kappa, i, c.count - i));
+    if constexpr (!(kPass & kStiffen)) k = load_n(DF(), kappa + i, live);
+    const VD w = hn::IfThenElseZero(active, hn::PromoteTo(d, k));
     const VD wu = hn::Mul(w, u);
     energy = hn::MulAdd(wu, u, energy);
     int entry = 0;
     HWY_UNROLL(8)
     for (int row = 0; row < 6; ++row) {
       pull[row] = hn::MulAdd(wu, J.v[row], pull[row]);
-      const VD wJ = hn::Mul(w, J.v[row]);
-      for (int col = row; col < 6; ++col, ++entry)
-        system[entry] = hn::MulAdd(wJ, J.v[col], system[entry]);
+      if constexpr (kPass & kSystem) {
+        const VD wJ = hn::Mul(w, J.v[row]);
+        for (int col = row; col < 6; ++col, ++entry)
+          system[entry] = hn::MulAdd(wJ, J.v[col], system[entry]);
+      }
     }
   }
-  for (int k = 0; k < kUpper6; ++k) out.system[k] = hn::GetLane(hn::SumOfLanes(d, system[k]));
+  if constexpr (kPass & kSystem)
+    for (int k = 0; k < kUpper6; ++k) out.system[k] = hn::GetLane(hn::SumOfLanes(d, system[k]));
   for (int k = 0; k < 6; ++k) out.pull[k] = hn::GetLane(hn::SumOfLanes(d, pull[k]));
   out.energy = hn::GetLane(hn::SumOfLanes(d, energy));
-}
-
-// Fills kappa; returns the largest e of a contact that can carry load, or 0.
-HWY_INLINE double stiffen(const SeriesColumns& c, const SeriesParameters& p, float* kappa) {
-  const DD d;
-  const VD one = hn::Set(d, 1.0), per_lever = hn::Set(d, 1 / p.lever), per_c = hn::Set(d, 1 / p.c);
-  VD max_e = hn::Zero(d);
-  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
-    const std::size_t live = c.count - i;
-    const Axes J = axes_at(c, per_lever, i);
-    VD a = hn::Mul(J.v[0], J.v[0]);
-    for (int k = 1; k < 6; ++k) a = hn::MulAdd(J.v[k], J.v[k], a);
-    const VD soft = hn::NegMulAdd(hn::Min(a, hn::Set(d, 2.0)), per_c, one);
-    const VD facing = c.facing != nullptr ? load_column(c.facing, i, live) : one;
-    const VD k = hn::Div(facing, soft);
-    store_n(hn::DemoteTo(DF(), k), DF(), kappa + i, live);
-    const auto carries = hn::Gt(k, hn::Zero(d));
-    max_e = hn::Max(max_e, hn::IfThenElseZero(carries, load_column(c.e, i, live)));
-  }
   return hn::GetLane(hn::MaxOfLanes(d, max_e));
 }
 
 void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double* y, float* kappa,
                        float* slack, SeriesResult& result) {
-  const DD d;
-  const double max_e = stiffen(c, p, kappa);
   result = {0, 0};
+  check_start(y);
+  SeriesSums first;
+  const double max_e = pass<kStiffen | kSystem>(c, p, y, kappa, slack, first);
+  bool filled = false;  // slack, at y
   if (max_e > 0) {
-    result = newton(p, max_e, y, [&](const double* at) HWY_ATTR {
+    const bool apart = slack != c.e;
+    result = newton(p, max_e, y, first, [&](const double* at, bool system) HWY_ATTR {
       SeriesSums sums;
-      sum_active(c, p.lever, kappa, at, sums);
+      filled = !system && apart;
+      if (system) {
+        pass<kSystem>(c, p, at, kappa, slack, sums);
+      } else if (apart) {
+        pass<kSlack>(c, p, at, kappa, slack, sums);
+      } else {
+        pass<0>(c, p, at, kappa, slack, sums);
+      }
       return sums;
     });
   } else {
     for (int k = 0; k < 6; ++k) y[k] = 0;  // nothing to hold
   }
-  const VD per_lever = hn::Set(d, 1 / p.lever);
-  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
-    const VD u = hn::Max(slack_at(c, axes_at(c, per_lever, i), i, y), hn::Zero(d));
-    store_n(hn::DemoteTo(DF(), u), DF(), slack + i, c.count - i);
-  }
+  if (filled) return;
+  SeriesSums unused;
+  pass<kSlack>(c, p, y, kappa, slack, unused);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

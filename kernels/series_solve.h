@@ -39,7 +39,7 @@ struct SeriesResult {
 };
 
 // y: the start, and then the solution. kappa, slack (count): kappa_i and max(0, e_i - J_i.y); slack
-// may be the column e. A start that is not finite counts as 0.
+// may be the column e, at the cost of a pass. A start that is not finite counts as 0.
 SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
                           double y[6], float* kappa, float* slack);
 // The specification, for float and (gradient tests) double columns.

@@ -47,7 +47,8 @@ SeriesResult series_solve_ref(const SeriesColumnsT<T>& c, const SeriesParameters
   }
   SeriesResult result{0, 0};
   if (max_e > 0) {
-    result = newton(p, max_e, y, [&](const double* at) {
+    check_start(y);
+    const auto sums_at = [&](const double* at, bool) {
       SeriesSums sums;
       for (std::size_t i = 0; i < c.count; ++i) {
         double J[6];
@@ -62,7 +63,8 @@ SeriesResult series_solve_ref(const SeriesColumnsT<T>& c, const SeriesParameters
         sums.energy += w * u * u;
       }
       return sums;
-    });
+    };
+    result = newton(p, max_e, y, sums_at(y, true), sums_at);
   } else {
     std::fill_n(y, 6, 0.0);  // nothing to hold
   }

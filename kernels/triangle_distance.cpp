@@ -1,10 +1,11 @@
 // triangle_distance.cpp - the fast twin of triangle_distance_ref.
 //
-// Nodes are visited in Morton order, so that 16 in a row are a compact block of 4 x 2 x 2 nodes,
-// no node farther than kRadius from its middle. First the exact distance of the 32 middles to every
-// triangle: the smallest at a block, plus kRadius, bounds all its nodes. Then a block looks only at
-// triangles that may come below that, which are two or three. Both steps are minima over the whole
-// list, so its order does not matter.
+// A brick is 32 blocks of 4 x 2 x 2 nodes. A triangle is weighed at the nodes of a block only where
+// it may be the nearest of one: the block meets the region that its FacetRegion names, and the
+// triangle's plane comes nearer than the farthest of the block's nodes is so far. Both are tested
+// on the middles of all blocks at once: an affine function differs from its value there by at most
+// what it gains over half a block. Neither test can drop what would have lowered a distance, so the
+// order of the triangles does not change a bit.
 //
 // In the frame of a triangle the distance is h^2 + min over edges (w^2 + beyond^2), where beyond is
 // how far the point lies past the ends of the edge; h^2 alone over the inside. All seven functions
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #undef HWY_TARGET_INCLUDE
@@ -32,39 +34,33 @@ inline constexpr std::size_t kBlock = 16;  // nodes: 4 x 2 x 2
 inline constexpr std::size_t kBlocks = kBrickSamples / kBlock;
 inline constexpr float kBlockHalf[3] = {1.5f, 0.5f, 0.5f};
 inline constexpr float kRadius = 1.6584f;  // |kBlockHalf|, rounded up
+inline constexpr float kBrickRadius = 6.0622f;  // 3.5 sqrt(3), rounded up
 inline constexpr std::size_t kFunctions = 7;
+inline constexpr std::size_t kPlanes = 16;
 inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
+inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [voxel]
 
-struct MortonNodes {
+// x fastest within a block and among blocks.
+struct BlockNodes {
   alignas(64) float middle_x[kBlocks], middle_y[kBlocks], middle_z[kBlocks];
-  alignas(64) float first_x[kBlocks], first_y[kBlocks], first_z[kBlocks];
-  alignas(64) float in_x[kBlock], in_y[kBlock], in_z[kBlock];  // from the first node of a block
-  std::array<std::uint16_t, kBrickSamples> row;                // Morton -> x fastest
+  alignas(64) float in_x[kBlock], in_y[kBlock], in_z[kBlock];  // from the middle of a block
 };
 
-constexpr MortonNodes morton_nodes() {
-  MortonNodes m{};
-  for (std::size_t n = 0; n < kBrickSamples; ++n) {
-    std::size_t c[3] = {0, 0, 0};
-    for (std::size_t bit = 0; bit < 9; ++bit) c[bit % 3] |= (n >> bit & 1) << (bit / 3);
-    m.row[n] = static_cast<std::uint16_t>((c[2] * 8 + c[1]) * 8 + c[0]);
-    if (n < kBlock) {
-      m.in_x[n] = float(c[0]);
-      m.in_y[n] = float(c[1]);
-      m.in_z[n] = float(c[2]);
-    }
-    if (n % kBlock != 0) continue;
-    const std::size_t b = n / kBlock;
-    m.first_x[b] = float(c[0]);
-    m.first_y[b] = float(c[1]);
-    m.first_z[b] = float(c[2]);
-    m.middle_x[b] = m.first_x[b] + kBlockHalf[0];
-    m.middle_y[b] = m.first_y[b] + kBlockHalf[1];
-    m.middle_z[b] = m.first_z[b] + kBlockHalf[2];
+constexpr BlockNodes block_nodes() {
+  BlockNodes m{};
+  for (std::size_t n = 0; n < kBlock; ++n) {
+    m.in_x[n] = float(n % 4) - kBlockHalf[0];
+    m.in_y[n] = float(n / 4 % 2) - kBlockHalf[1];
+    m.in_z[n] = float(n / 8) - kBlockHalf[2];
+  }
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    m.middle_x[b] = float(4 * (b % 2)) + kBlockHalf[0];
+    m.middle_y[b] = float(2 * (b / 2 % 4)) + kBlockHalf[1];
+    m.middle_z[b] = float(2 * (b / 8)) + kBlockHalf[2];
   }
   return m;
 }
-inline constexpr MortonNodes kNodes = morton_nodes();
+inline constexpr BlockNodes kNodes = block_nodes();
 
 // Middles of the 64 bricks of a tile.
 struct TileBricks {
@@ -81,11 +77,6 @@ constexpr TileBricks tile_bricks() {
 }
 inline constexpr TileBricks kTile = tile_bricks();
 
-// For one brick's list; kept by the thread.
-struct Room {
-  std::vector<float> middle, constant;
-};
-
 }  // namespace h6::kernels
 #endif
 
@@ -100,8 +91,7 @@ HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF 
   const D d;
   const VF zero = hn::Zero(d);
   const auto edge = [&](int e) HWY_ATTR {
-    const VF beyond =
-        hn::Max(hn::Max(hn::Sub(s[e], hn::Set(d, f.length[e])), hn::Neg(s[e])), zero);
+    const VF beyond = hn::Max(hn::Sub(hn::Abs(s[e]), hn::Set(d, f.half[e])), zero);
     return hn::MulAdd(beyond, beyond, hn::Mul(w[e], w[e]));
   };
   const VF nearest = hn::Min(hn::Min(edge(0), edge(1)), edge(2));
@@ -109,45 +99,17 @@ HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF 
   return hn::IfThenZeroElse(hn::Ge(inner, hn::Set(d, f.inside_from)), nearest);
 }
 
-// Distances of the 32 middles to one triangle, and what they say about each block.
-HWY_INLINE void measure_middles(const DistanceFacet& f, const float* constant, float* middle,
-                                float* most) {
-  const D d;
-  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
-    const VF x = hn::Load(d, kNodes.middle_x + b), y = hn::Load(d, kNodes.middle_y + b),
-             z = hn::Load(d, kNodes.middle_z + b);
-    const auto at = [&](std::size_t k) HWY_ATTR {
-      return hn::MulAdd(x, hn::Set(d, f.gx[k]),
-                        hn::MulAdd(y, hn::Set(d, f.gy[k]),
-                                   hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, constant[k]))));
-    };
-    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
-    const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared(f, s, w)));
-    hn::Store(away, d, middle + b);
-    hn::Store(hn::Min(hn::Load(d, most + b), away), d, most + b);
-  }
-}
-
-HWY_INLINE std::uint32_t blocks_below(const float* middle, const float* limit) {
-  const D d;
-  std::uint32_t live = 0;
-  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::Lt(hn::Load(d, middle + b), hn::Load(d, limit + b)), bits);
-    live |= (std::uint32_t{bits[0]} | std::uint32_t{bits[1]} << 8) << b;
-  }
-  return live;
-}
-
-// The functions of a triangle on the nodes of a block, less their value at its first node.
+// The functions of a triangle at places given from a first one, less their value there.
+template <std::size_t kCount>
 struct Pattern {
-  alignas(64) float v[kFunctions][kBlock];
+  alignas(64) float v[kFunctions][kCount];
 };
-HWY_INLINE void make_pattern(const DistanceFacet& f, Pattern& pattern) {
+template <std::size_t kCount>
+HWY_INLINE void make_pattern(const DistanceFacet& f, const float* px, const float* py,
+                             const float* pz, Pattern<kCount>& pattern) {
   const D d;
-  for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
-    const VF x = hn::Load(d, kNodes.in_x + n), y = hn::Load(d, kNodes.in_y + n),
-             z = hn::Load(d, kNodes.in_z + n);
+  for (std::size_t n = 0; n < kCount; n += hn::Lanes(d)) {
+    const VF x = hn::Load(d, px + n), y = hn::Load(d, py + n), z = hn::Load(d, pz + n);
     for (std::size_t k = 0; k < kFunctions; ++k)
       hn::Store(hn::MulAdd(x, hn::Set(d, f.gx[k]),
                            hn::MulAdd(y, hn::Set(d, f.gy[k]), hn::Mul(z, hn::Set(d, f.gz[k])))),
@@ -155,63 +117,207 @@ HWY_INLINE void make_pattern(const DistanceFacet& f, Pattern& pattern) {
   }
 }
 
-// Lowers the squared distances of the blocks in `live`.
-HWY_INLINE void lower_blocks(const DistanceFacet& f, const float* constant, std::uint32_t live,
-                             float* best) {
+// c + g.p of `count` functions at once.
+HWY_INLINE void values_at(const float* gx, const float* gy, const float* gz, const float* c,
+                          std::size_t count, float px, float py, float pz, float* out) {
+  const hn::CappedTag<float, 8> d;
+  const auto x = hn::Set(d, px), y = hn::Set(d, py), z = hn::Set(d, pz);
+  for (std::size_t k = 0; k < count; k += hn::Lanes(d))
+    hn::Store(hn::MulAdd(x, hn::LoadU(d, gx + k),
+                         hn::MulAdd(y, hn::LoadU(d, gy + k),
+                                    hn::MulAdd(z, hn::LoadU(d, gz + k), hn::LoadU(d, c + k)))),
+              d, out + k);
+}
+
+// What functions gain over half a box at most, and the leeway.
+HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::size_t count,
+                      const float (&half)[3], float* out) {
+  const hn::CappedTag<float, 8> d;
+  for (std::size_t k = 0; k < count; k += hn::Lanes(d))
+    hn::Store(hn::MulAdd(hn::Set(d, half[0]), hn::Abs(hn::LoadU(d, gx + k)),
+                         hn::MulAdd(hn::Set(d, half[1]), hn::Abs(hn::LoadU(d, gy + k)),
+                                    hn::MulAdd(hn::Set(d, half[2]),
+                                               hn::Abs(hn::LoadU(d, gz + k)),
+                                               hn::Set(d, kLeeway)))),
+              d, out + k);
+}
+
+// Boxes of one size, as a triangle's functions and the planes of its region see them.
+struct Gains {
+  alignas(64) float function[8], plane[kPlanes];
+};
+HWY_INLINE void set_gains(const DistanceFacet& f, const FacetRegion& r, const float (&half)[3],
+                          Gains& gain) {
+  gains(f.gx, f.gy, f.gz, 8, half, gain.function);
+  if ((r.edges | r.corners) != 0) gains(r.gx, r.gy, r.gz, kPlanes, half, gain.plane);
+}
+
+// Whether boxes may meet the region: their middles are at (x, y, z), where the functions are s and
+// w; `plane` is what the planes are at (0, 0, 0).
+HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains& gain,
+                      const float* plane, VF x, VF y, VF z, const VF (&s)[3], const VF (&w)[3]) {
   const D d;
-  const hn::CappedTag<float, 4> d4;
-  Pattern pattern;
-  make_pattern(f, pattern);
-  for (; live != 0; live &= live - 1) {
-    const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(live);
-    alignas(32) float first[8];
-    for (std::size_t k = 0; k < 8; k += hn::Lanes(d4)) {
-      const auto x = hn::Set(d4, kNodes.first_x[b]), y = hn::Set(d4, kNodes.first_y[b]),
-                 z = hn::Set(d4, kNodes.first_z[b]);
-      hn::Store(hn::MulAdd(x, hn::LoadU(d4, f.gx + k),
-                           hn::MulAdd(y, hn::LoadU(d4, f.gy + k),
-                                      hn::MulAdd(z, hn::LoadU(d4, f.gz + k),
-                                                 hn::LoadU(d4, constant + k)))),
-                d4, first + k);
+  const auto below = [&](VF value, float level) HWY_ATTR {
+    return hn::Le(value, hn::Set(d, level));
+  };
+  const auto above = [&](VF value, float level) HWY_ATTR {
+    return hn::Ge(value, hn::Set(d, level));
+  };
+  const auto below_plane = [&](std::size_t k) HWY_ATTR {
+    return below(hn::MulAdd(x, hn::Set(d, r.gx[k]),
+                            hn::MulAdd(y, hn::Set(d, r.gy[k]),
+                                       hn::MulAdd(z, hn::Set(d, r.gz[k]), hn::Set(d, plane[k])))),
+                 gain.plane[k]);
+  };
+  const float* g = gain.function;
+  auto there = hn::And(hn::And(above(w[0], -g[3]), above(w[1], -g[4])), above(w[2], -g[5]));
+  for (std::size_t e = 0; e < 3; ++e)
+    if (r.edges >> e & 1)
+      there = hn::Or(there, hn::And(hn::And(below(w[e], g[3 + e]), below_plane(e)),
+                                    below(hn::Abs(s[e]), f.half[e] + g[e])));
+  for (std::size_t v = 0; v < 3; ++v)
+    if (r.corners >> v & 1) {
+      const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
+      there = hn::Or(there, hn::And(hn::And(hn::And(below(s[v], g[v] - f.half[v]),
+                                                    above(s[u], f.half[u] - g[u])),
+                                            hn::And(below_plane(p), below_plane(p + 1))),
+                                    hn::And(below_plane(p + 2), below_plane(p + 3))));
     }
-    for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
+  return there;
+}
+
+// Those of the bricks that may meet the region.
+HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r,
+                                    std::uint64_t bricks) {
+  constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
+  const D d;
+  Gains gain = {};
+  set_gains(f, r, kBrickHalf, gain);
+  std::uint64_t met = 0;
+  for (std::size_t b = 0; b < 64; b += hn::Lanes(d)) {
+    if ((bricks >> b & ((std::uint64_t{1} << hn::Lanes(d)) - 1)) == 0) continue;
+    const VF x = hn::Load(d, kTile.x + b), y = hn::Load(d, kTile.y + b),
+             z = hn::Load(d, kTile.z + b);
+    const auto at = [&](std::size_t k) HWY_ATTR {
+      return hn::MulAdd(x, hn::Set(d, f.gx[k]),
+                        hn::MulAdd(y, hn::Set(d, f.gy[k]),
+                                   hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
+    };
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, meets(f, r, gain, r.c, x, y, z, s, w), bits);
+    met |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;
+  }
+  return bricks & met;
+}
+
+// One triangle, prepared for all bricks of its tile.
+struct Ready {
+  Ready(const DistanceFacet& facet, const FacetRegion& where) : f(facet), region(where) {}
+  const DistanceFacet& f;
+  const FacetRegion& region;
+  Pattern<kBlock> nodes;
+  Pattern<kBlocks> middles;
+  Gains gain = {};
+};
+
+// The blocks of a brick where the triangle may lower a distance. `first` and `plane` are its
+// functions and the planes of its region at the first node, `most` the farthest squares so far.
+HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const float* plane,
+                                     const float* most) {
+  const D d;
+  const DistanceFacet& f = t.f;
+  std::uint32_t live = 0;
+  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
+    const auto at = [&](std::size_t k) HWY_ATTR {
+      return hn::Add(hn::Load(d, t.middles.v[k] + b), hn::Set(d, first[k]));
+    };
+    const VF h = at(6), farthest = hn::Load(d, most + b);
+    const VF gap = hn::Max(hn::Sub(hn::Abs(h), hn::Set(d, t.gain.function[6])), hn::Zero(d));
+    auto in = hn::Le(hn::Mul(gap, gap), farthest);
+    if (hn::AllFalse(d, in)) continue;
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
+    if (t.region.everywhere) {
+      const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared(f, s, w)));
+      in = hn::And(in, hn::Le(hn::Sub(away, hn::Set(d, kRadius + kRounding)), hn::Sqrt(farthest)));
+    } else {
+      in = hn::And(in, meets(f, t.region, t.gain, plane, hn::Load(d, kNodes.middle_x + b),
+                             hn::Load(d, kNodes.middle_y + b), hn::Load(d, kNodes.middle_z + b), s,
+                             w));
+    }
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, in, bits);
+    live |= (std::uint32_t{bits[0]} | std::uint32_t{bits[1]} << 8) << b;
+  }
+  return live;
+}
+
+// Lowers the squared distances of the blocks in `live`, and what is the farthest in them.
+HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t live, float* best,
+                             float* most) {
+  const D d;
+  const DistanceFacet& f = t.f;
+  for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
+    VF node[kFunctions];  // at the nodes of a block whose middle is the brick's first node
+    for (std::size_t k = 0; k < kFunctions; ++k)
+      node[k] = hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
+    for (std::uint32_t left = live; left != 0; left &= left - 1) {
+      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
       const auto at = [&](std::size_t k) HWY_ATTR {
-        return hn::Add(hn::Load(d, pattern.v[k] + n), hn::Set(d, first[k]));
+        return hn::Add(node[k], hn::Set(d, t.middles.v[k][b]));
       };
       const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
       float* to = best + b * kBlock + n;
-      hn::Store(hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w))), d, to);
+      const VF lower = hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w)));
+      hn::Store(lower, d, to);
+      const float farthest = hn::GetLane(hn::MaxOfLanes(d, lower));
+      most[b] = n == 0 ? farthest : std::max(most[b], farthest);
     }
   }
 }
 
-void FacetDistance(const DistanceFacet* facets, const std::uint32_t* list, std::size_t count,
-                   const float* origin, float reach, Room& room, float* distance) {
-  const D d;
-  alignas(64) float best[kBrickSamples], limit[kBlocks];
-  std::fill(best, best + kBrickSamples, reach * reach);
-  std::fill(limit, limit + kBlocks, reach);
-  room.middle.resize(count * kBlocks + 16);
-  room.constant.resize(count * 8);
-  float* middle = room.middle.data();
-  middle += (64 - reinterpret_cast<std::uintptr_t>(middle) % 64) % 64 / sizeof(float);
-  for (std::size_t i = 0; i < count; ++i) {
-    const DistanceFacet& f = facets[list[i]];
-    float* constant = room.constant.data() + 8 * i;
-    for (std::size_t k = 0; k < 8; ++k)
-      constant[k] = f.c[k] + (origin[0] * f.gx[k] + origin[1] * f.gy[k] + origin[2] * f.gz[k]);
-    measure_middles(f, constant, middle + i * kBlocks, limit);
+void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
+                  const std::uint64_t* near, std::size_t count, float reach, TileRoom& room) {
+  std::uint64_t used = 0;
+  for (std::size_t i = 0; i < count; ++i) used |= near[i];
+  for (; used != 0; used &= used - 1) {
+    const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(used);
+    std::fill_n(room.squared + b * kBrickSamples, kBrickSamples, reach * reach);
+    std::fill_n(room.most + b * kBlocks, kBlocks, reach * reach);
   }
-  // A node is at most kRadius farther than its block's middle, so the nearest triangle of any node
-  // is at most 2 kRadius farther from the middle than the nearest one there.
+  for (std::size_t i = 0; i < count; ++i) {
+    const DistanceFacet& f = facets[i];
+    const FacetRegion& r = regions[i];
+    std::uint64_t bricks = near[i];
+    if (!r.everywhere && (bricks & (bricks - 1)) != 0) bricks = bricks_met(f, r, bricks);
+    if (bricks == 0) continue;
+    Ready t(f, r);
+    make_pattern(f, kNodes.in_x, kNodes.in_y, kNodes.in_z, t.nodes);
+    make_pattern(f, kNodes.middle_x, kNodes.middle_y, kNodes.middle_z, t.middles);
+    set_gains(f, r, kBlockHalf, t.gain);
+    for (; bricks != 0; bricks &= bricks - 1) {
+      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(bricks);
+      const float x = float(8 * (b % 4)), y = float(8 * (b / 4 % 4)), z = float(8 * (b / 16));
+      alignas(64) float first[8], plane[kPlanes];
+      values_at(f.gx, f.gy, f.gz, f.c, 8, x, y, z, first);
+      if ((r.edges | r.corners) != 0) values_at(r.gx, r.gy, r.gz, r.c, kPlanes, x, y, z, plane);
+      float* most = room.most + b * kBlocks;
+      if (const std::uint32_t live = live_blocks(t, first, plane, most); live != 0)
+        lower_blocks(t, first, live, room.squared + b * kBrickSamples, most);
+    }
+  }
+}
+
+void BrickDistance(const TileRoom& room, std::size_t brick, float* distance) {
+  const hn::CappedTag<float, 4> d;
+  const float* from = room.squared + brick * kBrickSamples;
   for (std::size_t b = 0; b < kBlocks; ++b)
-    limit[b] = std::min(limit[b] + kRadius, reach) + kRadius + kRounding;
-  for (std::size_t i = 0; i < count; ++i)
-    if (const std::uint32_t live = blocks_below(middle + i * kBlocks, limit); live != 0)
-      lower_blocks(facets[list[i]], room.constant.data() + 8 * i, live, best);
-  for (std::size_t n = 0; n < kBrickSamples; n += hn::Lanes(d))
-    hn::Store(hn::Sqrt(hn::Load(d, best + n)), d, best + n);
-  for (std::size_t n = 0; n < kBrickSamples; ++n) distance[kNodes.row[n]] = best[n];
+    for (std::size_t row = 0; row < 4; ++row) {
+      const std::size_t x = 4 * (b % 2), y = 2 * (b / 2 % 4) + row % 2, z = 2 * (b / 8) + row / 2;
+      for (std::size_t n = 0; n < 4; n += hn::Lanes(d))
+        hn::StoreU(hn::Sqrt(hn::LoadU(d, from + b * kBlock + 4 * row + n)), d,
+                   distance + (z * 8 + y) * 8 + x + n);
+    }
 }
 
 std::uint64_t BricksWithinReach(const DistanceFacet& f, float reach) {
@@ -228,16 +334,24 @@ std::uint64_t BricksWithinReach(const DistanceFacet& f, float reach) {
       box2 = hn::MulAdd(apart, apart, box2);
     }
     auto in = hn::Le(box2, hn::Mul(within, within));
+    if (hn::AllFalse(d, in)) continue;
+    VF value[kFunctions];
+    for (std::size_t k = 0; k < kFunctions; ++k)
+      value[k] = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
+                            hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
+                                       hn::MulAdd(p[2], hn::Set(d, f.gz[k]),
+                                                  hn::Set(d, f.c[k]))));
     // Planes: of the triangle, both sides, and through its edges, away from it.
     for (std::size_t k = 3; k < kFunctions; ++k) {
-      const VF at = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
-                               hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
-                                          hn::MulAdd(p[2], hn::Set(d, f.gz[k]),
-                                                     hn::Set(d, f.c[k]))));
       const float extent = 3.5f * (std::fabs(f.gx[k]) + std::fabs(f.gy[k]) + std::fabs(f.gz[k]));
-      const VF away = k == 6 ? hn::Abs(at) : hn::Neg(at);
+      const VF away = k == 6 ? hn::Abs(value[k]) : hn::Neg(value[k]);
       in = hn::And(in, hn::Le(away, hn::Set(d, extent + reach + kRounding)));
     }
+    // The ball around the brick.
+    const VF s[3] = {value[0], value[1], value[2]}, w[3] = {value[3], value[4], value[5]};
+    const VF ball = hn::Set(d, reach + kBrickRadius + kRounding);
+    in = hn::And(in, hn::Le(hn::MulAdd(value[6], value[6], beside_squared(f, s, w)),
+                            hn::Mul(ball, ball)));
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, in, bits);
     near |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;
@@ -265,97 +379,22 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace h6::kernels {
 
-HWY_EXPORT(FacetDistance);
+HWY_EXPORT(TileDistance);
+HWY_EXPORT(BrickDistance);
 HWY_EXPORT(BricksWithinReach);
 HWY_EXPORT(NodesAbove);
-
-namespace {
-
-using Row = std::array<double, 3>;
-double dot(const Row& a, const Row& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Row cross(const Row& a, const Row& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Row times(double s, const Row& a) { return {s * a[0], s * a[1], s * a[2]}; }
-
-void set_function(DistanceFacet& f, std::size_t k, const Row& g, const Row& zero_at) {
-  f.gx[k] = float(g[0]);
-  f.gy[k] = float(g[1]);
-  f.gz[k] = float(g[2]);
-  f.c[k] = float(-dot(g, zero_at));
-}
-
-// Unit, across a.
-Row any_normal(const Row& a) {
-  std::size_t least = 0;
-  for (std::size_t k = 1; k < 3; ++k)
-    if (std::fabs(a[k]) < std::fabs(a[least])) least = k;
-  Row e{};
-  e[least] = 1;
-  const Row n = cross(a, e);
-  return times(1 / std::sqrt(dot(n, n)), n);
-}
-
-// Three times the segment from `from` along the unit vector `along`; nothing lies over it.
-void set_segment(DistanceFacet& f, const Row& from, const Row& along, double length) {
-  const Row n = any_normal(along), in = cross(n, along);
-  for (std::size_t e = 0; e < 3; ++e) {
-    set_function(f, e, along, from);
-    set_function(f, 3 + e, in, from);
-    f.length[e] = float(length);
-  }
-  set_function(f, 6, n, from);
-  f.inside_from = 1e30f;
-}
-
-}  // namespace
-
-DistanceFacet make_distance_facet(const double* t) {
-  DistanceFacet f;
-  f.gx[7] = f.gy[7] = f.gz[7] = f.c[7] = 0;
-  const Row corner[3] = {{t[0], t[1], t[2]}, {t[3], t[4], t[5]}, {t[6], t[7], t[8]}};
-  Row edge[3];
-  double length[3];
-  std::size_t longest = 0;
-  for (std::size_t e = 0; e < 3; ++e) {
-    const Row &a = corner[e], &b = corner[(e + 1) % 3];
-    edge[e] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    length[e] = std::sqrt(dot(edge[e], edge[e]));
-    if (length[e] > length[longest]) longest = e;
-    f.low[e] = float(std::min({corner[0][e], corner[1][e], corner[2][e]}));
-    f.high[e] = float(std::max({corner[0][e], corner[1][e], corner[2][e]}));
-  }
-  const Row n = cross(edge[2], edge[0]);
-  const double n_length = std::sqrt(dot(n, n)), height_over = n_length / length[longest];
-  // Below a height of 1e-4 voxel the longest edge alone is right to that.
-  if (!(height_over > 1e-4)) {
-    const Row along = length[longest] > 1e-9 ? times(1 / length[longest], edge[longest])
-                                             : Row{1, 0, 0};
-    set_segment(f, corner[longest], along, length[longest]);
-    return f;
-  }
-  const Row normal = times(1 / n_length, n);
-  for (std::size_t e = 0; e < 3; ++e) {
-    const Row along = times(1 / length[e], edge[e]);
-    set_function(f, e, along, corner[e]);
-    set_function(f, 3 + e, cross(normal, along), corner[e]);
-    f.length[e] = float(length[e]);
-  }
-  set_function(f, 6, normal, corner[0]);
-  // Points on an edge are over the triangle whatever float says, but on a sliver that must not
-  // reach past its tips.
-  f.inside_from = -float(std::min(2e-6, 1e-5 * height_over / length[longest]));
-  return f;
-}
 
 std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach) {
   return HWY_DYNAMIC_DISPATCH(BricksWithinReach)(facet, reach);
 }
 
-void facet_distance(const DistanceFacet* facets, const std::uint32_t* list, std::size_t count,
-                    const float origin[3], float reach, float* distance) {
-  thread_local Room room;
-  HWY_DYNAMIC_DISPATCH(FacetDistance)(facets, list, count, origin, reach, room, distance);
+void tile_distance(const DistanceFacet* facets, const FacetRegion* regions,
+                   const std::uint64_t* near, std::size_t count, float reach, TileRoom& room) {
+  HWY_DYNAMIC_DISPATCH(TileDistance)(facets, regions, near, count, reach, room);
+}
+
+void brick_distance(const TileRoom& room, std::size_t brick, float* distance) {
+  HWY_DYNAMIC_DISPATCH(BrickDistance)(room, brick, distance);
 }
 
 void nodes_above(const float* distance, float level, std::uint64_t words[8]) {
@@ -364,13 +403,13 @@ void nodes_above(const float* distance, float level, std::uint64_t words[8]) {
 
 void triangle_distance(const double* corners, std::size_t count, float reach, float* distance) {
   std::vector<DistanceFacet> facets(count);
-  std::vector<std::uint32_t> list(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    facets[i] = make_distance_facet(corners + 9 * i);
-    list[i] = static_cast<std::uint32_t>(i);
-  }
-  const float origin[3] = {0, 0, 0};
-  facet_distance(facets.data(), list.data(), count, origin, reach, distance);
+  const std::vector<FacetRegion> regions(count);
+  const std::vector<std::uint64_t> near(std::max<std::size_t>(count, 1), 1);
+  for (std::size_t i = 0; i < count; ++i) facets[i] = make_distance_facet(corners + 9 * i);
+  const auto room = std::make_unique<TileRoom>();
+  if (count == 0) std::fill_n(room->squared, kBrickSamples, reach * reach);
+  tile_distance(facets.data(), regions.data(), near.data(), count, reach, *room);
+  brick_distance(*room, 0, distance);
 }
 
 }  // namespace h6::kernels

@@ -14,12 +14,12 @@ inline constexpr std::size_t kBrickSamples = 512;
 inline constexpr int kTileBricks = 4;  // along an axis
 
 // One triangle, ready for float work: seven functions of the place p, g.p + c, all in voxels.
-// 0..2: along edge e, from its start; 3..5: off edge e in the plane, positive on the triangle's
+// 0..2: along edge e, from its middle; 3..5: off edge e in the plane, positive on the triangle's
 // side; 6: off the plane; 7 is not used. Made in double: on a long sliver a float cross product is
 // wrong by whole voxels at the far end.
 struct DistanceFacet {
   float gx[8], gy[8], gz[8], c[8];
-  float length[3];     // of the edges
+  float half[3];       // lengths of the edges
   float inside_from;   // a point is over the triangle when all of 3..5 are at least this
   float low[3], high[3];
 };
@@ -31,10 +31,34 @@ DistanceFacet make_distance_facet(const double* corners);
 // Certain where it says no; where it says yes, wrong only around edges and corners.
 std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach);
 
-// distance[n] = min(reach, distance of node n to the nearest of facets[list[0..count)]), for the
-// brick whose first node is at `origin`. The order of the list does not change a bit.
-void facet_distance(const DistanceFacet* facets, const std::uint32_t* list, std::size_t count,
-                    const float origin[3], float reach, float* distance);
+// Where a triangle of a mesh may be the nearest of all: over its inside; beyond edge e (from corner
+// e to the next), where it answers for it, below plane e; beyond corner v, where it answers for it,
+// below planes 3 + 4 v ... 6 + 4 v (see FacetRegion). Planes are g.p + c <= 0; one of zeros says
+// nothing.
+//
+// The nearest point of a mesh lies inside a triangle, inside an edge or on a corner. On an edge,
+// the place is beyond it as seen in the plane of EACH triangle that has the edge; on a corner,
+// behind the start of EACH edge that leaves it. So it is enough when one triangle answers for each
+// edge and corner, and planes for another triangle's edge or other edges keep its region small.
+struct FacetRegion {
+  float gx[16] = {}, gy[16] = {}, gz[16] = {}, c[16] = {};
+  std::uint8_t edges = 0, corners = 0;  // bits: those it answers for
+  bool everywhere = true;               // nothing is known of its neighbours
+};
+
+// Squared distances of the bricks of a tile, in an order of their own.
+struct TileRoom {
+  alignas(64) float squared[64 * kBrickSamples];
+  alignas(64) float most[64 * kBrickSamples / 16];
+};
+
+// The squared distances, at most reach^2, of the nodes of a tile's bricks to the nearest of `count`
+// facets; facet i is weighed in the bricks of near[i] only. Bricks that are in no near[i] are left
+// alone. The order of the facets does not change a bit.
+void tile_distance(const DistanceFacet* facets, const FacetRegion* regions,
+                   const std::uint64_t* near, std::size_t count, float reach, TileRoom& room);
+// The distances of the nodes of one brick.
+void brick_distance(const TileRoom& room, std::size_t brick, float* distance);
 
 // The same from corners (count x 3 corners x 3 coordinates), for the brick at (0,0,0).
 void triangle_distance(const double* corners, std::size_t count, float reach, float* distance);

@@ -20,15 +20,19 @@ void set_mesh_pose(Body& body, const h6Pose& pose) {
   body.x = from(pose.p) + body.R * body.com;
 }
 
-// Every bit of every pose and velocity, mixed in order (multiply and shift, 64 bits).
-std::uint64_t state_hash(const h6Session& s) {
+// Every bit of every pose and velocity and of what hands said, mixed in order (multiply and shift,
+// 64 bits). A changed sample shows in its own frame, felt or not.
+std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
   std::uint64_t hash = 0x9e3779b97f4a7c15u;
-  const auto mix = [&hash](const double* values, int count) {
+  const auto mix_bits = [&hash](std::uint64_t bits) {
+    hash = (hash ^ bits) * 0xd6e8feb86659fd93u;
+    hash ^= hash >> 32;
+  };
+  const auto mix = [&mix_bits](const double* values, int count) {
     for (int i = 0; i < count; ++i) {
       std::uint64_t bits;
       std::memcpy(&bits, &values[i], sizeof bits);
-      hash = (hash ^ bits) * 0xd6e8feb86659fd93u;
-      hash ^= hash >> 32;
+      mix_bits(bits);
     }
   };
   const auto mix_state = [&mix](const RigidState& state) {
@@ -41,7 +45,23 @@ std::uint64_t state_hash(const h6Session& s) {
   // Elsewhere the manipulandum is where the hand's sample says.
   for (std::size_t h = 0; h < s.hand_count; ++h)
     if (s.hands[h].mode == H6_PSEUDO_ADMITTANCE) mix_state(s.hands[h].manipulandum);
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    const h6DeviceSample& in = samples[h];
+    mix(&in.pose.p.x, 7);
+    mix(&in.velocity.linear.x, 6);
+    mix_bits(in.buttons);
+    if (s.hands[h].mode != H6_IMPEDANCE) mix(&in.wrench.force.x, 6);  // else not read
+  }
   return hash;
+}
+
+void set_rating(Hand& hand, const h6DeviceCapabilities& capabilities) {
+  hand.guard.set_limits(limits_of(capabilities, hand.safety));
+  hand.watch.set(hand.safety, capabilities);
+}
+
+void note_interval(Hand& hand, double dt, double seconds) {
+  hand.overdue = seconds > 2 * dt ? seconds - dt : 0;
 }
 
 }  // namespace h6
@@ -53,6 +73,8 @@ extern "C" {
 h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands) {
   return frame(*session, samples, commands);
 }
+
+void h6SetCoarse(h6Session* session, uint32_t pairs) { session->anytime.forced = pairs; }
 
 h6BodyState h6GetBody(const h6Session* session, int32_t index) {
   H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);
@@ -88,13 +110,28 @@ h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) {
 double h6GetVoxel(const h6Session* session, int32_t body) { return session->bodies[body].voxel; }
 
 void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities) {
-  session->hands[hand].guard.set_limits(limits_of(*capabilities));
+  set_rating(session->hands[hand], *capabilities);
 }
 void h6Fault(h6Session* session, h6Cause cause) {
   for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.fault(cause);
 }
-void h6Rearm(h6Session* session) {
-  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.rearm();
+void h6Arm(h6Session* session) {
+  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.arm();
+}
+void h6Rearm(h6Session* session) { h6Arm(session); }
+void h6Disarm(h6Session* session) {
+  for (std::size_t h = 0; h < session->hand_count; ++h) session->hands[h].guard.disarm();
+}
+void h6LoseDevice(h6Session* session, int32_t hand) {
+  session->hands[hand].lost = true;
+  h6Fault(session, H6_CAUSE_DEVICE_LOST);
+}
+void h6NoteInterval(h6Session* session, double seconds) {
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    note_interval(session->hands[h], session->dt, seconds);
+}
+h6HandSafety h6GetSafety(const h6Session* session, int32_t hand) {
+  return session->hands[hand].guard.report();
 }
 
 }  // extern "C"

@@ -45,7 +45,7 @@ RigidState held_by(const h6DeviceSample& sample, const Body& body) {
 
 // The damping of the free body is in its step.
 void couple_admittance(h6Session& s, Hand& hand, Body& body) {
-  if (hand.guard.fault() != H6_CAUSE_NONE) return;  // a device that was lost pushes no more
+  if (hand.guard.holds()) return;  // a device that was lost pushes no more
   const Saturated force = saturate(from(hand.sample.wrench.force), hand.coupling.max_force);
   const Saturated torque = saturate(from(hand.sample.wrench.torque), hand.coupling.max_torque);
   if (force.cut || torque.cut) s.report.status |= H6_COUPLING_SATURATED;

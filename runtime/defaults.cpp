@@ -9,13 +9,16 @@ constexpr const char* kMethods[H6_METHOD_COUNT] = {"none",   "global", "cluster"
                                                    "gauss6", "robust", "series"};
 constexpr const char* kStages[H6_STAGE_COUNT] = {"traverse", "contacts",  "weights", "wrench",
                                                  "coupling", "integrate", "output"};
-constexpr const char* kCauses[H6_CAUSE_COUNT] = {"none", "clamped",     "slewed", "not finite",
-                                                 "late", "device lost", "stopped",
-                                                 "speed", "clutched", "passivity"};
+constexpr const char* kCauses[H6_CAUSE_COUNT] = {
+    "none",     "clamped",  "slewed",    "not finite", "late",    "device lost", "stopped",
+    "speed",    "clutched", "passivity", "power",      "derated", "overspeed",   "soft start",
+    "dead man", "disarmed", "pose jump", "bad sample", "frozen",  "watchdog"};
+constexpr const char* kDeviceStates[H6_DEVICE_STATE_COUNT] = {"absent", "ready",    "armed",
+                                                              "active", "degraded", "lost"};
 constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
-    "passivity"};
+    "passivity",        "coarse contacts"};
 struct Piece {
   const char* name;
   uint32_t bit;
@@ -38,6 +41,9 @@ const char* h6StageName(h6Stage stage) {
 }
 const char* h6CauseName(h6Cause cause) {
   return cause >= 0 && cause < H6_CAUSE_COUNT ? kCauses[cause] : nullptr;
+}
+const char* h6DeviceStateName(h6DeviceState state) {
+  return state >= 0 && state < H6_DEVICE_STATE_COUNT ? kDeviceStates[state] : nullptr;
 }
 const char* h6MethodName(h6Method method) {
   return method >= 0 && method < H6_METHOD_COUNT ? kMethods[method] : nullptr;
@@ -102,12 +108,21 @@ h6CouplingDef h6DefaultCouplingDef(void) {
   return def;
 }
 
+h6SafetyDef h6DefaultSafetyDef(void) {
+  h6SafetyDef def{};
+  def.soft_start = 0.1;
+  def.decay_time = 0.02;
+  def.pose_jump = 0.02;
+  return def;
+}
+
 h6HandDef h6DefaultHandDef(void) {
   h6HandDef def{};
   def.mode = H6_IMPEDANCE;
   def.coupling = h6DefaultCouplingDef();
   def.filter.motion_scale = def.filter.rotation_scale = def.filter.force_scale = 1;
   def.manipulandum_mass = 0.1;
+  def.safety = h6DefaultSafetyDef();
   return def;
 }
 

@@ -53,6 +53,16 @@ bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
   return true;
 }
 
+// Names by brick, in the order of the hot layout. Without any: nothing is kept.
+bool convert_names(const h6FieldDef& def, const std::int32_t* names, std::size_t bricks,
+                   const Field& field, const h6Allocator& allocator, Buffer<std::int32_t>* out) {
+  if (!names || bricks == 0) return true;
+  if (!out->reserve(allocator, bricks)) return false;
+  for (std::size_t cell = 0; cell < field.table.count; ++cell)
+    if (field.table[cell] >= 0) (*out)[field.table[cell]] = names[def.brick_index[cell]];
+  return true;
+}
+
 }  // namespace
 
 bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field, h6Error* error) {
@@ -78,6 +88,9 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
     field->bricks[size.bricks * kernels::kBrickStride + i] = 0;
   for (int i = 0; i < 8; ++i) field->far[size.far_cells * 8 + i] = 0;
   kernels::layout_table(def, field->table.data);
+  if (!convert_names(def, def.part, size.bricks, *field, model.allocator, &field->part) ||
+      !convert_names(def, def.triangle, size.bricks, *field, model.allocator, &field->triangle))
+    return fail(error, "no memory for the names of %zu bricks", size.bricks);
   for_each(model, cells, [&](std::size_t cell) {
     kernels::layout_cell(def, field->table.data, cell, field->bricks.data, field->far.data);
   });

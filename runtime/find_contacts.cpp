@@ -4,19 +4,24 @@
 // dropped with all its points. Here in flat tiers, and a sphere that was dropped stays so until the
 // shell has moved as far as it was clear. METHOD.md, Sec. 6.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
 #include "kernels/cull_spheres.h"
 #include "kernels/expiry.h"
 #include "kernels/touch_groups.h"
+#include "runtime/anytime.h"
 #include "runtime/stages.h"
+#include "sched/clock.h"
 
 namespace h6 {
 namespace {
 
 constexpr std::size_t kSlice = 64;           // groups sampled at a time: some 2 us
 constexpr std::size_t kWorthSharing = 256;   // groups from which the helper is asked: some 8 us
+constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which pairs are shared out
+constexpr std::size_t kPairSlices = 32;
 constexpr float kSlack = 1e-3f;              // [voxel]
 constexpr double kLongestWay = 256;          // [voxel] float has 3e-5 left there
 
@@ -27,6 +32,18 @@ kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
   const Vec3 b_mesh = b.x - b.R * b.com;  // origin of b's mesh frame in the world
   const Vec3 centre = a.x + a.R * (shell.centre - a.com);
   const Vec3 t = (b.R.transpose() * (centre - b_mesh) - field.origin) / field.voxel;
+  kernels::Affine affine;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
+    affine.m[r][3] = static_cast<float>(t[r]);
+  }
+  return affine;
+}
+
+// The same for arms: from a's centre of mass, along the axes of the world.
+kernels::Affine arms_to_field(const Body& a, const Body& b, const Field& field) {
+  const Mat3 m = b.R.transpose() / field.voxel;
+  const Vec3 t = m * (a.x - (b.x - b.R * b.com)) - field.origin / field.voxel;
   kernels::Affine affine;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
@@ -53,16 +70,21 @@ bool is_sampled(const kernels::FieldView& field, const kernels::Affine& to_field
   return field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]] >= 0;
 }
 
-kernels::Touching candidates_from(const h6Session& s, std::size_t at) {
-  return {s.candidate + at, s.candidate_distance + at, s.gradient_x + at, s.gradient_y + at,
-          s.gradient_z + at};
+kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at) {
+  return {t.candidate + at, t.candidate_distance + at, t.gradient_x + at, t.gradient_y + at,
+          t.gradient_z + at};
 }
 
-void move_candidates(h6Session& s, std::size_t to, std::size_t from, std::size_t count) {
-  if (to == from) return;
-  std::memmove(s.candidate + to, s.candidate + from, count * sizeof *s.candidate);
-  for (float* c : {s.candidate_distance, s.gradient_x, s.gradient_y, s.gradient_z})
-    std::memmove(c + to, c + from, count * sizeof *c);
+// From one's scratch to another's, or within one; the two may overlap.
+void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
+                     std::size_t from_row, std::size_t count) {
+  const kernels::Touching a = candidates_from(to, to_row), b = candidates_from(from, from_row);
+  if (a.row == b.row || count == 0) return;
+  std::memmove(a.row, b.row, count * sizeof *a.row);
+  std::memmove(a.distance, b.distance, count * sizeof *a.distance);
+  std::memmove(a.gx, b.gx, count * sizeof *a.gx);
+  std::memmove(a.gy, b.gy, count * sizeof *a.gy);
+  std::memmove(a.gz, b.gz, count * sizeof *a.gz);
 }
 
 // What one traversal needs of a pair.
@@ -80,6 +102,16 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
+  // The sample of each of the blocks' groups; `out` names rows of the shell as ever.
+  std::size_t touch_samples(const std::uint32_t* blocks, std::size_t count,
+                            const kernels::Touching& out, float* least) const {
+    const Samples& samples = shell.samples;
+    const std::size_t found = kernels::touch_groups(
+        field, place, {samples.x.data, samples.y.data, samples.z.data, shell.groups.count}, blocks,
+        count, margin, out, least);
+    for (std::size_t k = 0; k < found; ++k) out.row[k] = samples.row[out.row[k]];
+    return found;
+  }
   std::size_t touch(const std::uint32_t* groups, std::size_t count,
                     const kernels::Touching& out, float* least) const {
     return kernels::touch_groups(field, place,
@@ -88,20 +120,21 @@ struct Search {
   }
 };
 
-// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`.
-std::size_t touch(h6Session& s, const Search& search, const std::uint32_t* groups,
-                  std::size_t count, std::size_t used) {
-  if (count < kWorthSharing || s.team->threads() == 1)
-    return search.touch(groups, count, candidates_from(s, used), s.clearance);
+// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`. `alone`: this is
+// a slice itself.
+std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::size_t count,
+                  std::size_t used, bool alone) {
+  if (alone || count < kWorthSharing || s.team->threads() == 1)
+    return search.touch(t.survivors, count, candidates_from(t, used), t.clearance);
   const std::size_t slices = (count + kSlice - 1) / kSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
     const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
-    s.slice_count[i] = search.touch(
-        groups + at, n, candidates_from(s, used + at * kGroupRows), s.clearance + at);
+    s.slice_count[i] = search.touch(t.survivors + at, n, candidates_from(t, used + at * kGroupRows),
+                                    t.clearance + at);
   });
   std::size_t kept = s.slice_count[0];
   for (std::size_t i = 1; i < slices; ++i) {
-    move_candidates(s, used + kept, used + i * kSlice * kGroupRows, s.slice_count[i]);
+    move_candidates(t, used + kept, t, used + i * kSlice * kGroupRows, s.slice_count[i]);
     kept += s.slice_count[i];
   }
   return kept;
@@ -144,9 +177,24 @@ float travel(Pair& pair, const Search& search) {
   return static_cast<float>(pair.travelled);
 }
 
+// One point of each group of `blocks` blocks, and how deep any of the others may be.
+std::size_t touch_coarsely(Pair& pair, TraverseScratch& t, const Search& search,
+                           std::size_t blocks, std::size_t used) {
+  const std::size_t found =
+      search.touch_samples(t.open_blocks, blocks, candidates_from(t, used), t.clearance);
+  for (std::size_t k = 0; k < blocks; ++k) {
+    const float reach = search.scale * search.shell.samples.reach[t.open_blocks[k]];
+    // The long form: cells far inside hold no samples.
+    pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - t.clearance[k]);
+  }
+  return found;
+}
+
 // Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
-// points; of each only what may have come within reach since it was last looked at.
-std::size_t traverse_pair(h6Session& s, Pair& pair, std::size_t used) {
+// points; of each only what may have come within reach since it was last looked at. Where time is
+// short it ends with the deepest tier that is complete: what was not looked at stays expired.
+std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::size_t used,
+                          bool alone) {
   const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   const Shell& shell = s.model->shells[a.shell];
   const Field& field = s.model->fields[b.field];
@@ -155,44 +203,56 @@ std::size_t traverse_pair(h6Session& s, Pair& pair, std::size_t used) {
   const Search search{field.view, shell, shell_to_field(a, shell, b, field),
                       static_cast<float>(1.0 / field.voxel), field.wide || margin > 0.5f, margin};
   const float now = travel(pair, search);
+  pair.sampled = 0;
+  pair.missed = 0;
 
   std::size_t count =
-      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, s.frontier);
+      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, t.frontier);
   if (count == 0) return 0;
-  const std::size_t blocks = search.cull(shell.blocks, s.frontier, count, s.survivors, s.clearance);
+  const std::size_t blocks = search.cull(shell.blocks, t.frontier, count, t.survivors, t.clearance);
   for (std::size_t k = 0; k < count; ++k)
-    pair.block_expiry[s.frontier[k]] = expiry_of(now, s.clearance[k]);
+    pair.block_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
   if (blocks == 0) return 0;
 
-  count = kernels::expired(pair.group_expiry, s.survivors, blocks, now, s.frontier);
-  std::copy_n(s.survivors, blocks, s.open_blocks);
-  const std::size_t groups = search.cull(shell.groups, s.frontier, count, s.survivors, s.clearance);
+  std::copy_n(t.survivors, blocks, t.open_blocks);
+  const auto number = static_cast<std::size_t>(&pair - s.pairs);
+  if (must_be_coarse(s, number, used, 0)) return touch_coarsely(pair, t, search, blocks, used);
+  count = kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
+  const std::size_t groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
   for (std::size_t k = 0; k < count; ++k)
-    pair.group_expiry[s.frontier[k]] = expiry_of(now, s.clearance[k]);
-  const std::size_t found = touch(s, search, s.survivors, groups, used);
+    pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
+  if (must_be_coarse(s, number, used, groups)) {
+    kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
+    return touch_coarsely(pair, t, search, blocks, used);
+  }
+  const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
+  const std::size_t found = touch(s, t, search, groups, used, alone);
+  if (s.anytime.by_clock) learn_sampling(s, groups, found, since);
+  pair.sampled = groups;
   for (std::size_t k = 0; k < groups; ++k)
-    pair.group_expiry[s.survivors[k]] =
-        expiry_of(now, kernels::cull_clearance(s.clearance[k] - margin, search.wide));
-  kernels::least_of_blocks(pair.group_expiry, s.open_blocks, blocks, pair.block_expiry);
+    pair.group_expiry[t.survivors[k]] =
+        expiry_of(now, kernels::cull_clearance(t.clearance[k] - margin, search.wide));
+  kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
   return found;
 }
 
 // Keeps the `most` deepest of `count` candidates, in their order. Ties go to the first.
 std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair* pairs,
                          std::size_t pair_count) {
-  std::copy_n(s.candidate_distance, count, s.scratch_depth);
+  const TraverseScratch& t = s.traversal[0];
+  std::copy_n(t.candidate_distance, count, s.scratch_depth);
   std::nth_element(s.scratch_depth, s.scratch_depth + (most - 1), s.scratch_depth + count);
   const float limit = s.scratch_depth[most - 1];
   std::size_t below = 0;
-  for (std::size_t i = 0; i < count; ++i) below += s.candidate_distance[i] < limit;
+  for (std::size_t i = 0; i < count; ++i) below += t.candidate_distance[i] < limit;
   std::size_t ties = most - below, n = 0;
   for (std::size_t p = 0; p < pair_count; ++p) {
     const std::size_t first = n;
     for (std::size_t i = pairs[p].first; i < pairs[p].first + pairs[p].candidates; ++i) {
-      const float d = s.candidate_distance[i];
+      const float d = t.candidate_distance[i];
       if (d > limit || (d == limit && ties == 0)) continue;
       ties -= d == limit;
-      move_candidates(s, n++, i, 1);
+      move_candidates(t, n++, t, i, 1);
     }
     pairs[p].candidates = n - first;
     pairs[p].first = first;
@@ -203,32 +263,103 @@ std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair
 // Points that are only about to touch count where their gap is a sample.
 void drop_unsampled(h6Session& s, Pair& pair, const Shell& shell, const Field& field,
                     const kernels::Affine& to_field) {
+  const TraverseScratch& t = s.traversal[0];
   std::size_t n = pair.first;
   for (std::size_t i = pair.first; i < pair.first + pair.candidates; ++i) {
-    const std::uint32_t row = s.candidate[i];
-    if (!(s.candidate_distance[i] < 0) &&
+    const std::uint32_t row = t.candidate[i];
+    if (!(t.candidate_distance[i] < 0) &&
         !is_sampled(field.view, to_field, shell.x[row], shell.y[row], shell.z[row]))
       continue;
-    move_candidates(s, n++, i, 1);
+    move_candidates(t, n++, t, i, 1);
   }
   pair.candidates = n - pair.first;
 }
 
-}  // namespace
-
-void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  const std::size_t most = s.contacts[s.pairs[first_pair].a].capacity;
+std::size_t traverse_in_order(h6Session& s, std::size_t first_pair, std::size_t end_pair,
+                              std::size_t most) {
   std::size_t used = 0;
   for (std::size_t p = first_pair; p < end_pair; ++p) {
     Pair& pair = s.pairs[p];
     pair.first = used;
-    pair.candidates = traverse_pair(s, pair, used);
+    pair.candidates = traverse_pair(s, s.traversal[0], pair, used, false);
     used += pair.candidates;
     if (used > most) {
       used = keep_deepest(s, used, most, s.pairs + first_pair, p + 1 - first_pair);
       s.report.status |= H6_CONTACTS_DROPPED;
     }
   }
+  return used;
+}
+
+// Is there enough for two, and enough pairs? One that has most of the work is shared within. With a
+// budget the clock decides pair after pair, in order.
+bool worth_sharing(const h6Session& s, const Body& a, std::size_t first_pair,
+                   std::size_t end_pair) {
+  if (!s.traversal[1].candidate || end_pair - first_pair < 2 || s.anytime.by_clock) return false;
+  if (a.traverse_ns < (a.pairs_shared ? 0.5 * kPairsWorthSharing : kPairsWorthSharing))
+    return false;
+  std::size_t all = 0, most = 0;
+  for (std::size_t p = first_pair; p < end_pair; ++p) {
+    all += s.pairs[p].sampled;
+    most = std::max(most, s.pairs[p].sampled);
+  }
+  return most < kWorthSharing || 2 * most <= all;
+}
+
+// Every thread fills its own scratch; joined in the order of pairs. False: there is no room, as only
+// where contacts will be dropped. Nothing is lost by then doing it again: expiries stay true.
+bool traverse_shared(h6Session& s, std::size_t first_pair, std::size_t end_pair,
+                     std::size_t* used) {
+  TraverseScratch &mine = s.traversal[0], &helpers = s.traversal[1];
+  mine.used = helpers.used = 0;
+  const std::size_t pairs = end_pair - first_pair, slice = (pairs + kPairSlices - 1) / kPairSlices;
+  std::atomic<bool> full{false};
+  s.team->for_slices((pairs + slice - 1) / slice, [&](std::size_t i) {
+    const int here = sched::FrameTeam::here();
+    TraverseScratch& t = s.traversal[here];
+    const std::size_t end = std::min(first_pair + (i + 1) * slice, end_pair);
+    for (std::size_t p = first_pair + i * slice; p < end; ++p) {
+      Pair& pair = s.pairs[p];
+      const std::size_t room = kBlockRows * s.model->shells[s.bodies[pair.a].shell].blocks.count;
+      if (t.used + room > s.candidate_capacity) return full.store(true, std::memory_order_relaxed);
+      pair.found_by = here;
+      pair.first = t.used;
+      pair.candidates = traverse_pair(s, t, pair, t.used, true);
+      t.used += pair.candidates;
+    }
+  });
+  std::size_t end = mine.used + helpers.used;
+  if (full.load(std::memory_order_relaxed) || end > s.candidate_capacity) return false;
+  *used = end;
+  // From the last one on: what is the caller's own only ever moves up.
+  for (std::size_t p = end_pair; p-- > first_pair;) {
+    Pair& pair = s.pairs[p];
+    end -= pair.candidates;
+    move_candidates(mine, end, s.traversal[pair.found_by], pair.first, pair.candidates);
+    pair.first = end;
+  }
+  return true;
+}
+
+}  // namespace
+
+void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
+  Body& a = s.bodies[s.pairs[first_pair].a];
+  const std::size_t most = s.contacts[s.pairs[first_pair].a].capacity;
+  const bool timed = s.traversal[1].candidate && end_pair - first_pair > 1;
+  const std::int64_t since = timed ? sched::now_ns() : 0;
+  std::size_t used = 0;
+  a.pairs_shared = worth_sharing(s, a, first_pair, end_pair) &&
+                   traverse_shared(s, first_pair, end_pair, &used);
+  if (!a.pairs_shared) used = traverse_in_order(s, first_pair, end_pair, most);
+  if (used > most) {
+    keep_deepest(s, used, most, s.pairs + first_pair, end_pair - first_pair);
+    s.report.status |= H6_CONTACTS_DROPPED;
+  }
+  if (timed) a.traverse_ns = static_cast<double>(sched::now_ns() - since);
+  for (std::size_t p = first_pair; p < end_pair; ++p)
+    s.report.missed_depth_voxels =
+        std::max<double>(s.report.missed_depth_voxels, s.pairs[p].missed);
 }
 
 void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
@@ -252,11 +383,12 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
     frame.voxel = static_cast<float>(field.voxel);
     kernels::make_contacts({shell.x.data, shell.y.data, shell.z.data, shell.nx.data, shell.ny.data,
                             shell.nz.data, shell.point.data},
-                           candidates_from(s, pair.first), pair.candidates, frame,
+                           candidates_from(s.traversal[0], pair.first), pair.candidates, frame,
                            {c.depth + first, c.nx + first, c.ny + first, c.nz + first,
                             c.gx + first, c.gy + first, c.gz + first, c.rx + first, c.ry + first,
                             c.rz + first, c.point + first});
     c.count += pair.candidates;
+    if (pair.candidates > 0) pair.arms = arms_to_field(a, b, field);
     pair.begin = first;
     std::fill_n(c.field_body + first, pair.candidates, pair.b);
     pair.end = c.count;

@@ -27,9 +27,10 @@ struct Stopwatch {
   }
 };
 
-void begin(h6Session& s, const h6DeviceSample* samples) {
+void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   s.report = {};
   s.report.frame = s.frame++;
+  begin_anytime(s, start);
   for (std::size_t i = 0; i < s.body_count; ++i) {
     Body& body = s.bodies[i];
     body.f.setZero();
@@ -61,13 +62,22 @@ void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   }
 }
 
+// A timeline shows who did what.
+void note_helper(h6Session& s, std::int64_t start) {
+  const sched::FrameTeam::HelperWork helped = s.team->helper_work();
+  if (!helped.slices) return;
+  s.report.helper_start_us = 1e-3 * static_cast<double>(helped.first - start);
+  s.report.helper_us = 1e-3 * static_cast<double>(helped.busy);
+  s.report.helper_slices = helped.slices;
+}
+
 }  // namespace
 
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands) {
   const sched::FlushDenormals flush;
   const std::int64_t start = sched::now_ns();
   s.team->begin_frame();
-  begin(s, samples);
+  begin(s, samples, start);
   Stopwatch watch{s, sched::now_ns()};
   for (std::size_t first = 0, end; first < s.pair_count; first = end) {
     end = pairs_of_shell(s, first);
@@ -98,8 +108,10 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
     for (std::size_t h = 0; h < s.hand_count; ++h)
       send(s, s.hands[h], commands ? &commands[h] : nullptr);
   });
+  learn_frame(s);
   s.report.passivity_energy = least_energy(s);
-  s.report.state_hash = state_hash(s);
+  s.report.state_hash = state_hash(s, samples);
+  note_helper(s, start);
   const std::int64_t now = sched::now_ns();
   s.report.frame_us = 1e-3 * static_cast<double>(now - start);
   s.team->end_frame(start + static_cast<std::int64_t>(1e9 * s.dt));

@@ -64,7 +64,7 @@ class HandFilter {
   h6HandFilterDef def_{1, 1, 1, 0, false};
   bool admittance_ = false, started_ = false, clutched_ = false;
   ScaledMotion to_scene_, to_device_;
-  h6DeviceSample device_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}};
+  h6DeviceSample device_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};
   h6Pose held_{{0, 0, 0}, {1, 0, 0, 0}};  // last pose in the scene
 };
 

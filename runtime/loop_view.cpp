@@ -48,8 +48,7 @@ void LoopView::write(const h6Session& s, double time) {
     const Contacts& c = s.contacts[b];
     std::size_t i = skip;
     for (; i < c.count; i += step)
-      slot.contact[slot.rows++] =
-          row_of(c, i, s.bodies[b].x, static_cast<std::int32_t>(b));
+      slot.contact[slot.rows++] = row_of(c, i, s.bodies[b].x, static_cast<std::int32_t>(b));
     skip = i - c.count;
   }
   slots_.publish();
@@ -58,7 +57,7 @@ void LoopView::write(const h6Session& s, double time) {
 bool LoopView::read(h6LoopView* out) {
   const Slot* slot = slots_.newest();
   if (!slot) return false;
-  *out = {slot->frame, slot->time, slot->body.size(), slot->body.data(),
+  *out = {slot->frame,    slot->time, slot->body.size(),   slot->body.data(),
           slot->contacts, slot->rows, slot->contact.data()};
   return true;
 }
@@ -78,6 +77,7 @@ void take_over(h6Session& next, const h6Session& before) {
     if (!set.passivity) hand.port.forget();
     next.hands[i] = hand;
   }
+  next.anytime.no_clock = before.anytime.no_clock;
   next.report = before.report;
   next.frame = before.frame;
 }

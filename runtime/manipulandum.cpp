@@ -39,7 +39,7 @@ Vec3 at_most(const Vec3& v, double most) {
 
 void follow_device(Hand& hand, const Body& body, RigidState& state, const h6BodyState& wanted,
                    const h6DeviceCommand& passed, double h) {
-  if (passed.cause != H6_CAUSE_SPEED && passed.cause != H6_CAUSE_CLAMPED) return;
+  if ((passed.causes & (1u << H6_CAUSE_SPEED | 1u << H6_CAUSE_CLAMPED)) == 0) return;
   const h6Pose pose = mesh_pose(body, state);
   const h6Velocity u = mesh_velocity(body, state);
   const Vec3 ahead = hand.motion_scale * (from(passed.pose.p) - from(wanted.pose.p));
@@ -59,7 +59,7 @@ void follow_device(Hand& hand, const Body& body, RigidState& state, const h6Body
 void step_manipulandum(h6Session& s, Hand& hand) {
   const Body& body = s.bodies[hand.body];
   RigidState& m = hand.manipulandum;
-  if (hand.guard.fault() != H6_CAUSE_NONE) {  // a driver that was lost pulls no more
+  if (hand.guard.holds()) {  // a driver that was lost pulls no more
     m.v.setZero();
     m.w.setZero();
     return;

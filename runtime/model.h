@@ -14,13 +14,23 @@ struct Field {
   kernels::FieldView view{};
   Buffer<std::int32_t> table;
   Buffer<std::int16_t> bricks, far;
-  std::size_t bytes() const { return table.count * 4 + bricks.count * 2 + far.count * 2; }
+  Buffer<std::int32_t> part, triangle;  // (bricks) or empty
+  std::size_t bytes() const {
+    return (table.count + part.count + triangle.count) * 4 + (bricks.count + far.count) * 2;
+  }
 };
 
 // Spheres around equal runs of points; the radius is rounded up.
 struct Tier {
   std::size_t count = 0;
   Buffer<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
+};
+
+// One point of each group, the nearest to its centre: what is sampled where time is short.
+struct Samples {
+  Buffer<float> x, y, z;      // (groups, rounded up to whole blocks)
+  Buffer<std::uint32_t> row;  // of the shell
+  Buffer<float> reach;        // (blocks) from a group's sample to its farthest point, the longest
 };
 
 // A shell's points in three flat tiers. Rows are sorted so that those next to each other are near
@@ -33,7 +43,10 @@ struct Shell {
   Buffer<float> x, y, z, nx, ny, nz;  // normals point inward
   Buffer<std::uint32_t> point;        // of the definition
   Tier groups, blocks;
-  std::size_t bytes() const { return x.count * 28 + (groups.x.count + blocks.x.count) * 16; }
+  Samples samples;
+  std::size_t bytes() const {
+    return x.count * 28 + (groups.x.count + blocks.x.count + samples.x.count) * 16;
+  }
 };
 inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;
 

@@ -16,24 +16,18 @@
 namespace h6 {
 
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end) {
-  for (std::size_t i = begin; i < end; ++i) {
-    const Vec3 n(c.nx[i], c.ny[i], c.nz[i]), r(c.rx[i], c.ry[i], c.rz[i]);
-    const double approach = n.dot(u.head<3>()) + r.cross(n).dot(u.tail<3>());
-    c.slack[i] = static_cast<float>(double{c.depth[i]} - beta * approach);
-  }
+  kernels::series_gap(kernel_columns(c, begin, end), c.depth + begin, beta, u.data(),
+                      c.load + begin);
 }
 
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever,
                                    double y[6]) {
   fill_facing(c, true);
-  const kernels::SeriesColumns columns{c.nx, c.ny,    c.nz,     c.rx,   c.ry,
-                                       c.rz, c.slack, c.facing, c.count};
+  const kernels::SeriesColumns columns{c.nx, c.ny,   c.nz,     c.rx,   c.ry,
+                                       c.rz, c.load, c.facing, c.count};
   const kernels::SeriesResult result =
       kernels::series_solve(columns, {def.series_c, lever}, y, c.kappa, c.slack);
-  for (std::size_t i = 0; i < c.count; ++i) {
-    c.load[i] = c.kappa[i] * c.slack[i];
-    c.weight[i] = c.depth[i] > 0 ? c.load[i] / c.depth[i] : 0.0f;
-  }
+  kernels::series_loads(c.kappa, c.slack, c.depth, c.count, c.load, c.weight);
   return result;
 }
 

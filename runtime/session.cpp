@@ -103,6 +103,11 @@ void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
   // A body that never turns hangs on the origin of its mesh frame.
   const Vec3 com = body.translation_only ? Vec3(Vec3::Zero()) : body.com;
   hand.filter.set(def.filter, com, def.mode != H6_IMPEDANCE);
+  hand.safety = def.safety;
+  h6DeviceCapabilities unknown{};
+  unknown.max_force = SafetyLimits{}.force, unknown.max_torque = SafetyLimits{}.torque;
+  unknown.frame_time = true;
+  set_rating(hand, unknown);
   hand.passivity = def.passivity;
   hand.port.set(com);
   h6CouplingDef& c = hand.coupling = def.coupling;
@@ -155,6 +160,7 @@ struct Sizes {
   std::size_t bodies, pairs, hands;
   std::size_t groups, blocks;  // of the largest shell, and (all) of all pairs together
   std::size_t all_groups, all_blocks;
+  bool shares = false;        // pairs between two threads
   std::vector<bool> touches;  // (bodies) the body is the shell of a pair
 };
 
@@ -172,17 +178,19 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
     if (s.contacts) s.contacts[i] = columns;
   }
   s.candidate_capacity = s.max_contacts + kGroupRows * n.groups;
-  s.frontier = arena.take<std::uint32_t>(n.groups);
-  s.survivors = arena.take<std::uint32_t>(n.groups);
-  s.open_blocks = arena.take<std::uint32_t>(n.blocks);
-  s.clearance = arena.take<float>(n.groups);
+  for (std::size_t i = 0; i < (n.shares ? 2u : 1u); ++i) {
+    TraverseScratch& t = s.traversal[i];
+    t.frontier = arena.take<std::uint32_t>(n.groups);
+    t.survivors = arena.take<std::uint32_t>(n.groups);
+    t.open_blocks = arena.take<std::uint32_t>(n.blocks);
+    t.clearance = arena.take<float>(n.groups);
+    t.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
+    for (float** column : {&t.candidate_distance, &t.gradient_x, &t.gradient_y, &t.gradient_z})
+      *column = arena.take<float>(s.candidate_capacity);
+  }
   s.group_expiry = arena.take<float>(n.all_groups);
   s.block_expiry = arena.take<float>(n.all_blocks);
-  s.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
-  for (float** column : {&s.candidate_distance, &s.scratch_depth})
-    *column = arena.take<float>(s.candidate_capacity);
-  for (float** column : {&s.gradient_x, &s.gradient_y, &s.gradient_z})
-    *column = arena.take<float>(s.candidate_capacity);
+  s.scratch_depth = arena.take<float>(s.candidate_capacity);
   const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
   s.cluster_order = arena.take<std::uint32_t>(merged);
   s.cluster_root = arena.take<std::uint32_t>(merged);
@@ -195,7 +203,7 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const std::vector<h6PairDef> pairs = pairs_of(def);
-  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0,
+  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0, false,
           std::vector<bool>(def.body_count)};
   for (const h6PairDef& p : pairs) {
     const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
@@ -203,6 +211,7 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
     n.blocks = std::max(n.blocks, shell.blocks.x.count);
     n.all_groups += 16 * shell.blocks.count;
     n.all_blocks += shell.blocks.x.count;
+    n.shares = n.shares || (def.threads > 1 && n.touches[p.shell_body]);
     n.touches[p.shell_body] = true;
   }
   Arena count;
@@ -268,6 +277,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   s->gravity = from(def->gravity);
   s->net_stiffness = def->net_stiffness;
   s->max_contacts = def->max_contacts;
+  s->anytime.budget_ns = 1e3 * def->frame_budget_us;
   bool ready = false;
   try {
     ready = fill(*s, *def, error);

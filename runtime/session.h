@@ -2,6 +2,7 @@
 #pragma once
 #include "hapsix/hapsix.h"
 #include "kernels/contact_wrench.h"
+#include "runtime/anytime.h"
 #include "runtime/arena.h"
 #include "runtime/contacts.h"
 #include "runtime/hand_filter.h"
@@ -41,8 +42,22 @@ struct Body : RigidState {
   Vec6 f = Vec6::Zero();
   Mat6 K = Mat6::Zero(), D = Mat6::Zero();
 
+  double traverse_ns = 0;  // what the pairs of this body's shell took last
+  bool pairs_shared = false;  // between the threads, then
+
   double series_y[6] = {};  // `series`: the spring's extension in the last frame, a warm start
   ContactPort contact_port;  // of this body's shell
+};
+
+// What a thread needs to traverse a pair, and the points that it found to touch.
+struct TraverseScratch {
+  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's groups)
+  std::uint32_t* open_blocks = nullptr;                     // (largest shell's blocks)
+  float* clearance = nullptr;                               // (largest shell's groups) [voxel]
+  std::uint32_t* candidate = nullptr;                       // (candidate_capacity) shell's rows
+  float* candidate_distance = nullptr;                      // [voxel]
+  float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
+  std::size_t used = 0;  // candidates
 };
 
 // A shell body a against a field body b.
@@ -54,7 +69,11 @@ struct Pair {
   // before `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
   float *group_expiry = nullptr, *block_expiry = nullptr;
   double travelled = -1;         // < 0: nothing is known
+  std::size_t sampled = 0;       // groups, when it was last traversed
+  int found_by = 0;              // whose scratch holds its candidates
+  float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
+  kernels::Affine arms{};        // the same for arms of contacts [m], when they were gathered
   // When both move: how each one's motion changes the other's wrench.
   Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
   // `series` lets the field bodies of one shell body feel one another: pair p's wrench on b_p
@@ -85,8 +104,17 @@ struct Hand {
   bool passivity = false;
   HandPort port;
   h6Wrench told{};  // to the device, in the last frame
+  // What stands last, and what it knows of the device. lost, overdue: for the next frame.
+  h6SafetyDef safety{};
+  DeviceWatch watch;
+  bool lost = false;   // it could not be read or written
+  double overdue = 0;  // a command comes so much too late [s]
   OutputGuard guard;
 };
+
+void set_rating(Hand& hand, const h6DeviceCapabilities& capabilities);
+// So many seconds lie between the last command and the next one: late, when a frame is missing.
+void note_interval(Hand& hand, double dt, double seconds);
 
 // Moving bodies that pairs connect: solved together when there are at most four.
 inline constexpr int kIslandBodies = 4;
@@ -118,15 +146,11 @@ struct h6Session {
   std::size_t island_count = 0;
   h6::Contacts* contacts = nullptr;  // (bodies); capacity 0 without a shell
 
-  // Scratch of one pair's traversal and one shell body's contacts.
-  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's groups)
-  std::uint32_t* open_blocks = nullptr;                     // (largest shell's blocks)
-  float* clearance = nullptr;                               // (largest shell's groups) [voxel]
+  // Scratch of traversal and one shell body's contacts. The helper's is there where a shell body has
+  // several pairs; whoever finds them, candidates end up in the first.
+  h6::TraverseScratch traversal[2];
   float *group_expiry = nullptr, *block_expiry = nullptr;   // of all pairs
-  std::uint32_t* candidate = nullptr;                       // rows of the shell that touch
-  float* candidate_distance = nullptr;                      // [voxel]
   float* scratch_depth = nullptr;                           // to find the deepest
-  float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
   std::size_t candidate_capacity = 0;
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)
   std::uint64_t* cluster_cell = nullptr;                            // (max_contacts)
@@ -134,6 +158,7 @@ struct h6Session {
   std::size_t* slice_count = nullptr;                               // (slices) survivors of each
   h6::kernels::WrenchSum* slice_sum = nullptr;                      // (slices)
 
+  h6::Anytime anytime;
   h6FrameReport report{};
   std::uint64_t frame = 0;
   h6::sched::FrameTeam* team = nullptr;

@@ -138,6 +138,35 @@ bool check_device_mode(const h6HandDef& h, std::size_t i, h6Error* error) {
   return true;
 }
 
+bool check_safety(const h6SafetyDef& d, std::size_t i, h6Error* error) {
+  for (const auto& [name, value] : {std::pair{"max_force", d.max_force},
+                                    {"max_torque", d.max_torque},
+                                    {"max_force_rate", d.max_force_rate},
+                                    {"max_torque_rate", d.max_torque_rate},
+                                    {"max_power", d.max_power},
+                                    {"max_speed", d.max_speed},
+                                    {"derate_speed", d.derate_speed},
+                                    {"cut_speed", d.cut_speed}})
+    if (!not_negative(value))
+      return fail(error, "hand %zu: safety %s must be 0 (the device's) or more, it is %g", i, name,
+                  value);
+  struct Range {
+    const char* name;
+    double value, least, most;
+  };
+  for (const Range& r : {Range{"soft_start", d.soft_start, 0, 10},
+                         {"decay_time", d.decay_time, 0.001, 0.02},
+                         {"pose_jump", d.pose_jump, 0.001, 0.05},
+                         {"freeze_time", d.freeze_time, 0, 1}})
+    if (!(r.value >= r.least && r.value <= r.most))
+      return fail(error, "hand %zu: safety %s must be in %g..%g, it is %g", i, r.name, r.least,
+                  r.most, r.value);
+  if (d.derate_speed > 0 && d.cut_speed > 0 && d.derate_speed > d.cut_speed)
+    return fail(error, "hand %zu: safety derate_speed, %g m/s, is above cut_speed, %g", i,
+                d.derate_speed, d.cut_speed);
+  return true;
+}
+
 // Several hands pull on one body as several springs do; but it cannot be where two of them are, nor
 // step once for each.
 bool check_other_hands(const h6SessionDef& def, std::size_t i, h6Error* error) {
@@ -175,7 +204,8 @@ bool check_hand(const h6SessionDef& def, std::size_t i, h6Error* error) {
     return fail(error, "hand %zu: max_depth_voxels must be above 0, it is %g", i,
                 c.max_depth_voxels);
   return check_device_mode(h, i, error) && check_coupling_mode(h, i, error) &&
-         check_filter(h.filter, i, error) && check_other_hands(def, i, error);
+         check_filter(h.filter, i, error) && check_safety(h.safety, i, error) &&
+         check_other_hands(def, i, error);
 }
 
 }  // namespace
@@ -197,6 +227,8 @@ bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error
   if (def.threads < 1 || def.threads > 2)
     return fail(error, "threads must be 1 or 2 (the haptic thread and one helper), it is %u",
                 def.threads);
+  if (!(def.frame_budget_us >= 0 && def.frame_budget_us <= 1e6))
+    return fail(error, "frame_budget_us must be in 0..1000000, it is %g", def.frame_budget_us);
   if (!from(def.gravity).allFinite()) return fail(error, "gravity is not finite");
   if (!check_contact(def.contact, error)) return false;
   for (std::size_t i = 0; i < def.body_count; ++i)

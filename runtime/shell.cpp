@@ -149,6 +149,32 @@ bool make_tier(const Shell& shell, std::size_t rows, const h6Allocator& allocato
   return true;
 }
 
+bool take_samples(const Shell& shell, const h6Allocator& allocator, Samples& samples) {
+  const std::size_t padded = shell.blocks.count * kGroupRows;
+  if (!samples.row.reserve(allocator, padded) ||
+      !samples.reach.reserve(allocator, shell.blocks.count))
+    return false;
+  for (Buffer<float>* column : {&samples.x, &samples.y, &samples.z})
+    if (!column->reserve(allocator, padded)) return false;
+  std::fill_n(samples.reach.data, shell.blocks.count, 0.0f);
+  const auto place = [&](std::size_t r) { return Vec3(shell.x[r], shell.y[r], shell.z[r]); };
+  for (std::size_t g = 0; g < padded; ++g) {
+    const std::size_t group = std::min(g, shell.groups.count - 1), first = group * kGroupRows;
+    const std::size_t end = std::min(first + kGroupRows, shell.points);
+    const Vec3 centre(shell.groups.x[group], shell.groups.y[group], shell.groups.z[group]);
+    std::size_t nearest = first;
+    for (std::size_t r = first; r < end; ++r)
+      if ((place(r) - centre).squaredNorm() < (place(nearest) - centre).squaredNorm()) nearest = r;
+    samples.row[g] = static_cast<std::uint32_t>(nearest);
+    samples.x[g] = shell.x[nearest], samples.y[g] = shell.y[nearest];
+    samples.z[g] = shell.z[nearest];
+    float& reach = samples.reach[g / kGroupRows];
+    for (std::size_t r = first; r < end; ++r)
+      reach = std::max(reach, static_cast<float>((place(r) - place(nearest)).norm() * 1.000001));
+  }
+  return true;
+}
+
 }  // namespace
 
 bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
@@ -187,7 +213,8 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     shell->radius = std::max(shell->radius, q.norm());
   }
   if (!make_tier(*shell, kGroupRows, allocator, shell->groups) ||
-      !make_tier(*shell, kBlockRows, allocator, shell->blocks))
+      !make_tier(*shell, kBlockRows, allocator, shell->blocks) ||
+      !take_samples(*shell, allocator, shell->samples))
     return fail(error, "no memory for the spheres of %zu points", n);
   return true;
 }

@@ -80,7 +80,7 @@ h6Pose mesh_pose(const Body& body);
 h6Pose mesh_pose(const Body& body, const RigidState& state);
 h6Velocity mesh_velocity(const Body& body, const RigidState& state);
 void set_mesh_pose(Body& body, const h6Pose& pose);
-std::uint64_t state_hash(const h6Session& s);
+std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples);
 
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/gauss_sweep.h"
 #include "kernels/gauss_tree.h"
 #include "runtime/stages.h"
 #include "runtime/weighing.h"
@@ -15,21 +16,6 @@ namespace {
 constexpr std::size_t kSlice = 128;         // rows of the density sum at a time
 constexpr std::size_t kWorthSharing = 256;  // contacts from which the helper is asked
 constexpr float kFacingEdge = 0.25f;        // N.g from which a contact counts in full
-
-// T = (r x N) / sqrt(|r x N|^2 + l0^2): Eq. (10), with l0 against blow-up where r is parallel to N.
-// As handles, Eq. (13): T = r x F/|F| over `lever`; F/|F| = N.
-void torque_directions(Contacts& c, float l0, bool handles, float lever) {
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const float x = c.ry[i] * c.nz[i] - c.rz[i] * c.ny[i];
-    const float y = c.rz[i] * c.nx[i] - c.rx[i] * c.nz[i];
-    const float z = c.rx[i] * c.ny[i] - c.ry[i] * c.nx[i];
-    const float length = handles ? lever : std::sqrt(x * x + y * y + z * z + l0 * l0);
-    const float scale = length > 0 ? 1.0f / length : 0.0f;
-    c.tx[i] = x * scale;
-    c.ty[i] = y * scale;
-    c.tz[i] = z * scale;
-  }
-}
 
 struct Rule {
   bool gauss = false, facing = false, depth = false, handles = false, printed = false;
@@ -83,33 +69,39 @@ void weigh_as_printed(Contacts& c, const Rule& rule) {
 
 }  // namespace
 
-// A contact whose normal opposes the field's gradient would pull the body in.
 void fill_facing(Contacts& c, bool filter) {
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const float dot = c.nx[i] * c.gx[i] + c.ny[i] * c.gy[i] + c.nz[i] * c.gz[i];
-    c.facing[i] = filter ? std::clamp(dot / kFacingEdge, 0.0f, 1.0f) : 1.0f;
-  }
+  if (filter) return kernels::contact_facing(kernel_columns(c, 0, c.count), kFacingEdge, c.facing);
+  std::fill_n(c.facing, c.count, 1.0f);
 }
 
 namespace {
 
+template <class Run>
+void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
+  if (team) return team->for_slices(slices, run);
+  for (std::size_t i = 0; i < slices; ++i) run(i);
+}
+
 void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
                      void* scratch, float* weight) {
   const kernels::GaussTree tree = kernels::gauss_tree(view, rule.hat, rule.widths, scratch, weight);
-  for (int stage = 0; stage < kernels::kGaussStages; ++stage) {
-    const std::size_t slices = kernels::gauss_tree_slices(tree, stage);
-    const auto run = [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); };
-    if (team) {
-      team->for_slices(slices, run);
-    } else {
-      for (std::size_t i = 0; i < slices; ++i) run(i);
-    }
-  }
+  for (int stage = 0; stage < kernels::kGaussStages; ++stage)
+    for_slices(kernels::gauss_tree_slices(tree, stage), team,
+               [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); });
 }
 
-// The angle in the chord's place is no quadratic.
-bool tree_fits(const Rule& rule, std::size_t count) {
-  return rule.gauss && !rule.widths.geodesic && count >= kernels::gauss_tree_from(rule.hat);
+// False, and nothing weighed, where contacts crowd so that the tree is faster.
+bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
+                      void* scratch, float* weight) {
+  if (view.count > kernels::kGaussSweepMost) return false;
+  const kernels::GaussSweep sweep =
+      kernels::gauss_sweep(view, rule.hat, rule.widths, scratch, weight);
+  for (int stage = 0; stage < kernels::kGaussSweepStages; ++stage) {
+    if (stage == 1 && !kernels::gauss_sweep_pays(sweep)) return false;
+    for_slices(kernels::gauss_sweep_slices(sweep, stage), team,
+               [&](std::size_t i) { kernels::gauss_sweep_run(sweep, stage, i); });
+  }
+  return true;
 }
 
 void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
@@ -122,13 +114,13 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
                                      rule.facing ? c.facing : nullptr,
                                      rule.depth ? c.depth : nullptr,
                                      c.count};
-  if (scratch && tree_fits(rule, c.count)) {
-    weigh_with_tree(view, rule, team, scratch, c.weight);
-  } else if (c.count < kWorthSharing || !team) {
-    kernels::gauss_weights(view, rule.hat, rule.widths, 0, c.count, c.weight);
+  if (c.count < kWorthSharing) team = nullptr;
+  // The angle in the chord's place is no quadratic, and reaches farther.
+  if (scratch && !rule.widths.geodesic) {
+    if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
+      weigh_with_tree(view, rule, team, scratch, c.weight);
   } else {
-    const std::size_t slices = (c.count + kSlice - 1) / kSlice;
-    team->for_slices(slices, [&](std::size_t i) {
+    for_slices((c.count + kSlice - 1) / kSlice, team, [&](std::size_t i) {
       kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice,
                              std::min((i + 1) * kSlice, c.count), c.weight);
     });
@@ -156,14 +148,17 @@ void merge_clusters(h6Session& s, std::size_t first_pair, std::size_t end_pair) 
 
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
   const Rule rule = rule_of(def, 1.0);
-  return tree_fits(rule, count) ? kernels::gauss_tree_bytes(count, rule.hat) : 0;
+  if (!rule.gauss || rule.widths.geodesic) return 0;
+  return std::max(kernels::gauss_tree_bytes(count, rule.hat),
+                  kernels::gauss_sweep_bytes(std::min(count, kernels::kGaussSweepMost), rule.hat));
 }
 
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                    sched::FrameTeam* team, void* scratch) {
   const Rule rule = rule_of(def, voxel);
   fill_facing(c, rule.facing);
-  torque_directions(c, rule.l0, rule.handles, static_cast<float>(lever));
+  kernels::torque_directions(kernel_columns(c, 0, c.count), rule.l0,
+                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx, c.ty, c.tz);
   if (rule.gauss) {
     weigh_gauss(c, rule, team, scratch);
   } else {

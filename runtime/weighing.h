@@ -1,6 +1,7 @@
 // weighing.h - the rules of METHOD.md, Sec. 3, on columns of contacts: shared by a session's frame
 // and by h6WeighContacts.
 #pragma once
+#include "kernels/contact_columns.h"
 #include "kernels/contact_wrench.h"
 #include "kernels/series_solve.h"
 #include "runtime/contacts.h"
@@ -16,6 +17,13 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
                    sched::FrameTeam* team, void* scratch = nullptr);
 // What weigh_columns can use for up to `count` contacts; 0 where the rule has no use for it.
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
+
+// Rows begin..end-1.
+inline kernels::ContactColumns kernel_columns(const Contacts& c, std::size_t begin,
+                                              std::size_t end) {
+  return {c.nx + begin, c.ny + begin, c.nz + begin, c.gx + begin, c.gy + begin,
+          c.gz + begin, c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
+}
 
 // Fills facing: clamp(N.g / 0.25, 0, 1), or 1 without the filter.
 void fill_facing(Contacts& c, bool filter);
@@ -49,9 +57,9 @@ std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, st
 // L: farther than any contact of this body can be.
 inline double series_lever(double radius, double voxel) { return radius > voxel ? radius : voxel; }
 
-// e of rows begin..end-1 goes to slack: depth less what damping takes at the relative velocity u.
+// e of rows begin..end-1 goes to load: depth less what damping takes at the relative velocity u.
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end);
-// Facing, kappa, slack (from e), load, weight; y is the start and then the extension.
+// Facing, kappa, slack, load (from e), weight; y is the start and then the extension.
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6]);
 // sum lambda J, sum kappa J J_g^T and sum kappa J J^T over rows that carry load.
 kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,

@@ -40,6 +40,20 @@ class FrameTeam {
         const_cast<void*>(static_cast<const void*>(&body)));
   }
   unsigned threads() const;
+  // What the helper did since begin_frame, by the clock [ns]; on the caller's thread, after a run.
+  struct HelperWork {
+    std::int64_t first = 0;  // its first slice began
+    std::int64_t busy = 0;   // in slices
+    std::uint32_t slices = 0;
+  };
+  HelperWork helper_work() const;
+  // Whose thread this is, for scratch of its own: 0 the caller's, 1 a helper's.
+  static int here();
+
+  // From the helper's next nap on: SCHED_FIFO of this priority (0: as it was made), on any core but
+  // that of the haptic thread (-1: any). Without it a busy machine takes the helper off its core in
+  // the midst of a slice, and the haptic thread waits for that slice.
+  void set_realtime(int priority, int haptic_core);
 
  private:
   struct Helper;

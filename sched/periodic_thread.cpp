@@ -55,7 +55,10 @@ void PeriodicThread::run() {
       more = work_.tick(frame, timing, wakeup_us);
       const std::int64_t end = now_ns();
       const std::int64_t cpu = thread_cpu_ns() - cpu_before;
-      timing = {wakeup_us, cause_of(start - deadline, end - start, cpu, period)};
+      const Late late = cause_of(start - deadline, end - start, cpu, period);
+      timing = {wakeup_us, late,
+                late == Late::no ? 0.0 : 1e-3 * static_cast<double>(end - deadline - period),
+                1e-3 * static_cast<double>(cpu)};
       deadline += period;
       if (end > deadline + period) deadline = end + period;
     }

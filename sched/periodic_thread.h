@@ -27,6 +27,8 @@ enum class Late {
 struct TickTiming {
   double wakeup_us = 0;  // start after the deadline
   Late late = Late::no;
+  double late_us = 0;  // end after the next deadline, of a late one
+  double cpu_us = 0;   // the thread's own CPU time
 };
 
 struct PeriodicThreadOptions {

@@ -1,5 +1,6 @@
 #include "sched/realtime.h"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -8,6 +9,7 @@
 #include <cerrno>
 #include <cstdarg>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 
 #if defined(__SSE__)
@@ -24,6 +26,51 @@ void append(RealtimeGrant& grant, const char* format, ...) {
   va_start(arguments, format);
   std::vsnprintf(grant.text + used, sizeof grant.text - used, format, arguments);
   va_end(arguments);
+}
+
+// The first line of a small file that the kernel makes; empty when it does not.
+void read_line(const char* file, char* out, std::size_t size) {
+  out[0] = 0;
+  const int fd = open(file, O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return;
+  const ssize_t n = read(fd, out, size - 1);
+  close(fd);
+  out[n > 0 ? n : 0] = 0;
+  out[std::strcspn(out, "\n")] = 0;
+}
+
+// Is `core` in a list like "1,3-5"?
+bool in_list(const char* list, int core) {
+  for (const char* at = list; *at;) {
+    char* end;
+    const long first = std::strtol(at, &end, 10);
+    if (end == at) return false;
+    const long last = *end == '-' ? std::strtol(end + 1, &end, 10) : first;
+    if (core >= first && core <= last) return true;
+    at = *end == ',' ? end + 1 : "";
+  }
+  return false;
+}
+
+// Whether the clock stays up and the core stays ours: the machine's settings, not the thread's.
+void look_at_core(RealtimeGrant& grant, int core) {
+  char list[256], file[96];
+  read_line("/sys/devices/system/cpu/isolated", list, sizeof list);
+  grant.isolated = in_list(list, core);
+  std::snprintf(file, sizeof file, "/sys/devices/system/cpu/cpu%d/cpufreq/scaling_governor", core);
+  read_line(file, grant.governor, sizeof grant.governor);
+  if (grant.isolated)
+    append(grant, " Core %d is isolated.", core);
+  else
+    append(
+        grant,
+        " Core %d is not isolated: 'isolcpus=%d nohz_full=%d' on the kernel's command line keeps "
+        "other programs off it.",
+        core, core, core);
+  if (grant.governor[0] && std::strcmp(grant.governor, "performance") != 0)
+    append(grant,
+           " Its governor is '%s': 'cpupower frequency-set -g performance' keeps its clock up.",
+           grant.governor);
 }
 
 // The kernel grows a stack page by page, each a page fault: take them now.
@@ -72,6 +119,7 @@ RealtimeGrant request_realtime(const RealtimeRequest& request) {
            "memory not locked (%s): allow it with '<user> - memlock unlimited' in "
            "/etc/security/limits.conf.",
            std::strerror(errno));
+  look_at_core(grant, core);
   touch_stack();
   return grant;
 }

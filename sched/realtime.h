@@ -13,7 +13,9 @@ struct RealtimeRequest {
 struct RealtimeGrant {
   bool pinned = false, fifo = false, locked = false;
   int core = -1;
-  char text[1024] = "";  // one sentence an item, with the way to get what was refused
+  bool isolated = false;   // the scheduler puts nothing else on that core by itself
+  char governor[32] = "";  // of its clock; "" where the kernel does not say
+  char text[1024] = "";    // one sentence an item, with the way to get what was refused
 };
 
 // Pins the calling thread, makes it SCHED_FIFO, locks the memory that the process has now and

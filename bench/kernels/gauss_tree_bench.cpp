@@ -1,13 +1,16 @@
-// gauss_tree_bench.cpp - density on the Gauss map by the tree, where the flat kernel is quadratic.
+// gauss_tree_bench.cpp - density on the Gauss map by the tree and by the sweep, where the flat
+// kernel is quadratic.
 //
 // Sets: spread (directions everywhere), clump (as wide as the hats), walls (six, rough, wall by
 // wall, torque directions of arms on them), one-normal (a flat wall), equal.
 #include "kernels/gauss_tree.h"
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
 #include "bench/kernels/kernel_bench.h"
+#include "kernels/gauss_sweep.h"
 
 namespace {
 
@@ -27,7 +30,10 @@ struct Contacts {
   std::size_t step;  // between contacts that are compared
 
   Contacts(const std::string& set, std::size_t n, const Rule& rule)
-      : weight(n), want(n), memory(gauss_tree_bytes(n, rule.hat)), step(n > 2000 ? n / 500 : 1) {
+      : weight(n),
+        want(n),
+        memory(std::max(gauss_tree_bytes(n, rule.hat), gauss_sweep_bytes(n, rule.hat))),
+        step(n > 2000 ? n / 500 : 1) {
     Random random(7);
     double poles[7][3];
     for (auto& pole : poles) random.direction(pole);
@@ -83,15 +89,19 @@ struct Contacts {
   }
 };
 
-// `flat`: gauss_weights on the same contacts, which says where the tree begins to pay.
-Case make(const std::string& set, std::size_t n, const Rule& rule, bool flat) {
+enum class Way { tree, sweep, flat };
+
+// On the same contacts each, which says where one begins to pay.
+Case make(const std::string& set, std::size_t n, const Rule& rule, Way way) {
   auto c = std::make_shared<Contacts>(set, n, rule);
   const DirectionsView view = c->view(rule.weighted);
   for (std::size_t i = 0; i < n; i += c->step)
     gauss_weights_ref(view, rule.hat, rule.widths, i, i + 1, c->want.data());
   return {[=] {
-            if (flat) {
+            if (way == Way::flat) {
               gauss_weights(view, rule.hat, rule.widths, 0, n, c->weight.data());
+            } else if (way == Way::sweep) {
+              gauss_weights_sweep(view, rule.hat, rule.widths, c->memory.data(), c->weight.data());
             } else {
               gauss_weights_tree(view, rule.hat, rule.widths, c->memory.data(), c->weight.data());
             }
@@ -114,10 +124,15 @@ const bool registered = [] {
         // The reference takes a minute where contacts are many.
         const bool all = n <= 10000;
         add(
-            "kernels/gauss_tree/" + name, n, [=] { return make(set, n, rule, false); }, all);
+            "kernels/gauss_tree/" + name, n, [=] { return make(set, n, rule, Way::tree); }, all);
+        if (all)
+          add(
+              "kernels/gauss_sweep/" + name, n, [=] { return make(set, n, rule, Way::sweep); },
+              false);
         if (n <= 1000)
           add(
-              "kernels/gauss_flat/" + name, n, [=] { return make(set, n, rule, true); }, false);
+              "kernels/gauss_flat/" + name, n, [=] { return make(set, n, rule, Way::flat); },
+              false);
       }
     }
   }

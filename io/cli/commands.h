@@ -18,7 +18,10 @@ struct Program {
 
 void add_bake(CLI::App& app, Program& program);
 void add_run(CLI::App& app, Program& program);
+void add_check(CLI::App& app, Program& program);
+void add_replay(CLI::App& app, Program& program);
 void add_info(CLI::App& app, Program& program);
+void add_devices(CLI::App& app, Program& program);
 void add_scene(CLI::App& app, Program& program);
 void add_demo(CLI::App& app, Program& program);
 void add_experiments(CLI::App& app, Program& program);

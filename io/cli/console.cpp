@@ -8,9 +8,11 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "hapsix/hapsix.h"
 #include "io/write_aside.h"
 
 namespace h6::cli {
@@ -31,6 +33,16 @@ void on_signal(int number) {
   }
 }
 
+// A crash stops the devices first and is then what it would have been.
+constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGQUIT};
+struct sigaction before_crash[std::size(kCrashes)];
+void on_crash(int number) {
+  for (std::size_t i = 0; i < std::size(kCrashes); ++i)
+    if (kCrashes[i] == number) sigaction(number, &before_crash[i], nullptr);
+  h6HaltAll();
+  raise(number);
+}
+
 }  // namespace
 
 void install_signal_handlers() {
@@ -39,6 +51,12 @@ void install_signal_handlers() {
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction hang_up {};
+  sigaction(SIGHUP, nullptr, &hang_up);
+  if (hang_up.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);  // not under nohup
+  action.sa_handler = on_crash;
+  for (std::size_t i = 0; i < std::size(kCrashes); ++i)
+    sigaction(kCrashes[i], &action, &before_crash[i]);
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);  // a file over the limit is a failed write, with a sentence
 }

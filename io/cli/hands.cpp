@@ -1,8 +1,7 @@
 #include "io/cli/hands.h"
 
-#include "device/path_device.h"
 #include "device/simulated_arm.h"
-#include "device/simulated_hand.h"
+#include "io/mesh_file.h"
 
 namespace h6::cli {
 namespace {
@@ -57,42 +56,46 @@ device::ArmFigures arm_figures(const io::SceneHand& hand, const h6CouplingDef& c
   return to;
 }
 
-template <class Device>
-Outcome keep(Result<std::unique_ptr<Device>> opened, Hands& out) {
+void keep(OpenedDevice opened, Hands& out) {
+  if (opened.real_time) out.real_time = opened.device.capabilities.name;
+  out.devices.push_back(opened.device);
+  out.alive.push_back(std::move(opened.alive));
+}
+
+// The scene's own arm, with its figures.
+Outcome open_arm(const io::SceneHand& hand, DevicePlace place, const h6CouplingDef& coupling,
+                 Hands& out) {
+  auto opened = device::SimulatedArm::open(std::move(place.path),
+                                           arm_figures(hand, coupling, place.grip), hand.def.mode);
   if (!opened) return opened.failure();
-  std::shared_ptr<Device> device = std::move(*opened);
-  out.devices.push_back(device->device());
-  out.alive.push_back(std::move(device));
+  std::shared_ptr<device::SimulatedArm> arm = std::move(*opened);
+  OpenedDevice device;
+  device.device = arm->device();
+  device.alive = std::move(arm);
+  keep(std::move(device), out);
   return Done{};
 }
 
 Outcome open_hand(const io::SceneHand& hand, const h6BodyDef& body, const h6CouplingDef& coupling,
-                  std::shared_ptr<device::Steering> steering, Hands& out) {
+                  double unit, std::shared_ptr<device::Steering> steering, Hands& out) {
   if (Outcome known = check_device(hand.device); !known) return known;
-  device::HandPath path = hand_path(hand, body.pose, std::move(steering));
+  DevicePlace place;
+  place.path = hand_path(hand, body.pose, std::move(steering));
+  place.home = body.pose;
   // A body that never turns hangs on the origin of its mesh frame.
-  const h6Vec3 grip = body.translation_only ? h6Vec3{} : body.com;
-  if (hand.device == "arm")
-    return keep(device::SimulatedArm::open(std::move(path), arm_figures(hand, coupling, grip),
-                                           hand.def.mode),
-                out);
-  if (hand.def.mode != H6_IMPEDANCE)
+  place.grip = body.translation_only ? h6Vec3{} : body.com;
+  place.unit = unit;
+  if (hand.device == "arm") return open_arm(hand, std::move(place), coupling, out);
+  if (hand.def.mode != H6_IMPEDANCE && hand.device.rfind("plugin:", 0) != 0)
     return Failure{"the device '" + hand.device +
                    "' works in impedance mode only, choose that mode or the device 'arm'"};
-  if (hand.device == "path") return keep(device::PathDevice::open(std::move(path)), out);
-  device::Arm person;
-  person.grip = grip;
-  return keep(device::SimulatedHand::open(std::move(path), person), out);
+  Result<OpenedDevice> opened = open_device(hand.device, place);
+  if (!opened) return opened.failure();
+  keep(std::move(*opened), out);
+  return Done{};
 }
 
 }  // namespace
-
-Outcome check_device(const std::string& name) {
-  if (name == "path" || name == "simulated" || name == "arm") return Done{};
-  return Failure{"no device is called '" + name +
-                 "': 'path' follows the scene's path exactly, 'simulated' is a person who yields, "
-                 "'arm' is a simulated force-feedback arm that a person holds"};
-}
 
 Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,
                          h6Session* session, std::shared_ptr<device::Steering> steering) {
@@ -100,9 +103,9 @@ Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::Sc
   for (std::size_t i = 0; i < hands.size(); ++i) {
     const auto index = static_cast<std::int32_t>(i);
     const auto body = static_cast<std::size_t>(loaded.body_index(hands[i].body));
-    if (Outcome opened =
-            open_hand(hands[i], loaded.bodies[body], h6GetCoupling(session, index),
-                      i == 0 ? steering : nullptr, out);
+    if (Outcome opened = open_hand(hands[i], loaded.bodies[body], h6GetCoupling(session, index),
+                                   io::metres(loaded.scene.unit), i == 0 ? steering : nullptr,
+                                   out);
         !opened)
       return Failure{"hand of '" + hands[i].body + "': " + opened.error()};
     h6SetRating(session, index, &out.devices[i].capabilities);

@@ -6,6 +6,7 @@
 
 #include "device/steering.h"
 #include "hapsix/result.h"
+#include "io/cli/open_device.h"
 #include "io/load_scene.h"
 
 namespace h6::cli {
@@ -14,16 +15,11 @@ namespace h6::cli {
 struct Hands {
   std::vector<h6Device> devices;
   std::vector<std::shared_ptr<void>> alive;
+  std::string real_time;  // a device that lives on the machine's clock; empty: none
 };
 
-// A name that nothing here has is one sentence.
-Outcome check_device(const std::string& name);
-
-// Opens what `hands` names, one for each hand of the session, and tells the session their ratings:
-//   path       follows the hand's path exactly, whatever is felt
-//   simulated  a person who follows it and yields
-//   arm        a simulated force-feedback arm, held by such a person; in the mode of `def`, with
-//              the figures of `arm`
+// Opens what `hands` names (open_device.h), one for each hand of the session, and tells the session
+// their ratings. The device `arm` is in the mode of `def` and has the figures of `arm`.
 // `hands` are the scene's, changed at will; their `def` must be what the session was made of.
 // `steering` may take the first hand off its path.
 Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,

@@ -10,6 +10,7 @@
 #include "io/cli/commands.h"
 #include "io/field_file.h"
 #include "io/mesh_file.h"
+#include "io/recorded_run.h"
 #include "io/recording.h"
 #include "io/scene_file.h"
 #include "io/shell_file.h"
@@ -127,7 +128,9 @@ Result<ordered_json> shell_info(const std::string& file) {
 }
 
 Result<ordered_json> recording_info(const Console& console, const std::string& file) {
-  if (Outcome repaired = io::repair_recording(file); !repaired) return repaired.failure();
+  const Result<std::string> repaired = io::repair_recording(file);
+  if (!repaired) return repaired.failure();
+  if (!repaired->empty()) console.log("repaired: " + *repaired);
   io::FrameRange none;
   none.count = 0;
   Result<io::Recording> r = io::read_recording(file, none);
@@ -140,11 +143,17 @@ Result<ordered_json> recording_info(const Console& console, const std::string& f
                     {"hands", r->head.hands},
                     {"whole", r->whole},
                     {"remark", r->remark},
+                    {"repaired", *repaired},
                     {"program", r->head.program},
                     {"simd_target", r->head.simd_target},
                     {"asset_hashes", r->head.asset_hashes},
                     {"events", r->events.size()},
                     {"columns", r->columns}};
+  if (const Result<io::RecordedRun> run = io::recorded_run(r->head); run)
+    json["run"] = {{"scene", run->generated.empty() ? run->scene_file.string() : run->generated},
+                   {"threads", run->threads},
+                   {"virtual_time", run->virtual_time},
+                   {"frame_budget_us", run->frame_budget_us}};
   if (!r->summary_json.empty())
     json["summary"] = ordered_json::parse(r->summary_json, nullptr, false);
   if (json.contains("summary") && json["summary"].is_discarded()) json["summary"] = nullptr;
@@ -228,7 +237,8 @@ void add_info(CLI::App& app, Program& program) {
   auto file = std::make_shared<std::string>(), units = std::make_shared<std::string>("m");
   auto schema = std::make_shared<bool>(false);
   auto* option =
-      info->add_option("FILE", *file, "STL, OBJ, PLY, glTF, COLLADA (also .gz), .vdb, .json, .csv or .h5")
+      info->add_option("FILE", *file,
+                       "STL, OBJ, PLY, glTF, COLLADA (also .gz), .vdb, .json, .csv or .h5")
           ->option_text("FILE");
   info->add_option("--units", *units, "Unit of a mesh or path: m, mm, cm or in; default m")
       ->option_text("UNIT")

@@ -75,8 +75,11 @@ int main(int argc, char** argv) {
                                         "." + std::to_string(H6_VERSION_MINOR) + "." +
                                         std::to_string(H6_VERSION_PATCH));
   add_bake(app, program);
+  add_check(app, program);
   add_run(app, program);
+  add_replay(app, program);
   add_info(app, program);
+  add_devices(app, program);
   add_scene(app, program);
   add_demo(app, program);
   add_experiments(app, program);

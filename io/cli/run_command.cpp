@@ -44,9 +44,13 @@ int run_command(const Console& console, const std::string& name, const RunOption
   Result<io::Scene> scene = find_scene(name);
   if (!scene) return console.fail(scene.error());
   if (options.device.empty())
-    for (const io::SceneHand& hand : scene->hands)
+    for (const io::SceneHand& hand : scene->hands) {
       if (Outcome known = check_device(hand.device); !known)
         return console.fail(name + ": hand of '" + hand.body + "': " + known.error());
+      if (hand.device.rfind("plugin:", 0) == 0)  // code; a scene may come from anyone
+        return console.fail(name + ": hand of '" + hand.body +
+                            "': a scene does not load plug-ins by itself, give it with --device");
+    }
   auto loaded = [&] {
     const EndsAtOnce asked(console, name + ": cancelled");
     return io::load_scene(std::move(*scene), console.progress());
@@ -72,6 +76,8 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
                 depth_strip(*summary).c_str());
+    if (const std::string late = late_table(*summary); !late.empty())
+      std::printf("\n%s", late.c_str());
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);
     if (!options.record.empty()) std::printf("recording: %s\n", options.record.c_str());
   }
@@ -93,16 +99,18 @@ void add_run(CLI::App& app, Program& program) {
       ->option_text("FILE|NAME");
   run->add_option("--device", o->device,
                   "For every hand: path (follows the scene's path exactly), simulated (a person "
-                  "who yields) or arm (a simulated force-feedback arm that a person holds)")
+                  "who yields), arm (a simulated force-feedback arm that a person holds), "
+                  "spacemouse, plugin:FILE, ... ('hapsix devices' shows all)")
       ->option_text("NAME");
   run->add_option("--duration", o->duration, "Default: as the scene says")
       ->option_text("SECONDS")
       ->check(number_within(1e-3, 1e6));
   run->add_flag("--virtual-time", o->virtual_time,
                 "As fast as possible instead of in real time; same code, same bits");
-  run->add_option("--method", o->method,
-                  "none, global, cluster, gauss3, gauss6, robust or series; the Gauss ones also with "
-                  "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
+  run->add_option(
+         "--method", o->method,
+         "none, global, cluster, gauss3, gauss6, robust or series; the Gauss ones also with "
+         "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
       ->option_text("NAME");
   run->add_option("--threads", o->threads,
                   "1 (default), or 2 for a helper on the other core; same bits")
@@ -111,6 +119,12 @@ void add_run(CLI::App& app, Program& program) {
   run->add_option("--spin", o->spin_us, "Poll the clock so long before each deadline; default 0")
       ->option_text("MICROSECONDS")
       ->check(number_within(0, 10000));
+  run->add_option(
+         "--budget", o->budget_us,
+         "Anytime mode: a frame that would take longer makes do with one point in sixteen; "
+         "not in virtual time; default off")
+      ->option_text("MICROSECONDS")
+      ->check(number_within(0, 1000000));
   run->add_option("--record", o->record, "Record every frame to this .h5 file")
       ->option_text("FILE")
       ->check(ends_with(".h5"));

@@ -1,6 +1,6 @@
 #include "io/cli/run_setup.h"
 
-#include "io/scene_file.h"
+#include "io/recorded_run.h"
 #include "kernels/targets.h"
 
 namespace h6::cli {
@@ -47,8 +47,21 @@ Outcome RunSetup::open_recording() {
   scene.rate = def.rate;
   scene.net_stiffness = def.net_stiffness;
   scene.hands = hands;
+  io::RecordedRun how;
+  how.generated = scene.generated;
+  std::error_code ignored;
+  if (!scene.file.empty()) how.scene_file = std::filesystem::absolute(scene.file, ignored);
+  how.unit = scene.unit;
+  how.threads = def.threads;
+  how.virtual_time = virtual_time;
+  how.max_contacts = def.max_contacts;
+  how.frame_budget_us = def.frame_budget_us;
+  how.gravity = def.gravity;
+  how.bodies.assign(def.bodies, def.bodies + def.body_count);
+  for (const h6Device& device : devices.devices) how.ratings.push_back(device.capabilities);
   io::RecordingHead head;
-  head.scene_json = io::scene_text(scene);
+  head.scene_json = io::recorded_scene_text(scene);
+  head.run_json = io::run_text(how);
   for (const io::LoadedAsset& a : loaded.assets) head.asset_hashes.push_back(a.hash);
   head.simd_target = kernels::target_name();
   head.rate = def.rate;

@@ -50,6 +50,29 @@ std::string table(const std::vector<RunSummary>& runs) {
   return out;
 }
 
+std::string late_table(const RunSummary& run) {
+  const h6LoopReport& r = run.loop;
+  const auto row = [](const char* cause, const h6LateHistogram& h) {
+    std::string line = format("%-24s", cause);
+    std::uint64_t all = 0;
+    for (const std::uint64_t n : h.frames) {
+      line += format(" %8llu", static_cast<unsigned long long>(n));
+      all += n;
+    }
+    return all ? line + '\n' : std::string();
+  };
+  std::string rows = row("own computation", r.late_us_compute) + row("wake-up", r.late_us_wakeup) +
+                     row("stolen", r.late_us_stolen);
+  if (!rows.empty())
+    rows =
+        "late frames, by how late  < 10 us  < 0.1 ms   < 1 ms  < 10 ms < 0.1 s   longer\n" + rows;
+  if (r.coarse_frames > 0)
+    rows +=
+        format("coarse frames: %llu, to end in time; nothing left out was deeper than %.2f voxel\n",
+               static_cast<unsigned long long>(r.coarse_frames), run.missed_depth_voxels);
+  return rows;
+}
+
 std::string depth_strip(const RunSummary& run) {
   static const char* const blocks[] = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
   constexpr int rows = 4;

@@ -1,10 +1,11 @@
 #include "io/cli/view_run.h"
 
-#include <CLI/CLI.hpp>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -27,9 +28,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using io::view::ViewRequest;
 
-constexpr auto kPicture = std::chrono::microseconds(16000);
-constexpr std::size_t kWaiting = 256;         // wishes not looked at yet
-constexpr std::size_t kViewContacts = 2000;   // arrows
+constexpr auto kPicture = std::chrono::microseconds(16667);
+constexpr std::size_t kWaiting = 256;        // wishes not looked at yet
+constexpr std::size_t kViewContacts = 2000;  // arrows
 
 // From the server's thread to ours.
 class Wishes {
@@ -122,7 +123,6 @@ class Viewer : public RunObserver {
     loop_ = loop;
     note_ = std::move(note);
     wish_ = {};
-    pace_ = 1;
     offset_ = {};
     state_.begin();
     state_.recording(setup.recorder != nullptr);
@@ -139,7 +139,7 @@ class Viewer : public RunObserver {
     h6LoopView view;
     if (h6ReadView(loop_, &view)) state_.contacts(view);
     if (Clock::now() >= next_ && state_.any() && server_->clients() > 0) {
-      next_ = Clock::now() + kPicture;
+      next_ = std::max(next_ + kPicture, Clock::now() - kPicture);
       server_->publish(state_.state_message());
     }
     return !again_;
@@ -214,8 +214,10 @@ class Viewer : public RunObserver {
                           number(coupling_.max_depth_voxels, 2) + " voxels");
   }
   void act(const io::view::SetPace& set) {
+    if (!setup_->devices.real_time.empty())  // it would be sent too little, too late
+      return server_->say(io::view::LiveState::note("the device '" + setup_->devices.real_time +
+                                                    "' lives on the clock: no slow motion"));
     h6SetPace(loop_, set.pace);
-    pace_ = set.pace;
   }
   void act(const io::view::Reset&) {
     record_.clear();
@@ -231,7 +233,8 @@ class Viewer : public RunObserver {
     }
     struct stat exists;
     int n = 1;
-    do record_ = options_.folder + "/" + loaded_.scene.name + "-view-" + std::to_string(n++) + ".h5";
+    do
+      record_ = options_.folder + "/" + loaded_.scene.name + "-view-" + std::to_string(n++) + ".h5";
     while (stat(record_.c_str(), &exists) == 0 && n < 10000);
     server_->say(io::view::LiveState::note("recording from the start: " + record_));
   }
@@ -260,7 +263,6 @@ class Viewer : public RunObserver {
   Note note_;
   std::string record_;
   bool again_ = false;
-  double pace_ = 1;
   Clock::time_point next_;
 };
 
@@ -277,8 +279,7 @@ void add_view_options(CLI::App& command, ViewOptions& view) {
 }
 
 Outcome view_scene(const io::LoadedScene& loaded, const RunOptions& given, const ViewOptions& view,
-                   const Console& console,
-                   const std::function<void(const RunSummary&)>& done) {
+                   const Console& console, const std::function<void(const RunSummary&)>& done) {
   RunOptions options = given;
   Viewer viewer(loaded, view, console);
   h6ContactDef contact = loaded.session_def().contact;

@@ -17,8 +17,8 @@ namespace h6::cli {
 
 struct ViewOptions {
   bool on = false;
-  int port = 0;           // 0: any free one
-  bool open = true;       // a browser, where there is a screen
+  int port = 0;              // 0: any free one
+  bool open = true;          // a browser, where there is a screen
   std::string folder = ".";  // for what is recorded from the page
 };
 

@@ -45,8 +45,12 @@ std::vector<SceneName> scene_names() {
 }
 
 Result<Scene> make_scene(const std::string& name) {
-  for (const Entry& entry : kScenes)
-    if (name == entry.name) return entry.make();
+  for (const Entry& entry : kScenes) {
+    if (name != entry.name) continue;
+    Scene scene = entry.make();
+    scene.generated = name;
+    return scene;
+  }
   std::string known;
   for (const Entry& entry : kScenes) known += (known.empty() ? "" : ", ") + std::string(entry.name);
   return Failure{"there is no generated scene \"" + name + "\"; known: " + known};

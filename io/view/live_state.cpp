@@ -183,9 +183,10 @@ Message LiveState::state_message() {
                     {"budget_us", 1e6 / loaded_.scene.rate},
                     {"late", {{"compute", late_[0]}, {"wakeup", late_[1]}, {"stolen", late_[2]}}},
                     {"status", status},
+                    {"device", h6DeviceStateName(r.state[0])},
                     {"cause", h6CauseName(cause_)},
                     {"fault", r.report.status & H6_OUTPUT_FAULT ? h6CauseName(r.command[0].cause)
-                                                                 : h6CauseName(H6_CAUSE_NONE)},
+                                                                : h6CauseName(H6_CAUSE_NONE)},
                     {"ended", false},
                     {"verdict", ""},
                     {"recording", recording_}};
@@ -246,13 +247,12 @@ Message LiveState::slice_message(const Slice& slice) const {
   corner[axis] += slice.at * size[axis];
   along_u[u] = size[u], along_v[v] = size[v];
   const auto list = [](const h6Vec3& p) { return ordered_json{p.x, p.y, p.z}; };
-  return envelope.message(
-      {{"kind", "slice"},
-       {"width", width},
-       {"height", height},
-       {"corner", list(apply(pose, {corner[0], corner[1], corner[2]}))},
-       {"u", list(rotate(pose.q, {along_u[0], along_u[1], along_u[2]}))},
-       {"v", list(rotate(pose.q, {along_v[0], along_v[1], along_v[2]}))}});
+  return envelope.message({{"kind", "slice"},
+                           {"width", width},
+                           {"height", height},
+                           {"corner", list(apply(pose, {corner[0], corner[1], corner[2]}))},
+                           {"u", list(rotate(pose.q, {along_u[0], along_u[1], along_u[2]}))},
+                           {"v", list(rotate(pose.q, {along_v[0], along_v[1], along_v[2]}))}});
 }
 
 }  // namespace h6::io::view

@@ -46,7 +46,7 @@ class LiveState {
   h6CouplingDef coupling_{};
   h6FrameRecord last_{};
   bool any_ = false, recording_ = false;
-  h6Status status_ = 0;   // of all rows since the last message
+  h6Status status_ = 0;  // of all rows since the last message
   h6Cause cause_ = H6_CAUSE_NONE;
   std::uint64_t late_[3] = {};
   std::vector<float> rows_, poses_, p_, n_, t_, w_, d_;

@@ -2,15 +2,21 @@
 // files: as a C++ array they would take seconds to compile.
 #include "io/view/page.h"
 
-#define H6_PAGE(name, file)                      \
-  __asm__(".section .rodata\n"                   \
-          ".global h6_page_" #name "\n"          \
-          "h6_page_" #name ":\n"                 \
-          ".incbin \"" HAPSIX_PAGES "/" file "\"\n" \
-          ".global h6_page_" #name "_end\n"      \
-          "h6_page_" #name "_end:\n"             \
-          ".byte 0\n"                            \
-          ".previous\n");                        \
+#define H6_PAGE(name, file)              \
+  __asm__(                               \
+      ".section .rodata\n"               \
+      ".global h6_page_" #name           \
+      "\n"                               \
+      "h6_page_" #name                   \
+      ":\n"                              \
+      ".incbin \"" HAPSIX_PAGES "/" file \
+      "\"\n"                             \
+      ".global h6_page_" #name           \
+      "_end\n"                           \
+      "h6_page_" #name                   \
+      "_end:\n"                          \
+      ".byte 0\n"                        \
+      ".previous\n");                    \
   extern "C" const char h6_page_##name[], h6_page_##name##_end[];
 
 H6_PAGE(live, "live.html")

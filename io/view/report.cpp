@@ -30,9 +30,9 @@ void append(std::vector<float>& to, const h6Pose& p) {
 
 double percentile(std::vector<float> v, double share) {
   if (v.empty()) return 0;
-  const auto at = static_cast<std::size_t>(
-      std::clamp(std::ceil(share * static_cast<double>(v.size())) - 1, 0.0,
-                 static_cast<double>(v.size() - 1)));
+  const auto at =
+      static_cast<std::size_t>(std::clamp(std::ceil(share * static_cast<double>(v.size())) - 1, 0.0,
+                                          static_cast<double>(v.size() - 1)));
   std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(at), v.end());
   return v[at];
 }
@@ -81,8 +81,7 @@ ReportRun::ReportRun(std::string label, RecordingHead head, std::uint64_t frames
     : label_(std::move(label)), head_(std::move(head)), frames_(frames) {
   span_frames_ = std::max<std::uint64_t>(1, (frames + kSpans - 1) / kSpans);
   const auto by_rate = static_cast<std::uint64_t>(std::max(1.0, head_.rate / kReplayRate));
-  const std::uint64_t step =
-      std::max(by_rate, (frames + kReplaySamples - 1) / kReplaySamples);
+  const std::uint64_t step = std::max(by_rate, (frames + kReplaySamples - 1) / kReplaySamples);
   for (std::uint64_t f = 0; f < frames; f += step) replay_frames_.push_back(f);
   contacts_.resize(replay_frames_.size());
 }
@@ -119,8 +118,7 @@ void ReportRun::row(const h6FrameRecord& r) {
     if (!(r.late & (1u << k))) continue;
     ++late_[k];
     if (late_frames_.size() < kLateFrames)
-      late_frames_.push_back(
-          {r.time, r.report.frame, causes[k], r.report.frame_us, r.wakeup_us});
+      late_frames_.push_back({r.time, r.report.frame, causes[k], r.report.frame_us, r.wakeup_us});
     else
       ++late_left_out_;
   }
@@ -206,9 +204,8 @@ class ReportWriter {
                       {"frame_us", l.frame_us},
                       {"wakeup_us", l.wakeup_us}});
     for (std::size_t i = 0; i < std::min(kEvents, r.events_.size()); ++i)
-      events.push_back({{"t", r.events_[i].time},
-                        {"what", r.events_[i].what},
-                        {"detail", r.events_[i].detail}});
+      events.push_back(
+          {{"t", r.events_[i].time}, {"what", r.events_[i].what}, {"detail", r.events_[i].detail}});
     if (r.events_.size() > kEvents)
       events.push_back({{"t", r.end_},
                         {"what", "more"},
@@ -216,25 +213,26 @@ class ReportWriter {
                                        " more events are in the recording"}});
     char hash[20];
     std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(r.hash_));
-    runs_.push_back({{"label", r.label_},
-                     {"method", said("method")},
-                     {"verdict", said("verdict")},
-                     {"frames", r.seen_},
-                     {"contacts_mean", r.contacts_sum_ / frames},
-                     {"contacts_max", r.contacts_max_},
-                     {"depth_max", r.depth_max_},
-                     {"force_max", r.force_max_},
-                     {"frame_us", spread(r.frame_us_)},
-                     {"stages", stages},
-                     {"late", {{"compute", r.late_[0]}, {"wakeup", r.late_[1]}, {"stolen", r.late_[2]}}},
-                     {"late_frames", late},
-                     {"late_left_out", r.late_left_out_},
-                     {"events", events},
-                     {"state_hash", hash},
-                     {"program", r.head_.program},
-                     {"simd_target", r.head_.simd_target},
-                     {"asset_hashes", r.head_.asset_hashes},
-                     {"config", r.head_.scene_json}});
+    runs_.push_back(
+        {{"label", r.label_},
+         {"method", said("method")},
+         {"verdict", said("verdict")},
+         {"frames", r.seen_},
+         {"contacts_mean", r.contacts_sum_ / frames},
+         {"contacts_max", r.contacts_max_},
+         {"depth_max", r.depth_max_},
+         {"force_max", r.force_max_},
+         {"frame_us", spread(r.frame_us_)},
+         {"stages", stages},
+         {"late", {{"compute", r.late_[0]}, {"wakeup", r.late_[1]}, {"stolen", r.late_[2]}}},
+         {"late_frames", late},
+         {"late_left_out", r.late_left_out_},
+         {"events", events},
+         {"state_hash", hash},
+         {"program", r.head_.program},
+         {"simd_target", r.head_.simd_target},
+         {"asset_hashes", r.head_.asset_hashes},
+         {"config", r.head_.scene_json}});
     duration_ = std::max(duration_, r.end_);
   }
 

@@ -28,9 +28,19 @@ void print(std::string& to, const char* format, Values... values) {
 void Trace::add(const h6FrameRecord* rows, std::size_t count) {
   for (std::size_t i = count > most_ ? count - most_ : 0; i < count; ++i) {
     const h6FrameRecord& r = rows[i];
-    Row row{r.time, r.wakeup_us, r.report.frame_us, {}, r.report.max_depth_voxels, r.report.frame,
-            r.report.contacts, r.late, r.report.status};
+    Row row{};
+    row.time = r.time;
+    row.wakeup_us = r.wakeup_us;
+    row.frame_us = r.report.frame_us;
     std::copy_n(r.report.stage_us, H6_STAGE_COUNT, row.stage_us);
+    row.depth_voxels = r.report.max_depth_voxels;
+    row.helper_start_us = r.report.helper_start_us;
+    row.helper_us = r.report.helper_us;
+    row.helper_slices = r.report.helper_slices;
+    row.frame = r.report.frame;
+    row.contacts = r.report.contacts;
+    row.late = r.late;
+    row.status = r.report.status;
     if (rows_.size() == most_) rows_.pop_front();
     rows_.push_back(row);
   }
@@ -41,12 +51,14 @@ Outcome Trace::write(const std::filesystem::path& file) const {
       "{\"displayTimeUnit\":\"ms\",\"traceEvents\":[\n"
       "{\"ph\":\"M\",\"pid\":1,\"name\":\"process_name\",\"args\":{\"name\":\"hapsix\"}},\n"
       "{\"ph\":\"M\",\"pid\":1,\"tid\":1,\"name\":\"thread_name\",\"args\":{\"name\":\"haptic "
-      "thread\"}}";
+      "thread\"}},\n"
+      "{\"ph\":\"M\",\"pid\":1,\"tid\":2,\"name\":\"thread_name\",\"args\":{\"name\":\"helper\"}}";
   for (const Row& r : rows_) {
     // Microseconds; a frame begins at its deadline, then wakes up, then works.
     const double deadline = 1e6 * r.time, start = deadline + std::max(0.0, r.wakeup_us);
     if (r.wakeup_us > 0)
-      print(text, ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"wake-up\",\"ts\":%.3f,\"dur\":%.3f}",
+      print(text,
+            ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"wake-up\",\"ts\":%.3f,\"dur\":%.3f}",
             deadline, r.wakeup_us);
     print(text,
           ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"frame\",\"ts\":%.3f,\"dur\":%.3f,"
@@ -62,13 +74,19 @@ Outcome Trace::write(const std::filesystem::path& file) const {
             h6StageName(static_cast<h6Stage>(s)), at, r.stage_us[s]);
       at += r.stage_us[s];
     }
+    if (r.helper_slices)  // from its first slice on, as if it had not waited between them
+      print(text,
+            ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":2,\"name\":\"%u slices\",\"ts\":%.3f,\"dur\":%.3f}",
+            r.helper_slices, start + r.helper_start_us, r.helper_us);
     if (r.late)
       print(text, ",\n{\"ph\":\"i\",\"s\":\"t\",\"pid\":1,\"tid\":1,\"name\":\"%s\",\"ts\":%.3f}",
             late_name(r.late), start + r.frame_us);
     print(text, ",\n{\"ph\":\"C\",\"pid\":1,\"name\":\"contacts\",\"ts\":%.3f,\"args\":{\"n\":%u}}",
           deadline, r.contacts);
-    print(text, ",\n{\"ph\":\"C\",\"pid\":1,\"name\":\"depth [voxel]\",\"ts\":%.3f,\"args\":{\"d\":%.4f}}",
-          deadline, r.depth_voxels);
+    print(
+        text,
+        ",\n{\"ph\":\"C\",\"pid\":1,\"name\":\"depth [voxel]\",\"ts\":%.3f,\"args\":{\"d\":%.4f}}",
+        deadline, r.depth_voxels);
   }
   text += "\n]}\n";
   return write_aside(file, [&](const std::filesystem::path& place) -> Outcome {

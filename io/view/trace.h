@@ -1,5 +1,6 @@
 // trace.h - the last seconds of a run as a timeline that chrome://tracing and ui.perfetto.dev open:
-// each frame with its stages, its wake-up, late frames and their cause, contacts and depth.
+// each frame with its stages and, on a thread of its own, what the helper took of it; wake-up, late
+// frames and their cause, contacts and depth.
 #pragma once
 #include <deque>
 #include <filesystem>
@@ -20,6 +21,8 @@ class Trace {
  private:
   struct Row {
     double time, wakeup_us, frame_us, stage_us[H6_STAGE_COUNT], depth_voxels;
+    double helper_start_us, helper_us;
+    std::uint32_t helper_slices;
     std::uint64_t frame;
     std::uint32_t contacts, late;
     h6Status status;

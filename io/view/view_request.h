@@ -22,9 +22,9 @@ struct Clutch {
   bool on = false;
 };
 struct SetContact {
-  std::string method;       // with its pieces, "gauss6+facing"; empty: as it is
-  double stiffness = 0;     // [N/m]; 0: as it is
-  double epsilon = 0;       // 0: as it is
+  std::string method;           // with its pieces, "gauss6+facing"; empty: as it is
+  double stiffness = 0;         // [N/m]; 0: as it is
+  double epsilon = 0;           // 0: as it is
   double max_depth_voxels = 0;  // of the coupling; 0: as it is
 };
 // 1: real time; below: slow motion; 0: paused.
@@ -40,11 +40,10 @@ struct Slice {
   int axis = 2;
   double at = 0.5;
 };
-using ViewRequest =
-    std::variant<Grab, MoveHand, Clutch, SetContact, SetPace, Reset, Record, Slice>;
+using ViewRequest = std::variant<Grab, MoveHand, Clutch, SetContact, SetPace, Reset, Record, Slice>;
 
-// {"do": "grab", "on": true}, {"do": "hand", "p": [x, y, z], "q": [w, x, y, z]}, ... Every number is
-// checked to be finite and in its range; a failure is a sentence for the page.
+// {"do": "grab", "on": true}, {"do": "hand", "p": [x, y, z], "q": [w, x, y, z]}, ... Every number
+// is checked to be finite and in its range; a failure is a sentence for the page.
 Result<ViewRequest> parse_request(std::string_view text);
 
 }  // namespace h6::io::view

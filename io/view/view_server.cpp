@@ -257,8 +257,8 @@ void ViewServer::Body::accept() {
 
 ViewServer::ViewServer(std::unique_ptr<Body> body) : body_(std::move(body)) {}
 
-Result<std::unique_ptr<ViewServer>> ViewServer::open(const ServerOptions& options,
-                                                     std::string page, Receive receive) {
+Result<std::unique_ptr<ViewServer>> ViewServer::open(const ServerOptions& options, std::string page,
+                                                     Receive receive) {
   auto body = std::make_unique<Body>();
   body->options = options;
   if (body->options.token.empty()) body->options.token = random_token();

@@ -23,12 +23,12 @@
 namespace h6::io::view {
 
 struct ServerOptions {
-  std::uint16_t port = 0;           // 0: any free one
-  std::size_t max_clients = 8;      // at once, watching
-  std::size_t max_connections = 32; // at once, in all
-  std::size_t max_request = 4096;   // of a text from a client [bytes]
-  int stall_seconds = 20;           // a client that does not read for so long is closed
-  std::string token;                // empty: 128 random bits
+  std::uint16_t port = 0;            // 0: any free one
+  std::size_t max_clients = 8;       // at once, watching
+  std::size_t max_connections = 32;  // at once, in all
+  std::size_t max_request = 4096;    // of a text from a client [bytes]
+  int stall_seconds = 20;            // a client that does not read for so long is closed
+  std::string token;                 // empty: 128 random bits
 };
 
 class ViewServer {
@@ -49,8 +49,8 @@ class ViewServer {
   // To every client, in order, none left out: a client with 64 of them outstanding is closed.
   void say(Message message);
 
-  std::size_t clients() const;      // watching now
-  std::uint64_t refused() const;    // requests turned away
+  std::size_t clients() const;    // watching now
+  std::uint64_t refused() const;  // requests turned away
 
  private:
   struct Body;

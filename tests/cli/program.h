@@ -133,6 +133,12 @@ class Process {
         return std::stoull(line.substr(7), nullptr, 16) >> (number - 1) & 1;
     return false;
   }
+  // Whether it has come to its end; wait() still tells what it left.
+  bool ended() const {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == pid_;
+  }
   // Its end, or SIGKILL after `limit` seconds.
   Ended wait(double limit = 30) {
     Ended ended;

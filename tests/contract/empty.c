@@ -1,4 +1,5 @@
 /* The contract needs nothing but a C99 compiler. */
+#include "hapsix/device_plugin.h"
 #include "hapsix/hapsix.h"
 
 int main(void) { return 0; }

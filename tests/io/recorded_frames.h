@@ -66,6 +66,10 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
   fill(&r.report.state_hash, 1);
   fill(&r.wakeup_us, 1);
   r.late = natural();
+  fill(&r.late_us, 1);
+  fill(&r.cpu_us, 1);
+  r.report.coarse_pairs = natural();
+  fill(&r.report.missed_depth_voxels, 1);
   for (std::size_t h = 0; h < hands; ++h) {
     fill(&r.hand[h].pose, 7);
     fill(&r.hand[h].velocity, 6);
@@ -82,6 +86,9 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
 inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
   const auto equal = [](const auto& x, const auto& y) { return !std::memcmp(&x, &y, sizeof x); };
   bool all = equal(a.time, b.time) && equal(a.wakeup_us, b.wakeup_us) && a.late == b.late &&
+             equal(a.late_us, b.late_us) && equal(a.cpu_us, b.cpu_us) &&
+             a.report.coarse_pairs == b.report.coarse_pairs &&
+             equal(a.report.missed_depth_voxels, b.report.missed_depth_voxels) &&
              a.report.frame == b.report.frame && a.report.status == b.report.status &&
              a.report.contacts == b.report.contacts &&
              equal(a.report.max_depth, b.report.max_depth) &&

@@ -167,7 +167,10 @@ TEST_CASE("kills in the midst of writing leave a whole file and the older one") 
       if (fs::exists(place / other))
         fs::last_write_time(place / other,
                             fs::file_time_type::clock::now() - std::chrono::seconds(60));
-    REQUIRE(repair_recording(file));
+    const bool left = fs::exists(place / "run.h5.part") || fs::exists(place / "run.h5.swap");
+    const auto repaired = repair_recording(file);
+    REQUIRE(repaired);
+    CHECK(repaired->empty() != left);
     CHECK_FALSE(fs::exists(place / "run.h5.part"));
     CHECK(plain_shape(file, "/frames/t").at(0) == r.frames.size());
     record(file, 7);
@@ -287,7 +290,11 @@ TEST_CASE("names swap in one step or in three, and a kill between the three is r
   fs::rename(a, c);  // no file at the place, the older copy in .part, the newer in .swap
   CHECK(read(a).frames.size() == 20);
   CHECK(mentions(read(a).remark, "swap"));
-  REQUIRE(repair_recording(a));
+  const auto repaired = repair_recording(a);
+  REQUIRE(repaired);
+  CHECK(mentions(*repaired, "a.h5.swap with 20 frames"));
+  CHECK(mentions(*repaired, "a.h5.part, an older copy, was removed"));
+  CHECK(repair_recording(a)->empty());  // nothing is left to do
   CHECK(plain_shape(a, "/frames/t") == std::vector<hsize_t>{20});
   CHECK(folder.files() == 1);
 
@@ -295,7 +302,9 @@ TEST_CASE("names swap in one step or in three, and a kill between the three is r
   fs::copy_file(a, b);
   fs::resize_file(a, fs::file_size(a) / 2);
   CHECK(read(a).frames.size() == 20);
-  REQUIRE(repair_recording(a));
+  const auto replaced = repair_recording(a);
+  REQUIRE(replaced);
+  CHECK(mentions(*replaced, "kept as a.h5.damaged"));
   CHECK(plain_shape(a, "/frames/t") == std::vector<hsize_t>{20});
   CHECK(fs::exists(folder / "a.h5.damaged"));
   CHECK_FALSE(repair_recording(folder / "none.h5"));

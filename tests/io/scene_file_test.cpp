@@ -119,6 +119,20 @@ TEST_CASE("every key arrives, lengths in metres") {
   check_close(hand.driver_damping, 4);
   check_close(hand.admittance_damping, 6);
   CHECK(hand.passivity);
+  const h6SafetyDef& safety = hand.safety;
+  check_close(safety.max_force, 3.5);
+  check_close(safety.max_torque, 0.25);
+  check_close(safety.max_force_rate, 700);
+  check_close(safety.max_torque_rate, 70);
+  check_close(safety.max_power, 1.5);
+  check_close(safety.max_speed, 0.5);
+  check_close(safety.derate_speed, 0.75);
+  check_close(safety.cut_speed, 1.25);
+  check_close(safety.soft_start, 0.5);
+  check_close(safety.decay_time, 0.01);
+  check_close(safety.pose_jump, 8e-3);
+  check_close(safety.freeze_time, 0.25);
+  CHECK(safety.dead_man_buttons == 6);
   CHECK(s.hands[0].device == "arm");
   REQUIRE(s.hands[0].arm);
   const SceneArm& arm = *s.hands[0].arm;
@@ -170,7 +184,7 @@ TEST_CASE("switches that are off and an arm that is not described are not writte
   CHECK(!text.contains("net_stiffness"));
   CHECK(!text["contact"].contains("passivity"));
   CHECK(!text["bodies"][1].contains("translation_only"));
-  for (const char* key : {"relative", "passivity", "arm"}) CHECK(!text["hands"][0].contains(key));
+  for (const char* key : {"relative", "passivity", "safety", "arm"}) CHECK(!text["hands"][0].contains(key));
 }
 
 TEST_CASE("units scale every length and nothing else") {

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "io/scene_file.h"
 #include "io/scene_keys.h"
@@ -103,6 +104,10 @@ inline Json full_scene() {
                "motion_scale": 2, "rotation_scale": 1.5, "force_scale": 0.5, "relative": true,
                "clutch_buttons": 5, "manipulandum_mass": 0.2, "driver_stiffness": 900,
                "driver_damping": 4, "admittance_damping": 6, "passivity": true,
+               "safety": {"max_force": 3.5, "max_torque": 0.25, "max_force_rate": 700,
+                 "max_torque_rate": 70, "max_power": 1.5, "max_speed": 0.5, "derate_speed": 0.75,
+                 "cut_speed": 1.25, "soft_start": 0.5, "decay_time": 0.01, "pose_jump": 8,
+                 "freeze_time": 0.25, "dead_man_buttons": 6},
                "arm": {"delay_frames": 2, "mass": 0.31, "inertia": 4e-4, "damping": 1.1,
                  "rotational_damping": 2e-3, "position_step": 0.02, "angle_step": 2e-4,
                  "force_step": 0.03, "torque_step": 2e-3, "velocity": "exact",
@@ -182,6 +187,14 @@ inline void check_same(const h6HandDef& a, const h6HandDef& b) {
   check_close(a.driver_stiffness, b.driver_stiffness);
   check_close(a.driver_damping, b.driver_damping);
   check_close(a.admittance_damping, b.admittance_damping);
+  const auto limits = [](const h6SafetyDef& d) {
+    return std::vector<double>{d.max_force,  d.max_torque,   d.max_force_rate, d.max_torque_rate,
+                               d.max_power,  d.max_speed,    d.derate_speed,   d.cut_speed,
+                               d.soft_start, d.decay_time,   d.pose_jump,      d.freeze_time,
+                               static_cast<double>(d.dead_man_buttons)};
+  };
+  const std::vector<double> la = limits(a.safety), lb = limits(b.safety);
+  for (std::size_t i = 0; i < la.size(); ++i) check_close(la[i], lb[i]);
 }
 
 inline void check_same(const SceneVerdict& a, const SceneVerdict& b) {

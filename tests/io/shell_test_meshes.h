@@ -101,31 +101,37 @@ inline Mesh inside_out(Mesh mesh) {
   return mesh;
 }
 
-// Least and mean distance to the nearest other point among the first `count`.
+// Least and mean distance to the nearest other point among the first `count`; `one_side`: of those
+// whose normals are less than 134 degrees apart, as the sides of a sheet are sampled each for itself.
 struct Spacing {
   double least = INFINITY, mean = 0;
 };
-inline Spacing spacing(const ShellData& s, std::size_t count) {
+inline Spacing spacing(const ShellData& s, std::size_t count, bool one_side = false) {
   std::vector<std::uint32_t> order(count);
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return s.x[a] < s.x[b]; });
   Spacing out;
+  double found = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Vec3 p = point(s, order[i]);
     double best = INFINITY;
     const auto look = [&](std::size_t k) {
       const Vec3 d = minus(point(s, order[k]), p);
       if (d.x * d.x > best) return false;
-      best = std::min(best, dot(d, d));
+      if (!one_side || dot(normal(s, order[k]), normal(s, order[i])) > -0.694)
+        best = std::min(best, dot(d, d));
       return true;
     };
     for (std::size_t k = i + 1; k < count && look(k); ++k) {
     }
     for (std::size_t k = i; k > 0 && look(k - 1); --k) {
     }
+    if (std::isinf(best)) continue;  // alone on its side
     out.least = std::min(out.least, std::sqrt(best));
-    out.mean += std::sqrt(best) / double(count);
+    out.mean += std::sqrt(best);
+    ++found;
   }
+  out.mean /= std::max(1.0, found);
   return out;
 }
 

@@ -51,19 +51,22 @@ TEST_CASE("a hand's quaternion is made unit length; places that are none are ref
   CHECK(std::fabs(p.q.w * p.q.w + p.q.x * p.q.x + p.q.y * p.q.y + p.q.z * p.q.z - 1) < 1e-12);
   for (const char* wrong :
        {R"({"do":"hand","p":[0,0],"q":[1,0,0,0]})", R"({"do":"hand","p":[0,0,1e9],"q":[1,0,0,0]})",
-        R"({"do":"hand","p":[0,0,"1"],"q":[1,0,0,0]})", R"({"do":"hand","p":[0,0,0],"q":[0,0,0,0]})",
-        R"({"do":"hand","p":[0,0,1e999],"q":[1,0,0,0]})", R"({"do":"hand","p":[0,0,null],"q":[1,0,0,0]})"})
+        R"({"do":"hand","p":[0,0,"1"],"q":[1,0,0,0]})",
+        R"({"do":"hand","p":[0,0,0],"q":[0,0,0,0]})",
+        R"({"do":"hand","p":[0,0,1e999],"q":[1,0,0,0]})",
+        R"({"do":"hand","p":[0,0,null],"q":[1,0,0,0]})"})
     CHECK_MESSAGE(!parse_request(wrong), wrong);
 }
 
 TEST_CASE("what is out of range, of another type or unknown is one sentence") {
   for (const char* wrong :
        {"", "[]", "null", "{", R"({"do":1})", R"({"do":"fly"})", R"({"do":"grab","on":1})",
-        R"({"do":"pace","pace":2})", R"({"do":"pace","pace":-0.1})", R"({"do":"contact","method":"best"})",
-        R"({"do":"contact","stiffness":-5})", R"({"do":"contact","stiffness":1e30})",
-        R"({"do":"contact","epsilon":5})", R"({"do":"contact","max_depth_voxels":0})",
-        R"({"do":"slice","axis":3,"at":0.5})", R"({"do":"slice","axis":1.5,"at":0.5})",
-        R"({"do":"slice","axis":0,"at":1.01})", R"({"do":"record"})"}) {
+        R"({"do":"pace","pace":2})", R"({"do":"pace","pace":-0.1})",
+        R"({"do":"contact","method":"best"})", R"({"do":"contact","stiffness":-5})",
+        R"({"do":"contact","stiffness":1e30})", R"({"do":"contact","epsilon":5})",
+        R"({"do":"contact","max_depth_voxels":0})", R"({"do":"slice","axis":3,"at":0.5})",
+        R"({"do":"slice","axis":1.5,"at":0.5})", R"({"do":"slice","axis":0,"at":1.01})",
+        R"({"do":"record"})"}) {
     const auto result = parse_request(wrong);
     REQUIRE_MESSAGE(!result, wrong);
     CHECK(result.error().find("not understood") != std::string::npos);
@@ -71,21 +74,29 @@ TEST_CASE("what is out of range, of another type or unknown is one sentence") {
   }
 }
 
-TEST_CASE("1e5 fuzzed requests: no crash, and nothing gets through that is not finite and in range") {
+TEST_CASE(
+    "1e5 fuzzed requests: no crash, and nothing gets through that is not finite and in range") {
   std::mt19937 random(3);
-  const std::string seeds[] = {R"({"do":"hand","p":[0.1,-2,3e-3],"q":[0.8,0,0.6,0]})",
-                               R"({"do":"contact","method":"gauss6+facing","stiffness":1e4,"epsilon":0.1})",
-                               R"({"do":"pace","pace":0.5})", R"({"do":"slice","axis":1,"at":0.25})"};
-  const std::string words[] = {"1e308", "-1e308", "NaN", "null", "[[[[", "]", "\"", "{", "1e-400", "\xff", "-0"};
+  const std::string seeds[] = {
+      R"({"do":"hand","p":[0.1,-2,3e-3],"q":[0.8,0,0.6,0]})",
+      R"({"do":"contact","method":"gauss6+facing","stiffness":1e4,"epsilon":0.1})",
+      R"({"do":"pace","pace":0.5})", R"({"do":"slice","axis":1,"at":0.25})"};
+  const std::string words[] = {"1e308", "-1e308", "NaN",    "null", "[[[[", "]",
+                               "\"",    "{",      "1e-400", "\xff", "-0"};
   std::size_t through = 0;
   for (int i = 0; i < 100000; ++i) {
     std::string text = seeds[random() % std::size(seeds)];
     for (unsigned k = random() % 4; k > 0; --k) {
       const std::size_t at = random() % (text.size() + 1);
       switch (random() % 3) {
-        case 0: text.insert(at, words[random() % std::size(words)]); break;
-        case 1: text.erase(at, random() % 5); break;
-        default: if (at < text.size()) text[at] = static_cast<char>(random());
+        case 0:
+          text.insert(at, words[random() % std::size(words)]);
+          break;
+        case 1:
+          text.erase(at, random() % 5);
+          break;
+        default:
+          if (at < text.size()) text[at] = static_cast<char>(random());
       }
     }
     const auto result = parse_request(text);
@@ -152,6 +163,7 @@ TEST_CASE("a timeline has each of the last frames with its stages, in order, ins
     r.wakeup_us = 5;
     for (double& us : r.report.stage_us) us = 6;
     if (i == 200) r.late = H6_LATE_STOLEN;
+    if (i % 2) r.report.helper_slices = 3, r.report.helper_start_us = 4, r.report.helper_us = 9;
     trace.add(&r, 1);
   }
   const auto file = std::filesystem::temp_directory_path() /
@@ -161,11 +173,15 @@ TEST_CASE("a timeline has each of the last frames with its stages, in order, ins
   text << std::ifstream(file).rdbuf();
   std::filesystem::remove(file);
   const json all = json::parse(text.str());
-  int frames = 0, late = 0;
+  int frames = 0, late = 0, helped = 0;
   double start = 0, end = 0;
   for (const json& e : all["traceEvents"]) {
     if (e["ph"] == "i") ++late;
     if (e["ph"] != "X" || e["name"] == "wake-up") continue;
+    if (e["tid"] == 2) {
+      ++helped;
+      continue;
+    }
     const double ts = e["ts"], dur = e["dur"];
     if (e["name"] == "frame") {
       ++frames;
@@ -178,4 +194,5 @@ TEST_CASE("a timeline has each of the last frames with its stages, in order, ins
   }
   CHECK(frames == 100);
   CHECK(late == 1);
+  CHECK(helped == 50);
 }

@@ -137,7 +137,8 @@ struct Client : Line {
   explicit Client(const Server& s, int receive_buffer = 0) : Line(s.port, receive_buffer) {
     send(s.upgrade("/live?token=" + s.token, "http://" + s.host()));
     std::string answer;  // up to its empty line, not a byte more
-    for (char c; answer.find("\r\n\r\n") == std::string::npos && recv(fd, &c, 1, 0) == 1;) answer += c;
+    for (char c; answer.find("\r\n\r\n") == std::string::npos && recv(fd, &c, 1, 0) == 1;)
+      answer += c;
     REQUIRE(answer.rfind("HTTP/1.1 101", 0) == 0);
   }
 };
@@ -155,9 +156,9 @@ TEST_CASE("the page is for who has the token, at this address") {
   CHECK(page.find("the page") != std::string::npos);
   CHECK(page.find("Content-Security-Policy") != std::string::npos);
   CHECK(status(s.get("/?token=" + s.token, "localhost:" + std::to_string(s.port))) == 200);
-  for (const std::string& target : std::vector<std::string>{
-           "/", "/?token=", "/?token=0123456789abcdee", "/?other=" + s.token,
-           "/?token=" + s.token + "0"}) {
+  for (const std::string& target :
+       std::vector<std::string>{"/", "/?token=", "/?token=0123456789abcdee", "/?other=" + s.token,
+                                "/?token=" + s.token + "0"}) {
     const std::string reply = s.get(target, s.host());
     CHECK_MESSAGE(status(reply) == 403, target);
     CHECK(reply.find("the page") == std::string::npos);
@@ -236,7 +237,9 @@ TEST_CASE("oversize and malformed messages close that client only") {
   CHECK(s.heard.back() == "still here");
 }
 
-TEST_CASE("a client that does not read holds nobody up, misses live messages, and is closed when told too much") {
+TEST_CASE(
+    "a client that does not read holds nobody up, misses live messages, and is closed when told "
+    "too much") {
   ServerOptions options;
   options.stall_seconds = 600;  // not what is tested here
   Server s(options);
@@ -248,7 +251,7 @@ TEST_CASE("a client that does not read holds nobody up, misses live messages, an
     read += reader.read(5).size();
   }
   read += reader.read(300).size();
-  CHECK(read > 1000000);            // the one that reads went on seeing
+  CHECK(read > 1000000);                                  // the one that reads went on seeing
   CHECK(soon([&] { return s.server->clients() == 2; }));  // nothing piled up for the other
   for (int i = 0; i < 200; ++i) s.server->say(live);
   CHECK(soon([&] {
@@ -312,9 +315,19 @@ TEST_CASE("1e5 random requests and frames: no crash, and the page is still serve
     for (char& c : text) c = static_cast<char>(random());
     return text;
   };
-  const std::string pieces[] = {"GET ", "/live?token=", s.token, " HTTP/1.1\r\n", "Host: ", s.host(),
-                                "\r\n", "Origin: ", "Content-Length: 99999999999\r\n", "\r\n\r\n",
-                                "Transfer-Encoding: chunked\r\n", "{\"do\":", std::string(3, '\0')};
+  const std::string pieces[] = {"GET ",
+                                "/live?token=",
+                                s.token,
+                                " HTTP/1.1\r\n",
+                                "Host: ",
+                                s.host(),
+                                "\r\n",
+                                "Origin: ",
+                                "Content-Length: 99999999999\r\n",
+                                "\r\n\r\n",
+                                "Transfer-Encoding: chunked\r\n",
+                                "{\"do\":",
+                                std::string(3, '\0')};
   std::size_t sent = 0;
   while (sent < 20000) {  // pieces of requests, many a connection
     const Line line(s.port);

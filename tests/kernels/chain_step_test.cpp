@@ -25,9 +25,7 @@ void on_every_target(F&& check) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
-Chain& node(ChainBrick& brick, int n) {
-  return brick.v[n / 64 + 1][n / 8 % 8 + 1][n % 8 + 1];
-}
+Chain& node(ChainBrick& brick, int n) { return brick.v[n / 64 + 1][n / 8 % 8 + 1][n % 8 + 1]; }
 
 }  // namespace
 
@@ -38,8 +36,7 @@ TEST_CASE("chain_step: every target says what the reference says") {
       ChainBrick brick;
       for (auto& layer : brick.v)
         for (auto& line : layer)
-          for (Chain& c : line)
-            c = random() % 3 ? kChainFar : Chain(int(random() % 3000) - 1500);
+          for (Chain& c : line) c = random() % 3 ? kChainFar : Chain(int(random() % 3000) - 1500);
       std::vector<Chain> fast(512), exact(512);
       chain_step(brick, fast.data());
       chain_step_ref(brick, exact.data());
@@ -63,6 +60,32 @@ TEST_CASE("chain_seeds: every target says what the reference says, never less th
       for (std::size_t n = 0; n < fast.size(); ++n)
         if (fast[n] != kChainFar) CHECK(fast[n] * kChainUnit >= 0.9f - u[n]);
     }
+  });
+}
+
+TEST_CASE("chain_sides: every target says what the reference says, on the limits too") {
+  on_every_target([] {
+    std::mt19937_64 random(5);
+    const ChainLimits limits{0.875f, 0.15f, 1.135f, 0.25f};
+    std::size_t found[3] = {0, 0, 0};
+    for (int i = 0; i < 40; ++i) {
+      std::vector<Chain> chain(512);
+      std::vector<float> u(512);
+      for (Chain& c : chain) c = random() % 5 ? Chain(int(random() % 900) - 200) : kChainFar;
+      for (float& v : u) v = float(random() % 96) / 32;  // many exactly on a limit
+      ChainSides fast, exact;
+      chain_sides(chain.data(), u.data(), limits, fast);
+      chain_sides_ref(chain.data(), u.data(), limits, exact);
+      for (std::size_t z = 0; z < 8; ++z) {
+        CHECK(fast.in_sight[z] == exact.in_sight[z]);
+        CHECK(fast.dented[z] == exact.dented[z]);
+        CHECK(fast.close[z] == exact.close[z]);
+        found[0] += exact.in_sight[z] != 0;
+        found[1] += exact.dented[z] != 0;
+        found[2] += exact.close[z] != 0;
+      }
+    }
+    for (const std::size_t count : found) CHECK(count > 0);
   });
 }
 

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
 #include <vector>
 
@@ -126,23 +127,27 @@ TEST_CASE("triangle_distance: the winding and the first corner do not matter") {
   }
 }
 
-TEST_CASE("facet_distance: the order of the list does not change a bit, nor a brick's place much") {
+TEST_CASE("tile_distance: the order of the facets does not change a bit, nor a brick's place much") {
   on_every_target([] {
     Random random;
     const Triangles t = random_triangles(60, 3.0, random);
-    std::vector<DistanceFacet> facets;
-    std::vector<std::uint32_t> up, down;
-    for (std::uint32_t i = 0; i < 60; ++i) {
-      facets.push_back(make_distance_facet(t.data() + 9 * i));
-      up.push_back(i);
-      down.insert(down.begin(), i);
-    }
-    for (const float at : {0.0f, 8.0f, 24.0f}) {
-      const float origin[3] = {at, 0, 8};
+    std::vector<DistanceFacet> up(60), down(60);
+    const std::vector<FacetRegion> regions(60);
+    for (std::size_t i = 0; i < 60; ++i)
+      up[i] = down[59 - i] = make_distance_facet(t.data() + 9 * i);
+    constexpr int kBricks[] = {0, 1 + 16, 3 + 16, 63};
+    std::uint64_t bricks = 0;
+    for (int b : kBricks) bricks |= std::uint64_t{1} << b;
+    const std::vector<std::uint64_t> near(60, bricks);
+    const auto one = std::make_unique<TileRoom>(), other = std::make_unique<TileRoom>();
+    tile_distance(up.data(), regions.data(), near.data(), 60, 20.0f, *one);
+    tile_distance(down.data(), regions.data(), near.data(), 60, 20.0f, *other);
+    for (int brick : kBricks) {
       std::vector<float> a(kBrickSamples), b(kBrickSamples), exact(kBrickSamples);
-      facet_distance(facets.data(), up.data(), 60, origin, 20.0f, a.data());
-      facet_distance(facets.data(), down.data(), 60, origin, 20.0f, b.data());
+      brick_distance(*one, std::size_t(brick), a.data());
+      brick_distance(*other, std::size_t(brick), b.data());
       CHECK(a == b);
+      const double origin[3] = {8.0 * (brick % 4), 8.0 * (brick / 4 % 4), 8.0 * (brick / 16)};
       Triangles there = t;
       for (std::size_t i = 0; i < there.size(); ++i) there[i] -= origin[i % 3];
       triangle_distance_ref(there.data(), 60, 20.0f, exact.data());

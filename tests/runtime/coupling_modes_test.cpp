@@ -124,7 +124,7 @@ TEST_CASE("a quasi-static body does not feel how fast it came") {
     sample.velocity = {{speed, 0, -speed}, {0, speed, 0}};
     return scene.hold(sample, 3).wrench;
   };
-  const h6Wrench slow = felt_at(0), fast = felt_at(2);
+  const h6Wrench slow = felt_at(0), fast = felt_at(1);
   CHECK(norm(slow.force) > 0);
   CHECK(std::memcmp(&slow, &fast, sizeof slow) == 0);
 }

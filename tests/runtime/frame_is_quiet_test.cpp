@@ -3,7 +3,14 @@
 #include <doctest/doctest.h>
 
 #include <dlfcn.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
 #include <pthread.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
 #include <atomic>
@@ -13,16 +20,19 @@
 #include <new>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "hapsix/hapsix.h"
-#include "tests/support/analytic.h"
+#include "tests/support/ball_in_bowl.h"
 
 namespace {
-// Counted on the stepping thread only: the test runner may do as it likes.
+// Counted on the stepping thread only, the test runner may do as it likes; or on all of them.
 thread_local bool watching = false;
-std::atomic<long> allocations{0}, locks{0};
+std::atomic<bool> watching_all{false};
+std::atomic<long> allocations{0}, locks{0}, calls{0};
 void note(std::atomic<long>& counter) {
-  if (watching) counter.fetch_add(1, std::memory_order_relaxed);
+  if (watching || watching_all.load(std::memory_order_relaxed))
+    counter.fetch_add(1, std::memory_order_relaxed);
 }
 }  // namespace
 
@@ -55,6 +65,12 @@ int pthread_mutex_lock(pthread_mutex_t* mutex) {
       reinterpret_cast<int (*)(pthread_mutex_t*)>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
   return next(mutex);
 }
+int pthread_mutex_trylock(pthread_mutex_t* mutex) {
+  note(locks);
+  static const auto next =
+      reinterpret_cast<int (*)(pthread_mutex_t*)>(dlsym(RTLD_NEXT, "pthread_mutex_trylock"));
+  return next(mutex);
+}
 #endif
 }
 
@@ -63,49 +79,6 @@ using namespace h6::test;
 namespace {
 
 constexpr double mm = 1e-3;
-
-// A ball pressed into a conforming bowl: hundreds of contacts in all directions, body rolling
-// about.
-struct BallInBowl {
-  FieldArrays bowl = sample_analytic(
-      [](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
-      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
-  ShellArrays ball;
-  Model model;
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
-
-  explicit BallInBowl(unsigned threads, int points = 30000)
-      : ball(sphere_points(20 * mm, points)), model({def_of(bowl)}, {ball.def()}) {
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0;
-    hand.body = 1;
-    hand.coupling.max_depth_voxels = 3;  // pressed hard: many contacts
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
-    def.threads = threads;
-  }
-  ~BallInBowl() { h6DestroySession(session); }
-  void open() {
-    h6Error error;
-    h6DestroySession(session);
-    session = h6CreateSession(model.handle, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
-  }
-  // Leans on the wall from the first frame on. Modes read of it what they need.
-  h6DeviceSample sample(int i) const {
-    const double a = 0.2 * std::sin(0.01 * i), x = std::sin(1.2 + 0.02 * i);
-    h6DeviceSample s =
-        hand_at(pose(2 * mm * x, 1.5 * mm * std::cos(0.013 * i), 1 * mm * std::sin(0.05 * i)));
-    s.pose.q = {std::cos(a), 0, std::sin(a), 0};
-    s.wrench.force = {20 * x, 10 * std::cos(0.013 * i), 5 * std::sin(0.05 * i)};
-    s.wrench.torque = {0.01, 0.02 * x, 0};
-    s.buttons = static_cast<std::uint32_t>(i / 20 % 2);
-    return s;
-  }
-};
 
 // Every rule, and every option of the Gauss ones.
 struct Rule {
@@ -209,6 +182,107 @@ TEST_CASE("a thousand frames allocate nothing and take no lock, on one thread an
       }
   }
 }
+
+namespace {
+
+// ---- a process whose stepping thread may not call the system at all
+
+struct Counts {
+  long allocations = 0, locks = 0, calls = 0, frames = 0, helped = 0;
+};
+
+// From now on every system call of this thread is counted instead of made, but for the ends of
+// signal handlers and of the process, and write for the result; the monotonic clock is none, or is
+// excepted.
+bool forbid_calls() {
+  struct sigaction action {};
+  action.sa_sigaction = [](int, siginfo_t*, void*) { calls.fetch_add(1); };
+  action.sa_flags = SA_SIGINFO;
+  sigaction(SIGSYS, &action, nullptr);
+  const auto allow = [](unsigned number) {
+    return std::array<sock_filter, 2>{sock_filter{BPF_JMP | BPF_JEQ | BPF_K, 0, 1, number},
+                                      sock_filter{BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW}};
+  };
+  std::vector<sock_filter> filter{
+      {BPF_LD | BPF_W | BPF_ABS, 0, 0, static_cast<unsigned>(offsetof(seccomp_data, nr))}};
+  for (const unsigned number : {SYS_rt_sigreturn, SYS_exit_group, SYS_write, SYS_clock_gettime}) {
+    const auto pair = allow(number);
+    filter.insert(filter.end(), pair.begin(), pair.end());
+  }
+  filter.push_back({BPF_RET | BPF_K, 0, 0, SECCOMP_RET_TRAP});
+  const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+  return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
+}
+
+// Runs in a child and ends it: destroying things would call the system. `break_it`: the counters
+// are shown to count.
+[[noreturn]] void run_forbidden(int result, unsigned threads, long frames, bool break_it) {
+  BallInBowl scene(threads, 24000);
+  scene.hand.passivity = scene.def.contact.passivity = true;
+  scene.open();
+  std::vector<h6DeviceSample> samples;
+  for (int i = 0; i < 1000; ++i) samples.push_back(scene.sample(i));
+  std::vector<h6DeviceCommand> commands(1);
+  for (int i = 0; i < 50; ++i) h6Step(scene.session, &samples[0], commands.data());
+  Counts counts;
+  if (!forbid_calls()) counts.frames = frames = -1;
+  watching_all = true;
+  for (long i = 0; i < frames; ++i) {
+    const auto k = static_cast<std::size_t>(i % 1000);
+    // Every tenth with a budget's decision, so that both ways of traversal are walked.
+    if (i % 10 == 9) h6SetCoarse(scene.session, 1);
+    h6Step(scene.session, &samples[k], commands.data());
+    counts.helped += h6GetFrame(scene.session).contacts >= 256;
+  }
+  if (break_it && frames > 0) {
+    std::free(std::malloc(3));
+    pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+    pthread_mutex_lock(&mutex);
+    syscall(SYS_getppid);
+  }
+  watching_all = false;
+  counts.allocations = allocations, counts.locks = locks, counts.calls = calls;
+  counts.frames = frames;
+  (void)!write(result, &counts, sizeof counts);
+  for (;;) syscall(SYS_exit_group, 0);
+}
+
+Counts in_a_child(unsigned threads, long frames, bool break_it) {
+  int ends[2];
+  REQUIRE(pipe(ends) == 0);
+  const pid_t pid = fork();
+  if (pid == 0) run_forbidden(ends[1], threads, frames, break_it);
+  close(ends[1]);
+  Counts counts;
+  const bool told = read(ends[0], &counts, sizeof counts) == sizeof counts;
+  close(ends[0]);
+  waitpid(pid, nullptr, 0);
+  REQUIRE(told);
+  return counts;
+}
+
+}  // namespace
+
+TEST_CASE("ten thousand frames call neither allocator, lock nor system, on one thread and on two") {
+  const Counts broken = in_a_child(1, 10, true);
+  if (broken.frames < 0) {
+    MESSAGE("this machine does not let a process forbid itself system calls: skipped");
+    return;
+  }
+  CHECK(broken.allocations == 1);
+  CHECK(broken.locks == 1);
+  CHECK(broken.calls == 1);
+  for (const unsigned threads : {1u, 2u}) {
+    CAPTURE(threads);
+    const Counts counts = in_a_child(threads, 10000, false);
+    CHECK(counts.frames == 10000);
+    CHECK(counts.helped > 5000);  // contacts enough that there is work for a helper
+    CHECK(counts.allocations == 0);
+    CHECK(counts.locks == 0);
+    CHECK(counts.calls == 0);
+  }
+}
 #endif
 
 namespace {
@@ -251,6 +325,59 @@ TEST_CASE("one thread and two give the same bits, frame by frame") {
     mode.set(two);
     CAPTURE(std::string(mode.name));
     check_same_bits(one, two, 60, 100);
+  }
+}
+
+TEST_CASE("many fields and two hands: pairs shared between threads give the same bits") {
+  // 24 bowls, one into the other, and two balls in each of them.
+  struct Bowls : BallInBowl {
+    std::vector<h6BodyDef> many;
+    std::array<h6HandDef, 2> two{h6DefaultHandDef(), h6DefaultHandDef()};
+    Bowls(unsigned threads, std::size_t most) : BallInBowl(threads, 3000) {
+      for (int i = 0; i < 26; ++i) {
+        h6BodyDef body = h6DefaultBodyDef();
+        body.fixed = i >= 2;
+        (i < 2 ? body.shell : body.field) = 0;
+        if (i >= 2) body.pose = pose(0.05 * mm * (i % 5), 0.04 * mm * (i % 7), 0.03 * mm * i);
+        many.push_back(body);
+      }
+      for (std::size_t i = 0; i < 2; ++i) two[i] = hand, two[i].body = static_cast<int>(i);
+      def.bodies = many.data(), def.body_count = many.size();
+      def.hands = two.data(), def.hand_count = 2;
+      def.max_contacts = most;
+    }
+  };
+  for (const std::size_t most : {72000u, 700u, 60u}) {
+    CAPTURE(most);
+    Bowls one(1, most), two(2, most);
+    one.open();
+    two.open();
+    std::uint32_t contacts = 0;
+    bool dropped = false;
+    for (int i = 0; i < 50; ++i) {
+      const h6DeviceSample samples[] = {one.sample(i), one.sample(i + 40)};
+      if (i % 10 == 9) h6SetCoarse(one.session, 17), h6SetCoarse(two.session, 17);
+      h6Step(one.session, samples, nullptr);
+      h6Step(two.session, samples, nullptr);
+      const h6FrameReport a = h6GetFrame(one.session), b = h6GetFrame(two.session);
+      REQUIRE(a.state_hash == b.state_hash);
+      REQUIRE(a.contacts == b.contacts);
+      REQUIRE(a.missed_depth_voxels == b.missed_depth_voxels);
+      REQUIRE(a.status == b.status);
+      for (int body = 0; body < 2; ++body) {
+        const h6Contacts c = h6GetContacts(one.session, body), d = h6GetContacts(two.session, body);
+        REQUIRE(c.count == d.count);
+        for (std::size_t k = 0; k < c.count; ++k) {
+          if (c.point[k] == d.point[k] && c.field_body[k] == d.field_body[k]) continue;
+          REQUIRE(c.point[k] == d.point[k]);
+          REQUIRE(c.field_body[k] == d.field_body[k]);
+        }
+      }
+      contacts = std::max(contacts, a.contacts);
+      dropped = dropped || (a.status & H6_CONTACTS_DROPPED);
+    }
+    CHECK(contacts >= std::min<std::size_t>(most, 800));
+    CHECK(dropped == (most < 1000));
   }
 }
 

@@ -309,6 +309,7 @@ struct Pressing {
     bodies[1].shell = 0;
     bodies[1].pose = test::pose(0, 0, 5 * mm);
     hand.body = 1;
+    hand.safety.soft_start = 0;  // has tests of its own
     def.bodies = bodies, def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;
   }
@@ -332,7 +333,7 @@ TEST_CASE("under the clutch the hand feels nothing, the part stays pressed, and 
   scene.hand.filter.clutch_buttons = 2;
   scene.open();
   h6DeviceCapabilities slow{};
-  slow.max_force = 10, slow.max_torque = 1, slow.max_force_rate = 500;  // half a newton a frame
+  slow.max_force = 10, slow.max_torque = 1, slow.max_force_rate = 500, slow.frame_time = true;  // half a newton a frame
   h6SetRating(scene.session, 0, &slow);
   scene.step(3000);
   const double pressed = scene.told.wrench.force.z, height = h6GetBody(scene.session, 1).pose.p.z;

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -25,6 +26,8 @@ constexpr double mm = 1e-3;
 struct Pusher {
   std::vector<h6DeviceCommand> written;
   std::atomic<int> stops{0};
+  std::atomic<int> arms{0}, writes{0};
+  std::atomic<bool> refuses{false};
   int fail_read_at = -1, fail_write_at = -1, nan_at = -1;
   int reads = 0;
 
@@ -41,9 +44,14 @@ struct Pusher {
     d.write = [](void* self, double, const h6DeviceCommand* c) {
       auto& p = *static_cast<Pusher*>(self);
       p.written.push_back(*c);
+      ++p.writes;
       return static_cast<int>(p.written.size()) - 1 == p.fail_write_at ? -1 : 0;
     };
     d.stop = [](void* self) { ++static_cast<Pusher*>(self)->stops; };
+    d.arm = [](void* self) {
+      ++static_cast<Pusher*>(self)->arms;
+      return static_cast<Pusher*>(self)->refuses.load() ? -1 : 0;
+    };
     return d;
   }
 };
@@ -200,4 +208,140 @@ TEST_CASE("a loop that cannot run is refused with a sentence") {
   def.duration = NAN;
   CHECK(h6StartLoop(scene.session, &device, &def, &error) == nullptr);
   CHECK(std::string(error.message).find("duration") != std::string::npos);
+}
+
+namespace {
+
+double most_force(const Pusher& pusher, std::size_t from = 0) {
+  double most = 0;
+  for (std::size_t i = from; i < pusher.written.size(); ++i)
+    most = std::max(most, std::fabs(pusher.written[i].wrench.force.z));
+  return most;
+}
+
+void wait_for_writes(const Pusher& pusher, int more) {
+  for (const int then = pusher.writes + more; pusher.writes < then;)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+// In real time, on the frames' own: however slow the machine is, nothing is late.
+struct Live {
+  Scene scene;
+  h6Device device;
+  h6LoopDef def = h6DefaultLoopDef();
+  h6Loop* loop = nullptr;
+  explicit Live(bool disarmed = false, bool refuses = false) : device(scene.pusher.device()) {
+    device.capabilities.frame_time = true;
+    scene.pusher.refuses = refuses;
+    def.disarmed = disarmed;
+    def.realtime = false;
+    loop = h6StartLoop(scene.session, &device, &def, nullptr);
+    REQUIRE(loop);
+  }
+  ~Live() { h6DestroyLoop(loop); }
+  h6LoopReport end() {
+    h6RequestStop(loop);
+    return h6JoinLoop(loop);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a loop arms its devices when it starts, and again when it is asked to") {
+  Live live;
+  wait_for_writes(live.scene.pusher, 300);
+  CHECK(live.scene.pusher.arms == 1);
+  h6ArmLoop(live.loop);
+  wait_for_writes(live.scene.pusher, 3);
+  CHECK(live.scene.pusher.arms == 2);
+  const h6LoopReport report = live.end();
+  CHECK(most_force(live.scene.pusher) > 0.5);
+  CHECK(report.hand[0].state == H6_ACTIVE);
+  CHECK(report.hand[0].times[H6_CAUSE_SOFT_START] == 1);
+  CHECK(report.watchdog_trips == 0);
+}
+
+TEST_CASE("a loop that starts disarmed says nothing but zero until it is armed, softly") {
+  Live live(true);
+  wait_for_writes(live.scene.pusher, 300);
+  CHECK(live.scene.pusher.arms == 0);
+  h6ArmLoop(live.loop);
+  wait_for_writes(live.scene.pusher, 200);
+  h6DisarmLoop(live.loop);
+  wait_for_writes(live.scene.pusher, 100);
+  const h6LoopReport report = live.end();
+  const std::vector<h6DeviceCommand>& written = live.scene.pusher.written;
+  std::size_t first = 0;
+  while (first < written.size() && written[first].wrench.force.z == 0) ++first;
+  CHECK(first >= 300);
+  REQUIRE(first < written.size());
+  CHECK(written[first].wrench.force.z < 0.2);
+  CHECK(most_force(live.scene.pusher) > 0.5);
+  CHECK(written.back().wrench.force.z == 0);
+  CHECK(written.back().cause == H6_CAUSE_DISARMED);
+  CHECK(report.hand[0].state == H6_READY);
+}
+
+TEST_CASE("a device that refuses to be armed gets nothing") {
+  Live live(false, true);
+  wait_for_writes(live.scene.pusher, 200);
+  h6ArmLoop(live.loop);
+  wait_for_writes(live.scene.pusher, 100);
+  live.end();
+  CHECK(live.scene.pusher.arms == 2);
+  CHECK(most_force(live.scene.pusher) == 0);
+}
+
+TEST_CASE("halted: stopped at once, nothing is written after, the loop ends, the cause is kept") {
+  for (const bool all : {false, true}) {
+    Live live;
+    wait_for_writes(live.scene.pusher, 200);
+    if (all)
+      h6HaltAll();
+    else
+      h6HaltLoop(live.loop);
+    CHECK(live.scene.pusher.stops >= 1);
+    const int writes = live.scene.pusher.writes;
+    const h6LoopReport report = h6JoinLoop(live.loop);
+    CHECK(live.scene.pusher.writes == writes);
+    CHECK(report.fault == H6_CAUSE_STOPPED);
+  }
+}
+
+TEST_CASE("limits above a device's rating are refused, below it they hold") {
+  Scene scene;
+  h6SessionDef def = h6DefaultSessionDef();
+  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
+  bodies[0].fixed = true, bodies[0].field = 0;
+  bodies[1].shell = 0, bodies[1].pose = pose(0, 0, 5.2 * mm);
+  h6HandDef hand = h6DefaultHandDef();
+  hand.body = 1;
+  def.bodies = bodies.data(), def.body_count = 2;
+  def.hands = &hand, def.hand_count = 1;
+  const h6Device device = scene.pusher.device();
+  h6LoopDef loop_def = h6DefaultLoopDef();
+  loop_def.virtual_time = true;
+  loop_def.duration = 0.5;
+  h6Error error{};
+  for (const double most : {25.0, 0.3}) {
+    hand.safety.max_force = most;
+    h6DestroySession(scene.session);
+    scene.session = h6CreateSession(scene.model.handle, &def, &error);
+    REQUIRE(scene.session);
+    h6Loop* loop = h6StartLoop(scene.session, &device, &loop_def, &error);
+    CHECK((loop != nullptr) == (most < 20));
+    if (loop) {
+      h6LoopReport report{};
+      for (h6FrameRecord record; h6LoopRunning(loop);) (void)h6ReadRecords(loop, &record, 1);
+      report = h6JoinLoop(loop);
+      CHECK(report.hand[0].frames[H6_CAUSE_CLAMPED] > 100);
+      CHECK(most_force(scene.pusher) == h6::test::near(0.3));
+      h6DestroyLoop(loop);
+    } else {
+      CHECK(std::string(error.message).find("max_force, 25 N, is above") != std::string::npos);
+    }
+  }
+  hand.safety.decay_time = 0.05;
+  CHECK(h6CreateSession(scene.model.handle, &def, &error) == nullptr);
+  CHECK(std::string(error.message).find("decay_time") != std::string::npos);
 }

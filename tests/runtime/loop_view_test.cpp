@@ -203,7 +203,8 @@ TEST_CASE("paused, time stands still; slow, devices see the time of the frames")
   while (n < 50) n += h6ReadRecords(run.loop, rows.data() + n, 50 - n);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  CHECK(seconds > 0.15);  // 50 frames at a quarter of the pace take 0.2 s; less only if it ran ahead
+  CHECK(seconds >
+        0.15);  // 50 frames at a quarter of the pace take 0.2 s; less only if it ran ahead
   for (std::size_t i = 1; i < n; ++i)
     CHECK(std::fabs(rows[i].time - rows[i - 1].time - 1e-3) < 1e-9);
 }

@@ -210,6 +210,7 @@ struct Pumping {
     bodies[0].fixed = true, bodies[0].field = 0;
     bodies[1].shell = 0;
     hand.body = 1;
+    hand.safety.soft_start = 0;  // has tests of its own
     hand.coupling.max_force = 60;
     def.bodies = bodies.data(), def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;

@@ -7,62 +7,22 @@
 #include <cmath>
 #include <memory>
 
-#include "hapsix/hapsix.h"
-#include "tests/support/analytic.h"
+#include "tests/support/box_on_floor.h"
 
 using namespace h6::test;
 
 namespace {
 
-constexpr double mm = 1e-3;
-
-// A floor z < 0 in a 128 x 128 x 64 mm grid, 1 mm voxels.
-FieldArrays floor_field() {
-  return sample_analytic([](double, double, double z) { return z; }, {-64 * mm, -64 * mm, -32 * mm},
-                         mm, 16, 16, 8);
-}
-
-struct BoxOnFloor {
-  FieldArrays field = floor_field();
-  ShellArrays shell = bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
-  Model model{{def_of(field)}, {shell.def()}};
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
-
-  BoxOnFloor() {
-    bodies[0].fixed = true;
-    bodies[0].field = 0;
-    bodies[1].shell = 0;
-    bodies[1].pose = pose(0, 0, 5.2 * mm);
-    const double a = 0.1 / 12 * (400 + 100) * mm * mm, c = 0.1 / 12 * 800 * mm * mm;
-    const double inertia[6] = {a, a, c, 0, 0, 0};
-    std::copy(inertia, inertia + 6, bodies[1].inertia);
-    hand.body = 1;
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
-  }
-  ~BoxOnFloor() { h6DestroySession(session); }
-  void open() {
-    h6Error error;
-    h6DestroySession(session);
-    session = h6CreateSession(model.handle, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
-  }
-  h6DeviceCommand hold(const h6Pose& where, int frames) {
-    const h6DeviceSample sample = hand_at(where);
-    h6DeviceCommand command{};
-    for (int i = 0; i < frames; ++i) h6Step(session, &sample, &command);
-    return command;
-  }
+// Its centre of mass is the mesh's origin.
+struct CentredBox : BoxOnFloor {
+  CentredBox() { bodies[1].com = {0, 0, 0}; }
 };
 
 }  // namespace
 
 TEST_CASE("a box held into the floor comes to rest, with every method") {
   for (int method = 0; method < H6_METHOD_COUNT; ++method) {
-    BoxOnFloor scene;
+    CentredBox scene;
     scene.def.contact.method = static_cast<h6Method>(method);
     scene.open();
     CAPTURE(h6MethodName(scene.def.contact.method));
@@ -83,7 +43,7 @@ TEST_CASE("penetration at rest is the coupling force over the net stiffness") {
   const std::array<std::pair<h6Method, double>, 3> nets = {
       {{H6_METHOD_NONE, 144.0}, {H6_METHOD_GLOBAL, 10.0}, {H6_METHOD_GAUSS3, 1.0}}};
   for (const auto& [method, net] : nets) {
-    BoxOnFloor scene;
+    CentredBox scene;
     scene.def.contact.method = method;
     scene.open();
     CAPTURE(h6MethodName(method));
@@ -95,7 +55,7 @@ TEST_CASE("penetration at rest is the coupling force over the net stiffness") {
 }
 
 TEST_CASE("the largest coupling force is k times half a voxel, however far the hand goes") {
-  BoxOnFloor scene;
+  CentredBox scene;
   scene.def.contact.method = H6_METHOD_GAUSS3;
   scene.open();
   const h6DeviceCommand felt = scene.hold(pose(0, 0, -20 * mm), 4000);
@@ -106,7 +66,7 @@ TEST_CASE("the largest coupling force is k times half a voxel, however far the h
 }
 
 TEST_CASE("saturation bounds spring and damper together, at any hand speed") {
-  BoxOnFloor scene;
+  CentredBox scene;
   scene.open();
   h6DeviceSample sample = hand_at(pose(0, 0, 30 * mm));
   for (int i = 0; i < 200; ++i) {
@@ -123,7 +83,7 @@ TEST_CASE("saturation bounds spring and damper together, at any hand speed") {
 }
 
 TEST_CASE("without contact the body follows the hand to where it is") {
-  BoxOnFloor scene;
+  CentredBox scene;
   scene.open();
   const h6Pose target{{5 * mm, -3 * mm, 40 * mm}, {std::cos(0.3), 0, std::sin(0.3), 0}};
   scene.hold(target, 6000);
@@ -139,7 +99,7 @@ TEST_CASE("the explicit step has the stability limit of the theory and the impli
   // not.
   for (const auto& [k, integrator, stable] :
        {std::tuple{2e2, H6_EXPLICIT, true}, {2e4, H6_EXPLICIT, false}, {2e7, H6_IMPLICIT, true}}) {
-    BoxOnFloor scene;
+    CentredBox scene;
     scene.def.contact.method = H6_METHOD_NONE;
     scene.def.contact.stiffness = k;
     scene.def.contact.damping = 0;
@@ -198,7 +158,7 @@ TEST_CASE("two bodies that push each other keep their momentum") {
 }
 
 TEST_CASE("several fields act as one: two half floors hold like a whole one") {
-  FieldArrays whole = floor_field();
+  FieldArrays whole = CentredBox().field;
   const auto half = [](double sign) {
     return sample_analytic(
         [sign](double x, double, double z) {
@@ -237,7 +197,7 @@ TEST_CASE("several fields act as one: two half floors hold like a whole one") {
 }
 
 TEST_CASE("two hands hold two bodies, each its own") {
-  BoxOnFloor scene;
+  CentredBox scene;
   std::array<h6BodyDef, 3> bodies{scene.bodies[0], scene.bodies[1], scene.bodies[1]};
   bodies[1].pose = pose(-20 * mm, 0, 5.2 * mm);
   bodies[2].pose = pose(20 * mm, 0, 5.2 * mm);
@@ -258,7 +218,7 @@ TEST_CASE("two hands hold two bodies, each its own") {
 
 TEST_CASE("a scene moved and turned as a whole behaves the same") {
   const auto depth_at = [](const h6Quat& q) {
-    BoxOnFloor scene;
+    CentredBox scene;
     const auto turn = [&](h6Vec3 v) {  // q v q*
       const double x = q.x, y = q.y, z = q.z, w = q.w;
       const double tx = 2 * (y * v.z - z * v.y), ty = 2 * (z * v.x - x * v.z),
@@ -269,7 +229,7 @@ TEST_CASE("a scene moved and turned as a whole behaves the same") {
     scene.bodies[0].pose = {turn({0, 0, 0}), q};
     scene.bodies[1].pose = {turn({0, 0, 5.2 * mm}), q};
     scene.open();
-    scene.hold({turn({0, 0, 3 * mm}), q}, 2000);
+    scene.hold(h6Pose{turn({0, 0, 3 * mm}), q}, 2000);
     return h6GetFrame(scene.session).max_depth;
   };
   const double straight = depth_at({1, 0, 0, 0});

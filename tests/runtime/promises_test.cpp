@@ -174,9 +174,11 @@ void check_too_weak(h6CouplingMode mode, h6Gradient gradient, h6Method method, d
   }
   CHECK(free == 0);
   const h6BodyState later = h6GetBody(scene.session, 1);
-  // A ten-thousandth of a voxel in 1.5 s.
-  CHECK(std::fabs(later.pose.p.x - settled.pose.p.x) < 1e-4 * mm);
-  CHECK(std::fabs(later.pose.p.y - settled.pose.p.y) < 1e-4 * mm);
+  // A ten-thousandth of a voxel in 1.5 s; sideways also what the 0.98 N are rounded to in float may
+  // do in that time, for nothing else is there to hold a part without friction.
+  const double rounded = 0.5 * (0.98 * std::ldexp(1, -24) / 0.1) * 1.5 * 1.5;  // 0.66 um
+  CHECK(std::fabs(later.pose.p.x - settled.pose.p.x) < 1e-4 * mm + rounded);
+  CHECK(std::fabs(later.pose.p.y - settled.pose.p.y) < 1e-4 * mm + rounded);
   CHECK(std::fabs(later.pose.p.z - settled.pose.p.z) < 1e-4 * mm);
   CHECK(std::fabs(later.velocity.linear.z) < 1e-6);
   CHECK(std::fabs(later.pose.p.z - 5 * mm) < 0.5 * mm);

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <mutex>
 #include <set>
 #include <thread>
 #include <vector>
@@ -51,6 +52,75 @@ TEST_CASE("the helper does help") {
     team.end_frame(now_ns() + 100000);
   }
   CHECK(seen.size() == 2);
+}
+
+TEST_CASE("a host's own TBB work never runs on the haptic thread or its helper") {
+  FrameTeam team(2);
+  std::mutex mutex;
+  std::set<std::thread::id> ours;
+  const auto frames = [&](int count, std::int64_t ns, const auto& enough) {
+    for (int frame = 0; frame < count && !enough(); ++frame) {
+      team.begin_frame();
+      team.for_slices(8, [&](std::size_t) {
+        for (const std::int64_t end = now_ns() + ns; now_ns() < end;) {
+        }
+        std::lock_guard lock(mutex);
+        ours.insert(std::this_thread::get_id());
+      });
+      team.end_frame(now_ns() + 100000);
+    }
+  };
+  frames(500, 300000, [&] { return ours.size() == 2; });  // until the helper is at work
+  CHECK(ours.size() == 2);
+
+  std::atomic<bool> stop{false};
+  std::atomic<long> tasks{0};
+  std::set<std::thread::id> foreign;
+  std::vector<std::thread> hosts;
+  for (int i = 0; i < 2; ++i)
+    hosts.emplace_back([&] {
+      while (!stop)
+        parallel_for(64, 0, [&](std::size_t) {
+          for (const std::int64_t end = now_ns() + 20000; now_ns() < end;) {
+          }
+          ++tasks;
+          std::lock_guard lock(mutex);
+          foreign.insert(std::this_thread::get_id());
+        });
+    });
+  while (tasks < 100) std::this_thread::yield();
+  const long before = tasks;
+  frames(300, 20000, [] { return false; });
+  while (tasks < before + 100) std::this_thread::yield();
+  stop = true;
+  for (std::thread& host : hosts) host.join();
+  CHECK(ours.size() == 2);  // nobody else's thread took a slice either
+  for (const std::thread::id id : ours) CHECK(foreign.count(id) == 0);
+}
+
+TEST_CASE("a helper that is held up keeps its one slice, and the haptic thread takes all others") {
+  FrameTeam team(2);
+  const auto haptic = std::this_thread::get_id();
+  std::atomic<int> by_helper{0}, by_haptic{0};
+  for (int frame = 0; frame < 20000 && by_helper == 0; ++frame) {
+    by_helper = by_haptic = 0;
+    team.begin_frame();
+    team.for_slices(40, [&](std::size_t) {
+      // The helper is off its core, as it were, until there is nothing else left to do.
+      if (std::this_thread::get_id() != haptic) {
+        ++by_helper;
+        for (const std::int64_t end = now_ns() + 5000000000; by_haptic < 39 && now_ns() < end;) {
+        }
+        return;
+      }
+      for (const std::int64_t end = now_ns() + 10000; now_ns() < end;) {
+      }
+      ++by_haptic;
+    });
+    team.end_frame(now_ns() + 100000);
+  }
+  CHECK(by_helper == 1);
+  CHECK(by_haptic == 39);
 }
 
 TEST_CASE("a team that nobody steps can be destroyed at once") {

@@ -62,6 +62,7 @@ struct BoxOnFloor {
     const double inertia[6] = {a, a, c, 0, 0, 0};
     std::copy(inertia, inertia + 6, bodies[1].inertia);
     hand.body = 1;
+    hand.safety.soft_start = 0;  // has tests of its own
     def.bodies = bodies.data(), def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;
   }

@@ -42,14 +42,18 @@ enum {
   H6_OUTPUT_CLAMPED = 1u << 5,
   /* The wrench changed faster than the slew limit and was slowed down; admittance: the motion. */
   H6_OUTPUT_SLEWED = 1u << 6,
-  /* The output is held by a fault until h6Rearm: the wrench at zero; admittance: the pose. */
+  /* The output is held by a fault until h6Arm: the wrench at zero; admittance: the pose. */
   H6_OUTPUT_FAULT = 1u << 7,
   /* A device could not be read or written in this frame. */
   H6_DEVICE_LOST = 1u << 8,
   /* The frame before this one ended after its deadline. */
   H6_LATE = 1u << 9,
   /* Energy would have been made at a hand or a contact: the passivity controller damped it. */
-  H6_PASSIVITY = 1u << 10
+  H6_PASSIVITY = 1u << 10,
+  /* The frame would have overrun h6SessionDef.frame_budget_us: contacts of the last
+   * h6FrameReport.coarse_pairs pairs are those of one point in sixteen. Raise the budget, lower the
+   * rate, or give the shell fewer points. */
+  H6_COARSE = 1u << 11
 };
 
 /* The name of one status bit ("contacts dropped"), or NULL when the bit has no name. */

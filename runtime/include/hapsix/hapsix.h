@@ -28,6 +28,7 @@ H6_API h6ModelDef    h6DefaultModelDef(void);
 H6_API h6BodyDef     h6DefaultBodyDef(void);    /* at the origin, at rest, 0.1 kg, no shell, no field */
 H6_API h6ContactDef  h6DefaultContactDef(void); /* robust, 1e4 N/m, beta 1e-3 s                      */
 H6_API h6CouplingDef h6DefaultCouplingDef(void);/* 1e3 N/m, critically damped, half a voxel          */
+H6_API h6SafetyDef   h6DefaultSafetyDef(void);  /* the device's ratings, soft start of 0.1 s         */
 H6_API h6HandDef     h6DefaultHandDef(void);
 H6_API h6SessionDef  h6DefaultSessionDef(void); /* implicit, 1000 Hz, 16384 contacts, 1 thread       */
 
@@ -69,10 +70,21 @@ H6_API void       h6DestroySession(h6Session* session);
 /* One frame of 1/rate seconds: samples of each hand in, a wrench for each hand out. */
 H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
+/* For the next step only: so many pairs, the last ones in their order, are traversed coarsely,
+ * whatever the clock says. With h6FrameReport.coarse_pairs a run in anytime mode is repeated to the
+ * bit. */
+H6_API void h6SetCoarse(h6Session* session, uint32_t pairs);
+
 /* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
+/* What the contacts of h6GetContacts are with: for each row the `part` and the `triangle` that the
+ * field names for the brick (8 voxels wide) in which the contact is, -1 where it names none, or
+ * the contact is deeper than all bricks. Each array has room for `count` rows, or is NULL. Until
+ * the next step, like the contacts; a frame spends nothing on it. */
+H6_API void          h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
+                                    int32_t* triangle);
 H6_API h6FrameReport h6GetFrame(const h6Session* session);
 /* What the zeros of the defs became: coupling in use by a hand, the voxel of a body [m]. */
 H6_API h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand);
@@ -81,9 +93,20 @@ H6_API double        h6GetVoxel(const h6Session* session, int32_t body);
 /* Ratings that the safety chain keeps a hand's output inside; a loop sets them from its devices.
  * Without them: 100 N and 10 N m. Values above those are cut down to them. */
 H6_API void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities);
-/* Latches the output of every hand at zero, for this cause; and lets it start again, softly. */
+/* A session begins armed. h6Disarm lets every output decay to zero. h6Fault latches it at zero at
+ * once, for this cause. h6Arm clears faults and starts again, softly; it leaves a hand alone whose
+ * device is absent, lost, frozen or sends no numbers. h6Rearm is the same. While a loop runs, only
+ * its own functions below. */
+H6_API void h6Arm(h6Session* session);
+H6_API void h6Disarm(h6Session* session);
 H6_API void h6Fault(h6Session* session, h6Cause cause);
 H6_API void h6Rearm(h6Session* session);
+/* For the next step only, of a program that steps by itself: this hand's device could not be read or
+ * written, all outputs latch; so many seconds lie between the last commands and the next ones. */
+H6_API void h6LoseDevice(h6Session* session, int32_t hand);
+H6_API void h6NoteInterval(h6Session* session, double seconds);
+/* Of the last step, and counts since the session was made. */
+H6_API h6HandSafety h6GetSafety(const h6Session* session, int32_t hand);
 
 /* ---- the haptic loop ---------------------------------------------------------------------------- */
 
@@ -96,6 +119,10 @@ typedef struct h6FrameRecord {
   h6BodyState     body[H6_MAX_HANDS];          /* the body of each hand                            */
   double          wakeup_us;                   /* start after the deadline                         */
   uint32_t        late;                        /* H6_LATE_*                                        */
+  h6DeviceState   state[H6_MAX_HANDS];
+  double          late_us;                     /* of a late frame: its end after the next deadline */
+  double          cpu_us;                      /* of the haptic thread in the tick, devices and all;
+                                                  0 in virtual time                                */
 } h6FrameRecord;
 
 enum { H6_LATE_COMPUTE = 1u << 0, H6_LATE_WAKEUP = 1u << 1, H6_LATE_STOLEN = 1u << 2 };
@@ -107,9 +134,23 @@ typedef struct h6LoopDef {
   int32_t  core;          /* -1: the last one                                                      */
   double   spin_us;       /* poll the clock this long before each deadline instead of sleeping [us]*/
   size_t   ring_frames;   /* records kept for a slow reader; overruns are counted. 0: none         */
+  bool     disarmed;      /* every output stays at zero until h6ArmLoop                            */
   size_t   view_contacts; /* rows of contacts kept for a viewer; 0: no viewer                      */
 } h6LoopDef;
 H6_API h6LoopDef h6DefaultLoopDef(void);  /* real time, realtime asked for, 1000 records           */
+
+/* Late frames by how long after the deadline they ended: under 10, 100 us, 1, 10, 100 ms, longer. */
+#define H6_LATE_BINS 6
+typedef struct h6LateHistogram { uint64_t frames[H6_LATE_BINS]; } h6LateHistogram;
+
+/* What of the real-time treatment that was asked for was had. `governor`: of its core, "" unknown. */
+typedef struct h6Granted {
+  int32_t core;           /* pinned to it; -1: not pinned                                          */
+  bool    fifo;           /* SCHED_FIFO                                                            */
+  bool    locked;         /* memory                                                                */
+  bool    isolated;       /* nothing else is scheduled on that core by itself (isolcpus)           */
+  char    governor[32];   /* "performance" keeps the clock up                                      */
+} h6Granted;
 
 typedef struct h6LoopReport {
   uint64_t frames;
@@ -122,9 +163,16 @@ typedef struct h6LoopReport {
   h6Cause  fault;         /* why the output is latched at zero, or H6_CAUSE_NONE                   */
   double   wakeup_us_max;
   char     granted[1024]; /* what real-time support was granted, and how to get the rest           */
+  uint64_t watchdog_trips;/* the haptic thread stood still so often, and devices were stopped      */
+  h6HandSafety hand[H6_MAX_HANDS];
+  h6Granted grant;        /* the same to be read by a program                                      */
+  h6LateHistogram late_us_compute, late_us_stolen, late_us_wakeup;
+  uint64_t coarse_frames; /* with H6_COARSE                                                        */
 } h6LoopReport;
 
-/* Starts the haptic thread; `devices` has one entry per hand and must outlive the loop. */
+/* Starts the haptic thread; `devices` has one entry per hand and must outlive the loop. Unless every
+ * device lives on the frames' time, a watchdog thread stops the devices when no command has been sent
+ * for a frame and a decay_time; the outputs are then latched at zero. */
 H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
                            h6Error* error);
 /* Takes up to `capacity` records, oldest first; call from one reader thread. Never blocks the loop. */
@@ -159,6 +207,14 @@ H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error)
 H6_API bool   h6LoopRunning(const h6Loop* loop);
 /* Asks it to end after the current frame; any thread, and a signal handler. */
 H6_API void   h6RequestStop(h6Loop* loop);
+/* The same as h6Arm and h6Disarm, for the next frame; any thread. */
+H6_API void   h6ArmLoop(h6Loop* loop);
+H6_API void   h6DisarmLoop(h6Loop* loop);
+/* Stops every device now, sends nothing more, ends the loop; waits 2 ms at most for a command on its
+ * way. For any thread and a signal handler; h6HaltAll does it to every loop of the process, as its
+ * exit does by itself. Signal handlers are the program's to install. */
+H6_API void   h6HaltLoop(h6Loop* loop);
+H6_API void   h6HaltAll(void);
 /* Waits for the end, stops the devices, gives the report; records can still be read until
  * h6DestroyLoop. */
 H6_API h6LoopReport h6JoinLoop(h6Loop* loop);

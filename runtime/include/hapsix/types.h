@@ -38,6 +38,7 @@ typedef struct h6FieldDef {
   double         band;         /* every unit cell with a point nearer than this to the surface
                                   has all of its 8 nodes in bricks                             [m] */
   const int32_t* part;         /* (brick_count) nearest part of the mesh, or NULL                  */
+  const int32_t* triangle;     /* (brick_count) nearest triangle of the mesh, -1: none; or NULL    */
 } h6FieldDef;
 
 /* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs
@@ -172,6 +173,31 @@ typedef struct h6HandFilterDef {
 
 enum { H6_IMPEDANCE = 1u << 0, H6_ADMITTANCE = 1u << 1, H6_PSEUDO_ADMITTANCE = 1u << 2 };
 
+/* The safety chain of a hand's output (METHOD.md, "The safety chain"). It is always on; what is set
+ * here can only make it tighter than the device's own ratings: a loop refuses values above them.
+ * h6DefaultSafetyDef fills in what is not zero by default. */
+typedef struct h6SafetyDef {
+  double   max_force;       /* 0: the device's rating                                         [N]  */
+  double   max_torque;      /*                                                              [N m]  */
+  double   max_force_rate;  /* slew limit; 0: the device's                                  [N/s]  */
+  double   max_torque_rate; /*                                                            [N m/s]  */
+  double   max_power;       /* that the hand may be given; 0: max_force at 1 m/s              [W]  */
+  double   max_speed;       /* admittance modes, of the motion sent; 0: the device's        [m/s]  */
+  double   derate_speed;    /* of the hand; from here on the wrench falls linearly to nothing at
+                               cut_speed; 0: half of that                                   [m/s]  */
+  double   cut_speed;       /* of the hand; zero, latched; 0: twice the device's max_velocity, at
+                               most 5 m/s. A turn counts as the speed at 0.2 m              [m/s]  */
+  double   soft_start;      /* from nothing to the whole output after every arming, pose jump and
+                               recovery, 0 .. 10; default 0.1                                 [s]  */
+  double   decay_time;      /* from the whole output to nothing, 0.001 .. 0.02; default 0.02  [s]  */
+  double   pose_jump;       /* a sample that is farther from the last one than this and what a hand
+                               at 5 m/s moves in a frame is a jump; so is a turn by half a radian;
+                               0.001 .. 0.05; default 0.02                                    [m]  */
+  double   freeze_time;     /* samples that stay the same for so long mean a frozen device, at most
+                               1; 0: the device's                                             [s]  */
+  uint32_t dead_man_buttons;/* nothing is rendered unless one of these is held; 0: none            */
+} h6SafetyDef;
+
 /* How an arm and the engine talk (Xu & Barbic 2016, Fig. 13; METHOD.md, Sec. 4):
  *   impedance         pose in, wrench out
  *   admittance        wrench of the person in (a force sensor), pose and velocity of the body out;
@@ -192,6 +218,7 @@ typedef struct h6HandDef {
   bool            passivity;          /* observe the energy that leaves through this hand and take
                                          back by damping what was never put in
                                          (Hannaford & Ryu 2002)                                    */
+  h6SafetyDef     safety;   /* of what goes to the device                                          */
 } h6HandDef;
 
 typedef struct h6SessionDef {
@@ -207,6 +234,10 @@ typedef struct h6SessionDef {
   size_t       max_contacts;  /* a shell body; storage is reserved once                            */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
+  double       frame_budget_us; /* anytime mode: a step that would take longer stops traversal at the
+                                   deepest complete tier (H6_COARSE). It reads the clock: no two runs
+                                   leave out the same, h6SetCoarse repeats one. 0: never, and in
+                                   virtual time [us]                                               */
   h6Allocator  allocator;
 } h6SessionDef;
 
@@ -270,7 +301,7 @@ typedef struct h6FrameReport {
   double   max_depth_voxels;          /* the same in voxels of its field                           */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
-  uint64_t state_hash;                /* of poses and velocities after the step                    */
+  uint64_t state_hash;                /* of poses and velocities after the step and of the samples */
   uint32_t series_iterations;         /* `series`: Newton steps, the most of any shell body        */
   double   series_residual;           /* `series`: the largest left, of c * the deepest e          */
   /* With h6SessionDef.net_stiffness: extreme eigenvalues of S J^T w k J S over all shell bodies'
@@ -279,6 +310,12 @@ typedef struct h6FrameReport {
   double   net_stiffness_min, net_stiffness_max;
   double   passivity_energy;          /* observed at the worst port: < 0 where energy was made; 0
                                          when nothing is observed                             [J]  */
+  double   helper_start_us, helper_us;/* threads 2: the helper's first slice after the frame began, and
+                                         its time in slices                                        */
+  uint32_t helper_slices;
+  uint32_t coarse_pairs;             /* so many pairs, the last ones, were traversed coarsely       */
+  double   missed_depth_voxels;      /* H6_COARSE: no point that was left out is deeper, as long as
+                                        none is deeper than its field's band                        */
 } h6FrameReport;
 
 #ifdef __cplusplus

@@ -103,6 +103,7 @@ function show(packet: Packet) {
   if (h.cause !== 'none') chips.push([h.cause, 'warn']);
   for (const bit of h.status) chips.push([bit, 'warn']);
   if (!chips.length) chips.push(['output as asked', 'good']);
+  chips.push([`device ${h.device}`, h.device === 'active' || h.device === 'armed' ? 'good' : 'warn']);
   for (const [text, kind] of chips) {
     const e = document.createElement('span');
     e.textContent = text;
@@ -196,11 +197,10 @@ requestAnimationFrame(tick);
 // What a test looks at: numbers, not pixels.
 (window as any).hapsix = {
   view, ask, state: () => newest?.head,
-  // The deepest contact of the last so many seconds [voxel].
-  deepest(seconds: number) {
+  // The deepest contact since a time of the run [voxel].
+  deepest(since: number) {
     let most = 0;
-    const end = rows.length ? rows[rows.length - width] : 0;
-    for (let i = 0; i < rows.length; i += width) if (rows[i] > end - seconds) most = Math.max(most, rows[i + 4]);
+    for (let i = 0; i < rows.length; i += width) if (rows[i] >= since) most = Math.max(most, rows[i + 4]);
     return most;
   },
   pointOn: (body: number) => view.visiblePoint(body),

@@ -1,0 +1,52 @@
+// plugin.h - a device out of a shared library (hapsix/device_plugin.h).
+//
+//   probe  in a child process: load, open, read once, close. A crash or a hang ends the child, and
+//          becomes a sentence
+//   open   in this process, only after that went well
+#pragma once
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hapsix/device.h"
+#include "hapsix/device_plugin.h"
+#include "hapsix/result.h"
+
+namespace h6::device {
+
+struct PluginFile {
+  std::string path;  // of the shared library; without a slash: in the working folder
+  std::vector<std::pair<std::string, std::string>> options;
+};
+
+class PluginDevice {
+ public:
+  // `home` and `grip` as in h6PluginStart. `patience`: for the probe, after which it hangs [s]. A
+  // sentence when there is no such file, it is no plug-in or one for another version, its open
+  // fails, crashes or hangs, or what it says of itself makes no sense.
+  static Result<std::unique_ptr<PluginDevice>> open(const PluginFile& file, const h6Pose& home,
+                                                    const h6Vec3& grip, double patience = 10);
+  ~PluginDevice();
+  PluginDevice(const PluginDevice&) = delete;
+  PluginDevice& operator=(const PluginDevice&) = delete;
+
+  // The interface for a loop; valid while this object lives. The plug-in's time is real time.
+  h6Device device();
+  const std::string& about() const { return about_; }
+
+  // What the interface calls.
+  int read(double time, h6DeviceSample& out);
+  int write(double time, const h6DeviceCommand& command);
+  int arm();
+
+ private:
+  PluginDevice() = default;
+  void* library_ = nullptr;
+  const h6DevicePluginV1* plugin_ = nullptr;
+  void* device_ = nullptr;
+  h6PluginCapabilities capabilities_{};
+  std::string about_;
+};
+
+}  // namespace h6::device

@@ -1,0 +1,217 @@
+/* udp_arm.c - a plug-in for an arm that is reached through a network (udp_arm_protocol.h).
+ *
+ *   build/release/hapsix_udp_arm --port 47806 &
+ *   hapsix run SCENE --device 'plugin:build/release/plugins/udp_arm.so?port=47806'
+ *
+ * No thread: a datagram is sent and taken without waiting, once a frame. A command that is sent in
+ * one frame is answered by the sample that is read in the next. */
+#include <arpa/inet.h>
+#include <errno.h>
+#include <math.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "device/plugins/udp_arm_protocol.h"
+#include "hapsix/device_plugin.h"
+
+typedef struct Device {
+  h6PluginStart start; /* options are not looked at after open */
+  int socket;
+  uint32_t number;
+  UdpArmSample newest;
+  double heard;    /* when `newest` came [s] */
+  double waits;    /* since when a command has had no answer; 0: none has not [s] */
+  double patience; /* how long a command may have none [s] */
+  atomic_int stopped;
+} Device;
+
+static double now(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void rotate(const double q[4], const double v[3], double out[3]) {
+  const double t[3] = {2 * (q[2] * v[2] - q[3] * v[1]), 2 * (q[3] * v[0] - q[1] * v[2]),
+                       2 * (q[1] * v[1] - q[2] * v[0])};
+  out[0] = v[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
+  out[1] = v[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
+  out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
+}
+
+static void send_command(Device* d, uint32_t motors, const h6PluginCommand* from) {
+  UdpArmCommand c;
+  memset(&c, 0, sizeof c);
+  c.mark = UDP_ARM_COMMAND, c.number = d->number, c.motors = motors;
+  if (motors) {
+    memcpy(c.force, from->force, sizeof c.force);
+    memcpy(c.torque, from->torque, sizeof c.torque);
+  }
+  if (d->waits == 0) d->waits = now();
+  /* Nobody there, a full queue: known by the samples that do not come. */
+  (void)!send(d->socket, &c, sizeof c, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+/* Everything that has come; the newest is kept. */
+static void take_samples(Device* d) {
+  UdpArmSample s;
+  for (int n = 0; n < 100; ++n) {
+    const ssize_t bytes = recv(d->socket, &s, sizeof s, MSG_DONTWAIT | MSG_TRUNC);
+    if (bytes < 0 && errno != ECONNREFUSED) return;
+    if (bytes != (ssize_t)sizeof s || s.mark != UDP_ARM_SAMPLE) continue;
+    if ((int32_t)(s.number - d->newest.number) < 0 && now() - d->heard < 1)
+      continue; /* overtaken */
+    d->newest = s;
+    d->heard = now();
+    d->waits = 0;
+  }
+}
+
+static int fail(char* error, size_t size, const char* what, const char* which) {
+  snprintf(error, size, "%s%s", what, which);
+  return 1;
+}
+
+static int open_device(const h6PluginStart* start, h6PluginCapabilities* can, void** device,
+                       char* error, size_t error_size) {
+  double patience = 1e-3 * UDP_ARM_SILENCE;
+  struct sockaddr_in to;
+  memset(&to, 0, sizeof to);
+  to.sin_family = AF_INET;
+  to.sin_port = htons(UDP_ARM_PORT);
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  for (size_t i = 0; i < start->option_count; ++i) {
+    const char *key = start->options[i].key, *value = start->options[i].value;
+    if (strcmp(key, "host") == 0) {
+      if (inet_pton(AF_INET, value, &to.sin_addr) != 1)
+        return fail(error, error_size, "host must be an address like 127.0.0.1, not ", value);
+    } else if (strcmp(key, "port") == 0) {
+      char* end;
+      const long port = strtol(value, &end, 10);
+      if (*value == '\0' || *end != '\0' || port < 1 || port > 65535)
+        return fail(error, error_size, "port must be 1 to 65535, not ", value);
+      to.sin_port = htons((uint16_t)port);
+    } else if (strcmp(key, "timeout") == 0) {
+      patience = 1e-3 * atof(value);
+      if (!(patience >= 1e-3 && patience <= 10))
+        return fail(error, error_size, "timeout must be 1 to 10000 ms, not ", value);
+    } else {
+      return fail(error, error_size, "the options are host, port and timeout, not ", key);
+    }
+  }
+  Device* d = calloc(1, sizeof *d);
+  if (!d) return fail(error, error_size, "out of memory", "");
+  d->start = *start;
+  d->patience = patience;
+  d->start.options = NULL, d->start.option_count = 0;
+  atomic_init(&d->stopped, 0);
+  d->socket = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (d->socket < 0 || connect(d->socket, (struct sockaddr*)&to, sizeof to) != 0) {
+    if (d->socket >= 0) close(d->socket);
+    free(d);
+    return fail(error, error_size, "no socket: ", strerror(errno));
+  }
+  for (int attempt = 0; attempt < 10 && d->newest.mark == 0; ++attempt) {
+    send_command(d, 0, NULL);
+    struct pollfd wait = {d->socket, POLLIN, 0};
+    poll(&wait, 1, 50);
+    if (wait.revents & POLLERR) usleep(50000); /* nobody there yet */
+    take_samples(d);
+  }
+  if (d->newest.mark == 0) {
+    char where[INET_ADDRSTRLEN] = "";
+    inet_ntop(AF_INET, &to.sin_addr, where, sizeof where);
+    snprintf(error, error_size, "no arm answers at %s, UDP port %d: start it first", where,
+             ntohs(to.sin_port));
+    close(d->socket);
+    free(d);
+    return 1;
+  }
+  snprintf(can->name, sizeof can->name, "arm over UDP");
+  can->dof_in = 6, can->dof_out = 6;
+  can->max_force = 30, can->max_torque = 3;
+  can->modes = H6_PLUGIN_IMPEDANCE;
+  can->rate = 1000;
+  /* An arm that is gone is known by its silence, and said to be lost; later than that it would be
+   * taken for one that hangs. */
+  can->freeze_time = d->patience < 0.5 ? 2 * d->patience : 1;
+  *device = d;
+  return 0;
+}
+
+/* home, moved and turned about the grip. */
+static int read_device(void* device, double time, h6PluginSample* out) {
+  (void)time;
+  Device* d = device;
+  take_samples(d);
+  if (d->waits != 0 && now() - d->waits > d->patience) return 1;
+  /* Of an old sample the pose is still the best there is, its velocity is not. */
+  const int silent = d->waits != 0 && now() - d->waits > 1e-3 * UDP_ARM_SILENCE;
+  const UdpArmSample* s = &d->newest;
+  const double *a = s->turned, *b = d->start.home_orientation;
+  double* q = out->orientation;
+  q[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  q[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  q[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  q[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+  double at_home[3], lever[3];
+  rotate(b, d->start.grip, at_home);
+  rotate(q, d->start.grip, lever);
+  const double *w = s->angular, *l = lever;
+  const double swing[3] = {w[1] * l[2] - w[2] * l[1], w[2] * l[0] - w[0] * l[2],
+                           w[0] * l[1] - w[1] * l[0]};
+  for (int i = 0; i < 3; ++i) {
+    out->position[i] = d->start.home_position[i] + at_home[i] + s->moved[i] - lever[i];
+    out->linear[i] = silent ? 0 : s->linear[i] - swing[i];
+    out->angular[i] = silent ? 0 : w[i];
+  }
+  out->buttons = s->buttons;
+  out->sequence = s->number;
+  return 0;
+}
+
+static int write_device(void* device, double time, const h6PluginCommand* command) {
+  (void)time;
+  Device* d = device;
+  ++d->number;
+  send_command(d, atomic_load(&d->stopped) ? 0 : 1, command);
+  return 0;
+}
+
+/* Sends its own datagram and touches nothing that the haptic thread may be at. */
+static void stop_device(void* device) {
+  Device* d = device;
+  atomic_store(&d->stopped, 1);
+  const UdpArmCommand c = {UDP_ARM_COMMAND, 0, 0, 0, {0, 0, 0}, {0, 0, 0}};
+  (void)!send(d->socket, &c, sizeof c, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+static int arm_device(void* device) {
+  atomic_store(&((Device*)device)->stopped, 0);
+  return 0;
+}
+
+static void close_device(void* device) {
+  Device* d = device;
+  send_command(d, 0, NULL);
+  close(d->socket);
+  free(d);
+}
+
+const h6DevicePluginV1 h6_device_plugin_v1 = {
+    H6_PLUGIN_ABI,
+    sizeof(h6DevicePluginV1),
+    "An arm behind UDP (hapsix_udp_arm simulates one); options: host, port, timeout [ms].",
+    open_device,
+    read_device,
+    write_device,
+    stop_device,
+    arm_device,
+    close_device};

@@ -1,0 +1,367 @@
+// check_command.cpp - hapsix check: whether meshes are fit for fields, before an hour is spent on
+// them, and whether a baked field is what its mesh says.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "io/bake_plan.h"
+#include "io/clearance.h"
+#include "io/cli/checks.h"
+#include "io/cli/commands.h"
+#include "io/exact_check.h"
+#include "io/field_file.h"
+#include "io/load_scene.h"
+#include "io/mesh_file.h"
+#include "io/scene_file.h"
+#include "io/single_precision.h"
+#include "io/wall_thickness.h"
+
+namespace h6::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct CheckOptions {
+  std::vector<std::string> files;
+  std::string units = "m", field;
+  io::FieldBake bake;
+  bool verify = false;
+  double stiffness = h6DefaultContactDef().stiffness;
+  io::ExactCheckOptions exact;
+};
+
+// One mesh and the field it is for.
+struct Subject {
+  std::string name;
+  io::Mesh mesh;
+  io::FieldBake bake;
+  h6Pose pose = {{0, 0, 0}, {1, 0, 0, 0}};
+};
+
+ordered_json spread(const std::vector<double>& lengths, double voxel) {
+  if (lengths.empty()) return nullptr;
+  ordered_json out;
+  for (const auto& [name, share] :
+       {std::pair{"min", 0.0}, {"p1", 0.01}, {"p5", 0.05}, {"p25", 0.25}, {"median", 0.5}})
+    out[name] = io::quantile(lengths, share) / voxel;
+  out["below_1_voxel"] = io::share_below(lengths, voxel);
+  out["below_2_voxels"] = io::share_below(lengths, 2 * voxel);
+  return out;
+}
+
+// Depth grows to the middle of a wall; beyond it contact pushes out on the other side. One contact
+// carries the whole stiffness, however many share it.
+double holding_force(double stiffness, double thickness, double offset) {
+  return stiffness * (thickness / 2 + offset);
+}
+
+ordered_json exact_json(const io::ExactCheck& c) {
+  return {{"agrees", c.agrees()},
+          {"nodes", c.nodes},
+          {"node_error_max", c.worst_node},
+          {"node_error_mean", c.mean_node},
+          {"nodes_buried", c.buried},
+          {"nodes_too_deep", c.deep},
+          {"too_deep_max", c.worst_deep},
+          {"nodes_sealed", c.nearer},
+          {"between", c.between},
+          {"between_error_max", c.worst_between},
+          {"between_error_mean", c.mean_between},
+          {"sides", c.voted},
+          {"sides_doubtful", c.doubtful},
+          {"sides_drained", c.drained},
+          {"sides_filled", c.filled},
+          {"sides_enclosed", c.enclosed},
+          {"far", c.far},
+          {"far_above", c.far_wrong},
+          {"far_excess_max", c.far_excess},
+          {"far_gap_mean", c.far_gap},
+          {"far_grid_gap_mean", c.corner_gap}};
+}
+
+void print(const ordered_json& m, const Subject& s, const io::Walls& walls, const io::FieldPlan& p,
+           double stiffness) {
+  std::printf("%s: %zu triangles, %s; voxel %.4g mm", s.name.c_str(),
+              m["triangles"].get<std::size_t>(), m["closed"].get<bool>() ? "closed" : "a soup",
+              1e3 * p.voxel_size);
+  if (p.offset > 0) std::printf(", moved out by %.4g mm", 1e3 * p.offset);
+  std::printf(
+      "\n  bake    %d x %d x %d nodes, about %zu bricks, %.0f MB, %.0f MB as the engine keeps "
+      "them; "
+      "about %.2g s\n",
+      8 * p.bricks[0], 8 * p.bricks[1], 8 * p.bricks[2], p.brick_count, 1e-6 * double(p.bytes),
+      1e-6 * double(p.engine_bytes), p.seconds);
+  const auto line = [&](const char* what, const std::vector<double>& lengths) {
+    if (lengths.empty()) return std::printf("  %-7s none found\n", what);
+    return std::printf(
+        "  %-7s %.3g voxels for a hundredth, %.3g for a twentieth, %.3g for half of them; %.2g %% "
+        "below one voxel, %.2g %% below two\n",
+        what, io::quantile(lengths, 0.01) / p.voxel_size,
+        io::quantile(lengths, 0.05) / p.voxel_size, io::quantile(lengths, 0.5) / p.voxel_size,
+        100 * io::share_below(lengths, p.voxel_size),
+        100 * io::share_below(lengths, 2 * p.voxel_size));
+  };
+  line("walls", walls.thickness);
+  line("gaps", walls.gap);
+  if (walls.bowls > 0)
+    std::printf("  open    %.3g %% of the area is on pieces with holes, measured as if closed\n",
+                100 * walls.bowls);
+  if (walls.sheets > 0)
+    std::printf(
+        "  sheets  %.3g %% of the area is on sheets, which hold nothing: %.3g voxels thick\n",
+        100 * walls.sheets, 2 * p.offset / p.voxel_size);
+  if (m["holding_force_N"].is_number())
+    std::printf("  force   at %.4g N/m, %.3g N and less cannot push through\n", stiffness,
+                m["holding_force_N"].get<double>());
+}
+
+void print(const io::ExactCheck& c) {
+  std::printf(
+      "  field   %s\n"
+      "    distance  %zu nodes: %.2g voxel wrong at most; interpolated %.2g, %.2g on average\n"
+      "    sides     %zu votes: %zu outside that should be inside, %zu inside that should be "
+      "outside; %zu cavities, %zu doubtful\n"
+      "    far       %zu places: %zu bounds above the distance, %.2g voxel below it on average "
+      "(%.2g where the far grid is given)\n",
+      c.agrees() ? "agrees with the mesh" : "DISAGREES with the mesh", c.nodes, c.worst_node,
+      c.worst_between, c.mean_between, c.voted, c.drained, c.filled, c.enclosed, c.doubtful, c.far,
+      c.far_wrong, c.far_gap, c.corner_gap);
+}
+
+// What is worth a sentence of its own.
+std::vector<std::string> warnings_of(const Subject& s, const io::MeshAudit& a,
+                                     const io::Walls& walls, const io::FieldPlan& p) {
+  std::vector<std::string> out = s.mesh.remarks;
+  if (std::string far = io::too_far_for_floats(a.low, a.high); !far.empty()) out.push_back(far);
+  const auto percent = [](double share) { return number_text(std::round(1e3 * share) / 10); };
+  if (const double thin = io::share_below(walls.thickness, 2 * p.voxel_size); thin > 0.001)
+    out.push_back(percent(thin) +
+                  " % of the walls are thinner than two voxels: "
+                  "penetration there ends after one; bake with more voxels");
+  if (const double closed = io::share_below(walls.gap, 2 * p.offset); closed > 0.001)
+    out.push_back(percent(closed) + " % of the gaps are narrower than " +
+                  number_text(std::round(2e6 * p.offset) / 1e3) +
+                  " mm, twice the offset, and will close; more voxels make this smaller");
+  if (!a.closed && p.offset < 0.5 * p.voxel_size)
+    out.push_back(
+        "the offset is below half a voxel and the mesh is open: the outside leaks in "
+        "through every hole");
+  return out;
+}
+
+struct Verified {
+  bool asked = false, bad = false;
+};
+
+Result<ordered_json> check_one(const Console& console, const CheckOptions& o, const Subject& s,
+                               double stiffness, Verified& verified) {
+  const io::MeshAudit a = io::audit(s.mesh);
+  Result<io::FieldData> field = Failure{""};
+  io::FieldBake bake = s.bake;
+  if (!o.field.empty()) {
+    field = io::read_field(o.field);
+    if (!field) return field.failure();
+    bake.voxel_size = field->voxel_size, bake.offset = field->offset;
+  }
+  const Result<io::FieldPlan> planned = io::plan_field(s.mesh, a, bake);
+  if (!planned) return Failure{s.name + ": " + planned.error()};
+  const io::FieldPlan& p = *planned;
+  io::WallOptions wall_options;
+  wall_options.threads = o.bake.threads;
+  const Result<io::Walls> walls = io::measure_walls(s.mesh, wall_options);
+  if (!walls) return Failure{s.name + ": " + walls.error()};
+  const std::vector<std::string> warnings = warnings_of(s, a, *walls, p);
+  console.warn(warnings);
+
+  ordered_json m{{"name", s.name},
+                 {"triangles", a.triangles},
+                 {"closed", a.closed},
+                 {"odd_edges", a.odd_edges},
+                 {"duplicates", a.duplicates},
+                 {"components", a.components},
+                 {"low_m", {a.low.x, a.low.y, a.low.z}},
+                 {"high_m", {a.high.x, a.high.y, a.high.z}},
+                 {"voxel_size", p.voxel_size},
+                 {"offset", p.offset},
+                 {"dims", {8 * p.bricks[0], 8 * p.bricks[1], 8 * p.bricks[2]}},
+                 {"bricks_estimate", p.brick_count},
+                 {"field_bytes_estimate", p.bytes},
+                 {"engine_bytes_estimate", p.engine_bytes},
+                 {"bake_seconds_estimate", p.seconds},
+                 {"walls_voxels", spread(walls->thickness, p.voxel_size)},
+                 {"gaps_voxels", spread(walls->gap, p.voxel_size)},
+                 {"bowls_share", walls->bowls},
+                 {"sheets_share", walls->sheets},
+                 {"buried_share", walls->buried}};
+  // The thinnest hundredth: a few rays that graze an edge are no wall.
+  const double thin = walls->sheets > 0.001 ? 0 : io::quantile(walls->thickness, 0.01);
+  const bool known = walls->sheets > 0.001 || !walls->thickness.empty();
+  m["holding_force_N"] =
+      known ? ordered_json(holding_force(stiffness, thin, p.offset)) : ordered_json();
+  m["warnings"] = warnings;
+  if (!console.json) print(m, s, *walls, p, stiffness);
+
+  if (o.field.empty() && !o.verify) return m;
+  if (o.field.empty()) {
+    field = io::bake_field(s.mesh, s.bake, nullptr, console.progress());
+    if (!field) return Failure{s.name + ": " + field.error()};
+  }
+  io::ExactCheckOptions exact = o.exact;
+  exact.sealed = s.bake.seal > 0;
+  exact.threads = o.bake.threads;
+  const Result<io::ExactCheck> c = io::check_exactly(s.mesh, *field, exact, console.progress());
+  if (!c) return Failure{s.name + ": " + c.error()};
+  m["field"] = exact_json(*c);
+  verified.asked = true;
+  verified.bad |= c->closed && !c->agrees();
+  if (!console.json) print(*c);
+  return m;
+}
+
+// The mesh of a field or a shell; none of a baked file or of given points.
+template <class Source>
+Result<io::Mesh> mesh_of(const Source& source, const io::Scene& scene) {
+  if (source.mesh_data) return *source.mesh_data;
+  if (source.mesh.empty()) return io::Mesh{};
+  return io::read_mesh(source.mesh, source.unit.value_or(scene.unit));
+}
+
+// The bodies of a scene that are touched as fields.
+Result<std::vector<Subject>> subjects_of_scene(const io::Scene& scene) {
+  std::vector<Subject> out;
+  for (const io::SceneBody& b : scene.bodies) {
+    if (!b.field) continue;
+    Result<io::Mesh> mesh = mesh_of(*b.field, scene);
+    if (!mesh) return mesh.failure();
+    if (mesh->triangles.empty()) continue;
+    out.push_back({b.name, std::move(*mesh), b.field->bake, b.pose});
+  }
+  return out;
+}
+
+// How far every shell is from a field where the scene begins, less the field's offset.
+Result<ordered_json> clearances(const Console& console, const io::Scene& scene, const Subject& s,
+                                const ordered_json& m, unsigned threads) {
+  ordered_json list = ordered_json::array();
+  for (const io::SceneBody& b : scene.bodies) {
+    if (!b.shell || b.name == s.name) continue;
+    const Result<io::Mesh> mesh = mesh_of(*b.shell, scene);
+    if (!mesh) return mesh.failure();
+    const Result<double> gap = io::clearance(*mesh, b.pose, s.mesh, s.pose, threads);
+    if (!gap) return gap.failure();
+    if (!std::isfinite(*gap)) continue;
+    const double voxels = (*gap - m["offset"].get<double>()) / m["voxel_size"].get<double>();
+    list.push_back({{"shell", b.name}, {"distance_m", *gap}, {"voxels", voxels}});
+    if (!console.json)
+      std::printf("  start   %s is %.3g mm away: %.3g voxels from contact\n", b.name.c_str(),
+                  1e3 * *gap, voxels);
+  }
+  return list;
+}
+
+int check_command(const Console& console, CheckOptions& o) {
+  const Result<io::Unit> unit = io::unit_from_name(o.units);
+  if (!unit) return console.fail(unit.error(), kUsage);
+  if (!o.field.empty() && o.files.size() > 1)
+    return console.fail("--field is the field of one mesh: name one", kUsage);
+  if (!o.field.empty())
+    if (Outcome there = check_input(o.field); !there) return console.fail(there.error());
+  o.bake.voxel_size *= io::metres(*unit);
+  if (o.bake.offset > 0) o.bake.offset *= io::metres(*unit);
+  o.bake.seal *= io::metres(*unit);
+
+  const EndsAtOnce asked(console, o.files.front() + ": cancelled");
+  ordered_json list = ordered_json::array();
+  Verified verified;
+  for (const std::string& file : o.files) {
+    if (Outcome there = check_input(file); !there) return console.fail(there.error());
+    std::vector<Subject> subjects;
+    double stiffness = o.stiffness;
+    std::optional<io::Scene> scene;
+    if (file.ends_with(".json")) {
+      Result<io::Scene> read = io::read_scene(file);
+      if (!read) return console.fail(read.error());
+      scene = std::move(*read);
+      Result<std::vector<Subject>> found = subjects_of_scene(*scene);
+      if (!found) return console.fail(found.error());
+      subjects = std::move(*found);
+      stiffness = scene->contact.stiffness;
+    } else {
+      Result<io::Mesh> mesh = io::read_mesh(file, *unit);
+      if (!mesh) return console.fail(mesh.error());
+      subjects.push_back({file, std::move(*mesh), o.bake, {{0, 0, 0}, {1, 0, 0, 0}}});
+    }
+    for (const Subject& s : subjects) {
+      Result<ordered_json> m = check_one(console, o, s, stiffness, verified);
+      if (!m) return console.fail(m.error());
+      if (scene) {
+        Result<ordered_json> start = clearances(console, *scene, s, *m, o.bake.threads);
+        if (!start) return console.fail(start.error());
+        (*m)["clearances"] = std::move(*start);
+      }
+      list.push_back(std::move(*m));
+    }
+  }
+  console.result({{"meshes", list},
+                  {"agrees", verified.asked ? ordered_json(!verified.bad) : ordered_json()}});
+  return verified.bad ? kFailed : kOk;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, Program& program) {
+  CLI::App* check = app.add_subcommand(
+      "check", "Whether meshes suit their voxels: walls, gaps, force; whether a field is right");
+  auto o = std::make_shared<CheckOptions>();
+  check->add_option("FILE", o->files, "Meshes, or scenes whose fields are meshes")
+      ->required()
+      ->option_text("FILE...");
+  check->add_option("--units", o->units, "Unit of the meshes and of lengths here; default m")
+      ->option_text("UNIT")
+      ->check(one_of({"m", "mm", "cm", "in"}));
+  auto* voxels =
+      check
+          ->add_option("--voxels", o->bake.voxels,
+                       "Of the field they are meant for, on the longest padded side; default 256")
+          ->option_text("N")
+          ->check(whole_within(16, 2048));
+  check->add_option("--voxel-size", o->bake.voxel_size, "Edge of a voxel, instead of --voxels")
+      ->option_text("S")
+      ->excludes(voxels)
+      ->check(number_above(0));
+  check->add_option("--offset", o->bake.offset, "As for 'hapsix bake field'")
+      ->option_text("S")
+      ->check(number_within(0, 1e6));
+  check->add_option("--seal", o->bake.seal, "Likewise; samples nearer than the mesh are then fine")
+      ->option_text("WIDTH")
+      ->check(number_within(0, 1e6));
+  check
+      ->add_option("--stiffness", o->stiffness,
+                   "Of the contact, for the force that walls withstand [N/m]; default 1e4, or the "
+                   "scene's")
+      ->option_text("K")
+      ->check(number_above(0));
+  auto* field = check->add_option("--field", o->field, "A baked .vdb of the mesh: compare the two")
+                    ->option_text("FILE");
+  check->add_flag("--verify", o->verify, "Bake a field, keep it nowhere, and compare it")
+      ->excludes(field);
+  check->add_option("--points", o->exact.points, "Places to compare at; default 20000")
+      ->option_text("N")
+      ->check(whole_within(1, 100000000));
+  check
+      ->add_option("--far-points", o->exact.far_points,
+                   "Places far from the mesh to compare at; default 50000")
+      ->option_text("N")
+      ->check(whole_within(1, 100000000));
+  check->add_option("--threads", o->bake.threads, "Default: all of the machine's")
+      ->option_text("N")
+      ->check(whole_within(0, 1024));
+  check->callback([&program, o] {
+    program.work = [&program, o] { return check_command(program.console, *o); };
+  });
+}
+
+}  // namespace h6::cli

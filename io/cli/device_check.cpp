@@ -1,0 +1,155 @@
+#include "io/cli/device_check.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <thread>
+
+namespace h6::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double us_since(Clock::time_point t) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - t).count();
+}
+
+bool usable(const h6DeviceSample& s) {
+  const h6Pose& p = s.pose;
+  const double sum = p.p.x + p.p.y + p.p.z + s.velocity.linear.x + s.velocity.linear.y +
+                     s.velocity.linear.z + s.velocity.angular.x + s.velocity.angular.y +
+                     s.velocity.angular.z;
+  const double q2 = p.q.w * p.q.w + p.q.x * p.q.x + p.q.y * p.q.y + p.q.z * p.q.z;
+  return std::fabs(sum) < 1e6 && std::fabs(q2 - 1) < 2e-3;  // false for what is no number, too
+}
+
+double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
+h6Vec3 minus(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+double& part(h6Vec3& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; }
+
+// The turn from a to b, small angles.
+h6Vec3 turned(const h6Quat& a, const h6Quat& b) {
+  const h6Quat c{a.w, -a.x, -a.y, -a.z};
+  h6Quat d{
+      b.w * c.w - b.x * c.x - b.y * c.y - b.z * c.z, b.w * c.x + b.x * c.w + b.y * c.z - b.z * c.y,
+      b.w * c.y - b.x * c.z + b.y * c.w + b.z * c.x, b.w * c.z + b.x * c.y - b.y * c.x + b.z * c.w};
+  const double sign = d.w < 0 ? -2 : 2;
+  return {sign * d.x, sign * d.y, sign * d.z};
+}
+
+// A device at 1 kHz, one frame after the other.
+class Frames {
+ public:
+  explicit Frames(const h6Device& device) : device_(device), next_(Clock::now()) {
+    sample.pose.q.w = 1;
+  }
+  // Waits for its time, reads, writes.
+  void run(const h6Wrench& wrench) {
+    std::this_thread::sleep_until(next_);
+    next_ =
+        std::max(next_, Clock::now() - std::chrono::milliseconds(5)) + std::chrono::milliseconds(1);
+    time = 1e-3 * static_cast<double>(count.frames++);
+    const h6DeviceSample before = sample;
+    Clock::time_point begun = Clock::now();
+    lost = device_.read(device_.self, time, &sample) != 0;
+    count.read_us_max = std::max(count.read_us_max, us_since(begun));
+    good = usable(sample);
+    count.failed += lost;
+    count.unusable += !lost && !good;
+    count.changed += std::memcmp(&before.pose, &sample.pose, sizeof sample.pose) != 0;
+    h6DeviceCommand command{};
+    command.wrench = lost || !good ? h6Wrench{} : wrench;
+    command.pose = sample.pose;
+    begun = Clock::now();
+    lost = device_.write(device_.self, time, &command) != 0 || lost;
+    count.write_us_max = std::max(count.write_us_max, us_since(begun));
+  }
+  h6DeviceSample sample{};
+  SampleCount count;
+  double time = 0;
+  bool lost = false, good = true;
+
+ private:
+  const h6Device& device_;
+  Clock::time_point next_;
+};
+
+// Why the check must not go on; empty: it may.
+std::string danger(const Frames& f, const h6Pose& start) {
+  if (f.lost) return "the device was lost";
+  if (!f.good) return "the device sent what is no place or no rotation";
+  if (norm(f.sample.velocity.linear) > 1) return "the device moved faster than 1 m/s";
+  if (norm(minus(f.sample.pose.p, start.p)) > 0.1) return "the device moved farther than 0.1 m";
+  return "";
+}
+
+}  // namespace
+
+SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each) {
+  Frames frames(device);
+  while (frames.time < seconds) {
+    frames.run({});
+    if (!each(frames.time, frames.sample, frames.lost)) break;
+  }
+  device.stop(device.self);
+  return frames.count;
+}
+
+CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each) {
+  constexpr double kPi = 3.14159265358979323846;
+  CheckResult result;
+  Frames frames(device);
+  h6Pose start{};
+  const auto go_on = [&](const h6Wrench& wrench) {
+    frames.run(wrench);
+    if (frames.count.frames == 1) start = frames.sample.pose;
+    if (result.trouble.empty()) result.trouble = danger(frames, start);
+    if (result.trouble.empty() && !each(frames.time, frames.sample, frames.lost))
+      result.trouble = "cancelled";
+    return result.trouble.empty();
+  };
+  const auto push = [&](bool torque, int axis, double sign, double most) {
+    static constexpr const char* names[] = {"x", "y", "z"};
+    Push p;
+    p.what = std::string(torque ? "torque " : "force ") + (sign < 0 ? "-" : "+") + names[axis];
+    p.applied = most;
+    const h6Pose before = frames.sample.pose;
+    for (int i = 0; i < 400; ++i) {
+      h6Wrench w{};
+      part(torque ? w.torque : w.force, axis) = sign * most * 0.5 * (1 - std::cos(kPi * i / 200));
+      if (!go_on(w)) return false;
+      if (i != 220) continue;  // a little after the height: what yields lags
+      h6Vec3 moved =
+          torque ? turned(before.q, frames.sample.pose.q) : minus(frames.sample.pose.p, before.p);
+      p.moved = sign * part(moved, axis);
+    }
+    for (int i = 0; i < 100; ++i)
+      if (!go_on({})) return false;
+    result.pushes.push_back(p);
+    return true;
+  };
+  const h6DeviceCapabilities& c = device.capabilities;
+  const double force = std::min(0.1 * c.max_force, 10.0),
+               torque = std::min(0.1 * c.max_torque, 1.0);
+  bool going = true;
+  for (int i = 0; i < 500 && going; ++i) going = go_on({});
+  // What renders no force may have a light for it.
+  for (int i = 0; i < 1000 && going && c.dof_out == 0; ++i) going = go_on({{0, 0, force}, {}});
+  for (const bool turn : {false, true})
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double sign : {1.0, -1.0}) {
+        const double most = turn ? torque : force;
+        const bool renders = c.dof_out == 6 || (c.dof_out == 3 && !turn);
+        if (going && most > 0 && renders) going = push(turn, axis, sign, most);
+      }
+  device.stop(device.self);
+  result.samples = frames.count;
+  for (const Push& p : result.pushes)
+    if (result.trouble.empty() && p.moved < -2e-4)
+      result.trouble = "pushed by " + p.what +
+                       " it moved the other way: an axis or a sign is wrong, or a person pushed";
+  return result;
+}
+
+}  // namespace h6::cli

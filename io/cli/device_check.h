@@ -1,0 +1,45 @@
+// device_check.h - a device by itself, without a scene: its samples, and a tenth of its force.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "hapsix/device.h"
+
+namespace h6::cli {
+
+// Samples of one device, taken at 1 kHz.
+struct SampleCount {
+  std::uint64_t frames = 0, failed = 0;  // reads, and those that said "lost"
+  std::uint64_t unusable = 0;            // not finite, out of this world, or no rotation
+  std::uint64_t changed = 0;             // other than the one before
+  double read_us_max = 0, write_us_max = 0;
+};
+
+// One push of the self check.
+struct Push {
+  std::string what;    // "force +x"
+  double applied = 0;  // at its height [N] or [N m]
+  double moved = 0;    // the way of the push, at its height [m] or [rad]
+};
+
+struct CheckResult {
+  SampleCount samples;
+  std::vector<Push> pushes;
+  std::string trouble;  // why it ended early, or what is wrong; empty: all is well
+};
+
+// Called once a frame; false ends it.
+using EachFrame = std::function<bool(double time, const h6DeviceSample&, bool lost)>;
+
+// Reads at 1 kHz and commands nothing but zero.
+SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each);
+
+// Half a second of samples; then pushes of 0.4 s along and about every axis, each rising smoothly
+// to 10 % of the rating (and never more than 10 N or 1 N m) and back. A device that renders no
+// force is told of one for a second instead. Ends at zero at once when the device is lost, sends
+// what is no place, moves faster than 1 m/s or farther than 0.1 m, or `each` says so; the device is
+// then stopped.
+CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each);
+
+}  // namespace h6::cli

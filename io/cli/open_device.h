@@ -1,0 +1,43 @@
+// open_device.h - every device that the program knows, by name: NAME[:TARGET][?KEY=VALUE&...].
+#pragma once
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "device/hand_path.h"
+#include "hapsix/result.h"
+
+namespace h6::cli {
+
+struct DeviceKind {
+  const char* name;
+  const char* form;     // as it is typed
+  const char* about;    // one line
+  const char* options;  // each with its meaning; empty: none
+  bool real_time;       // lives on the machine's clock, not on that of the frames
+};
+const std::vector<DeviceKind>& device_kinds();
+
+// Whether `text` names a device and its options can be read; nothing is opened.
+Outcome check_device(const std::string& text);
+
+// What a device needs to know of the scene and of the body in hand.
+struct DevicePlace {
+  device::HandPath path{};               // at least one row
+  h6Pose home{{0, 0, 0}, {1, 0, 0, 0}};  // where the mesh frame begins
+  h6Vec3 grip{};                         // the body's centre of mass, mesh frame [m]
+  double unit = 1;                       // metres in one unit of the scene
+};
+
+struct OpenedDevice {
+  h6Device device{};
+  std::shared_ptr<void> alive;  // what it lives in
+  bool real_time = false;
+  std::string about;                  // of a plug-in; else empty
+  std::function<std::string()> live;  // what it shows of itself beside its pose; may be empty
+};
+
+Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& place);
+
+}  // namespace h6::cli

@@ -1,0 +1,356 @@
+// replay_command.cpp - hapsix replay REC.h5: the recorded hand once more, in virtual time.
+//
+//   recording --head--> scene, settings, SIMD target --> session
+//             --rows--> samples -> h6Step -> row <-- compared to the bit --> recorded row
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cinttypes>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "io/cli/checks.h"
+#include "io/cli/commands.h"
+#include "io/cli/histogram.h"
+#include "io/cli/run_scene.h"
+#include "io/cli/run_setup.h"
+#include "io/recorded_run.h"
+#include "kernels/targets.h"
+
+namespace h6::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct ReplayOptions {
+  std::string file, method;
+  unsigned threads = 0;  // 0: as recorded
+  bool verify = false;
+};
+
+struct Divergence {
+  std::uint64_t frame;
+  double time;
+  io::RowDifference where;
+  std::uint64_t recorded_hash, replayed_hash;
+};
+
+std::string hex(std::uint64_t value) {
+  char text[20];
+  std::snprintf(text, sizeof text, "%016" PRIx64, value);
+  return text;
+}
+
+// One run as a person compares it.
+struct Figures {
+  std::uint64_t frames = 0;
+  double contacts = 0, max_depth_voxels = 0, max_force = 0, max_torque = 0;
+  std::uint32_t contacts_max = 0;
+  Histogram frame_us;
+  io::VerdictWatch verdict;
+  std::uint64_t hash = 0;  // of all state hashes, in order
+
+  Figures(const io::LoadedScene& loaded, double rate)
+      : verdict(loaded.scene.verdict, loaded.watched_points,
+                loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com, rate) {}
+
+  void add(const h6FrameRecord& r) {
+    const h6FrameReport& f = r.report;
+    ++frames;
+    contacts += f.contacts;
+    contacts_max = std::max(contacts_max, f.contacts);
+    max_depth_voxels = std::max(max_depth_voxels, f.max_depth_voxels);
+    frame_us.add(f.frame_us);
+    for (const h6DeviceCommand& c : r.command) {
+      const h6Wrench& w = c.wrench;
+      max_force = std::max(max_force, std::hypot(w.force.x, w.force.y, w.force.z));
+      max_torque = std::max(max_torque, std::hypot(w.torque.x, w.torque.y, w.torque.z));
+    }
+    verdict.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
+                  (f.status & H6_STATE_NOT_FINITE) == 0);
+    hash = (hash ^ f.state_hash) * 0xd6e8feb86659fd93u;
+    hash ^= hash >> 32;
+  }
+  ordered_json json() const {
+    return {
+        {"contacts",
+         {{"mean", frames ? contacts / static_cast<double>(frames) : 0}, {"max", contacts_max}}},
+        {"max_depth_voxels", max_depth_voxels},
+        {"max_force", max_force},
+        {"max_torque", max_torque},
+        {"verdict", io::verdict_name(verdict.verdict())},
+        {"frame_us",
+         {{"p50", frame_us.percentile(50)},
+          {"p99", frame_us.percentile(99)},
+          {"max", frame_us.max()}}},
+        {"hash", hex(hash)}};
+  }
+  void print(const char* name, const std::string& method) const {
+    std::printf("%-9s %-14s %-9s %8.1f %6u %8.3f %8.2f %8.1f %8.1f\n", name, method.c_str(),
+                io::verdict_name(verdict.verdict()),
+                frames ? contacts / static_cast<double>(frames) : 0, contacts_max, max_depth_voxels,
+                max_force, frame_us.percentile(50), frame_us.percentile(99));
+  }
+};
+
+// Faults that come from outside the frame: from devices, deadlines, the program. Set as recorded.
+class Faults {
+ public:
+  void before(h6Session* session, const h6FrameRecord& recorded, std::size_t hands) {
+    const bool latched = recorded.report.status & H6_OUTPUT_FAULT;
+    if (latched_ && !latched) h6Rearm(session);
+    latched_ = latched;
+    for (std::size_t h = 0; latched && h < hands; ++h) {
+      const h6Cause cause = recorded.command[h].cause;
+      if (cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_STOPPED || cause == H6_CAUSE_LATE)
+        return h6Fault(session, cause);
+    }
+  }
+
+ private:
+  bool latched_ = false;
+};
+
+class Replay {
+ public:
+  Replay(const Console& console, const ReplayOptions& options)
+      : console_(console), options_(options) {}
+
+  Outcome open() {
+    io::FrameRange none;
+    none.count = 0;
+    Result<io::Recording> recording = io::read_recording(options_.file, none);
+    if (!recording) return recording.failure();
+    head_ = recording->head;
+    frames_ = recording->frame_count;
+    if (!recording->remark.empty()) remarks.push_back(recording->remark);
+    Result<io::RecordedRun> run = io::recorded_run(head_);
+    if (!run) return run.failure();
+    run_ = std::move(*run);
+    take_target();
+    Result<std::unique_ptr<io::LoadedScene>> loaded =
+        io::load_recorded(head_, run_, options_.file, console_.progress());
+    if (!loaded) return loaded.failure();
+    loaded_ = std::move(*loaded);
+    if (loaded_->hands.size() != head_.hands)
+      return Failure{"its scene has another number of hands than its rows"};
+    return open_session();
+  }
+
+  // Frame after frame; `as_recorded` gets the recorded rows, `now` the new ones.
+  Outcome play() {
+    recorded_.emplace(*loaded_, head_.rate);
+    replayed_.emplace(*loaded_, head_.rate);
+    const io::Progress progress = console_.progress();
+    Faults faults;
+    std::uint64_t expected = 0;
+    for (std::uint64_t at = 0; at < frames_ && !divergence; at += kPiece) {
+      const Result<io::Recording> piece = io::read_recording(options_.file, {at, kPiece});
+      if (!piece) return piece.failure();
+      for (const h6FrameRecord& row : piece->frames) {
+        if (row.report.frame != expected) return gap(expected, row.report.frame);
+        ++expected;
+        faults.before(session_.get(), row, head_.hands);
+        step(row);
+        recorded_->add(row);
+        replayed_->add(now_);
+        if (options_.verify && !same(row)) break;
+      }
+      if (!progress("replaying " + loaded_->scene.name,
+                    static_cast<double>(expected) / static_cast<double>(frames_)))
+        return Failure{"interrupted after " + std::to_string(expected) + " frames"};
+    }
+    return Done{};
+  }
+
+  ordered_json json() const {
+    ordered_json out{{"recording", options_.file},
+                     {"scene", loaded_->scene.name},
+                     {"recorded_method", recorded_method_},
+                     {"method", method_},
+                     {"threads", threads_},
+                     {"frames", replayed_->frames},
+                     {"seconds", static_cast<double>(replayed_->frames) / head_.rate},
+                     {"recorded_simd_target", head_.simd_target},
+                     {"simd_target", kernels::target_name()},
+                     {"recorded_in_virtual_time", run_.virtual_time},
+                     {"remarks", remarks},
+                     {"recorded", recorded_->json()},
+                     {"replayed", replayed_->json()}};
+    if (!options_.verify) return out;
+    out["same"] = !divergence;
+    out["divergence"] = nullptr;
+    if (divergence) {
+      const io::RowDifference& d = divergence->where;
+      out["divergence"] = {{"frame", divergence->frame},
+                           {"time", divergence->time},
+                           {"column", d.column},
+                           {"cell", d.cell},
+                           {"hand", d.hand},
+                           {"recorded", d.a},
+                           {"replayed", d.b},
+                           {"recorded_hash", hex(divergence->recorded_hash)},
+                           {"replayed_hash", hex(divergence->replayed_hash)}};
+    }
+    return out;
+  }
+
+  void print() const {
+    std::printf("%-9s %-14s %-9s %8s %6s %8s %8s %8s %8s\n", "", "method", "verdict", "contacts",
+                "most", "deepest", "force", "p50", "p99");
+    std::printf("%-9s %-14s %-9s %8s %6s %8s %8s %8s %8s\n", "", "", "", "mean", "", "[voxel]",
+                "[N]", "[us]", "[us]");
+    recorded_->print("recorded", recorded_method_);
+    replayed_->print("replayed", method_);
+    if (options_.verify && !divergence)
+      std::printf("\nevery one of %" PRIu64 " frames is the same to the bit: %s on %u thread%s\n",
+                  replayed_->frames, kernels::target_name(), threads_, threads_ == 1 ? "" : "s");
+  }
+
+  // What a person is told of a divergence.
+  std::string sentence() const {
+    const io::RowDifference& d = divergence->where;
+    char text[400];
+    std::snprintf(
+        text, sizeof text,
+        "frame %" PRIu64 " (%.4f s) is not what was recorded: %s%s%s is %.17g, it was %.17g",
+        divergence->frame, divergence->time, d.column.c_str(), d.cell == d.column ? "" : " ",
+        d.cell == d.column ? "" : d.cell.c_str(), d.b, d.a);
+    std::string out = text;
+    if (d.column == "hash")
+      out = "frame " + std::to_string(divergence->frame) + " (" + number(divergence->time, 4) +
+            " s) is not what was recorded: its hash differs while all that a hand holds is the "
+            "same, so the hand's sample or another body differs";
+    if (head_.simd_target != kernels::target_name())
+      out += "; it was recorded on " + head_.simd_target + ", this is " + kernels::target_name();
+    return out;
+  }
+
+  std::vector<std::string> remarks;
+  std::optional<Divergence> divergence;
+
+ private:
+  static constexpr std::uint64_t kPiece = 4096;
+
+  // The instruction set decides about bits: that of the recording where this machine has it.
+  void take_target() {
+    if (head_.simd_target == kernels::target_name()) return;
+    if (kernels::force_target(head_.simd_target.c_str()))
+      remarks.push_back("recorded on " + head_.simd_target +
+                        ", which is not this machine's best: replayed on that");
+    else
+      remarks.push_back("recorded on " + head_.simd_target +
+                        ", which this machine or build does not have: replayed on " +
+                        kernels::target_name() + ", bits will differ");
+  }
+
+  Outcome open_session() {
+    h6SessionDef def = loaded_->session_def();
+    def.threads = threads_ = options_.threads ? options_.threads : run_.threads;
+    def.max_contacts = run_.max_contacts;
+    def.gravity = run_.gravity;
+    method_ = recorded_method_ = h6MethodName(def.contact.method);
+    if (!options_.method.empty()) {
+      method_ = options_.method;
+      h6MethodFromName(options_.method.c_str(), &def.contact.method, &def.contact.pieces);
+    }
+    h6Error error{};
+    session_.reset(h6CreateSession(loaded_->model.get(), &def, &error));
+    if (!session_) return Failure{error.message};
+    for (std::size_t h = 0; h < head_.hands; ++h)
+      h6SetRating(session_.get(), static_cast<std::int32_t>(h), &run_.ratings[h]);
+    return Done{};
+  }
+
+  void step(const h6FrameRecord& row) {
+    now_ = {};
+    now_.time = row.time;
+    std::copy(std::begin(row.hand), std::end(row.hand), now_.hand);
+    h6SetCoarse(session_.get(), row.report.coarse_pairs);  // what the clock decided then
+    h6Step(session_.get(), now_.hand, now_.command);
+    now_.report = h6GetFrame(session_.get());
+    for (std::size_t h = 0; h < head_.hands; ++h)
+      now_.body[h] = h6GetBody(session_.get(), loaded_->hands[h].body);
+  }
+
+  bool same(const h6FrameRecord& row) {
+    // Times are not bits of the state; nor is what the safety chain made of a late frame.
+    if (!io::first_difference(row, now_, head_.hands, false)) return true;
+    divergence =
+        Divergence{row.report.frame, row.time, *io::first_difference(row, now_, head_.hands, true),
+                   row.report.state_hash, now_.report.state_hash};
+    return false;
+  }
+
+  Outcome gap(std::uint64_t expected, std::uint64_t found) {
+    if (expected == 0)
+      return Failure{"it begins with frame " + std::to_string(found) +
+                     ": a run can only be replayed from its first frame on"};
+    return Failure{"frames " + std::to_string(expected) + " to " + std::to_string(found - 1) +
+                   " are missing, the recorder was too slow for them: up to there " +
+                   (options_.verify ? "every frame is the same" : "it was replayed")};
+  }
+
+  const Console& console_;
+  const ReplayOptions& options_;
+  io::RecordingHead head_;
+  io::RecordedRun run_;
+  std::uint64_t frames_ = 0;
+  std::unique_ptr<io::LoadedScene> loaded_;
+  SessionPtr session_;
+  unsigned threads_ = 1;
+  std::string method_, recorded_method_;
+  std::optional<Figures> recorded_, replayed_;
+  h6FrameRecord now_{};
+};
+
+int replay_command(const Console& console, const ReplayOptions& options) {
+  RunOptions method;
+  method.method = options.method;
+  if (Outcome known = check_options(method); !known) return console.fail(known.error(), kUsage);
+  if (options.verify && !options.method.empty())
+    return console.fail("--verify compares bits with the recorded method: leave --method out",
+                        kUsage);
+  if (Outcome there = check_input(options.file); !there) return console.fail(there.error());
+  Replay replay(console, options);
+  const auto failed = [&](const std::string& sentence) {
+    console.warn(replay.remarks);
+    return console.fail(options.file + " cannot be replayed: " + sentence);
+  };
+  if (Outcome opened = replay.open(); !opened) return failed(opened.error());
+  if (Outcome played = replay.play(); !played) return failed(played.error());
+  console.warn(replay.remarks);
+  ordered_json json = replay.json();
+  if (replay.divergence) json["error"] = replay.sentence();
+  console.result(json);
+  if (!console.json) replay.print();
+  if (!replay.divergence) return kOk;
+  console.log("hapsix: " + replay.sentence());
+  return kFailed;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, Program& program) {
+  CLI::App* replay =
+      app.add_subcommand("replay", "Run a recorded hand again, and compare every bit");
+  auto o = std::make_shared<ReplayOptions>();
+  replay->add_option("REC", o->file, "A recording, made by 'hapsix run --record'")
+      ->required()
+      ->option_text("REC.h5")
+      ->check(ends_with(".h5"));
+  replay->add_option("--method", o->method, "Another way to share contact stiffness, same hand")
+      ->option_text("NAME");
+  replay->add_option("--threads", o->threads, "1 or 2; default as recorded")
+      ->option_text("N")
+      ->check(whole_within(1, 2));
+  replay->add_flag("--verify", o->verify,
+                   "Compare every frame with the recorded one; exit 1 at the first that differs");
+  replay->callback([&program, o] {
+    program.work = [&program, o] { return replay_command(program.console, *o); };
+  });
+}
+
+}  // namespace h6::cli

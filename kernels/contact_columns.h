@@ -1,0 +1,39 @@
+// contact_columns.h - what the weighing rules need of every contact before they look at all of
+// them.
+#pragma once
+#include "kernels/views.h"
+
+namespace h6::kernels {
+
+// Inward unit normal N, unit gradient g of the field, arm r from the centre of mass [m].
+struct ContactColumns {
+  const float *nx, *ny, *nz;
+  const float *gx, *gy, *gz;
+  const float *rx, *ry, *rz;
+  std::size_t count;
+};
+
+// facing_i = clamp(N.g / edge, 0, 1): what opposes the gradient would pull the body in.
+void contact_facing(const ContactColumns& c, float edge, float* facing);
+void contact_facing_ref(const ContactColumns& c, float edge, float* facing);
+
+// T = (r x N) / sqrt(|r x N|^2 + l0^2), Xu & Barbic 2016, Eq. (10), with l0 against blow-up where r
+// is parallel to N; 0 where the root is. With lever > 0, Eq. (13): T = (r x N) / lever.
+void torque_directions(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
+                       float* tz);
+void torque_directions_ref(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
+                           float* tz);
+
+// e_i = depth_i - beta [N; r x N].u: depth less what damping takes at the relative velocity u.
+void series_gap(const ContactColumns& c, const float* depth, double beta, const double u[6],
+                float* e);
+void series_gap_ref(const ContactColumns& c, const float* depth, double beta, const double u[6],
+                    float* e);
+
+// load_i = kappa_i slack_i; weight_i = load_i / depth_i, or 0 where the depth is not above 0.
+void series_loads(const float* kappa, const float* slack, const float* depth, std::size_t count,
+                  float* load, float* weight);
+void series_loads_ref(const float* kappa, const float* slack, const float* depth, std::size_t count,
+                      float* load, float* weight);
+
+}  // namespace h6::kernels

@@ -1,0 +1,212 @@
+// The worked example: an arm in a process of its own, reached through UDP, in the hand of a session
+// at 1 kHz; killed, started again.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <dlfcn.h>
+#include <doctest/doctest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "device/plugin.h"
+#include "hapsix/hapsix.h"
+#include "tests/support/near.h"
+
+using namespace h6;
+using namespace h6::device;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+const std::string library = HAPSIX_PLUGIN_FOLDER "/udp_arm.so";
+
+// The other process; killed with its object. Port 0: any, asked back.
+class ArmProcess {
+ public:
+  explicit ArmProcess(int port = 0) {
+    int ends[2];
+    REQUIRE(pipe(ends) == 0);
+    const std::string number = std::to_string(port);
+    pid_ = fork();
+    if (pid_ == 0) {
+      dup2(ends[1], STDOUT_FILENO);
+      close(ends[0]);
+      execl(HAPSIX_UDP_ARM, HAPSIX_UDP_ARM, "--port", number.c_str(), "--press", "0.02", "--period",
+            "0.5", static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    close(ends[1]);
+    char text[32] = "";
+    CHECK(read(ends[0], text, sizeof text - 1) > 0);
+    close(ends[0]);
+    this->port = std::atoi(text);
+    CHECK(this->port > 0);
+  }
+  ~ArmProcess() { end(); }
+  void end() {
+    if (pid_ <= 0) return;
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+    pid_ = -1;
+  }
+  int port = 0;
+
+ private:
+  pid_t pid_ = -1;
+};
+
+// A machine that does something else may hold the other process up: that is not what is tested.
+PluginFile at(int port) { return {library, {{"port", std::to_string(port)}, {"timeout", "300"}}}; }
+
+// A floor at z = 0 and a part of one point, 5 mm above it, 1 kHz.
+struct Floor {
+  std::vector<float> d = std::vector<float>(512), far_grid = std::vector<float>(8);
+  float zero = 0, up = 1;
+  std::int32_t brick = 0;
+  std::uint32_t rows[2] = {0, 1};
+  h6Model* model = nullptr;
+  h6Session* session = nullptr;
+  h6BodyDef body[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
+  h6HandDef hand = h6DefaultHandDef();
+  Floor() {
+    for (int i = 0; i < 512; ++i) d[static_cast<std::size_t>(i)] = 5e-3f * (i / 64 - 4);
+    for (std::size_t i = 0; i < 8; ++i) far_grid[i] = d[i < 4 ? 0 : 511];
+    h6FieldDef field{};
+    field.origin = {-0.02, -0.02, -0.02}, field.voxel_size = 5e-3;
+    for (int& bricks : field.bricks) bricks = 1;
+    field.brick_index = &brick, field.samples = d.data(), field.brick_count = 1;
+    field.far_grid = far_grid.data(), field.band = 5e-3;
+    const h6ShellDef tip{1,    &zero, &zero, &zero, &zero, &zero, &up,
+                         NULL, 1,     rows,  rows,  &zero, rows,  rows};
+    h6ModelDef parts = h6DefaultModelDef();
+    parts.fields = &field, parts.field_count = 1, parts.shells = &tip, parts.shell_count = 1;
+    h6Error error{};
+    model = h6CreateModel(&parts, &error);
+    REQUIRE_MESSAGE(model, error.message);
+    body[0].fixed = true, body[0].field = 0, body[1].shell = 0, body[1].pose.p.z = 5e-3;
+    hand.body = 1;
+    h6SessionDef def = h6DefaultSessionDef();
+    def.bodies = body, def.body_count = 2, def.hands = &hand, def.hand_count = 1;
+    session = h6CreateSession(model, &def, &error);
+    REQUIRE_MESSAGE(session, error.message);
+  }
+  ~Floor() { h6DestroySession(session), h6DestroyModel(model); }
+};
+
+double force(const h6FrameRecord& r) {
+  const h6Vec3& f = r.command[0].wrench.force;
+  return std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z);
+}
+
+}  // namespace
+
+TEST_CASE("a command is answered by the next frame at 1 kHz; the round trip is printed") {
+  ArmProcess arm;
+  void* const lib = dlopen(library.c_str(), RTLD_NOW);
+  REQUIRE(lib);
+  const auto* plugin = static_cast<const h6DevicePluginV1*>(dlsym(lib, "h6_device_plugin_v1"));
+  REQUIRE(plugin);
+  const std::string port = std::to_string(arm.port);
+  const h6PluginOption option{"port", port.c_str()};
+  h6PluginStart start{&option, 1, {0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}};
+  h6PluginCapabilities can{};
+  void* device = nullptr;
+  char error[256] = "";
+  REQUIRE_MESSAGE(plugin->open(&start, &can, &device, error, sizeof error) == 0, error);
+  std::vector<double> trip;
+  int answered = 0, asked = 0;
+  const h6PluginCommand command{};
+  h6PluginSample s{};
+  auto deadline = Clock::now();
+  const int frames = 700;
+  for (int i = 0; i < frames; ++i) {
+    std::this_thread::sleep_until(deadline += std::chrono::milliseconds(1));
+    const std::uint32_t before = s.sequence;
+    const bool pending = i > 0 && (i - 1) % 7 != 0;
+    asked += pending;
+    if (plugin->read(device, 0, &s) == 0) answered += pending && s.sequence > before;
+    const std::uint32_t sent = s.sequence;
+    const auto begun = Clock::now();
+    plugin->write(device, 0, &command);
+    if (i % 7 != 0) continue;  // most answers wait for the next frame, some are waited for
+    while (plugin->read(device, 0, &s) == 0 && s.sequence == sent &&
+           Clock::now() - begun < std::chrono::milliseconds(5)) {
+    }
+    trip.push_back(std::chrono::duration<double, std::micro>(Clock::now() - begun).count());
+  }
+  std::sort(trip.begin(), trip.end());
+  MESSAGE("round trip through UDP and the other process: p50 ", trip[trip.size() / 2], " us, p99 ",
+          trip[trip.size() * 99 / 100], " us; answered by the next frame ", answered, " of ",
+          asked);
+  CHECK(answered > asked / 2);
+  plugin->stop(device);
+  plugin->close(device);
+  dlclose(lib);
+}
+
+TEST_CASE(
+    "the arm's process is killed: no force, the device is lost with its cause; when it is "
+    "there again it is read, and not armed by itself") {
+  Floor floor;
+  auto arm = std::make_unique<ArmProcess>();
+  const int port = arm->port;
+  auto opened = PluginDevice::open(at(port), floor.body[1].pose, {});
+  REQUIRE_MESSAGE(opened, (opened ? "" : opened.error()));
+  h6Device device = (*opened)->device();
+  h6LoopDef def = h6DefaultLoopDef();
+  def.ring_frames = 10000;
+  h6Error error{};
+  h6Loop* const loop = h6StartLoop(floor.session, &device, &def, &error);
+  REQUIRE_MESSAGE(loop, error.message);
+  std::vector<h6FrameRecord> rows, taken(256);
+  const auto run_until = [&](auto condition) {
+    for (int i = 0; i < 1000; ++i) {
+      while (const std::size_t n = h6ReadRecords(loop, taken.data(), taken.size()))
+        rows.insert(rows.end(), taken.begin(), taken.begin() + static_cast<long>(n));
+      if (!rows.empty() && condition(rows.back())) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return false;
+  };
+  CHECK(run_until([](const h6FrameRecord& r) { return force(r) > 1; }));
+  arm->end();
+  CHECK(run_until(
+      [](const h6FrameRecord& r) { return (r.report.status & H6_DEVICE_LOST) && force(r) == 0; }));
+  CHECK(rows.back().command[0].cause == H6_CAUSE_DEVICE_LOST);
+  arm = std::make_unique<ArmProcess>(port);
+  CHECK(arm->port == port);
+  CHECK(run_until([](const h6FrameRecord& r) { return !(r.report.status & H6_DEVICE_LOST); }));
+  const std::size_t back = rows.size();
+  CHECK(
+      run_until([&](const h6FrameRecord&) { return rows.size() > back + 700; }));  // presses again
+  double lowest = 1;
+  for (std::size_t i = back; i < rows.size(); ++i) {
+    CHECK(force(rows[i]) == 0);
+    lowest = std::min(lowest, rows[i].hand[0].pose.p.z);
+  }
+  CHECK(lowest < 0);  // it is read
+  h6RequestStop(loop);
+  const h6LoopReport report = h6JoinLoop(loop);
+  CHECK(report.fault == H6_CAUSE_DEVICE_LOST);
+  h6DestroyLoop(loop);
+}
+
+TEST_CASE("without an arm at the other end, open says where it looked") {
+  int port;
+  {
+    ArmProcess arm;
+    port = arm.port;
+  }
+  auto opened = PluginDevice::open(at(port), {{0, 0, 0}, {1, 0, 0, 0}}, {});
+  REQUIRE(!opened);
+  CHECK(opened.error().find("no arm answers at 127.0.0.1, UDP port " + std::to_string(port)) !=
+        std::string::npos);
+}

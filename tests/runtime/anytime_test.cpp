@@ -1,0 +1,176 @@
+// Anytime mode: what a frame leaves out when time is short, what it says of it, and that a run can
+// be repeated.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "tests/support/ball_in_bowl.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr double mm = kMm;
+
+// Depth of each point that touches.
+std::map<std::uint32_t, float> depths(const h6Session* session) {
+  const h6Contacts c = h6GetContacts(session, 1);
+  std::map<std::uint32_t, float> out;
+  for (std::size_t i = 0; i < c.count; ++i) out[c.point[i]] = c.depth[i];
+  return out;
+}
+
+// Somewhere in the bowl, pressed in by 0 to 1.5 mm, turned any way.
+h6BodyState somewhere(int i) {
+  const double a = 0.7 * i, b = 1.3 * i, d = (0.2 + 0.0875 * (i % 16)) * mm;
+  h6BodyState state{};
+  state.pose = pose(d * std::cos(a) * std::cos(b), d * std::sin(a) * std::cos(b), d * std::sin(b));
+  state.pose.q = {std::cos(a), std::sin(a) * std::cos(b), 0, std::sin(a) * std::sin(b)};
+  return state;
+}
+
+void step_at(h6Session* session, const h6BodyState& state) {
+  h6SetBody(session, 1, &state);
+  const h6DeviceSample sample = hand_at(state.pose);
+  h6Step(session, &sample, nullptr);
+}
+
+// Three bowls next to each other: three pairs.
+struct ThreeBowls : BallInBowl {
+  std::array<h6BodyDef, 4> four{h6DefaultBodyDef(), h6DefaultBodyDef(), h6DefaultBodyDef(),
+                                h6DefaultBodyDef()};
+  explicit ThreeBowls(unsigned threads) : BallInBowl(threads, 6000) {
+    for (std::size_t i : {0u, 2u, 3u}) four[i].fixed = true, four[i].field = 0;
+    four[1].shell = 0;
+    four[2].pose = pose(0.1 * mm, 0, 0);
+    four[3].pose = pose(0, 0.15 * mm, 0.05 * mm);
+    def.bodies = four.data(), def.body_count = 4;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a coarse frame has some of the full frame's contacts and bounds all it left out") {
+  BallInBowl full(1), coarse(1);
+  full.open();
+  coarse.open();
+  double tightest = HUGE_VAL;
+  for (int i = 0; i < 60; ++i) {
+    CAPTURE(i);
+    h6SetCoarse(coarse.session, 1);
+    step_at(full.session, somewhere(i));
+    step_at(coarse.session, somewhere(i));
+    const h6FrameReport f = h6GetFrame(full.session), c = h6GetFrame(coarse.session);
+    CHECK((f.status & H6_COARSE) == 0);
+    CHECK(f.coarse_pairs == 0);
+    CHECK(f.missed_depth_voxels == 0);
+    CHECK((c.status & H6_COARSE) != 0);
+    CHECK(c.coarse_pairs == 1);
+    const auto all = depths(full.session), some = depths(coarse.session);
+    REQUIRE(all.size() > 100);
+    CHECK(some.size() < all.size() / 8);
+    CHECK(some.size() > all.size() / 32);
+    for (const auto& [point, depth] : some) {
+      REQUIRE(all.count(point) == 1);
+      CHECK(all.at(point) == depth);
+    }
+    CHECK(f.max_depth_voxels <= c.missed_depth_voxels);
+    tightest = std::min(tightest, c.missed_depth_voxels - f.max_depth_voxels);
+  }
+  CHECK(tightest < 4);  // voxels: a bound, not just any number
+}
+
+TEST_CASE("nothing of a coarse frame stays: the next full one is as if it had not been") {
+  for (const h6Method method : {H6_METHOD_ROBUST, H6_METHOD_SERIES}) {
+    BallInBowl full(1, 6000), mixed(1, 6000);
+    for (BallInBowl* scene : {&full, &mixed}) {
+      scene->def.contact.method = method;
+      scene->open();
+    }
+    for (int i = 0; i < 90; ++i) {
+      // Slow and fast motion: some groups stay clear, some do not.
+      const h6BodyState state = i < 60 ? h6BodyState{full.sample(i).pose, {}} : somewhere(i);
+      if (i % 3) h6SetCoarse(mixed.session, 1);
+      step_at(full.session, state);
+      step_at(mixed.session, state);
+      CHECK((h6GetFrame(mixed.session).coarse_pairs == 1) == (i % 3 != 0));
+      if (i % 3 == 0) CHECK(depths(mixed.session) == depths(full.session));
+    }
+  }
+}
+
+TEST_CASE("a frame without time is coarse, one with enough never") {
+  for (const double budget : {1e-3, 1e6}) {
+    BallInBowl scene(1, 6000);
+    scene.def.frame_budget_us = budget;
+    scene.open();
+    for (int i = 0; i < 30; ++i) {
+      const h6DeviceSample sample = scene.sample(i);
+      h6Step(scene.session, &sample, nullptr);
+      CHECK((h6GetFrame(scene.session).coarse_pairs == 1) == (budget < 1));
+    }
+  }
+  BallInBowl scene(1, 2000);
+  for (const double wrong : {-1.0, 1e7, std::nan("")}) {
+    scene.def.frame_budget_us = wrong;
+    h6Error error;
+    CHECK(h6CreateSession(scene.model.handle, &scene.def, &error) == nullptr);
+    CHECK(std::string(error.message).find("frame_budget_us") != std::string::npos);
+  }
+}
+
+TEST_CASE("what the clock left out is repeated to the bit, on one thread and on two") {
+  ThreeBowls live(1), again(2);
+  live.def.frame_budget_us = 60;  // about what a frame takes: what happens is the machine's affair
+  live.open();
+  again.open();
+  std::array<int, 4> seen{};
+  for (int i = 0; i < 300; ++i) {
+    const h6DeviceSample sample = live.sample(i);
+    h6DeviceCommand a{}, b{};
+    if (i % 2) h6SetCoarse(live.session, static_cast<std::uint32_t>(i / 2 % 4));
+    h6Step(live.session, &sample, &a);
+    const h6FrameReport l = h6GetFrame(live.session);
+    h6SetCoarse(again.session, l.coarse_pairs);
+    h6Step(again.session, &sample, &b);
+    const h6FrameReport r = h6GetFrame(again.session);
+    REQUIRE(l.coarse_pairs <= 3);
+    ++seen[l.coarse_pairs];
+    REQUIRE(l.state_hash == r.state_hash);
+    REQUIRE(l.contacts == r.contacts);
+    REQUIRE(l.status == r.status);
+    REQUIRE(a.wrench.force.x == b.wrench.force.x);
+    REQUIRE(b.wrench.torque.z == a.wrench.torque.z);
+  }
+  for (const int n : seen) CHECK(n > 30);
+}
+
+TEST_CASE("virtual time has no deadline, and leaves nothing out") {
+  BallInBowl scene(1, 2000);
+  scene.def.frame_budget_us = 1e-3;
+  scene.open();
+  h6Device device{};
+  device.read = [](void*, double, h6DeviceSample* out) {
+    return *out = hand_at(pose(0.8 * mm, 0, 0)), 0;
+  };
+  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+  for (const bool virtual_time : {true, false}) {
+    const h6BodyState pressed{pose(0.8 * mm, 0, 0), {}};
+    h6SetBody(scene.session, 1, &pressed);
+    h6LoopDef def = h6DefaultLoopDef();
+    def.duration = 0.02;
+    def.virtual_time = virtual_time;
+    h6Loop* loop = h6StartLoop(scene.session, &device, &def, nullptr);
+    REQUIRE(loop);
+    const h6LoopReport report = h6JoinLoop(loop);
+    CHECK(report.frames == 20);
+    CHECK(report.coarse_frames == (virtual_time ? 0 : 20));
+    h6DestroyLoop(loop);
+  }
+}
