@@ -17,6 +17,7 @@ struct Program {
 };
 
 void add_bake(CLI::App& app, Program& program);
+void add_report(CLI::App& app, Program& program);
 void add_run(CLI::App& app, Program& program);
 void add_check(CLI::App& app, Program& program);
 void add_replay(CLI::App& app, Program& program);

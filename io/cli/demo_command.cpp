@@ -6,10 +6,12 @@
 
 #include "io/cli/checks.h"
 #include "io/cli/commands.h"
+#include "io/cli/report_files.h"
 #include "io/cli/run_scene.h"
 #include "io/cli/tables.h"
 #include "io/cli/view_run.h"
 #include "io/scenes/scenes.h"
+#include "io/view/page.h"
 
 namespace h6::cli {
 namespace {
@@ -27,6 +29,20 @@ void print(const std::vector<RunSummary>& runs, bool virtual_time) {
                 depth_strip(run).c_str());
   if (!virtual_time) std::printf("\nreal time: %s\n", runs.back().loop.granted);
   for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
+}
+
+// Where there is no page to put it on, the demo does without.
+Outcome report(const Console& console, const DemoOptions& o, const std::vector<RunSummary>& runs,
+               nlohmann::ordered_json& json) {
+  if (io::view::report_page().empty()) return Done{};
+  std::vector<std::string> recordings;
+  for (const RunSummary& run : runs) recordings.push_back(run.recording);
+  const std::string file = (std::filesystem::path(o.folder) / (o.scene + ".html")).string();
+  const Result<std::size_t> written = write_report(recordings, file, console);
+  if (!written) return written.failure();
+  json["report"] = file;
+  if (!console.json) std::printf("report: %s\n", file.c_str());
+  return Done{};
 }
 
 int demo_command(const Console& console, DemoOptions o) {
@@ -64,6 +80,8 @@ int demo_command(const Console& console, DemoOptions o) {
     if (runs.back().interrupted) return console.fail("interrupted");
   }
   if (!console.json) print(runs, o.run.virtual_time);
+  if (Outcome reported = report(console, o, runs, json); !reported)
+    return console.fail(reported.error());
   if (o.view.on) {
     o.view.folder = o.folder;
     o.run = {};  // a run without an end, by the scene's own settings, nothing recorded unasked

@@ -14,9 +14,9 @@
 #include "io/cli/checks.h"
 #include "io/cli/commands.h"
 #include "io/cli/histogram.h"
+#include "io/cli/recorded_session.h"
 #include "io/cli/run_scene.h"
-#include "io/cli/run_setup.h"
-#include "io/recorded_run.h"
+#include "io/recording.h"
 #include "kernels/targets.h"
 
 namespace h6::cli {
@@ -95,24 +95,6 @@ struct Figures {
   }
 };
 
-// Faults that come from outside the frame: from devices, deadlines, the program. Set as recorded.
-class Faults {
- public:
-  void before(h6Session* session, const h6FrameRecord& recorded, std::size_t hands) {
-    const bool latched = recorded.report.status & H6_OUTPUT_FAULT;
-    if (latched_ && !latched) h6Rearm(session);
-    latched_ = latched;
-    for (std::size_t h = 0; latched && h < hands; ++h) {
-      const h6Cause cause = recorded.command[h].cause;
-      if (cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_STOPPED || cause == H6_CAUSE_LATE)
-        return h6Fault(session, cause);
-    }
-  }
-
- private:
-  bool latched_ = false;
-};
-
 class Replay {
  public:
   Replay(const Console& console, const ReplayOptions& options)
@@ -126,25 +108,18 @@ class Replay {
     head_ = recording->head;
     frames_ = recording->frame_count;
     if (!recording->remark.empty()) remarks.push_back(recording->remark);
-    Result<io::RecordedRun> run = io::recorded_run(head_);
-    if (!run) return run.failure();
-    run_ = std::move(*run);
-    take_target();
-    Result<std::unique_ptr<io::LoadedScene>> loaded =
-        io::load_recorded(head_, run_, options_.file, console_.progress());
-    if (!loaded) return loaded.failure();
-    loaded_ = std::move(*loaded);
-    if (loaded_->hands.size() != head_.hands)
-      return Failure{"its scene has another number of hands than its rows"};
-    return open_session();
+    Result<std::unique_ptr<RecordedSession>> opened = RecordedSession::open(
+        options_.file, head_, {options_.method, options_.threads}, console_.progress(), remarks);
+    if (!opened) return opened.failure();
+    session_ = std::move(*opened);
+    return Done{};
   }
 
   // Frame after frame; `as_recorded` gets the recorded rows, `now` the new ones.
   Outcome play() {
-    recorded_.emplace(*loaded_, head_.rate);
-    replayed_.emplace(*loaded_, head_.rate);
+    recorded_.emplace(session_->loaded(), head_.rate);
+    replayed_.emplace(session_->loaded(), head_.rate);
     const io::Progress progress = console_.progress();
-    Faults faults;
     std::uint64_t expected = 0;
     for (std::uint64_t at = 0; at < frames_ && !divergence; at += kPiece) {
       const Result<io::Recording> piece = io::read_recording(options_.file, {at, kPiece});
@@ -152,13 +127,12 @@ class Replay {
       for (const h6FrameRecord& row : piece->frames) {
         if (row.report.frame != expected) return gap(expected, row.report.frame);
         ++expected;
-        faults.before(session_.get(), row, head_.hands);
-        step(row);
+        const h6FrameRecord& now = session_->step(row);
         recorded_->add(row);
-        replayed_->add(now_);
-        if (options_.verify && !same(row)) break;
+        replayed_->add(now);
+        if (options_.verify && !same(row, now)) break;
       }
-      if (!progress("replaying " + loaded_->scene.name,
+      if (!progress("replaying " + session_->loaded().scene.name,
                     static_cast<double>(expected) / static_cast<double>(frames_)))
         return Failure{"interrupted after " + std::to_string(expected) + " frames"};
     }
@@ -167,15 +141,15 @@ class Replay {
 
   ordered_json json() const {
     ordered_json out{{"recording", options_.file},
-                     {"scene", loaded_->scene.name},
-                     {"recorded_method", recorded_method_},
-                     {"method", method_},
-                     {"threads", threads_},
+                     {"scene", session_->loaded().scene.name},
+                     {"recorded_method", session_->recorded_method()},
+                     {"method", session_->method()},
+                     {"threads", session_->threads()},
                      {"frames", replayed_->frames},
                      {"seconds", static_cast<double>(replayed_->frames) / head_.rate},
                      {"recorded_simd_target", head_.simd_target},
                      {"simd_target", kernels::target_name()},
-                     {"recorded_in_virtual_time", run_.virtual_time},
+                     {"recorded_in_virtual_time", session_->run().virtual_time},
                      {"remarks", remarks},
                      {"recorded", recorded_->json()},
                      {"replayed", replayed_->json()}};
@@ -202,11 +176,12 @@ class Replay {
                 "most", "deepest", "force", "p50", "p99");
     std::printf("%-9s %-14s %-9s %8s %6s %8s %8s %8s %8s\n", "", "", "", "mean", "", "[voxel]",
                 "[N]", "[us]", "[us]");
-    recorded_->print("recorded", recorded_method_);
-    replayed_->print("replayed", method_);
+    recorded_->print("recorded", session_->recorded_method());
+    replayed_->print("replayed", session_->method());
     if (options_.verify && !divergence)
       std::printf("\nevery one of %" PRIu64 " frames is the same to the bit: %s on %u thread%s\n",
-                  replayed_->frames, kernels::target_name(), threads_, threads_ == 1 ? "" : "s");
+                  replayed_->frames, kernels::target_name(), session_->threads(),
+                  session_->threads() == 1 ? "" : "s");
   }
 
   // What a person is told of a divergence.
@@ -234,53 +209,12 @@ class Replay {
  private:
   static constexpr std::uint64_t kPiece = 4096;
 
-  // The instruction set decides about bits: that of the recording where this machine has it.
-  void take_target() {
-    if (head_.simd_target == kernels::target_name()) return;
-    if (kernels::force_target(head_.simd_target.c_str()))
-      remarks.push_back("recorded on " + head_.simd_target +
-                        ", which is not this machine's best: replayed on that");
-    else
-      remarks.push_back("recorded on " + head_.simd_target +
-                        ", which this machine or build does not have: replayed on " +
-                        kernels::target_name() + ", bits will differ");
-  }
-
-  Outcome open_session() {
-    h6SessionDef def = loaded_->session_def();
-    def.threads = threads_ = options_.threads ? options_.threads : run_.threads;
-    def.max_contacts = run_.max_contacts;
-    def.gravity = run_.gravity;
-    method_ = recorded_method_ = h6MethodName(def.contact.method);
-    if (!options_.method.empty()) {
-      method_ = options_.method;
-      h6MethodFromName(options_.method.c_str(), &def.contact.method, &def.contact.pieces);
-    }
-    h6Error error{};
-    session_.reset(h6CreateSession(loaded_->model.get(), &def, &error));
-    if (!session_) return Failure{error.message};
-    for (std::size_t h = 0; h < head_.hands; ++h)
-      h6SetRating(session_.get(), static_cast<std::int32_t>(h), &run_.ratings[h]);
-    return Done{};
-  }
-
-  void step(const h6FrameRecord& row) {
-    now_ = {};
-    now_.time = row.time;
-    std::copy(std::begin(row.hand), std::end(row.hand), now_.hand);
-    h6SetCoarse(session_.get(), row.report.coarse_pairs);  // what the clock decided then
-    h6Step(session_.get(), now_.hand, now_.command);
-    now_.report = h6GetFrame(session_.get());
-    for (std::size_t h = 0; h < head_.hands; ++h)
-      now_.body[h] = h6GetBody(session_.get(), loaded_->hands[h].body);
-  }
-
-  bool same(const h6FrameRecord& row) {
+  bool same(const h6FrameRecord& row, const h6FrameRecord& now) {
     // Times are not bits of the state; nor is what the safety chain made of a late frame.
-    if (!io::first_difference(row, now_, head_.hands, false)) return true;
+    if (!io::first_difference(row, now, head_.hands, false)) return true;
     divergence =
-        Divergence{row.report.frame, row.time, *io::first_difference(row, now_, head_.hands, true),
-                   row.report.state_hash, now_.report.state_hash};
+        Divergence{row.report.frame, row.time, *io::first_difference(row, now, head_.hands, true),
+                   row.report.state_hash, now.report.state_hash};
     return false;
   }
 
@@ -296,14 +230,9 @@ class Replay {
   const Console& console_;
   const ReplayOptions& options_;
   io::RecordingHead head_;
-  io::RecordedRun run_;
   std::uint64_t frames_ = 0;
-  std::unique_ptr<io::LoadedScene> loaded_;
-  SessionPtr session_;
-  unsigned threads_ = 1;
-  std::string method_, recorded_method_;
+  std::unique_ptr<RecordedSession> session_;
   std::optional<Figures> recorded_, replayed_;
-  h6FrameRecord now_{};
 };
 
 int replay_command(const Console& console, const ReplayOptions& options) {

@@ -1,0 +1,56 @@
+// recorded_session.h - a recording's run again: its scene, settings and SIMD target, its hand's
+// samples in, the same frames out.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "hapsix/result.h"
+#include "io/cli/run_setup.h"
+#include "io/load_scene.h"
+#include "io/recorded_run.h"
+#include "io/recording.h"
+
+namespace h6::cli {
+
+class RecordedSession {
+ public:
+  // Changes of what was recorded; empty or 0: none.
+  struct Changes {
+    std::string method;
+    unsigned threads = 0;
+  };
+  // A sentence where the recording does not say how it was run, or its parts are gone or changed.
+  // `remarks` gets what a person should know all the same.
+  static Result<std::unique_ptr<RecordedSession>> open(const std::filesystem::path& file,
+                                                       const io::RecordingHead& head,
+                                                       const Changes& changes,
+                                                       const io::Progress& progress,
+                                                       std::vector<std::string>& remarks);
+  // The recorded frame once more; rows in order, from the first on. The new row stays until the
+  // next call.
+  const h6FrameRecord& step(const h6FrameRecord& recorded);
+
+  const io::LoadedScene& loaded() const { return *loaded_; }
+  const io::RecordedRun& run() const { return run_; }
+  const h6Session* session() const { return session_.get(); }
+  unsigned threads() const { return threads_; }
+  const std::string& method() const { return method_; }
+  const std::string& recorded_method() const { return recorded_method_; }
+
+ private:
+  RecordedSession() = default;
+  void set_faults(const h6FrameRecord& recorded);
+  io::RecordedRun run_;
+  std::unique_ptr<io::LoadedScene> loaded_;
+  SessionPtr session_;
+  std::size_t hands_ = 0;
+  unsigned threads_ = 1;
+  std::string method_, recorded_method_;
+  bool latched_ = false;
+  h6FrameRecord now_{};
+};
+
+}  // namespace h6::cli

@@ -1,0 +1,187 @@
+// report_command.cpp - hapsix report REC.h5... -o OUT.html: recordings as one file to look at.
+//
+// Recordings hold what devices and bodies did; contacts are made again by running each recorded
+// hand once more. Where that is not possible any more, the report says so and does without.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "io/cli/checks.h"
+#include "io/cli/commands.h"
+#include "io/cli/recorded_session.h"
+#include "io/cli/report_files.h"
+#include "io/view/page.h"
+#include "io/view/report.h"
+#include "io/write_aside.h"
+
+namespace h6::cli {
+namespace {
+
+constexpr std::uint64_t kPiece = 4096;
+
+struct ReportOptions {
+  std::vector<std::string> files;
+  std::string output;
+};
+
+std::vector<io::view::ReportContact> contacts_now(const RecordedSession& s) {
+  std::vector<io::view::ReportContact> all;
+  const auto& loaded = s.loaded();
+  for (std::size_t b = 0; b < loaded.bodies.size(); ++b) {
+    const auto body = static_cast<std::int32_t>(b);
+    const h6Contacts c = h6GetContacts(s.session(), body);
+    if (!c.count) continue;
+    const h6BodyState state = h6GetBody(s.session(), body);
+    const h6Quat& q = state.pose.q;
+    // Arms are from the centre of mass.
+    const double m[3] = {loaded.bodies[b].com.x, loaded.bodies[b].com.y, loaded.bodies[b].com.z};
+    const double u[3] = {q.x, q.y, q.z}, p[3] = {state.pose.p.x, state.pose.p.y, state.pose.p.z};
+    double centre[3];
+    for (int a = 0; a < 3; ++a) {
+      const int i = (a + 1) % 3, j = (a + 2) % 3;
+      const auto cross = [&](int k) {
+        const int l = (k + 1) % 3, n = (k + 2) % 3;
+        return u[l] * m[n] - u[n] * m[l];
+      };
+      centre[a] = p[a] + m[a] + 2 * (q.w * cross(a) + u[i] * cross(j) - u[j] * cross(i));
+    }
+    for (std::size_t i = 0; i < c.count; ++i) {
+      if (!(c.depth[i] > 0)) continue;
+      io::view::ReportContact r{};
+      r.position = {static_cast<float>(centre[0] + c.rx[i]),
+                    static_cast<float>(centre[1] + c.ry[i]),
+                    static_cast<float>(centre[2] + c.rz[i])};
+      r.normal = {c.nx[i], c.ny[i], c.nz[i]};
+      r.torque_direction = {c.tx[i], c.ty[i], c.tz[i]};
+      r.weight = c.weight[i];
+      r.depth = c.depth[i];
+      all.push_back(r);
+    }
+  }
+  return all;
+}
+
+class Reporter {
+ public:
+  explicit Reporter(const Console& console) : console_(console) {}
+
+  Outcome add(const std::string& file) {
+    io::FrameRange none;
+    none.count = 0;
+    Result<io::Recording> recording = io::read_recording(file, none);
+    if (!recording) return recording.failure();
+    if (!recording->remark.empty()) console_.log(file + ": " + recording->remark);
+    if (recording->frame_count == 0) return Failure{"it has no frame"};
+    std::vector<std::string> remarks;
+    Result<std::unique_ptr<RecordedSession>> session =
+        RecordedSession::open(file, recording->head, {}, console_.progress(), remarks);
+    if (!session) {
+      const std::string why = "contacts of " + file + " are missing: " + session.error();
+      console_.log("hapsix: " + why);
+      about_ += (about_.empty() ? "" : "; ") + why;
+    }
+    runs_.emplace_back(std::filesystem::path(file).stem().string(), recording->head,
+                       recording->frame_count);
+    io::view::ReportRun& run = runs_.back();
+    Outcome read = frames(file, recording->frame_count, run, session ? session->get() : nullptr);
+    if (!read) return read;
+    run.events(std::move(recording->events), recording->summary_json);
+    if (session && !session_) session_ = std::move(*session);
+    return Done{};
+  }
+
+  Outcome write(const std::string& output) {
+    const Result<std::string> html =
+        io::view::make_report(runs_, session_ ? &session_->loaded() : nullptr, about_);
+    if (!html) return html.failure();
+    bytes = html->size();
+    return io::write_aside(output, [&](const std::filesystem::path& place) -> Outcome {
+      std::ofstream out(place, std::ios::binary);
+      out << *html;
+      out.flush();
+      if (!out) return Failure{output + " could not be written: is the disk full?"};
+      return Done{};
+    });
+  }
+
+  std::size_t bytes = 0;
+
+ private:
+  Outcome frames(const std::string& file, std::uint64_t count, io::view::ReportRun& run,
+                 RecordedSession* session) {
+    const io::Progress progress = console_.progress();
+    const std::vector<std::uint64_t>& shown = run.replay_frames();
+    std::size_t sample = 0;
+    std::uint64_t done = 0;
+    for (std::uint64_t at = 0; at < count; at += kPiece) {
+      const Result<io::Recording> piece = io::read_recording(file, {at, kPiece});
+      if (!piece) return piece.failure();
+      for (const h6FrameRecord& row : piece->frames) {
+        if (session) session->step(row);
+        if (sample < shown.size() && shown[sample] == done) {
+          if (session) run.contacts(sample, contacts_now(*session));
+          ++sample;
+        }
+        ++done;
+      }
+      run.add(piece->frames);
+      if (!progress("reading " + file, static_cast<double>(done) / static_cast<double>(count)))
+        return Failure{"interrupted"};
+    }
+    return Done{};
+  }
+
+  const Console& console_;
+  std::vector<io::view::ReportRun> runs_;
+  std::unique_ptr<RecordedSession> session_;  // draws the bodies
+  std::string about_;
+};
+
+int report_command(const Console& console, const ReportOptions& o) {
+  if (io::view::report_page().empty()) return console.fail(io::view::no_page());
+  for (const std::string& file : o.files)
+    if (Outcome there = check_input(file); !there) return console.fail(there.error());
+  if (Outcome place = check_output(o.output); !place) return console.fail(place.error());
+  const Result<std::size_t> bytes = write_report(o.files, o.output, console);
+  if (!bytes) return console.fail(bytes.error());
+  console.result({{"report", o.output}, {"recordings", o.files}, {"bytes", *bytes}});
+  if (!console.json)
+    std::printf("%s: %zu recording%s, %.1f MB; open it in a browser\n", o.output.c_str(),
+                o.files.size(), o.files.size() == 1 ? "" : "s", 1e-6 * static_cast<double>(*bytes));
+  return kOk;
+}
+
+}  // namespace
+
+Result<std::size_t> write_report(const std::vector<std::string>& recordings,
+                                 const std::string& output, const Console& console) {
+  Reporter reporter(console);
+  for (const std::string& file : recordings)
+    if (Outcome added = reporter.add(file); !added) return Failure{file + ": " + added.error()};
+  if (Outcome written = reporter.write(output); !written) return written.failure();
+  return reporter.bytes;
+}
+
+void add_report(CLI::App& app, Program& program) {
+  CLI::App* report = app.add_subcommand("report", "Recordings as one HTML file to look at");
+  auto o = std::make_shared<ReportOptions>();
+  report
+      ->add_option("REC", o->files,
+                   "Recordings, made by 'hapsix run --record'; laid over one another")
+      ->required()
+      ->option_text("REC.h5...")
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->expected(1, 16)
+      ->check(ends_with(".h5"));
+  report->add_option("-o,--output", o->output, "The report")
+      ->required()
+      ->option_text("OUT.html")
+      ->check(ends_with(".html"));
+  report->callback([&program, o] {
+    program.work = [&program, o] { return report_command(program.console, *o); };
+  });
+}
+
+}  // namespace h6::cli

@@ -1,0 +1,73 @@
+// A report, opened from disk as a person opens it: no server, nothing fetched.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdirSync, mkdtempSync, rmSync, statSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { pathToFileURL } from 'node:url';
+import { Browser, until, wait } from './browser.mjs';
+
+const program = process.env.HAPSIX_PROGRAM, pictures = process.env.HAPSIX_PICTURES ?? '.';
+mkdirSync(pictures, { recursive: true });
+let browser, folder, report;
+
+before(async () => {
+  folder = mkdtempSync(join(tmpdir(), 'hapsix-report-'));
+  const seconds = process.env.HAPSIX_REPORT_SECONDS ?? '8';
+  for (const method of ['global', 'robust'])
+    execFileSync(program, ['run', 'alpha-shortcut', '--virtual-time', '--duration', seconds, '--method', method, '--record', join(folder, `${method}.h5`)], { stdio: 'ignore' });
+  report = join(folder, 'report.html');
+  execFileSync(program, ['report', join(folder, 'global.h5'), join(folder, 'robust.h5'), '-o', report], { stdio: 'ignore' });
+  browser = await Browser.open(process.env.HAPSIX_CHROMIUM);
+}, { timeout: 240000 });
+
+after(async () => {
+  await browser?.close();
+  if (folder) rmSync(folder, { recursive: true, force: true });
+});
+
+test('one file below 10 MB', () => assert.ok(statSync(report).size < 10e6, `${statSync(report).size} bytes`));
+
+test('it opens from disk and shows both runs', async () => {
+  const start = Date.now();
+  await browser.go(pathToFileURL(report).href);
+  await until(() => browser.value('Boolean(window.hapsix?.ready)'), 'the report is ready');
+  console.log(`# open after ${Date.now() - start} ms, ${(statSync(report).size / 1e6).toFixed(2)} MB`);
+  const text = await browser.value('document.body.innerText');
+  for (const word of ['global', 'robust', 'through', 'held', 'Late frames', 'Configuration'])
+    assert.ok(text.includes(word), word);
+  await wait(800);
+  await browser.picture(join(pictures, 'report-top.png'));
+});
+
+test('the scrubber moves the part, and contacts are there', async () => {
+  const seen = async (t) => browser.value(`(async () => {
+    const h = window.hapsix, scrub = document.getElementById('scrub');
+    scrub.value = ${t}; scrub.dispatchEvent(new Event('input'));
+    await new Promise((done) => setTimeout(done, 300));
+    const v = h.replay.view; const p = v.bodies[v.hand].position;
+    return { x: [p.x, p.y, p.z], contacts: Number(document.getElementById('n-contacts').textContent) };
+  })()`);
+  const end = await browser.value('window.hapsix.head.duration');
+  // The second run: under `global` the part is through by then.
+  await browser.value(`(() => { const w = document.getElementById('which'); w.value = '1'; w.dispatchEvent(new Event('change')); })()`);
+  const first = await seen(0), later = await seen(0.6 * end);
+  assert.notDeepEqual(first.x, later.x);
+  assert.ok(later.contacts > 0, `${later.contacts} contacts`);
+  const colours = await browser.value(`(() => {
+    const c = window.hapsix.replay.view.renderer.domElement, g = document.createElement('canvas');
+    g.width = 200; g.height = 120;
+    const p = g.getContext('2d'); p.drawImage(c, 0, 0, 200, 120);
+    return new Set(new Uint32Array(p.getImageData(0, 0, 200, 120).data.buffer)).size;
+  })()`);
+  assert.ok(colours > 50, `${colours} colours`);
+  await browser.value(`document.getElementById('space').scrollIntoView()`);
+  await wait(300);
+  await browser.picture(join(pictures, 'report-replay.png'));
+});
+
+test('nothing was fetched and nothing went wrong', async () => {
+  assert.deepEqual(browser.problems, []);
+  assert.equal(await browser.value('performance.getEntriesByType("resource").filter((r) => r.name.startsWith("http")).length'), 0);
+});
