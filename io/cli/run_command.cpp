@@ -39,8 +39,9 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (view.on && options.virtual_time)
     return console.fail("--view shows a run in real time: leave --virtual-time out", kUsage);
   if (Outcome known = check_options(options); !known) return console.fail(known.error(), kUsage);
-  if (!options.record.empty())
-    if (Outcome place = check_output(options.record); !place) return console.fail(place.error());
+  for (const std::string& file : {options.record, options.trace})
+    if (!file.empty())
+      if (Outcome place = check_output(file); !place) return console.fail(place.error());
   Result<io::Scene> scene = find_scene(name);
   if (!scene) return console.fail(scene.error());
   if (options.device.empty())
@@ -80,6 +81,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
       std::printf("\n%s", late.c_str());
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);
     if (!options.record.empty()) std::printf("recording: %s\n", options.record.c_str());
+    if (!options.trace.empty()) std::printf("timeline: %s\n", options.trace.c_str());
   }
   if (!summary->interrupted) return kOk;
   console.log("hapsix: " + stopped);
@@ -128,6 +130,11 @@ void add_run(CLI::App& app, Program& program) {
   run->add_option("--record", o->record, "Record every frame to this .h5 file")
       ->option_text("FILE")
       ->check(ends_with(".h5"));
+  run->add_option("--trace", o->trace,
+                  "A timeline of the last ten seconds, every stage of every frame, for "
+                  "ui.perfetto.dev or chrome://tracing")
+      ->option_text("FILE.json")
+      ->check(ends_with(".json"));
   add_view_options(*run, *view);
   run->callback([&program, name, o, view] {
     program.work = [&program, name, o, view] {

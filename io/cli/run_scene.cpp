@@ -9,6 +9,7 @@
 
 #include "io/cli/run_observer.h"
 #include "io/cli/run_setup.h"
+#include "io/view/trace.h"
 #include "kernels/targets.h"
 
 namespace h6::cli {
@@ -19,6 +20,8 @@ using nlohmann::ordered_json;
 struct LoopDeleter {
   void operator()(h6Loop* l) const { h6DestroyLoop(l); }
 };
+
+constexpr double kTraceSeconds = 10;
 
 double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
@@ -198,6 +201,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   if (interrupted.load()) h6RequestStop(loop.get());
 
   std::vector<h6FrameRecord> rows(256);
+  io::view::Trace trace(static_cast<std::size_t>(kTraceSeconds * def.rate));
   const io::Progress progress = observer ? io::Progress{} : console.progress();
   Outcome watched = Done{};
   if (observer)
@@ -211,6 +215,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
       else
         (void)watcher.rows(nullptr, 0);
       if (observer) observer->rows(rows.data(), n);
+      if (!options.trace.empty()) trace.add(rows.data(), n);
       if (progress) progress("running " + loaded.scene.name, rows[n - 1].time / loop_def.duration);
     }
     if (watched && recorder)
@@ -232,6 +237,8 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   summary.interrupted = !endless && interrupted.load() &&
                         static_cast<double>(summary.loop.frames) < summary.seconds * def.rate - 0.5;
   watcher.finish();
+  if (!options.trace.empty())
+    if (Outcome written = trace.write(options.trace); !written) return written.failure();
   if (def.hand_count == 0)  // nobody holds anything: the first body that moves
     for (std::size_t b = 0; b < def.body_count; ++b)
       if (!def.bodies[b].fixed) {

@@ -25,6 +25,7 @@ struct RunOptions {
   double spin_us = 0;
   double budget_us = 0;  // anytime mode; 0: off
   std::string record;  // empty: none
+  std::string trace;   // .json timeline of the last seconds; empty: none
   RunObserver* observer = nullptr;  // with one the run has no end of its own
   std::size_t view_contacts = 0;    // rows of contacts kept for the observer
 };
