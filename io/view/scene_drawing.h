@@ -12,7 +12,7 @@
 namespace h6::io::view {
 
 struct DrawLimits {
-  std::size_t triangles = 1000000;  // of all bodies together
+  std::size_t triangles = 250000;  // of all bodies together: 60 Hz on a laptop's graphics
 };
 
 // Adds position<i>, index<i> or points<i> of body i to `envelope`, and returns the head's part:

@@ -57,6 +57,10 @@ function load(packet: Packet) {
     end() { ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] }); },
   });
   settings(scene.contact);
+  if (view.partHidden()) {
+    input('opacity').value = '0.25';
+    view.environmentOpacity(0.25);
+  }
 }
 
 // What is in force, shown on the controls (also after another client changed it).

@@ -139,7 +139,9 @@ export class View3D {
     const focus = (part.isEmpty() ? box : part).getCenter(new THREE.Vector3()).divideScalar(this.radius);
     const near = part.isEmpty() ? 1 : Math.max(0.3, 0.7 * part.getSize(new THREE.Vector3()).length() / this.radius);
     this.orbit.target.copy(focus);
-    this.camera.position.copy(focus).add(new THREE.Vector3(1.2, -1.9, 1.3).multiplyScalar(1.25 * near));
+    const place = (scale: number) => this.camera.position.copy(focus).add(new THREE.Vector3(1.2, -1.9, 1.3).multiplyScalar(1.25 * scale));
+    place(near);
+    if (this.partHidden()) place(1);  // deep inside: from without, and through it
     this.orbit.update();
   }
 
@@ -235,6 +237,19 @@ export class View3D {
     shape.setIndex([0, 1, 2, 0, 2, 3]);
     this.slice = new THREE.Mesh(shape, new THREE.MeshBasicMaterial({ map, side: THREE.DoubleSide, transparent: true, depthWrite: false }));
     this.root.add(this.slice);
+  }
+
+  // Whether the environment stands between the camera and the part.
+  partHidden(): boolean {
+    const part = this.bodies[this.hand];
+    if (!part) return false;
+    this.camera.updateMatrixWorld();
+    this.root.updateMatrixWorld(true);
+    const to = new THREE.Box3().setFromObject(part).getCenter(new THREE.Vector3());
+    const from = this.camera.position, ray = new THREE.Raycaster(from, to.clone().sub(from).normalize());
+    const others = this.bodies.filter((_, i) => i !== this.hand);
+    const hit = ray.intersectObjects(others, true)[0];
+    return hit !== undefined && hit.distance < from.distanceTo(to);
   }
 
   hasSlice() { return this.slice !== null; }
