@@ -180,7 +180,11 @@ TEST_CASE(
   arm->end();
   CHECK(run_until(
       [](const h6FrameRecord& r) { return (r.report.status & H6_DEVICE_LOST) && force(r) == 0; }));
-  CHECK(rows.back().command[0].cause == H6_CAUSE_DEVICE_LOST);
+  // Unless the machine held the haptic thread up before: then the output was at zero already.
+  const auto expected = [](h6Cause cause) {
+    return cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_WATCHDOG || cause == H6_CAUSE_LATE;
+  };
+  CHECK(expected(rows.back().command[0].cause));
   arm = std::make_unique<ArmProcess>(port);
   CHECK(arm->port == port);
   CHECK(run_until([](const h6FrameRecord& r) { return !(r.report.status & H6_DEVICE_LOST); }));
@@ -195,7 +199,7 @@ TEST_CASE(
   CHECK(lowest < 0);  // it is read
   h6RequestStop(loop);
   const h6LoopReport report = h6JoinLoop(loop);
-  CHECK(report.fault == H6_CAUSE_DEVICE_LOST);
+  CHECK(expected(report.fault));
   h6DestroyLoop(loop);
 }
 
