@@ -15,6 +15,7 @@ void learn(double& cost, double seen) {
 
 // Fewer say nothing about the cost of one.
 constexpr std::size_t kTelling = 64;
+constexpr double kForget = 0.9999;
 
 }  // namespace
 
@@ -51,18 +52,27 @@ void learn_sampling(h6Session& s, std::size_t groups, std::size_t found, std::in
   learn(a.contacts_per_group, static_cast<double>(found) / n);
 }
 
+// One point of a group was looked at instead of sixteen.
+void learn_coarsely(h6Session& s, std::size_t groups, std::size_t found) {
+  Anytime& a = s.anytime;
+  if (!a.by_clock || groups < kTelling) return;
+  learn(a.contacts_per_group, 16 * static_cast<double>(found) / static_cast<double>(groups));
+}
+
 void learn_frame(h6Session& s) {
   Anytime& a = s.anytime;
   if (!a.by_clock) return;
   const double* us = s.report.stage_us;
   learn(a.rest_ns, 1e3 * (us[H6_STAGE_COUPLING] + us[H6_STAGE_INTEGRATE] + us[H6_STAGE_OUTPUT]));
-  // Coarse frames pass judgement on the cost of full ones only by time.
+  if (a.coarse) {
+    // Few contacts are cheaper than many, each: what a full frame costs is only seen in one. To try
+    // one means to be late where it still does not fit, so that takes its time: 1 % in 100 frames.
+    a.contact_ns *= kForget;
+    a.group_ns *= kForget;
+    return;
+  }
   const double spent = us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH];
   if (s.report.contacts >= kTelling) learn(a.contact_ns, 1e3 * spent / s.report.contacts);
-  if (!a.coarse) return;
-  // Nothing full was seen: try again some time.
-  a.contacts_per_group = std::max(1.0, a.contacts_per_group * 0.995);
-  a.group_ns *= 0.999;
 }
 
 }  // namespace h6

@@ -32,6 +32,8 @@ void begin_anytime(h6Session& s, std::int64_t start);
 bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t groups);
 // What a pair took, and what the frame did.
 void learn_sampling(h6Session& s, std::size_t groups, std::size_t found, std::int64_t since);
+// The same of a pair that was traversed coarsely, `groups` of which were to be sampled.
+void learn_coarsely(h6Session& s, std::size_t groups, std::size_t found);
 void learn_frame(h6Session& s);
 
 }  // namespace h6

@@ -223,7 +223,9 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
   if (must_be_coarse(s, number, used, groups)) {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
-    return touch_coarsely(pair, t, search, blocks, used);
+    const std::size_t found = touch_coarsely(pair, t, search, blocks, used);
+    learn_coarsely(s, groups, found);
+    return found;
   }
   const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(s, t, search, groups, used, alone);
