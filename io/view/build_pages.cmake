@@ -2,7 +2,7 @@
 # or without the network the first time, both are left empty and the program says so when it is
 # asked for a view. Nothing else fails for it.
 file(MAKE_DIRECTORY ${OUT})
-file(COPY ${SOURCE}/ DESTINATION ${OUT}/work PATTERN node_modules EXCLUDE)
+file(COPY ${SOURCE}/ DESTINATION ${OUT}/build PATTERN node_modules EXCLUDE)
 find_program(NODE node)
 find_program(NPM npm)
 set(problem "")
@@ -12,20 +12,20 @@ else()
   # Fetched again only when the lock file has changed.
   file(SHA256 ${SOURCE}/package-lock.json lock)
   set(fetched "")
-  if(EXISTS ${OUT}/work/fetched)
-    file(READ ${OUT}/work/fetched fetched)
+  if(EXISTS ${OUT}/build/fetched)
+    file(READ ${OUT}/build/fetched fetched)
   endif()
   if(NOT fetched STREQUAL lock)
-    execute_process(COMMAND ${NPM} ci --omit=dev WORKING_DIRECTORY ${OUT}/work RESULT_VARIABLE failed
+    execute_process(COMMAND ${NPM} ci --omit=dev WORKING_DIRECTORY ${OUT}/build RESULT_VARIABLE failed
                     OUTPUT_VARIABLE said ERROR_VARIABLE said TIMEOUT 240)
     if(failed)
       set(problem "npm could not fetch the page's packages: ${said}")
     else()
-      file(WRITE ${OUT}/work/fetched ${lock})
+      file(WRITE ${OUT}/build/fetched ${lock})
     endif()
   endif()
   if(NOT problem)
-    execute_process(COMMAND ${NODE} build.mjs ${OUT} WORKING_DIRECTORY ${OUT}/work RESULT_VARIABLE failed
+    execute_process(COMMAND ${NODE} build.mjs ${OUT} WORKING_DIRECTORY ${OUT}/build RESULT_VARIABLE failed
                     OUTPUT_VARIABLE said ERROR_VARIABLE said TIMEOUT 120)
     if(failed)
       set(problem "the page could not be built: ${said}")
