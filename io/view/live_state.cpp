@@ -187,8 +187,6 @@ Message LiveState::state_message() {
                     {"cause", h6CauseName(cause_)},
                     {"fault", r.report.status & H6_OUTPUT_FAULT ? h6CauseName(r.command[0].cause)
                                                                 : h6CauseName(H6_CAUSE_NONE)},
-                    {"ended", false},
-                    {"verdict", ""},
                     {"recording", recording_}};
   status_ = 0;
   cause_ = H6_CAUSE_NONE;

@@ -200,7 +200,8 @@ H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
 H6_API void   h6SetPace(h6Loop* loop, double pace);
 /* Other settings while it runs: `next` has the same model, bodies, hands and rate. Between two frames
  * it takes over poses, velocities, hands and the state of their safety chains, and what the bodies
- * did before is forgotten otherwise (coherence, warm starts). Returns the session before, to be
+ * did before is forgotten otherwise (coherence, warm starts). Filters and safety limits of the hands
+ * stay what they were. Returns the session before, to be
  * destroyed by the caller; NULL with `error` filled: nothing has changed. Waits for the frame in
  * progress; one thread at a time, not the haptic one. */
 H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);

@@ -114,7 +114,7 @@ function show(packet: Packet) {
     e.className = `chip ${kind}`;
     $('safety').append(e, ' ');
   }
-  chip('state', h.ended ? `ended: ${h.verdict}` : paused ? 'paused' : `${h.time.toFixed(1)} s`, h.ended ? 'warn' : 'good');
+  chip('state', paused ? 'paused' : `${h.time.toFixed(1)} s`, 'good');
   settings(h.contact);
   $('record').classList.toggle('on', h.recording);
 }
