@@ -1,5 +1,4 @@
 // README.md is true: its program is the one that is compiled and run, its paths exist.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <filesystem>

@@ -1,6 +1,8 @@
 // Baked assets are kept: a second run starts from them, and no state of the cache stops a run.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <functional>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "tests/cli/program.h"
 

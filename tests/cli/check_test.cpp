@@ -1,5 +1,9 @@
 // hapsix check from outside: what it says of meshes, scenes and fields, and how it exits.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

@@ -1,13 +1,17 @@
 // Scenes in the hand of a simulated arm: every way that a device and the engine can talk, with and
 // without delay.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "device/simulated_arm.h"
 #include "io/cli/run_setup.h"

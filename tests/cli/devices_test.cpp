@@ -1,5 +1,11 @@
 // hapsix devices, and runs with devices that are not simulated, from outside.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <chrono>
+#include <cstdlib>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+
 #include "tests/cli/program.h"
 #include "tests/support/near.h"
 

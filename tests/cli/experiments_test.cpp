@@ -1,5 +1,8 @@
 // hapsix experiments: the schema that other programs read, the report and recordings, mistakes.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <cmath>
+#include <string>
+#include <vector>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

@@ -3,7 +3,6 @@
 //
 // The engine runs in a child process, in real time. A loaded machine can hold it up long enough for
 // its watchdog: a scenario then ends at zero like any other, only for another cause.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <signal.h>
@@ -17,6 +16,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>

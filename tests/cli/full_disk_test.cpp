@@ -1,5 +1,9 @@
 // A disk that is full: one sentence that names the file, exit 1, and no half file.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <cstdlib>
+#include <set>
+#include <sstream>
+#include <string>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

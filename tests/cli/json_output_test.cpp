@@ -1,5 +1,8 @@
 // --json: one object on stdout with the keys that other programs rely on; people's words on stderr.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

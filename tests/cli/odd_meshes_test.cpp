@@ -1,7 +1,13 @@
 // Meshes that nobody means to make and everybody has: bakes, info and runs end with a clear result
 // or with one sentence, never otherwise.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <array>
 #include <functional>
+#include <limits>
+#include <set>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/cli/program.h"
 #include "tests/support/near.h"

@@ -3,15 +3,18 @@
 //
 // A run is cut short (--duration) where the interesting pose is that of the middle: its JSON then
 // ends there. Bakes are made once, in a cache of this test's own.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <optional>
 #include <sstream>
+#include <string>
 
 #include "real_scenes.h"
 

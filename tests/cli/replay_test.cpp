@@ -1,8 +1,14 @@
 // A recording runs again to the bit, and says where it does not.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <hdf5.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <set>
+#include <string>
+#include <thread>
 
 #include "tests/cli/program.h"
 

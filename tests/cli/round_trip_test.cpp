@@ -1,6 +1,8 @@
 // What the program writes it reads back to the same physics, and the same input gives the same
 // bits.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <set>
+#include <string>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

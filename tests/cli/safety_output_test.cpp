@@ -1,6 +1,7 @@
 // What a user sees of the safety chain: keys of a scene, events and counters of a run, and what a
 // signal does to a run.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <string>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

@@ -1,6 +1,13 @@
 // Ctrl-C, a kill, a terminal: the program ends soon, leaves nothing half made, keeps what it
 // recorded.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <set>
+#include <string>
+#include <thread>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

@@ -1,6 +1,12 @@
 // The whole program with a SpaceMouse that umockdev makes: listed, checked, and in the hand of a
 // run at 1 kHz. HAPSIX_SOAK_SECONDS=30 runs the alpha for so long instead of a box for two seconds.
-#define DOCTEST_CONFIG_IMPLEMENT
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <thread>
+
 #include "tests/cli/program.h"
 #include "tests/device/mock_hid.h"
 

@@ -1,6 +1,13 @@
 // Every mistake of a user: one sentence that says what and where, the right exit code, soon, and
 // nothing left behind.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "tests/cli/program.h"
 
 using namespace h6::test;

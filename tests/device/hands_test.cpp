@@ -1,9 +1,9 @@
 // Hands that need no hardware: a path followed exactly, and a person who yields.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <cmath>
+#include <string>
 
 #include "device/path_device.h"
 #include "device/simulated_hand.h"

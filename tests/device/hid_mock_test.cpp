@@ -1,12 +1,14 @@
 // The real path through hidapi, with devices that umockdev makes: found, opened, read, lit,
 // unplugged and plugged in again.
-#define DOCTEST_CONFIG_IMPLEMENT
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdint>
+#include <cstdio>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "device/spacemouse.h"

@@ -1,9 +1,14 @@
 // Hands that go wrong on purpose, hands that do what a text says, hands of an earlier run.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "device/bad_operator.h"

@@ -1,11 +1,12 @@
 // Devices out of shared libraries: the template, and every way to be wrong.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "device/plugin.h"
 #include "tests/support/near.h"

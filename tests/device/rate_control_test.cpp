@@ -1,10 +1,12 @@
 // A cap's deflection as velocity: dead zone, curve, scales, dominant axis, buttons, yielding.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "device/rate_control.h"
 #include "tests/support/near.h"

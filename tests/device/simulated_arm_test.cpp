@@ -1,12 +1,16 @@
 // A simulated arm and the person who holds it, by physics: what springs, delays, encoders and
 // motors must do whatever the figures are.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "device/simulated_arm.h"
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "tests/support/near.h"
 

@@ -1,13 +1,15 @@
 // What a SpaceMouse sends: both layouts, buttons, battery, and bytes that mean nothing.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "device/hid_port.h"
 #include "device/spacemouse_report.h"

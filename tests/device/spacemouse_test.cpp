@@ -1,15 +1,20 @@
 // The SpaceMouse's two threads, with a HID port of the test's own: newest wins, stale is released,
 // unplug and replug, light, battery, permission.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <cstring>
 #include <deque>
+#include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "device/spacemouse.h"
 #include "tests/device/spacemouse_samples.h"

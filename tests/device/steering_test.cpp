@@ -1,9 +1,9 @@
 // A hand that somebody takes off its path and gives back: no jump, bounded speed, the path's own
 // time stands still meanwhile.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <memory>
 
 #include "device/hand_path.h"
 #include "device/rotation.h"

@@ -1,6 +1,5 @@
 // The worked example: an arm in a process of its own, reached through UDP, in the hand of a session
 // at 1 kHz; killed, started again.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <dlfcn.h>
 #include <doctest/doctest.h>
 #include <signal.h>
@@ -10,7 +9,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <thread>

@@ -1,11 +1,11 @@
 // alpha_pushes_test.cpp - the alpha pushed at its shortcut: that the pushes are what they are said
 // to be, that "through" means unlinked whatever the direction, and that the default method holds.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "io/load_scene.h"
 #include "io/scenes/alpha.h"

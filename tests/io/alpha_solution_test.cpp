@@ -1,14 +1,15 @@
 // alpha_solution_test.cpp - the puzzle has a solution: proved on the geometry, then run.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "io/load_scene.h"
 #include "io/scenes/scenes.h"

@@ -1,6 +1,7 @@
 // The far grid at a million random points: safe everywhere, and tight.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+
+#include <cmath>
 
 #include "io/bake_field.h"
 #include "tests/io/field_check.h"

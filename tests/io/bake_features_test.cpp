@@ -1,7 +1,11 @@
 // Distances where triangles share edges and corners in every way: each node is weighed only with
 // triangles that answer for the feature it is nearest to.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 
 #include "io/bake_field.h"
 #include "tests/io/field_check.h"

@@ -1,9 +1,14 @@
 // Fields of real meshes: distances against a tree in double, sides against parity and winding.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
 
 #include "io/bake_field.h"
 #include "io/mesh_file.h"

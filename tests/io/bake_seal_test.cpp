@@ -1,9 +1,13 @@
 // Holes of known width: without --seal a part drains through them, with it the part holds, and
 // nothing else moves.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <string>
 
 #include "io/bake_field.h"
 #include "tests/io/field_check.h"

@@ -1,10 +1,16 @@
 // Shells: exact numbers, blue noise, inward normals, nested levels and spheres that lose nothing.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/bake_shell.h"
 #include "io/mesh_file.h"

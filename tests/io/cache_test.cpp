@@ -1,5 +1,4 @@
 // The cache of baked assets: found again, never believed blindly, never in the way.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <unistd.h>
@@ -8,7 +7,10 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "io/cache.h"
 #include "io/content_hash.h"

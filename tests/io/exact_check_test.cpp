@@ -1,7 +1,14 @@
 // Embree's answers against a judge that uses none of it, and the exact check against fields that
 // are right and fields that were spoilt by hand.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/exact_check.h"
 

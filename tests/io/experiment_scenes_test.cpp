@@ -1,9 +1,13 @@
 // experiment_scenes_test.cpp - the paper's experiments as scenes: sizes, samplings, and that each
 // run begins clear of everything.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "io/cache.h"
 #include "io/load_scene.h"

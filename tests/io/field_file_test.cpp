@@ -1,5 +1,4 @@
 // Fields as files: to the bit and back, for other programs, and through every kind of damage.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -7,9 +6,15 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <string>
 
 #include "io/bake_field.h"
 #include "io/field_file.h"

@@ -1,7 +1,10 @@
 // The triangle and the part that each brick is named after: the nearest of the mesh as it was
 // given.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 
 #include "io/bake_field.h"
 #include "kernels/triangle_distance.h"

@@ -1,14 +1,17 @@
 // industrial_scenes_test.cpp - the generated industrial inputs: sizes, defects, and whether what
 // they claim to know of themselves is true.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/mesh_file.h"
 #include "io/scenes/industrial.h"

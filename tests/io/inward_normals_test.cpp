@@ -1,6 +1,9 @@
 // Which way normals point: into the body, whatever its winding, and away from its hollows.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+
+#include <cmath>
+#include <utility>
+#include <vector>
 
 #include "io/bake_shell.h"
 #include "io/inward_normals.h"

@@ -1,14 +1,16 @@
 // From a scene to what the engine runs: mass properties, shared assets, sentences that name the
 // body.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "io/load_scene.h"
 #include "io/mass.h"

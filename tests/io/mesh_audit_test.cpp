@@ -1,14 +1,17 @@
 // mesh_audit_test.cpp - what the audit counts, on shapes whose answer is known and on real meshes.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <random>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "io/mesh.h"
 #include "io/mesh_file.h"

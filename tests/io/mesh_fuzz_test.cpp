@@ -1,11 +1,12 @@
 // mesh_fuzz_test.cpp - damaged mesh files never crash the readers, and what they accept is a mesh.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <set>
+#include <string>
 #include <tuple>
 
 #include "io/mesh.h"

@@ -1,13 +1,16 @@
 // mesh_nodes_test.cpp - glTF and COLLADA: every node where its transforms put it, the right way out,
 // under its name; and nothing a hostile file can say does harm.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/mesh_file.h"
 #include "tests/io/node_files.h"

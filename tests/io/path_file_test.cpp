@@ -1,9 +1,10 @@
 // path_file_test.cpp - hand paths: CSV there and back, what is refused, and what is between rows.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
+#include <cmath>
 #include <random>
+#include <string>
 
 #include "tests/io/scene_samples.h"
 

@@ -1,6 +1,5 @@
 // recording_kill_test.cpp - recordings survive kills at random instants, full disks and readers,
 // and cost no older file.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -10,8 +9,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <random>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "io/recording.h"
 #include "io/recording_copies.h"

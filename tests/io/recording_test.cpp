@@ -1,13 +1,15 @@
 // recording_test.cpp - recordings come back to the bit, open in any HDF5 tool, and damaged, foreign
 // or lying files are refused with a sentence.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "io/recording.h"
 
 #include <doctest/doctest.h>
 #include <hdf5.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
+#include <string>
+#include <vector>
 
 #include "tests/io/recorded_frames.h"
 

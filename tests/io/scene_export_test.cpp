@@ -1,10 +1,13 @@
 // scene_export_test.cpp - scenes written as files, and the schema of what is in them.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cmath>
+#include <string>
+#include <vector>
 
 #include "io/mesh_file.h"
 #include "io/scenes/scenes.h"

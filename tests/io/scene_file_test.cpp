@@ -1,9 +1,12 @@
 // scene_file_test.cpp - scene files: what is read, what is refused and how that is said.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
+#include <cmath>
+#include <cstdint>
 #include <random>
+#include <string>
+#include <utility>
 
 #include "tests/io/scene_samples.h"
 

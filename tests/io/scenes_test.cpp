@@ -1,12 +1,14 @@
 // scenes_test.cpp - generated scenes: are they what they claim, before anything is simulated?
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "io/mesh.h"
 #include "io/scenes/scenes.h"

@@ -1,14 +1,17 @@
 // Shell files: back to the bit, readable by others, and no file can do harm.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <unistd.h>
 
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <random>
 #include <sstream>
+#include <string>
+#include <string_view>
 
 #include "io/bake_shell.h"
 #include "io/shell_file.h"

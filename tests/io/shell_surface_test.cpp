@@ -1,9 +1,15 @@
 // Which surface a shell lies on: what the outside reaches, of sound meshes and of soups.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <functional>
 #include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/bake_shell.h"
 #include "io/blue_noise.h"

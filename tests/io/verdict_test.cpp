@@ -1,11 +1,13 @@
 // verdict_test.cpp - runs made up as motions, and what is said of them.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/verdict.h"
 

@@ -1,12 +1,13 @@
 // What the page asks, and what it is sent: requests that anyone could have written, envelopes,
 // timelines.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <vector>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>

@@ -1,6 +1,9 @@
 // Walls and gaps of bodies whose thickness is known.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include "io/wall_thickness.h"
 

@@ -1,8 +1,10 @@
 // contact_columns_test.cpp - facing, torque directions, gaps and loads of every contact.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "kernels/contact_columns.h"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
 
 #include "tests/kernels/kernel_test.h"
 

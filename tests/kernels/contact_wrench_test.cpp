@@ -1,7 +1,12 @@
 // contact_wrench_test.cpp - the wrench of contacts and its derivatives.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
 
 #include "kernels/contact_wrench.h"
 #include "tests/kernels/kernel_test.h"

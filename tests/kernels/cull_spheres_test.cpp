@@ -1,6 +1,10 @@
 // cull_spheres_test.cpp - culling loses no contact.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
 
 #include "kernels/cull_spheres.h"
 #include "kernels/sample_field.h"

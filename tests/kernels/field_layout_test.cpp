@@ -1,5 +1,8 @@
 // field_layout_test.cpp - far bounds are bounds, aprons meet their neighbours.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
 #include "kernels/field_layout.h"
 #include "kernels/sample_field.h"
 #include "tests/kernels/analytic_field.h"

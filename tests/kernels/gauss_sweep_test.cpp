@@ -1,11 +1,14 @@
 // gauss_sweep_test.cpp - the sweep gives the weights of the specification, at any number of
 // contacts.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "kernels/gauss_sweep.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "tests/kernels/gauss_sets.h"
 #include "tests/support/near.h"

@@ -1,10 +1,13 @@
 // gauss_tree_test.cpp - the tree gives the weights of the specification, at any number of contacts.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "kernels/gauss_tree.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "tests/kernels/gauss_sets.h"
 #include "tests/support/near.h"

@@ -1,7 +1,10 @@
 // gauss_weights_test.cpp - shares of stiffness on the Gauss map.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <numeric>
+#include <string>
+#include <vector>
 
 #include "kernels/gauss_weights.h"
 #include "tests/kernels/kernel_test.h"

@@ -1,10 +1,10 @@
 // One point against eight boxes and triangles: never more than the truth, and hardly less.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <hwy/targets.h>
 
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "kernels/nearest_eight.h"

@@ -1,5 +1,11 @@
 // sample_field_test.cpp - samples, gradients and bounds of a field in its hot layout.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
 #include "kernels/sample_field.h"
 #include "tests/kernels/analytic_field.h"
 #include "tests/kernels/kernel_test.h"

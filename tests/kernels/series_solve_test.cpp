@@ -1,9 +1,13 @@
 // series_solve_test.cpp - what the rule `series` promises, at any sampling of any shape.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "kernels/series_solve.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
 
 #include "kernels/contact_wrench.h"
 #include "tests/kernels/kernel_test.h"

@@ -1,7 +1,8 @@
 // targets_test.cpp - a forced target is the one that runs.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <map>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "kernels/gauss_weights.h"
 #include "tests/kernels/kernel_test.h"

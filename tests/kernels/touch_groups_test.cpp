@@ -1,7 +1,10 @@
 // touch_groups_test.cpp - traversal's kernels say what their specifications say, on every target.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "kernels/expiry.h"
 #include "kernels/touch_groups.h"

@@ -1,12 +1,13 @@
 // Anytime mode: what a frame leaves out when time is short, what it says of it, and that a run can
 // be repeated.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "hapsix/hapsix.h"

@@ -1,10 +1,12 @@
 // Clusters of contacts, and the options of the Gauss methods.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "hapsix/hapsix.h"

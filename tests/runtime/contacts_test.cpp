@@ -3,11 +3,14 @@
 // Traversal remembers from frame to frame what cannot touch yet. Here sessions walk, slowly and
 // fast, and in every frame their contacts are compared with a sample of all points at the very
 // place: no miss, none extra, not by one rounding.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "kernels/sample_field.h"
 #include "runtime/session.h"

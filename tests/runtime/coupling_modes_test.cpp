@@ -1,7 +1,7 @@
 // What stands between hand and body: dynamic, quasi-static or nothing.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>

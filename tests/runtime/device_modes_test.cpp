@@ -1,14 +1,16 @@
 // Devices that say how hard they are pushed and are told where to be: admittance and
 // pseudo-admittance, alone and in a closed loop with a person and a delay.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <deque>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"

@@ -1,9 +1,9 @@
 // What a hand's samples, lateness and buttons do to its output: states, trouble, decay, latching.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <string>
 

@@ -1,11 +1,11 @@
 // A thousand random scripts of everything that can go wrong with a device, in virtual time:
 // whatever happens in whatever order, no frame breaks a limit, and trouble ends at zero and stays
 // there.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "hapsix/hapsix.h"

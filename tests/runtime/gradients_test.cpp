@@ -3,12 +3,14 @@
 //
 // The forces are summed here contact by contact, straight from METHOD.md; the derivatives come from
 // the engine's own assembly, fed with the sums of the kernel's specification in double.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <random>
+#include <vector>
 
 #include "hapsix/hapsix.h"
 #include "kernels/contact_wrench.h"

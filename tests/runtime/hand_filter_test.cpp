@@ -1,12 +1,13 @@
 // Indexing and scaling: nothing is lost, nothing jumps, nothing winds up.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "runtime/hand_filter.h"
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <random>
+#include <utility>
 
 #include "tests/support/analytic.h"
 #include "tests/support/near.h"

@@ -1,5 +1,4 @@
 // The loop joins devices, session and clock: what it runs, counts and hands over.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 

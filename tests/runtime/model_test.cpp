@@ -1,12 +1,14 @@
 // Definitions that cannot be run are refused with a sentence; those that can are kept exactly.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"

@@ -1,9 +1,12 @@
 // What a contact is with: the names that its field has for the brick the contact is in.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <random>
+#include <vector>
 
 #include "runtime/session.h"
 #include "tests/support/analytic.h"

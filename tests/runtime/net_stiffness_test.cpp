@@ -1,5 +1,4 @@
 // The certificate of a frame: how stiff its contacts are together.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "runtime/net_stiffness.h"
 
 #include <doctest/doctest.h>
@@ -7,6 +6,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include "tests/support/analytic.h"
 #include "tests/support/near.h"

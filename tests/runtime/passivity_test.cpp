@@ -1,5 +1,4 @@
 // Energy that nobody put in is not given out.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "runtime/passivity.h"
 
 #include <doctest/doctest.h>
@@ -7,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "tests/support/analytic.h"

@@ -1,12 +1,15 @@
 // What holds in every frame, whatever is pushed against whatever: nothing pulls, nothing jumps,
 // nothing breaks a bound, and nonsense from a hand does no harm.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"

@@ -1,10 +1,11 @@
 // Whatever is asked for, what reaches a device is finite, inside the rating, slow enough,
 // explained.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 #include <string>

@@ -1,10 +1,12 @@
 // `series` in whole frames: bounds, derivatives with several moving fields, the margin.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <random>
+#include <vector>
 
 #include "hapsix/hapsix.h"
 #include "kernels/series_solve.h"

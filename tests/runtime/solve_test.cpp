@@ -1,5 +1,4 @@
 // solve_test.cpp - the step's system: answers satisfy it, and what is not positive is refused.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <random>

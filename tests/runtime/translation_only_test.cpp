@@ -1,9 +1,10 @@
 // Bodies of three degrees of freedom: they never turn and feel no torque.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "hapsix/hapsix.h"

@@ -1,10 +1,10 @@
 // What each rule promises about shared stiffness, seen through whole frames. METHOD.md, Sec. 3.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"

@@ -1,8 +1,8 @@
 // Values cross from a thread that must not wait to one that may be slow.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <array>
+#include <cstdint>
 #include <thread>
 
 #include "sched/latest_value.h"

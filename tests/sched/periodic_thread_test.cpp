@@ -1,7 +1,7 @@
 // Deadlines are absolute, late frames have one cause, denormals are flushed only in scope.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <string>

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"
