@@ -41,11 +41,12 @@ struct Shell {
   double radius = 0;       // farthest point from the centre [m]
   std::size_t points = 0;  // rows; columns repeat the last one up to a whole block
   Buffer<float> x, y, z, nx, ny, nz;  // normals point inward
+  Buffer<float> xyz;                  // the same places, row by row, and one more float
   Buffer<std::uint32_t> point;        // of the definition
   Tier groups, blocks;
   Samples samples;
   std::size_t bytes() const {
-    return x.count * 28 + (groups.x.count + blocks.x.count + samples.x.count) * 16;
+    return x.count * 40 + (groups.x.count + blocks.x.count + samples.x.count) * 16;
   }
 };
 inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;

@@ -186,6 +186,7 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
   bool reserved = shell->point.reserve(allocator, padded);
   for (Buffer<float>* b : {&shell->x, &shell->y, &shell->z, &shell->nx, &shell->ny, &shell->nz})
     reserved = b->reserve(allocator, padded) && reserved;
+  reserved = shell->xyz.reserve(allocator, 3 * padded + 1) && reserved;
   if (!reserved) return fail(error, "no memory for %zu points", n);
 
   std::uint32_t* rows = shell->point.data;
@@ -209,9 +210,12 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     shell->x[i] = static_cast<float>(q.x());
     shell->y[i] = static_cast<float>(q.y());
     shell->z[i] = static_cast<float>(q.z());
+    shell->xyz[3 * i] = shell->x[i], shell->xyz[3 * i + 1] = shell->y[i];
+    shell->xyz[3 * i + 2] = shell->z[i];
     shell->nx[i] = def.nx[p], shell->ny[i] = def.ny[p], shell->nz[i] = def.nz[p];
     shell->radius = std::max(shell->radius, q.norm());
   }
+  shell->xyz[3 * padded] = 0;
   if (!make_tier(*shell, kGroupRows, allocator, shell->groups) ||
       !make_tier(*shell, kBlockRows, allocator, shell->blocks) ||
       !take_samples(*shell, allocator, shell->samples))
