@@ -1,10 +1,13 @@
 // frame_scenes.h - seeded scenes for whole frames: a part of 56,823 points in clutter and in a
 // socket that fits it, both in fields of 1024^3 voxels sampled from signed distance functions.
+//
+// `size` below 1 makes all of it so much smaller, voxels apart: tests take a quarter.
 #pragma once
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <random>
 #include <vector>
 
@@ -59,6 +62,14 @@ struct Solid {
 };
 
 using Solids = std::vector<Solid>;
+inline Solids scaled(Solids solids, double size) {
+  for (Solid& s : solids) {
+    for (double& v : s.centre) v *= size;
+    for (double& v : s.half) v *= size;
+    s.round *= size;
+  }
+  return solids;
+}
 inline double distance(const Solids& solids, const Point& p) {
   double d = 1e9;
   for (const Solid& s : solids) d = std::min(d, s.distance(p));
@@ -78,12 +89,15 @@ struct PartPoints {
   std::vector<Point> at, inward;
 };
 // Random points of the part's surface: dropped anywhere near it, then moved onto it.
-inline const PartPoints& part_points() {
-  static const PartPoints points = [] {
-    PartPoints out;
+inline const PartPoints& part_points(double size = 1) {
+  static std::map<double, PartPoints> made;
+  PartPoints& out = made[size];
+  if (!out.at.empty()) return out;
+  {
     const Solids solids = part();
     Random random(1);
-    while (out.at.size() < kPoints) {
+    const auto count = static_cast<std::size_t>(kPoints * size * size);
+    while (out.at.size() < count) {
       Point p{random.uniform(-130, 215), random.uniform(-80, 110), random.uniform(-95, 120)}, g{};
       if (std::fabs(distance(solids, p)) > 4) continue;
       for (int step = 0; step < 6; ++step) {
@@ -101,15 +115,18 @@ inline const PartPoints& part_points() {
       out.at.push_back(p);
       out.inward.push_back({-g[0], -g[1], -g[2]});
     }
-    return out;
-  }();
-  return points;
+  }
+  for (Point& p : out.at)
+    for (double& v : p) v *= size;
+  return out;
 }
 
 // Boxes, tubes and posts around the part, none nearer than 1 voxel to it.
-inline Solids clutter() {
+inline Solids clutter(double size = 1) {
   Random random(2);
-  const PartPoints& points = part_points();
+  std::vector<Point> points = part_points(size).at;
+  for (Point& p : points)
+    for (double& v : p) v /= size;
   Solids solids;
   while (solids.size() < 160) {
     Solid s{{random.uniform(-420, 420), random.uniform(-420, 420), random.uniform(-420, 420)},
@@ -119,13 +136,13 @@ inline Solids clutter() {
     if (solids.size() % 3 == 1) s.tube = true, s.half[0] = s.half[1] = random.uniform(6, 20);
     if (solids.size() % 3 == 2) s.half = {random.uniform(5, 9), random.uniform(5, 9), 250};
     double nearest = 1e9;
-    for (std::size_t i = 0; i < kPoints; i += 7)
-      nearest = std::min(nearest, s.distance(points.at[i]));
+    for (std::size_t i = 0; i < points.size(); i += 7)
+      nearest = std::min(nearest, s.distance(points[i]));
     // A third of them stand close.
     if (nearest < 2 || (solids.size() % 4 == 0 && nearest > 12)) continue;
     solids.push_back(s);
   }
-  return solids;
+  return scaled(solids, size);
 }
 
 struct FieldArrays {
@@ -135,10 +152,12 @@ struct FieldArrays {
 };
 
 // Distance to the solids, or (socket) to what is left when the grown part is taken out of all.
-inline FieldArrays sample(const Solids& solids, bool socket) {
+inline FieldArrays sample(const Solids& solids, bool socket, double size = 1) {
   FieldArrays out;
-  const auto at = [](const Solids& set, bool turned, double i, double j, double k) {
-    const double d = distance(set, {i - kMiddle, j - kMiddle, k - kMiddle});
+  const int bricks = static_cast<int>(kBricks * size), blocks = bricks / 8;
+  const double middle_node = kMiddle * size;
+  const auto at = [middle_node](const Solids& set, bool turned, double i, double j, double k) {
+    const double d = distance(set, {i - middle_node, j - middle_node, k - middle_node});
     return turned ? kClearance - d : d;
   };
   constexpr double kHalfDiagonal = 4 * 1.7320508 + 1e-6;
@@ -150,14 +169,14 @@ inline FieldArrays sample(const Solids& solids, bool socket) {
       if (s.distance(centre) <= least + 2 * reach) some.push_back(s);
     return some;
   };
-  const std::size_t n = kBricks, m = n + 1;
+  const std::size_t n = bricks, m = n + 1, side = blocks;
   out.index.assign(n * n * n, -1);
   out.far.resize(m * m * m);
-  for (std::size_t block = 0; block < 16 * 16 * 16; ++block) {
-    const std::size_t b[3] = {block % 16, block / 16 % 16, block / 256};
+  for (std::size_t block = 0; block < side * side * side; ++block) {
+    const std::size_t b[3] = {block % side, block / side % side, block / (side * side)};
     const Solids set = nearest(solids,
-                               {64.0 * b[0] + 32 - kMiddle, 64.0 * b[1] + 32 - kMiddle,
-                                64.0 * b[2] + 32 - kMiddle},
+                               {64.0 * b[0] + 32 - middle_node, 64.0 * b[1] + 32 - middle_node,
+                                64.0 * b[2] + 32 - middle_node},
                                8 * kHalfDiagonal);
     for (std::size_t k = 0; k <= 8; ++k)
       for (std::size_t j = 0; j <= 8; ++j)
@@ -166,7 +185,8 @@ inline FieldArrays sample(const Solids& solids, bool socket) {
           const double d = at(set, socket, 8.0 * x, 8.0 * y, 8.0 * z);
           out.far[(z * m + y) * m + x] = std::nextafter(static_cast<float>(d * kVoxel), 0.0f);
           if (i == 8 || j == 8 || k == 8) continue;
-          const Point centre{8.0 * x + 4 - kMiddle, 8.0 * y + 4 - kMiddle, 8.0 * z + 4 - kMiddle};
+          const Point centre{8.0 * x + 4 - middle_node, 8.0 * y + 4 - middle_node,
+                             8.0 * z + 4 - middle_node};
           const double middle = distance(set, centre) - (socket ? kClearance : 0);
           if (std::fabs(middle) > kBand + 1.74 + kHalfDiagonal) continue;
           out.index[(z * n + y) * n + x] = static_cast<std::int32_t>(out.samples.size() / 512);
@@ -177,10 +197,10 @@ inline FieldArrays sample(const Solids& solids, bool socket) {
                             8.0 * z + node / 64)));
         }
   }
-  const double origin = -kMiddle * kVoxel;
+  const double origin = -middle_node * kVoxel;
   out.def.origin = {origin, origin, origin};
   out.def.voxel_size = kVoxel;
-  for (int& count : out.def.bricks) count = kBricks;
+  for (int& count : out.def.bricks) count = bricks;
   out.def.band = kBand * kVoxel;
   out.def.brick_index = out.index.data();
   out.def.samples = out.samples.data();
@@ -194,9 +214,10 @@ struct ShellArrays {
   std::vector<float> x, y, z, nx, ny, nz, radius;
   std::vector<std::uint32_t> level_first{0}, point, first_child, child_count;
 
-  ShellArrays() {
-    const PartPoints& points = part_points();
-    for (std::size_t i = 0; i < kPoints; ++i) {
+  explicit ShellArrays(double size = 1) {
+    const PartPoints& points = part_points(size);
+    const std::size_t total = points.at.size();
+    for (std::size_t i = 0; i < total; ++i) {
       x.push_back(float(kVoxel * points.at[i][0])), y.push_back(float(kVoxel * points.at[i][1]));
       z.push_back(float(kVoxel * points.at[i][2]));
       const Point& n = points.inward[i];
@@ -213,7 +234,7 @@ struct ShellArrays {
       }
       level_first.push_back(static_cast<std::uint32_t>(point.size()));
       if (level == 6) break;
-      const std::size_t next = level == 5 ? kPoints : std::min(kPoints, 4 * count);
+      const std::size_t next = level == 5 ? total : std::min(total, 4 * count);
       std::vector<std::vector<std::uint32_t>> children(count);
       for (std::size_t k = 0; k < count; ++k) children[k].push_back(members[k]);
       for (std::size_t i = count; i < next; ++i) {
@@ -259,9 +280,9 @@ struct ShellArrays {
   }
 };
 
-inline h6Model* make_model(bool socket) {
-  FieldArrays field = sample(socket ? part() : clutter(), socket);
-  static const ShellArrays shell;
+inline h6Model* make_model(bool socket, double size = 1) {
+  FieldArrays field = sample(socket ? scaled(part(), size) : clutter(size), socket, size);
+  const ShellArrays shell(size);
   const h6ShellDef shell_def = shell.def();
   h6ModelDef def = h6DefaultModelDef();
   def.fields = &field.def, def.field_count = 1;

@@ -23,8 +23,8 @@ HWY_INLINE VF clearance_of(VF distance, bool wide) {
   if (wide) return long_form;
   const VF short_form = hn::Mul(left, hn::Set(d, 1.0f / kSqrt3));
   const VF edge = hn::Set(d, kShortReach);
-  const VF far_form = hn::IfThenElse(hn::Gt(long_form, edge), long_form,
-                                     hn::Set(d, kShortReach - 1e-4f));
+  const VF far_form =
+      hn::IfThenElse(hn::Gt(long_form, edge), long_form, hn::Set(d, kShortReach - 1e-4f));
   return hn::IfThenElse(hn::Lt(short_form, edge), short_form, far_form);
 }
 

@@ -1,7 +1,7 @@
 // lane_loads-inl.h - 16 bytes from an address of its own for each lane, turned into columns.
 //
-// Included once for each SIMD target. Where a lane wants several words that lie together, this takes
-// one load where gathers take one for each word.
+// Included once for each SIMD target. Where a lane wants several words that lie together, this
+// takes one load where gathers take one for each word.
 //
 //   lane 0 -> a0 b0 c0 d0          column 0: a0 a1 a2 a3 ...
 //   lane 1 -> a1 b1 c1 d1          column 1: b0 b1 b2 b3 ...
@@ -91,8 +91,8 @@ HWY_INLINE void load_brick_pairs(const std::int16_t* layer, const std::int32_t* 
   const LaneTag d;
   const hn::Repartition<std::uint8_t, LaneTag> bytes;
   const hn::RepartitionToWide<LaneTag> wide;
-  HWY_ALIGN static constexpr std::uint8_t kPick[16] = {0, 1, 2,  3,  10, 11, 12, 13,
-                                                       0, 1, 2,  3,  10, 11, 12, 13};
+  HWY_ALIGN static constexpr std::uint8_t kPick[16] = {0, 1, 2, 3, 10, 11, 12, 13,
+                                                       0, 1, 2, 3, 10, 11, 12, 13};
   const auto pick = hn::LoadDup128(bytes, kPick);
   const auto at = [&](std::size_t i) HWY_ATTR { return layer + offset[i]; };
   const auto row = [&](std::size_t j) HWY_ATTR {

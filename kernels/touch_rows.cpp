@@ -33,9 +33,8 @@ std::size_t touch_rows_simd(const FieldView& field, const Affine& to_field,
     hn::Store(row, di, lane);
     VI place[4];
     load_quads(
-        [&](std::size_t i) HWY_ATTR {
-          return places.xyz + std::size_t{3} * static_cast<std::uint32_t>(lane[i]);
-        },
+        [&](std::size_t i)
+            HWY_ATTR { return places.xyz + std::size_t{3} * static_cast<std::uint32_t>(lane[i]); },
         place);
     const VF x = hn::BitCast(d, place[0]), y = hn::BitCast(d, place[1]);
     const VF z = hn::BitCast(d, place[2]);

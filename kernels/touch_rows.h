@@ -15,15 +15,14 @@ inline constexpr float kExpirySlack = 1e-3f;
 
 // Samples points rows[0..count-1] (each at most once), writes those with a distance below `limit`,
 // in order, and returns how many. `out` has room for `count` rounded up to 16 rows; out.row may be
-// `rows` itself. expiry[r] of every such row r becomes, in quanta of 1/256 voxel rounded down and at
-// most 65535, `now` plus how far the shell may move before the point can come below the limit
+// `rows` itself. expiry[r] of every such row r becomes, in quanta of 1/256 voxel rounded down and
+// at most 65535, `now` plus how far the shell may move before the point can come below the limit
 // (cull_clearance, of cull_spheres.h, less kExpirySlack, at least 0).
 std::size_t touch_rows(const FieldView& field, const Affine& to_field, const PlacesView& places,
                        const std::uint32_t* rows, std::size_t count, float limit, bool wide,
                        float now, const Touching& out, std::uint16_t* expiry);
-std::size_t touch_rows_ref(const FieldView& field, const Affine& to_field,
-                           const PlacesView& places, const std::uint32_t* rows, std::size_t count,
-                           float limit, bool wide, float now, const Touching& out,
-                           std::uint16_t* expiry);
+std::size_t touch_rows_ref(const FieldView& field, const Affine& to_field, const PlacesView& places,
+                           const std::uint32_t* rows, std::size_t count, float limit, bool wide,
+                           float now, const Touching& out, std::uint16_t* expiry);
 
 }  // namespace h6::kernels

@@ -9,10 +9,9 @@
 
 namespace h6::kernels {
 
-std::size_t touch_rows_ref(const FieldView& field, const Affine& to_field,
-                           const PlacesView& places, const std::uint32_t* rows, std::size_t count,
-                           float limit, bool wide, float now, const Touching& out,
-                           std::uint16_t* expiry) {
+std::size_t touch_rows_ref(const FieldView& field, const Affine& to_field, const PlacesView& places,
+                           const std::uint32_t* rows, std::size_t count, float limit, bool wide,
+                           float now, const Touching& out, std::uint16_t* expiry) {
   std::size_t written = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t row = rows[k];

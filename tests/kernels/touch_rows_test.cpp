@@ -62,7 +62,8 @@ TEST_CASE("touch_rows: SIMD finds the same points and expiries as the reference 
             CHECK(got.row[i] == want.row[i]);
             CHECK(std::fabs(got.d[i] - want.d[i]) < 1e-3f);
             CHECK(std::fabs(got.gx[i] - want.gx[i]) + std::fabs(got.gy[i] - want.gy[i]) +
-                      std::fabs(got.gz[i] - want.gz[i]) < 1e-3f);
+                      std::fabs(got.gz[i] - want.gz[i]) <
+                  1e-3f);
           }
           for (std::size_t i = 0; i < until.size(); ++i)
             CHECK(std::abs(int(until[i]) - int(until_want[i])) <= 1);
@@ -96,8 +97,7 @@ TEST_CASE("touch_rows: a point that moves less than its expiry says does not tou
     std::vector<std::uint16_t> after(n);
     const std::size_t found = touch_rows(field.view(), kIdentity, {moved.data()}, rows.data(), n, 0,
                                          false, now, hits.columns(), after.data());
-    for (std::size_t i = 0; i < found; ++i)
-      CHECK(until[hits.row[i]] * kPointQuantum <= now);
+    for (std::size_t i = 0; i < found; ++i) CHECK(until[hits.row[i]] * kPointQuantum <= now);
   }
   CHECK(far > 100000);
 }
@@ -135,8 +135,8 @@ TEST_CASE("expiry: SIMD finds the same points and groups on every target, known 
       std::vector<std::uint32_t> some, got(blocks + 1), want(blocks + 1);
       for (std::uint32_t b = 0; b < blocks; b += 1 + random.below(2)) some.push_back(b);
       for (const std::size_t most : {1, 8, 12, 16}) {
-        const std::size_t n = mostly_expired_ref(values.data(), some.data(), some.size(), 1.5f,
-                                                 most, want.data());
+        const std::size_t n =
+            mostly_expired_ref(values.data(), some.data(), some.size(), 1.5f, most, want.data());
         CHECK(mostly_expired(values.data(), some.data(), some.size(), 1.5f, most, got.data()) == n);
         CHECK(std::equal(want.begin(), want.begin() + n, got.begin()));
       }

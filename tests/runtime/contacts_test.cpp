@@ -8,10 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "bench/frame_scenes.h"
 #include "kernels/sample_field.h"
 #include "runtime/session.h"
 #include "tests/support/analytic.h"
@@ -45,10 +48,11 @@ constexpr double kRadius = 20 * mm;
 
 struct Walk {
   std::string name;
-  Distance distance;
   h6Method method;
-  double room;  // how far from the middle it walks [m]
-  bool moving_field;
+  double voxel, radius;  // of the field, of the shell [m]
+  double room;           // how far from the middle it walks [m]
+  bool moving_field = false;
+  int jump = 0;  // frames from one jump of some voxels to the next; 0: none
 };
 
 double uniform(std::mt19937_64& random) {
@@ -56,7 +60,7 @@ double uniform(std::mt19937_64& random) {
 }
 
 struct Found {
-  int missed = 0, extra = 0, contacts = 0, near = 0;
+  int missed = 0, extra = 0, contacts = 0, near = 0, poses = 0;
 };
 
 bool is_sample(const h6Session* s, const h6::Shell& shell, std::size_t r) {
@@ -96,13 +100,10 @@ void compare(const h6Session* s, Found& found, double* least, std::uint32_t* dee
     if (d[r] < *least) *least = d[r], *deepest = static_cast<std::uint32_t>(r);
   }
   found.near += std::fabs(*least - margin) < 0.05;
+  ++found.poses;
 }
 
-Found walk(const Walk& w, double step_voxels, int frames, unsigned threads) {
-  FieldArrays field = field_of(w.distance);
-  ShellArrays shell = sphere_points(kRadius, 3001);
-  Model model({def_of(field)}, {shell.def()});
-  REQUIRE(model.handle);
+Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, unsigned threads) {
   h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
   bodies[0].fixed = !w.moving_field, bodies[0].field = 0;
   bodies[0].inertia[0] = bodies[0].inertia[1] = bodies[0].inertia[2] = 1e-4;
@@ -114,7 +115,7 @@ Found walk(const Walk& w, double step_voxels, int frames, unsigned threads) {
   def.contact.method = w.method;
   def.threads = threads;
   h6Error error{};
-  h6Session* s = h6CreateSession(model.handle, &def, &error);
+  h6Session* s = h6CreateSession(model, &def, &error);
   CAPTURE(error.message);
   REQUIRE(s);
   std::mt19937_64 random(7);
@@ -124,9 +125,11 @@ Found walk(const Walk& w, double step_voxels, int frames, unsigned threads) {
   for (int i = 0; i < frames; ++i) {
     // Stands still now and then; turns by as much as it shifts.
     if (i % 17 != 0) {
-      for (int k = 0; k < 3; ++k) p[k] += step_voxels * mm * uniform(random);
+      for (int k = 0; k < 3; ++k) p[k] += step_voxels * w.voxel * uniform(random);
+      if (w.jump > 0 && i % w.jump == 1)
+        for (int k = 0; k < 3; ++k) p[k] += w.room * uniform(random);
       if (p.norm() > w.room) p *= w.room / p.norm();
-      const double turn = step_voxels * mm / kRadius;
+      const double turn = step_voxels * w.voxel / w.radius;
       q = h6::exp_rotation(turn * h6::Vec3(uniform(random), uniform(random), uniform(random))) * q;
       q.normalize();
     }
@@ -134,7 +137,7 @@ Found walk(const Walk& w, double step_voxels, int frames, unsigned threads) {
     h6BodyState state{};
     h6::Quat turned = h6::Quat::Identity();
     if (w.moving_field) {
-      base += 0.3 * mm * h6::Vec3(uniform(random), uniform(random), uniform(random));
+      base += 0.3 * w.voxel * h6::Vec3(uniform(random), uniform(random), uniform(random));
       turned = h6::exp_rotation(h6::Vec3(0, 0, 1e-3 * i));
       state.pose = {h6::to(base), h6::to(turned)};
       h6SetBody(s, 0, &state);
@@ -159,14 +162,14 @@ Found walk(const Walk& w, double step_voxels, int frames, unsigned threads) {
     // Grazing: shifted along the deepest point's gradient until it is within 0.05 voxel.
     const float margin = w.method == H6_METHOD_SERIES ? float(def.contact.margin_voxels) : 0.0f;
     for (int shift = 0; shift < 2; ++shift) {
-      const h6::Shell& rows = model.handle->shells[0];
+      const h6::Shell& rows = model->shells[0];
       const h6::Vec3 local = rows.centre + h6::Vec3(rows.x[deepest], rows.y[deepest],
                                                     rows.z[deepest]);
       const h6::Vec3 at = p + q * local;
       double d, g[3];
-      h6SampleField(model.handle, 0, at.data(), 1, &d, g, nullptr);
-      const double wanted = (margin + 0.04 * uniform(random)) * mm;
-      if (std::fabs(d) > 3 * mm) break;
+      h6SampleField(model, 0, at.data(), 1, &d, g, nullptr);
+      const double wanted = (margin + 0.04 * uniform(random)) * w.voxel;
+      if (std::fabs(d) > 3 * w.voxel) break;
       p += (wanted - d) * h6::Vec3(g[0], g[1], g[2]);
       step();
     }
@@ -175,26 +178,34 @@ Found walk(const Walk& w, double step_voxels, int frames, unsigned threads) {
   return found;
 }
 
-const Walk kWalks[] = {
-    {"clutter", clutter, H6_METHOD_GAUSS6, 18 * mm, false},
-    {"series", clutter, H6_METHOD_SERIES, 18 * mm, false},
-    {"socket",
-     [](double x, double y, double z) { return kRadius + 0.25 * mm - std::hypot(x, y, z); },
-     H6_METHOD_GAUSS3, 0.6 * mm, false},
-    {"sheet", [](double, double, double z) { return std::fabs(z - 20.5 * mm) - mm; },
-     H6_METHOD_NONE, 8 * mm, false},
-    {"moving field", clutter, H6_METHOD_GAUSS6, 18 * mm, true},
+struct FormulaWalk {
+  Distance distance;
+  Walk walk;
+};
+
+const FormulaWalk kWalks[] = {
+    {clutter, {"clutter", H6_METHOD_GAUSS6, mm, kRadius, 18 * mm}},
+    {clutter, {"series", H6_METHOD_SERIES, mm, kRadius, 18 * mm}},
+    {[](double x, double y, double z) { return kRadius + 0.25 * mm - std::hypot(x, y, z); },
+     {"socket", H6_METHOD_GAUSS3, mm, kRadius, 0.6 * mm}},
+    {[](double, double, double z) { return std::fabs(z - 20.5 * mm) - mm; },
+     {"sheet", H6_METHOD_NONE, mm, kRadius, 8 * mm}},
+    {clutter, {"moving field", H6_METHOD_GAUSS6, mm, kRadius, 18 * mm, true}},
 };
 
 }  // namespace
 
 TEST_CASE("contacts are all points that touch and no others, on slow, medium and fast walks") {
-  for (const Walk& w : kWalks) {
+  for (const auto& [distance, w] : kWalks) {
     CAPTURE(w.name);
+    FieldArrays field = field_of(distance);
+    ShellArrays shell = sphere_points(kRadius, 3001);
+    Model model({def_of(field)}, {shell.def()});
+    REQUIRE(model.handle);
     Found all;
     for (const double step : {0.005, 0.1, 6.0}) {
       CAPTURE(step);
-      const Found f = walk(w, step, 1200, 1);
+      const Found f = walk(model.handle, w, step, 1200, 1);
       CHECK(f.missed == 0);
       CHECK(f.extra == 0);
       all.contacts += f.contacts;
@@ -203,6 +214,33 @@ TEST_CASE("contacts are all points that touch and no others, on slow, medium and
     MESSAGE(w.name << ": " << all.contacts << " contacts, " << all.near << " grazing poses");
     CHECK(all.contacts > 1000);
     CHECK(all.near > 200);
+  }
+}
+
+// HAPSIX_ALL_POSES=1: at full size (1024^3 voxels, 56,823 points) and 10,000 poses a scene.
+TEST_CASE("contacts in the scenes of the benches are all points that touch and no others") {
+  const bool full = std::getenv("HAPSIX_ALL_POSES") != nullptr;
+  const double size = full ? 1 : 0.25;
+  for (const bool socket : {false, true}) {
+    const std::unique_ptr<h6Model, void (*)(h6Model*)> model(h6::bench::make_model(socket, size),
+                                                             h6DestroyModel);
+    REQUIRE(model);
+    const Walk w{socket ? "socket" : "clutter", H6_METHOD_GAUSS6, h6::bench::kVoxel,
+           model->shells[0].radius, (socket ? 1 : full ? 6 : 2) * h6::bench::kVoxel, false, 50};
+    CAPTURE(w.name);
+    Found all;
+    for (const double step : {0.005, 0.1, 6.0}) {
+      CAPTURE(step);
+      const Found f = walk(model.get(), w, step, full ? 2200 : 200, 1);
+      CHECK(f.missed == 0);
+      CHECK(f.extra == 0);
+      all.contacts += f.contacts, all.near += f.near, all.poses += f.poses;
+    }
+    MESSAGE(w.name << ": " << all.poses << " poses, " << all.near << " of them grazing, "
+                   << all.contacts << " contacts");
+    CHECK(all.contacts > 1000);
+    CHECK(all.near > 50);
+    CHECK(all.poses >= (full ? 10000 : 500));
   }
 }
 
