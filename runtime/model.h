@@ -20,17 +20,27 @@ struct Field {
   }
 };
 
+// A column of memory that something else holds.
+template <class T>
+struct Column {
+  T* data = nullptr;
+  std::size_t count = 0;
+  void take(Arena& arena, std::size_t n) { data = arena.take<T>(n), count = n; }
+  T& operator[](std::size_t i) { return data[i]; }
+  const T& operator[](std::size_t i) const { return data[i]; }
+};
+
 // Spheres around equal runs of points; the radius is rounded up.
 struct Tier {
   std::size_t count = 0;
-  Buffer<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
+  Column<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
 };
 
 // One point of each group, the nearest to its centre: what is sampled where time is short.
 struct Samples {
-  Buffer<float> x, y, z;      // (groups, rounded up to whole blocks)
-  Buffer<std::uint32_t> row;  // of the shell
-  Buffer<float> reach;        // (blocks) from a group's sample to its farthest point, the longest
+  Column<float> x, y, z;      // (groups, rounded up to whole blocks)
+  Column<std::uint32_t> row;  // of the shell
+  Column<float> reach;        // (blocks) from a group's sample to its farthest point, the longest
 };
 
 // A shell's points in three flat tiers. Rows are sorted so that those next to each other are near
@@ -40,14 +50,13 @@ struct Shell {
   Vec3 centre;             // mesh frame [m]
   double radius = 0;       // farthest point from the centre [m]
   std::size_t points = 0;  // rows; columns repeat the last one up to a whole block
-  Buffer<float> x, y, z, nx, ny, nz;  // normals point inward
-  Buffer<float> xyz;                  // the same places, row by row, and one more float
-  Buffer<std::uint32_t> point;        // of the definition
+  Column<float> x, y, z, nx, ny, nz;  // normals point inward
+  Column<float> xyz;                  // the same places, row by row, and one more float
+  Column<std::uint32_t> point;        // of the definition
   Tier groups, blocks;
   Samples samples;
-  std::size_t bytes() const {
-    return x.count * 40 + (groups.x.count + blocks.x.count + samples.x.count) * 16;
-  }
+  Buffer<char> memory;  // of all columns: together they lie on few pages
+  std::size_t bytes() const { return memory.count; }
 };
 inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;
 

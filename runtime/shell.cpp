@@ -2,6 +2,7 @@
 // Sec. 6.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "runtime/model.h"
 
@@ -136,29 +137,18 @@ void enclose(const Shell& shell, std::size_t begin, std::size_t end, Tier& tier,
   tier.radius[at] = static_cast<float>(radius * 1.000001);
 }
 
-bool make_tier(const Shell& shell, std::size_t rows, const h6Allocator& allocator, Tier& tier) {
-  tier.count = (shell.points + rows - 1) / rows;
-  const std::size_t padded = (tier.count + 15) / 16 * 16;
-  for (Buffer<float>* column : {&tier.x, &tier.y, &tier.z, &tier.radius})
-    if (!column->reserve(allocator, padded)) return false;
+void make_tier(const Shell& shell, std::size_t rows, Tier& tier) {
   for (std::size_t i = 0; i < tier.count; ++i)
     enclose(shell, i * rows, std::min((i + 1) * rows, shell.points), tier, i);
-  for (std::size_t i = tier.count; i < padded; ++i)
-    for (Buffer<float>* column : {&tier.x, &tier.y, &tier.z, &tier.radius})
+  for (std::size_t i = tier.count; i < tier.x.count; ++i)
+    for (Column<float>* column : {&tier.x, &tier.y, &tier.z, &tier.radius})
       (*column)[i] = (*column)[tier.count - 1];
-  return true;
 }
 
-bool take_samples(const Shell& shell, const h6Allocator& allocator, Samples& samples) {
-  const std::size_t padded = shell.blocks.count * kGroupRows;
-  if (!samples.row.reserve(allocator, padded) ||
-      !samples.reach.reserve(allocator, shell.blocks.count))
-    return false;
-  for (Buffer<float>* column : {&samples.x, &samples.y, &samples.z})
-    if (!column->reserve(allocator, padded)) return false;
+void take_samples(const Shell& shell, Samples& samples) {
   std::fill_n(samples.reach.data, shell.blocks.count, 0.0f);
   const auto place = [&](std::size_t r) { return Vec3(shell.x[r], shell.y[r], shell.z[r]); };
-  for (std::size_t g = 0; g < padded; ++g) {
+  for (std::size_t g = 0; g < samples.x.count; ++g) {
     const std::size_t group = std::min(g, shell.groups.count - 1), first = group * kGroupRows;
     const std::size_t end = std::min(first + kGroupRows, shell.points);
     const Vec3 centre(shell.groups.x[group], shell.groups.y[group], shell.groups.z[group]);
@@ -172,7 +162,25 @@ bool take_samples(const Shell& shell, const h6Allocator& allocator, Samples& sam
     for (std::size_t r = first; r < end; ++r)
       reach = std::max(reach, static_cast<float>((place(r) - place(nearest)).norm() * 1.000001));
   }
-  return true;
+}
+
+// Called twice: with an empty arena to count, then to take. What traversal reads stands first.
+void lay_out(Shell& shell, Arena& arena) {
+  const std::size_t padded = (shell.points + kBlockRows - 1) / kBlockRows * kBlockRows;
+  for (auto [tier, rows] : {std::pair{&shell.blocks, kBlockRows}, {&shell.groups, kGroupRows}}) {
+    tier->count = (shell.points + rows - 1) / rows;
+    for (Column<float>* column : {&tier->x, &tier->y, &tier->z, &tier->radius})
+      column->take(arena, (tier->count + 15) / 16 * 16);
+  }
+  shell.xyz.take(arena, 3 * padded + 1);
+  for (Column<float>* column : {&shell.x, &shell.y, &shell.z, &shell.nx, &shell.ny, &shell.nz})
+    column->take(arena, padded);
+  shell.point.take(arena, padded);
+  Samples& samples = shell.samples;
+  for (Column<float>* column : {&samples.x, &samples.y, &samples.z})
+    column->take(arena, shell.blocks.count * kGroupRows);
+  samples.row.take(arena, shell.blocks.count * kGroupRows);
+  samples.reach.take(arena, shell.blocks.count);
 }
 
 }  // namespace
@@ -183,11 +191,12 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     return false;
   const std::size_t n = shell->points = def.point_count;
   const std::size_t padded = (n + kBlockRows - 1) / kBlockRows * kBlockRows;
-  bool reserved = shell->point.reserve(allocator, padded);
-  for (Buffer<float>* b : {&shell->x, &shell->y, &shell->z, &shell->nx, &shell->ny, &shell->nz})
-    reserved = b->reserve(allocator, padded) && reserved;
-  reserved = shell->xyz.reserve(allocator, 3 * padded + 1) && reserved;
-  if (!reserved) return fail(error, "no memory for %zu points", n);
+  Arena room;
+  lay_out(*shell, room);
+  if (!shell->memory.reserve(allocator, room.used()))
+    return fail(error, "no memory for %zu points", n);
+  Arena arena(shell->memory.data, shell->memory.count);
+  lay_out(*shell, arena);
 
   std::uint32_t* rows = shell->point.data;
   for (std::size_t i = 0; i < n; ++i) rows[i] = static_cast<std::uint32_t>(i);
@@ -216,10 +225,9 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     shell->radius = std::max(shell->radius, q.norm());
   }
   shell->xyz[3 * padded] = 0;
-  if (!make_tier(*shell, kGroupRows, allocator, shell->groups) ||
-      !make_tier(*shell, kBlockRows, allocator, shell->blocks) ||
-      !take_samples(*shell, allocator, shell->samples))
-    return fail(error, "no memory for the spheres of %zu points", n);
+  make_tier(*shell, kGroupRows, shell->groups);
+  make_tier(*shell, kBlockRows, shell->blocks);
+  take_samples(*shell, shell->samples);
   return true;
 }
 
