@@ -5,9 +5,15 @@
 // The part is moved from where it is free until it has about the contacts asked for. Slow: 0.01
 // voxel a frame; fast: the frame before stood far outside the field, so nothing is remembered.
 // Contacts of the timed poses are compared with all points before a time is reported.
+//     field/memory/voxels:1024/bricks:N
+// Time is that of h6CreateModel, `resident_mb` what it adds to this process.
 #include <benchmark/benchmark.h>
 
+#include <unistd.h>
+
+#include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <string>
@@ -142,6 +148,47 @@ void frame(benchmark::State& state, bool socket, h6Method method, std::size_t wa
   for (int k = 0; k < H6_STAGE_COUNT; ++k)
     state.counters[std::string(h6StageName(static_cast<h6Stage>(k))) + "_us"] = median(k, 0.5);
 }
+
+double resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  double all = 0, resident = 0;
+  statm >> all >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+// What is in the bricks does not matter to how much room they take.
+void memory(benchmark::State& state) {
+  const auto bricks = static_cast<std::size_t>(state.range(0));
+  for (auto _ : state) {
+    FieldArrays field;
+    field.samples.assign(512 * bricks, static_cast<float>(kVoxel));
+    field.index.assign(std::size_t(kBricks) * kBricks * kBricks, -1);
+    for (std::size_t i = 0; i < bricks; ++i)
+      field.index[7 * i] = static_cast<std::int32_t>(i);
+    field.far.assign(std::size_t(kBricks + 1) * (kBricks + 1) * (kBricks + 1),
+                     static_cast<float>(20 * kVoxel));
+    h6FieldDef& def = field.def;
+    def.voxel_size = kVoxel, def.band = kBand * kVoxel;
+    for (int& count : def.bricks) count = kBricks;
+    def.brick_index = field.index.data(), def.samples = field.samples.data();
+    def.brick_count = bricks, def.far_grid = field.far.data();
+    h6ModelDef model_def = h6DefaultModelDef();
+    model_def.fields = &def, model_def.field_count = 1;
+    const double before = resident_bytes();
+    const auto start = std::chrono::steady_clock::now();
+    std::unique_ptr<h6Model, ModelDeleter> model(h6CreateModel(&model_def, nullptr));
+    state.SetIterationTime(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    if (!model) return state.SkipWithError("no model");
+    state.counters["resident_mb"] = 1e-6 * (resident_bytes() - before);
+  }
+}
+BENCHMARK(memory)
+    ->Name("field/memory/voxels:1024/bricks")
+    ->Arg(270000)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(1);
 
 [[maybe_unused]] const bool registered = [] {
   for (const bool socket : {false, true})
