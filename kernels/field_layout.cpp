@@ -212,11 +212,10 @@ void layout_cell(const h6FieldDef& def, const std::int32_t* table, std::size_t s
   std::int16_t* out = bricks + kBrickStride * entry;
   for (int z = 0; z < 9; ++z) {
     for (int y = 0; y < 9; ++y) {
-      for (int x = 0; x < 9; ++x) out[brick_node(x, y, z)] = round_near(nodes.at(x, y, z));
-      out[brick_node(0, y, z) + 4] = out[brick_node(4, y, z)];
+      for (int x = 0; x < 9; ++x) *out++ = round_near(nodes.at(x, y, z));
     }
   }
-  std::fill(out + 2 * kHalfNodes, out + kBrickStride, std::int16_t{0});
+  std::fill_n(out, kBrickStride - kBrickNodes, std::int16_t{0});
 }
 
 }  // namespace h6::kernels

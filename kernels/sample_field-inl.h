@@ -1,8 +1,7 @@
 // sample_field-inl.h - one vector of field samples; shared by sample_field and cull_spheres.
 //
 // Included once for each SIMD target. Two neighbours along x are 4 adjacent bytes, in a brick and
-// in a far cell alike. Loads of 16 bytes a lane fetch 2 such pairs of a brick, or all 4 of a far
-// cell: gathers would take a load for each, and more on top (Zen 4: 81 operations for 16 lanes).
+// in a far cell alike: 4 gathers of 32 bits fetch the 8 corners.
 //
 //          y1z1 --- pair 3       pair = low half: corner at x, high half: corner at x + 1
 //         /    /
@@ -22,7 +21,6 @@
 #endif
 
 #include "hwy/highway.h"
-#include "kernels/lane_loads-inl.h"
 #include "kernels/tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -33,6 +31,18 @@ using DF = hn::ScalableTag<float>;
 using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 using VI = hn::Vec<DI>;
+
+// Two int16 at each byte offset.
+HWY_INLINE VI gather_pairs(const std::int16_t* pool, VI offset) {
+#if HWY_TARGET == HWY_SCALAR
+  // Highway's one-lane gather reads through an int32 pointer, which pairs are not aligned for.
+  std::int32_t pair;
+  std::memcpy(&pair, reinterpret_cast<const char*>(pool) + hn::GetLane(offset), sizeof pair);
+  return hn::Set(DI(), pair);
+#else
+  return hn::GatherOffset(DI(), reinterpret_cast<const std::int32_t*>(pool), offset);
+#endif
+}
 
 HWY_INLINE VF low_half(VI pair) {
   return hn::ConvertTo(DF(), hn::ShiftRight<16>(hn::ShiftLeft<16>(pair)));
@@ -103,28 +113,24 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   VF quantum = hn::Set(d, kNearQuantum);
   VF slope = quantum;
   if (!hn::AllTrue(di, far)) {
-    // brick_node of the cell's lowest corner.
-    const VI half = hn::ShiftRight<2>(x.cell);
-    const VI node = hn::Add(
-        hn::Add(x.cell, hn::Mul(half, hn::Set(di, kHalfNodes - 4))),
-        hn::Add(hn::Mul(y.cell, hn::Set(di, 5)), hn::Mul(z.cell, hn::Set(di, 45))));
-    const VI at = hn::IfThenZeroElse(
-        far, hn::Add(hn::Mul(entry, hn::Set(di, kBrickStride)), node));
-    HWY_ALIGN std::int32_t offset[hn::MaxLanes(di)];
-    hn::Store(at, di, offset);
-    load_brick_pairs(field.bricks, offset, pair[0], pair[1]);
-    load_brick_pairs(field.bricks + 45, offset, pair[2], pair[3]);
+    const VI node =
+        hn::Add(x.cell, hn::Add(hn::Mul(y.cell, hn::Set(di, 9)), hn::Mul(z.cell, hn::Set(di, 81))));
+    const VI offset = hn::IfThenZeroElse(
+        far, hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node)));
+    pair[0] = gather_pairs(field.bricks, offset);
+    pair[1] = gather_pairs(field.bricks + 9, offset);
+    pair[2] = gather_pairs(field.bricks + 81, offset);
+    pair[3] = gather_pairs(field.bricks + 90, offset);
   } else {
     pair[0] = pair[1] = pair[2] = pair[3] = hn::Zero(di);
   }
   if (any_far) {
     const VI row = hn::Sub(hn::Set(di, -1), entry);
-    HWY_ALIGN std::int32_t offset[hn::MaxLanes(di)];
-    hn::Store(hn::IfThenElseZero(far, hn::ShiftLeft<3>(row)), di, offset);
-    VI corner[4];
-    load_quads([&](std::size_t i) HWY_ATTR { return field.far + offset[i]; }, corner);
+    const VI offset = hn::IfThenElseZero(far, hn::ShiftLeft<4>(row));
     HWY_UNROLL(4)
-    for (int k = 0; k < 4; ++k) pair[k] = hn::IfThenElse(far, corner[k], pair[k]);
+    for (int k = 0; k < 4; ++k) {
+      pair[k] = hn::IfThenElse(far, gather_pairs(field.far + 2 * k, offset), pair[k]);
+    }
     const auto far_f = hn::RebindMask(d, far);
     x.fraction = hn::IfThenElse(far_f, far_fraction(x), x.fraction);
     y.fraction = hn::IfThenElse(far_f, far_fraction(y), y.fraction);

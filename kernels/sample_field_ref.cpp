@@ -35,7 +35,7 @@ Sample sample_near(const std::int16_t* brick, const std::int32_t cell[3], const 
   float corner[8];
   for (int k = 0; k < 8; ++k) {
     const int x = cell[0] + (k & 1), y = cell[1] + (k >> 1 & 1), z = cell[2] + (k >> 2);
-    corner[k] = kNearQuantum * brick[brick_node(x, y, z)];
+    corner[k] = kNearQuantum * brick[(z * 9 + y) * 9 + x];
   }
   return trilinear(corner, t);
 }

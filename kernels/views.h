@@ -9,31 +9,23 @@
 namespace h6::kernels {
 
 // A field in its hot layout. One table entry a brick of 8 x 8 x 8 unit cells:
-//   >= 0  row in `bricks`: 9 x 9 x 9 nodes, int16 in 1/1024 voxel; the last layer repeats the
-//         neighbours' first. Distances there are samples, trilinear between nodes. Two halves of
-//         5 x 9 x 9 nodes, x fastest, which share the nodes at x = 4: so near in x, a cell's
-//         corners at one z lie within 14 bytes, and two loads of 16 fetch all eight.
+//   >= 0  row in `bricks`: 9 x 9 x 9 nodes, x fastest, int16 in 1/1024 voxel; the last layer
+//         repeats the neighbours' first. Distances there are samples, trilinear between nodes.
 //   <  0  no samples. Row -1 - entry in `far`: the 8 corners of the cell, x fastest, int16 in 1/32
 //         voxel, lowered so that the trilinear value between them never exceeds |d|: a bound.
 //
 //        table (bx*by*bz)       bricks                       far
-//        [ 0][-1][-2][ 1] ...   [405 | 405 int16, padded]... [8 int16][8 int16]...
+//        [ 0][-1][-2][ 1] ...   [729 int16, padded][...]     [8 int16][8 int16]...
 struct FieldView {
   std::int32_t size[3];       // bricks along x, y, z; nodes 0 .. 8*size - 1
   const std::int32_t* table;  // (size z * y * x), x fastest
   const std::int16_t* bricks;
   const std::int16_t* far;
 };
-inline constexpr int kHalfNodes = 5 * 9 * 9;
-inline constexpr int kBrickStride = 816;  // int16 a brick; a multiple of 32 bytes, 16 bytes of which
-                                          // may be read from any cell on
-// Node (x, y, z) of a brick, 0..8 each; x = 4 stands in the other half too, at column 4.
-inline constexpr int brick_node(int x, int y, int z) {
-  const int half = x >= 4;
-  return half * kHalfNodes + (z * 9 + y) * 5 + x - 4 * half;
-}
-// Nodes are addressed by 32-bit numbers, so a field may have this many bricks (4.3 GB), no more.
-inline constexpr std::size_t kMaxBricks = 0x7fffffffu / kBrickStride;
+inline constexpr int kBrickNodes = 9 * 9 * 9;
+inline constexpr int kBrickStride = 736;  // int16 a brick; a multiple of 32 bytes
+// Gathers address bricks by a 32-bit byte offset, so a field may have this many (2.1 GB), no more.
+inline constexpr std::size_t kMaxBricks = 0x7fffffffu / (kBrickStride * sizeof(std::int16_t));
 inline constexpr float kNearQuantum = 1.0f / 1024.0f;  // voxels
 inline constexpr float kFarQuantum = 1.0f / 32.0f;     // voxels
 

@@ -72,16 +72,18 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
   field->wide = def.band < 2.999 * def.voxel_size;
   const std::size_t cells = std::size_t(def.bricks[0]) * def.bricks[1] * def.bricks[2];
   const kernels::FieldLayoutSize size = kernels::field_layout_size(def);
-  if (size.bricks > kernels::kMaxBricks)
+  // Kernels address bricks by 32-bit byte offsets.
+  constexpr std::size_t most = INT32_MAX / (kernels::kBrickStride * sizeof(std::int16_t));
+  if (size.bricks > most)
     return fail(error,
                 "%zu bricks are more than the %zu supported: use a larger voxel or a narrower band",
-                size.bricks, kernels::kMaxBricks);
+                size.bricks, most);
   if (!field->table.reserve(model.allocator, cells) ||
       !field->bricks.reserve(model.allocator, (size.bricks + 1) * kernels::kBrickStride) ||
       !field->far.reserve(model.allocator, (size.far_cells + 1) * 8))
     return fail(error, "no memory for %zu bricks (%zu MB)", size.bricks,
                 size.bricks * kernels::kBrickStride * 2 / 1000000);
-  // One row more than is used: a load may read past its cell, and an empty pool stays readable.
+  // One row more than is used: a gather may read past its node, and an empty pool stays readable.
   for (int i = 0; i < kernels::kBrickStride; ++i)
     field->bricks[size.bricks * kernels::kBrickStride + i] = 0;
   for (int i = 0; i < 8; ++i) field->far[size.far_cells * 8 + i] = 0;

@@ -10,7 +10,7 @@
 
 #include "kernels/cull_spheres.h"
 #include "kernels/expiry.h"
-#include "kernels/touch_rows.h"
+#include "kernels/touch_groups.h"
 #include "runtime/anytime.h"
 #include "runtime/stages.h"
 #include "sched/clock.h"
@@ -18,14 +18,12 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSlice = 1024;         // points sampled at a time: some 2 us
-constexpr std::size_t kWorthSharing = 256;   // 16 points each, from which the helper is asked: 8 us
+constexpr std::size_t kSlice = 64;           // groups sampled at a time: some 2 us
+constexpr std::size_t kWorthSharing = 256;   // groups from which the helper is asked: some 8 us
 constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which pairs are shared out
 constexpr std::size_t kPairSlices = 32;
 constexpr float kSlack = 1e-3f;              // [voxel]
-constexpr double kLongestWay = 255;          // [voxel] float has 3e-5 left there, 16 bits 1/256
-// A sphere is looked at where so many of the 16 in it have expired: fewer are themselves cheaper.
-constexpr std::size_t kMany = 8;
+constexpr double kLongestWay = 256;          // [voxel] float has 3e-5 left there
 
 // Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
 kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
@@ -114,29 +112,29 @@ struct Search {
     for (std::size_t k = 0; k < found; ++k) out.row[k] = samples.row[out.row[k]];
     return found;
   }
-  std::size_t touch(const std::uint32_t* rows, std::size_t count, float now,
-                    const kernels::Touching& out, std::uint16_t* expiry) const {
-    return kernels::touch_rows(field, place, {shell.xyz.data}, rows, count, margin, wide, now, out,
-                               expiry);
+  std::size_t touch(const std::uint32_t* groups, std::size_t count,
+                    const kernels::Touching& out, float* least) const {
+    return kernels::touch_groups(field, place,
+                                 {shell.x.data, shell.y.data, shell.z.data, shell.points}, groups,
+                                 count, margin, out, least);
   }
 };
 
-// Which of the candidates behind `used` touch, in order, whatever runs the slices. `alone`: this is
+// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`. `alone`: this is
 // a slice itself.
-std::size_t touch(h6Session& s, TraverseScratch& t, const Pair& pair, const Search& search,
-                  float now, std::size_t count, std::size_t used, bool alone) {
-  const auto sample = [&](std::size_t at, std::size_t n) {
-    return search.touch(t.candidate + at, n, now, candidates_from(t, at), pair.point_expiry);
-  };
-  if (alone || count < kWorthSharing * kGroupRows || s.team->threads() == 1)
-    return sample(used, count);
+std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::size_t count,
+                  std::size_t used, bool alone) {
+  if (alone || count < kWorthSharing || s.team->threads() == 1)
+    return search.touch(t.survivors, count, candidates_from(t, used), t.clearance);
   const std::size_t slices = (count + kSlice - 1) / kSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
-    s.slice_count[i] = sample(used + i * kSlice, std::min(kSlice, count - i * kSlice));
+    const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
+    s.slice_count[i] = search.touch(t.survivors + at, n, candidates_from(t, used + at * kGroupRows),
+                                    t.clearance + at);
   });
   std::size_t kept = s.slice_count[0];
   for (std::size_t i = 1; i < slices; ++i) {
-    move_candidates(t, used + kept, t, used + i * kSlice, s.slice_count[i]);
+    move_candidates(t, used + kept, t, used + i * kSlice * kGroupRows, s.slice_count[i]);
     kept += s.slice_count[i];
   }
   return kept;
@@ -174,7 +172,6 @@ float travel(Pair& pair, const Search& search) {
     std::fill_n(pair.block_expiry, shell.blocks.count, 0.0f);
     std::fill(pair.block_expiry + shell.blocks.count, pair.block_expiry + shell.blocks.x.count,
               HUGE_VALF);
-    std::fill_n(pair.known_points, shell.blocks.count, std::uint16_t{0});
   }
   pair.last_place = search.place;
   return static_cast<float>(pair.travelled);
@@ -193,16 +190,6 @@ std::size_t touch_coarsely(Pair& pair, TraverseScratch& t, const Search& search,
   return found;
 }
 
-// Looks at the first `count` spheres of the frontier; false where each may hold a contact.
-bool cull_frontier(TraverseScratch& t, const Search& search, const Tier& tier, float now,
-                   std::size_t count, std::size_t used, float* expiry) {
-  if (count == 0) return false;
-  const std::size_t left =
-      search.cull(tier, t.frontier, count, t.candidate + used, t.clearance);
-  for (std::size_t k = 0; k < count; ++k) expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
-  return left < count;
-}
-
 // Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
 // points; of each only what may have come within reach since it was last looked at. Where time is
 // short it ends with the deepest tier that is complete: what was not looked at stays expired.
@@ -216,47 +203,37 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   const Search search{field.view, shell, shell_to_field(a, shell, b, field),
                       static_cast<float>(1.0 / field.voxel), field.wide || margin > 0.5f, margin};
   const float now = travel(pair, search);
-  const kernels::PointExpiries points{pair.point_expiry, pair.known_points, shell.points};
   pair.sampled = 0;
   pair.missed = 0;
 
-  const auto open_blocks = [&] {
-    return kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now,
-                            t.open_blocks);
-  };
-  std::size_t blocks = open_blocks();
-  std::size_t many =
-      kernels::mostly_expired(pair.group_expiry, t.open_blocks, blocks, now, kMany, t.frontier);
-  if (cull_frontier(t, search, shell.blocks, now, many, used, pair.block_expiry))
-    blocks = open_blocks();
+  std::size_t count =
+      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, t.frontier);
+  if (count == 0) return 0;
+  const std::size_t blocks = search.cull(shell.blocks, t.frontier, count, t.survivors, t.clearance);
+  for (std::size_t k = 0; k < count; ++k)
+    pair.block_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
   if (blocks == 0) return 0;
+
+  std::copy_n(t.survivors, blocks, t.open_blocks);
   const auto number = static_cast<std::size_t>(&pair - s.pairs);
   if (must_be_coarse(s, number, used, 0)) return touch_coarsely(pair, t, search, blocks, used);
-
-  const auto open_groups = [&] {
-    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.open_groups);
-  };
-  std::size_t groups = open_groups();
-  many = kernels::mostly_expired_points(points, t.open_groups, groups, now, kMany, t.frontier);
-  if (cull_frontier(t, search, shell.groups, now, many, used, pair.group_expiry))
-    groups = open_groups();
-  const std::size_t rows =
-      kernels::expired_points(points, t.open_groups, groups, now, t.candidate + used);
-  const std::size_t sixteens = (rows + kGroupRows - 1) / kGroupRows;
-  if (must_be_coarse(s, number, used, sixteens)) {
+  count = kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
+  const std::size_t groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
+  for (std::size_t k = 0; k < count; ++k)
+    pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
+  if (must_be_coarse(s, number, used, groups)) {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
     const std::size_t found = touch_coarsely(pair, t, search, blocks, used);
-    learn_coarsely(s, sixteens, found);
+    learn_coarsely(s, groups, found);
     return found;
   }
   const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
-  const std::size_t found = touch(s, t, pair, search, now, rows, used, alone);
-  if (s.anytime.by_clock) learn_sampling(s, sixteens, found, since);
-  pair.sampled = sixteens;
+  const std::size_t found = touch(s, t, search, groups, used, alone);
+  if (s.anytime.by_clock) learn_sampling(s, groups, found, since);
+  pair.sampled = groups;
   for (std::size_t k = 0; k < groups; ++k)
-    pair.known_points[t.open_groups[k] / 16] |=
-        static_cast<std::uint16_t>(1u << t.open_groups[k] % 16);
-  kernels::least_of_points(points, t.open_groups, groups, pair.group_expiry);
+    pair.group_expiry[t.survivors[k]] =
+        expiry_of(now, kernels::cull_clearance(t.clearance[k] - margin, search.wide));
   kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
   return found;
 }

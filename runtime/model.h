@@ -51,7 +51,6 @@ struct Shell {
   double radius = 0;       // farthest point from the centre [m]
   std::size_t points = 0;  // rows; columns repeat the last one up to a whole block
   Column<float> x, y, z, nx, ny, nz;  // normals point inward
-  Column<float> xyz;                  // the same places, row by row, and one more float
   Column<std::uint32_t> point;        // of the definition
   Tier groups, blocks;
   Samples samples;

@@ -181,7 +181,7 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   for (std::size_t i = 0; i < (n.shares ? 2u : 1u); ++i) {
     TraverseScratch& t = s.traversal[i];
     t.frontier = arena.take<std::uint32_t>(n.groups);
-    t.open_groups = arena.take<std::uint32_t>(n.groups);
+    t.survivors = arena.take<std::uint32_t>(n.groups);
     t.open_blocks = arena.take<std::uint32_t>(n.blocks);
     t.clearance = arena.take<float>(n.groups);
     t.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
@@ -190,8 +190,6 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   }
   s.group_expiry = arena.take<float>(n.all_groups);
   s.block_expiry = arena.take<float>(n.all_blocks);
-  s.point_expiry = arena.take<std::uint16_t>(kGroupRows * n.all_groups);
-  s.known_points = arena.take<std::uint16_t>(n.all_groups / 16);
   s.scratch_depth = arena.take<float>(s.candidate_capacity);
   const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
   s.cluster_order = arena.take<std::uint32_t>(merged);
@@ -236,20 +234,15 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   for (std::size_t i = 0; i < n.bodies; ++i) set_body(s, i, def.bodies[i], pairs);
   s.pair_count = n.pairs;
   float *group_expiry = s.group_expiry, *block_expiry = s.block_expiry;
-  std::uint16_t *point_expiry = s.point_expiry, *known_points = s.known_points;
   for (std::size_t i = 0; i < n.pairs; ++i) {
     new (&s.pairs[i]) Pair();
     s.pairs[i].a = pairs[i].shell_body;
     s.pairs[i].b = pairs[i].field_body;
     s.pairs[i].group_expiry = group_expiry;
     s.pairs[i].block_expiry = block_expiry;
-    s.pairs[i].point_expiry = point_expiry;
-    s.pairs[i].known_points = known_points;
     const Shell& shell = s.model->shells[s.bodies[s.pairs[i].a].shell];
     group_expiry += 16 * shell.blocks.count;
     block_expiry += shell.blocks.x.count;
-    point_expiry += kBlockRows * shell.blocks.count;
-    known_points += shell.blocks.count;
   }
   s.hand_count = n.hands;
   for (std::size_t i = 0; i < n.hands; ++i) {

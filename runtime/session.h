@@ -51,9 +51,8 @@ struct Body : RigidState {
 
 // What a thread needs to traverse a pair, and the points that it found to touch.
 struct TraverseScratch {
-  std::uint32_t* frontier = nullptr;                        // (largest shell's groups)
+  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's groups)
   std::uint32_t* open_blocks = nullptr;                     // (largest shell's blocks)
-  std::uint32_t* open_groups = nullptr;                     // (largest shell's groups)
   float* clearance = nullptr;                               // (largest shell's groups) [voxel]
   std::uint32_t* candidate = nullptr;                       // (candidate_capacity) shell's rows
   float* candidate_distance = nullptr;                      // [voxel]
@@ -69,8 +68,6 @@ struct Pair {
   // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch
   // before `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
   float *group_expiry = nullptr, *block_expiry = nullptr;
-  // The same of points, in 16 bits, and a bit for each group: they say something. kernels/expiry.h
-  std::uint16_t *point_expiry = nullptr, *known_points = nullptr;
   double travelled = -1;         // < 0: nothing is known
   std::size_t sampled = 0;       // groups, when it was last traversed
   int found_by = 0;              // whose scratch holds its candidates
@@ -153,7 +150,6 @@ struct h6Session {
   // several pairs; whoever finds them, candidates end up in the first.
   h6::TraverseScratch traversal[2];
   float *group_expiry = nullptr, *block_expiry = nullptr;   // of all pairs
-  std::uint16_t *point_expiry = nullptr, *known_points = nullptr;
   float* scratch_depth = nullptr;                           // to find the deepest
   std::size_t candidate_capacity = 0;
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)

@@ -172,7 +172,6 @@ void lay_out(Shell& shell, Arena& arena) {
     for (Column<float>* column : {&tier->x, &tier->y, &tier->z, &tier->radius})
       column->take(arena, (tier->count + 15) / 16 * 16);
   }
-  shell.xyz.take(arena, 3 * padded + 1);
   for (Column<float>* column : {&shell.x, &shell.y, &shell.z, &shell.nx, &shell.ny, &shell.nz})
     column->take(arena, padded);
   shell.point.take(arena, padded);
@@ -219,12 +218,9 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     shell->x[i] = static_cast<float>(q.x());
     shell->y[i] = static_cast<float>(q.y());
     shell->z[i] = static_cast<float>(q.z());
-    shell->xyz[3 * i] = shell->x[i], shell->xyz[3 * i + 1] = shell->y[i];
-    shell->xyz[3 * i + 2] = shell->z[i];
     shell->nx[i] = def.nx[p], shell->ny[i] = def.ny[p], shell->nz[i] = def.nz[p];
     shell->radius = std::max(shell->radius, q.norm());
   }
-  shell->xyz[3 * padded] = 0;
   make_tier(*shell, kGroupRows, shell->groups);
   make_tier(*shell, kBlockRows, shell->blocks);
   take_samples(*shell, shell->samples);

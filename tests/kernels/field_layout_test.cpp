@@ -115,7 +115,7 @@ TEST_CASE("field_layout: every brick's last layer repeats its neighbours' first"
             for (int y = step[1] ? 8 : 0; y < (step[1] ? 9 : 8); ++y)
               for (int x = step[0] ? 8 : 0; x < (step[0] ? 9 : 8); ++x) {
                 const auto node = [](const FieldView& v, std::int32_t row, int i, int j, int k) {
-                  return v.bricks[std::size_t(row) * kBrickStride + brick_node(i, j, k)];
+                  return v.bricks[std::size_t(row) * kBrickStride + (k * 9 + j) * 9 + i];
                 };
                 differences += node(view, own, x, y, z) !=
                                node(view, other, x - 8 * step[0], y - 8 * step[1], z - 8 * step[2]);
@@ -139,7 +139,7 @@ TEST_CASE(
         for (int z = 0; z < 8; ++z)
           for (int y = 0; y < 8; ++y) {
             const double held =
-                kNearQuantum * view.bricks[std::size_t(own) * kBrickStride + brick_node(8, y, z)];
+                kNearQuantum * view.bricks[std::size_t(own) * kBrickStride + (z * 9 + y) * 9 + 8];
             const double truth = field.distance({8.0 * a + 8, 8.0 * b + y, 8.0 * c + z});
             CHECK(std::fabs(held) >= 3.0 - 1e-3);
             CHECK(std::fabs(held) <= std::fabs(truth) + 1e-3);
