@@ -38,7 +38,8 @@ struct ContactColumns {
   std::uint32_t* point;
 };
 // depth = -voxel distance, n = Ra n, g = Rb gradient / |gradient| (n where that vanishes, on a
-// medial sheet), r = Ra p + arm, for rows 0..count-1.
+// medial sheet), r = Ra p + arm, for rows 0..count-1. Columns of the shell are readable to whole
+// groups of 16. Fast where rows of a group follow each other, as touch_groups writes them.
 void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,
                    const ContactFrame& frame, const ContactColumns& out);
 void make_contacts_ref(const ShellColumns& shell, const Touching& rows, std::size_t count,
