@@ -1,4 +1,5 @@
-// gauss_sweep.cpp - sorting along the line, windows, pairs and weights of gauss_sweep.h.
+// gauss_sweep.cpp - stages and weights of gauss_sweep.h; sorting along the line, windows and pairs
+// of a product.
 #include "kernels/gauss_sweep.h"
 
 #include <algorithm>
@@ -90,7 +91,7 @@ HWY_INLINE void gather_rows(const GaussSweep& sweep, const GaussLine& g, float p
   for (std::size_t i = 0; i < c.count; i += kLanes) {
     const auto row = hn::Load(di, reinterpret_cast<const std::int32_t*>(source) + i);
     const auto real = hn::FirstN(d, c.count - i);
-    for (int k = 0; k < g.axes; ++k) {
+    for (int k = 0; k < 6; ++k) {
       const VF v = hn::GatherIndex(d, g.column[k], row);
       hn::Store(hn::IfThenElse(real, v, hn::Set(d, kNowhere)), d, g.at[k] + i);
     }
@@ -102,19 +103,19 @@ HWY_INLINE void gather_rows(const GaussSweep& sweep, const GaussLine& g, float p
   }
   const std::size_t padded = whole_tiles(c.count);
   for (std::size_t i = (c.count + kLanes - 1) / kLanes * kLanes; i < padded; i += kLanes) {
-    for (int k = 0; k < g.axes; ++k) hn::Store(hn::Set(d, kNowhere), d, g.at[k] + i);
+    for (int k = 0; k < 6; ++k) hn::Store(hn::Set(d, kNowhere), d, g.at[k] + i);
     hn::Store(hn::Zero(d), d, g.share + i);
   }
 }
 
-void sort_line(const GaussSweep& sweep, std::size_t density) {
-  const GaussLine& g = sweep.line[density];
+void sort_line(const GaussSweep& sweep) {
+  const GaussLine& g = sweep.line;
   const DirectionsView& c = sweep.contacts;
   const std::size_t count = c.count, padded = whole_tiles(count);
   const std::size_t groups = (count + kRows - 1) / kRows;
   const bool weighted = c.facing != nullptr || c.depth != nullptr;
   const float per_share = weighted ? gauss_per_share(c) : 1.0f;
-  if (density == 0) *sweep.per_share = per_share;
+  *sweep.per_share = per_share;
 
   std::uint64_t pairs = 0;
   std::uint32_t* const source = reinterpret_cast<std::uint32_t*>(g.share);
@@ -145,7 +146,7 @@ void sort_line(const GaussSweep& sweep, std::size_t density) {
     }
   }
   std::fill_n(source + count, padded - count, 0u);
-  sweep.pairs[density] = pairs * kRows;
+  *sweep.pairs = pairs * kRows;
   gather_rows(sweep, g, per_share, source);
   // Half of the pairs to each part.
   g.split[0] = 0, g.split[1] = g.split[2] = groups * kRows;
@@ -159,17 +160,16 @@ void sort_line(const GaussSweep& sweep, std::size_t density) {
 // ---- pairs
 
 // Rows i .. i + kRows - 1.
-template <int kAxes>
 struct Group {
   VF at[kRows][3], share[kRows], sum[kRows];
 };
 
-template <int kAxes, bool kWeighted, bool kMasked>
+template <bool kWeighted, bool kMasked>
 HWY_INLINE void add_tile(const GaussLine& g, const VF* width2, std::size_t i, std::size_t j,
-                         float* column, Group<kAxes>& rows) {
+                         float* column, Group& rows) {
   const DF d;
   const VF zero = hn::Zero(d);
-  VF x[kAxes], hat[kRows];
+  VF x[6], hat[kRows];
   for (int k = 0; k < 3; ++k) x[k] = hn::Load(d, g.at[k] + j);
   const auto gap_to_edge = [&](std::size_t r, int s) HWY_ATTR {
     VF v = width2[s];
@@ -191,13 +191,11 @@ HWY_INLINE void add_tile(const GaussLine& g, const VF* width2, std::size_t i, st
       hat[r] = hn::IfThenZeroElse(hn::FirstN(d, out), hat[r]);
     }
   }
-  if constexpr (kAxes == 6) {
-    const VF any = hn::Max(hn::Max(hat[0], hat[1]), hn::Max(hat[2], hat[3]));
-    if (hn::AllTrue(d, hn::Eq(any, zero))) return;
-    for (int k = 3; k < 6; ++k) x[k] = hn::Load(d, g.at[k] + j);
-    HWY_UNROLL(4)
-    for (std::size_t r = 0; r < kRows; ++r) hat[r] = hn::Mul(hat[r], gap_to_edge(r, 1));
-  }
+  const VF any = hn::Max(hn::Max(hat[0], hat[1]), hn::Max(hat[2], hat[3]));
+  if (hn::AllTrue(d, hn::Eq(any, zero))) return;
+  for (int k = 3; k < 6; ++k) x[k] = hn::Load(d, g.at[k] + j);
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) hat[r] = hn::Mul(hat[r], gap_to_edge(r, 1));
   VF sum = hn::Load(d, column + j);
   if constexpr (kWeighted) {
     const VF share = hn::Load(d, g.share + j);
@@ -236,43 +234,43 @@ HWY_INLINE void store_sums(const VF* sum, float* to) {
 }
 
 // A group's rows from `i` on, with columns from `j` to `end`; returns where it stopped.
-template <int kAxes, bool kWeighted>
+template <bool kWeighted>
 HWY_INLINE std::size_t add_group(const GaussLine& g, const VF* width2, std::size_t i, std::size_t j,
                                  std::size_t end, float* fresh) {
   const DF d;
-  Group<kAxes> rows;
+  Group rows;
   HWY_UNROLL(4)
   for (std::size_t r = 0; r < kRows; ++r) {
     for (int k = 0; k < 3; ++k) rows.at[r][k] = hn::Set(d, g.at[k][i + r]);
     if (kWeighted) rows.share[r] = hn::Set(d, g.share[i + r]);
     rows.sum[r] = hn::Zero(d);
   }
-  for (; j < i + kRows; j += kLanes) add_tile<kAxes, kWeighted, true>(g, width2, i, j, fresh, rows);
-  for (; j < end; j += kLanes) add_tile<kAxes, kWeighted, false>(g, width2, i, j, fresh, rows);
+  for (; j < i + kRows; j += kLanes) add_tile<kWeighted, true>(g, width2, i, j, fresh, rows);
+  for (; j < end; j += kLanes) add_tile<kWeighted, false>(g, width2, i, j, fresh, rows);
   store_sums(rows.sum, g.row + i);
   return j;
 }
 
-template <int kAxes, bool kWeighted>
+template <bool kWeighted>
 HWY_INLINE void add_pairs(const GaussLine& g, std::size_t count, std::size_t part) {
   const DF d;
   const std::size_t begin = g.split[part], end = g.split[part + 1], padded = whole_tiles(count);
   float *const fresh = g.fresh[part], *const total = g.sum[part];
   std::fill_n(fresh, padded, 0.0f);
   std::fill_n(total, padded, 0.0f);
-  VF width2[kAxes / 3];
-  for (int s = 0; s < kAxes / 3; ++s) width2[s] = hn::Set(d, g.width[s] * g.width[s]);
+  VF width2[2];
+  for (int s = 0; s < 2; ++s) width2[s] = hn::Set(d, g.width[s] * g.width[s]);
   for (std::size_t first = begin; first < end; first += kFresh) {
     const std::size_t behind = HWY_MIN(first + kFresh, end);
     std::size_t farthest = 0;
     for (std::size_t i = first; i < behind; i += kRows) {
       const std::size_t window = g.end[i / kRows];
       std::size_t j = i / kLanes * kLanes;
-      j = add_group<kAxes, kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
+      j = add_group<kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
       while (HWY_UNLIKELY(j < window)) {
         float before[kRows];
         std::copy_n(g.row + i, kRows, before);
-        j = add_group<kAxes, kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
+        j = add_group<kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
         for (std::size_t r = 0; r < kRows; ++r) g.row[i + r] += before[r];
       }
       farthest = HWY_MAX(farthest, j);
@@ -284,44 +282,42 @@ HWY_INLINE void add_pairs(const GaussLine& g, std::size_t count, std::size_t par
   }
 }
 
-void sum_pairs(const GaussSweep& sweep, std::size_t density, std::size_t part) {
-  const GaussLine& g = sweep.line[density];
+void sum_pairs(const GaussSweep& sweep, std::size_t part) {
   const std::size_t count = sweep.contacts.count;
   const bool weighted = sweep.contacts.facing != nullptr || sweep.contacts.depth != nullptr;
-  if (g.axes == 3) {
-    weighted ? add_pairs<3, true>(g, count, part) : add_pairs<3, false>(g, count, part);
-  } else {
-    weighted ? add_pairs<6, true>(g, count, part) : add_pairs<6, false>(g, count, part);
-  }
+  weighted ? add_pairs<true>(sweep.line, count, part) : add_pairs<false>(sweep.line, count, part);
 }
 
 // ---- weights
 
-void weigh_line(const GaussSweep& sweep) {
+// Adds up what the parts of a product summed.
+void join_parts(const GaussSweep& sweep) {
   const DF d;
+  const GaussLine& g = sweep.line;
   const DirectionsView& c = sweep.contacts;
   const bool weighted = c.facing != nullptr || c.depth != nullptr;
-  for (int p = 0; p < sweep.densities; ++p) {
-    const GaussLine& g = sweep.line[p];
-    float unit = 1, self = 1;
-    for (int s = 0; s < g.axes / 3; ++s) unit /= g.width[s] * g.width[s];
-    for (std::size_t j = 0; j < c.count; j += kLanes) {
-      VF phi = hn::Load(d, g.row + j);
-      for (std::size_t part = 0; part < kGaussSweepParts; ++part)
-        phi = hn::Add(phi, hn::Load(d, g.sum[part] + j));
-      const VF own = weighted ? hn::Load(d, g.share + j) : hn::Set(d, self);
-      hn::Store(hn::MulAdd(phi, hn::Set(d, unit), own), d, g.row + j);
-    }
+  const float unit = 1 / (g.width[0] * g.width[0] * g.width[1] * g.width[1]);
+  for (std::size_t j = 0; j < c.count; j += kLanes) {
+    VF phi = hn::Load(d, g.row + j);
+    for (const float* sum : g.sum) phi = hn::Add(phi, hn::Load(d, sum + j));
+    const VF own = weighted ? hn::Load(d, g.share + j) : hn::Set(d, 1.0f);
+    hn::Store(hn::MulAdd(phi, hn::Set(d, unit), own), d, g.row + j);
   }
+}
+
+void weigh_rows(const GaussSweep& sweep, std::size_t begin, std::size_t end) {
+  const DF d;
+  const DirectionsView& c = sweep.contacts;
   const DI di;
   const VF zero = hn::Zero(d), self = hn::Set(d, sweep.densities == 2 ? 2.0f : 1.0f);
-  for (std::size_t i = 0; i < c.count; i += kLanes) {
-    const std::size_t live = c.count - i;
+  for (std::size_t i = begin; i < end; i += kLanes) {
+    const std::size_t live = end - i;
     VF phi = zero;
     for (int p = 0; p < sweep.densities; ++p) {
-      const GaussLine& g = sweep.line[p];
-      const auto place = load_n(di, reinterpret_cast<const std::int32_t*>(g.place) + i, live);
-      phi = hn::Add(phi, hn::GatherIndex(d, g.row, place));
+      const bool product = sweep.hat == Hat::product;
+      const std::uint32_t* const places = product ? sweep.line.place : sweep.bands[p].place;
+      const auto place = load_n(di, reinterpret_cast<const std::int32_t*>(places) + i, live);
+      phi = hn::Add(phi, hn::GatherIndex(d, product ? sweep.line.row : sweep.bands[p].phi, place));
     }
     const VF facing = c.facing ? load_n(d, c.facing + i, live) : hn::Set(d, 1.0f);
     VF share = hn::Set(d, *sweep.per_share);
@@ -342,88 +338,108 @@ namespace h6::kernels {
 
 HWY_EXPORT(sort_line);
 HWY_EXPORT(sum_pairs);
-HWY_EXPORT(weigh_line);
+HWY_EXPORT(join_parts);
+HWY_EXPORT(weigh_rows);
 
 namespace {
 
-constexpr std::size_t kAlign = 64;
+constexpr std::size_t kBlocksASlice = 16;  // summed, of 16 contacts each
+constexpr std::size_t kRowsASlice = 2048;  // weighed
 
-// Hands out columns of a block, or only counts.
-struct Columns {
-  char* at;
-  std::size_t used = 0;
-  template <class T>
-  void take(T*& column, std::size_t rows) {
-    column = at != nullptr ? reinterpret_cast<T*>(at + used) : nullptr;
-    used += (rows * sizeof(T) + kAlign - 1) / kAlign * kAlign;
+void lay_out_line(GaussLine& g, std::size_t count, GaussColumns& columns) {
+  const std::size_t rows = (count + 15) / 16 * 16;
+  for (float*& at : g.at) columns.take(at, rows);
+  columns.take(g.share, rows);
+  columns.take(g.row, rows);
+  for (std::size_t part = 0; part < kGaussSweepParts; ++part) {
+    columns.take(g.fresh[part], rows);
+    columns.take(g.sum[part], rows);
   }
-};
+  columns.take(g.place, rows);
+  columns.take(g.end, rows / 4);
+  columns.take(g.split, kGaussSweepParts + 1);
+}
 
 GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& widths,
-                        Columns& columns) {
+                        GaussColumns& columns) {
   GaussSweep sweep{};
   sweep.contacts = c;
   sweep.hat = hat;
   sweep.densities = hat == Hat::sum ? 2 : 1;
-  columns.take(sweep.per_share, 1);
+  columns.take(sweep.per_share, 2);  // one for each density that sorts
   columns.take(sweep.pairs, 2);
-  const std::size_t rows = (c.count + 15) / 16 * 16;
   const float* const normals[6] = {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz};
+  const float width[2] = {std::max(widths.normal, kMinWidth), std::max(widths.torque, kMinWidth)};
+  if (hat == Hat::product) {
+    std::copy_n(normals, 6, sweep.line.column);
+    std::copy_n(width, 2, sweep.line.width);
+    lay_out_line(sweep.line, c.count, columns);
+    return sweep;
+  }
   for (int p = 0; p < sweep.densities; ++p) {
-    GaussLine& g = sweep.line[p];
-    g.axes = hat == Hat::product ? 6 : 3;
-    std::copy_n(normals + 3 * p, g.axes, g.column);
-    g.width[0] = std::max(p == 0 ? widths.normal : widths.torque, kMinWidth);
-    g.width[1] = std::max(widths.torque, kMinWidth);
-    for (int k = 0; k < g.axes; ++k) columns.take(g.at[k], rows);
-    columns.take(g.share, rows);
-    columns.take(g.row, rows);
-    for (std::size_t part = 0; part < kGaussSweepParts; ++part) {
-      columns.take(g.fresh[part], rows);
-      columns.take(g.sum[part], rows);
-    }
-    columns.take(g.place, rows);
-    columns.take(g.end, rows / 4);
-    columns.take(g.split, kGaussSweepParts + 1);
+    std::copy_n(normals + 3 * p, 3, sweep.bands[p].column);
+    sweep.bands[p].width = width[p];
+    lay_out_bands(sweep.bands[p], c.count, columns);
   }
   return sweep;
+}
+
+std::size_t slices_of(std::size_t rows, std::size_t size) { return (rows + size - 1) / size; }
+
+void sort(const GaussSweep& sweep, std::size_t density) {
+  if (sweep.hat == Hat::product) return HWY_DYNAMIC_DISPATCH(sort_line)(sweep);
+  const DirectionsView& c = sweep.contacts;
+  const bool weighted = c.facing != nullptr || c.depth != nullptr;
+  sweep.per_share[density] = weighted ? gauss_per_share(c) : 1.0f;
+  sweep.pairs[density] = sort_bands(sweep.bands[density], c, sweep.per_share[density]);
+}
+
+void sum(const GaussSweep& sweep, std::size_t slice) {
+  if (sweep.hat == Hat::product) return HWY_DYNAMIC_DISPATCH(sum_pairs)(sweep, slice);
+  const std::size_t blocks = band_blocks(sweep.contacts.count);
+  const std::size_t each = slices_of(blocks, kBlocksASlice);
+  const std::size_t first = slice % each * kBlocksASlice;
+  sum_bands(sweep.bands[slice / each], first, first + kBlocksASlice);
 }
 
 }  // namespace
 
 std::size_t gauss_sweep_bytes(std::size_t count, Hat hat) {
-  Columns counting{nullptr};
+  GaussColumns counting{nullptr};
   DirectionsView c{};
   c.count = count;
   with_columns(c, hat, {1, 1}, counting);
-  return counting.used + kAlign;
+  return counting.block_bytes();
 }
 
 GaussSweep gauss_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
                        float* weight) {
-  const auto address = reinterpret_cast<std::uintptr_t>(memory);
-  Columns columns{static_cast<char*>(memory) + (kAlign - address % kAlign) % kAlign};
+  GaussColumns columns = GaussColumns::in(memory);
   GaussSweep sweep = with_columns(c, hat, widths, columns);
   sweep.weight = weight;
   return sweep;
 }
 
 std::size_t gauss_sweep_slices(const GaussSweep& sweep, int stage) {
-  if (sweep.contacts.count == 0) return 0;
+  const std::size_t count = sweep.contacts.count;
+  if (count == 0) return 0;
   const auto densities = static_cast<std::size_t>(sweep.densities);
-  return stage == 0 ? densities : stage == 1 ? densities * kGaussSweepParts : 1;
+  if (stage == 0) return densities;
+  if (sweep.hat == Hat::product) return stage == 1 ? kGaussSweepParts : 1;
+  return stage == 1 ? densities * slices_of(band_blocks(count), kBlocksASlice)
+                    : slices_of(count, kRowsASlice);
 }
 
 void gauss_sweep_run(const GaussSweep& sweep, int stage, std::size_t slice) {
-  switch (stage) {
-    case 0:
-      return HWY_DYNAMIC_DISPATCH(sort_line)(sweep, slice);
-    case 1:
-      return HWY_DYNAMIC_DISPATCH(sum_pairs)(sweep, slice / kGaussSweepParts,
-                                             slice % kGaussSweepParts);
-    default:
-      return HWY_DYNAMIC_DISPATCH(weigh_line)(sweep);
+  if (stage == 0) return sort(sweep, slice);
+  if (stage == 1) return sum(sweep, slice);
+  const std::size_t count = sweep.contacts.count;
+  if (sweep.hat == Hat::product) {
+    HWY_DYNAMIC_DISPATCH(join_parts)(sweep);
+    return HWY_DYNAMIC_DISPATCH(weigh_rows)(sweep, 0, count);
   }
+  const std::size_t first = slice * kRowsASlice;
+  HWY_DYNAMIC_DISPATCH(weigh_rows)(sweep, first, std::min(first + kRowsASlice, count));
 }
 
 }  // namespace h6::kernels

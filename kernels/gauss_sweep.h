@@ -1,9 +1,10 @@
-// gauss_sweep.h - the weights of gauss_weights.h for some thousand contacts: along a line, each
-// pair once.
+// gauss_sweep.h - the weights of gauss_weights.h for some thousand contacts: sorted, so that each
+// meets only those of a window.
 //
-// Contacts are sorted by their place along a fixed line across the Gauss map. A hat reaches no
-// farther along the line than it does on the map, so a contact meets only those of a window; and
-// since a hat is the same both ways, only those behind it: one evaluation serves both densities.
+// Hats over one sphere: gauss_bands.h. A product of two: contacts are sorted by their place along a
+// fixed line across the map of N. A hat reaches no farther along the line than it does on the map,
+// so a contact meets only those of a window; and since a hat is the same both ways, only those
+// behind it: one evaluation serves both densities.
 //
 //     columns -> buckets along the line -> rows in order, with the end of every window
 //             -> sums of a row (over lanes) and of a column (over rows) -> weights
@@ -11,18 +12,17 @@
 // Stages and slices are those of gauss_tree.h. Slices have their own sums, which are added in
 // order, so which thread runs what changes no bit.
 #pragma once
-#include "kernels/gauss_weights.h"
+#include "kernels/gauss_bands.h"
 
 namespace h6::kernels {
 
 inline constexpr int kGaussSweepStages = 3;
-inline constexpr std::size_t kGaussSweepParts = 2;     // slices of a density's pairs
+inline constexpr std::size_t kGaussSweepParts = 2;     // slices of a product's pairs
 inline constexpr std::size_t kGaussSweepMost = 32768;  // contacts; from there on gauss_tree
 inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536;  // a contact
 
-// The density of one hat over one sphere, or of the product of both.
+// The density of the product of two hats.
 struct GaussLine {
-  int axes;                // 3, or 6: N and T
   const float* column[6];  // as they came
   float width[2];
   // In order along the line, padded to whole tiles.
@@ -37,10 +37,11 @@ struct GaussLine {
 struct GaussSweep {
   DirectionsView contacts;
   Hat hat;
-  int densities;  // 2 for Hat::sum
-  GaussLine line[2];
+  int densities;         // 2 for Hat::sum
+  GaussBands bands[2];   // of hats over one sphere
+  GaussLine line;        // of a product
   float* per_share;      // 1 / the largest s
-  std::uint64_t* pairs;  // (densities) that a window holds
+  std::uint64_t* pairs;  // (densities) that windows hold
   float* weight;
 };
 

@@ -4,31 +4,20 @@
 
 #include <algorithm>
 
+#include "kernels/gauss_memory.h"
 #include "kernels/gauss_tree_stages.h"
 
 namespace h6::kernels {
 namespace {
 
-constexpr std::size_t kAlign = 64;
 constexpr std::size_t kLeavesASlice = 64;   // built
 constexpr std::size_t kTargetsASlice = 16;  // leaves whose contacts are summed
 constexpr std::size_t kRowsASlice = 8192;   // weighed
 
-// Hands out columns of a block, or only counts.
-struct Columns {
-  char* at;
-  std::size_t used = 0;
-  template <class T>
-  void take(T*& column, std::size_t rows) {
-    column = at != nullptr ? reinterpret_cast<T*>(at + used) : nullptr;
-    used += (rows * sizeof(T) + kAlign - 1) / kAlign * kAlign;
-  }
-};
-
 std::size_t padded(std::size_t rows) { return (rows + kGaussLeaf - 1) / kGaussLeaf * kGaussLeaf; }
 int moments_of(int axes) { return axes == 3 ? 2 : kGaussMoments; }
 
-void lay_out(GaussDensity& g, std::size_t count, Columns& columns) {
+void lay_out(GaussDensity& g, std::size_t count, GaussColumns& columns) {
   const std::size_t rows = padded(count);
   columns.take(g.leaves, rows * static_cast<std::size_t>(g.axes + 1));
   columns.take(g.source, rows);
@@ -49,7 +38,7 @@ void lay_out(GaussDensity& g, std::size_t count, Columns& columns) {
 }
 
 GaussTree with_columns(const DirectionsView& c, Hat hat, const GaussWidths& widths,
-                       Columns& columns) {
+                       GaussColumns& columns) {
   GaussTree tree{};
   tree.contacts = c;
   tree.hat = hat;
@@ -72,17 +61,16 @@ std::size_t slices_of(std::size_t rows, std::size_t size) { return (rows + size 
 }  // namespace
 
 std::size_t gauss_tree_bytes(std::size_t count, Hat hat) {
-  Columns counting{nullptr};
+  GaussColumns counting{nullptr};
   DirectionsView c{};
   c.count = count;
   with_columns(c, hat, {1, 1}, counting);
-  return counting.used + kAlign;
+  return counting.block_bytes();
 }
 
 GaussTree gauss_tree(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
                      float* weight) {
-  const auto address = reinterpret_cast<std::uintptr_t>(memory);
-  Columns columns{static_cast<char*>(memory) + (kAlign - address % kAlign) % kAlign};
+  GaussColumns columns = GaussColumns::in(memory);
   GaussTree tree = with_columns(c, hat, widths, columns);
   tree.weight = weight;
   return tree;

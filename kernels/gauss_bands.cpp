@@ -1,0 +1,358 @@
+// gauss_bands.cpp - sorting, runs and sums of gauss_bands.h.
+#include "kernels/gauss_bands.h"
+
+#include <algorithm>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/gauss_bands.cpp"
+#include "kernels/simd.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/tail-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+using DF = hn::CappedTag<float, kBandBlock>;
+using DI = hn::RebindToSigned<DF>;
+using VF = hn::Vec<DF>;
+constexpr std::size_t kLanes = hn::MaxLanes(DF());
+constexpr std::size_t kParts = kBandBlock / kLanes;  // vectors that hold a block
+
+// No wall of a machine is square to the line, nor do two of its six directions meet on it; the
+// second stands across it.
+constexpr float kLine[3] = {0.6104f, -0.3702f, 0.7003f};
+constexpr float kAcross[3] = {-0.7690f, -0.0652f, 0.6359f};
+constexpr std::size_t kSorted = 48;  // contacts from which sorting pays
+// Hats that are summed before they join the total: rounding grows with the number of sums.
+constexpr std::size_t kFresh = 128;
+
+// ---- order
+
+// Contacts of one direction that follow each other become one; returns how many are left.
+HWY_INLINE std::size_t join_equal(const GaussBands& g, const DirectionsView& c, float per_share) {
+  const DF d;
+  const DI di;
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < c.count; i += kLanes) {
+    const std::size_t live = c.count - i;
+    VF v[3];
+    auto same = hn::FirstN(d, live);
+    for (int k = 0; k < 3; ++k) {
+      HWY_ALIGN float shifted[kLanes] = {};
+      const float* before = g.column[k] + i - 1;
+      if (HWY_UNLIKELY(i == 0)) {
+        shifted[0] = std::numeric_limits<float>::quiet_NaN();  // the first follows none
+        std::copy_n(g.column[k], HWY_MIN(live, kLanes) - 1, shifted + 1);
+        before = shifted;
+      }
+      v[k] = load_n(d, g.column[k] + i, live);
+      same = hn::And(same, hn::Eq(v[k], load_n(d, before, live)));
+    }
+    const auto fresh = hn::AndNot(same, hn::FirstN(d, live));
+    for (int k = 0; k < 3; ++k) hn::StoreU(hn::Compress(v[k], fresh), d, g.direction[k] + left);
+    const auto at = hn::Iota(di, static_cast<std::int32_t>(i));
+    hn::StoreU(hn::Compress(at, hn::RebindMask(di, fresh)), di,
+               reinterpret_cast<std::int32_t*>(g.head) + left);
+    left += hn::CountTrue(d, fresh);
+  }
+  g.head[left] = static_cast<std::uint32_t>(c.count);
+  if (c.depth == nullptr && c.facing == nullptr) {
+    for (std::size_t j = 0; j < left; ++j)
+      g.mass[j] = static_cast<float>(static_cast<std::int32_t>(g.head[j + 1] - g.head[j]));
+    return left;
+  }
+  for (std::size_t j = 0; j < left; ++j) {
+    g.mass[j] = 0;
+    for (std::size_t i = g.head[j]; i < g.head[j + 1]; ++i)
+      g.mass[j] += per_share * (c.depth != nullptr ? c.depth[i] : 1.0f) *
+                   (c.facing != nullptr ? c.facing[i] : 1.0f);
+  }
+  return left;
+}
+
+struct Range {
+  float low, extent;
+};
+
+// Places along both directions, and the longest axis of any vector.
+HWY_INLINE float project(const GaussBands& g, std::size_t count, float* const* along,
+                         Range* range) {
+  const DF d;
+  VF low[2], high[2], size = hn::Zero(d);
+  for (int k = 0; k < 2; ++k) low[k] = hn::Set(d, 1e30f), high[k] = hn::Set(d, -1e30f);
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    const std::size_t live = count - i;
+    const VF x = load_n(d, g.direction[0] + i, live), y = load_n(d, g.direction[1] + i, live);
+    const VF z = load_n(d, g.direction[2] + i, live);
+    size = hn::Max(size, hn::Max(hn::Abs(x), hn::Max(hn::Abs(y), hn::Abs(z))));
+    for (int k = 0; k < 2; ++k) {
+      const float* u = k == 0 ? kLine : kAcross;
+      VF p = hn::Mul(x, hn::Set(d, u[0]));
+      p = hn::MulAdd(y, hn::Set(d, u[1]), p);
+      p = hn::MulAdd(z, hn::Set(d, u[2]), p);
+      // Lanes past the end repeat a real one.
+      if (live < kLanes) p = hn::IfThenElse(hn::FirstN(d, live), p, hn::Set(d, hn::GetLane(p)));
+      hn::StoreU(p, d, along[k] + i);
+      low[k] = hn::Min(low[k], p), high[k] = hn::Max(high[k], p);
+    }
+  }
+  for (int k = 0; k < 2; ++k) {
+    range[k].low = hn::GetLane(hn::MinOfLanes(d, low[k]));
+    range[k].extent = hn::GetLane(hn::MaxOfLanes(d, high[k])) - range[k].low;
+  }
+  return hn::GetLane(hn::MaxOfLanes(d, size));
+}
+
+// Cells that n contacts are sorted into.
+HWY_INLINE std::uint32_t cells_for(std::size_t n) {
+  std::uint32_t cells = 256;
+  while (cells < kBandCells && cells < 2 * n) cells *= 2;
+  return cells;
+}
+
+HWY_INLINE void choose_grid(const GaussBands& g, std::size_t count, const Range* range, float size,
+                            float* scale) {
+  // A place is rounded by less than 1e-6 of the longest vector, a cell's number by less.
+  const float reach = g.width * 1.001f + 4e-6f * size;
+  const std::uint32_t most = cells_for(count);
+  GaussBands::Grid& grid = *g.grid;
+  const float fit = range[0].extent / reach;
+  grid.bands = fit > 1 ? static_cast<std::uint32_t>(HWY_MIN(fit, static_cast<float>(most / 8))) : 1;
+  grid.shift = 0;
+  while ((grid.bands << (grid.shift + 1)) <= most) ++grid.shift;
+  grid.cells = grid.bands << grid.shift;
+  const float cells = static_cast<float>(1u << grid.shift);
+  scale[0] = range[0].extent > 0 ? static_cast<float>(grid.bands) / range[0].extent : 0.0f;
+  scale[1] = range[1].extent > 0 ? cells / range[1].extent : 0.0f;
+  const float far = reach * scale[1] + 1;
+  grid.reach = static_cast<std::uint32_t>(far < cells ? far : cells);
+}
+
+HWY_INLINE hn::Vec<DI> cell_along(const float* along, const Range& range, float scale,
+                                  std::uint32_t cells) {
+  const DF d;
+  const DI di;
+  const VF at = hn::Mul(hn::Sub(hn::LoadU(d, along), hn::Set(d, range.low)), hn::Set(d, scale));
+  // Whatever a NaN becomes, the cell stays in range.
+  return hn::Min(hn::Max(hn::ConvertTo(di, at), hn::Zero(di)),
+                 hn::Set(di, static_cast<std::int32_t>(cells - 1)));
+}
+
+// Fills g.start and g.edge from counts of each cell.
+HWY_INLINE void place_cells(const GaussBands& g, std::size_t count) {
+  std::uint32_t sum = 0;
+  std::size_t edge = 0, row = 0;  // the next block's edge, and the contact there
+  const std::uint32_t cells = g.grid->cells;
+  std::uint32_t last = 0;
+  for (std::uint32_t cell = 0; cell < cells; ++cell) {
+    const std::uint32_t here = g.start[cell];
+    g.start[cell] = sum;
+    sum += here;
+    if (here > 0) last = cell;
+    for (; HWY_UNLIKELY(row < sum); row += edge % 2 == 1 ? kBandBlock - 1 : 1)
+      g.edge[edge++] = cell;
+  }
+  g.start[cells] = sum;
+  const std::size_t edges = 2 * band_blocks(count);
+  for (; edge < edges; ++edge) g.edge[edge] = last;
+}
+
+HWY_INLINE void put(const GaussBands& g, std::size_t j, std::size_t to) {
+  float* const at = g.at + 4 * to;
+  for (int k = 0; k < 3; ++k) at[k] = g.direction[k][j];
+  at[3] = g.mass[j];
+  std::size_t i = g.head[j];
+  do g.place[i] = static_cast<std::uint32_t>(to);
+  while (HWY_UNLIKELY(++i < g.head[j + 1]));
+}
+
+// Contacts that a block meets: runs in order and apart.
+struct Runs {
+  std::uint32_t first[4], end[4];
+  int count;
+};
+HWY_INLINE Runs runs_of(const GaussBands& g, std::size_t block) {
+  const GaussBands::Grid& grid = *g.grid;
+  Runs runs{{}, {grid.count}, 1};
+  if (grid.count < kSorted) return runs;
+  const std::uint32_t along = (1u << grid.shift) - 1;
+  const std::uint32_t a = g.edge[2 * block], b = g.edge[2 * block + 1];
+  const std::uint32_t band_a = a >> grid.shift, band_b = b >> grid.shift;
+  const std::uint32_t low = band_a > 0 ? band_a - 1 : 0;
+  const std::uint32_t high = HWY_MIN(band_b + 1, grid.bands - 1);
+  if (band_b - band_a > 1) {
+    runs.first[0] = g.start[low << grid.shift];
+    runs.end[0] = g.start[(high + 1) << grid.shift];
+    return runs;
+  }
+  // Cells as in even bands; a block in two bands lies around the end that they share.
+  const std::uint32_t odd_a = band_a % 2 * along, odd_b = band_b % 2 * along;
+  const std::uint32_t ca = (a & along) ^ odd_a, cb = (b & along) ^ odd_b;
+  std::uint32_t from = HWY_MIN(ca, cb), to = HWY_MAX(ca, cb);
+  if (band_a != band_b) (odd_a == 0 ? to : from) = odd_a == 0 ? along : 0;
+  from = from > grid.reach ? from - grid.reach : 0;
+  to = HWY_MIN(to + grid.reach, along);
+  runs.count = 0;
+  for (std::uint32_t band = low; band <= high; ++band) {
+    const std::uint32_t* const start = g.start + (band << grid.shift);
+    const bool odd = band % 2 == 1;
+    runs.first[runs.count] = start[odd ? along - to : from];
+    runs.end[runs.count] = start[(odd ? along - from : to) + 1];
+    runs.count += runs.first[runs.count] < runs.end[runs.count];
+  }
+  return runs;
+}
+
+std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_share) {
+  GaussBands::Grid& grid = *g.grid;
+  const std::size_t count = join_equal(g, c, per_share), blocks = band_blocks(count);
+  grid = {static_cast<std::uint32_t>(count), 1, 1, 0, 1};
+  if (count < kSorted) {
+    for (std::size_t j = 0; j < count; ++j) put(g, j, j);
+  } else {
+    const DI di;
+    float* const along[2] = {g.at, g.at + blocks * kBandBlock};
+    Range range[2];
+    float scale[2];
+    const float size = project(g, count, along, range);
+    choose_grid(g, count, range, size, scale);
+    const std::uint32_t cells = 1u << grid.shift;
+    const auto last = hn::Set(di, static_cast<std::int32_t>(cells - 1));
+    for (std::size_t j = 0; j < count; j += kLanes) {
+      const auto band = cell_along(along[0] + j, range[0], scale[0], grid.bands);
+      const auto q = cell_along(along[1] + j, range[1], scale[1], cells);
+      // Back and forth: where a band ends, the next one begins.
+      const auto odd = hn::Ne(hn::And(band, hn::Set(di, 1)), hn::Zero(di));
+      const auto turned = hn::Xor(q, hn::IfThenElseZero(odd, last));
+      hn::StoreU(hn::Or(hn::ShiftLeftSame(band, static_cast<int>(grid.shift)), turned), di,
+                 reinterpret_cast<std::int32_t*>(g.cell) + j);
+    }
+    std::fill_n(g.start, grid.cells, 0u);
+    for (std::size_t j = 0; j < count; ++j) g.rank[j] = g.start[g.cell[j]]++;
+    place_cells(g, count);
+    for (std::size_t j = 0; j < count; ++j) put(g, j, g.start[g.cell[j]] + g.rank[j]);
+  }
+  for (std::size_t j = count; j < blocks * kBandBlock; ++j) {
+    std::copy_n(g.at + 4 * (count - 1), 3, g.at + 4 * j);
+    g.at[4 * j + 3] = 0;
+  }
+  std::uint64_t met = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    const Runs runs = runs_of(g, b);
+    for (int r = 0; r < runs.count; ++r) met += runs.end[r] - runs.first[r];
+  }
+  return met * kBandBlock;
+}
+
+// ---- sums
+
+// A block, a lane each.
+struct Rows {
+  VF x[3][kParts];
+};
+HWY_INLINE Rows load_rows(const GaussBands& g, std::size_t block) {
+  Rows r;
+  VF mass;
+  for (std::size_t p = 0; p < kParts; ++p)
+    hn::LoadInterleaved4(DF(), g.at + 4 * (block * kBandBlock + p * kLanes), r.x[0][p], r.x[1][p],
+                         r.x[2][p], mass);
+  return r;
+}
+
+struct Sum {
+  VF phi[kParts];
+};
+
+// The hat of one contact at every lane.
+HWY_INLINE VF hat_at(const Rows& rows, std::size_t p, VF width2, const float* at) {
+  const DF d;
+  const VF gx = hn::Sub(rows.x[0][p], hn::Set(d, at[0]));
+  const VF gy = hn::Sub(rows.x[1][p], hn::Set(d, at[1]));
+  const VF gz = hn::Sub(rows.x[2][p], hn::Set(d, at[2]));
+  const VF v = hn::NegMulAdd(gy, gy, hn::NegMulAdd(gx, gx, width2));
+  return hn::Max(hn::NegMulAdd(gz, gz, v), hn::Zero(d));
+}
+
+// Contacts first .. end - 1, one by one. Several sums at a time: an addition takes longer than a
+// hat.
+HWY_INLINE void add_contacts(const GaussBands& g, const Rows& rows, VF width2, std::size_t first,
+                             std::size_t end, Sum& sum) {
+  constexpr std::size_t kSums = 4;
+  const DF d;
+  while (first < end) {
+    const std::size_t stop = HWY_MIN(first + kFresh, end);
+    HWY_UNROLL(4)
+    for (std::size_t p = 0; p < kParts; ++p) {
+      VF fresh[kSums];
+      for (VF& v : fresh) v = hn::Zero(d);
+      const float* at = g.at + 4 * first;
+      const float* const behind = g.at + 4 * stop;
+      for (; at + 4 * kSums <= behind; at += 4 * kSums) {
+        HWY_UNROLL(4)
+        for (std::size_t k = 0; k < kSums; ++k)
+          fresh[k] =
+              hn::MulAdd(hn::Set(d, at[4 * k + 3]), hat_at(rows, p, width2, at + 4 * k), fresh[k]);
+      }
+      for (; at < behind; at += 4)
+        fresh[0] = hn::MulAdd(hn::Set(d, at[3]), hat_at(rows, p, width2, at), fresh[0]);
+      const VF two[2] = {hn::Add(fresh[0], fresh[1]), hn::Add(fresh[2], fresh[3])};
+      sum.phi[p] = hn::Add(sum.phi[p], hn::Add(two[0], two[1]));
+    }
+    first = stop;
+  }
+}
+
+void sum_simd(const GaussBands& g, std::size_t begin, std::size_t end) {
+  const DF d;
+  const VF width2 = hn::Set(d, g.width * g.width);
+  const VF unit = hn::Set(d, 1 / (g.width * g.width));
+  end = HWY_MIN(end, band_blocks(g.grid->count));
+  for (std::size_t block = begin; block < end; ++block) {
+    const Rows rows = load_rows(g, block);
+    const Runs runs = runs_of(g, block);
+    Sum sum;
+    for (VF& phi : sum.phi) phi = hn::Zero(d);
+    for (int r = 0; r < runs.count; ++r)
+      add_contacts(g, rows, width2, runs.first[r], runs.end[r], sum);
+    for (std::size_t p = 0; p < kParts; ++p)
+      hn::Store(hn::Mul(sum.phi[p], unit), d, g.phi + block * kBandBlock + p * kLanes);
+  }
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(sort_simd);
+HWY_EXPORT(sum_simd);
+
+std::uint64_t sort_bands(const GaussBands& g, const DirectionsView& c, float per_share) {
+  return HWY_DYNAMIC_DISPATCH(sort_simd)(g, c, per_share);
+}
+void sum_bands(const GaussBands& g, std::size_t begin, std::size_t end) {
+  HWY_DYNAMIC_DISPATCH(sum_simd)(g, begin, end);
+}
+
+void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns) {
+  const std::size_t blocks = band_blocks(count), rows = blocks * kBandBlock;
+  for (float*& direction : g.direction) columns.take(direction, rows + kBandBlock);
+  columns.take(g.mass, rows);
+  columns.take(g.head, rows + kBandBlock);
+  columns.take(g.at, 4 * rows);
+  columns.take(g.phi, rows);
+  columns.take(g.place, rows);
+  columns.take(g.cell, rows);
+  columns.take(g.rank, rows);
+  columns.take(g.start, kBandCells + 1);
+  columns.take(g.edge, 2 * blocks + 2);
+  columns.take(g.grid, 1);
+}
+
+}  // namespace h6::kernels
+#endif
