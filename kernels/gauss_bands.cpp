@@ -32,46 +32,67 @@ constexpr std::size_t kFresh = 128;
 
 // ---- order
 
-// Contacts of one direction that follow each other become one; returns how many are left.
-HWY_INLINE std::size_t join_equal(const GaussBands& g, const DirectionsView& c, float per_share) {
+constexpr std::size_t kWorthJoining = 16;  // contacts to one that is saved
+
+// Which of the contacts from i on differ from the one before.
+HWY_INLINE hn::Mask<DF> differing(const GaussBands& g, std::size_t i, std::size_t live) {
+  const DF d;
+  auto same = hn::FirstN(d, live);
+  for (const float* column : g.column) {
+    HWY_ALIGN float shifted[kLanes] = {};
+    const float* before = column + i - 1;
+    if (HWY_UNLIKELY(i == 0)) {
+      shifted[0] = std::numeric_limits<float>::quiet_NaN();  // the first follows none
+      std::copy_n(column, HWY_MIN(live, kLanes) - 1, shifted + 1);
+      before = shifted;
+    }
+    same = hn::And(same, hn::Eq(load_n(d, column + i, live), load_n(d, before, live)));
+  }
+  return hn::AndNot(same, hn::FirstN(d, live));
+}
+
+HWY_INLINE float share_of(const DirectionsView& c, std::size_t i, float per_share) {
+  if (c.depth != nullptr) per_share *= c.depth[i];
+  if (c.facing != nullptr) per_share *= c.facing[i];
+  return per_share;
+}
+
+// What is sorted: columns and weights of contacts, or of runs of equal ones where those are many.
+struct Items {
+  const float* v[3];
+  const float* mass;          // null: contacts as they came
+  const std::uint32_t* head;  // likewise
+  std::size_t count;
+};
+
+HWY_INLINE Items items_of(const GaussBands& g, const DirectionsView& c, float per_share) {
   const DF d;
   const DI di;
   std::size_t left = 0;
+  for (std::size_t i = 0; i < c.count; i += kLanes)
+    left += hn::CountTrue(d, differing(g, i, c.count - i));
+  if (kWorthJoining * (c.count - left) < c.count)
+    return {{g.column[0], g.column[1], g.column[2]}, nullptr, nullptr, c.count};
+  left = 0;
   for (std::size_t i = 0; i < c.count; i += kLanes) {
     const std::size_t live = c.count - i;
-    VF v[3];
-    auto same = hn::FirstN(d, live);
-    for (int k = 0; k < 3; ++k) {
-      HWY_ALIGN float shifted[kLanes] = {};
-      const float* before = g.column[k] + i - 1;
-      if (HWY_UNLIKELY(i == 0)) {
-        shifted[0] = std::numeric_limits<float>::quiet_NaN();  // the first follows none
-        std::copy_n(g.column[k], HWY_MIN(live, kLanes) - 1, shifted + 1);
-        before = shifted;
-      }
-      v[k] = load_n(d, g.column[k] + i, live);
-      same = hn::And(same, hn::Eq(v[k], load_n(d, before, live)));
-    }
-    const auto fresh = hn::AndNot(same, hn::FirstN(d, live));
-    for (int k = 0; k < 3; ++k) hn::StoreU(hn::Compress(v[k], fresh), d, g.direction[k] + left);
+    const auto fresh = differing(g, i, live);
+    for (int k = 0; k < 3; ++k)
+      hn::StoreU(hn::Compress(load_n(d, g.column[k] + i, live), fresh), d, g.direction[k] + left);
     const auto at = hn::Iota(di, static_cast<std::int32_t>(i));
     hn::StoreU(hn::Compress(at, hn::RebindMask(di, fresh)), di,
                reinterpret_cast<std::int32_t*>(g.head) + left);
     left += hn::CountTrue(d, fresh);
   }
   g.head[left] = static_cast<std::uint32_t>(c.count);
-  if (c.depth == nullptr && c.facing == nullptr) {
-    for (std::size_t j = 0; j < left; ++j)
-      g.mass[j] = static_cast<float>(static_cast<std::int32_t>(g.head[j + 1] - g.head[j]));
-    return left;
-  }
+  const bool weighted = c.depth != nullptr || c.facing != nullptr;
   for (std::size_t j = 0; j < left; ++j) {
+    g.mass[j] = static_cast<float>(static_cast<std::int32_t>(g.head[j + 1] - g.head[j]));
+    if (!weighted) continue;
     g.mass[j] = 0;
-    for (std::size_t i = g.head[j]; i < g.head[j + 1]; ++i)
-      g.mass[j] += per_share * (c.depth != nullptr ? c.depth[i] : 1.0f) *
-                   (c.facing != nullptr ? c.facing[i] : 1.0f);
+    for (std::size_t i = g.head[j]; i < g.head[j + 1]; ++i) g.mass[j] += share_of(c, i, per_share);
   }
-  return left;
+  return {{g.direction[0], g.direction[1], g.direction[2]}, g.mass, g.head, left};
 }
 
 struct Range {
@@ -79,15 +100,15 @@ struct Range {
 };
 
 // Places along both directions, and the longest axis of any vector.
-HWY_INLINE float project(const GaussBands& g, std::size_t count, float* const* along,
-                         Range* range) {
+HWY_INLINE float project(const Items& items, float* const* along, Range* range) {
   const DF d;
+  const std::size_t count = items.count;
   VF low[2], high[2], size = hn::Zero(d);
   for (int k = 0; k < 2; ++k) low[k] = hn::Set(d, 1e30f), high[k] = hn::Set(d, -1e30f);
   for (std::size_t i = 0; i < count; i += kLanes) {
     const std::size_t live = count - i;
-    const VF x = load_n(d, g.direction[0] + i, live), y = load_n(d, g.direction[1] + i, live);
-    const VF z = load_n(d, g.direction[2] + i, live);
+    const VF x = load_n(d, items.v[0] + i, live), y = load_n(d, items.v[1] + i, live);
+    const VF z = load_n(d, items.v[2] + i, live);
     size = hn::Max(size, hn::Max(hn::Abs(x), hn::Max(hn::Abs(y), hn::Abs(z))));
     for (int k = 0; k < 2; ++k) {
       const float* u = k == 0 ? kLine : kAcross;
@@ -161,13 +182,32 @@ HWY_INLINE void place_cells(const GaussBands& g, std::size_t count) {
   for (; edge < edges; ++edge) g.edge[edge] = last;
 }
 
-HWY_INLINE void put(const GaussBands& g, std::size_t j, std::size_t to) {
-  float* const at = g.at + 4 * to;
-  for (int k = 0; k < 3; ++k) at[k] = g.direction[k][j];
-  at[3] = g.mass[j];
-  std::size_t i = g.head[j];
-  do g.place[i] = static_cast<std::uint32_t>(to);
-  while (HWY_UNLIKELY(++i < g.head[j + 1]));
+// Moves every item j to place to(j).
+template <class To>
+HWY_INLINE void put(const GaussBands& g, const Items& items, const DirectionsView& c,
+                    float per_share, const To& to) {
+  const float *const x = items.v[0], *const y = items.v[1], *const z = items.v[2];
+  const auto each = [&](const auto& share, const auto& place) HWY_ATTR {
+    for (std::size_t j = 0; j < items.count; ++j) {
+      const std::uint32_t there = to(j);
+      float* const at = g.at + 4 * std::size_t{there};
+      at[0] = x[j], at[1] = y[j], at[2] = z[j], at[3] = share(j);
+      place(j, there);
+    }
+  };
+  const auto alone = [&](std::size_t j, std::uint32_t there) { g.place[j] = there; };
+  if (items.head != nullptr) {
+    each([&](std::size_t j) { return items.mass[j]; },
+         [&](std::size_t j, std::uint32_t there) {
+           std::size_t i = items.head[j];
+           do g.place[i] = there;
+           while (HWY_UNLIKELY(++i < items.head[j + 1]));
+         });
+  } else if (c.depth != nullptr || c.facing != nullptr) {
+    each([&](std::size_t j) { return share_of(c, j, per_share); }, alone);
+  } else {
+    each([](std::size_t) { return 1.0f; }, alone);
+  }
 }
 
 // Contacts that a block meets: runs in order and apart.
@@ -209,16 +249,20 @@ HWY_INLINE Runs runs_of(const GaussBands& g, std::size_t block) {
 
 std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_share) {
   GaussBands::Grid& grid = *g.grid;
-  const std::size_t count = join_equal(g, c, per_share), blocks = band_blocks(count);
+  const Items items = items_of(g, c, per_share);
+  const std::size_t count = items.count, blocks = band_blocks(count);
   grid = {static_cast<std::uint32_t>(count), 1, 1, 0, 1};
   if (count < kSorted) {
-    for (std::size_t j = 0; j < count; ++j) put(g, j, j);
+    put(g, items, c, per_share, [](std::size_t j) { return static_cast<std::uint32_t>(j); });
   } else {
     const DI di;
     float* const along[2] = {g.at, g.at + blocks * kBandBlock};
     Range range[2];
     float scale[2];
-    const float size = project(g, count, along, range);
+    const float size = project(items, along, range);
+    std::uint32_t* const cell = reinterpret_cast<std::uint32_t*>(g.phi);
+    // Places are filled from the first on, where items are no contacts: ranks must stand apart.
+    std::uint32_t* const rank = items.head != nullptr ? g.rank : g.place;
     choose_grid(g, count, range, size, scale);
     const std::uint32_t cells = 1u << grid.shift;
     const auto last = hn::Set(di, static_cast<std::int32_t>(cells - 1));
@@ -229,12 +273,12 @@ std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_
       const auto odd = hn::Ne(hn::And(band, hn::Set(di, 1)), hn::Zero(di));
       const auto turned = hn::Xor(q, hn::IfThenElseZero(odd, last));
       hn::StoreU(hn::Or(hn::ShiftLeftSame(band, static_cast<int>(grid.shift)), turned), di,
-                 reinterpret_cast<std::int32_t*>(g.cell) + j);
+                 reinterpret_cast<std::int32_t*>(cell) + j);
     }
     std::fill_n(g.start, grid.cells, 0u);
-    for (std::size_t j = 0; j < count; ++j) g.rank[j] = g.start[g.cell[j]]++;
+    for (std::size_t j = 0; j < count; ++j) rank[j] = g.start[cell[j]]++;
     place_cells(g, count);
-    for (std::size_t j = 0; j < count; ++j) put(g, j, g.start[g.cell[j]] + g.rank[j]);
+    put(g, items, c, per_share, [&](std::size_t j) { return g.start[cell[j]] + rank[j]; });
   }
   for (std::size_t j = count; j < blocks * kBandBlock; ++j) {
     std::copy_n(g.at + 4 * (count - 1), 3, g.at + 4 * j);
@@ -347,7 +391,6 @@ void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns) {
   columns.take(g.at, 4 * rows);
   columns.take(g.phi, rows);
   columns.take(g.place, rows);
-  columns.take(g.cell, rows);
   columns.take(g.rank, rows);
   columns.take(g.start, kBandCells + 1);
   columns.take(g.edge, 2 * blocks + 2);

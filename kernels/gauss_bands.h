@@ -20,12 +20,12 @@ struct GaussBands {
   float *direction[3], *mass;  // of those that are one: the s_j over the largest s added up
   std::uint32_t* head;         // the first contact of each
   // In order of the bands, padded to whole blocks with copies of the last one that weigh nothing.
-  float* at;                   // x y z and mass, one by one
-  float* phi;                  // what is summed
-  std::uint32_t* place;        // (count) where each contact went
-  std::uint32_t *cell, *rank;  // of each, and its place there
-  std::uint32_t* start;        // first of each cell, and the count
-  std::uint32_t* edge;         // cells of the first and the last of each block
+  float* at;             // x y z and mass, one by one
+  float* phi;            // what is summed
+  std::uint32_t* place;  // (count) where each contact went
+  std::uint32_t* rank;   // of each in its cell
+  std::uint32_t* start;  // first of each cell, and the count
+  std::uint32_t* edge;   // cells of the first and the last of each block
   struct Grid {
     std::uint32_t count;                // of what is sorted
     std::uint32_t bands, cells, shift;  // cells of a band: 2^shift
