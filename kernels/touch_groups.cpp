@@ -86,7 +86,7 @@ HWY_INLINE void pick_rows(const ShellColumns& shell, const std::uint32_t* rows, 
 }
 
 void make_contacts_simd(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                        const ContactFrame& frame, const ContactColumns& out) {
+                        const ContactFrame& frame, const MadeContacts& out) {
   constexpr std::size_t kStage = 512;  // contacts that stay in the first cache
   const DF d;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
@@ -143,7 +143,7 @@ std::size_t touch_groups(const FieldView& field, const Affine& to_field, const P
 }
 
 void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                   const ContactFrame& frame, const ContactColumns& out) {
+                   const ContactFrame& frame, const MadeContacts& out) {
   HWY_DYNAMIC_DISPATCH(make_contacts_simd)(shell, rows, count, frame, out);
 }
 

@@ -33,7 +33,7 @@ struct ShellColumns {
   const float *x, *y, *z, *nx, *ny, *nz;
   const std::uint32_t* point;
 };
-struct ContactColumns {
+struct MadeContacts {
   float *depth, *nx, *ny, *nz, *gx, *gy, *gz, *rx, *ry, *rz;
   std::uint32_t* point;
 };
@@ -41,8 +41,8 @@ struct ContactColumns {
 // medial sheet), r = Ra p + arm, for rows 0..count-1. Columns of the shell are readable to whole
 // groups of 16. Fast where rows of a group follow each other, as touch_groups writes them.
 void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                   const ContactFrame& frame, const ContactColumns& out);
+                   const ContactFrame& frame, const MadeContacts& out);
 void make_contacts_ref(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                       const ContactFrame& frame, const ContactColumns& out);
+                       const ContactFrame& frame, const MadeContacts& out);
 
 }  // namespace h6::kernels

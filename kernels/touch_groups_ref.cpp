@@ -31,7 +31,7 @@ std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
 }
 
 void make_contacts_ref(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                       const ContactFrame& frame, const ContactColumns& out) {
+                       const ContactFrame& frame, const MadeContacts& out) {
   const auto rotate = [](const float R[9], float x, float y, float z, float v[3]) {
     for (int k = 0; k < 3; ++k) v[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
   };

@@ -121,7 +121,7 @@ TEST_CASE("make_contacts: SIMD agrees with the reference on every target and cou
       const auto of = [&](std::vector<float>& v, std::vector<std::uint32_t>& p) {
         float* at[10];
         for (std::size_t k = 0; k < 10; ++k) at[k] = v.data() + k * (n + 3);
-        return ContactColumns{at[0], at[1], at[2], at[3], at[4], at[5],
+        return MadeContacts{at[0], at[1], at[2], at[3], at[4], at[5],
                               at[6], at[7], at[8], at[9], p.data()};
       };
       make_contacts(columns, hits.columns(), n, frame, of(got, got_point));
