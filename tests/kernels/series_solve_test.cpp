@@ -176,6 +176,32 @@ TEST_CASE("series_solve: SIMD agrees with the reference on every target and coun
   });
 }
 
+TEST_CASE(
+    "series_solve: thousands of contacts are solved alike from cold, however they are sorted") {
+  Patch<float> ball;
+  const Patch<double> exact = hemisphere(3000);
+  for (std::size_t i = 0; i < exact.count(); ++i) {
+    const auto& c = exact.column;
+    ball.add({c[3][i], c[4][i], c[5][i]}, {c[0][i], c[1][i], c[2][i]}, c[6][i]);
+  }
+  // One deep contact after a thousand that are about to touch: no sample of them knows of it.
+  Patch<float> hidden;
+  for (int i = 0; i < 1000; ++i) hidden.add({0.01, 1e-5 * i, 0}, {0, 0, 1}, -1e-4);
+  hidden.add({0.005, 0, 0}, {0, 1, 0}, 4e-4);
+  for (const Patch<float>& p : {ball, hidden, random_patch(900, 3), random_patch(5001, 4)}) {
+    const SeriesParameters q{4, 0.02};
+    const Solved<float> want(p, q);
+    on_every_target([&](const std::string&) {
+      Vec6 y = Vec6::Zero();
+      std::vector<float> kappa(p.count()), slack(p.count());
+      const SeriesResult got = series_solve(p.view(), q, y.data(), kappa.data(), slack.data());
+      CHECK(got.residual <= 1e-6);
+      CHECK(got.iterations <= want.result.iterations + 1);
+      CHECK((y - want.y).norm() <= 2e-6 * want.y.norm());
+    });
+  }
+}
+
 TEST_CASE("series_solve: no sampling of any shape makes the net stiffness larger than c k") {
   for (const double c : {2.5, 4.0, 10.0})
     for (const Patch<double>& shape : shapes()) {
