@@ -77,6 +77,19 @@ void torque_simd(const ContactColumns& c, float l0, float lever, float* tx, floa
   }
 }
 
+void depths_simd(const float* depth, std::size_t count, Depths& out) {
+  const DF d;
+  const auto zero = hn::Zero(d);
+  auto deepest = zero;
+  std::size_t inside = 0;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto deep = load_n(d, depth + i, count - i);
+    inside += hn::CountTrue(d, hn::Gt(deep, zero));
+    deepest = hn::Max(deepest, deep);
+  }
+  out = {inside, hn::GetLane(hn::MaxOfLanes(d, deepest))};
+}
+
 void gap_simd(const ContactColumns& c, const float* depth, double beta, const double* u, float* e) {
   const DD d;
   const hn::Rebind<float, DD> df;
@@ -111,6 +124,7 @@ namespace h6::kernels {
 
 HWY_EXPORT(facing_simd);
 HWY_EXPORT(torque_simd);
+HWY_EXPORT(depths_simd);
 HWY_EXPORT(gap_simd);
 HWY_EXPORT(loads_simd);
 
@@ -120,6 +134,11 @@ void contact_facing(const ContactColumns& c, float edge, float* facing) {
 void torque_directions(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                        float* tz) {
   HWY_DYNAMIC_DISPATCH(torque_simd)(c, l0, lever, tx, ty, tz);
+}
+Depths look_at_depths(const float* depth, std::size_t count) {
+  Depths out;
+  HWY_DYNAMIC_DISPATCH(depths_simd)(depth, count, out);
+  return out;
 }
 void series_gap(const ContactColumns& c, const float* depth, double beta, const double u[6],
                 float* e) {

@@ -24,6 +24,14 @@ void torque_directions(const ContactColumns& c, float l0, float lever, float* tx
 void torque_directions_ref(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                            float* tz);
 
+// Depths above 0: how many there are, and the largest, 0 where there is none. No NaN.
+struct Depths {
+  std::size_t inside;
+  float deepest;
+};
+Depths look_at_depths(const float* depth, std::size_t count);
+Depths look_at_depths_ref(const float* depth, std::size_t count);
+
 // e_i = depth_i - beta [N; r x N].u: depth less what damping takes at the relative velocity u.
 void series_gap(const ContactColumns& c, const float* depth, double beta, const double u[6],
                 float* e);

@@ -38,6 +38,15 @@ void torque_directions_ref(const ContactColumns& c, float l0, float lever, float
   }
 }
 
+Depths look_at_depths_ref(const float* depth, std::size_t count) {
+  Depths out{0, 0};
+  for (std::size_t i = 0; i < count; ++i) {
+    out.inside += depth[i] > 0;
+    out.deepest = depth[i] > out.deepest ? depth[i] : out.deepest;
+  }
+  return out;
+}
+
 void series_gap_ref(const ContactColumns& c, const float* depth, double beta, const double u[6],
                     float* e) {
   for (std::size_t i = 0; i < c.count; ++i) {

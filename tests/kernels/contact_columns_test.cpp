@@ -52,6 +52,22 @@ double worst(Column& got, Column& want, std::size_t count, double tolerance) {
 
 }  // namespace
 
+TEST_CASE("contact_columns: depths are counted and the largest found on every target and count") {
+  on_every_target([](const std::string&) {
+    Random random(12);
+    for (std::size_t n = 0; n <= 67; ++n) {
+      Column depth(n, n % 5);  // followed by NaN
+      for (std::size_t i = 0; i < n; ++i)
+        depth[i] = i % 4 == 1 ? 0.0f : float(random.uniform(-1e-3, n % 3 == 0 ? 0 : 1e-3));
+      const Depths got = look_at_depths(depth.begin(), n);
+      const Depths want = look_at_depths_ref(depth.begin(), n);
+      CHECK(got.inside == want.inside);
+      CHECK(got.deepest == want.deepest);
+      CHECK((got.deepest > 0) == (got.inside > 0));
+    }
+  });
+}
+
 TEST_CASE("contact_columns: SIMD agrees with the reference on every target, count and alignment") {
   const double u[6] = {0.3, -0.2, 0.1, 2, -3, 1};
   on_every_target([&](const std::string&) {
