@@ -5,6 +5,7 @@
 //
 // No allocation, lock, print, exception or wait in here or below; slices of work may run on the
 // helper of `team`, joined in index order: any number of threads gives the same bits.
+#include "kernels/contact_columns.h"
 #include "runtime/net_stiffness.h"
 #include "runtime/stages.h"
 #include "sched/clock.h"
@@ -50,15 +51,13 @@ void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
     const Pair& pair = s.pairs[p];
     const double voxel = s.model->fields[s.bodies[pair.b].field].voxel;
     const Contacts& c = s.contacts[pair.a];
-    float deepest = 0;
-    std::uint32_t inside = 0;  // the others are about to touch
-    for (std::size_t i = pair.begin; i < pair.end; ++i) {
-      deepest = std::max(deepest, c.depth[i]);
-      inside += c.depth[i] > 0;
-    }
-    s.report.contacts += inside;
-    s.report.max_depth = std::max<double>(s.report.max_depth, deepest);
-    s.report.max_depth_voxels = std::max<double>(s.report.max_depth_voxels, deepest / voxel);
+    const kernels::Depths depths =
+        kernels::look_at_depths(c.depth + pair.begin, pair.end - pair.begin);
+    const double deepest = depths.deepest;
+    // The others are about to touch.
+    s.report.contacts += static_cast<std::uint32_t>(depths.inside);
+    s.report.max_depth = std::max(s.report.max_depth, deepest);
+    s.report.max_depth_voxels = std::max(s.report.max_depth_voxels, deepest / voxel);
   }
 }
 
