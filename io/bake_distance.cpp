@@ -1,7 +1,6 @@
 // bake_distance.cpp - the unsigned distance of a tile's nodes to the triangles near them, and what
 // the later steps ask about it, while it is in the cache.
 #include <algorithm>
-#include <span>
 
 #include "io/bake_grid.h"
 
@@ -54,7 +53,7 @@ struct Facets {
   std::vector<kernels::FacetRegion> region;  // at least as many; only what is in use is set
   std::vector<std::uint64_t> near;  // bricks
   std::vector<double> corners;      // 9 each, tile-local
-  std::vector<std::uint32_t> owner; // triangle
+  std::vector<std::int32_t> owner;  // triangle
 };
 
 void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
@@ -103,7 +102,7 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles,
     for (std::size_t f = out.facet.size(); f < out.corners.size() / 9; ++f) {
       out.facet.push_back(kernels::make_distance_facet(out.corners.data() + 9 * f));
       out.near.push_back(tiles.near[i]);
-      out.owner.push_back(t);
+      out.owner.push_back(std::int32_t(t));
       if (out.region.size() < out.facet.size()) out.region.emplace_back();
       kernels::FacetRegion& region = out.region[out.facet.size() - 1];
       region.edges = region.corners = 0;
@@ -113,47 +112,6 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles,
     if (farthest < kFar && out.facet.back().inside_from <= 0)
       set_region(features, surface, t, corner, out.region[out.facet.size() - 1]);
   }
-}
-
-// The triangle of the surface nearest to the middle of the brick; of equals the first; kNobody
-// where none is near. `u` are the distances of the brick's nodes, exact below reach.
-constexpr std::uint32_t kNobody = ~0u;
-std::uint32_t nearest_owner(const Facets& facets, int brick, const float (&origin)[3],
-                            const float* u, float reach) {
-  thread_local std::vector<std::uint32_t> list;
-  list.resize(facets.near.size());
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < facets.near.size(); ++i) {
-    list[count] = std::uint32_t(i);
-    count += facets.near[i] >> brick & 1;
-  }
-  if (count == 0) return kNobody;
-  if (count == 1) return facets.owner[list[0]];
-  const double middle[3] = {origin[0] + 3.5, origin[1] + 3.5, origin[2] + 3.5};
-  const float at[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
-  float around = reach;  // the eight nodes around the middle are less than 0.8661 away
-  for (const std::size_t n : {219u, 220u, 227u, 228u, 283u, 284u, 291u, 292u})
-    around = std::min(around, u[n]);
-  float most = around < reach ? around + 0.8661f + 1e-3f : 1e9f;
-  double nearest = std::numeric_limits<double>::max();
-  std::uint32_t owner = kNobody;
-  for (const std::uint32_t i : std::span(list.data(), count)) {
-    const kernels::DistanceFacet& f = facets.facet[i];
-    // Off its plane, or beyond one of its edges.
-    float least = 0;
-    for (std::size_t k = 3; k < 7; ++k) {
-      const float v = f.gx[k] * at[0] + f.gy[k] * at[1] + f.gz[k] * at[2] + f.c[k];
-      least = std::max(least, k == 6 ? std::fabs(v) : -v);
-    }
-    if (least > most) continue;
-    const double* t = facets.corners.data() + 9 * i;
-    const double d2 = kernels::point_triangle_squared(middle, t, t + 3, t + 6);
-    if (d2 > nearest || (d2 == nearest && facets.owner[i] >= owner)) continue;
-    nearest = d2;
-    owner = facets.owner[i];
-    most = std::min(most, float(std::sqrt(nearest)) + 1e-3f);
-  }
-  return owner;
 }
 
 NodeMask above(const float* u, float level) {
@@ -183,7 +141,7 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
   thread_local const auto room = std::make_unique<kernels::TileRoom>();
   prepare(surface, grid, tiles, band.features, tile, facets);
   kernels::tile_distance(facets.facet.data(), facets.region.data(), facets.near.data(),
-                         facets.facet.size(), float(grid.reach()), *room);
+                         facets.owner.data(), facets.facet.size(), float(grid.reach()), *room);
   const std::array<int, 3> brick = tiles.first_brick(tile);
   const float zero_set = float(grid.near_zero_set());
   std::uint64_t used = 0, weighed = 0;
@@ -194,7 +152,6 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
     const int in[3] = {b % 4, b / 4 % 4, b / 16};
     const std::size_t r = std::size_t(
         band.row[grid.cell(brick[0] + in[0], brick[1] + in[1], brick[2] + in[2])]);
-    const float origin[3] = {float(8 * in[0]), float(8 * in[1]), float(8 * in[2])};
     float* u = band.nodes(r);
     if (weighed >> b & 1)
       kernels::brick_distance(*room, std::size_t(b), u);
@@ -205,10 +162,10 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
     NodeMask near = above(u, std::nextafter(zero_set, 0.0f));
     for (std::uint64_t& z : near.z) z = ~z;
     band.towards[r] = looked_at_by(near);
-    const std::uint32_t owner = nearest_owner(facets, b, origin, u, float(grid.reach()));
-    if (owner == kNobody) continue;
-    band.triangle[r] = surface.source[owner];
-    if (!band.part.empty()) band.part[r] = surface.part[owner];
+    const std::int32_t owner = room->nearest[b];
+    if (owner == kernels::kNobody) continue;
+    band.triangle[r] = surface.source[std::size_t(owner)];
+    if (!band.part.empty()) band.part[r] = surface.part[std::size_t(owner)];
   }
 }
 

@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -37,6 +38,7 @@ inline constexpr float kRadius = 1.6584f;  // |kBlockHalf|, rounded up
 inline constexpr float kBrickRadius = 6.0622f;  // 3.5 sqrt(3), rounded up
 inline constexpr std::size_t kFunctions = 7;
 inline constexpr std::size_t kPlanes = 16;
+inline constexpr std::uint32_t kEachVisit = 4;
 inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
 inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [voxel]
 
@@ -186,13 +188,17 @@ HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains&
   return there;
 }
 
-// Those of the bricks that may meet the region.
+// Those of the bricks that may meet the region. On the way the triangle is weighed at the middles of
+// the bricks, and of some beside them, which does no harm.
 HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r,
-                                    std::uint64_t bricks) {
+                                    std::uint64_t bricks, std::int32_t name, TileRoom& room) {
   constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
   const D d;
+  const hn::RebindToSigned<D> d32;
+  // One brick is as soon weighed as tested.
+  const bool all = r.everywhere || (bricks & (bricks - 1)) == 0;
   Gains gain = {};
-  set_gains(f, r, kBrickHalf, gain);
+  if (!all) set_gains(f, r, kBrickHalf, gain);
   std::uint64_t met = 0;
   for (std::size_t b = 0; b < 64; b += hn::Lanes(d)) {
     if ((bricks >> b & ((std::uint64_t{1} << hn::Lanes(d)) - 1)) == 0) continue;
@@ -203,12 +209,20 @@ HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r
                         hn::MulAdd(y, hn::Set(d, f.gy[k]),
                                    hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
     };
-    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
+    const VF away = hn::MulAdd(h, h, beside_squared(f, s, w)), least = hn::Load(d, room.middle + b);
+    const auto named = hn::Load(d32, room.nearest + b), own = hn::Set(d32, name);
+    const auto nearer = hn::Or(
+        hn::Lt(away, least),
+        hn::And(hn::Eq(away, least), hn::RebindMask(d, hn::Lt(own, named))));
+    hn::Store(hn::Min(away, least), d, room.middle + b);
+    hn::Store(hn::IfThenElse(hn::RebindMask(d32, nearer), own, named), d32, room.nearest + b);
+    if (all) continue;
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, meets(f, r, gain, r.c, x, y, z, s, w), bits);
     met |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;
   }
-  return bricks & met;
+  return all ? bricks : bricks & met;
 }
 
 // One triangle, prepared for all bricks of its tile.
@@ -252,9 +266,8 @@ HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const f
   return live;
 }
 
-// Lowers the squared distances of the blocks in `live`, and what is the farthest in them.
-HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t live, float* best,
-                             float* most) {
+// Lowers the squared distances of the blocks in `live`.
+HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t live, float* best) {
   const D d;
   const DistanceFacet& f = t.f;
   for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
@@ -268,28 +281,41 @@ HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t l
       };
       const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
       float* to = best + b * kBlock + n;
-      const VF lower = hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w)));
-      hn::Store(lower, d, to);
-      const float farthest = hn::GetLane(hn::MaxOfLanes(d, lower));
-      most[b] = n == 0 ? farthest : std::max(most[b], farthest);
+      hn::Store(hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w))), d, to);
     }
   }
 }
 
+// Tells the farthest of the blocks in `lowered` anew.
+HWY_INLINE void tell_farthest(std::uint32_t lowered, const float* best, float* most) {
+  const D d;
+  for (; lowered != 0; lowered &= lowered - 1) {
+    const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(lowered);
+    VF farthest = hn::Load(d, best + b * kBlock);
+    for (std::size_t n = hn::Lanes(d); n < kBlock; n += hn::Lanes(d))
+      farthest = hn::Max(farthest, hn::Load(d, best + b * kBlock + n));
+    most[b] = hn::GetLane(hn::MaxOfLanes(d, farthest));
+  }
+}
+
 void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
-                  const std::uint64_t* near, std::size_t count, float reach, TileRoom& room) {
+                  const std::uint64_t* near, const std::int32_t* names, std::size_t count,
+                  float reach, TileRoom& room) {
+  std::fill_n(room.middle, 64, std::numeric_limits<float>::max());
+  std::fill_n(room.nearest, 64, kNobody);
   std::uint64_t used = 0;
   for (std::size_t i = 0; i < count; ++i) used |= near[i];
   for (; used != 0; used &= used - 1) {
     const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(used);
     std::fill_n(room.squared + b * kBrickSamples, kBrickSamples, reach * reach);
     std::fill_n(room.most + b * kBlocks, kBlocks, reach * reach);
+    room.lowered[b] = room.visits[b] = 0;
   }
   for (std::size_t i = 0; i < count; ++i) {
     const DistanceFacet& f = facets[i];
     const FacetRegion& r = regions[i];
     std::uint64_t bricks = near[i];
-    if (!r.everywhere && (bricks & (bricks - 1)) != 0) bricks = bricks_met(f, r, bricks);
+    if (bricks != 0) bricks = bricks_met(f, r, bricks, names[i], room);
     if (bricks == 0) continue;
     Ready t(f, r);
     make_pattern(f, kNodes.in_x, kNodes.in_y, kNodes.in_z, t.nodes);
@@ -301,9 +327,17 @@ void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
       alignas(64) float first[8], plane[kPlanes];
       values_at(f.gx, f.gy, f.gz, f.c, 8, x, y, z, first);
       if ((r.edges | r.corners) != 0) values_at(r.gx, r.gy, r.gz, r.c, kPlanes, x, y, z, plane);
-      float* most = room.most + b * kBlocks;
-      if (const std::uint32_t live = live_blocks(t, first, plane, most); live != 0)
-        lower_blocks(t, first, live, room.squared + b * kBrickSamples, most);
+      float *squared = room.squared + b * kBrickSamples, *most = room.most + b * kBlocks;
+      // What was the farthest stays an upper bound: it need not be told anew each time.
+      const std::uint32_t visit = room.visits[b]++;
+      if (visit < kEachVisit || visit % kEachVisit == 0) {
+        tell_farthest(room.lowered[b], squared, most);
+        room.lowered[b] = 0;
+      }
+      if (const std::uint32_t live = live_blocks(t, first, plane, most); live != 0) {
+        lower_blocks(t, first, live, squared);
+        room.lowered[b] |= live;
+      }
     }
   }
 }
@@ -389,8 +423,9 @@ std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach) {
 }
 
 void tile_distance(const DistanceFacet* facets, const FacetRegion* regions,
-                   const std::uint64_t* near, std::size_t count, float reach, TileRoom& room) {
-  HWY_DYNAMIC_DISPATCH(TileDistance)(facets, regions, near, count, reach, room);
+                   const std::uint64_t* near, const std::int32_t* names, std::size_t count,
+                   float reach, TileRoom& room) {
+  HWY_DYNAMIC_DISPATCH(TileDistance)(facets, regions, near, names, count, reach, room);
 }
 
 void brick_distance(const TileRoom& room, std::size_t brick, float* distance) {
@@ -408,7 +443,8 @@ void triangle_distance(const double* corners, std::size_t count, float reach, fl
   for (std::size_t i = 0; i < count; ++i) facets[i] = make_distance_facet(corners + 9 * i);
   const auto room = std::make_unique<TileRoom>();
   if (count == 0) std::fill_n(room->squared, kBrickSamples, reach * reach);
-  tile_distance(facets.data(), regions.data(), near.data(), count, reach, *room);
+  const std::vector<std::int32_t> names(count, 0);
+  tile_distance(facets.data(), regions.data(), near.data(), names.data(), count, reach, *room);
   brick_distance(*room, 0, distance);
 }
 

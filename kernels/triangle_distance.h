@@ -7,6 +7,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace h6::kernels {
 
@@ -46,17 +47,25 @@ struct FacetRegion {
   bool everywhere = true;               // nothing is known of its neighbours
 };
 
-// Squared distances of the bricks of a tile, in an order of their own.
+// Squared distances of the bricks of a tile, in an order of their own, and the name of the facet
+// nearest to the middle of each brick, half way between its nodes 3 and 4 along every axis.
+inline constexpr std::int32_t kNobody = std::numeric_limits<std::int32_t>::max();
 struct TileRoom {
   alignas(64) float squared[64 * kBrickSamples];
-  alignas(64) float most[64 * kBrickSamples / 16];
+  alignas(64) float most[64 * kBrickSamples / 16];  // by block; see triangle_distance.cpp
+  std::uint32_t lowered[64], visits[64];
+  alignas(64) float middle[64];           // squared distance of the middle
+  alignas(64) std::int32_t nearest[64];   // or kNobody
 };
 
 // The squared distances, at most reach^2, of the nodes of a tile's bricks to the nearest of `count`
 // facets; facet i is weighed in the bricks of near[i] only. Bricks that are in no near[i] are left
-// alone. The order of the facets does not change a bit.
+// alone, and nearest to their middles is anybody or nobody; elsewhere it is the nearest of those
+// weighed in the brick or a nearer one, of equals the least name. The order of the facets does not
+// change a bit.
 void tile_distance(const DistanceFacet* facets, const FacetRegion* regions,
-                   const std::uint64_t* near, std::size_t count, float reach, TileRoom& room);
+                   const std::uint64_t* near, const std::int32_t* names, std::size_t count,
+                   float reach, TileRoom& room);
 // The distances of the nodes of one brick.
 void brick_distance(const TileRoom& room, std::size_t brick, float* distance);
 

@@ -132,27 +132,66 @@ TEST_CASE("tile_distance: the order of the facets does not change a bit, nor a b
     Random random;
     const Triangles t = random_triangles(60, 3.0, random);
     std::vector<DistanceFacet> up(60), down(60);
+    std::vector<std::int32_t> names(60), turned(60);
     const std::vector<FacetRegion> regions(60);
-    for (std::size_t i = 0; i < 60; ++i)
+    for (std::size_t i = 0; i < 60; ++i) {
       up[i] = down[59 - i] = make_distance_facet(t.data() + 9 * i);
+      names[i] = turned[59 - i] = std::int32_t(i);
+    }
     constexpr int kBricks[] = {0, 1 + 16, 3 + 16, 63};
     std::uint64_t bricks = 0;
     for (int b : kBricks) bricks |= std::uint64_t{1} << b;
     const std::vector<std::uint64_t> near(60, bricks);
     const auto one = std::make_unique<TileRoom>(), other = std::make_unique<TileRoom>();
-    tile_distance(up.data(), regions.data(), near.data(), 60, 20.0f, *one);
-    tile_distance(down.data(), regions.data(), near.data(), 60, 20.0f, *other);
+    tile_distance(up.data(), regions.data(), near.data(), names.data(), 60, 20.0f, *one);
+    tile_distance(down.data(), regions.data(), near.data(), turned.data(), 60, 20.0f, *other);
     for (int brick : kBricks) {
       std::vector<float> a(kBrickSamples), b(kBrickSamples), exact(kBrickSamples);
       brick_distance(*one, std::size_t(brick), a.data());
       brick_distance(*other, std::size_t(brick), b.data());
       CHECK(a == b);
+      CHECK(one->nearest[brick] == other->nearest[brick]);
       const double origin[3] = {8.0 * (brick % 4), 8.0 * (brick / 4 % 4), 8.0 * (brick / 16)};
       Triangles there = t;
       for (std::size_t i = 0; i < there.size(); ++i) there[i] -= origin[i % 3];
       triangle_distance_ref(there.data(), 60, 20.0f, exact.data());
       for (std::size_t n = 0; n < kBrickSamples; ++n) CHECK(std::fabs(a[n] - exact[n]) < 3e-5);
     }
+  });
+}
+
+TEST_CASE("tile_distance: a brick's name is that of the facet nearest to its middle, the least of equals") {
+  on_every_target([] {
+    Random random;
+    constexpr std::size_t kCount = 40;
+    Triangles t = random_triangles(kCount, 3.0, random);
+    for (double& c : t) c = 2 * c + 8;
+    std::vector<DistanceFacet> facets;
+    std::vector<std::int32_t> names;
+    for (int copy = 0; copy < 2; ++copy)
+      for (std::size_t i = 0; i < kCount; ++i) {
+        facets.push_back(make_distance_facet(t.data() + 9 * i));
+        names.push_back(std::int32_t(copy == 0 ? 100 + i : i));
+      }
+    const std::vector<FacetRegion> regions(2 * kCount);
+    const std::vector<std::uint64_t> near(2 * kCount, ~std::uint64_t{0});
+    const auto room = std::make_unique<TileRoom>();
+    tile_distance(facets.data(), regions.data(), near.data(), names.data(), facets.size(), 6.0f,
+                  *room);
+    for (std::size_t b = 0; b < 64; ++b) {
+      const double p[3] = {8.0 * double(b % 4) + 3.5, 8.0 * double(b / 4 % 4) + 3.5,
+                           8.0 * double(b / 16) + 3.5};
+      double least = 1e300;
+      for (std::size_t i = 0; i < kCount; ++i) {
+        const double* c = t.data() + 9 * i;
+        least = std::min(least, point_triangle_squared(p, c, c + 3, c + 6));
+      }
+      REQUIRE(room->nearest[b] < std::int32_t(kCount));
+      const double* c = t.data() + 9 * room->nearest[b];
+      CHECK(std::sqrt(point_triangle_squared(p, c, c + 3, c + 6)) < std::sqrt(least) + 1e-4);
+    }
+    tile_distance(facets.data(), regions.data(), near.data(), names.data(), 0, 6.0f, *room);
+    CHECK(std::all_of(room->nearest, room->nearest + 64, [](auto n) { return n == kNobody; }));
   });
 }
 
