@@ -177,6 +177,42 @@ void bin_triangle(const Surface& surface, const Grid& grid, const Tiles& tiles, 
       for (int a = r.low[0]; a <= r.high[0]; ++a) add(a, b, c);
 }
 
+// Rows in the order of cells, layer by layer; returns how many. They are not made if too many.
+std::size_t number_rows(const Grid& grid, const std::vector<std::atomic<std::uint64_t>>& used,
+                        unsigned threads, NarrowBand& band) {
+  const Tiles& tiles = band.tiles;
+  // Calls f(cell) for the cells of a layer that have a row, in order.
+  const auto each_cell = [&](int c, auto&& f) {
+    for (int b = 0; b < grid.bricks[1]; ++b)
+      for (int a = 0; a < grid.bricks[0]; a += 4) {
+        const std::uint64_t bits = used[tiles.of({a, b, c})].load(std::memory_order_relaxed);
+        const std::uint64_t line = bits >> Tiles::bit({a, b, c}) & 0xf;
+        for (int i = 0; i < 4; ++i)
+          if (line >> i & 1) f(grid.cell(a + i, b, c));
+      }
+  };
+  const std::size_t layers = std::size_t(grid.bricks[2]);
+  std::vector<std::size_t> first(layers + 1, 0);
+  sched::parallel_for(layers, threads, [&](std::size_t c) {
+    std::size_t count = 0;
+    each_cell(int(c), [&](std::size_t) { ++count; });
+    first[c + 1] = count;
+  });
+  for (std::size_t c = 0; c < layers; ++c) first[c + 1] += first[c];
+  const std::size_t rows = first[layers];
+  if (rows > kMaxBricks) return rows;
+  band.row.assign(grid.cells(), -1);
+  band.cell.resize(rows);
+  sched::parallel_for(layers, threads, [&](std::size_t c) {
+    std::size_t r = first[c];
+    each_cell(int(c), [&](std::size_t cell) {
+      band.row[cell] = std::int32_t(r);
+      band.cell[r++] = std::uint32_t(cell);
+    });
+  });
+  return rows;
+}
+
 Failure too_many(const Grid& grid, double excess) {
   char text[200];
   std::snprintf(
@@ -215,14 +251,8 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
   });
   if (total > kMaxPairs) return too_many(grid, 4.0);
 
-  band.row.assign(grid.cells(), -1);
-  for (std::size_t c = 0; c < grid.cells(); ++c) {
-    const std::array<int, 3> at = grid.place(c);
-    if (!(used[tiles.of(at)] >> Tiles::bit(at) & 1)) continue;
-    band.row[c] = std::int32_t(band.cell.size());
-    band.cell.push_back(std::uint32_t(c));
-  }
-  if (band.rows() > kMaxBricks) return too_many(grid, double(band.rows()) / kMaxBricks);
+  const std::size_t rows = number_rows(grid, used, threads, band);
+  if (rows > kMaxBricks) return too_many(grid, double(rows) / kMaxBricks);
 
   tiles.first.assign(tile_count + 1, 0);
   for (std::size_t t = 0; t < tile_count; ++t) {

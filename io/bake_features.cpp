@@ -17,7 +17,8 @@ double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * 
 // The triangles around each vertex, in order. Every thread reads all triangles and takes those at
 // its range of vertices.
 struct Rings {
-  std::vector<std::uint32_t> first, triangle;
+  std::vector<std::uint32_t> first;
+  Large<std::uint32_t> triangle;
   Rings(const Surface& surface, unsigned threads)
       : first(surface.vertices.size() + 1, 0), triangle(3 * surface.triangles.size()) {
     constexpr std::size_t kRanges = 4;
@@ -123,20 +124,25 @@ void look_at_corner(const Surface& surface, const Rings& rings, std::uint32_t ve
 void find_features(const Surface& surface, unsigned threads, Features& out) {
   const Rings rings(surface, threads);
   const std::size_t triangles = surface.triangles.size(), vertices = surface.vertices.size();
-  out.owned.assign(triangles, 0);
-  out.across.assign(3 * triangles, {});
-  out.from.assign(4 * vertices, {});
+  out.owned.resize(triangles);
+  out.across.resize(3 * triangles);
+  out.from.resize(4 * vertices);
   sched::parallel_for((triangles + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
-    for (std::size_t t = s * kSlice; t < std::min(triangles, (s + 1) * kSlice); ++t)
+    for (std::size_t t = s * kSlice; t < std::min(triangles, (s + 1) * kSlice); ++t) {
+      out.owned[t] = 0;
       for (std::size_t k = 0; k < 3; ++k) {
+        out.across[3 * t + k] = {};
         look_at_edge(surface, rings, std::uint32_t(t), k, out);
         const std::uint32_t corner = surface.triangles[t][k];
         if (rings.triangle[rings.first[corner]] == t) out.owned[t] |= std::uint8_t(8u << k);
       }
+    }
   });
   sched::parallel_for((vertices + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
-    for (std::size_t v = s * kSlice; v < std::min(vertices, (s + 1) * kSlice); ++v)
+    for (std::size_t v = s * kSlice; v < std::min(vertices, (s + 1) * kSlice); ++v) {
+      std::fill_n(out.from.begin() + std::ptrdiff_t(4 * v), 4, Features::Gradient{});
       look_at_corner(surface, rings, std::uint32_t(v), out);
+    }
   });
 }
 

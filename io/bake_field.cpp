@@ -166,8 +166,8 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
 
   if (!steps.tell("flood", 0.6)) return cancelled;
   const Reached reached = flood(surface, *grid, band, options.cavities, threads);
-  std::vector<std::uint32_t>().swap(band.tiles.triangle);
-  std::vector<std::uint64_t>().swap(band.tiles.near);
+  Large<std::uint32_t>().swap(band.tiles.triangle);
+  Large<std::uint64_t>().swap(band.tiles.near);
   Inside inside;
   if (!look_inside(*grid, band, reached, threads, steps, inside)) return cancelled;
 

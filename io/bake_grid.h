@@ -67,10 +67,10 @@ struct Grid {
 
 // The triangles that count: with area, each once. Vertices are in metres until `to_grid`.
 struct Surface {
-  std::vector<Vec3> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::int32_t> part;  // (triangles) or empty
-  std::vector<std::int32_t> source;// (triangles) of the mesh; -1: a plug
+  Large<Vec3> vertices;
+  Large<std::array<std::uint32_t, 3>> triangles;
+  Large<std::int32_t> part;    // (triangles) or empty
+  Large<std::int32_t> source;  // (triangles) of the mesh; -1: a plug
   Vec3 low{}, high{};              // [m]
   std::size_t duplicates = 0, flat = 0;
   std::size_t open_edges = 0;      // of one face
@@ -92,7 +92,7 @@ struct NodeMask {
     return all != 0;
   }
 };
-using Masks = std::vector<NodeMask, SampleAllocator<NodeMask>>;  // (rows) not cleared
+using Masks = Large<NodeMask>;  // (rows) not cleared
 
 // Where the surface runs between nodes: bit n of edge[k] is the edge from node n along axis k.
 // Touching counts. Nodes exactly on the surface are in `on`.
@@ -106,8 +106,8 @@ struct Crossing {
 struct Tiles {
   std::array<int, 3> size{};
   std::vector<std::size_t> first;       // (tiles + 1) into the lists
-  std::vector<std::uint32_t> triangle;
-  std::vector<std::uint64_t> near;      // bit (c*4 + b)*4 + a
+  Large<std::uint32_t> triangle;
+  Large<std::uint64_t> near;            // bit (c*4 + b)*4 + a
   std::size_t count() const { return first.size() - 1; }
   std::size_t of(const std::array<int, 3>& brick) const {
     return (std::size_t(brick[2] / 4) * std::size_t(size[1]) + std::size_t(brick[1] / 4)) *
@@ -126,9 +126,9 @@ struct Tiles {
 // What neighbours say about where a triangle may be the nearest (kernels::FacetRegion).
 struct Features {
   using Gradient = std::array<float, 3>;  // of unit length, or zero: nothing is known
-  std::vector<std::uint8_t> owned;        // (triangles) bit e: edge e, bit 3 + v: corner v
-  std::vector<Gradient> across;           // (3 triangles) into another triangle of an owned edge
-  std::vector<Gradient> from;             // (4 vertices) along edges that leave it
+  Large<std::uint8_t> owned;              // (triangles) bit e: edge e, bit 3 + v: corner v
+  Large<Gradient> across;                 // (3 triangles) into another triangle of an owned edge
+  Large<Gradient> from;                   // (4 vertices) along edges that leave it
 };
 // bake_features.cpp
 void find_features(const Surface& surface, unsigned threads, Features& out);

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "io/bake_grid.h"
-#include "io/raw_vector.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -67,7 +66,7 @@ void by_vertex(std::size_t vertices, std::size_t triangles, unsigned threads, Ma
     for (auto& of_slice : place) total += std::exchange(of_slice[k], total);
   }
   first[kRanges] = total;
-  RawVector<Item> items(total);
+  Large<Item> items(total);
   sched::parallel_for(slices, threads, [&](std::size_t s) {
     for (std::size_t i = s * kSlice; i < std::min(triangles, (s + 1) * kSlice); ++i)
       make(i, [&](const Item& item) { items[place[s][item.vertex >> shift]++] = item; });
@@ -232,7 +231,13 @@ Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
     surface.source[to] = std::int32_t(i);
     if (parts) surface.part[to] = mesh.part[i];
   });
-  surface.vertices = mesh.vertices;
+  surface.vertices.resize(mesh.vertices.size());
+  sched::parallel_for(slices_of(mesh.vertices.size()), threads, [&](std::size_t s) {
+    const std::size_t begin = s * kSlice, end = std::min(mesh.vertices.size(), begin + kSlice);
+    std::copy(mesh.vertices.begin() + std::ptrdiff_t(begin),
+              mesh.vertices.begin() + std::ptrdiff_t(end),
+              surface.vertices.begin() + std::ptrdiff_t(begin));
+  });
   return surface;
 }
 

@@ -7,6 +7,7 @@
 #include "io/bake_tree.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "sched/parallel_for.h"
 
@@ -47,14 +48,26 @@ std::uint32_t hilbert(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   return morton(c[2] ^ flip, c[1] ^ flip, c[0] ^ flip);
 }
 
-// By the upper half of the words, which has 30 bits; equal ones keep their order.
-void sort_by_code(std::vector<std::uint64_t>& words) {
-  std::vector<std::uint64_t> other(words.size());
+// By the upper half of the words, which has 30 bits; equal ones keep their order. Slices count and
+// move side by side; each knows its places from the counts of all.
+void sort_by_code(Large<std::uint64_t>& words, unsigned threads) {
+  constexpr std::size_t kSlice = 65536, kDigits = 1024;
+  Large<std::uint64_t> other(words.size());
+  const std::size_t slices = (words.size() + kSlice - 1) / kSlice;
+  std::vector<std::array<std::uint32_t, kDigits>> place(slices);
   for (int shift = 32; shift < 62; shift += 10) {
-    std::vector<std::size_t> next(1025, 0);
-    for (std::uint64_t w : words) ++next[(w >> shift & 1023) + 1];
-    for (std::size_t i = 1; i < next.size(); ++i) next[i] += next[i - 1];
-    for (std::uint64_t w : words) other[next[w >> shift & 1023]++] = w;
+    const auto each = [&](auto&& body) {
+      sched::parallel_for(slices, threads, [&](std::size_t s) {
+        for (std::size_t i = s * kSlice; i < std::min(words.size(), (s + 1) * kSlice); ++i)
+          body(place[s][words[i] >> shift & (kDigits - 1)], words[i]);
+      });
+    };
+    for (auto& counts : place) counts.fill(0);
+    each([](std::uint32_t& count, std::uint64_t) { ++count; });
+    std::uint32_t sum = 0;
+    for (std::size_t digit = 0; digit < kDigits; ++digit)
+      for (auto& counts : place) sum += std::exchange(counts[digit], sum);
+    each([&](std::uint32_t& to, std::uint64_t word) { other[to++] = word; });
     words.swap(other);
   }
 }
@@ -141,7 +154,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
   for (int k = 0; k < 3; ++k) middle_[k] = grid.middle(k);
   const std::size_t count = surface.triangles.size();
   constexpr std::size_t kSlice = 8192;
-  std::vector<std::uint64_t> words(count);
+  Large<std::uint64_t> words(count);
   sched::parallel_for((count + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
     for (std::size_t i = s * kSlice; i < std::min(count, (s + 1) * kSlice); ++i) {
       const auto& t = surface.triangles[i];
@@ -154,16 +167,21 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
                                       cell(a.z + b.z + c.z))) << 32 | i;
     }
   });
-  sort_by_code(words);
+  sort_by_code(words, threads);
   triangle_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) triangle_[i] = std::uint32_t(words[i]);
-  std::vector<std::uint64_t>().swap(words);
+  sched::parallel_for((count + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
+    for (std::size_t i = s * kSlice; i < std::min(count, (s + 1) * kSlice); ++i)
+      triangle_[i] = std::uint32_t(words[i]);
+  });
+  Large<std::uint64_t>().swap(words);
 
   const std::size_t leaves = (count + 7) / 8;
   leaf_.resize(leaves);
-  around_leaf_.assign((leaves + 7) / 8, nothing_around());
-  level_.emplace_back((leaves + 7) / 8, no_boxes());
+  around_leaf_.resize((leaves + 7) / 8);
+  level_.emplace_back((leaves + 7) / 8);
   sched::parallel_for(level_[0].size(), threads, [&](std::size_t node) {
+    around_leaf_[node] = nothing_around();
+    level_[0][node] = no_boxes();
     for (std::size_t l = 8 * node; l < std::min(leaves, 8 * node + 8); ++l) {
       kernels::EightBoxes& boxes = level_[0][node];
       for (std::size_t i = 0; i < 8; ++i) {
@@ -189,8 +207,8 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
     }
   });
   while (level_.back().size() > 1) {
-    const std::vector<kernels::EightBoxes>& below = level_.back();
-    std::vector<kernels::EightBoxes> above((below.size() + 7) / 8, no_boxes());
+    const Large<kernels::EightBoxes>& below = level_.back();
+    Large<kernels::EightBoxes> above((below.size() + 7) / 8, no_boxes());
     for (std::size_t i = 0; i < below.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k) {
         above[i / 8].low[k][i % 8] = *std::min_element(below[i].low[k], below[i].low[k] + 8);

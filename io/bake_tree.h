@@ -5,7 +5,7 @@
 
 namespace h6::io::bake {
 
-// Triangles in Morton order, eight to a leaf, eight leaves or nodes to a node: no pointers, every
+// Triangles in the order of Hilbert's curve, eight to a leaf, eight leaves or nodes to a node: no pointers, every
 // level is an array. The nearest distance does not depend on where a search starts.
 class TriangleTree {
  public:
@@ -34,10 +34,10 @@ class TriangleTree {
 
   const Surface& surface_;
   double middle_[3];                     // float coordinates are about this
-  std::vector<std::uint32_t> triangle_;  // place -> triangle
-  std::vector<kernels::EightTriangles> leaf_;
-  std::vector<kernels::EightTurnedBoxes> around_leaf_;
-  std::vector<std::vector<kernels::EightBoxes>> level_;  // last: one node
+  Large<std::uint32_t> triangle_;        // place -> triangle
+  Large<kernels::EightTriangles> leaf_;
+  Large<kernels::EightTurnedBoxes> around_leaf_;
+  std::vector<Large<kernels::EightBoxes>> level_;  // last: one node
 };
 
 }  // namespace h6::io::bake

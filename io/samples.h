@@ -46,6 +46,9 @@ struct SampleAllocator {
   bool operator==(const SampleAllocator<U>&) const { return true; }
 };
 
-using Samples = std::vector<float, SampleAllocator<float>>;
+// Many of anything, likewise not filled.
+template <class T>
+using Large = std::vector<T, SampleAllocator<T>>;
+using Samples = Large<float>;
 
 }  // namespace h6::io
