@@ -90,6 +90,22 @@ kernels::EightTurnedBoxes nothing_around() {
   return boxes;
 }
 
+// How far eight triangles reach along an axis. In steps of eight, which a compiler makes vectors of.
+void reach_along(const kernels::EightTriangles& t, const std::array<float, 3>& n, float& low,
+                 float& high) {
+  float least[8], most[8];
+  for (std::size_t i = 0; i < 8; ++i) {
+    const float a = n[0] * t.a[0][i] + n[1] * t.a[1][i] + n[2] * t.a[2][i];
+    const float b = n[0] * t.ab[0][i] + n[1] * t.ab[1][i] + n[2] * t.ab[2][i];
+    const float c = n[0] * t.ac[0][i] + n[1] * t.ac[1][i] + n[2] * t.ac[2][i];
+    const float under = b < c ? b : c, over = b > c ? b : c;
+    least[i] = a + (under < 0.0f ? under : 0.0f);
+    most[i] = a + (over > 0.0f ? over : 0.0f);
+  }
+  low = *std::min_element(least, least + 8);
+  high = *std::max_element(most, most + 8);
+}
+
 // Around eight triangles: along the grid, or across and along their mean plane, whichever is less.
 void put_box_around(const kernels::EightTriangles& t, kernels::EightTurnedBoxes& boxes,
                     std::size_t box) {
@@ -106,15 +122,8 @@ void put_box_around(const kernels::EightTriangles& t, kernels::EightTurnedBoxes&
   const auto put = [&](const Frame& axis, float largest) {
     float middle[3], half[3], size = 1;
     for (std::size_t k = 0; k < 3; ++k) {
-      float low = 1e9f, high = -1e9f;
-      const auto& n = axis[k];
-      for (std::size_t i = 0; i < 8; ++i) {
-        const float a = n[0] * t.a[0][i] + n[1] * t.a[1][i] + n[2] * t.a[2][i];
-        const float b = n[0] * t.ab[0][i] + n[1] * t.ab[1][i] + n[2] * t.ab[2][i];
-        const float c = n[0] * t.ac[0][i] + n[1] * t.ac[1][i] + n[2] * t.ac[2][i];
-        low = std::min(low, a + std::min({b, c, 0.0f}));
-        high = std::max(high, a + std::max({b, c, 0.0f}));
-      }
+      float low, high;
+      reach_along(t, axis[k], low, high);
       middle[k] = (low + high) / 2;
       half[k] = (high - low) / 2 + 4 * kRounded;
       size *= half[k] + 0.5f;
