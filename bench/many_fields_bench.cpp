@@ -1,8 +1,10 @@
-// many_fields_bench.cpp - whole frames with many pairs:
+// many_fields_bench.cpp - whole frames with many pairs, and with several hands:
 // frame/many_fields/fields:N/threads:T/slow|fast
+// frame/two_hands/contacts:N/threads:T/slow|fast
 //
 // A ball of 56,823 points among N smaller balls, each an obstacle of its own; one in eight touches.
 // Slow: 0.01 voxel a frame; fast: the frame before stood a metre away, so nothing is remembered.
+// Two hands: each presses such a ball into one smaller ball, N contacts each.
 // One thread and two must give the same bits before a time is reported.
 #include <benchmark/benchmark.h>
 
@@ -53,19 +55,55 @@ Session open(const Balls& balls, int fields, unsigned threads) {
   return Session(h6CreateSession(balls.model.handle, &def, nullptr));
 }
 
+// All hands alike.
 void step(h6Session* session, int i, bool fast) {
   if (fast) {
     const h6DeviceSample away = test::hand_at(test::pose(1, 0, 0));
-    h6Step(session, &away, nullptr);
+    const h6DeviceSample both[2] = {away, away};
+    h6Step(session, both, nullptr);
   }
   const double x = 0.005 * kMm * (std::abs(i % 4 - 2) - 1);
-  const h6DeviceSample sample = test::hand_at(test::pose(x, 0, 0));
-  h6Step(session, &sample, nullptr);
+  const h6DeviceSample sample = test::hand_at(test::pose(x, 0, 0)), both[2] = {sample, sample};
+  h6Step(session, both, nullptr);
 }
 
-void many_fields(benchmark::State& state, int fields, unsigned threads, bool fast) {
-  static const Balls balls;
-  const Session one = open(balls, fields, 1), session = open(balls, fields, threads);
+const Balls& balls() {
+  static const Balls all;
+  return all;
+}
+
+// Two large balls, each against a small one of its own, `deep` inside it [mm].
+Session open_hands(double deep, unsigned threads) {
+  h6BodyDef bodies[4] = {h6DefaultBodyDef(), h6DefaultBodyDef(), h6DefaultBodyDef(),
+                         h6DefaultBodyDef()};
+  h6HandDef hands[2] = {h6DefaultHandDef(), h6DefaultHandDef()};
+  for (int h = 0; h < 2; ++h) {
+    bodies[h].shell = 0;
+    hands[h].body = h;
+    hands[h].coupling.mode = H6_COUPLING_DIRECT;
+    bodies[2 + h].fixed = true, bodies[2 + h].field = 0;
+    bodies[2 + h].pose = test::pose(0, (h ? -1 : 1) * (28 - deep) * kMm, 0);
+  }
+  h6SessionDef def = h6DefaultSessionDef();
+  def.bodies = bodies, def.body_count = 4;
+  def.hands = hands, def.hand_count = 2;
+  def.threads = threads;
+  return Session(h6CreateSession(balls().model.handle, &def, nullptr));
+}
+
+// As deep as it takes for each hand to have so many contacts.
+double depth_for(double contacts) {
+  double low = 0, high = 8;
+  for (int i = 0; i < 20; ++i) {
+    const double deep = 0.5 * (low + high);
+    const Session probe = open_hands(deep, 1);
+    step(probe.get(), 0, false);
+    (h6GetFrame(probe.get()).contacts < 2 * contacts ? low : high) = deep;
+  }
+  return high;
+}
+
+void measure(benchmark::State& state, const Session& one, const Session& session, bool fast) {
   if (!one || !session) return state.SkipWithError("no session");
   for (int i = 0; i < 100; ++i) {
     step(one.get(), i, fast), step(session.get(), i, fast);
@@ -74,7 +112,7 @@ void many_fields(benchmark::State& state, int fields, unsigned threads, bool fas
       return state.SkipWithError("two threads differ from one");
   }
   std::vector<double> frame, traverse;
-  double contacts = 0;
+  double contacts = 0, helped = 0;
   int i = 0;
   for (auto _ : state) {
     step(session.get(), i++, fast);
@@ -83,18 +121,40 @@ void many_fields(benchmark::State& state, int fields, unsigned threads, bool fas
     frame.push_back(report.frame_us);
     traverse.push_back(report.stage_us[H6_STAGE_TRAVERSE]);
     contacts += report.contacts;
+    helped += report.helper_slices > 0;
   }
   const auto at = [](std::vector<double>& t, double p) {
     std::sort(t.begin(), t.end());
     return t[static_cast<std::size_t>(p * static_cast<double>(t.size() - 1))];
   };
   state.counters["contacts"] = contacts / static_cast<double>(frame.size());
+  state.counters["helped"] = helped / static_cast<double>(frame.size());
   state.counters["p50_us"] = at(frame, 0.5);
   state.counters["p99_us"] = at(frame, 0.99);
   state.counters["traverse_us"] = at(traverse, 0.5);
 }
 
+void many_fields(benchmark::State& state, int fields, unsigned threads, bool fast) {
+  measure(state, open(balls(), fields, 1), open(balls(), fields, threads), fast);
+}
+
+void two_hands(benchmark::State& state, int contacts, unsigned threads, bool fast) {
+  const double deep = depth_for(contacts);
+  measure(state, open_hands(deep, 1), open_hands(deep, threads), fast);
+}
+
 [[maybe_unused]] const bool registered = [] {
+  for (const int contacts : {10, 30, 100, 300, 1000})
+    for (const bool fast : {false, true})
+      for (const unsigned threads : {1u, 2u})
+        benchmark::RegisterBenchmark(
+            ("frame/two_hands/contacts:" + std::to_string(contacts) +
+             "/threads:" + std::to_string(threads) + (fast ? "/fast" : "/slow"))
+                .c_str(),
+            two_hands, contacts, threads, fast)
+            ->UseManualTime()
+            ->Unit(benchmark::kMicrosecond)
+            ->Iterations(2000);
   for (const int fields : {2, 8, 40, 200})
     for (const bool fast : {false, true})
       for (const unsigned threads : {1u, 2u})

@@ -1,7 +1,8 @@
 // frame.cpp - one frame, on one page.
 //
 //   samples -> [traverse -> contacts -> weights -> wrench, K, D] -> coupling -> step -> output
-//                each shell body against every field it can touch     each hand     safety, always
+//         each shell body against every field it can touch; bodies     each hand     safety, always
+//         side by side or one after the other
 //
 // No allocation, lock, print, exception or wait in here or below; slices of work may run on the
 // helper of `team`, joined in index order: any number of threads gives the same bits.
@@ -61,6 +62,34 @@ void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   }
 }
 
+// One shell body against all it can touch, up to what stiffness each contact has.
+void weigh_shell(h6Session& s, std::size_t first, std::size_t end) {
+  Stopwatch watch{s, sched::now_ns()};
+  watch.timed(H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
+  watch.timed(H6_STAGE_CONTACTS, [&] {
+    gather_contacts(s, first, end);
+    note_depths(s, first, end);
+  });
+  watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
+}
+
+// All of them: one after the other, each with both threads where that pays, or side by side.
+void weigh_shells(h6Session& s) {
+  s.in_lanes = worth_lanes(s);
+  if (s.in_lanes) return run_lanes(s, weigh_shell);
+  for (std::size_t i = 0; i < s.shell_count; ++i) {
+    const std::int64_t since = s.lanes ? sched::now_ns() : 0;
+    weigh_shell(s, s.shell_pairs[i], s.shell_pairs[i + 1]);
+    if (s.lanes)
+      s.bodies[s.pairs[s.shell_pairs[i]].a].shell_ns = static_cast<double>(sched::now_ns() - since);
+  }
+}
+
+void sum_shell(h6Session& s, std::size_t first, std::size_t end) {
+  if (s.contact.method == H6_METHOD_SERIES) return sum_series(s, first, end);
+  for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]);
+}
+
 // A timeline shows who did what.
 void note_helper(h6Session& s, std::int64_t start) {
   const sched::FrameTeam::HelperWork helped = s.team->helper_work();
@@ -75,22 +104,14 @@ void note_helper(h6Session& s, std::int64_t start) {
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands) {
   const sched::FlushDenormals flush;
   const std::int64_t start = sched::now_ns();
-  s.team->begin_frame();
+  s.team->begin_frame(start);
   begin(s, samples, start);
+  weigh_shells(s);
   Stopwatch watch{s, sched::now_ns()};
-  for (std::size_t first = 0, end; first < s.pair_count; first = end) {
-    end = pairs_of_shell(s, first);
-    watch.timed(H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
-    watch.timed(H6_STAGE_CONTACTS, [&] {
-      gather_contacts(s, first, end);
-      note_depths(s, first, end);
-    });
-    watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
-    watch.timed(H6_STAGE_WRENCH, [&] {
-      if (s.contact.method == H6_METHOD_SERIES) return sum_series(s, first, end);
-      for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]);
-    });
-  }
+  watch.timed(H6_STAGE_WRENCH, [&] {
+    for (std::size_t i = 0; i < s.shell_count; ++i)
+      sum_shell(s, s.shell_pairs[i], s.shell_pairs[i + 1]);
+  });
   watch.timed(H6_STAGE_COUPLING, [&] {
     for (std::size_t h = 0; h < s.hand_count; ++h) {
       couple(s, s.hands[h]);

@@ -160,7 +160,9 @@ struct Sizes {
   std::size_t bodies, pairs, hands;
   std::size_t groups, blocks;  // of the largest shell, and (all) of all pairs together
   std::size_t all_groups, all_blocks;
+  std::size_t shells = 0;     // bodies that are the shell of a pair
   bool shares = false;        // pairs between two threads
+  bool lanes = false;         // shell bodies between two threads
   std::vector<bool> touches;  // (bodies) the body is the shell of a pair
 };
 
@@ -178,7 +180,7 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
     if (s.contacts) s.contacts[i] = columns;
   }
   s.candidate_capacity = s.max_contacts + kGroupRows * n.groups;
-  for (std::size_t i = 0; i < (n.shares ? 2u : 1u); ++i) {
+  for (std::size_t i = 0; i < (n.shares || n.lanes ? 2u : 1u); ++i) {
     TraverseScratch& t = s.traversal[i];
     t.frontier = arena.take<std::uint32_t>(n.groups);
     t.survivors = arena.take<std::uint32_t>(n.groups);
@@ -199,11 +201,17 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   s.weigh_scratch = weighing ? arena.take<char>(weighing) : nullptr;
   s.slice_count = arena.take<std::size_t>(n.groups / 64 + 1);
   s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / 1024 + 1);
+  s.shell_pairs = arena.take<std::uint32_t>(n.shells + 1);
+  if (!n.lanes) return;
+  s.lanes = arena.take<h6Session>(2);
+  s.lane_scratch = {arena.take<float>(s.candidate_capacity), arena.take<std::uint32_t>(merged),
+                    arena.take<std::uint32_t>(merged), arena.take<std::uint64_t>(merged),
+                    weighing ? arena.take<char>(weighing) : nullptr};
 }
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const std::vector<h6PairDef> pairs = pairs_of(def);
-  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0, false,
+  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0, 0, false, false,
           std::vector<bool>(def.body_count)};
   for (const h6PairDef& p : pairs) {
     const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
@@ -212,8 +220,10 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
     n.all_groups += 16 * shell.blocks.count;
     n.all_blocks += shell.blocks.x.count;
     n.shares = n.shares || (def.threads > 1 && n.touches[p.shell_body]);
+    n.shells += !n.touches[p.shell_body];
     n.touches[p.shell_body] = true;
   }
+  n.lanes = def.threads > 1 && n.shells > 1;
   Arena count;
   lay_out(s, count, n);
   s.memory_bytes = count.used();
@@ -243,7 +253,10 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
     const Shell& shell = s.model->shells[s.bodies[s.pairs[i].a].shell];
     group_expiry += 16 * shell.blocks.count;
     block_expiry += shell.blocks.x.count;
+    if (i == 0 || pairs[i - 1].shell_body != pairs[i].shell_body)
+      s.shell_pairs[s.shell_count++] = static_cast<std::uint32_t>(i);
   }
+  s.shell_pairs[s.shell_count] = static_cast<std::uint32_t>(n.pairs);
   s.hand_count = n.hands;
   for (std::size_t i = 0; i < n.hands; ++i) {
     new (&s.hands[i]) Hand();
@@ -253,6 +266,8 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   s.island_count = islands.size();
   std::copy(islands.begin(), islands.end(), s.islands);
   s.team = new sched::FrameTeam(def.threads);
+  if (n.lanes) s.alone = new sched::FrameTeam(1);
+  open_lanes(s);
   return true;
 }
 
@@ -292,6 +307,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
 void h6DestroySession(h6Session* s) {
   if (!s) return;
   delete s->team;
+  delete s->alone;
   release(s->allocator, s->memory, s->memory_bytes);
   const h6Allocator allocator = s->allocator;
   destroy(allocator, s);

@@ -10,6 +10,7 @@
 #include "runtime/model.h"
 #include "runtime/passivity.h"
 #include "runtime/safety.h"
+#include "runtime/shell_lanes.h"
 #include "sched/frame_team.h"
 
 namespace h6 {
@@ -44,6 +45,7 @@ struct Body : RigidState {
 
   double traverse_ns = 0;  // what the pairs of this body's shell took last
   bool pairs_shared = false;  // between the threads, then
+  double shell_ns = 0;        // what traversal, contacts and weights of its shell took last
 
   double series_y[6] = {};  // `series`: the spring's extension in the last frame, a warm start
   ContactPort contact_port;  // of this body's shell
@@ -158,10 +160,18 @@ struct h6Session {
   std::size_t* slice_count = nullptr;                               // (slices) survivors of each
   h6::kernels::WrenchSum* slice_sum = nullptr;                      // (slices)
 
+  std::uint32_t* shell_pairs = nullptr;  // (shell_count + 1) first pair of each shell body
+  std::size_t shell_count = 0;
+  // Null where there is one thread, or one shell body: shell_lanes.h.
+  h6Session* lanes = nullptr;  // (2)
+  h6::LaneScratch lane_scratch;
+  bool in_lanes = false;  // in the last frame
+
   h6::Anytime anytime;
   h6FrameReport report{};
   std::uint64_t frame = 0;
   h6::sched::FrameTeam* team = nullptr;
+  h6::sched::FrameTeam* alone = nullptr;  // of lanes
   void* memory = nullptr;
   std::size_t memory_bytes = 0;
 };

@@ -50,16 +50,22 @@ class Treatment {
   cpu_set_t came_with_{};
 };
 
+constexpr int kInHaste = 2;           // frames that came too early in a row: so will the next
 constexpr std::int64_t kNap = 50000;  // ns; how late the helper may notice an early frame
 }  // namespace
 
-// One job at a time. The ticket is the whole job in one word: its number (32 bits), how many slices
-// it has (16) and the next free one (16). A claim is one compare-and-swap of that word, so a helper
-// that wakes late can never take a slice of a job that is over, nor read a job that is being set
-// up.
+// One job at a time. The ticket is the whole job in one word: its number (32 bits), the end of its
+// free slices (16) and the first of them (16). A claim is one compare-and-swap of that word, so a
+// helper that wakes late can never take a slice of a job that is over, nor read a job that is being
+// set up. The haptic thread takes the first one, the helper the last: so each has the same ones in
+// frame after frame, and what they left in its cache.
 struct FrameTeam::Helper {
-  oneapi::tbb::task_arena arena{1, 0};
-  std::atomic<bool> stop{false}, ended{false};
+  oneapi::tbb::task_arena arena{1, 0};  // alive for as long as its task waits
+  // A task that TBB has no thread for (every helper stays in one) may wait for ever: who is done
+  // with it then leaves it behind.
+  enum State { kWaiting, kHelping, kEnded, kAbandoned };
+  std::atomic<int> state{kWaiting};
+  std::atomic<bool> stop{false};
   std::atomic<bool> polling{false};         // a frame is on
   std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
   std::atomic<int> treatment{0};            // priority + 256 * (the haptic thread's core + 1)
@@ -69,6 +75,8 @@ struct FrameTeam::Helper {
   Slice work = nullptr;
   void* context = nullptr;
   std::uint32_t job = 0;
+  std::int64_t announced = 0;  // when the next frame was said to be due
+  int early = 0;               // frames in a row that came long before they were due
   // Written by the helper before it counts a slice as done, read and cleared when all are.
   HelperWork helped;
 
@@ -78,21 +86,22 @@ struct FrameTeam::Helper {
 
   // Takes and runs one slice of the current job; false when none is free.
   bool work_one(bool by_helper) {
-    std::uint64_t t = ticket.load(std::memory_order_acquire);
-    std::uint32_t next, slices;
+    std::uint64_t t = ticket.load(std::memory_order_acquire), claimed;
+    std::uint32_t first, end;
     do {
-      next = t & 0xffff;
-      slices = t >> 16 & 0xffff;
-      if (next >= slices) return false;
-    } while (!ticket.compare_exchange_weak(t, t + 1, std::memory_order_acq_rel,
+      first = t & 0xffff;
+      end = t >> 16 & 0xffff;
+      if (first >= end) return false;
+      claimed = by_helper ? t - 0x10000 : t + 1;
+    } while (!ticket.compare_exchange_weak(t, claimed, std::memory_order_acq_rel,
                                            std::memory_order_acquire));
     if (by_helper) {
       const std::int64_t start = now_ns();
       if (helped.slices++ == 0) helped.first = start;
-      work(context, next);
+      work(context, end - 1);
       helped.busy += now_ns() - start;
     } else {
-      work(context, next);
+      work(context, first);
     }
     done.fetch_add(1, std::memory_order_release);
     return true;
@@ -100,6 +109,8 @@ struct FrameTeam::Helper {
 
   void help() {
     (void)polling.load(std::memory_order_acquire);
+    int waiting = kWaiting;
+    if (!state.compare_exchange_strong(waiting, kHelping, std::memory_order_acq_rel)) return;
     FlushDenormals flush;
     Treatment treated;
     this_is_helper = 1;
@@ -121,25 +132,30 @@ struct FrameTeam::Helper {
       if (!work_one(true)) relax();
     }
     this_is_helper = 0;
-    ended.store(true, std::memory_order_release);
+    state.store(kEnded, std::memory_order_release);
   }
 };
 
 FrameTeam::FrameTeam(unsigned threads) {
   if (threads < 2) return;
-  helper_ = std::make_unique<Helper>();
+  helper_ = std::make_shared<Helper>();
   // Polling is off until the first frame; the store also orders construction before the helper's
   // work.
   helper_->polling.store(false, std::memory_order_release);
   // The sanitizer cannot see TBB hand the closure over; what it calls is watched as ever.
-  helper_->arena.enqueue([helper = helper_.get()]()
+  helper_->arena.enqueue([helper = helper_]()
                              __attribute__((no_sanitize("thread"))) { helper->help(); });
 }
 
 FrameTeam::~FrameTeam() {
   if (!helper_) return;
+  int waiting = Helper::kWaiting;
+  if (helper_->state.compare_exchange_strong(waiting, Helper::kAbandoned,
+                                             std::memory_order_acq_rel))
+    return;
   helper_->stop.store(true, std::memory_order_relaxed);
-  while (!helper_->ended.load(std::memory_order_acquire)) std::this_thread::yield();
+  while (helper_->state.load(std::memory_order_acquire) != Helper::kEnded)
+    std::this_thread::yield();
 }
 
 unsigned FrameTeam::threads() const { return helper_ ? 2 : 1; }
@@ -152,10 +168,13 @@ void FrameTeam::set_realtime(int priority, int haptic_core) {
                              std::memory_order_relaxed);
 }
 
-void FrameTeam::begin_frame() {
+void FrameTeam::begin_frame(std::int64_t now) {
   if (!helper_) return;
-  helper_->helped = {};
-  helper_->polling.store(true, std::memory_order_release);
+  Helper& h = *helper_;
+  h.helped = {};
+  const bool early = now < h.announced - kPollBefore;
+  h.early = early ? h.early + (h.early < kInHaste) : 0;
+  h.polling.store(true, std::memory_order_release);
 }
 
 FrameTeam::HelperWork FrameTeam::helper_work() const {
@@ -164,7 +183,11 @@ FrameTeam::HelperWork FrameTeam::helper_work() const {
 
 void FrameTeam::end_frame(std::int64_t next_frame_ns) {
   if (!helper_) return;
-  helper_->next_frame.store(next_frame_ns, std::memory_order_relaxed);
+  helper_->announced = next_frame_ns;
+  // Whoever steps as fast as they can is not waited for asleep.
+  const bool haste = helper_->early >= kInHaste;
+  helper_->next_frame.store(haste ? now_ns() + kPollBefore : next_frame_ns,
+                            std::memory_order_relaxed);
   helper_->polling.store(false, std::memory_order_release);
 }
 

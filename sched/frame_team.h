@@ -2,9 +2,9 @@
 //
 // Entering a TBB arena every millisecond costs a futex call a frame. So the helper is one task that
 // stays in an arena of its own from construction to destruction: it naps between frames, polls from
-// shortly before the next one is expected, and claims slices from a counter. The haptic thread
-// claims from the same counter until none is left, then waits at most for the one slice that the
-// helper has in hand: a helper that is pre-empted between slices is not waited for.
+// shortly before the next one is expected, and claims slices from the end. The haptic thread claims
+// from the beginning until none is left, then waits at most for the one slice that the helper has
+// in hand: a helper that is pre-empted between slices is not waited for.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -21,9 +21,9 @@ class FrameTeam {
   FrameTeam(const FrameTeam&) = delete;
   FrameTeam& operator=(const FrameTeam&) = delete;
 
-  // Brackets a frame: the helper polls between these two. `period_ns` tells it when the next frame
-  // is due; 0: at once (virtual time).
-  void begin_frame();
+  // Brackets a frame: the helper polls between these two. `next_frame_ns` tells it when the next
+  // one is due, by now_ns(); where frames keep coming long before that (virtual time) it polls on.
+  void begin_frame(std::int64_t now_ns);
   void end_frame(std::int64_t next_frame_ns);
 
   // Runs work(context, slice) for every slice in 0..slices-1, each once, on this thread and perhaps
@@ -57,7 +57,7 @@ class FrameTeam {
 
  private:
   struct Helper;
-  std::unique_ptr<Helper> helper_;
+  std::shared_ptr<Helper> helper_;  // its task's too
 };
 
 }  // namespace h6::sched

@@ -1,9 +1,11 @@
 // The resident helper takes slices, each once, and never holds the haptic thread up.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -22,7 +24,7 @@ TEST_CASE("every slice runs exactly once, whoever takes it, job after job") {
     std::vector<std::atomic<int>> ran(97);
     long wrong = 0;
     for (int frame = 0; frame < 3000; ++frame) {
-      team.begin_frame();
+      team.begin_frame(now_ns());
       for (const std::size_t slices :
            {std::size_t{97}, std::size_t{2}, std::size_t{0}, std::size_t{1}}) {
         for (auto& r : ran) r.store(0, std::memory_order_relaxed);
@@ -41,7 +43,7 @@ TEST_CASE("the helper does help") {
   std::set<std::thread::id> seen;
   std::mutex mutex;
   for (int frame = 0; frame < 200 && seen.size() < 2; ++frame) {
-    team.begin_frame();
+    team.begin_frame(now_ns());
     team.for_slices(8, [&](std::size_t) {
       const std::int64_t end = now_ns() + 300000;
       while (now_ns() < end) {
@@ -60,7 +62,7 @@ TEST_CASE("a host's own TBB work never runs on the haptic thread or its helper")
   std::set<std::thread::id> ours;
   const auto frames = [&](int count, std::int64_t ns, const auto& enough) {
     for (int frame = 0; frame < count && !enough(); ++frame) {
-      team.begin_frame();
+      team.begin_frame(now_ns());
       team.for_slices(8, [&](std::size_t) {
         for (const std::int64_t end = now_ns() + ns; now_ns() < end;) {
         }
@@ -104,7 +106,7 @@ TEST_CASE("a helper that is held up keeps its one slice, and the haptic thread t
   std::atomic<int> by_helper{0}, by_haptic{0};
   for (int frame = 0; frame < 20000 && by_helper == 0; ++frame) {
     by_helper = by_haptic = 0;
-    team.begin_frame();
+    team.begin_frame(now_ns());
     team.for_slices(40, [&](std::size_t) {
       // The helper is off its core, as it were, until there is nothing else left to do.
       if (std::this_thread::get_id() != haptic) {
@@ -123,15 +125,69 @@ TEST_CASE("a helper that is held up keeps its one slice, and the haptic thread t
   CHECK(by_haptic == 39);
 }
 
+TEST_CASE("the helper has the last slices of every job, the haptic thread the first") {
+  FrameTeam team(2);
+  constexpr std::size_t kSlices = 60;
+  std::vector<int> by(kSlices);
+  int shared = 0;
+  for (int frame = 0; frame < 3000 && shared < 5; ++frame) {
+    team.begin_frame(now_ns());
+    team.for_slices(kSlices, [&](std::size_t i) {
+      by[i] = FrameTeam::here();
+      for (const std::int64_t end = now_ns() + 20000; now_ns() < end;) {
+      }
+    });
+    team.end_frame(now_ns() + 100000);
+    REQUIRE(std::is_sorted(by.begin(), by.end()));
+    shared += by.front() == 0 && by.back() == 1;
+  }
+  CHECK(shared == 5);
+}
+
+TEST_CASE("whoever steps without a pause has the helper in most frames all the same") {
+  FrameTeam team(2);
+  int helped = 0, frames = 0;
+  // Each says that the next one is due in ten milliseconds, and comes at once.
+  const std::int64_t give_up = now_ns() + 20'000'000'000;
+  for (; helped < 200 && now_ns() < give_up; ++frames) {
+    team.begin_frame(now_ns());
+    team.for_slices(8, [&](std::size_t) {
+      for (const std::int64_t end = now_ns() + 20000; now_ns() < end;) {
+      }
+    });
+    helped += team.helper_work().slices > 0;
+    team.end_frame(now_ns() + 10000000);
+  }
+  CHECK(helped == 200);
+  MESSAGE(frames << " frames for 200 with help");
+}
+
 TEST_CASE("a team that nobody steps can be destroyed at once") {
   const auto start = std::chrono::steady_clock::now();
   for (int i = 0; i < 5; ++i) {
     FrameTeam team(2);
-    team.begin_frame();
+    team.begin_frame(now_ns());
     team.end_frame(now_ns() + 3600000000000);  // the next frame is an hour away
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(5));
+}
+
+TEST_CASE("more teams than the machine has threads: all work, and go in any order") {
+  for (const bool last_first : {false, true}) {
+    std::vector<std::unique_ptr<FrameTeam>> teams;
+    for (unsigned i = 0; i < machine_threads() + 2; ++i)
+      teams.push_back(std::make_unique<FrameTeam>(2));
+    std::atomic<int> ran{0};
+    for (int frame = 0; frame < 50; ++frame)
+      for (const auto& team : teams) {
+        team->begin_frame(now_ns());
+        team->for_slices(9, [&](std::size_t) { ++ran; });
+        team->end_frame(now_ns());
+      }
+    CHECK(ran == static_cast<int>(50 * 9 * teams.size()));
+    while (!teams.empty()) teams.erase(last_first ? teams.end() - 1 : teams.begin());
+  }
 }
 
 TEST_CASE("parallel_for visits every index once on any number of threads") {
