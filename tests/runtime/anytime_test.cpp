@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
+#include "runtime/session.h"
+#include "sched/clock.h"
 #include "tests/support/ball_in_bowl.h"
 
 using namespace h6::test;
@@ -174,4 +176,89 @@ TEST_CASE("virtual time has no deadline, and leaves nothing out") {
     CHECK(report.coarse_frames == (virtual_time ? 0 : 20));
     h6DestroyLoop(loop);
   }
+}
+
+namespace {
+
+// What the clock decides in a scene of `contacts`, one in sixteen in a coarse frame, each of which
+// costs so much. `stolen`: every so-many-th full frame takes a millisecond more.
+struct Costs {
+  double contacts, full_ns, coarse_ns;
+  int stolen = 0;
+};
+struct Decided {
+  int full = 0, late = 0, last_late = -1;
+};
+
+Decided decide(h6Session& s, const Costs& c, int frames) {
+  Decided out;
+  const auto groups = static_cast<std::size_t>(c.contacts / 4);
+  for (int i = 0; i < frames; ++i) {
+    s.report = {};
+    s.anytime.budget_ns = 0.8e9 * s.dt;
+    h6::begin_anytime(s, h6::sched::now_ns());
+    const bool coarse = h6::must_be_coarse(s, 0, 0, 0) || h6::must_be_coarse(s, 0, 0, groups);
+    const double n = coarse ? c.contacts / 16 : c.contacts;
+    double us = 1e-3 * n * (coarse ? c.coarse_ns : c.full_ns);
+    if (!coarse && c.stolen && ++out.full % c.stolen == 0) us += 1000;
+    if (!coarse && !c.stolen) ++out.full;
+    const bool late = us > 1e6 * s.dt;
+    s.report.contacts = static_cast<std::uint32_t>(n);
+    s.report.stage_us[H6_STAGE_WEIGHTS] = us;
+    if (coarse) h6::learn_coarsely(s, groups, static_cast<std::size_t>(n));
+    if (s.anytime.trying) s.anytime.start -= static_cast<std::int64_t>(1e3 * us);
+    h6::learn_frame(s);
+    if (late && !(c.stolen && us - 1000 <= 1e6 * s.dt)) ++out.late, out.last_late = i;
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("what does not fit is not tried where it would be late, from the first frame on") {
+  // Of a period of 1 ms, a full frame takes 1.3 to 6 ms.
+  for (const double full_ns : {130.0, 200.0, 600.0}) {
+    CAPTURE(full_ns);
+    h6Session s;
+    const Decided all = decide(s, {10000, full_ns, 0.8 * full_ns}, 20000);
+    CHECK(all.late == 0);
+    CHECK(all.full == 0);
+  }
+  // Where it was full before and there is more of it now: what is known of one contact is enough.
+  h6Session s;
+  CHECK(decide(s, {2000, 150, 120}, 500).full > 450);
+  CHECK(decide(s, {10000, 150, 120}, 20000).late == 0);
+  CHECK(decide(s, {2000, 150, 120}, 500).full > 450);
+}
+
+TEST_CASE("what fits is full, at once or soon") {
+  h6Session small;
+  CHECK(decide(small, {1000, 80, 60}, 1000).full > 950);
+  h6Session fits;
+  const Decided all = decide(fits, {10000, 60, 50}, 20000);
+  CHECK(all.late == 0);
+  CHECK(all.full > 15000);
+  // Over the budget, and within the period: seen now and then, never late.
+  h6Session close;
+  const Decided some = decide(close, {10000, 90, 75}, 20000);
+  CHECK(some.late == 0);
+}
+
+TEST_CASE("a stolen millisecond now and then does not make all frames coarse") {
+  h6Session s;
+  const Decided all = decide(s, {6000, 100, 80, 10}, 20000);
+  CHECK(all.full > 19000);
+  CHECK(all.late == 0);
+}
+
+TEST_CASE("a machine that becomes faster is noticed in coarse frames; a bad day is forgotten") {
+  h6Session s;
+  CHECK(decide(s, {10000, 160, 130}, 2000).full == 0);
+  CHECK(decide(s, {10000, 60, 45}, 4000).full > 3000);
+  // Three slow frames in a row were the last full ones; half a minute later one is tried.
+  h6Session slow;
+  CHECK(decide(slow, {6000, 80, 60}, 100).full > 90);
+  (void)decide(slow, {6000, 200, 60}, 20);
+  CHECK(decide(slow, {6000, 80, 60}, 20000).full < 20000);
+  CHECK(decide(slow, {6000, 80, 60}, 20000).full > 5000);
 }
