@@ -59,7 +59,9 @@ Json rating_json(const h6DeviceCapabilities& c) {
           {"workspace_min", list(c.workspace_min)},
           {"workspace_max", list(c.workspace_max)},
           {"rate", c.rate},
-          {"modes", c.modes}};
+          {"modes", c.modes},
+          {"freeze_time", c.freeze_time},
+          {"frame_time", c.frame_time}};
 }
 
 h6DeviceCapabilities rating(const Json& o) {
@@ -76,6 +78,8 @@ h6DeviceCapabilities rating(const Json& o) {
   c.workspace_max = vec3(o.at("workspace_max"));
   c.rate = o.at("rate").get<double>();
   c.modes = o.at("modes").get<std::uint32_t>();
+  c.freeze_time = o.value("freeze_time", 0.0);  // older files do without
+  c.frame_time = o.value("frame_time", false);
   return c;
 }
 
@@ -163,6 +167,49 @@ std::string run_text(const RecordedRun& run) {
                     {"bodies", bodies},
                     {"ratings", ratings}};
   return all.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string settings_text(const h6ContactDef& contact, const h6CouplingDef& coupling) {
+  const Json exact = {{"method", h6MethodName(contact.method)},
+                      {"pieces", contact.pieces},
+                      {"stiffness", contact.stiffness},
+                      {"epsilon", contact.epsilon},
+                      {"epsilon_normal", contact.epsilon_normal},
+                      {"epsilon_torque", contact.epsilon_torque},
+                      {"max_depth_voxels", coupling.max_depth_voxels},
+                      {"max_force", coupling.max_force},
+                      {"max_torque", coupling.max_torque}};
+  char text[160];
+  std::snprintf(text, sizeof text, "method %s, stiffness %.0f N/m, saturation %.2f voxels ",
+                h6MethodName(contact.method), contact.stiffness, coupling.max_depth_voxels);
+  return text + exact.dump();
+}
+
+Outcome take_settings(const std::string& text, h6ContactDef& contact, h6CouplingDef& coupling) {
+  const std::size_t braces = text.find('{');
+  const Failure unreadable{"what they became cannot be read: " + text.substr(0, 80)};
+  if (braces == std::string::npos) return unreadable;
+  try {
+    const Json o = Json::parse(text.substr(braces));
+    h6ContactDef to = contact;
+    h6CouplingDef held = coupling;
+    if (h6MethodFromName(o.at("method").get<std::string>().c_str(), &to.method, &to.pieces) != 0)
+      return unreadable;
+    to.pieces = o.at("pieces").get<std::uint32_t>();
+    for (const auto& [key, value] : {std::pair{"stiffness", &to.stiffness},
+                                     {"epsilon", &to.epsilon},
+                                     {"epsilon_normal", &to.epsilon_normal},
+                                     {"epsilon_torque", &to.epsilon_torque},
+                                     {"max_depth_voxels", &held.max_depth_voxels},
+                                     {"max_force", &held.max_force},
+                                     {"max_torque", &held.max_torque}})
+      *value = o.at(key).get<double>();
+    contact = to;
+    coupling = held;
+    return Done{};
+  } catch (const std::exception&) {
+    return unreadable;
+  }
 }
 
 std::string recorded_scene_text(Scene scene) {

@@ -28,6 +28,12 @@ struct RecordedRun {
   std::vector<h6DeviceCapabilities> ratings;  // of each hand's device
 };
 
+// What a person changed while it ran: the detail of a "settings" event, for people and, in braces
+// at its end, to the bit. Back into definitions that hold what was before; a sentence where it
+// cannot be read. Column `settings` says from which frame on.
+std::string settings_text(const h6ContactDef& contact, const h6CouplingDef& coupling);
+Outcome take_settings(const std::string& text, h6ContactDef& contact, h6CouplingDef& coupling);
+
 // The two texts of a recording's head. `scene` with the settings it is run with.
 std::string run_text(const RecordedRun& run);
 std::string recorded_scene_text(Scene scene);

@@ -16,7 +16,7 @@ namespace recording {
 // Poses, velocities and wrenches are recorded as the doubles they consist of.
 static_assert(sizeof(h6Pose) == 7 * sizeof(double) && offsetof(h6Pose, q) == 3 * sizeof(double));
 static_assert(sizeof(h6Velocity) == 6 * sizeof(double) && sizeof(h6Wrench) == 6 * sizeof(double));
-static_assert(sizeof(h6Cause) == 4 && sizeof(h6Status) == 4);
+static_assert(sizeof(h6Cause) == 4 && sizeof(h6Status) == 4 && sizeof(h6DeviceState) == 4);
 static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 20, "names below, format version");
 static_assert(offsetof(h6FrameReport, net_stiffness_max) ==
               offsetof(h6FrameReport, net_stiffness_min) + sizeof(double));
@@ -24,7 +24,7 @@ static_assert(offsetof(h6FrameReport, net_stiffness_max) ==
 const std::vector<Column>& columns() {
   using R = h6FrameRecord;
   constexpr auto report = offsetof(R, report), hand = offsetof(R, hand), body = offsetof(R, body),
-                 command = offsetof(R, command);
+                 command = offsetof(R, command), input = offsetof(R, safety_input);
   constexpr auto hands = sizeof(h6DeviceSample), bodies = sizeof(h6BodyState),
                  commands = sizeof(h6DeviceCommand);
   const auto real = Cell::real;
@@ -48,6 +48,17 @@ const std::vector<Column>& columns() {
        true},
       {"cause", n32, 1, command + offsetof(h6DeviceCommand, cause), commands,
        "index into /config cause_names", "cause"},
+      {"causes", n32, 1, command + offsetof(h6DeviceCommand, causes), commands,
+       "bits: 1 << index into /config cause_names", "causes", true},
+      {"state", n32, 1, offsetof(R, state), sizeof(h6DeviceState),
+       "index into /config state_names", "state", true},
+      {"sequence", n32, 1, hand + offsetof(h6DeviceSample, sequence), hands, "1", "sequence", true},
+      {"safety_asked", n32, 1, input + offsetof(h6SafetyInput, asked), sizeof(h6SafetyInput),
+       "bits: 1 arm, 2 disarm, 4 lost, 8 from a fault, 16 from disarmed; fault << 8",
+       "safety_asked", true},
+      {"overdue", real, 1, input + offsetof(h6SafetyInput, overdue), sizeof(h6SafetyInput), "s",
+       "overdue", true},
+      {"settings", n32, 1, offsetof(R, settings), 0, "changes so far", "settings", true},
       {"contacts", n32, 1, report + offsetof(h6FrameReport, contacts), 0, "1", "contacts"},
       {"max_depth", real, 1, report + offsetof(h6FrameReport, max_depth), 0, "m", "max_depth"},
       {"max_depth_voxels", real, 1, report + offsetof(h6FrameReport, max_depth_voxels), 0, "voxel",
@@ -84,6 +95,16 @@ const std::vector<std::string>& cause_names() {
       "none",     "clamped",  "slewed",    "not finite", "late",    "device lost", "stopped",
       "speed",    "clutched", "passivity", "power",      "derated", "overspeed",   "soft start",
       "dead man", "disarmed", "pose jump", "bad sample", "frozen",  "watchdog"};
+  return names;
+}
+
+const std::vector<std::string>& state_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (int i = 0; i < H6_DEVICE_STATE_COUNT; ++i)
+      all.emplace_back(h6DeviceStateName(static_cast<h6DeviceState>(i)));
+    return all;
+  }();
   return names;
 }
 

@@ -6,9 +6,12 @@
 // then replaced. A run that is killed, fails or records nothing never costs an older file.
 //
 // /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, net_stiffness,
-// stage_us, frame_us, wakeup_us} (n) or (n, width), /frames/{hand_pose, hand_velocity, hand_wrench,
-// buttons, body_pose, body_velocity, wrench, command_pose, cause} (n, hands) or (n, hands, width),
-// with units and column names as attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit.
+// stage_us, frame_us, wakeup_us, settings} (n) or (n, width), /frames/{hand_pose, hand_velocity,
+// hand_wrench, buttons, sequence, body_pose, body_velocity, wrench, command_pose, cause, causes,
+// state, safety_asked, overdue} (n, hands) or (n, hands, width), with units and column names as
+// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit. The gravest
+// cause and all of them, the device's state, and what its safety chain was told from outside are
+// there for every frame; an event is there when one of them comes up.
 // /config and /summary keep their attributes a second time, as the text that read_recording takes.
 #pragma once
 #include <cstdint>

@@ -1,7 +1,7 @@
 // recording_layout.h - what stands where in a recording, and HDF5 made safe to use. Private.
 //
 //   /config    attributes: version, json, asset_hashes, simd_target, program, run, rate, hands,
-//              stage_names, cause_names, units
+//              stage_names, cause_names, state_names, units
 //   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns
 //   /events    t, what, detail
 //   /summary   attribute json; the group is there once the run has ended
@@ -43,6 +43,7 @@ struct Column {
 const std::vector<Column>& columns();
 const std::vector<std::string>& stage_names();
 const std::vector<std::string>& cause_names();
+const std::vector<std::string>& state_names();
 
 std::size_t cell_bytes(Cell cell);
 hid_t cell_type(Cell cell);  // as on disk; not to be closed

@@ -108,12 +108,18 @@ Outcome read_head(const Source& source, RecordingHead& head) {
   return Done{};
 }
 
-// An enumeration is checked before it becomes one.
-bool causes_known(const std::vector<std::byte>& packed) {
-  for (std::size_t at = 0; at + 4 <= packed.size(); at += 4) {
-    std::uint32_t cause = 0;
-    std::memcpy(&cause, packed.data() + at, 4);
-    if (cause >= H6_CAUSE_COUNT) return false;
+// Names are checked before they become enumerations, bits before anybody looks for their names.
+bool means_something(const char* column, const std::vector<std::byte>& packed) {
+  const std::string_view name = column;
+  const std::uint32_t most = name == "cause"          ? H6_CAUSE_COUNT - 1
+                             : name == "causes"       ? (1u << H6_CAUSE_COUNT) - 1
+                             : name == "state"        ? H6_DEVICE_STATE_COUNT - 1
+                             : name == "safety_asked" ? (H6_CAUSE_COUNT << 8) - 1
+                                                      : UINT32_MAX;
+  for (std::size_t at = 0; most < UINT32_MAX && at + 4 <= packed.size(); at += 4) {
+    std::uint32_t number = 0;
+    std::memcpy(&number, packed.data() + at, 4);
+    if (number > most) return false;
   }
   return true;
 }
@@ -129,8 +135,9 @@ Outcome read_column(const Source& source, const Column& column, const Stored& st
   for (hsize_t row = first; row < end;) {
     const hsize_t count = std::min(piece - row % piece, end - row);
     if (Outcome read = read_rows(source, stored, row, count, packed); !read) return read;
-    if (std::strcmp(column.name, "cause") == 0 && !causes_known(packed))
-      return source.wrong("/frames/cause has a number that means nothing");
+    if (!means_something(column.name, packed))
+      return source.wrong("/frames/" + std::string(column.name) +
+                          " has a number that means nothing");
     unpack(column, hands, packed.data(), count, frames.data() + (row - first));
     row += count;
   }

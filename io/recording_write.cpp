@@ -88,6 +88,7 @@ bool put_head(hid_t file, const RecordingHead& head) {
          put_number(config, "hands", H5T_STD_U32LE, H5T_NATIVE_UINT32, &hands) &&
          put_texts(config, "stage_names", stage_names()) &&
          put_texts(config, "cause_names", cause_names()) &&
+         put_texts(config, "state_names", state_names()) &&
          put_text(config, "units",
                   "SI: m, s, N, N m, rad; times of stages in us; quaternions w x y z; world frame; "
                   "poses of the mesh frame, torque about the body's centre of mass");

@@ -130,6 +130,15 @@ void h6NoteInterval(h6Session* session, double seconds) {
   for (std::size_t h = 0; h < session->hand_count; ++h)
     note_interval(session->hands[h], session->dt, seconds);
 }
+h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand) {
+  return session->hands[hand].guard.input();
+}
+void h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input) {
+  Hand& to = session->hands[hand];
+  to.guard.repeat(input->asked);
+  to.lost = (input->asked & H6_ASKED_LOST) != 0;
+  to.overdue = input->overdue > 0 ? input->overdue : 0;
+}
 h6HandSafety h6GetSafety(const h6Session* session, int32_t hand) {
   return session->hands[hand].guard.report();
 }

@@ -154,6 +154,7 @@ void change_session(h6Loop& loop) {
   take_over(*next, *loop.session);
   loop.given_back.store(loop.session, std::memory_order_release);
   loop.session = next;
+  ++loop.record.settings;
 }
 
 // Slow motion: a frame every so many periods. Whoever lives on the frames' time sees no difference.
@@ -231,6 +232,7 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
     row.hand[h] = loop.samples[h];
     row.command[h] = loop.commands[h];
     row.state[h] = s.hands[h].guard.state();
+    row.safety_input[h] = s.hands[h].guard.input();
     const Body& body = s.bodies[s.hands[h].body];
     row.body[h] = {mesh_pose(body), {to(body.v), to(body.w)}};
   }
@@ -388,15 +390,7 @@ void h6SetPace(h6Loop* loop, double pace) {
 }
 
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
-  const h6Session& now = *loop->session;
-  if (!next || next->model != now.model || next->body_count != now.body_count ||
-      next->hand_count != now.hand_count || next->dt != now.dt)
-    return fail(error, "a loop goes on with a session of the same model, bodies, hands and rate"),
-           nullptr;
-  for (std::size_t h = 0; h < next->hand_count; ++h)
-    if (next->hands[h].body != now.hands[h].body || next->hands[h].mode != now.hands[h].mode)
-      return fail(error, "a loop goes on with hands on the same bodies, in the same modes"),
-             nullptr;
+  if (!may_take_over(next, *loop->session, error)) return nullptr;
   if (const int core = loop->fifo_core; core >= 0) next->team->set_realtime(kHelperPriority, core);
   loop->offered.store(next, std::memory_order_release);
   while (true) {

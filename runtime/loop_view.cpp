@@ -82,4 +82,22 @@ void take_over(h6Session& next, const h6Session& before) {
   next.frame = before.frame;
 }
 
+bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error) {
+  if (!next || next->model != before.model || next->body_count != before.body_count ||
+      next->hand_count != before.hand_count || next->dt != before.dt)
+    return fail(error, "a loop goes on with a session of the same model, bodies, hands and rate");
+  for (std::size_t h = 0; h < next->hand_count; ++h)
+    if (next->hands[h].body != before.hands[h].body || next->hands[h].mode != before.hands[h].mode)
+      return fail(error, "a loop goes on with hands on the same bodies, in the same modes");
+  return true;
+}
+
 }  // namespace h6
+
+extern "C" bool h6TakeOver(h6Session* next, const h6Session* before, h6Error* error) {
+  if (!before || next == before)
+    return h6::fail(error, "a session goes on where another one stands");
+  if (!h6::may_take_over(next, *before, error)) return false;
+  h6::take_over(*next, *before);
+  return true;
+}

@@ -31,5 +31,6 @@ class LoopView {
 // `next` goes on where `before` is: poses, velocities, hands, and what their safety chains hold.
 // Settings stay those of `next`. Both are of the same bodies and hands.
 void take_over(h6Session& next, const h6Session& before);
+bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error);
 
 }  // namespace h6

@@ -8,6 +8,8 @@
 namespace h6 {
 namespace {
 
+constexpr unsigned kCauseShift = 8;  // of h6SafetyInput.asked
+
 // v shortened to at most `most`; true when it was longer.
 bool clamp_norm(Vec3& v, double most) {
   // stableNorm: a finite vector whose square overflows must still come out at `most`.
@@ -132,11 +134,32 @@ AboveRating above_rating(const h6DeviceCapabilities& c, const h6SafetyDef& def) 
 }
 
 void OutputGuard::fault(h6Cause cause) {
-  if (fault_ == H6_CAUSE_NONE) fault_ = cause;
+  if (fault_ != H6_CAUSE_NONE) return;
+  fault_ = cause;
+  asked_ |= static_cast<std::uint32_t>(cause) << kCauseShift;
+}
+
+void OutputGuard::disarm() {
+  armed_ = false;
+  asked_ |= H6_ASKED_DISARM;
+}
+
+void OutputGuard::repeat(std::uint32_t asked) {
+  if (asked & H6_ASKED_ARM) {
+    if (asked & H6_ASKED_FROM_FAULT) fault(H6_CAUSE_STOPPED);
+    if (asked & H6_ASKED_FROM_DISARMED) disarm();
+    arm();
+  }
+  if (asked & H6_ASKED_DISARM) disarm();
+  const std::uint32_t cause = asked >> kCauseShift;
+  if (cause > H6_CAUSE_NONE && cause < H6_CAUSE_COUNT) fault(static_cast<h6Cause>(cause));
 }
 
 void OutputGuard::arm() {
   if (!may_arm_) return;
+  asked_ = H6_ASKED_ARM;
+  if (fault_ != H6_CAUSE_NONE) asked_ |= H6_ASKED_FROM_FAULT;
+  if (!armed_) asked_ |= H6_ASKED_FROM_DISARMED;
   // A motion that was latched starts where the device is by now.
   if (fault_ != H6_CAUSE_NONE) moving_ = false;
   if (!armed()) gain_ = 0;
@@ -146,7 +169,7 @@ void OutputGuard::arm() {
 }
 
 void OutputGuard::restart() {
-  armed_ = false;
+  disarm();
   moving_ = false;
   may_arm_ = true;
   gain_ = trouble_ = 0;
@@ -182,6 +205,8 @@ void OutputGuard::note(const DeviceWatch& watch, bool lost, double overdue, doub
   speed_ = watch.speed();
   causes_ = 0;
   falling_ = H6_CAUSE_NONE;
+  if (lost) asked_ |= H6_ASKED_LOST;
+  input_ = {asked_, overdue};
   if (lost) fault(H6_CAUSE_DEVICE_LOST);
   if (overdue > 0) note_cause(H6_CAUSE_LATE);  // also when something else was first
   const bool trouble = overdue > 0 || hangs || !watch.usable();
@@ -248,6 +273,7 @@ h6DeviceCommand OutputGuard::finished(h6DeviceCommand command, h6Status* status)
     times_[cause] += (last_causes_ >> cause & 1u) == 0;
   }
   last_causes_ = causes_;
+  asked_ = 0;  // a fault of this frame's own comes again by itself
   return command;
 }
 

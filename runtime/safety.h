@@ -18,7 +18,7 @@
 #pragma once
 #include <cstdint>
 
-#include "hapsix/device.h"
+#include "hapsix/hapsix.h"
 #include "runtime/device_watch.h"
 #include "runtime/math.h"
 
@@ -63,7 +63,10 @@ class OutputGuard {
   // Clears a fault and starts from zero, softly; a motion from the device's own pose. Not while the
   // device is absent, lost, frozen or sends no numbers.
   void arm();
-  void disarm() { armed_ = false; }
+  void disarm();
+  // What of these four came since the last frame, for a record of it, and once more from that.
+  const h6SafetyInput& input() const { return input_; }
+  void repeat(std::uint32_t asked);
   // Another device: not armed, nothing has been sent. A fault stays.
   void restart();
 
@@ -107,6 +110,8 @@ class OutputGuard {
   Quat q_ = Quat::Identity();
   bool moving_ = false;
 
+  std::uint32_t asked_ = 0;  // since the last frame: H6_ASKED_*, a fault's cause
+  h6SafetyInput input_{};    // of this frame
   std::uint32_t causes_ = 0, last_causes_ = 0;  // bits 1u << h6Cause
   std::uint64_t frames_[H6_CAUSE_COUNT] = {}, times_[H6_CAUSE_COUNT] = {};
 };

@@ -127,6 +127,14 @@ Result<ordered_json> shell_info(const std::string& file) {
                       {"input_hash", s->input_hash}};
 }
 
+// How often each thing happened, also where a killed run left no summary.
+ordered_json event_counts(const std::vector<io::RecordingEvent>& events) {
+  ordered_json counts = ordered_json::object();
+  for (const io::RecordingEvent& e : events)
+    counts[e.what] = counts.value(e.what, std::uint64_t{0}) + 1;
+  return counts;
+}
+
 Result<ordered_json> recording_info(const Console& console, const std::string& file) {
   const Result<std::string> repaired = io::repair_recording(file);
   if (!repaired) return repaired.failure();
@@ -148,6 +156,7 @@ Result<ordered_json> recording_info(const Console& console, const std::string& f
                     {"simd_target", r->head.simd_target},
                     {"asset_hashes", r->head.asset_hashes},
                     {"events", r->events.size()},
+                    {"event_counts", event_counts(r->events)},
                     {"columns", r->columns}};
   if (const Result<io::RecordedRun> run = io::recorded_run(r->head); run)
     json["run"] = {{"scene", run->generated.empty() ? run->scene_file.string() : run->generated},

@@ -22,16 +22,17 @@ class RecordedSession {
     std::string method;
     unsigned threads = 0;
   };
-  // A sentence where the recording does not say how it was run, or its parts are gone or changed.
-  // `remarks` gets what a person should know all the same.
+  // `recording`: its head, events and columns are read, not its frames. A sentence where it does
+  // not say how it was run, or its parts are gone or changed. `remarks` gets what a person should
+  // know all the same.
   static Result<std::unique_ptr<RecordedSession>> open(const std::filesystem::path& file,
-                                                       const io::RecordingHead& head,
+                                                       const io::Recording& recording,
                                                        const Changes& changes,
                                                        const io::Progress& progress,
                                                        std::vector<std::string>& remarks);
   // The recorded frame once more; rows in order, from the first on. The new row stays until the
-  // next call.
-  const h6FrameRecord& step(const h6FrameRecord& recorded);
+  // next call. A sentence where settings were changed and the recording does not say how or when.
+  Result<const h6FrameRecord*> step(const h6FrameRecord& recorded);
 
   const io::LoadedScene& loaded() const { return *loaded_; }
   const io::RecordedRun& run() const { return run_; }
@@ -43,8 +44,16 @@ class RecordedSession {
  private:
   RecordedSession() = default;
   void set_faults(const h6FrameRecord& recorded);
+  Outcome follow_settings(const h6FrameRecord& recorded);
+  Outcome change_settings(const std::string& detail);
   io::RecordedRun run_;
   std::unique_ptr<io::LoadedScene> loaded_;
+  h6SessionDef def_{};
+  std::vector<h6HandDef> hand_defs_;
+  std::vector<io::RecordingEvent> settings_;  // events, in order
+  std::uint32_t changed_ = 0;                 // so many of them are behind us
+  bool own_method_ = false;                   // another than was recorded
+  bool has_inputs_ = false, says_when_ = false;
   SessionPtr session_;
   std::size_t hands_ = 0;
   unsigned threads_ = 1;

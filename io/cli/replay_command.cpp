@@ -109,7 +109,7 @@ class Replay {
     frames_ = recording->frame_count;
     if (!recording->remark.empty()) remarks.push_back(recording->remark);
     Result<std::unique_ptr<RecordedSession>> opened = RecordedSession::open(
-        options_.file, head_, {options_.method, options_.threads}, console_.progress(), remarks);
+        options_.file, *recording, {options_.method, options_.threads}, console_.progress(), remarks);
     if (!opened) return opened.failure();
     session_ = std::move(*opened);
     return Done{};
@@ -127,10 +127,11 @@ class Replay {
       for (const h6FrameRecord& row : piece->frames) {
         if (row.report.frame != expected) return gap(expected, row.report.frame);
         ++expected;
-        const h6FrameRecord& now = session_->step(row);
+        const Result<const h6FrameRecord*> now = session_->step(row);
+        if (!now) return now.failure();
         recorded_->add(row);
-        replayed_->add(now);
-        if (options_.verify && !same(row, now)) break;
+        replayed_->add(**now);
+        if (options_.verify && !same(row, **now)) break;
       }
       if (!progress("replaying " + session_->loaded().scene.name,
                     static_cast<double>(expected) / static_cast<double>(frames_)))

@@ -76,12 +76,8 @@ class Reporter {
     if (recording->frame_count == 0) return Failure{"it has no frame"};
     std::vector<std::string> remarks;
     Result<std::unique_ptr<RecordedSession>> session =
-        RecordedSession::open(file, recording->head, {}, console_.progress(), remarks);
-    if (!session) {
-      const std::string why = "contacts of " + file + " are missing: " + session.error();
-      console_.log("hapsix: " + why);
-      about_ += (about_.empty() ? "" : "; ") + why;
-    }
+        RecordedSession::open(file, *recording, {}, console_.progress(), remarks);
+    if (!session) leave_out("contacts of " + file + " are missing: " + session.error());
     runs_.emplace_back(std::filesystem::path(file).stem().string(), recording->head,
                        recording->frame_count);
     io::view::ReportRun& run = runs_.back();
@@ -119,7 +115,12 @@ class Reporter {
       const Result<io::Recording> piece = io::read_recording(file, {at, kPiece});
       if (!piece) return piece.failure();
       for (const h6FrameRecord& row : piece->frames) {
-        if (session) session->step(row);
+        if (session) {
+          if (const auto stepped = session->step(row); !stepped) {
+            leave_out("contacts of " + file + " end early: " + stepped.error());
+            session = nullptr;
+          }
+        }
         if (sample < shown.size() && shown[sample] == done) {
           if (session) run.contacts(sample, contacts_now(*session));
           ++sample;
@@ -131,6 +132,11 @@ class Reporter {
         return Failure{"interrupted"};
     }
     return Done{};
+  }
+
+  void leave_out(const std::string& why) {
+    console_.log("hapsix: " + why);
+    about_ += (about_.empty() ? "" : "; ") + why;
   }
 
   const Console& console_;

@@ -17,6 +17,7 @@
 #include "device/steering.h"
 #include "io/cli/checks.h"
 #include "io/cli/run_observer.h"
+#include "io/recorded_run.h"
 #include "io/view/live_state.h"
 #include "io/view/page.h"
 #include "io/view/view_request.h"
@@ -209,9 +210,7 @@ class Viewer : public RunObserver {
     h6DestroySession(old);
     setup_->session = std::move(next);
     state_.settings(contact_, coupling_);
-    note_("settings", std::string("method ") + h6MethodName(contact_.method) + ", stiffness " +
-                          number(contact_.stiffness, 0) + " N/m, saturation " +
-                          number(coupling_.max_depth_voxels, 2) + " voxels");
+    note_("settings", io::settings_text(contact_, coupling_));
   }
   void act(const io::view::SetPace& set) {
     if (!setup_->devices.real_time.empty())  // it would be sent too little, too late

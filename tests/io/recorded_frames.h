@@ -74,6 +74,7 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
   fill(&r.late_us, 1);
   fill(&r.cpu_us, 1);
   r.report.coarse_pairs = natural();
+  r.settings = natural();
   fill(&r.report.missed_depth_voxels, 1);
   for (std::size_t h = 0; h < hands; ++h) {
     fill(&r.hand[h].pose, 7);
@@ -83,6 +84,11 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
     fill(&r.command[h].wrench, 6);
     fill(&r.command[h].pose, 7);
     r.command[h].cause = static_cast<h6Cause>(natural() % H6_CAUSE_COUNT);
+    r.command[h].causes = natural() >> (32 - H6_CAUSE_COUNT);
+    r.state[h] = static_cast<h6DeviceState>(natural() % H6_DEVICE_STATE_COUNT);
+    r.hand[h].sequence = natural();
+    r.safety_input[h].asked = (natural() & 0xffu) | (natural() % H6_CAUSE_COUNT) << 8;
+    fill(&r.safety_input[h].overdue, 1);
     fill(&r.body[h], 13);
   }
   return r;
@@ -92,7 +98,7 @@ inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
   const auto equal = [](const auto& x, const auto& y) { return !std::memcmp(&x, &y, sizeof x); };
   bool all = equal(a.time, b.time) && equal(a.wakeup_us, b.wakeup_us) && a.late == b.late &&
              equal(a.late_us, b.late_us) && equal(a.cpu_us, b.cpu_us) &&
-             a.report.coarse_pairs == b.report.coarse_pairs &&
+             a.report.coarse_pairs == b.report.coarse_pairs && a.settings == b.settings &&
              equal(a.report.missed_depth_voxels, b.report.missed_depth_voxels) &&
              a.report.frame == b.report.frame && a.report.status == b.report.status &&
              a.report.contacts == b.report.contacts &&
@@ -110,7 +116,11 @@ inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
           a.hand[h].buttons == b.hand[h].buttons && equal(a.body[h], b.body[h]) &&
           equal(a.command[h].wrench, b.command[h].wrench) &&
           equal(a.command[h].pose, b.command[h].pose) &&
-          a.command[h].cause == b.command[h].cause;
+          a.command[h].cause == b.command[h].cause &&
+          a.command[h].causes == b.command[h].causes && a.state[h] == b.state[h] &&
+          a.hand[h].sequence == b.hand[h].sequence &&
+          a.safety_input[h].asked == b.safety_input[h].asked &&
+          equal(a.safety_input[h].overdue, b.safety_input[h].overdue);
   return all;
 }
 

@@ -75,7 +75,9 @@ TEST_CASE("the HDF5 library alone sees the documented datasets") {
   CHECK(plain_shape(file, "/frames/hand_velocity") == Shape{600, 2, 6});
   CHECK(plain_shape(file, "/frames/body_pose") == Shape{600, 2, 7});
   CHECK(plain_shape(file, "/frames/wrench") == Shape{600, 2, 6});
-  CHECK(plain_shape(file, "/frames/cause") == Shape{600, 2});
+  for (const char* safety : {"cause", "causes", "state", "safety_asked", "overdue"})
+    CHECK(plain_shape(file, (std::string("/frames/") + safety).c_str()) == Shape{600, 2});
+  CHECK(plain_shape(file, "/frames/settings") == Shape{600});
   CHECK(plain_shape(file, "/frames/hand_wrench") == Shape{600, 2, 6});
   CHECK(plain_shape(file, "/frames/command_pose") == Shape{600, 2, 7});
   CHECK(plain_shape(file, "/frames/net_stiffness") == Shape{600, 2});
@@ -105,19 +107,25 @@ TEST_CASE("a recording from before a column was added opens, with zeros in its p
   const std::vector<std::string> all = read(file).columns;
   CHECK(std::count(all.begin(), all.end(), "hand_wrench") == 1);
   const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-  const char* later[] = {"hand_wrench", "command_pose", "net_stiffness"};
+  const char* later[] = {"hand_wrench", "command_pose", "net_stiffness", "causes", "state",
+                         "sequence", "safety_asked", "overdue", "settings"};
   for (const char* name : later)
     REQUIRE(H5Ldelete(h5, (std::string("/frames/") + name).c_str(), H5P_DEFAULT) >= 0);
   H5Fclose(h5);
   const Recording r = read(file);
   REQUIRE(r.frames.size() == 300);
-  CHECK(r.columns.size() + 3 == all.size());
+  CHECK(r.columns.size() + std::size(later) == all.size());
   for (const char* name : later)
     CHECK(std::count(r.columns.begin(), r.columns.end(), name) == 0);
   for (std::size_t i = 0; i < 300; ++i) {
     h6FrameRecord expected = frame(i);
     expected.hand[0].wrench = {};
     expected.command[0].pose = {};
+    expected.command[0].causes = 0;
+    expected.state[0] = H6_ABSENT;
+    expected.hand[0].sequence = 0;
+    expected.safety_input[0] = {};
+    expected.settings = 0;
     expected.report.net_stiffness_min = expected.report.net_stiffness_max = 0;
     REQUIRE(same(r.frames[i], expected));
   }

@@ -105,6 +105,22 @@ H6_API void h6Rearm(h6Session* session);
  * written, all outputs latch; so many seconds lie between the last commands and the next ones. */
 H6_API void h6LoseDevice(h6Session* session, int32_t hand);
 H6_API void h6NoteInterval(h6Session* session, double seconds);
+/* What came to a hand's safety chain from outside before a step: requests, faults, deadlines. What of
+ * the last step h6GetSafetyInput gives, and h6SetSafetyInput for the next one, repeats a recorded run
+ * to the bit, also where outputs move bodies (admittance modes). */
+typedef struct h6SafetyInput {
+  uint32_t asked;         /* H6_ASKED_*; a fault's h6Cause in the byte from bit 8 on               */
+  double   overdue;       /* so much too late comes the command of this step                  [s]  */
+} h6SafetyInput;
+enum {
+  H6_ASKED_ARM          = 1u << 0,
+  H6_ASKED_DISARM       = 1u << 1, /* after an H6_ASKED_ARM of the same step                       */
+  H6_ASKED_LOST         = 1u << 2, /* the device could not be read, or written before              */
+  H6_ASKED_FROM_FAULT   = 1u << 3, /* what H6_ASKED_ARM found: it cleared a fault,                 */
+  H6_ASKED_FROM_DISARMED= 1u << 4  /* it was not armed                                             */
+};
+H6_API h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand);
+H6_API void          h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input);
 /* Of the last step, and counts since the session was made. */
 H6_API h6HandSafety h6GetSafety(const h6Session* session, int32_t hand);
 
@@ -123,6 +139,8 @@ typedef struct h6FrameRecord {
   double          late_us;                     /* of a late frame: its end after the next deadline */
   double          cpu_us;                      /* of the haptic thread in the tick, devices and all;
                                                   0 in virtual time                                */
+  h6SafetyInput   safety_input[H6_MAX_HANDS];
+  uint32_t        settings;                    /* so often was the session changed before it       */
 } h6FrameRecord;
 
 enum { H6_LATE_COMPUTE = 1u << 0, H6_LATE_WAKEUP = 1u << 1, H6_LATE_STOLEN = 1u << 2 };
@@ -205,6 +223,8 @@ H6_API void   h6SetPace(h6Loop* loop, double pace);
  * destroyed by the caller; NULL with `error` filled: nothing has changed. Waits for the frame in
  * progress; one thread at a time, not the haptic one. */
 H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);
+/* The same between two steps of a program that steps by itself. False: nothing has changed. */
+H6_API bool   h6TakeOver(h6Session* next, const h6Session* before, h6Error* error);
 H6_API bool   h6LoopRunning(const h6Loop* loop);
 /* Asks it to end after the current frame; any thread, and a signal handler. */
 H6_API void   h6RequestStop(h6Loop* loop);
