@@ -19,7 +19,7 @@
 #include <thread>
 #include <vector>
 
-#include "bench/frame_scenes.h"
+#include "tests/support/frame_scenes.h"
 #include "io/load_scene.h"
 #include "io/scenes/scenes.h"
 #include "sched/parallel_for.h"

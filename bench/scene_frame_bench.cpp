@@ -21,6 +21,7 @@
 
 #include "bench/frame_scenes.h"
 #include "sched/clock.h"
+#include "tests/support/frame_scenes.h"
 
 namespace {
 

@@ -14,10 +14,10 @@
 #include <string>
 #include <vector>
 
-#include "bench/frame_scenes.h"
 #include "kernels/sample_field.h"
 #include "runtime/session.h"
 #include "tests/support/analytic.h"
+#include "tests/support/frame_scenes.h"
 
 using namespace h6::test;
 
