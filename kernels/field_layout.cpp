@@ -1,29 +1,18 @@
 // field_layout.cpp - from samples in metres to int16 nodes and far bounds in voxels.
 //
 // The bound of a far cell. Let D be the true unsigned distance, L_c <= D the far grid's magnitude
-// at the cell's 8 corners, H = 8 voxels its edge, and I(f) the trilinear interpolation of corner
-// values, at a point with fractions t along the axes. We want corner values V with I(V) <= D in
-// the cell.
+// at the cell's 8 corners, at least 0, H = 8 voxels its edge, and I(f) the trilinear interpolation
+// of corner values, at a point x with fractions t along the axes.
 //
-// 1. D^2 - |x|^2 is a minimum of linear functions of x, so concave. Trilinear weights are positive,
-//    sum to 1 and reproduce x, so by Jensen I(D^2) - I(|x|^2) <= D(x)^2 - |x|^2, and
-//        D(x)^2 >= I(L^2) - H^2 sum_a t_a (1 - t_a).
-// 2. I(L^2) = I(L)^2 + Var, the variance of L under the weights. Coordinates are independent there,
-//    so Var is at least the sum over axes of t_a (1 - t_a) (mean difference along a)^2, and that
-//    mean is between the 4 edge differences: at least q_a in magnitude when they share a sign and
-//    q_a is the smallest, else q_a = 0. With t (1 - t) <= 1/4:
-//        D(x)^2 >= I(L)^2 - S,   S = 1/4 sum_a (H^2 - min(q_a, H)^2)
-//    S is 32 near a plane, 48 at worst. To first order this is I(L) - S / 2D, the known 3 H^2 / 8D
-//    at worst.
-// 3. Let k be any constant with D >= k in the cell, p = sqrt(k^2 + S). For every s in [0, 1]
-//        V_c = k + s (L_c - p)
-//    is safe: where I(L) <= p, I(V) <= k <= D; where I(L) > p, I(V) <= k + I(L) - p, and
-//    sqrt(I^2 - S) - I grows with I from k - p, so that this is <= sqrt(I(L)^2 - S) <= D.
-//    s is the largest that keeps every V_c >= 0 (a bound needs no clamp in the kernel then), or 0
-//    where that is better on average.
-// 4. k is the largest of: the band (a far cell lies outside it); sqrt(m^2 - S), m the smallest L_c;
-//    max_c L_c less the cell's diagonal (D is 1-Lipschitz).
-// Values are rounded down, by a little more than the sampler's own rounding.
+// D^2 - |x|^2 is a minimum of linear functions of x, one for each point of the surface, so concave.
+// Trilinear weights are positive, sum to 1 and reproduce x, so by Jensen
+//     I(D^2) - I(|x|^2) <= D(x)^2 - |x|^2,
+// and I(|x|^2) - |x|^2 = H^2 sum_a t_a (1 - t_a), hence
+//     D(x)^2 >= I(L^2) - H^2 sum_a t_a (1 - t_a).
+// Equality is possible, where the surface is a single point under a cell's middle: nothing tighter
+// follows from the corners alone. But a far cell lies outside the band, too.
+// Corners are rounded down by 1/1024 voxel at least, so I by 2e-6 of itself at the farthest and by
+// more where they are near: more than the sampler's own rounding.
 #include "kernels/field_layout.h"
 
 #include <algorithm>
@@ -33,7 +22,7 @@ namespace h6::kernels {
 namespace {
 
 constexpr double kEdge = 8.0;               // voxels a far cell
-constexpr double kFloatSlack = 1.0 / 1024;  // voxels: float interpolation of values up to 1024
+constexpr double kFloatSlack = 1.0 / 1024;  // voxels: see the head comment
 constexpr double kInt16Max = 32767.0;
 
 struct Cell {
@@ -54,28 +43,11 @@ std::size_t slot_count(const h6FieldDef& def) {
   return std::size_t(def.bricks[0]) * std::size_t(def.bricks[1]) * std::size_t(def.bricks[2]);
 }
 
-// Corner values of a far cell's bound, in voxels, >= 0, and the side.
+// Bounds at the corners of a far cell, in voxels, >= 0, and the side.
 struct FarBound {
   double corner[8];
   double side;  // 1 outside the obstacle, -1 inside
 };
-
-// S of the head comment.
-double interpolation_excess(const double L[8]) {
-  double excess = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    double lowest = kEdge, highest = -kEdge;
-    for (int k = 0; k < 8; ++k) {
-      if ((k >> axis & 1) != 0) continue;
-      const double difference = L[k | 1 << axis] - L[k];
-      lowest = std::min(lowest, difference);
-      highest = std::max(highest, difference);
-    }
-    const double q = std::min(kEdge, std::max({0.0, lowest, -highest}));
-    excess += (kEdge * kEdge - q * q) / 4;
-  }
-  return excess;
-}
 
 FarBound far_bound(const h6FieldDef& def, const Cell& c) {
   FarBound bound{{}, 1.0};
@@ -85,24 +57,13 @@ FarBound far_bound(const h6FieldDef& def, const Cell& c) {
   for (int k = 0; k < 8; ++k) {
     const std::size_t x = c.at[0] + (k & 1), y = c.at[1] + (k >> 1 & 1), z = c.at[2] + (k >> 2);
     const double value = def.far_grid[(z * ny + y) * nx + x] / def.voxel_size;
-    L[k] = std::fabs(value);
+    L[k] = std::max(std::fabs(value), def.band / def.voxel_size);
     inside |= value < 0;
     outside |= value > 0;
   }
   if (inside && outside) return bound;  // no far cell holds the surface: nothing is known then
   if (inside) bound.side = -1.0;
-
-  const auto [low, high] = std::minmax_element(L, L + 8);
-  const double S = interpolation_excess(L);
-  const double k =
-      std::max({0.0, def.band / def.voxel_size, std::sqrt(std::max(0.0, *low * *low - S)),
-                *high - std::sqrt(3.0) * kEdge});
-  const double p = std::sqrt(k * k + S);
-  double mean = 0;
-  for (double value : L) mean += value / 8;
-  double s = *low < p ? std::min(1.0, k / (p - *low)) : 1.0;
-  if (mean < p) s = 0;
-  for (int i = 0; i < 8; ++i) bound.corner[i] = std::max(0.0, k + s * (L[i] - p));
+  std::copy_n(L, 8, bound.corner);
   return bound;
 }
 
@@ -162,15 +123,17 @@ class BrickNodes {
     if (source.samples != nullptr) {
       return source.samples[(n[2] * 8 + n[1]) * 8 + n[0]] / def_.voxel_size;
     }
-    double d = 0;
+    double square = 0;
     for (int k = 0; k < 8; ++k) {
       double weight = 1;
       for (int axis = 0; axis < 3; ++axis) {
         const double t = n[axis] / kEdge;
         weight *= (k >> axis & 1) != 0 ? t : 1 - t;
       }
-      d += weight * source.bound.corner[k];
+      square += weight * source.bound.corner[k] * source.bound.corner[k];
     }
+    for (int axis = 0; axis < 3; ++axis) square -= n[axis] * (kEdge - n[axis]);
+    const double d = std::sqrt(std::max(square, 0.0));
     return source.bound.side * std::max(d, def_.band / def_.voxel_size);
   }
 

@@ -94,6 +94,29 @@ HWY_INLINE VF far_fraction(const Axis& a) {
   return hn::Mul(hn::Add(a.fraction, hn::ConvertTo(d, a.cell)), hn::Set(d, 0.125f));
 }
 
+// The bound of far cells from the values at their corners, as pairs along x [quanta], and the
+// fractions: views.h. The sign is that of the interpolated value.
+HWY_INLINE VF far_bound(const VF low[4], const VF step[4], const Axis& x, const Axis& y,
+                        const Axis& z, VF value, float band) {
+  const DF d;
+  VF row[4];
+  HWY_UNROLL(4)
+  for (int k = 0; k < 4; ++k) {
+    const VF high = hn::Add(low[k], step[k]);
+    row[k] = lerp(hn::Mul(low[k], low[k]), hn::Mul(high, high), x.fraction);
+  }
+  const VF whole =
+      hn::Mul(lerp(lerp(row[0], row[1], y.fraction), lerp(row[2], row[3], y.fraction), z.fraction),
+              hn::Set(d, kFarQuantum * kFarQuantum));
+  const VF one = hn::Set(d, 1.0f);
+  const VF sag = hn::MulAdd(x.fraction, hn::Sub(one, x.fraction),
+                            hn::MulAdd(y.fraction, hn::Sub(one, y.fraction),
+                                       hn::Mul(z.fraction, hn::Sub(one, z.fraction))));
+  const VF square = hn::Max(hn::NegMulAdd(sag, hn::Set(d, 64.0f), whole),
+                            hn::Min(whole, hn::Set(d, band * band)));
+  return hn::CopySign(hn::Sqrt(square), value);
+}
+
 // Value and gradient at points inside the grid.
 template <bool kGradient>
 HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& value, VF& gx,
@@ -150,6 +173,11 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   const VF b0 = hn::MulAdd(y.fraction, h0, a00), b1 = hn::MulAdd(y.fraction, h1, a10);
   const VF k = hn::Sub(b1, b0);
   value = hn::Mul(hn::MulAdd(z.fraction, k, b0), quantum);
+  if (any_far) {
+    const VF low[4] = {c00, c01, c10, c11}, step[4] = {e00, e01, e10, e11};
+    value = hn::IfThenElse(hn::RebindMask(d, far),
+                           far_bound(low, step, x, y, z, value, field.band), value);
+  }
   if (kGradient) {
     gx = hn::Mul(lerp(lerp(e00, e01, y.fraction), lerp(e10, e11, y.fraction), z.fraction), slope);
     gy = hn::Mul(lerp(h0, h1, z.fraction), slope);

@@ -40,12 +40,21 @@ Sample sample_near(const std::int16_t* brick, const std::int32_t cell[3], const 
   return trilinear(corner, t);
 }
 
-Sample sample_far(const std::int16_t* far, const std::int32_t cell[3], const float t[3]) {
-  float corner[8], u[3];
-  for (int k = 0; k < 8; ++k) corner[k] = kFarQuantum * far[k];
-  for (int axis = 0; axis < 3; ++axis) u[axis] = (cell[axis] + t[axis]) / 8;
+Sample sample_far(const std::int16_t* far, float band, const std::int32_t cell[3],
+                  const float t[3]) {
+  float corner[8], square[8], u[3], sag = 0;
+  for (int k = 0; k < 8; ++k) {
+    corner[k] = kFarQuantum * far[k];
+    square[k] = corner[k] * corner[k];
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    u[axis] = (cell[axis] + t[axis]) / 8;
+    sag += 64 * (u[axis] * (1 - u[axis]));
+  }
   Sample s = trilinear(corner, u);
   for (float& slope : s.gradient) slope /= 8;  // per voxel
+  const float whole = trilinear(square, u).value;
+  s.value = std::copysign(std::sqrt(std::max(whole - sag, std::min(whole, band * band))), s.value);
   return s;
 }
 
@@ -61,7 +70,8 @@ Sample sample_inside(const FieldView& field, const float q[3]) {
   }
   const std::int32_t slot = (brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0];
   const std::int32_t entry = field.table[slot];
-  if (entry < 0) return sample_far(field.far + 8 * (std::ptrdiff_t{-1} - entry), cell, t);
+  if (entry < 0)
+    return sample_far(field.far + 8 * (std::ptrdiff_t{-1} - entry), field.band, cell, t);
   return sample_near(field.bricks + std::ptrdiff_t{kBrickStride} * entry, cell, t);
 }
 

@@ -11,8 +11,10 @@ namespace h6::kernels {
 // A field in its hot layout. One table entry a brick of 8 x 8 x 8 unit cells:
 //   >= 0  row in `bricks`: 9 x 9 x 9 nodes, x fastest, int16 in 1/1024 voxel; the last layer
 //         repeats the neighbours' first. Distances there are samples, trilinear between nodes.
-//   <  0  no samples. Row -1 - entry in `far`: the 8 corners of the cell, x fastest, int16 in 1/32
-//         voxel, lowered so that the trilinear value between them never exceeds |d|: a bound.
+//   <  0  no samples. Row -1 - entry in `far`: bounds of |d| at the 8 corners of the cell, x
+//         fastest, int16 in 1/32 voxel, with the sign of the side; all 0 where nothing is known. At
+//         fractions t in between |d| is at least (field_layout.cpp has the proof)
+//             sqrt(max(I - 64 sum_a t_a (1 - t_a), min(I, band^2))),   I = trilinear of squares
 //
 //        table (bx*by*bz)       bricks                       far
 //        [ 0][-1][-2][ 1] ...   [729 int16, padded][...]     [8 int16][8 int16]...
@@ -21,6 +23,7 @@ struct FieldView {
   const std::int32_t* table;  // (size z * y * x), x fastest
   const std::int16_t* bricks;
   const std::int16_t* far;
+  float band = 0;  // no point of a far cell is nearer to the surface [voxel]
 };
 inline constexpr int kBrickNodes = 9 * 9 * 9;
 inline constexpr int kBrickStride = 736;  // int16 a brick; a multiple of 32 bytes

@@ -77,7 +77,8 @@ class AnalyticField {
     return {{def_.bricks[0], def_.bricks[1], def_.bricks[2]},
             table_.data(),
             bricks_.data(),
-            far_nodes_.data()};
+            far_nodes_.data(),
+            static_cast<float>(def_.band / def_.voxel_size * (1 - 1e-6))};
   }
   double distance(const Point& p) const { return distance_(p); }
   double last(int axis) const { return 8.0 * def_.bricks[axis] - 1; }

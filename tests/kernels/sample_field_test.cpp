@@ -186,12 +186,14 @@ TEST_CASE("sample_field: near the surface it is the distance to within interpola
   });
 }
 
-TEST_CASE("sample_field: the gradient is the slope of the distance, in bricks, far and outside") {
+TEST_CASE(
+    "sample_field: the gradient is the slope of the distance in bricks and out of them, and points "
+    "where it grows in far cells") {
   const AnalyticField& field = clutter_field();
   on_every_target([&](const std::string&) {
     Random random(10);
     const double h = 1.0 / 64;
-    int near = 0, far = 0, outside = 0;
+    int near = 0, far = 0, outside = 0, turned = 0;
     for (int i = 0; i < 4000; ++i) {
       const double q[3] = {random.uniform(-20, 147), random.uniform(-20, 155),
                            random.uniform(-20, 163)};
@@ -207,7 +209,22 @@ TEST_CASE("sample_field: the gradient is the slope of the distance, in bricks, f
       p.set(0, q[0], q[1], q[2]);
       Samples s = sample(sample_field, field, kIdentity, p, nullptr, 1);
       if (kink || (out && distance_at(field, c[0], c[1], c[2]) <= 0.1)) continue;
-      ++(out ? outside : field.near({q[0], q[1], q[2]}) ? near : far);
+      if (!field.near({c[0], c[1], c[2]})) {
+        ++(out ? outside : far);
+        double dot = 0, truth2 = 0;
+        for (int k = 0; k < 3; ++k) {
+          double a[3] = {q[0], q[1], q[2]}, b[3] = {q[0], q[1], q[2]};
+          a[k] += h, b[k] -= h;
+          const double t = field.distance({a[0], a[1], a[2]}) - field.distance({b[0], b[1], b[2]});
+          dot += t * (k == 0 ? s.gx[0] : k == 1 ? s.gy[0] : s.gz[0]);
+          truth2 += t * t;
+        }
+        const double length = std::hypot(s.gx[0], s.gy[0], s.gz[0]);
+        CHECK(length < 1.8);
+        turned += dot < 0.8 * length * std::sqrt(truth2);
+        continue;
+      }
+      ++(out ? outside : near);
       const double slope[3] = {double{distance_at(field, q[0] + h, q[1], q[2])} -
                                    distance_at(field, q[0] - h, q[1], q[2]),
                                double{distance_at(field, q[0], q[1] + h, q[2])} -
@@ -222,6 +239,7 @@ TEST_CASE("sample_field: the gradient is the slope of the distance, in bricks, f
     CHECK(near > 100);
     CHECK(far > 100);
     CHECK(outside > 100);
+    CHECK(turned < 0.2 * (far + outside));  // where two parts are nearly as far
   });
 }
 
