@@ -23,6 +23,7 @@ constexpr std::size_t kWorthSharing = 256;   // groups from which the helper is 
 constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which pairs are shared out
 constexpr std::size_t kPairSlices = 32;
 constexpr float kSlack = 1e-3f;              // [voxel]
+constexpr std::size_t kFewGroups = 4;        // of a block: looked at sooner than the block's sphere
 constexpr double kLongestWay = 256;          // [voxel] float has 3e-5 left there
 
 // Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
@@ -206,21 +207,32 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   pair.sampled = 0;
   pair.missed = 0;
 
-  std::size_t count =
-      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, t.frontier);
-  if (count == 0) return 0;
-  const std::size_t blocks = search.cull(shell.blocks, t.frontier, count, t.survivors, t.clearance);
-  for (std::size_t k = 0; k < count; ++k)
-    pair.block_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
+  std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now,
+                                        t.open_blocks);
   if (blocks == 0) return 0;
-
-  std::copy_n(t.survivors, blocks, t.open_blocks);
+  const auto expired_groups = [&] {
+    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
+  };
+  std::size_t count = expired_groups();
+  if (count > kFewGroups * blocks) {
+    const std::size_t left =
+        search.cull(shell.blocks, t.open_blocks, blocks, t.survivors, t.clearance);
+    for (std::size_t k = 0; k < blocks; ++k)
+      pair.block_expiry[t.open_blocks[k]] = expiry_of(now, t.clearance[k]);
+    std::copy_n(t.survivors, left, t.open_blocks);
+    blocks = left;
+    if (blocks == 0) return 0;
+    count = expired_groups();
+  }
   const auto number = static_cast<std::size_t>(&pair - s.pairs);
   if (must_be_coarse(s, number, used, 0)) return touch_coarsely(pair, t, search, blocks, used);
-  count = kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
   const std::size_t groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
   for (std::size_t k = 0; k < count; ++k)
     pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
+  // Each group waits for memory by itself otherwise.
+  for (std::size_t k = 0; k < groups; ++k)
+    for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
+      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
   if (must_be_coarse(s, number, used, groups)) {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
     const std::size_t found = touch_coarsely(pair, t, search, blocks, used);
