@@ -19,10 +19,10 @@
 #include <thread>
 #include <vector>
 
-#include "tests/support/frame_scenes.h"
 #include "io/load_scene.h"
 #include "io/scenes/scenes.h"
 #include "sched/parallel_for.h"
+#include "tests/support/frame_scenes.h"
 
 namespace {
 

@@ -175,8 +175,8 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   value = hn::Mul(hn::MulAdd(z.fraction, k, b0), quantum);
   if (any_far) {
     const VF low[4] = {c00, c01, c10, c11}, step[4] = {e00, e01, e10, e11};
-    value = hn::IfThenElse(hn::RebindMask(d, far),
-                           far_bound(low, step, x, y, z, value, field.band), value);
+    value = hn::IfThenElse(hn::RebindMask(d, far), far_bound(low, step, x, y, z, value, field.band),
+                           value);
   }
   if (kGradient) {
     gx = hn::Mul(lerp(lerp(e00, e01, y.fraction), lerp(e10, e11, y.fraction), z.fraction), slope);

@@ -8,7 +8,8 @@ namespace h6::kernels {
 // field by `to_field`; distance[k] in voxels, gx/gy/gz[k] its gradient per voxel in field axes, not
 // normalised. Gradient columns may all be null.
 //   in a brick        trilinear sample; its exact derivative
-//   in a far cell     a bound with the sign of the side: |distance| <= true |d|, at least 0 (views.h);
+//   in a far cell     a bound with the sign of the side: |distance| <= true |d|, at least 0
+//   (views.h);
 //                     the derivative of what interpolates the corners, which points the right way
 //   outside the grid  hypot(distance to the grid, value at the nearest grid point when positive)
 // A point that is not finite has distance +infinity and gradient 0.

@@ -192,9 +192,9 @@ inline FieldArrays sample(const Solids& solids, bool socket, double size = 1) {
           out.index[(z * n + y) * n + x] = static_cast<std::int32_t>(out.samples.size() / 512);
           const Solids few = nearest(set, centre, kHalfDiagonal);
           for (int node = 0; node < 512; ++node)
-            out.samples.push_back(static_cast<float>(
-                kVoxel * at(few, socket, 8.0 * x + node % 8, 8.0 * y + node / 8 % 8,
-                            8.0 * z + node / 64)));
+            out.samples.push_back(
+                static_cast<float>(kVoxel * at(few, socket, 8.0 * x + node % 8,
+                                               8.0 * y + node / 8 % 8, 8.0 * z + node / 64)));
         }
   }
   const double origin = -middle_node * kVoxel;
