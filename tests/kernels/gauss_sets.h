@@ -112,13 +112,20 @@ inline Contacts contacts_of(Set set, std::size_t n, GaussWidths width, std::size
   return c;
 }
 
-// Largest error of every `step`th of those weights.
-inline double worst_of(const std::vector<float>& got, const DirectionsView& c, Hat hat,
-                       const GaussWidths& widths, std::size_t step = 1) {
+// Every `step`th of the weights that the specification gives.
+inline std::vector<float> reference_of(const DirectionsView& c, Hat hat, const GaussWidths& widths,
+                                       std::size_t step = 1) {
   std::vector<float> want(c.count);
-  double worst = 0;
-  for (std::size_t i = 0; i < c.count; i += step) {
+  for (std::size_t i = 0; i < c.count; i += step)
     gauss_weights_ref(c, hat, widths, i, i + 1, want.data());
+  return want;
+}
+
+// Largest error of every `step`th weight.
+inline double worst_of(const std::vector<float>& got, const std::vector<float>& want,
+                       std::size_t step = 1) {
+  double worst = 0;
+  for (std::size_t i = 0; i < got.size(); i += step) {
     const double error = std::fabs(double{got[i]} - want[i]);
     worst = std::max(worst, want[i] > 0 ? error / want[i] : got[i] == 0 ? 0.0 : HUGE_VAL);
     if (!std::isfinite(got[i])) worst = HUGE_VAL;
