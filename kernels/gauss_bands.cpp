@@ -128,18 +128,11 @@ HWY_INLINE float project(const Items& items, float* const* along, Range* range) 
   return hn::GetLane(hn::MaxOfLanes(d, size));
 }
 
-// Cells that n contacts are sorted into.
-HWY_INLINE std::uint32_t cells_for(std::size_t n) {
-  std::uint32_t cells = 256;
-  while (cells < kBandCells && cells < 2 * n) cells *= 2;
-  return cells;
-}
-
 HWY_INLINE void choose_grid(const GaussBands& g, std::size_t count, const Range* range, float size,
                             float* scale) {
   // A place is rounded by less than 1e-6 of the longest vector, a cell's number by less.
   const float reach = g.width * 1.001f + 4e-6f * size;
-  const std::uint32_t most = cells_for(count);
+  const std::uint32_t most = band_cells(count);
   GaussBands::Grid& grid = *g.grid;
   const float fit = range[0].extent / reach;
   grid.bands = fit > 1 ? static_cast<std::uint32_t>(HWY_MIN(fit, static_cast<float>(most / 8))) : 1;
@@ -392,7 +385,7 @@ void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns) {
   columns.take(g.phi, rows);
   columns.take(g.place, rows);
   columns.take(g.rank, rows);
-  columns.take(g.start, kBandCells + 1);
+  columns.take(g.start, band_cells(count) + 1);
   columns.take(g.edge, 2 * blocks + 2);
   columns.take(g.grid, 1);
 }

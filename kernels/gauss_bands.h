@@ -12,7 +12,12 @@
 namespace h6::kernels {
 
 inline constexpr std::size_t kBandBlock = 16;
-inline constexpr std::uint32_t kBandCells = 16384;  // at most
+// Cells that n contacts are sorted into, at most.
+inline std::uint32_t band_cells(std::size_t n) {
+  std::uint32_t cells = 256;
+  while (cells < 16384 && cells < 2 * n) cells *= 2;
+  return cells;
+}
 
 struct GaussBands {
   const float* column[3];  // as they came
