@@ -232,6 +232,51 @@ TEST_CASE("bake_field: an open sheet becomes a plate two offsets thick") {
   CHECK(worst < 1e-3 * field.voxel_size);
 }
 
+TEST_CASE("bake_field: a large soup without an offset bakes: nothing is thick, distances are exact, "
+          "and it is said that the outside leaks in") {
+  Random random(11);
+  Mesh mesh;
+  for (int sheet = 0; sheet < 1500; ++sheet) {
+    const double size = random(0.02, 0.15), bend = random(-0.05, 0.05);
+    const Mesh flat = patch(3, 3, [&](double s, double t) {
+      return Vec3{size * (s - 0.5), size * (t - 0.5), bend * s * t};
+    });
+    add(mesh, moved(turned(flat, random(0, 6), random(0, 6)),
+                    {random(-1, 1), random(-1, 1), random(-1, 1)}));
+  }
+  FieldBake options = small_bake(160);
+  options.offset = 0;
+  FieldBakeReport report;
+  const FieldData field = must_bake(mesh, options, &report);
+  CHECK(mesh.triangles.size() == 27000);
+  CHECK(field.offset == 0);
+  CHECK_FALSE(report.closed);
+  CHECK(std::any_of(report.warnings.begin(), report.warnings.end(), [](const std::string& s) {
+    return s.find("leaks in") != std::string::npos;
+  }));
+  const Judge judge(mesh);
+  std::size_t count = 0, checked = 0, inside = 0, short_way = 0;
+  double worst = 0;
+  for_nodes(field, [&](std::array<int, 3> n, double d) {
+    if (count++ % 61 != 0) return;
+    const double u = judge.distance(node_position(field, n));
+    if (u > field.band) return;
+    ++checked;
+    if (d >= 0) {
+      worst = std::max(worst, std::fabs(d - u));
+    } else {  // enclosed by sheets that meet
+      ++inside;
+      short_way += -d < u - 1e-3 * field.voxel_size;
+    }
+  });
+  CHECK(checked > 10000);
+  CHECK(worst < 1e-3 * field.voxel_size);
+  CHECK(short_way == 0);
+  CHECK(double(inside) < 0.05 * double(checked));
+  options.threads = 1;
+  CHECK(same_bits(field, must_bake(mesh, options)));
+}
+
 TEST_CASE("bake_field: a box with cracks narrower than the offset is solid") {
   // Faces drawn in by half a voxel: every edge of the box is a crack.
   const double gap = 0.5 / 48;
