@@ -50,8 +50,8 @@ struct FieldBakeReport {
 // and a lower bound of that beyond. Inside a closed mesh: minus the distance to the surface,
 // likewise. Inside a soup: minus (distance + offset), the way out through the nearest sheet, or
 // distance - offset between that sheet and the zero set. Where sheets lie buried in the solid
-// (parts that run into each other) the way out is up to 0.74 voxel + 13 % too short, never too
-// long.
+// (parts that run into each other) the way out is up to 0.74 voxel + 13 % too short; in a few
+// places too long (bake_inside.cpp).
 // far_grid: outside tight to 0.03 voxel; inside a lower bound.
 Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                              const Progress& progress = {});

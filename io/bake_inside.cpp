@@ -12,7 +12,10 @@
 //     smooth sheets and the depth of the dent below a crack.
 //   D >= u + offset: behind a sheet: u + offset. Sheets buried in the solid (two parts run into
 //     each other) do not border R, and u + offset is too short there:
-//     max(u + offset, (D - corner slack)/1.13), a lower bound.
+//     max(u + offset, (D - corner slack)/1.13), a lower bound of the way to the nodes of R.
+// What is outside without a node of R, a groove between nodes say, begins no chain, and D goes the
+// long way round. `hapsix check --verify` compares with the sheet: of 487,178 nodes of 25 meshes 65
+// (two closed meshes) were up to 0.46 voxel too deep, 26 (three soups) up to 2.7 (bench/README.md).
 #include <algorithm>
 #include <atomic>
 
