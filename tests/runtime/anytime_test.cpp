@@ -235,7 +235,7 @@ TEST_CASE("what fits is full, at once or soon") {
   h6Session small;
   CHECK(decide(small, {1000, 80, 60}, 1000).full > 950);
   h6Session fits;
-  const Decided all = decide(fits, {10000, 60, 50}, 20000);
+  const Decided all = decide(fits, {10000, 60, 35}, 20000);
   CHECK(all.late == 0);
   CHECK(all.full > 15000);
   // Over the budget, and within the period: seen now and then, never late.
@@ -246,7 +246,7 @@ TEST_CASE("what fits is full, at once or soon") {
 
 TEST_CASE("a stolen millisecond now and then does not make all frames coarse") {
   h6Session s;
-  const Decided all = decide(s, {6000, 100, 80, 10}, 20000);
+  const Decided all = decide(s, {6000, 100, 60, 10}, 20000);
   CHECK(all.full > 19000);
   CHECK(all.late == 0);
 }
@@ -254,11 +254,11 @@ TEST_CASE("a stolen millisecond now and then does not make all frames coarse") {
 TEST_CASE("a machine that becomes faster is noticed in coarse frames; a bad day is forgotten") {
   h6Session s;
   CHECK(decide(s, {10000, 160, 130}, 2000).full == 0);
-  CHECK(decide(s, {10000, 60, 45}, 4000).full > 3000);
+  CHECK(decide(s, {10000, 60, 30}, 4000).full > 3000);
   // Three slow frames in a row were the last full ones; half a minute later one is tried.
   h6Session slow;
-  CHECK(decide(slow, {6000, 80, 60}, 100).full > 90);
-  (void)decide(slow, {6000, 200, 60}, 20);
-  CHECK(decide(slow, {6000, 80, 60}, 20000).full < 20000);
-  CHECK(decide(slow, {6000, 80, 60}, 20000).full > 5000);
+  CHECK(decide(slow, {6000, 80, 45}, 100).full > 90);
+  (void)decide(slow, {6000, 200, 45}, 20);
+  CHECK(decide(slow, {6000, 80, 45}, 20000).full < 20000);
+  CHECK(decide(slow, {6000, 80, 45}, 20000).full > 5000);
 }
