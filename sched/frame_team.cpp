@@ -50,6 +50,9 @@ class Treatment {
   cpu_set_t came_with_{};
 };
 
+// What sharing costs, with the helper polling (slices of 2 us, 8,000 jobs, p50): a job of 4 us
+// takes 2.7 us on both threads, 8: 5.0, 16: 9.4, 32: 18.3; of two slices of 1 us 1.7 instead
+// of 2.2. So some 0.7 us: less work than 4 us is not worth it.
 constexpr int kInHaste = 2;           // frames that came too early in a row: so will the next
 constexpr std::int64_t kNap = 50000;  // ns; how late the helper may notice an early frame
 }  // namespace
