@@ -1,5 +1,6 @@
 // Ctrl-C, a kill, a terminal: the program ends soon, leaves nothing half made, keeps what it
 // recorded.
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -67,7 +68,7 @@ TEST_CASE("Ctrl-C ends a real-time run at once: devices stopped, recording finis
       const Ended ended = process.wait();
       const double took =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - asked).count();
-      CHECK(took < 1);  // some 0.03 s on an idle machine
+      CHECK(took < 1 * kSlower);  // some 0.03 s on an idle machine
       CHECK(ended.code == 1);
       CHECK(ended.err.find("interrupted after") != std::string::npos);
       if (json) {
@@ -109,6 +110,7 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
   for (const double seconds : {0.3, 1.2}) {
     Process process(box,
                     {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "2048", "--json"});
+    REQUIRE(soon([&] { return process.handles(SIGINT); }, 20));
     pause_seconds(seconds);
     process.send(SIGINT);
     const Ended ended = process.wait(10);
@@ -121,6 +123,7 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
   spill(box.file("scene.json"), R"({"hapsix": 1, "units": "m", "bodies": [
     {"name": "ball", "fixed": true, "field": {"mesh": "ball.stl", "voxels": 2048}}]})");
   Process process(box, {"run", "scene.json"});
+  REQUIRE(soon([&] { return process.handles(SIGINT); }, 20));
   pause_seconds(1);
   process.send(SIGINT);
   const Ended ended = process.wait(10);
@@ -229,7 +232,7 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
     spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
     Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "2048"}, "",
                     dup(terminal.theirs));
-    pause_seconds(2.5);
+    pause_seconds(2.5 * std::min(kSlower, 4.0));
     process.send(SIGINT);
     CHECK(process.wait(10).code == 1);
     const std::string seen = terminal.read_all();
