@@ -112,6 +112,7 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
   const h6PairDef pair{1, 0};
   def.pairs = &pair, def.pair_count = 1;
   def.bodies = bodies, def.body_count = 2;
+  def.max_contacts = model->shells[0].points;  // none is dropped
   def.contact.method = w.method;
   def.threads = threads;
   h6Error error{};
