@@ -19,7 +19,6 @@
 #include <memory>
 #include <string>
 
-#include "bench/frame_scenes.h"
 #include "sched/clock.h"
 #include "tests/support/frame_scenes.h"
 
