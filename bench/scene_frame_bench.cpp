@@ -4,8 +4,7 @@
 // Clutter: most of the part's surface is free. Conforming: a socket with 0.25 voxel of clearance.
 // The part is moved from where it is free until it has about the contacts asked for. Slow: 0.01
 // voxel a frame; fast: the frame before stood far outside the field, so nothing is remembered.
-// Contacts of the timed poses are compared with all points before a time is reported. With two
-// threads frames are a period apart, as in a haptic loop: the helper sleeps until the next is due.
+// Contacts of the timed poses are compared with all points before a time is reported.
 //     field/memory/voxels:1024/bricks:N
 // Time is that of h6CreateModel, `resident_mb` what it adds to this process.
 #include <benchmark/benchmark.h>
@@ -19,7 +18,6 @@
 #include <memory>
 #include <string>
 
-#include "sched/clock.h"
 #include "tests/support/frame_scenes.h"
 
 namespace {
@@ -110,9 +108,7 @@ void frame(benchmark::State& state, bool socket, h6Method method, std::size_t wa
   const double push = push_for(model, wanted, socket ? 8 : 60);
   h6DeviceSample sample{};
   sample.pose.q.w = 1;
-  std::int64_t due = 0;
   const auto step = [&](double t) {
-    due = h6::sched::now_ns() + 1000000;
     const h6Vec3 p = along(t);
     h6BodyState body{};
     body.pose.p = p, body.pose.q.w = 1;
@@ -134,8 +130,6 @@ void frame(benchmark::State& state, bool socket, h6Method method, std::size_t wa
   for (auto _ : state) {
     if (fast) step(1500);
     if (cold) flush_caches();
-    while (threads > 1 && h6::sched::now_ns() < due) {
-    }
     step(fast ? push : slow(i++));
     const h6FrameReport report = h6GetFrame(session.get());
     state.SetIterationTime(1e-6 * report.frame_us);
