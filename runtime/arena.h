@@ -21,7 +21,7 @@ inline void* allocate(const h6Allocator& a, std::size_t bytes) {
   bytes = (bytes + kAlignment - 1) & ~(kAlignment - 1);
   if (a.allocate && a.release) return a.allocate(a.user, bytes, kAlignment);
   if (bytes < kHugePage) return std::aligned_alloc(kAlignment, bytes ? bytes : kAlignment);
-  // Fields are read all over: on pages of 4 kB most of a frame with cold caches is finding them.
+  // Fields are read all over: on pages of 4 kB finding them is a good part of a cold frame.
   const std::size_t whole = (bytes + kHugePage - 1) & ~(kHugePage - 1);
   void* memory = std::aligned_alloc(kHugePage, whole);
 #ifdef MADV_HUGEPAGE

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -81,8 +82,8 @@ struct MockCap {
 class MockMachine {
  public:
   MockMachine() : bed_(u_.create()) {
-    char name[] = "/tmp/hapsix-mock-XXXXXX";
-    if (mkdtemp(name)) folder_ = name;
+    std::string name = (std::filesystem::temp_directory_path() / "hapsix-mock-XXXXXX").string();
+    if (mkdtemp(name.data())) folder_ = name;
     // A CAD mouse of the same maker, always there and never a cap. (Without any device umockdev
     // forgets how to add one.)
     MockCap mouse{"C3", "CadMouse", 0xc650};
