@@ -1,18 +1,24 @@
 // realtime_bench.cpp - the haptic thread beside a plain sleeping thread, idle and under load:
 //     realtime/alpha|socket/RATEHz/idle|loaded/threads:T/spin:US
+//     realtime/arithmetic/RATEHz/idle|loaded
 //
 // The alpha's hand goes its way there and back. 60 s at 1 kHz, 20 s at 4 kHz; then the same frames
 // for a sixth of that on a std::thread that sleeps until the next tick. HAPSIX_BENCH_SECONDS=3 in
 // the environment: 3 s. Socket: 10,000 contacts on a part that follows the hand exactly, with a
 // budget of 0.8 periods (anytime mode). Load, on both cores: a host that saturates TBB and a
 // streamer of memory. Before times are reported the first frames are stepped again on one thread
-// and must have the same hashes.
+// and must have the same hashes. HAPSIX_BENCH_LATE=1: each late frame is printed, stage by stage.
+//
+// Arithmetic: on the same thread a sum in registers that takes a coarse frame's time and touches no
+// memory. It cannot be late by its own work, so what it counts as that is what the machine took
+// from it and put on its CPU time; the rows above have that too.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <string>
@@ -21,7 +27,9 @@
 
 #include "io/load_scene.h"
 #include "io/scenes/scenes.h"
+#include "sched/clock.h"
 #include "sched/parallel_for.h"
+#include "sched/periodic_thread.h"
 #include "tests/support/frame_scenes.h"
 
 namespace {
@@ -209,6 +217,22 @@ struct Times {
   }
 };
 
+void print_late(const h6FrameRecord& row) {
+  static const bool asked = std::getenv("HAPSIX_BENCH_LATE") != nullptr;
+  if (!asked || row.late == 0) return;
+  const h6FrameReport& r = row.report;
+  const char* why = row.late & H6_LATE_COMPUTE  ? "own"
+                    : row.late & H6_LATE_STOLEN ? "stolen"
+                                                : "wake-up";
+  std::fprintf(
+      stderr, "frame %llu late by %.0f us (%s): wake-up %.0f wall %.0f cpu %.0f us, %u contacts%s;",
+      static_cast<unsigned long long>(r.frame), row.late_us, why, row.wakeup_us, r.frame_us,
+      row.cpu_us, r.contacts, r.coarse_pairs ? " coarse" : "");
+  for (int i = 0; i < H6_STAGE_COUNT; ++i)
+    std::fprintf(stderr, " %s %.0f", h6StageName(static_cast<h6Stage>(i)), r.stage_us[i]);
+  std::fprintf(stderr, "; helper %.0f us in %u slices\n", r.helper_us, r.helper_slices);
+}
+
 // The first frames once more, on one thread, in virtual time.
 bool same_again(Scene& scene, double rate, const std::vector<h6FrameRecord>& rows) {
   const Session session = scene.session(rate, 1, false);
@@ -268,6 +292,7 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
       while (const std::size_t n = h6ReadRecords(loop.get(), rows.data(), rows.size()))
         for (std::size_t i = 0; i < n; ++i) {
           times.add(rows[i].wakeup_us, rows[i].report.frame_us);
+          print_late(rows[i]);
           contacts += rows[i].report.contacts;
           if (rows[i].report.frame == first.size() && first.size() < 1000) first.push_back(rows[i]);
         }
@@ -296,6 +321,42 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
   }
 }
 
+void arithmetic(benchmark::State& state, double rate, bool loaded) {
+  const double seconds = seconds_at(rate);
+  for (auto _ : state) {
+    const Load load(loaded);
+    Times times;
+    std::uint64_t late[4] = {};
+    std::uint32_t x = 1;
+    double took = 0;
+    sched::PeriodicThreadOptions options;
+    options.rate = rate, options.spin_us = 100;
+    const auto frames = static_cast<std::uint64_t>(seconds * rate);
+    times.wakeup.reserve(frames), times.compute.reserve(frames), times.total.reserve(frames);
+    sched::PeriodicThread thread(options,
+                                 {nullptr,
+                                  [&](std::uint64_t frame, const sched::TickTiming&, double) {
+                                    const std::int64_t start = sched::now_ns();
+                                    for (int i = 0; i < 35000; ++i) {
+                                      x = x * 1664525u + 1013904223u;
+                                      benchmark::DoNotOptimize(x);
+                                    }
+                                    took = 1e-3 * static_cast<double>(sched::now_ns() - start);
+                                    return frame + 1 < frames;
+                                  },
+                                  [&](std::uint64_t, const sched::TickTiming& timing) {
+                                    times.add(timing.wakeup_us, took);
+                                    ++late[static_cast<int>(timing.late)];
+                                  }});
+    thread.join();
+    times.tell(state, "");
+    state.counters["frames"] = static_cast<double>(times.total.size());
+    state.counters["late_compute"] = static_cast<double>(late[int(sched::Late::compute)]);
+    state.counters["late_stolen"] = static_cast<double>(late[int(sched::Late::stolen)]);
+    state.counters["late_wakeup"] = static_cast<double>(late[int(sched::Late::wakeup)]);
+  }
+}
+
 [[maybe_unused]] const bool registered = [] {
   for (const std::string scene : {"alpha", "socket"})
     for (const int rate : {1000, 4000})
@@ -312,6 +373,15 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
                 ->UseRealTime()
                 ->Unit(benchmark::kSecond);
           }
+  for (const int rate : {1000, 4000})
+    for (const bool loaded : {false, true})
+      benchmark::RegisterBenchmark(
+          ("realtime/arithmetic/" + std::to_string(rate) + "Hz/" + (loaded ? "loaded" : "idle"))
+              .c_str(),
+          arithmetic, rate, loaded)
+          ->Iterations(1)
+          ->UseRealTime()
+          ->Unit(benchmark::kSecond);
   return true;
 }();
 
