@@ -28,6 +28,7 @@ void relax() {
 constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
 
 thread_local int this_is_helper = 0;
+thread_local std::int64_t this_waited = 0;
 
 // The thread belongs to TBB: it gets back what it came with.
 class Treatment {
@@ -165,6 +166,7 @@ FrameTeam::~FrameTeam() {
 unsigned FrameTeam::threads() const { return helper_ ? 2 : 1; }
 
 int FrameTeam::here() { return this_is_helper; }
+std::int64_t FrameTeam::waited_ns() { return this_waited; }
 
 void FrameTeam::set_realtime(int priority, int haptic_core) {
   if (helper_)
@@ -208,7 +210,10 @@ void FrameTeam::run(std::size_t slices, Slice work, void* context) {
   h.ticket.store(Helper::ticket_of(++h.job, slices), std::memory_order_release);
   while (h.work_one(false)) {
   }
+  if (h.done.load(std::memory_order_acquire) == slices) return;
+  const std::int64_t since = now_ns();
   while (h.done.load(std::memory_order_acquire) != slices) relax();
+  this_waited += now_ns() - since;
 }
 
 }  // namespace h6::sched

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sched/frame_team.h"
+
 #include "sched/clock.h"
 
 namespace h6::sched {
@@ -49,13 +51,15 @@ void PeriodicThread::run() {
       more = work_.tick(frame, timing, 0.0);
     } else {
       wait_for(deadline, spin);
-      const std::int64_t cpu_before = thread_cpu_ns();
+      const std::int64_t cpu_before = thread_cpu_ns(), waited_before = FrameTeam::waited_ns();
       const std::int64_t start = now_ns();
       const double wakeup_us = 1e-3 * static_cast<double>(start - deadline);
       more = work_.tick(frame, timing, wakeup_us);
       const std::int64_t end = now_ns();
       const std::int64_t cpu = thread_cpu_ns() - cpu_before;
-      const Late late = cause_of(start - deadline, end - start, cpu, period);
+      // Where the machine has taken the helper's core, this one spins for its slice.
+      const std::int64_t own = cpu - (FrameTeam::waited_ns() - waited_before);
+      const Late late = cause_of(start - deadline, end - start, own, period);
       timing = {wakeup_us, late,
                 late == Late::no ? 0.0 : 1e-3 * static_cast<double>(end - deadline - period),
                 1e-3 * static_cast<double>(cpu)};

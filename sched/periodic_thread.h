@@ -18,7 +18,7 @@ namespace h6::sched {
 // Why a frame ended after its deadline: exactly one cause a late frame.
 enum class Late {
   no,
-  compute,  // the thread's own CPU time was over the period
+  compute,  // the thread's own CPU time, without waiting for a helper, was over the period
   stolen,   // it was not, but the clock was: the machine ran something else
   wakeup,   // the frame was short enough, but began too late
 };

@@ -1,6 +1,7 @@
 // Deadlines are absolute, late frames have one cause, denormals are flushed only in scope.
 #include <doctest/doctest.h>
 
+#include <atomic>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "sched/clock.h"
+#include "sched/frame_team.h"
 #include "sched/periodic_thread.h"
 
 using namespace h6::sched;
@@ -71,6 +73,36 @@ TEST_CASE("a frame that computes too long is late by its own computation; one th
   thread.join();
   CHECK(compute == 1);
   CHECK(stolen == 1);
+}
+
+TEST_CASE("a frame that waits for a helper's slice is not late by its own computation") {
+  FrameTeam team(2);
+  std::atomic<bool> taken{false};
+  int late[4] = {};
+  bool helped = false;
+  PeriodicThreadOptions options;
+  options.rate = 200;  // 5 ms
+  PeriodicThread thread(
+      options, {nullptr,
+                [&](std::uint64_t n, const TickTiming&, double) {
+                  team.begin_frame(now_ns());
+                  taken = false;
+                  team.for_slices(2, [&](std::size_t slice) {
+                    if (slice == 1) taken = true;
+                    if (slice == 1 && FrameTeam::here()) sleep_until_ns(now_ns() + 8000000);
+                    const std::int64_t give_up = now_ns() + 2000000;
+                    while (slice == 0 && !taken && now_ns() < give_up) {
+                    }
+                    if (FrameTeam::here()) helped = true;
+                  });
+                  team.end_frame(now_ns() + 5000000);
+                  return n < 40 && !(helped && n > 0);
+                },
+                [&](std::uint64_t, const TickTiming& t) { ++late[static_cast<int>(t.late)]; }});
+  thread.join();
+  CHECK(helped);
+  CHECK(late[static_cast<int>(Late::compute)] == 0);
+  CHECK(late[static_cast<int>(Late::stolen)] > 0);
 }
 
 TEST_CASE("after a long stall the schedule moves on instead of catching up") {
