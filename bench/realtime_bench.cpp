@@ -224,10 +224,11 @@ void print_late(const h6FrameRecord& row) {
   const char* why = row.late & H6_LATE_COMPUTE  ? "own"
                     : row.late & H6_LATE_STOLEN ? "stolen"
                                                 : "wake-up";
-  std::fprintf(
-      stderr, "frame %llu late by %.0f us (%s): wake-up %.0f wall %.0f cpu %.0f us, %u contacts%s;",
-      static_cast<unsigned long long>(r.frame), row.late_us, why, row.wakeup_us, r.frame_us,
-      row.cpu_us, r.contacts, r.coarse_pairs ? " coarse" : "");
+  std::fprintf(stderr,
+               "frame %llu late by %.0f us (%s): wake-up %.0f wall %.0f cpu %.0f us, %u contacts "
+               "of %u in 16 points;",
+               static_cast<unsigned long long>(r.frame), row.late_us, why, row.wakeup_us,
+               r.frame_us, row.cpu_us, r.contacts, r.coarse_points ? r.coarse_points : 16u);
   for (int i = 0; i < H6_STAGE_COUNT; ++i)
     std::fprintf(stderr, " %s %.0f", h6StageName(static_cast<h6Stage>(i)), r.stage_us[i]);
   std::fprintf(stderr, "; helper %.0f us in %u slices\n", r.helper_us, r.helper_slices);
@@ -237,7 +238,7 @@ void print_late(const h6FrameRecord& row) {
 bool same_again(Scene& scene, double rate, const std::vector<h6FrameRecord>& rows) {
   const Session session = scene.session(rate, 1, false);
   for (const h6FrameRecord& row : rows) {
-    h6SetCoarse(session.get(), row.report.coarse_pairs);
+    h6SetCoarse(session.get(), row.report.coarse_pairs, row.report.coarse_points);
     h6Step(session.get(), row.hand, nullptr);
     if (h6GetFrame(session.get()).state_hash != row.report.state_hash) return false;
   }

@@ -74,6 +74,8 @@ const std::vector<Column>& columns() {
       {"cpu_us", real, 1, offsetof(R, cpu_us), 0, "us", "cpu_us", true},
       {"coarse_pairs", n32, 1, report + offsetof(h6FrameReport, coarse_pairs), 0, "1",
        "coarse_pairs", true},
+      {"coarse_points", n32, 1, report + offsetof(h6FrameReport, coarse_points), 0, "of sixteen",
+       "coarse_points", true},
       {"missed_depth_voxels", real, 1, report + offsetof(h6FrameReport, missed_depth_voxels), 0,
        "voxel", "missed_depth_voxels", true},
       {"status", n32, 1, report + offsetof(h6FrameReport, status), 0, "bits of h6Status",

@@ -1,6 +1,7 @@
 #include "runtime/anytime.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "runtime/session.h"
 #include "sched/clock.h"
@@ -13,39 +14,132 @@ void learn(double& cost, double seen) {
   cost = seen > cost ? std::min(seen, 2 * cost) : cost + 0.005 * (seen - cost);
 }
 
-// Fewer say nothing about the cost of one; coarse frames have a sixteenth.
-constexpr std::size_t kTelling = 64, kTellingCoarse = 32;
-constexpr double kForget = 0.9999, kForgetGuess = 0.999;
-// What a contact of a full frame costs where one of a coarse frame costs 1. In a socket with 9,627
-// contacts, 616 of them in a coarse frame: 2.0 for `robust` (99 and 50 ns), 1.5 for `gauss6`.
-constexpr double kCrowding = 2.0;
-constexpr double kInTime = 0.95;        // of the period: a frame that takes less is not late
-constexpr double kPatience = 30;        // between tries of what does not seem to fit [s]
-constexpr std::uint32_t kSettled = 50;  // coarse frames until their cost is known
+// Fewer say nothing about the cost of one.
+constexpr std::size_t kTelling = 32;
+constexpr double kUnknown = 200;        // ns a contact
+constexpr double kSpare = 0.85;         // of the budget: what a finer tier may take
+constexpr std::uint32_t kCalm = 20;     // frames until a finer tier is allowed
+constexpr std::uint32_t kStrikes = 3;   // until it is not any more
+constexpr std::uint64_t kFresh = 1000;  // frames for which a cost is believed as it is
+// A contact costs more where there are more: at least by so much of the proportion, and 1.25 times
+// what it did so far. In a socket with 9,627 contacts `robust` takes 99 ns for one, with 616 of
+// them 50.
+constexpr double kLeastGrowth = 0.25, kGrowth = 1.25;
+constexpr std::uint32_t kLookEvery = 16;  // frames: how many groups are near
 
 double middle_of(const double (&seen)[3], std::uint32_t count) {
   if (count < 3) return *std::min_element(seen, seen + std::max(count, 1u));
   return std::max(std::min(seen[0], seen[1]), std::min(std::max(seen[0], seen[1]), seen[2]));
 }
 
-// Of a full frame's contact, now [ns].
-double full_contact_ns(const Anytime& a) {
-  if (a.full_frames == 0)
-    return a.coarse_contact_ns > 0 ? kCrowding * a.coarse_contact_ns : a.contact_ns;
-  if (!(a.coarse_then > 0)) return a.contact_ns;
-  return a.contact_ns * std::clamp(a.coarse_contact_ns / a.coarse_then, 0.5, 1.0);
+int size_of(double contacts) {
+  const auto n = static_cast<std::uint32_t>(std::max(contacts, 1.0));
+  return static_cast<int>(std::bit_width(n)) - 1;
 }
 
-// So that what did not fit is tried again, but only where it would not be late.
-void grow_doubtful(h6Session& s) {
-  Anytime& a = s.anytime;
-  if (a.full_frames == 0 && !(a.coarse_contact_ns > 0)) {
-    a.doubt *= kForgetGuess;
-    return;
+// Of one of `contacts`, at most [ns].
+double contact_ns(const Anytime& a, double contacts) {
+  const int size = size_of(contacts);
+  const auto below = [&](int i) {
+    while (--i >= 0 && a.contact[i].times == 0) {
+    }
+    return i;
+  };
+  const Anytime::Cost& same = a.contact[size];
+  const bool known = same.times > 0;
+  const int fewer = below(size);
+  const auto from = [&](const Anytime::Cost& c, int i) {
+    if (contacts <= c.contacts) return c.ns;
+    const double most = c.ns / c.contacts;
+    double growth = most;
+    if (const int before = below(i); before >= 0) {
+      const Anytime::Cost& b = a.contact[before];
+      growth = std::clamp(kGrowth * (c.ns - b.ns) / (c.contacts - b.contacts), kLeastGrowth * most,
+                          most);
+    }
+    return c.ns + growth * (contacts - c.contacts);
+  };
+  if (known && (fewer < 0 || a.frames - same.when < kFresh)) return from(same, size);
+  if (fewer >= 0) {
+    const double bound = from(a.contact[fewer], fewer);
+    return known ? std::min(bound, from(same, size)) : bound;
   }
-  const double period = 1e9 * s.dt;
-  const bool in_time = a.full_ns <= kInTime * period;
-  a.doubt = in_time ? std::max(kForget * a.doubt, std::min(1.0, a.budget_ns / period)) : 1.0;
+  // Fewer than ever: none of them costs more than one of many.
+  for (int i = size + 1; i < Anytime::kSizes; ++i)
+    if (a.contact[i].times > 0) return a.contact[i].ns;
+  return kUnknown;
+}
+
+double elapsed_ns(const Anytime& a) { return static_cast<double>(sched::now_ns() - a.start); }
+
+// What a frame takes from its beginning when this pair and all that follow (as they were last) are
+// traversed in `tier`.
+struct Ahead {
+  double elapsed, used;
+  double blocks = 0, groups = 0;
+};
+
+Ahead look_ahead(const h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks,
+                 double groups) {
+  Ahead ahead{elapsed_ns(s.anytime), static_cast<double>(used), static_cast<double>(blocks),
+              groups};
+  for (std::size_t p = pair + 1; p < s.pair_count; ++p) {
+    ahead.blocks += static_cast<double>(s.pairs[p].open_blocks);
+    ahead.groups += static_cast<double>(s.pairs[p].open_groups);
+  }
+  return ahead;
+}
+
+double foresee(const Anytime& a, const Ahead& ahead, int tier) {
+  const double share = static_cast<double>(1 << tier) / 16;
+  const double sampled = tier == Anytime::kAll ? ahead.groups : 16 * share * ahead.blocks;
+  const double contacts = ahead.used + ahead.groups * a.contacts_per_group * share;
+  return ahead.elapsed + sampled * a.group_ns + contacts * contact_ns(a, contacts) + a.rest_ns;
+}
+
+// The finest tier for the rest of the frame.
+int choose(Anytime& a, const Ahead& ahead) {
+  // Where nothing is known, from below: on the way up each size's cost is seen.
+  if (!a.begun && ahead.groups > 0) {
+    a.begun = true;
+    if (foresee(a, ahead, Anytime::kAll) > kSpare * a.budget_ns) a.finest = 0;
+  }
+  int fits = std::min(a.finest + 1, Anytime::kAll);
+  while (fits > 0 && foresee(a, ahead, fits) > kSpare * a.budget_ns) --fits;
+  a.fitting = std::min(a.fitting, fits);
+  int tier = a.finest;
+  while (tier > 0 && tier > fits && foresee(a, ahead, tier) > a.budget_ns) --tier;
+  return tier;
+}
+
+void become_coarse(h6Session& s, std::size_t pair, int tier) {
+  s.anytime.coarse = true;
+  s.anytime.tier = tier;
+  s.report.coarse_pairs = static_cast<std::uint32_t>(s.pair_count - pair);
+  s.report.coarse_points = 1u << tier;
+  s.report.status |= H6_COARSE;
+}
+
+bool decide(h6Session& s, const Ahead& ahead, std::size_t pair) {
+  const int tier = choose(s.anytime, ahead);
+  if (tier < Anytime::kAll) become_coarse(s, pair, tier);
+  return s.anytime.coarse;
+}
+
+void learn_contacts(Anytime& a, double contacts, double spent) {
+  if (contacts < kTelling) return;
+  Anytime::Cost& c = a.contact[size_of(contacts)];
+  if (a.frames - c.when >= kFresh) c.times = 0;  // what was known before is out of date
+  c.seen[2] = c.seen[1], c.seen[1] = c.seen[0], c.seen[0] = spent / contacts;
+  const bool first = c.times < 3;
+  c.times = std::min(c.times + 1, 3u);
+  // One frame in three may have been robbed of its time.
+  const double now = middle_of(c.seen, c.times);
+  if (first)
+    c.ns = now, c.contacts = contacts;
+  else
+    learn(c.ns, now), c.contacts += 0.1 * (contacts - c.contacts);
+  c.when = a.frames;
 }
 
 }  // namespace
@@ -53,86 +147,82 @@ void grow_doubtful(h6Session& s) {
 void begin_anytime(h6Session& s, std::int64_t start) {
   Anytime& a = s.anytime;
   a.start = start;
-  a.coarse = a.trying = false;
+  a.coarse = false;
+  a.fitting = Anytime::kAll;
   a.by_clock = a.forced == Anytime::kByClock && a.budget_ns > 0 && !a.no_clock;
   if (a.forced == Anytime::kByClock) return;
-  s.report.coarse_pairs = static_cast<std::uint32_t>(std::min<std::size_t>(a.forced, s.pair_count));
-  if (s.report.coarse_pairs > 0) s.report.status |= H6_COARSE;
+  const std::size_t pairs = std::min<std::size_t>(a.forced, s.pair_count);
+  if (pairs > 0) become_coarse(s, s.pair_count - pairs, std::bit_width(a.forced_points) - 1);
+  a.coarse = false;  // pair by pair
   a.forced = Anytime::kByClock;
 }
 
-bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t groups) {
-  Anytime& a = s.anytime;
+bool is_coarse_anyway(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks) {
+  const Anytime& a = s.anytime;
   if (!a.by_clock) return pair + s.report.coarse_pairs >= s.pair_count;
   if (a.coarse) return true;
-  if (a.trying) return false;
-  const double n = static_cast<double>(groups);
-  const double contacts = static_cast<double>(used) + n * a.contacts_per_group;
-  const double elapsed = static_cast<double>(sched::now_ns() - a.start);
-  a.full_ns = elapsed + n * a.group_ns + contacts * full_contact_ns(a) + a.rest_ns;
-  if (a.full_ns * a.doubt <= a.budget_ns) return false;
-  const bool may_fit = 0.5 * a.full_ns <= a.budget_ns;  // if what was learnt was a bad day
-  a.trying = may_fit && groups > 0 && a.next_try > 0 && a.coarse_frames >= a.next_try;
-  if (a.trying) return false;
-  a.coarse = true;
-  s.report.coarse_pairs = static_cast<std::uint32_t>(s.pair_count - pair);
-  s.report.status |= H6_COARSE;
+  Pair& p = s.pairs[pair];
+  if (a.finest == Anytime::kAll || p.open_blocks == 0 || a.frames % kLookEvery == 0) return false;
+  const double each = static_cast<double>(p.open_groups) / static_cast<double>(p.open_blocks);
+  return decide(s, look_ahead(s, pair, used, blocks, each * static_cast<double>(blocks)), pair);
+}
+
+bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks,
+                    std::size_t groups) {
+  Pair& p = s.pairs[pair];
+  p.open_blocks = blocks, p.open_groups = groups;
+  if (!s.anytime.by_clock) return false;
+  return decide(s, look_ahead(s, pair, used, blocks, static_cast<double>(groups)), pair);
+}
+
+bool must_be_coarser(h6Session& s, std::size_t pair, std::size_t used, std::size_t found,
+                     std::size_t blocks) {
+  Anytime& a = s.anytime;
+  const int tier = a.coarse ? a.tier : Anytime::kAll;
+  // All coarse pairs of a frame are so in the same tier.
+  if (!a.by_clock || tier == 0 || (a.coarse && pair + s.report.coarse_pairs != s.pair_count))
+    return false;
+  const double most = 0.5 * (a.budget_ns + 1e9 * s.dt), n = static_cast<double>(used + found);
+  const double elapsed = elapsed_ns(a);
+  if (elapsed + n * contact_ns(a, n) + a.rest_ns <= most) return false;
+  int coarser = tier;
+  double ahead;
+  do {
+    --coarser;
+    const double share = static_cast<double>(1 << coarser) / (1 << tier);
+    const double left = static_cast<double>(used) + share * static_cast<double>(found);
+    ahead = elapsed + (1 << coarser) * static_cast<double>(blocks) * a.group_ns +
+            left * contact_ns(a, left) + a.rest_ns;
+  } while (coarser > 0 && ahead > most);
+  become_coarse(s, pair, coarser);
   return true;
 }
 
-void learn_sampling(h6Session& s, std::size_t groups, std::size_t found, std::int64_t since) {
+void learn_sampling(h6Session& s, std::size_t groups, std::size_t near, std::size_t found,
+                    std::int64_t since) {
   Anytime& a = s.anytime;
-  if (!a.by_clock || groups < kTelling) return;
-  const double n = static_cast<double>(groups);
-  learn(a.group_ns, static_cast<double>(sched::now_ns() - since) / n);
-  learn(a.contacts_per_group, static_cast<double>(found) / n);
-}
-
-// One point of a group was looked at instead of sixteen.
-void learn_coarsely(h6Session& s, std::size_t groups, std::size_t found) {
-  Anytime& a = s.anytime;
-  if (!a.by_clock || groups < kTelling) return;
-  learn(a.contacts_per_group, 16 * static_cast<double>(found) / static_cast<double>(groups));
+  if (!a.by_clock || groups < kTelling || near < kTelling) return;
+  learn(a.group_ns, static_cast<double>(sched::now_ns() - since) / static_cast<double>(groups));
+  const double all = a.coarse ? static_cast<double>(found << (Anytime::kAll - a.tier))
+                              : static_cast<double>(found);
+  learn(a.contacts_per_group, all / static_cast<double>(near));
 }
 
 void learn_frame(h6Session& s) {
   Anytime& a = s.anytime;
   if (!a.by_clock) return;
+  ++a.frames;
   const double* us = s.report.stage_us;
   learn(a.rest_ns, 1e3 * (us[H6_STAGE_COUPLING] + us[H6_STAGE_INTEGRATE] + us[H6_STAGE_OUTPUT]));
-  const double spent = 1e3 * (us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH]);
-  if (a.coarse) {
-    ++a.coarse_frames;
-    if (s.report.contacts >= kTellingCoarse) {
-      const double each = spent / s.report.contacts;
-      double& cost = a.coarse_contact_ns;
-      cost = cost > 0 ? cost + 0.02 * (std::min(each, 2 * cost) - cost) : each;
-      if (!(a.coarse_then > 0) && a.full_frames > 0 && a.coarse_frames >= kSettled)
-        a.coarse_then = cost;
-    }
-    a.group_ns = std::max(10.0, a.group_ns * kForget);
-    if (a.next_try == 0) a.next_try = static_cast<std::uint64_t>(kPatience / s.dt);
-    grow_doubtful(s);
-    return;
-  }
-  if (a.trying) {
-    const bool late = static_cast<double>(sched::now_ns() - a.start) > 1e9 * s.dt;
-    a.in_vain = late ? std::min(a.in_vain + 1, 10u) : 0;
-    if (!late) a.full_frames = 0;  // what was known before is out of date
-    a.next_try = static_cast<std::uint64_t>(kPatience / s.dt) << a.in_vain;
-  }
-  a.doubt = 1;
-  a.coarse_frames = 0;
-  if (s.report.contacts < kTelling) return;
-  const double now = spent / s.report.contacts;
-  a.seen[2] = a.seen[1], a.seen[1] = a.seen[0], a.seen[0] = now;
-  // One frame in three may have been robbed of its time.
-  if (a.full_frames == 0)
-    a.contact_ns = now;
-  else
-    learn(a.contact_ns, middle_of(a.seen, std::min(a.full_frames + 1, 3u)));
-  a.full_frames = std::min(a.full_frames + 1, 3u);
-  a.coarse_then = a.coarse_contact_ns;
+  std::size_t contacts = 0;
+  for (std::size_t p = 0; p < s.pair_count; ++p) contacts += s.pairs[p].candidates;
+  learn_contacts(a, static_cast<double>(contacts),
+                 1e3 * (us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH]));
+  const int tier = a.coarse ? a.tier : Anytime::kAll;
+  a.calm = a.fitting > a.finest ? a.calm + 1 : 0;
+  a.strikes = tier < a.finest ? a.strikes + 1 : 0;
+  if (a.strikes >= kStrikes) a.finest = tier, a.strikes = 0;
+  if (a.calm >= kCalm) ++a.finest, a.calm = 0;
 }
 
 }  // namespace h6

@@ -1,11 +1,11 @@
 // anytime.h - what of a frame's traversal to leave out so that the frame ends in time.
 //
-//   elapsed + groups to sample + contacts to weigh + the rest  >  budget:  one point in sixteen
+//   elapsed + groups to sample + contacts to weigh + the rest  <=  budget
 //
-// Costs are learnt from the frames before. What a full frame costs is only seen in one, and to try
-// one means to be late where it does not fit. So it is tried where the last ones fitted into the
-// period, if not into the budget, or coarse frames say that the machine has become faster; else
-// once in half a minute, and half as often each time that it was in vain.
+// Of each group of sixteen points one, two, four, eight or all are looked at: the finest tier that
+// keeps this. Costs are learnt from the frames before, as what few of them exceed. A contact costs
+// more the more there are, at most in proportion; so what a tier costs that was not seen lately is
+// bounded by what the next coarser one does, and no frame is late for having been tried.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -16,37 +16,48 @@ namespace h6 {
 
 struct Anytime {
   static constexpr std::uint32_t kByClock = UINT32_MAX;
-  double budget_ns = 0;             // from the start of a step; 0: none
-  bool no_clock = false;            // virtual time: frames have no deadline
-  std::uint32_t forced = kByClock;  // coarse pairs of the next step, whatever the clock says
+  static constexpr int kAll = 4;     // tier t looks at 2^t points of sixteen
+  static constexpr int kSizes = 32;  // of frames: 2^i contacts and more
+  double budget_ns = 0;              // from the start of a step; 0: none
+  bool no_clock = false;             // virtual time: frames have no deadline
+  std::uint32_t forced = kByClock;   // coarse pairs of the next step, whatever the clock says
+  std::uint32_t forced_points = 1;   // of sixteen, in those
   // Of this frame.
   std::int64_t start = 0;
   bool by_clock = false, coarse = false;
-  bool trying = false;  // it seems not to fit, and is not coarse all the same
-  double full_ns = 0;   // what a full one would take
+  int tier = 0;        // of its coarse pairs
+  int fitting = kAll;  // the finest that would have fitted with something to spare
   // Learnt. Where nothing is known yet, what a slow machine takes.
-  double group_ns = 60;           // to sample a group of points
+  double group_ns = 60;           // to sample sixteen points
   double contacts_per_group = 4;  // of those that are sampled
-  double contact_ns = 200;        // to make a contact, weigh it and sum it up, in a full frame
   double rest_ns = 3000;          // coupling, step, output
-  // Contacts of a coarse frame are fewer, and cheaper each.
-  double coarse_contact_ns = 0;  // 0: none seen
-  double coarse_then = 0;        // what that was when a full frame was seen last
-  double seen[3] = {};           // contact_ns of the last full frames, newest first
-  std::uint32_t full_frames = 0;
-  double doubt = 1;  // while frames are coarse: so much of the estimate is believed
-  std::uint64_t coarse_frames = 0, next_try = 0;  // in a row; when to try one all the same
-  std::uint32_t in_vain = 0;                      // tries
+  // To make a contact, weigh it and sum it up, in frames of one size.
+  struct Cost {
+    double contacts = 0, ns = 0;  // so many, each
+    double seen[3] = {};          // newest first
+    std::uint32_t times = 0;
+    std::uint64_t when = 0;  // frame that was last of that size
+  } contact[kSizes];
+  std::uint64_t frames = 0;
+  bool begun = false;                   // something was decided
+  int finest = kAll;                    // tier that is allowed
+  std::uint32_t calm = 0, strikes = 0;  // frames in a row that would allow more, or less
 };
 
 void begin_anytime(h6Session& s, std::int64_t start);
-// Is pair `pair` to be traversed coarsely? `used` contacts were found before it, `groups` of its
-// own are yet to be sampled (0: not known yet). Once it is so, it stays so for the frame.
-bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t groups);
-// What a pair took, and what the frame did.
-void learn_sampling(h6Session& s, std::size_t groups, std::size_t found, std::int64_t since);
-// The same of a pair that was traversed coarsely, `groups` of which were to be sampled.
-void learn_coarsely(h6Session& s, std::size_t groups, std::size_t found);
+// Is pair `pair` to be traversed coarsely, in anytime.tier? `used` contacts were found before it,
+// `blocks` of its own are open. Once it is so, it stays so for the frame. The first is asked before
+// its groups are looked at, the second when `groups` of them are known to be near.
+bool is_coarse_anyway(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks);
+bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks,
+                    std::size_t groups);
+// `found` contacts are more than there is time for: anytime.tier is coarser now, do it again.
+bool must_be_coarser(h6Session& s, std::size_t pair, std::size_t used, std::size_t found,
+                     std::size_t blocks);
+// What a pair took to sample `groups` (sixteen points each), of `near` in all, and what the frame
+// did.
+void learn_sampling(h6Session& s, std::size_t groups, std::size_t near, std::size_t found,
+                    std::int64_t since);
 void learn_frame(h6Session& s);
 
 }  // namespace h6

@@ -74,7 +74,10 @@ h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceComma
   return frame(*session, samples, commands);
 }
 
-void h6SetCoarse(h6Session* session, uint32_t pairs) { session->anytime.forced = pairs; }
+void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points) {
+  session->anytime.forced = pairs;
+  session->anytime.forced_points = points >= 8 ? 8 : points >= 4 ? 4 : points >= 2 ? 2 : 1;
+}
 
 h6BodyState h6GetBody(const h6Session* session, int32_t index) {
   H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->body_count);

@@ -22,9 +22,9 @@ constexpr std::size_t kSlice = 64;           // groups sampled at a time: some 2
 constexpr std::size_t kWorthSharing = 256;   // groups from which the helper is asked: some 8 us
 constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which pairs are shared out
 constexpr std::size_t kPairSlices = 32;
-constexpr float kSlack = 1e-3f;              // [voxel]
-constexpr std::size_t kFewGroups = 4;        // of a block: looked at sooner than the block's sphere
-constexpr double kLongestWay = 256;          // [voxel] float has 3e-5 left there
+constexpr float kSlack = 1e-3f;        // [voxel]
+constexpr std::size_t kFewGroups = 4;  // of a block: looked at sooner than the block's sphere
+constexpr double kLongestWay = 256;    // [voxel] float has 3e-5 left there
 
 // Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
 kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
@@ -103,26 +103,35 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
-  // The sample of each of the blocks' groups; `out` names rows of the shell as ever.
-  std::size_t touch_samples(const std::uint32_t* blocks, std::size_t count,
+  // Samples that stand in `vectors`; `out` names rows of the shell as ever.
+  std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
                             const kernels::Touching& out, float* least) const {
     const Samples& samples = shell.samples;
     const std::size_t found = kernels::touch_groups(
-        field, place, {samples.x.data, samples.y.data, samples.z.data, shell.groups.count}, blocks,
+        field, place, {samples.x.data, samples.y.data, samples.z.data, samples.x.count}, vectors,
         count, margin, out, least);
-    for (std::size_t k = 0; k < found; ++k) out.row[k] = samples.row[out.row[k]];
-    return found;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < found; ++k) {
+      const std::uint32_t row = samples.row[out.row[k]];
+      if (row == Samples::kNoRow) continue;
+      if (kept != k) {
+        out.distance[kept] = out.distance[k];
+        out.gx[kept] = out.gx[k], out.gy[kept] = out.gy[k], out.gz[kept] = out.gz[k];
+      }
+      out.row[kept++] = row;
+    }
+    return kept;
   }
-  std::size_t touch(const std::uint32_t* groups, std::size_t count,
-                    const kernels::Touching& out, float* least) const {
+  std::size_t touch(const std::uint32_t* groups, std::size_t count, const kernels::Touching& out,
+                    float* least) const {
     return kernels::touch_groups(field, place,
                                  {shell.x.data, shell.y.data, shell.z.data, shell.points}, groups,
                                  count, margin, out, least);
   }
 };
 
-// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`. `alone`: this is
-// a slice itself.
+// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`. `alone`: this
+// is a slice itself.
 std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::size_t count,
                   std::size_t used, bool alone) {
   if (alone || count < kWorthSharing || s.team->threads() == 1)
@@ -178,16 +187,31 @@ float travel(Pair& pair, const Search& search) {
   return static_cast<float>(pair.travelled);
 }
 
-// One point of each group of `blocks` blocks, and how deep any of the others may be.
-std::size_t touch_coarsely(Pair& pair, TraverseScratch& t, const Search& search,
+// Some points of each group of `blocks` blocks, and how deep any of the others may be. Again, with
+// fewer, where they are more contacts than there is time for.
+std::size_t touch_coarsely(h6Session& s, Pair& pair, TraverseScratch& t, const Search& search,
                            std::size_t blocks, std::size_t used) {
-  const std::size_t found =
-      search.touch_samples(t.open_blocks, blocks, candidates_from(t, used), t.clearance);
-  for (std::size_t k = 0; k < blocks; ++k) {
-    const float reach = search.scale * search.shell.samples.reach[t.open_blocks[k]];
-    // The long form: cells far inside hold no samples.
-    pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - t.clearance[k]);
-  }
+  const auto number = static_cast<std::size_t>(&pair - s.pairs);
+  const Samples& samples = search.shell.samples;
+  std::size_t found;
+  do {
+    const int tier = s.anytime.tier;
+    const std::size_t each = std::size_t{1} << tier;
+    for (std::size_t k = 0; k < blocks; ++k)
+      for (std::size_t j = 0; j < each; ++j)
+        t.frontier[k * each + j] =
+            static_cast<std::uint32_t>(t.open_blocks[k] * Samples::kOfGroup + j);
+    const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
+    found = search.touch_samples(t.frontier, blocks * each, candidates_from(t, used), t.clearance);
+    learn_sampling(s, blocks * each, pair.open_groups, found, since);
+    pair.missed = 0;
+    for (std::size_t k = 0; k < blocks; ++k) {
+      const float reach = search.scale * samples.reach[tier][t.open_blocks[k]];
+      const float least = *std::min_element(t.clearance + k * each, t.clearance + (k + 1) * each);
+      // The long form: cells far inside hold no samples.
+      pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - least);
+    }
+  } while (must_be_coarser(s, number, used, found, blocks));
   return found;
 }
 
@@ -201,14 +225,18 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   const Field& field = s.model->fields[b.field];
   const float margin = margin_of(s);
   // The short form of culling is proved up to half a voxel of margin.
-  const Search search{field.view, shell, shell_to_field(a, shell, b, field),
-                      static_cast<float>(1.0 / field.voxel), field.wide || margin > 0.5f, margin};
+  const Search search{field.view,
+                      shell,
+                      shell_to_field(a, shell, b, field),
+                      static_cast<float>(1.0 / field.voxel),
+                      field.wide || margin > 0.5f,
+                      margin};
   const float now = travel(pair, search);
   pair.sampled = 0;
   pair.missed = 0;
 
-  std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now,
-                                        t.open_blocks);
+  std::size_t blocks =
+      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, t.open_blocks);
   if (blocks == 0) return 0;
   const auto expired_groups = [&] {
     return kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
@@ -225,7 +253,8 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     count = expired_groups();
   }
   const auto number = static_cast<std::size_t>(&pair - s.pairs);
-  if (must_be_coarse(s, number, used, 0)) return touch_coarsely(pair, t, search, blocks, used);
+  if (is_coarse_anyway(s, number, used, blocks))
+    return touch_coarsely(s, pair, t, search, blocks, used);
   const std::size_t groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
   for (std::size_t k = 0; k < count; ++k)
     pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
@@ -233,15 +262,17 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   for (std::size_t k = 0; k < groups; ++k)
     for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
       __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
-  if (must_be_coarse(s, number, used, groups)) {
+  if (must_be_coarse(s, number, used, blocks, groups)) {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
-    const std::size_t found = touch_coarsely(pair, t, search, blocks, used);
-    learn_coarsely(s, groups, found);
-    return found;
+    return touch_coarsely(s, pair, t, search, blocks, used);
   }
   const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(s, t, search, groups, used, alone);
-  if (s.anytime.by_clock) learn_sampling(s, groups, found, since);
+  learn_sampling(s, groups, groups, found, since);
+  if (must_be_coarser(s, number, used, found, blocks)) {
+    kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
+    return touch_coarsely(s, pair, t, search, blocks, used);
+  }
   pair.sampled = groups;
   for (std::size_t k = 0; k < groups; ++k)
     pair.group_expiry[t.survivors[k]] =
@@ -320,8 +351,8 @@ bool worth_sharing(const h6Session& s, const Body& a, std::size_t first_pair,
   return most < kWorthSharing || 2 * most <= all;
 }
 
-// Every thread fills its own scratch; joined in the order of pairs. False: there is no room, as only
-// where contacts will be dropped. Nothing is lost by then doing it again: expiries stay true.
+// Every thread fills its own scratch; joined in the order of pairs. False: there is no room, as
+// only where contacts will be dropped. Nothing is lost by then doing it again: expiries stay true.
 bool traverse_shared(h6Session& s, std::size_t first_pair, std::size_t end_pair,
                      std::size_t* used) {
   TraverseScratch &mine = s.traversal[0], &helpers = s.traversal[1];
@@ -363,8 +394,8 @@ void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   const bool timed = s.traversal[1].candidate && end_pair - first_pair > 1;
   const std::int64_t since = timed ? sched::now_ns() : 0;
   std::size_t used = 0;
-  a.pairs_shared = worth_sharing(s, a, first_pair, end_pair) &&
-                   traverse_shared(s, first_pair, end_pair, &used);
+  a.pairs_shared =
+      worth_sharing(s, a, first_pair, end_pair) && traverse_shared(s, first_pair, end_pair, &used);
   if (!a.pairs_shared) used = traverse_in_order(s, first_pair, end_pair, most);
   if (used > most) {
     keep_deepest(s, used, most, s.pairs + first_pair, end_pair - first_pair);
@@ -395,12 +426,12 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
     }
     for (int k = 0; k < 3; ++k) frame.arm[k] = static_cast<float>(arm[k]);
     frame.voxel = static_cast<float>(field.voxel);
-    kernels::make_contacts({shell.x.data, shell.y.data, shell.z.data, shell.nx.data, shell.ny.data,
-                            shell.nz.data, shell.point.data},
-                           candidates_from(s.traversal[0], pair.first), pair.candidates, frame,
-                           {c.depth + first, c.nx + first, c.ny + first, c.nz + first,
-                            c.gx + first, c.gy + first, c.gz + first, c.rx + first, c.ry + first,
-                            c.rz + first, c.point + first});
+    kernels::make_contacts(
+        {shell.x.data, shell.y.data, shell.z.data, shell.nx.data, shell.ny.data, shell.nz.data,
+         shell.point.data},
+        candidates_from(s.traversal[0], pair.first), pair.candidates, frame,
+        {c.depth + first, c.nx + first, c.ny + first, c.nz + first, c.gx + first, c.gy + first,
+         c.gz + first, c.rx + first, c.ry + first, c.rz + first, c.point + first});
     c.count += pair.candidates;
     if (pair.candidates > 0) pair.arms = arms_to_field(a, b, field);
     pair.begin = first;

@@ -36,20 +36,27 @@ struct Tier {
   Column<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
 };
 
-// One point of each group, the nearest to its centre: what is sampled where time is short.
+// Eight points of each group: what is sampled where time is short. The first is the nearest to the
+// group's centre, each of the others the farthest from those before it. The first points of a
+// block's groups stand next to each other, then their second ones: vector 8 b + j has those of
+// block b. Where a group has fewer, its last point stands there again, with kNoRow.
 struct Samples {
-  Column<float> x, y, z;      // (groups, rounded up to whole blocks)
+  static constexpr std::size_t kOfGroup = 8;
+  static constexpr int kTiers = 4;  // the first 1, 2, 4, 8 of them
+  static constexpr std::uint32_t kNoRow = UINT32_MAX;
+  Column<float> x, y, z;      // (8 vectors of 16 a block)
   Column<std::uint32_t> row;  // of the shell
-  Column<float> reach;        // (blocks) from a group's sample to its farthest point, the longest
+  Column<float>
+      reach[kTiers];  // (blocks) from a point of a group to its nearest sample, the longest
 };
 
 // A shell's points in three flat tiers. Rows are sorted so that those next to each other are near
 // each other (split at medians): 16 rows are a group, 16 groups a block, each with its smallest
 // sphere. Coordinates are relative to `centre`, so that float serves meshes far from their origin.
 struct Shell {
-  Vec3 centre;             // mesh frame [m]
-  double radius = 0;       // farthest point from the centre [m]
-  std::size_t points = 0;  // rows; columns repeat the last one up to a whole block
+  Vec3 centre;                        // mesh frame [m]
+  double radius = 0;                  // farthest point from the centre [m]
+  std::size_t points = 0;             // rows; columns repeat the last one up to a whole block
   Column<float> x, y, z, nx, ny, nz;  // normals point inward
   Column<std::uint32_t> point;        // of the definition
   Tier groups, blocks;

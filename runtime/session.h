@@ -72,6 +72,7 @@ struct Pair {
   float *group_expiry = nullptr, *block_expiry = nullptr;
   double travelled = -1;         // < 0: nothing is known
   std::size_t sampled = 0;       // groups, when it was last traversed
+  std::size_t open_blocks = 0, open_groups = 0;  // near, when groups were last looked at
   int found_by = 0;              // whose scratch holds its candidates
   float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed

@@ -1,6 +1,7 @@
 // shell.cpp - checks a shell and its tree, and lays its points out for traversal. METHOD.md,
 // Sec. 6.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -131,8 +132,7 @@ void enclose(const Shell& shell, std::size_t begin, std::size_t end, Tier& tier,
   const Eigen::Vector3f f = c.cast<float>();
   double radius = 0;
   for (std::size_t i = begin; i < end; ++i)
-    radius = std::max(
-        radius, (Vec3(shell.x[i], shell.y[i], shell.z[i]) - f.cast<double>()).norm());
+    radius = std::max(radius, (Vec3(shell.x[i], shell.y[i], shell.z[i]) - f.cast<double>()).norm());
   tier.x[at] = f.x(), tier.y[at] = f.y(), tier.z[at] = f.z();
   tier.radius[at] = static_cast<float>(radius * 1.000001);
 }
@@ -146,21 +146,34 @@ void make_tier(const Shell& shell, std::size_t rows, Tier& tier) {
 }
 
 void take_samples(const Shell& shell, Samples& samples) {
-  std::fill_n(samples.reach.data, shell.blocks.count, 0.0f);
+  for (Column<float>& reach : samples.reach) std::fill_n(reach.data, shell.blocks.count, 0.0f);
   const auto place = [&](std::size_t r) { return Vec3(shell.x[r], shell.y[r], shell.z[r]); };
-  for (std::size_t g = 0; g < samples.x.count; ++g) {
+  for (std::size_t g = 0; g < shell.blocks.count * kGroupRows; ++g) {
     const std::size_t group = std::min(g, shell.groups.count - 1), first = group * kGroupRows;
-    const std::size_t end = std::min(first + kGroupRows, shell.points);
+    const std::size_t rows = std::min(kGroupRows, shell.points - first), block = g / kGroupRows;
     const Vec3 centre(shell.groups.x[group], shell.groups.y[group], shell.groups.z[group]);
-    std::size_t nearest = first;
-    for (std::size_t r = first; r < end; ++r)
-      if ((place(r) - centre).squaredNorm() < (place(nearest) - centre).squaredNorm()) nearest = r;
-    samples.row[g] = static_cast<std::uint32_t>(nearest);
-    samples.x[g] = shell.x[nearest], samples.y[g] = shell.y[nearest];
-    samples.z[g] = shell.z[nearest];
-    float& reach = samples.reach[g / kGroupRows];
-    for (std::size_t r = first; r < end; ++r)
-      reach = std::max(reach, static_cast<float>((place(r) - place(nearest)).norm() * 1.000001));
+    double gap[kGroupRows];  // of each point to the nearest sample
+    std::size_t next = first;
+    for (std::size_t i = 0; i < rows; ++i) {
+      gap[i] = HUGE_VAL;
+      if ((place(first + i) - centre).squaredNorm() < (place(next) - centre).squaredNorm())
+        next = first + i;
+    }
+    for (std::size_t j = 0; j < Samples::kOfGroup; ++j) {
+      const std::size_t at = (block * Samples::kOfGroup + j) * kGroupRows + g % kGroupRows;
+      const bool is_one = g < shell.groups.count && j < rows;
+      samples.row[at] = is_one ? static_cast<std::uint32_t>(next) : Samples::kNoRow;
+      samples.x[at] = shell.x[next], samples.y[at] = shell.y[next], samples.z[at] = shell.z[next];
+      const Vec3 sample = place(next);
+      double farthest = -1;
+      for (std::size_t i = 0; i < rows; ++i) {
+        gap[i] = std::min(gap[i], (place(first + i) - sample).norm());
+        if (gap[i] > farthest) farthest = gap[i], next = first + i;
+      }
+      if (!std::has_single_bit(j + 1)) continue;
+      float& reach = samples.reach[std::bit_width(j)][block];
+      reach = std::max(reach, static_cast<float>(farthest * 1.000001));
+    }
   }
 }
 
@@ -177,9 +190,9 @@ void lay_out(Shell& shell, Arena& arena) {
   shell.point.take(arena, padded);
   Samples& samples = shell.samples;
   for (Column<float>* column : {&samples.x, &samples.y, &samples.z})
-    column->take(arena, shell.blocks.count * kGroupRows);
-  samples.row.take(arena, shell.blocks.count * kGroupRows);
-  samples.reach.take(arena, shell.blocks.count);
+    column->take(arena, shell.blocks.count * kGroupRows * Samples::kOfGroup);
+  samples.row.take(arena, shell.blocks.count * kGroupRows * Samples::kOfGroup);
+  for (Column<float>& reach : samples.reach) reach.take(arena, shell.blocks.count);
 }
 
 }  // namespace

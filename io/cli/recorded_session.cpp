@@ -124,7 +124,8 @@ Result<const h6FrameRecord*> RecordedSession::step(const h6FrameRecord& recorded
   now_.time = recorded.time;
   now_.settings = recorded.settings;
   std::copy(std::begin(recorded.hand), std::end(recorded.hand), now_.hand);
-  h6SetCoarse(session_.get(), recorded.report.coarse_pairs);  // what the clock decided then
+  // What the clock decided then.
+  h6SetCoarse(session_.get(), recorded.report.coarse_pairs, recorded.report.coarse_points);
   h6Step(session_.get(), now_.hand, now_.command);
   now_.report = h6GetFrame(session_.get());
   for (std::size_t h = 0; h < hands_; ++h) {

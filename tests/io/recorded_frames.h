@@ -74,6 +74,7 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
   fill(&r.late_us, 1);
   fill(&r.cpu_us, 1);
   r.report.coarse_pairs = natural();
+  r.report.coarse_points = natural();
   r.settings = natural();
   fill(&r.report.missed_depth_voxels, 1);
   for (std::size_t h = 0; h < hands; ++h) {
@@ -98,7 +99,8 @@ inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
   const auto equal = [](const auto& x, const auto& y) { return !std::memcmp(&x, &y, sizeof x); };
   bool all = equal(a.time, b.time) && equal(a.wakeup_us, b.wakeup_us) && a.late == b.late &&
              equal(a.late_us, b.late_us) && equal(a.cpu_us, b.cpu_us) &&
-             a.report.coarse_pairs == b.report.coarse_pairs && a.settings == b.settings &&
+             a.report.coarse_pairs == b.report.coarse_pairs &&
+             a.report.coarse_points == b.report.coarse_points && a.settings == b.settings &&
              equal(a.report.missed_depth_voxels, b.report.missed_depth_voxels) &&
              a.report.frame == b.report.frame && a.report.status == b.report.status &&
              a.report.contacts == b.report.contacts &&

@@ -60,33 +60,71 @@ struct ThreeBowls : BallInBowl {
 }  // namespace
 
 TEST_CASE("a coarse frame has some of the full frame's contacts and bounds all it left out") {
-  BallInBowl full(1), coarse(1);
+  BallInBowl full(1);
   full.open();
-  coarse.open();
-  double tightest = HUGE_VAL;
-  for (int i = 0; i < 60; ++i) {
-    CAPTURE(i);
-    h6SetCoarse(coarse.session, 1);
-    step_at(full.session, somewhere(i));
-    step_at(coarse.session, somewhere(i));
-    const h6FrameReport f = h6GetFrame(full.session), c = h6GetFrame(coarse.session);
-    CHECK((f.status & H6_COARSE) == 0);
-    CHECK(f.coarse_pairs == 0);
-    CHECK(f.missed_depth_voxels == 0);
-    CHECK((c.status & H6_COARSE) != 0);
-    CHECK(c.coarse_pairs == 1);
-    const auto all = depths(full.session), some = depths(coarse.session);
-    REQUIRE(all.size() > 100);
-    CHECK(some.size() < all.size() / 8);
-    CHECK(some.size() > all.size() / 32);
-    for (const auto& [point, depth] : some) {
-      REQUIRE(all.count(point) == 1);
-      CHECK(all.at(point) == depth);
+  std::map<int, double> bound;  // of what is left out, over the deepest there is [voxel]
+  std::map<std::uint32_t, std::uint32_t> fewer[60];
+  for (const std::uint32_t points : {1u, 2u, 4u, 8u}) {
+    BallInBowl coarse(1);
+    coarse.open();
+    double tightest = HUGE_VAL;
+    for (int i = 0; i < 60; ++i) {
+      CAPTURE(points);
+      CAPTURE(i);
+      h6SetCoarse(coarse.session, 1, points);
+      step_at(full.session, somewhere(i));
+      step_at(coarse.session, somewhere(i));
+      const h6FrameReport f = h6GetFrame(full.session), c = h6GetFrame(coarse.session);
+      CHECK((f.status & H6_COARSE) == 0);
+      CHECK(f.coarse_pairs == 0);
+      CHECK(f.coarse_points == 0);
+      CHECK(f.missed_depth_voxels == 0);
+      CHECK((c.status & H6_COARSE) != 0);
+      CHECK(c.coarse_pairs == 1);
+      CHECK(c.coarse_points == points);
+      const auto all = depths(full.session), some = depths(coarse.session);
+      REQUIRE(all.size() > 100);
+      CHECK(some.size() * 16 < all.size() * 2 * points);
+      CHECK(some.size() * 16 > all.size() * points / 2);
+      for (const auto& [point, depth] : some) {
+        REQUIRE(all.count(point) == 1);
+        CHECK(all.at(point) == depth);
+      }
+      // What fewer points found is found by more.
+      for (const auto& [point, count] : fewer[i]) REQUIRE(some.count(point) == 1);
+      fewer[i].clear();
+      for (const auto& [point, depth] : some) fewer[i][point] = 1;
+      CHECK(f.max_depth_voxels <= c.missed_depth_voxels);
+      tightest = std::min(tightest, c.missed_depth_voxels - f.max_depth_voxels);
     }
-    CHECK(f.max_depth_voxels <= c.missed_depth_voxels);
-    tightest = std::min(tightest, c.missed_depth_voxels - f.max_depth_voxels);
+    bound[static_cast<int>(points)] = tightest;
   }
-  CHECK(tightest < 4);  // voxels: a bound, not just any number
+  CHECK(bound[1] < 4);  // voxels: a bound, not just any number
+  CHECK(bound[2] < bound[1]);
+  CHECK(bound[4] < bound[2]);
+  CHECK(bound[8] < bound[4]);
+}
+
+TEST_CASE("shells of any number of points are sampled without one that is not there") {
+  for (const int points : {1, 5, 16, 17, 100, 255, 257, 300}) {
+    CAPTURE(points);
+    BallInBowl full(1, points), coarse(1, points);
+    full.open(), coarse.open();
+    for (int i = 0; i < 40; ++i) {
+      h6SetCoarse(coarse.session, 1, 1u << i % 4);
+      step_at(full.session, somewhere(i));
+      step_at(coarse.session, somewhere(i));
+      const auto all = depths(full.session), some = depths(coarse.session);
+      CHECK(some.size() == h6GetContacts(coarse.session, 1).count);  // each once
+      for (const auto& [point, depth] : some) {
+        REQUIRE(all.count(point) == 1);
+        CHECK(all.at(point) == depth);
+      }
+      CHECK(h6GetFrame(full.session).max_depth_voxels <=
+            std::max(h6GetFrame(coarse.session).missed_depth_voxels,
+                     h6GetFrame(coarse.session).max_depth_voxels));
+    }
+  }
 }
 
 TEST_CASE("nothing of a coarse frame stays: the next full one is as if it had not been") {
@@ -99,7 +137,7 @@ TEST_CASE("nothing of a coarse frame stays: the next full one is as if it had no
     for (int i = 0; i < 90; ++i) {
       // Slow and fast motion: some groups stay clear, some do not.
       const h6BodyState state = i < 60 ? h6BodyState{full.sample(i).pose, {}} : somewhere(i);
-      if (i % 3) h6SetCoarse(mixed.session, 1);
+      if (i % 3) h6SetCoarse(mixed.session, 1, 1u << i % 4);
       step_at(full.session, state);
       step_at(mixed.session, state);
       CHECK((h6GetFrame(mixed.session).coarse_pairs == 1) == (i % 3 != 0));
@@ -137,13 +175,15 @@ TEST_CASE("what the clock left out is repeated to the bit, on one thread and on 
   for (int i = 0; i < 300; ++i) {
     const h6DeviceSample sample = live.sample(i);
     h6DeviceCommand a{}, b{};
-    if (i % 2) h6SetCoarse(live.session, static_cast<std::uint32_t>(i / 2 % 4));
+    if (i % 2) h6SetCoarse(live.session, static_cast<std::uint32_t>(i / 2 % 4), 1u << i / 8 % 4);
     h6Step(live.session, &sample, &a);
     const h6FrameReport l = h6GetFrame(live.session);
-    h6SetCoarse(again.session, l.coarse_pairs);
+    h6SetCoarse(again.session, l.coarse_pairs, l.coarse_points);
     h6Step(again.session, &sample, &b);
     const h6FrameReport r = h6GetFrame(again.session);
     REQUIRE(l.coarse_pairs <= 3);
+    REQUIRE(r.coarse_points == l.coarse_points);
+    REQUIRE((l.coarse_points == 0) == (l.coarse_pairs == 0));
     ++seen[l.coarse_pairs];
     REQUIRE(l.state_hash == r.state_hash);
     REQUIRE(l.contacts == r.contacts);
@@ -180,85 +220,120 @@ TEST_CASE("virtual time has no deadline, and leaves nothing out") {
 
 namespace {
 
-// What the clock decides in a scene of `contacts`, one in sixteen in a coarse frame, each of which
-// costs so much. `stolen`: every so-many-th full frame takes a millisecond more.
+// What the clock decides in a scene of `contacts`, each of which costs full_ns when all are there,
+// few_ns when a sixteenth is. `stolen`: every so-many-th frame takes a millisecond more.
 struct Costs {
-  double contacts, full_ns, coarse_ns;
+  double contacts, full_ns, few_ns;
   int stolen = 0;
 };
 struct Decided {
-  int full = 0, late = 0, last_late = -1;
+  int late = 0;
+  std::map<std::uint32_t, int> frames;  // that looked at so many points of sixteen
+  int full() { return frames[16]; }
 };
 
-Decided decide(h6Session& s, const Costs& c, int frames) {
-  Decided out;
-  const auto groups = static_cast<std::size_t>(c.contacts / 4);
-  for (int i = 0; i < frames; ++i) {
-    s.report = {};
-    s.anytime.budget_ns = 0.8e9 * s.dt;
-    h6::begin_anytime(s, h6::sched::now_ns());
-    const bool coarse = h6::must_be_coarse(s, 0, 0, 0) || h6::must_be_coarse(s, 0, 0, groups);
-    const double n = coarse ? c.contacts / 16 : c.contacts;
-    double us = 1e-3 * n * (coarse ? c.coarse_ns : c.full_ns);
-    if (!coarse && c.stolen && ++out.full % c.stolen == 0) us += 1000;
-    if (!coarse && !c.stolen) ++out.full;
-    const bool late = us > 1e6 * s.dt;
-    s.report.contacts = static_cast<std::uint32_t>(n);
-    s.report.stage_us[H6_STAGE_WEIGHTS] = us;
-    if (coarse) h6::learn_coarsely(s, groups, static_cast<std::size_t>(n));
-    if (s.anytime.trying) s.anytime.start -= static_cast<std::int64_t>(1e3 * us);
-    h6::learn_frame(s);
-    if (late && !(c.stolen && us - 1000 <= 1e6 * s.dt)) ++out.late, out.last_late = i;
+struct Clocked {
+  h6Session s;
+  h6::Pair pair;
+  int frame = 0;
+  Clocked() { s.pairs = &pair, s.pair_count = 1; }
+
+  Decided decide(const Costs& c, int frames) {
+    constexpr double kGroupNs = 20;
+    Decided out;
+    h6::Anytime& a = s.anytime;
+    const auto groups = static_cast<std::size_t>(c.contacts / 4), blocks = groups / 16;
+    const double period_us = 1e6 * s.dt;
+    for (int i = 0; i < frames; ++i, ++frame) {
+      s.report = {};
+      a.budget_ns = 0.8e9 * s.dt;
+      double us = 0;  // that passed in this frame
+      const auto pass = [&](double more_us) {
+        us += more_us;
+        a.start = h6::sched::now_ns() - static_cast<std::int64_t>(1e3 * us);
+      };
+      h6::begin_anytime(s, h6::sched::now_ns());
+      bool coarse = h6::is_coarse_anyway(s, 0, 0, blocks);
+      if (!coarse) pass(10), coarse = h6::must_be_coarse(s, 0, 0, blocks, groups);
+      double found = 0;
+      do {
+        const double points = s.report.coarse_points ? s.report.coarse_points : 16;
+        const double sampled =
+            points * static_cast<double>(s.report.coarse_points ? blocks : groups / 16);
+        found = c.contacts * points / 16;
+        pass(1e-3 * sampled * kGroupNs);
+        h6::learn_sampling(s, static_cast<std::size_t>(sampled), groups,
+                           static_cast<std::size_t>(found),
+                           h6::sched::now_ns() - static_cast<std::int64_t>(sampled * kGroupNs));
+      } while (h6::must_be_coarser(s, 0, 0, static_cast<std::size_t>(found), blocks));
+      const double few = c.contacts / 16;
+      const double each = c.few_ns + (c.full_ns - c.few_ns) * (found - few) / (c.contacts - few);
+      const bool robbed = c.stolen && frame % c.stolen == c.stolen - 1;
+      double weighing = 1e-3 * found * each;
+      out.late += us + weighing > period_us;
+      if (robbed) weighing += 1000;
+      pair.candidates = static_cast<std::size_t>(found);
+      s.report.stage_us[H6_STAGE_WEIGHTS] = weighing;
+      h6::learn_frame(s);
+      ++out.frames[s.report.coarse_points ? s.report.coarse_points : 16];
+    }
+    return out;
   }
-  return out;
-}
+};
 
 }  // namespace
 
-TEST_CASE("what does not fit is not tried where it would be late, from the first frame on") {
+TEST_CASE("what does not fit is not tried, from the first frame on; the finest that does is used") {
   // Of a period of 1 ms, a full frame takes 1.3 to 6 ms.
-  for (const double full_ns : {130.0, 200.0, 600.0}) {
-    CAPTURE(full_ns);
-    h6Session s;
-    const Decided all = decide(s, {10000, full_ns, 0.8 * full_ns}, 20000);
+  struct {
+    double full_ns, few_ns;
+    std::uint32_t points;  // that fit into 0.8 ms for certain
+  } const scenes[] = {{130, 65, 8}, {130, 120, 4}, {200, 100, 4}, {600, 300, 1}, {600, 40, 4}};
+  for (const auto& scene : scenes) {
+    CAPTURE(scene.full_ns);
+    CAPTURE(scene.few_ns);
+    Clocked c;
+    Decided all = c.decide({10000, scene.full_ns, scene.few_ns}, 20000);
     CHECK(all.late == 0);
-    CHECK(all.full == 0);
+    CHECK(all.full() == 0);
+    CHECK(all.frames[scene.points] + all.frames[2 * scene.points] > 19000);
   }
   // Where it was full before and there is more of it now: what is known of one contact is enough.
-  h6Session s;
-  CHECK(decide(s, {2000, 150, 120}, 500).full > 450);
-  CHECK(decide(s, {10000, 150, 120}, 20000).late == 0);
-  CHECK(decide(s, {2000, 150, 120}, 500).full > 450);
+  Clocked c;
+  CHECK(c.decide({2000, 150, 120}, 500).full() > 400);
+  CHECK(c.decide({10000, 150, 120}, 20000).late == 0);
+  CHECK(c.decide({2000, 150, 120}, 500).full() > 350);
 }
 
 TEST_CASE("what fits is full, at once or soon") {
-  h6Session small;
-  CHECK(decide(small, {1000, 80, 60}, 1000).full > 950);
-  h6Session fits;
-  const Decided all = decide(fits, {10000, 60, 35}, 20000);
+  Clocked small;
+  CHECK(small.decide({1000, 80, 60}, 1000).full() > 950);
+  Clocked fits;
+  Decided all = fits.decide({10000, 55, 35}, 20000);
   CHECK(all.late == 0);
-  CHECK(all.full > 15000);
-  // Over the budget, and within the period: seen now and then, never late.
-  h6Session close;
-  const Decided some = decide(close, {10000, 90, 75}, 20000);
+  CHECK(all.full() > 15000);
+  // Over the budget, and within the period: half of it is looked at.
+  Clocked close;
+  Decided some = close.decide({10000, 90, 75}, 20000);
   CHECK(some.late == 0);
+  CHECK(some.frames[8] + some.full() > 19000);
 }
 
 TEST_CASE("a stolen millisecond now and then does not make all frames coarse") {
-  h6Session s;
-  const Decided all = decide(s, {6000, 100, 60, 10}, 20000);
-  CHECK(all.full > 19000);
+  Clocked c;
+  (void)c.decide({6000, 100, 60}, 200);
+  Decided all = c.decide({6000, 100, 60, 10}, 20000);
+  CHECK(all.full() > 19000);
   CHECK(all.late == 0);
 }
 
 TEST_CASE("a machine that becomes faster is noticed in coarse frames; a bad day is forgotten") {
-  h6Session s;
-  CHECK(decide(s, {10000, 160, 130}, 2000).full == 0);
-  CHECK(decide(s, {10000, 60, 30}, 4000).full > 3000);
-  // Three slow frames in a row were the last full ones; half a minute later one is tried.
-  h6Session slow;
-  CHECK(decide(slow, {6000, 80, 45}, 100).full > 90);
-  (void)decide(slow, {6000, 200, 45}, 20);
-  CHECK(decide(slow, {6000, 80, 45}, 20000).full < 20000);
-  CHECK(decide(slow, {6000, 80, 45}, 20000).full > 5000);
+  Clocked c;
+  CHECK(c.decide({10000, 160, 130}, 2000).full() == 0);
+  CHECK(c.decide({10000, 50, 30}, 6000).full() > 3000);
+  Clocked slow;
+  (void)slow.decide({6000, 80, 45}, 100);
+  CHECK(slow.decide({6000, 80, 45}, 100).full() > 90);
+  CHECK(slow.decide({6000, 200, 160}, 50).full() < 10);
+  CHECK(slow.decide({6000, 80, 45}, 20000).full() > 15000);
 }

@@ -232,7 +232,7 @@ bool forbid_calls() {
   for (long i = 0; i < frames; ++i) {
     const auto k = static_cast<std::size_t>(i % 1000);
     // Every tenth with a budget's decision, so that both ways of traversal are walked.
-    if (i % 10 == 9) h6SetCoarse(scene.session, 1);
+    if (i % 10 == 9) h6SetCoarse(scene.session, 1, 1u << i / 10 % 4);
     h6Step(scene.session, &samples[k], commands.data());
     counts.helped += h6GetFrame(scene.session).contacts >= 256;
   }
@@ -357,7 +357,7 @@ TEST_CASE("many fields and two hands: pairs shared between threads give the same
     bool dropped = false;
     for (int i = 0; i < 50; ++i) {
       const h6DeviceSample samples[] = {one.sample(i), one.sample(i + 40)};
-      if (i % 10 == 9) h6SetCoarse(one.session, 17), h6SetCoarse(two.session, 17);
+      if (i % 10 == 9) h6SetCoarse(one.session, 17, 2), h6SetCoarse(two.session, 17, 2);
       h6Step(one.session, samples, nullptr);
       h6Step(two.session, samples, nullptr);
       const h6FrameReport a = h6GetFrame(one.session), b = h6GetFrame(two.session);

@@ -66,7 +66,7 @@ Seen check_same(ThreeBalls& one, ThreeBalls& two, int frames, bool coarse = fals
     const auto samples = one.samples(i % 1000);
     if (coarse && i % 3 == 0)
       for (const ThreeBalls* scene : {&one, &two})
-        h6SetCoarse(scene->session, static_cast<std::uint32_t>(i / 3 % 4));
+        h6SetCoarse(scene->session, static_cast<std::uint32_t>(i / 3 % 4), 1u << i % 4);
     h6Step(one.session, samples.data(), a.data());
     h6Step(two.session, samples.data(), b.data());
     const h6FrameReport r = h6GetFrame(one.session), s = h6GetFrame(two.session);
@@ -74,6 +74,7 @@ Seen check_same(ThreeBalls& one, ThreeBalls& two, int frames, bool coarse = fals
     REQUIRE(r.contacts == s.contacts);
     REQUIRE(r.status == s.status);
     REQUIRE(r.coarse_pairs == s.coarse_pairs);
+    REQUIRE(r.coarse_points == s.coarse_points);
     REQUIRE(r.max_depth == s.max_depth);
     REQUIRE(r.max_depth_voxels == s.max_depth_voxels);
     REQUIRE(r.missed_depth_voxels == s.missed_depth_voxels);

@@ -70,10 +70,10 @@ H6_API void       h6DestroySession(h6Session* session);
 /* One frame of 1/rate seconds: samples of each hand in, a wrench for each hand out. */
 H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
-/* For the next step only: so many pairs, the last ones in their order, are traversed coarsely,
- * whatever the clock says. With h6FrameReport.coarse_pairs a run in anytime mode is repeated to the
- * bit. */
-H6_API void h6SetCoarse(h6Session* session, uint32_t pairs);
+/* For the next step only: so many pairs, the last ones in their order, are traversed coarsely, with
+ * so many points of each sixteen (8, 4, 2, else 1), whatever the clock says. With coarse_pairs and
+ * coarse_points of h6FrameReport a run in anytime mode is repeated to the bit. */
+H6_API void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points);
 
 /* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
@@ -173,7 +173,8 @@ typedef struct h6Granted {
 typedef struct h6LoopReport {
   uint64_t frames;
   /* Frames that ended after the next deadline, each counted once, by cause: */
-  uint64_t late_compute;  /* the thread's own CPU time in the frame was over the period            */
+  uint64_t late_compute;  /* the thread's own CPU time in the frame, without waiting for a helper's
+                             slice, was over the period                                            */
   uint64_t late_stolen;   /* it was not, but the clock was: the machine ran something else         */
   uint64_t late_wakeup;   /* the frame was short enough but started too late                       */
   uint64_t ring_overruns; /* records lost to a slow reader                                         */
