@@ -26,6 +26,7 @@ constexpr std::uint64_t kFresh = 1000;  // frames for which a cost is believed a
 // them 50.
 constexpr double kLeastGrowth = 0.25, kGrowth = 1.25;
 constexpr std::uint32_t kLookEvery = 16;  // frames: how many groups are near
+constexpr double kLookNs = 60;            // a group, when nothing of them is in the caches
 
 double middle_of(const double (&seen)[3], std::uint32_t count) {
   if (count < 3) return *std::min_element(seen, seen + std::max(count, 1u));
@@ -161,10 +162,18 @@ bool is_coarse_anyway(h6Session& s, std::size_t pair, std::size_t used, std::siz
   const Anytime& a = s.anytime;
   if (!a.by_clock) return pair + s.report.coarse_pairs >= s.pair_count;
   if (a.coarse) return true;
-  Pair& p = s.pairs[pair];
-  if (a.finest == Anytime::kAll || p.open_blocks == 0 || a.frames % kLookEvery == 0) return false;
-  const double each = static_cast<double>(p.open_groups) / static_cast<double>(p.open_blocks);
-  return decide(s, look_ahead(s, pair, used, blocks, each * static_cast<double>(blocks)), pair);
+  const Pair& p = s.pairs[pair];
+  const double n = static_cast<double>(blocks), look = 16 * n * kLookNs;
+  const double each = p.open_blocks == 0
+                          ? 16
+                          : static_cast<double>(p.open_groups) / static_cast<double>(p.open_blocks);
+  const Ahead ahead = look_ahead(s, pair, used, blocks, each * n);
+  // To look at the groups is itself some of the work; to do it now and then is enough.
+  const bool room = look + foresee(a, ahead, 0) <= kSpare * a.budget_ns;
+  if (!a.begun ? look <= 0.5 * a.budget_ns
+               : a.finest == Anytime::kAll || (room && a.frames % kLookEvery == 0))
+    return false;
+  return decide(s, ahead, pair);
 }
 
 bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks,
