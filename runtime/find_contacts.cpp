@@ -134,8 +134,16 @@ struct Search {
 // is a slice itself.
 std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::size_t count,
                   std::size_t used, bool alone) {
-  if (alone || count < kWorthSharing || s.team->threads() == 1)
+  const auto by_myself = [&] {
     return search.touch(t.survivors, count, candidates_from(t, used), t.clearance);
+  };
+  if (alone || count < kWorthSharing || s.team->threads() == 1) return by_myself();
+  const std::int64_t since = sched::now_ns();
+  const auto timed = [&](std::size_t found) {
+    s.touching.took(static_cast<double>(sched::now_ns() - since));
+    return found;
+  };
+  if (!s.touching.share(count)) return timed(by_myself());
   const std::size_t slices = (count + kSlice - 1) / kSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
     const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
@@ -147,7 +155,7 @@ std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::s
     move_candidates(t, used + kept, t, used + i * kSlice * kGroupRows, s.slice_count[i]);
     kept += s.slice_count[i];
   }
-  return kept;
+  return timed(kept);
 }
 
 // How far [voxel] any point within `radius` of the shell's centre moved between two places: never

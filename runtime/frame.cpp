@@ -62,15 +62,23 @@ void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   }
 }
 
-// One shell body against all it can touch, up to what stiffness each contact has.
+// One shell body against all it can touch, up to the sums over its contacts: whoever weighed them
+// has them in his cache.
 void weigh_shell(h6Session& s, std::size_t first, std::size_t end) {
   Stopwatch watch{s, sched::now_ns()};
   watch.timed(H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
+  const std::int64_t since = watch.last;
   watch.timed(H6_STAGE_CONTACTS, [&] {
     gather_contacts(s, first, end);
     note_depths(s, first, end);
   });
   watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
+  // Contacts too: their columns come back from the helper's cache.
+  s.weighing.took(static_cast<double>(watch.last - since));
+  if (s.contact.method == H6_METHOD_SERIES) return;
+  watch.timed(H6_STAGE_WRENCH, [&] {
+    for (std::size_t p = first; p < end; ++p) sum_contacts(s, s.pairs[p]);
+  });
 }
 
 // All of them: one after the other, each with both threads where that pays, or side by side.
@@ -85,9 +93,9 @@ void weigh_shells(h6Session& s) {
   }
 }
 
-void sum_shell(h6Session& s, std::size_t first, std::size_t end) {
+void add_shell(h6Session& s, std::size_t first, std::size_t end) {
   if (s.contact.method == H6_METHOD_SERIES) return sum_series(s, first, end);
-  for (std::size_t p = first; p < end; ++p) sum_wrench(s, s.pairs[p]);
+  for (std::size_t p = first; p < end; ++p) add_wrench(s, s.pairs[p]);
 }
 
 // A timeline shows who did what.
@@ -110,7 +118,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   Stopwatch watch{s, sched::now_ns()};
   watch.timed(H6_STAGE_WRENCH, [&] {
     for (std::size_t i = 0; i < s.shell_count; ++i)
-      sum_shell(s, s.shell_pairs[i], s.shell_pairs[i + 1]);
+      add_shell(s, s.shell_pairs[i], s.shell_pairs[i + 1]);
   });
   watch.timed(H6_STAGE_COUPLING, [&] {
     for (std::size_t h = 0; h < s.hand_count; ++h) {

@@ -49,7 +49,8 @@ struct h6Loop {
   std::uint64_t view_step = 1;  // the viewer sees every so-many-th frame
   // Another session on its way in, and the one before on its way out.
   std::atomic<h6Session*> offered{nullptr}, given_back{nullptr};
-  std::atomic<int> fifo_core{-1};  // the haptic thread is FIFO, on this core; helpers too
+  // The haptic thread's core, which a helper keeps off, and the helper's priority (0: none).
+  std::atomic<int> core{-1}, helper_priority{0};
   std::unique_ptr<h6::sched::PeriodicThread> thread;
 };
 
@@ -359,10 +360,9 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
         sched::PeriodicThread::Work{
             [raw](const sched::RealtimeGrant& grant) {
               note_grant(raw->report, grant);
-              if (grant.fifo) {
-                raw->fifo_core = grant.core;
-                raw->session->team->set_realtime(kHelperPriority, grant.core);
-              }
+              raw->helper_priority = grant.fifo ? kHelperPriority : 0;
+              raw->core = grant.core;
+              raw->session->team->set_realtime(raw->helper_priority, grant.core);
               begin_output(*raw);
             },
             [raw](std::uint64_t, const sched::TickTiming& before, double wakeup) {
@@ -391,7 +391,8 @@ void h6SetPace(h6Loop* loop, double pace) {
 
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (!may_take_over(next, *loop->session, error)) return nullptr;
-  if (const int core = loop->fifo_core; core >= 0) next->team->set_realtime(kHelperPriority, core);
+  if (const int core = loop->core; core >= 0)
+    next->team->set_realtime(loop->helper_priority, core);
   loop->offered.store(next, std::memory_order_release);
   while (true) {
     if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire))

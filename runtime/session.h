@@ -10,6 +10,7 @@
 #include "runtime/model.h"
 #include "runtime/passivity.h"
 #include "runtime/safety.h"
+#include "runtime/share_gate.h"
 #include "runtime/shell_lanes.h"
 #include "sched/frame_team.h"
 
@@ -77,6 +78,7 @@ struct Pair {
   float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
   kernels::Affine arms{};        // the same for arms of contacts [m], when they were gathered
+  kernels::WrenchSum sum{};      // of its contacts
   // When both move: how each one's motion changes the other's wrench.
   Mat6 Kab = Mat6::Zero(), Kba = Mat6::Zero(), Dab = Mat6::Zero(), Dba = Mat6::Zero();
   // `series` lets the field bodies of one shell body feel one another: pair p's wrench on b_p
@@ -168,6 +170,7 @@ struct h6Session {
   h6::LaneScratch lane_scratch;
   bool in_lanes = false;  // in the last frame
 
+  h6::ShareGate touching, weighing, summing;  // of groups, contacts, contacts
   h6::Anytime anytime;
   h6FrameReport report{};
   std::uint64_t frame = 0;

@@ -12,8 +12,10 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
 // Shares of stiffness over all contacts of one shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair);
 void weigh_series(h6Session& s, std::size_t first_pair, std::size_t end_pair);
-// Wrench of a pair's contacts on both bodies, with its derivatives.
-void sum_wrench(h6Session& s, Pair& pair);
+// Wrench of a pair's contacts with its derivatives: summed, which reads no other pair's, then added
+// to both bodies, in the order of pairs.
+void sum_contacts(h6Session& s, Pair& pair);
+void add_wrench(h6Session& s, Pair& pair);
 // The same for all pairs of a shell body, which one solve connects.
 void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair);
 // What the two do with a pair's sums, from wherever these come: shares go to both bodies and, where

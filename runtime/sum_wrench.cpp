@@ -7,6 +7,7 @@
 
 #include "runtime/stages.h"
 #include "runtime/weighing.h"
+#include "sched/clock.h"
 
 namespace h6 {
 namespace {
@@ -18,12 +19,24 @@ kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
   const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
                                        c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
   const std::size_t count = pair.end - pair.begin, slices = (count + kSlice - 1) / kSlice;
-  if (slices <= 1) return kernels::contact_wrench(columns, p, pair.begin, pair.end);
-  s.team->for_slices(slices, [&](std::size_t i) {
-    s.slice_sum[i] = kernels::contact_wrench(columns, p, pair.begin + i * kSlice,
-                                             std::min(pair.begin + (i + 1) * kSlice, pair.end));
-  });
-  kernels::WrenchSum total = s.slice_sum[0];
+  const auto slice = [&](std::size_t i) {
+    return kernels::contact_wrench(columns, p, pair.begin + i * kSlice,
+                                   std::min(pair.begin + (i + 1) * kSlice, pair.end));
+  };
+  kernels::WrenchSum total;
+  if (slices <= 1 || s.team->threads() == 1) {
+    total = slice(0);
+    for (std::size_t i = 1; i < slices; ++i) total.add(slice(i));
+    return total;
+  }
+  const std::int64_t since = sched::now_ns();
+  const auto keep = [&](std::size_t i) { s.slice_sum[i] = slice(i); };
+  if (s.summing.share(count))
+    s.team->for_slices(slices, keep);
+  else
+    for (std::size_t i = 0; i < slices; ++i) keep(i);
+  s.summing.took(static_cast<double>(sched::now_ns() - since));
+  total = s.slice_sum[0];
   for (std::size_t i = 1; i < slices; ++i) total.add(s.slice_sum[i]);
   return total;
 }
@@ -85,7 +98,14 @@ void spread_wrench(h6Session& s, Pair& pair, const kernels::WrenchSum& sum) {
   if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, Vec6::Map(sum.elastic));
 }
 
-void sum_wrench(h6Session& s, Pair& pair) {
+void sum_contacts(h6Session& s, Pair& pair) {
+  if (pair.begin == pair.end) return;
+  kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
+  Vec6::Map(p.velocity) = pair_velocity(s, pair);
+  pair.sum = sum_slices(s, s.contacts[pair.a], pair, p);
+}
+
+void add_wrench(h6Session& s, Pair& pair) {
   pair.Kab.setZero();
   pair.Kba.setZero();
   pair.Dab.setZero();
@@ -93,9 +113,7 @@ void sum_wrench(h6Session& s, Pair& pair) {
   pair.f.setZero();
   pair.B.setZero();
   if (pair.begin == pair.end) return;
-  kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
-  Vec6::Map(p.velocity) = pair_velocity(s, pair);
-  spread_wrench(s, pair, sum_slices(s, s.contacts[pair.a], pair, p));
+  spread_wrench(s, pair, pair.sum);
 }
 
 }  // namespace h6

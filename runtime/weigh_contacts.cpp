@@ -179,8 +179,10 @@ void weigh_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) 
   if (s.contacts[a].count == 0) return;
   if (uses_clusters(s.contact)) merge_clusters(s, first_pair, end_pair);
   const Body& body = s.bodies[a];
-  weigh_columns(s.contacts[a], s.contact, body.voxel, series_lever(body.radius, body.voxel), s.team,
-                s.weigh_scratch);
+  const bool ask = s.contacts[a].count >= kWorthSharing && s.team->threads() > 1 &&
+                   s.weighing.share(s.contacts[a].count);
+  weigh_columns(s.contacts[a], s.contact, body.voxel, series_lever(body.radius, body.voxel),
+                ask ? s.team : nullptr, s.weigh_scratch);
 }
 
 }  // namespace h6

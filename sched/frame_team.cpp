@@ -37,7 +37,7 @@ class Treatment {
   ~Treatment() { set(0, -1); }
   void set(int priority, int haptic_core) {
     cpu_set_t cores = came_with_;
-    if (priority > 0 && haptic_core >= 0) CPU_CLR(haptic_core, &cores);
+    if (haptic_core >= 0) CPU_CLR(haptic_core, &cores);
     // With no other core it would only stand in the way.
     const bool alone = CPU_COUNT(&cores) == 0;
     pthread_setaffinity_np(pthread_self(), sizeof cores, alone ? &came_with_ : &cores);
@@ -170,8 +170,7 @@ std::int64_t FrameTeam::waited_ns() { return this_waited; }
 
 void FrameTeam::set_realtime(int priority, int haptic_core) {
   if (helper_)
-    helper_->treatment.store(priority > 0 ? priority + 256 * (haptic_core + 1) : 0,
-                             std::memory_order_relaxed);
+    helper_->treatment.store(priority + 256 * (haptic_core + 1), std::memory_order_relaxed);
 }
 
 void FrameTeam::begin_frame(std::int64_t now) {

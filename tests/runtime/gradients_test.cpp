@@ -289,7 +289,7 @@ TEST_CASE("the frame's own stage, with contacts in float, gives these gradients 
   contacts.count = contacts.capacity = columns.depth.size();
   engine.s.contacts = &contacts;
   for (std::size_t i = 0; i < engine.pairs.size(); ++i) {
-    sum_wrench(engine.s, engine.pairs[i]);
+    sum_contacts(engine.s, engine.pairs[i]), add_wrench(engine.s, engine.pairs[i]);
     kernels::WrenchParameters p{scene.k, scene.beta, {}, true};
     Vec6::Map(p.velocity) = pair_velocity(exact.s, exact.pairs[i]);
     spread_wrench(exact.s, exact.pairs[i],
