@@ -2,9 +2,12 @@
 //
 // Lanes are doubles: what a dense patch carries is a small difference of e and J.y in every
 // contact. The first pass divides kappa out. A pass reads eight columns and adds to 28 sums, or to
-// 7 where the solution is likely reached: then it leaves the slack as well, and is the last.
-// Without a start, many contacts are first solved for some of them.
+// 7 where the solution is likely reached: then it leaves the slack as well, and is the last. Most
+// contacts within the margin carry nothing: floats tell so first, with room for their rounding,
+// which changes no bit. Without a start, many contacts are first solved for some of them.
 #include "kernels/series_solve.h"
+
+#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/series_solve.cpp"
@@ -23,6 +26,7 @@ using DD = hn::ScalableTag<double>;
 using DF = hn::Rebind<float, DD>;
 using VD = hn::Vec<DD>;
 
+constexpr float kDoubt = 1e-5f;  // of a sum of some ten floats: a hundred times their rounding
 constexpr std::size_t kManyToStart = 768;  // contacts from which a start is worth its time
 
 HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
@@ -49,6 +53,39 @@ HWY_INLINE VD slack_at(const SeriesColumns& c, const Axes& J, std::size_t i, con
   VD u = load_column(c.e, i, c.count - i);
   for (int k = 0; k < 6; ++k) u = hn::NegMulAdd(J.v[k], hn::Set(d, y[k]), u);
   return u;
+}
+
+// What slack_at is in floats, for a quick look.
+struct Glance {
+  float y[6];  // those of the torque over the lever
+  float doubt;
+  Glance(const double* at, double lever) {
+    double size = 0;
+    for (int k = 0; k < 6; ++k) {
+      y[k] = static_cast<float>(k < 3 ? at[k] : at[k] / lever);
+      size += std::fabs(at[k]);
+    }
+    doubt = static_cast<float>(kDoubt * 2 * size);
+  }
+};
+
+// False: no contact from `i` on has slack, by more than what floats round off. An axis is at most
+// (1, |r| / L) long and |r| at most L: the sum of what is rounded is below 2 |y|.
+HWY_INLINE bool may_carry(const SeriesColumns& c, const Glance& g, std::size_t i) {
+  const DF d;
+  const std::size_t live = c.count - i;
+  const auto load = [&](const float* column) HWY_ATTR { return load_n(d, column + i, live); };
+  const auto e = load(c.e), nx = load(c.nx), ny = load(c.ny), nz = load(c.nz);
+  const auto rx = load(c.rx), ry = load(c.ry), rz = load(c.rz);
+  const auto y = [&](int k) HWY_ATTR { return hn::Set(d, g.y[k]); };
+  // (r x N).y = N.(y x r)
+  const auto sx = hn::NegMulAdd(y(5), ry, hn::MulAdd(y(4), rz, y(0)));
+  const auto sy = hn::NegMulAdd(y(3), rz, hn::MulAdd(y(5), rx, y(1)));
+  const auto sz = hn::NegMulAdd(y(4), rx, hn::MulAdd(y(3), ry, y(2)));
+  auto u = hn::NegMulAdd(nx, sx, hn::MulAdd(hn::Abs(e), hn::Set(d, kDoubt), e));
+  u = hn::NegMulAdd(nz, sz, hn::NegMulAdd(ny, sy, u));
+  // Whatever is not a number stays in.
+  return !hn::AllTrue(d, hn::Lt(u, hn::Set(d, -g.doubt)));
 }
 
 // kappa_i of contacts whose axes are J.
@@ -78,8 +115,15 @@ HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const 
   VD system[kUpper6], pull[6], energy = zero, max_e = zero;
   for (int k = 0; k < kUpper6; ++k) system[k] = zero;
   for (int k = 0; k < 6; ++k) pull[k] = zero;
+  const Glance glance(y, p.lever);
   for (std::size_t i = 0; i < c.count; i += stride * hn::Lanes(d)) {
     const std::size_t live = c.count - i;
+    if constexpr (!(kPass & kStiffen)) {
+      if (!may_carry(c, glance, i)) {
+        if constexpr (kPass & kSlack) store_n(hn::Zero(DF()), DF(), slack + i, live);
+        continue;
+      }
+    }
     const Axes J = axes_at(c, per_lever, i);
     const VD u = slack_at(c, J, i, y);
     hn::Vec<DF> k;

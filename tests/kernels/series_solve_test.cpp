@@ -202,6 +202,32 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("series_solve: slack is told from none to the last bit of a float") {
+  const SeriesParameters q{4, 0.02, 1e-6, 0};  // y stays where it starts
+  Vec6 start;
+  start << 3e-4, -2e-4, 5e-4, 1e-4, 4e-4, -6e-4;
+  Patch<float> p = random_patch(3000, 9);
+  int some = 0;
+  for (std::size_t i = 0; i < p.count(); ++i) {
+    const double at = p.axis(i, q.lever).dot(start);
+    // Just above, just below and far below, a few in a row each.
+    const double gap = i / 64 % 3 == 0 ? 1e-7 : i / 64 % 3 == 1 ? -1e-7 : -1e-2;
+    p.column[6][i] = static_cast<float>(at + gap * std::fabs(at));
+  }
+  const Solved<float> want(p, q, start);
+  for (const float slack : want.slack) some += slack > 0;
+  CHECK(some > 300);
+  CHECK(some < 2000);
+  on_every_target([&](const std::string&) {
+    Vec6 y = start;
+    std::vector<float> kappa(p.count()), slack(p.count());
+    series_solve(p.view(), q, y.data(), kappa.data(), slack.data());
+    CHECK(y == start);
+    for (std::size_t i = 0; i < p.count(); ++i)
+      CHECK(std::fabs(slack[i] - want.slack[i]) <= 1e-6 * want.slack[i] + 1e-18);
+  });
+}
+
 TEST_CASE("series_solve: no sampling of any shape makes the net stiffness larger than c k") {
   for (const double c : {2.5, 4.0, 10.0})
     for (const Patch<double>& shape : shapes()) {
