@@ -60,33 +60,43 @@ HWY_INLINE Axis6 wrench_axis(VD x, VD y, VD z, VD rx, VD ry, VD rz) {
   return {{x, y, z, cross(ry, z, rz, y), cross(rz, x, rx, z), cross(rx, y, ry, x)}};
 }
 
-// Contacts first..first+count-1 to the stage; lanes past the end are zero and count for nothing.
-HWY_INLINE void fill(const WrenchColumns& c, const WrenchParameters& p, std::size_t first,
-                     std::size_t count, Stage& stage) {
+// Contacts from `first` on to the stage, until it is full or none is left: returns where it
+// stopped. A vector of contacts that carry nothing is left out, which changes no bit; lanes past
+// the end are zero and count for nothing. `staged`: how many lanes there are.
+HWY_INLINE std::size_t fill(const WrenchColumns& c, const WrenchParameters& p, std::size_t first,
+                            std::size_t end, Stage& stage, std::size_t& staged) {
   const DD d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const std::size_t at = first + i, live = count - i;
+  staged = 0;
+  std::size_t at = first;
+  for (; at < end && staged < kStage; at += hn::Lanes(d)) {
+    const std::size_t live = end - at;
+    const VD full = load_column(c.weight, at, live), depth = load_column(c.depth, at, live);
+    auto carries = hn::Ne(full, hn::Zero(d));
+    if (p.damping == 0) carries = hn::And(carries, hn::Gt(depth, hn::Zero(d)));
+    if (hn::AllFalse(d, carries)) continue;
     const VD rx = load_column(c.rx, at, live), ry = load_column(c.ry, at, live);
     const VD rz = load_column(c.rz, at, live);
     const Axis6 J = wrench_axis(load_column(c.nx, at, live), load_column(c.ny, at, live),
                                 load_column(c.nz, at, live), rx, ry, rz);
     VD approach = hn::Zero(d);  // J.u
     for (int k = 0; k < 6; ++k) approach = hn::MulAdd(J.v[k], hn::Set(d, p.velocity[k]), approach);
-    const VD depth = load_column(c.depth, at, live);
     const VD e = hn::NegMulAdd(hn::Set(d, p.damping), approach, depth);
-    const VD weight = hn::IfThenElseZero(hn::Gt(e, hn::Zero(d)), load_column(c.weight, at, live));
+    const VD weight = hn::IfThenElseZero(hn::Gt(e, hn::Zero(d)), full);
     const VD kw = hn::Mul(hn::Set(d, p.stiffness), weight);
-    hn::Store(hn::Mul(kw, e), d, stage.kwe + i);
-    hn::Store(hn::Mul(kw, depth), d, stage.kwd + i);
+    hn::Store(hn::Mul(kw, e), d, stage.kwe + staged);
+    hn::Store(hn::Mul(kw, depth), d, stage.kwd + staged);
     for (int k = 0; k < 6; ++k) {
-      hn::Store(J.v[k], d, stage.J[k] + i);
-      hn::Store(hn::Mul(kw, J.v[k]), d, stage.kwJ[k] + i);
+      hn::Store(J.v[k], d, stage.J[k] + staged);
+      hn::Store(hn::Mul(kw, J.v[k]), d, stage.kwJ[k] + staged);
     }
-    if (!p.exact) continue;
-    const Axis6 Jg = wrench_axis(load_column(c.gx, at, live), load_column(c.gy, at, live),
-                                 load_column(c.gz, at, live), rx, ry, rz);
-    for (int k = 0; k < 6; ++k) hn::Store(Jg.v[k], d, stage.Jg[k] + i);
+    if (p.exact) {
+      const Axis6 Jg = wrench_axis(load_column(c.gx, at, live), load_column(c.gy, at, live),
+                                   load_column(c.gz, at, live), rx, ry, rz);
+      for (int k = 0; k < 6; ++k) hn::Store(Jg.v[k], d, stage.Jg[k] + staged);
+    }
+    staged += hn::Lanes(d);
   }
+  return at;
 }
 
 // sum[col] += factor * columns[col] over the stage, for col from kFrom on.
@@ -117,9 +127,9 @@ void contact_wrench_simd(const WrenchColumns& contacts, const WrenchParameters& 
                          std::size_t begin, std::size_t end, WrenchSum& out) {
   Stage stage;
   Sums sums{};
-  for (std::size_t first = begin; first < end; first += kStage) {
-    const std::size_t count = HWY_MIN(kStage, end - first);
-    fill(contacts, parameters, first, count, stage);
+  for (std::size_t first = begin; first < end;) {
+    std::size_t count;
+    first = fill(contacts, parameters, first, end, stage, count);
     add_row<0>(stage.kwe, stage.J, count, sums.force);
     add_row<0>(stage.kwd, stage.J, count, sums.elastic);
     add_row<0>(stage.kwJ[0], stage.J, count, sums.damping[0]);

@@ -177,6 +177,26 @@ TEST_CASE(
   });
 }
 
+TEST_CASE("contact_wrench: contacts that carry nothing may be most of them, wherever they are") {
+  on_every_target([](const std::string&) {
+    for (const bool still : {false, true}) {
+      for (const std::size_t apart : {2, 7, 16, 61, 700}) {
+        Contacts c = random_contacts(700, 3, 40 + apart);
+        WrenchParameters p = kMoving;
+        if (still) p.damping = 0;
+        // By their weight, or by their depth.
+        for (std::size_t i = 0; i < c.count; ++i)
+          if (i % apart != apart / 2) c.column[i / 32 % 2][i] = 0;
+        for (const bool exact : {false, true}) {
+          p.exact = exact;
+          const WrenchSum want = contact_wrench_ref(c.view(), p, 0, c.count);
+          CHECK(difference(contact_wrench(c.view(), p, 0, c.count), want, c, p) <= 1e-13);
+        }
+      }
+    }
+  });
+}
+
 TEST_CASE("contact_wrench: slices add up to the whole") {
   on_every_target([](const std::string&) {
     Contacts c = random_contacts(500, 2, 8);
