@@ -26,7 +26,8 @@ constexpr std::size_t kParts = kBandBlock / kLanes;  // vectors that hold a bloc
 // second stands across it.
 constexpr float kLine[3] = {0.6104f, -0.3702f, 0.7003f};
 constexpr float kAcross[3] = {-0.7690f, -0.0652f, 0.6359f};
-constexpr std::size_t kSorted = 48;  // contacts from which sorting pays
+constexpr std::size_t kSorted = 48;       // contacts from which sorting pays
+constexpr std::size_t kManyBands = 4096;  // contacts of a product from which several bands pay
 // Hats that are summed before they join the total: rounding grows with the number of sums.
 constexpr std::size_t kFresh = 128;
 
@@ -39,14 +40,13 @@ HWY_INLINE hn::Mask<DF> differing(const GaussBands& g, std::size_t i, std::size_
   const DF d;
   auto same = hn::FirstN(d, live);
   for (const float* column : g.column) {
-    HWY_ALIGN float shifted[kLanes] = {};
-    const float* before = column + i - 1;
     if (HWY_UNLIKELY(i == 0)) {
-      shifted[0] = std::numeric_limits<float>::quiet_NaN();  // the first follows none
-      std::copy_n(column, HWY_MIN(live, kLanes) - 1, shifted + 1);
-      before = shifted;
+      HWY_ALIGN float before[kLanes] = {std::numeric_limits<float>::quiet_NaN()};  // follows none
+      std::copy_n(column, HWY_MIN(live, kLanes) - 1, before + 1);
+      same = hn::And(same, hn::Eq(load_n(d, column, live), hn::Load(d, before)));
+    } else {
+      same = hn::And(same, hn::Eq(load_n(d, column + i, live), load_n(d, column + i - 1, live)));
     }
-    same = hn::And(same, hn::Eq(load_n(d, column + i, live), load_n(d, before, live)));
   }
   return hn::AndNot(same, hn::FirstN(d, live));
 }
@@ -68,11 +68,15 @@ struct Items {
 HWY_INLINE Items items_of(const GaussBands& g, const DirectionsView& c, float per_share) {
   const DF d;
   const DI di;
-  std::size_t left = 0;
-  for (std::size_t i = 0; i < c.count; i += kLanes)
+  const Items all{{g.column[0], g.column[1], g.column[2]}, nullptr, nullptr, c.count};
+  if (g.order_only) return all;
+  // A quarter of them tells whether it is worth it.
+  std::size_t seen = 0, left = 0;
+  for (std::size_t i = 0; i < c.count; i += 4 * kLanes) {
     left += hn::CountTrue(d, differing(g, i, c.count - i));
-  if (kWorthJoining * (c.count - left) < c.count)
-    return {{g.column[0], g.column[1], g.column[2]}, nullptr, nullptr, c.count};
+    seen += HWY_MIN(kLanes, c.count - i);
+  }
+  if (kWorthJoining * (seen - left) < seen) return all;
   left = 0;
   for (std::size_t i = 0; i < c.count; i += kLanes) {
     const std::size_t live = c.count - i;
@@ -98,6 +102,12 @@ HWY_INLINE Items items_of(const GaussBands& g, const DirectionsView& c, float pe
 struct Range {
   float low, extent;
 };
+
+// A product's contacts have few bands, its hat over the first sphere is wide: where contacts are
+// few a block would lie in several.
+HWY_INLINE bool in_one_band(const GaussBands& g, std::size_t count) {
+  return g.order_only && count < kManyBands;
+}
 
 // Places along both directions, and the longest axis of any vector.
 HWY_INLINE float project(const Items& items, float* const* along, Range* range) {
@@ -132,10 +142,11 @@ HWY_INLINE void choose_grid(const GaussBands& g, std::size_t count, const Range*
                             float* scale) {
   // A place is rounded by less than 1e-6 of the longest vector, a cell's number by less.
   const float reach = g.width * 1.001f + 4e-6f * size;
-  const std::uint32_t most = band_cells(count);
+  const std::uint32_t most = band_cells(count) / (in_one_band(g, count) ? 4 : 1);
   GaussBands::Grid& grid = *g.grid;
   const float fit = range[0].extent / reach;
   grid.bands = fit > 1 ? static_cast<std::uint32_t>(HWY_MIN(fit, static_cast<float>(most / 8))) : 1;
+  if (in_one_band(g, count)) grid.bands = 1;
   grid.shift = 0;
   while ((grid.bands << (grid.shift + 1)) <= most) ++grid.shift;
   grid.cells = grid.bands << grid.shift;
@@ -156,29 +167,28 @@ HWY_INLINE hn::Vec<DI> cell_along(const float* along, const Range& range, float 
                  hn::Set(di, static_cast<std::int32_t>(cells - 1)));
 }
 
-// Fills g.start and g.edge from counts of each cell.
-HWY_INLINE void place_cells(const GaussBands& g, std::size_t count) {
+// Turns counts of each cell into the first of each.
+HWY_INLINE void place_cells(const GaussBands& g) {
   std::uint32_t sum = 0;
-  std::size_t edge = 0, row = 0;  // the next block's edge, and the contact there
-  const std::uint32_t cells = g.grid->cells;
-  std::uint32_t last = 0;
-  for (std::uint32_t cell = 0; cell < cells; ++cell) {
+  for (std::uint32_t cell = 0; cell <= g.grid->cells; ++cell) {
     const std::uint32_t here = g.start[cell];
     g.start[cell] = sum;
     sum += here;
-    if (here > 0) last = cell;
-    for (; HWY_UNLIKELY(row < sum); row += edge % 2 == 1 ? kBandBlock - 1 : 1)
-      g.edge[edge++] = cell;
   }
-  g.start[cells] = sum;
-  const std::size_t edges = 2 * band_blocks(count);
-  for (; edge < edges; ++edge) g.edge[edge] = last;
 }
 
 // Moves every item j to place to(j).
 template <class To>
 HWY_INLINE void put(const GaussBands& g, const Items& items, const DirectionsView& c,
                     float per_share, const To& to) {
+  if (g.order_only) {
+    for (std::size_t j = 0; j < items.count; ++j) {
+      const std::uint32_t there = to(j);
+      g.place[j] = there;
+      g.source[there] = static_cast<std::uint32_t>(j);
+    }
+    return;
+  }
   const float *const x = items.v[0], *const y = items.v[1], *const z = items.v[2];
   const auto each = [&](const auto& share, const auto& place) HWY_ATTR {
     for (std::size_t j = 0; j < items.count; ++j) {
@@ -203,17 +213,14 @@ HWY_INLINE void put(const GaussBands& g, const Items& items, const DirectionsVie
   }
 }
 
-// Contacts that a block meets: runs in order and apart.
-struct Runs {
-  std::uint32_t first[4], end[4];
-  int count;
-};
-HWY_INLINE Runs runs_of(const GaussBands& g, std::size_t block) {
+HWY_INLINE BandRuns runs_of(const GaussBands& g, std::size_t block) {
   const GaussBands::Grid& grid = *g.grid;
-  Runs runs{{}, {grid.count}, 1};
+  BandRuns runs{{}, {grid.count}, 1};
   if (grid.count < kSorted) return runs;
   const std::uint32_t along = (1u << grid.shift) - 1;
-  const std::uint32_t a = g.edge[2 * block], b = g.edge[2 * block + 1];
+  const std::size_t first = block * kBandBlock;
+  const std::size_t last = HWY_MIN(first + kBandBlock, std::size_t{grid.count}) - 1;
+  const std::uint32_t a = g.cell_at[first], b = g.cell_at[last];
   const std::uint32_t band_a = a >> grid.shift, band_b = b >> grid.shift;
   const std::uint32_t low = band_a > 0 ? band_a - 1 : 0;
   const std::uint32_t high = HWY_MIN(band_b + 1, grid.bands - 1);
@@ -240,6 +247,32 @@ HWY_INLINE Runs runs_of(const GaussBands& g, std::size_t block) {
   return runs;
 }
 
+// Whole vectors, from the block itself on.
+HWY_INLINE void keep_behind(std::size_t block, BandRuns& runs) {
+  constexpr std::uint32_t kLane = kLanes;
+  std::uint32_t next = static_cast<std::uint32_t>(block * kBandBlock), count = 0;
+  for (std::uint32_t r = 0; r < runs.count; ++r) {
+    const std::uint32_t first = HWY_MAX(runs.first[r] / kLane * kLane, next);
+    const std::uint32_t end = (runs.end[r] + kLane - 1) / kLane * kLane;
+    if (first >= end) continue;
+    runs.first[count] = first, runs.end[count++] = next = end;
+  }
+  runs.count = count;
+}
+
+HWY_INLINE std::uint64_t list_runs(const GaussBands& g, std::size_t blocks) {
+  std::uint64_t met = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    BandRuns runs = runs_of(g, b);
+    if (g.order_only) {
+      keep_behind(b, runs);
+      g.runs[b] = runs;
+    }
+    for (std::uint32_t r = 0; r < runs.count; ++r) met += runs.end[r] - runs.first[r];
+  }
+  return met * kBandBlock;
+}
+
 std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_share) {
   GaussBands::Grid& grid = *g.grid;
   const Items items = items_of(g, c, per_share);
@@ -249,13 +282,14 @@ std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_
     put(g, items, c, per_share, [](std::size_t j) { return static_cast<std::uint32_t>(j); });
   } else {
     const DI di;
-    float* const along[2] = {g.at, g.at + blocks * kBandBlock};
+    float* along[2] = {g.at, g.at + blocks * kBandBlock};
     Range range[2];
     float scale[2];
     const float size = project(items, along, range);
     std::uint32_t* const cell = reinterpret_cast<std::uint32_t*>(g.phi);
     // Places are filled from the first on, where items are no contacts: ranks must stand apart.
     std::uint32_t* const rank = items.head != nullptr ? g.rank : g.place;
+    if (in_one_band(g, count)) along[1] = along[0], range[1] = range[0];
     choose_grid(g, count, range, size, scale);
     const std::uint32_t cells = 1u << grid.shift;
     const auto last = hn::Set(di, static_cast<std::int32_t>(cells - 1));
@@ -268,21 +302,24 @@ std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_
       hn::StoreU(hn::Or(hn::ShiftLeftSame(band, static_cast<int>(grid.shift)), turned), di,
                  reinterpret_cast<std::int32_t*>(cell) + j);
     }
-    std::fill_n(g.start, grid.cells, 0u);
+    std::fill_n(g.start, grid.cells + 1, 0u);
     for (std::size_t j = 0; j < count; ++j) rank[j] = g.start[cell[j]]++;
-    place_cells(g, count);
-    put(g, items, c, per_share, [&](std::size_t j) { return g.start[cell[j]] + rank[j]; });
+    place_cells(g);
+    put(g, items, c, per_share, [&](std::size_t j) {
+      const std::uint32_t there = g.start[cell[j]] + rank[j];
+      g.cell_at[there] = cell[j];
+      return there;
+    });
   }
   for (std::size_t j = count; j < blocks * kBandBlock; ++j) {
+    if (g.order_only) {
+      g.source[j] = 0;
+      continue;
+    }
     std::copy_n(g.at + 4 * (count - 1), 3, g.at + 4 * j);
     g.at[4 * j + 3] = 0;
   }
-  std::uint64_t met = 0;
-  for (std::size_t b = 0; b < blocks; ++b) {
-    const Runs runs = runs_of(g, b);
-    for (int r = 0; r < runs.count; ++r) met += runs.end[r] - runs.first[r];
-  }
-  return met * kBandBlock;
+  return list_runs(g, blocks);
 }
 
 // ---- sums
@@ -350,10 +387,10 @@ void sum_simd(const GaussBands& g, std::size_t begin, std::size_t end) {
   end = HWY_MIN(end, band_blocks(g.grid->count));
   for (std::size_t block = begin; block < end; ++block) {
     const Rows rows = load_rows(g, block);
-    const Runs runs = runs_of(g, block);
+    const BandRuns runs = runs_of(g, block);
     Sum sum;
     for (VF& phi : sum.phi) phi = hn::Zero(d);
-    for (int r = 0; r < runs.count; ++r)
+    for (std::uint32_t r = 0; r < runs.count; ++r)
       add_contacts(g, rows, width2, runs.first[r], runs.end[r], sum);
     for (std::size_t p = 0; p < kParts; ++p)
       hn::Store(hn::Mul(sum.phi[p], unit), d, g.phi + block * kBandBlock + p * kLanes);
@@ -378,15 +415,21 @@ void sum_bands(const GaussBands& g, std::size_t begin, std::size_t end) {
 
 void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns) {
   const std::size_t blocks = band_blocks(count), rows = blocks * kBandBlock;
-  for (float*& direction : g.direction) columns.take(direction, rows + kBandBlock);
-  columns.take(g.mass, rows);
-  columns.take(g.head, rows + kBandBlock);
-  columns.take(g.at, 4 * rows);
+  if (g.order_only) {
+    columns.take(g.at, 2 * rows);
+    columns.take(g.source, rows);
+    columns.take(g.runs, blocks);
+  } else {
+    for (float*& direction : g.direction) columns.take(direction, rows + kBandBlock);
+    columns.take(g.mass, rows);
+    columns.take(g.head, rows + kBandBlock);
+    columns.take(g.at, 4 * rows);
+  }
   columns.take(g.phi, rows);
   columns.take(g.place, rows);
   columns.take(g.rank, rows);
   columns.take(g.start, band_cells(count) + 1);
-  columns.take(g.edge, 2 * blocks + 2);
+  columns.take(g.cell_at, rows);
   columns.take(g.grid, 1);
 }
 

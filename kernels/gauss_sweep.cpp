@@ -1,5 +1,4 @@
-// gauss_sweep.cpp - stages and weights of gauss_sweep.h; sorting along the line, windows and pairs
-// of a product.
+// gauss_sweep.cpp - stages, pairs and weights of gauss_sweep.h.
 #include "kernels/gauss_sweep.h"
 
 #include <algorithm>
@@ -18,143 +17,39 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-constexpr std::size_t kTile = 16;  // contacts that columns are padded to
-using DF = hn::CappedTag<float, kTile>;
+using DF = hn::CappedTag<float, kBandBlock>;
 using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kRows = 4;  // a group: rows that share loads of columns
 
-// The line: no wall of a machine is square to it, nor do two of its six directions meet on it.
-constexpr float kLine[3] = {0.6104f, -0.3702f, 0.7003f};
-// Farther than any hat reaches; its square is still a float.
-constexpr float kNowhere = 1e15f;
-constexpr std::size_t kSorted = 48;  // contacts from which sorting pays
-constexpr std::size_t kMostBuckets = 2048;
 // Rows whose hats a column sums before they join the total: rounding grows with the number of
 // sums, not of contacts.
 constexpr std::size_t kFresh = 128;
-constexpr std::size_t kRun = 64 * kLanes;  // columns whose hats a row sums before, likewise
+constexpr std::uint32_t kRun = 64 * kLanes;  // columns whose hats a row sums before, likewise
 
-HWY_INLINE std::size_t whole_tiles(std::size_t rows) { return (rows + kTile - 1) / kTile * kTile; }
+// Farther than any hat reaches; its square is still a float.
+constexpr float kNowhere = 1e15f;
 
-// ---- order
-
-// Buckets of the contacts go to `bucket`; returns how many there are, and how many a hat spans.
-struct Buckets {
-  std::size_t count, reach;
-};
-HWY_INLINE Buckets buckets_of(const GaussLine& g, std::size_t count, float* along,
-                              std::uint32_t* bucket) {
-  const DF d;
-  const DI di;
-  VF low = hn::Set(d, 1e30f), high = hn::Set(d, -1e30f), size = hn::Zero(d);
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    const std::size_t live = count - i;
-    const VF x = load_n(d, g.column[0] + i, live), y = load_n(d, g.column[1] + i, live);
-    const VF z = load_n(d, g.column[2] + i, live);
-    VF p = hn::Mul(x, hn::Set(d, kLine[0]));
-    p = hn::MulAdd(y, hn::Set(d, kLine[1]), p);
-    p = hn::MulAdd(z, hn::Set(d, kLine[2]), p);
-    size = hn::Max(size, hn::Max(hn::Abs(x), hn::Max(hn::Abs(y), hn::Abs(z))));
-    // Lanes past the end repeat a real one.
-    if (live < kLanes) p = hn::IfThenElse(hn::FirstN(d, live), p, hn::Set(d, hn::GetLane(p)));
-    hn::StoreU(p, d, along + i);
-    low = hn::Min(low, p), high = hn::Max(high, p);
-  }
-  const float first = hn::GetLane(hn::MinOfLanes(d, low));
-  const float extent = hn::GetLane(hn::MaxOfLanes(d, high)) - first;
-  std::size_t buckets = 64;
-  while (buckets < kMostBuckets && 2 * buckets < count) buckets *= 2;
-  // Twice a width is enough to the bucket: more would only spread them.
-  const float scale = extent > 0 ? static_cast<float>(buckets - 1) / extent : 0.0f;
-  const auto last = hn::Set(di, static_cast<std::int32_t>(buckets - 1));
-  for (std::size_t i = 0; i < count; i += kLanes) {
-    const VF p = hn::Mul(hn::Sub(hn::LoadU(d, along + i), hn::Set(d, first)), hn::Set(d, scale));
-    // Whatever a NaN becomes, the bucket stays in range.
-    const auto b = hn::Min(hn::Max(hn::ConvertTo(di, p), hn::Zero(di)), last);
-    hn::StoreU(b, di, reinterpret_cast<std::int32_t*>(bucket) + i);
-  }
-  // A place is rounded by less than 1e-6 of the longest vector.
-  const float most = hn::GetLane(hn::MaxOfLanes(d, size));
-  const float reach = (g.width[0] * 1.0001f + 2e-6f * most) * scale + 1;
-  return {buckets,
-          reach < static_cast<float>(buckets) ? static_cast<std::size_t>(reach) + 1 : buckets};
-}
-
-// Columns in the order of `source`, with their padding. `source` may be where the shares go.
-HWY_INLINE void gather_rows(const GaussSweep& sweep, const GaussLine& g, float per_share,
-                            const std::uint32_t* source) {
+// Columns in the order of the bands, with their padding.
+void gather_rows(const GaussSweep& sweep) {
   const DF d;
   const DI di;
   const DirectionsView& c = sweep.contacts;
-  for (std::size_t i = 0; i < c.count; i += kLanes) {
-    const auto row = hn::Load(di, reinterpret_cast<const std::int32_t*>(source) + i);
-    const auto real = hn::FirstN(d, c.count - i);
+  const GaussPairs& pairs = *sweep.product;
+  const std::size_t rows = band_blocks(c.count) * kBandBlock;
+  for (std::size_t i = 0; i < rows; i += kLanes) {
+    const auto row = hn::Load(di, reinterpret_cast<const std::int32_t*>(sweep.bands[0].source) + i);
+    const auto real = hn::FirstN(d, c.count > i ? c.count - i : 0);
     for (int k = 0; k < 6; ++k) {
-      const VF v = hn::GatherIndex(d, g.column[k], row);
-      hn::Store(hn::IfThenElse(real, v, hn::Set(d, kNowhere)), d, g.at[k] + i);
+      const VF v = hn::GatherIndex(d, pairs.column[k], row);
+      hn::Store(hn::IfThenElse(real, v, hn::Set(d, kNowhere)), d, pairs.at[k] + i);
     }
-    if (c.facing == nullptr && c.depth == nullptr) continue;
-    VF share = hn::Set(d, per_share);
+    VF share = hn::Set(d, *sweep.per_share);
     if (c.depth != nullptr) share = hn::Mul(share, hn::GatherIndex(d, c.depth, row));
     if (c.facing != nullptr) share = hn::Mul(share, hn::GatherIndex(d, c.facing, row));
-    hn::Store(hn::IfThenElseZero(real, share), d, g.share + i);
+    hn::Store(hn::IfThenElseZero(real, share), d, pairs.share + i);
   }
-  const std::size_t padded = whole_tiles(c.count);
-  for (std::size_t i = (c.count + kLanes - 1) / kLanes * kLanes; i < padded; i += kLanes) {
-    for (int k = 0; k < 6; ++k) hn::Store(hn::Set(d, kNowhere), d, g.at[k] + i);
-    hn::Store(hn::Zero(d), d, g.share + i);
-  }
-}
-
-void sort_line(const GaussSweep& sweep) {
-  const GaussLine& g = sweep.line;
-  const DirectionsView& c = sweep.contacts;
-  const std::size_t count = c.count, padded = whole_tiles(count);
-  const std::size_t groups = (count + kRows - 1) / kRows;
-  const bool weighted = c.facing != nullptr || c.depth != nullptr;
-  const float per_share = weighted ? gauss_per_share(c) : 1.0f;
-  *sweep.per_share = per_share;
-
-  std::uint64_t pairs = 0;
-  std::uint32_t* const source = reinterpret_cast<std::uint32_t*>(g.share);
-  if (count < kSorted) {
-    for (std::size_t i = 0; i < count; ++i) g.place[i] = source[i] = static_cast<std::uint32_t>(i);
-    for (std::size_t q = 0; q < groups; ++q) g.end[q] = static_cast<std::uint32_t>(count);
-  } else {
-    std::uint32_t start[kMostBuckets + 1];
-    std::uint32_t* const bucket = reinterpret_cast<std::uint32_t*>(g.row);
-    const Buckets buckets = buckets_of(g, count, g.at[0], bucket);
-    std::fill_n(start, buckets.count + 1, 0u);
-    for (std::size_t i = 0; i < count; ++i) g.place[i] = start[bucket[i]]++;
-    std::uint32_t sum = 0;
-    for (std::size_t b = 0; b <= buckets.count; ++b) {
-      const std::uint32_t here = start[b];
-      start[b] = sum;
-      sum += here;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t to = g.place[i] + start[bucket[i]];
-      g.place[i] = to;
-      source[to] = static_cast<std::uint32_t>(i);
-    }
-    for (std::size_t q = 0; q < groups; ++q) {
-      const std::uint32_t last = bucket[source[HWY_MIN(q * kRows + kRows, count) - 1]];
-      g.end[q] = start[HWY_MIN(last + buckets.reach + 1, buckets.count)];
-      pairs += g.end[q] - q * kRows;
-    }
-  }
-  std::fill_n(source + count, padded - count, 0u);
-  *sweep.pairs = pairs * kRows;
-  gather_rows(sweep, g, per_share, source);
-  // Half of the pairs to each part.
-  g.split[0] = 0, g.split[1] = g.split[2] = groups * kRows;
-  if (count < kSorted) return;
-  std::uint64_t seen = 0;
-  std::size_t q = 0;
-  for (; 2 * seen < pairs; ++q) seen += g.end[q] - q * kRows;
-  g.split[1] = q * kRows;
 }
 
 // ---- pairs
@@ -164,8 +59,8 @@ struct Group {
   VF at[kRows][3], share[kRows], sum[kRows];
 };
 
-template <bool kWeighted, bool kMasked>
-HWY_INLINE void add_tile(const GaussLine& g, const VF* width2, std::size_t i, std::size_t j,
+template <bool kMasked>
+HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
                          float* column, Group& rows) {
   const DF d;
   const VF zero = hn::Zero(d);
@@ -196,27 +91,21 @@ HWY_INLINE void add_tile(const GaussLine& g, const VF* width2, std::size_t i, st
   for (int k = 3; k < 6; ++k) x[k] = hn::Load(d, g.at[k] + j);
   HWY_UNROLL(4)
   for (std::size_t r = 0; r < kRows; ++r) hat[r] = hn::Mul(hat[r], gap_to_edge(r, 1));
+  const VF share = hn::Load(d, g.share + j);
   VF sum = hn::Load(d, column + j);
-  if constexpr (kWeighted) {
-    const VF share = hn::Load(d, g.share + j);
-    HWY_UNROLL(4)
-    for (std::size_t r = 0; r < kRows; ++r) {
-      rows.sum[r] = hn::MulAdd(share, hat[r], rows.sum[r]);
-      sum = hn::MulAdd(rows.share[r], hat[r], sum);
-    }
-  } else {
-    HWY_UNROLL(4)
-    for (std::size_t r = 0; r < kRows; ++r) rows.sum[r] = hn::Add(rows.sum[r], hat[r]);
-    sum = hn::Add(sum, hn::Add(hn::Add(hat[0], hat[1]), hn::Add(hat[2], hat[3])));
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) {
+    rows.sum[r] = hn::MulAdd(share, hat[r], rows.sum[r]);
+    sum = hn::MulAdd(rows.share[r], hat[r], sum);
   }
   hn::Store(sum, d, column + j);
 }
 
-// Sums of four vectors' lanes, to to[0..3].
-HWY_INLINE void store_sums(const VF* sum, float* to) {
+// Adds the sums of four vectors' lanes to to[0..3].
+HWY_INLINE void add_sums(const VF* sum, float* to) {
   const DF d;
 #if HWY_TARGET == HWY_SCALAR
-  for (std::size_t r = 0; r < kRows; ++r) to[r] = hn::GetLane(hn::SumOfLanes(d, sum[r]));
+  for (std::size_t r = 0; r < kRows; ++r) to[r] += hn::GetLane(hn::SumOfLanes(d, sum[r]));
 #else
   const auto fold = [&](VF a, VF b) HWY_ATTR {
     return hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b));
@@ -224,86 +113,80 @@ HWY_INLINE void store_sums(const VF* sum, float* to) {
   // In every block of four: rows 0 1 2 3.
   const VF rows = fold(fold(sum[0], sum[2]), fold(sum[1], sum[3]));
   const hn::CappedTag<float, 4> d4;
-  HWY_ALIGN float blocks[kTile];
+  HWY_ALIGN float blocks[kBandBlock];
   hn::Store(rows, d, blocks);
   auto total = hn::Load(d4, blocks);
   for (std::size_t block = 4; block < kLanes; block += 4)
     total = hn::Add(total, hn::Load(d4, blocks + block));
-  hn::StoreU(total, d4, to);
+  hn::StoreU(hn::Add(total, hn::LoadU(d4, to)), d4, to);
 #endif
 }
 
-// A group's rows from `i` on, with columns from `j` to `end`; returns where it stopped.
-template <bool kWeighted>
-HWY_INLINE std::size_t add_group(const GaussLine& g, const VF* width2, std::size_t i, std::size_t j,
-                                 std::size_t end, float* fresh) {
+// A group's rows from `i` on, with columns from `j` to `end`.
+HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
+                          std::size_t end, float* fresh, float* total) {
   const DF d;
   Group rows;
   HWY_UNROLL(4)
   for (std::size_t r = 0; r < kRows; ++r) {
     for (int k = 0; k < 3; ++k) rows.at[r][k] = hn::Set(d, g.at[k][i + r]);
-    if (kWeighted) rows.share[r] = hn::Set(d, g.share[i + r]);
+    rows.share[r] = hn::Set(d, g.share[i + r]);
     rows.sum[r] = hn::Zero(d);
   }
-  for (; j < i + kRows; j += kLanes) add_tile<kWeighted, true>(g, width2, i, j, fresh, rows);
-  for (; j < end; j += kLanes) add_tile<kWeighted, false>(g, width2, i, j, fresh, rows);
-  store_sums(rows.sum, g.row + i);
-  return j;
+  for (; j < HWY_MIN(i + kRows, end); j += kLanes) add_tile<true>(g, width2, i, j, fresh, rows);
+  for (; j < end; j += kLanes) add_tile<false>(g, width2, i, j, fresh, rows);
+  add_sums(rows.sum, total + i);
 }
 
-template <bool kWeighted>
-HWY_INLINE void add_pairs(const GaussLine& g, std::size_t count, std::size_t part) {
+void sum_pairs(const GaussSweep& sweep, std::size_t part) {
   const DF d;
-  const std::size_t begin = g.split[part], end = g.split[part + 1], padded = whole_tiles(count);
-  float *const fresh = g.fresh[part], *const total = g.sum[part];
+  const GaussBands& g = sweep.bands[0];
+  const GaussPairs& pairs = *sweep.product;
+  const std::size_t count = g.grid->count, padded = band_blocks(count) * kBandBlock;
+  float *const fresh = pairs.fresh[part], *const total = pairs.sum[part];
   std::fill_n(fresh, padded, 0.0f);
   std::fill_n(total, padded, 0.0f);
   VF width2[2];
-  for (int s = 0; s < 2; ++s) width2[s] = hn::Set(d, g.width[s] * g.width[s]);
-  for (std::size_t first = begin; first < end; first += kFresh) {
-    const std::size_t behind = HWY_MIN(first + kFresh, end);
+  for (int s = 0; s < 2; ++s) width2[s] = hn::Set(d, pairs.width[s] * pairs.width[s]);
+  const std::size_t end = pairs.split[part + 1];
+  for (std::size_t first = pairs.split[part]; first < end; first += kFresh / kBandBlock) {
     std::size_t farthest = 0;
-    for (std::size_t i = first; i < behind; i += kRows) {
-      const std::size_t window = g.end[i / kRows];
-      std::size_t j = i / kLanes * kLanes;
-      j = add_group<kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
-      while (HWY_UNLIKELY(j < window)) {
-        float before[kRows];
-        std::copy_n(g.row + i, kRows, before);
-        j = add_group<kWeighted>(g, width2, i, j, HWY_MIN(window, j + kRun), fresh);
-        for (std::size_t r = 0; r < kRows; ++r) g.row[i + r] += before[r];
+    for (std::size_t b = first; b < HWY_MIN(first + kFresh / kBandBlock, end); ++b) {
+      const BandRuns& runs = g.runs[b];
+      const std::size_t rows = HWY_MIN((b + 1) * kBandBlock, count);
+      for (std::uint32_t r = 0; r < runs.count; ++r) {
+        for (std::uint32_t from = runs.first[r]; from < runs.end[r]; from += kRun) {
+          const std::uint32_t to = HWY_MIN(from + kRun, runs.end[r]);
+          for (std::size_t i = b * kBandBlock; i < rows; i += kRows)
+            add_group(pairs, width2, i, HWY_MAX(std::size_t{from}, i / kLanes * kLanes), to, fresh,
+                      total);
+        }
       }
-      farthest = HWY_MAX(farthest, j);
+      if (runs.count > 0) farthest = HWY_MAX(farthest, std::size_t{runs.end[runs.count - 1]});
     }
-    for (std::size_t j = first / kLanes * kLanes; j < farthest; j += kLanes) {
+    for (std::size_t j = first * kBandBlock; j < farthest; j += kLanes) {
       hn::Store(hn::Add(hn::Load(d, total + j), hn::Load(d, fresh + j)), d, total + j);
       hn::Store(hn::Zero(d), d, fresh + j);
     }
   }
 }
 
-void sum_pairs(const GaussSweep& sweep, std::size_t part) {
-  const std::size_t count = sweep.contacts.count;
-  const bool weighted = sweep.contacts.facing != nullptr || sweep.contacts.depth != nullptr;
-  weighted ? add_pairs<true>(sweep.line, count, part) : add_pairs<false>(sweep.line, count, part);
+// Adds up what the parts summed.
+void join_parts(const GaussSweep& sweep) {
+  const DF d;
+  const GaussBands& g = sweep.bands[0];
+  const GaussPairs& pairs = *sweep.product;
+  const VF unit =
+      hn::Set(d, 1 / (pairs.width[0] * pairs.width[0] * pairs.width[1] * pairs.width[1]));
+  for (std::size_t j = 0; j < g.grid->count; j += kLanes) {
+    VF phi = hn::Load(d, pairs.sum[0] + j);
+    for (std::size_t part = 1; part < kGaussSweepParts; ++part)
+      phi = hn::Add(phi, hn::Load(d, pairs.sum[part] + j));
+    hn::Store(hn::MulAdd(phi, unit, hn::Load(d, pairs.share + j)), d, pairs.sum[0] + j);
+  }
 }
 
 // ---- weights
-
-// Adds up what the parts of a product summed.
-void join_parts(const GaussSweep& sweep) {
-  const DF d;
-  const GaussLine& g = sweep.line;
-  const DirectionsView& c = sweep.contacts;
-  const bool weighted = c.facing != nullptr || c.depth != nullptr;
-  const float unit = 1 / (g.width[0] * g.width[0] * g.width[1] * g.width[1]);
-  for (std::size_t j = 0; j < c.count; j += kLanes) {
-    VF phi = hn::Load(d, g.row + j);
-    for (const float* sum : g.sum) phi = hn::Add(phi, hn::Load(d, sum + j));
-    const VF own = weighted ? hn::Load(d, g.share + j) : hn::Set(d, 1.0f);
-    hn::Store(hn::MulAdd(phi, hn::Set(d, unit), own), d, g.row + j);
-  }
-}
 
 void weigh_rows(const GaussSweep& sweep, std::size_t begin, std::size_t end) {
   const DF d;
@@ -314,10 +197,9 @@ void weigh_rows(const GaussSweep& sweep, std::size_t begin, std::size_t end) {
     const std::size_t live = end - i;
     VF phi = zero;
     for (int p = 0; p < sweep.densities; ++p) {
-      const bool product = sweep.hat == Hat::product;
-      const std::uint32_t* const places = product ? sweep.line.place : sweep.bands[p].place;
-      const auto place = load_n(di, reinterpret_cast<const std::int32_t*>(places) + i, live);
-      phi = hn::Add(phi, hn::GatherIndex(d, product ? sweep.line.row : sweep.bands[p].phi, place));
+      const GaussBands& g = sweep.bands[p];
+      const auto place = load_n(di, reinterpret_cast<const std::int32_t*>(g.place) + i, live);
+      phi = hn::Add(phi, hn::GatherIndex(d, g.order_only ? sweep.product->sum[0] : g.phi, place));
     }
     const VF facing = c.facing ? load_n(d, c.facing + i, live) : hn::Set(d, 1.0f);
     VF share = hn::Set(d, *sweep.per_share);
@@ -336,7 +218,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace h6::kernels {
 
-HWY_EXPORT(sort_line);
+HWY_EXPORT(gather_rows);
 HWY_EXPORT(sum_pairs);
 HWY_EXPORT(join_parts);
 HWY_EXPORT(weigh_rows);
@@ -345,20 +227,6 @@ namespace {
 
 constexpr std::size_t kBlocksASlice = 16;  // summed, of 16 contacts each
 constexpr std::size_t kRowsASlice = 2048;  // weighed
-
-void lay_out_line(GaussLine& g, std::size_t count, GaussColumns& columns) {
-  const std::size_t rows = (count + 15) / 16 * 16;
-  for (float*& at : g.at) columns.take(at, rows);
-  columns.take(g.share, rows);
-  columns.take(g.row, rows);
-  for (std::size_t part = 0; part < kGaussSweepParts; ++part) {
-    columns.take(g.fresh[part], rows);
-    columns.take(g.sum[part], rows);
-  }
-  columns.take(g.place, rows);
-  columns.take(g.end, rows / 4);
-  columns.take(g.split, kGaussSweepParts + 1);
-}
 
 GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                         GaussColumns& columns) {
@@ -370,28 +238,53 @@ GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& wid
   columns.take(sweep.pairs, 2);
   const float* const normals[6] = {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz};
   const float width[2] = {std::max(widths.normal, kMinWidth), std::max(widths.torque, kMinWidth)};
-  if (hat == Hat::product) {
-    std::copy_n(normals, 6, sweep.line.column);
-    std::copy_n(width, 2, sweep.line.width);
-    lay_out_line(sweep.line, c.count, columns);
-    return sweep;
-  }
   for (int p = 0; p < sweep.densities; ++p) {
-    std::copy_n(normals + 3 * p, 3, sweep.bands[p].column);
-    sweep.bands[p].width = width[p];
-    lay_out_bands(sweep.bands[p], c.count, columns);
+    GaussBands& g = sweep.bands[p];
+    g.order_only = hat == Hat::product;
+    std::copy_n(normals + 3 * p, 3, g.column);
+    g.width = width[p];
+    lay_out_bands(g, c.count, columns);
   }
+  if (hat != Hat::product) return sweep;
+  columns.take(sweep.product, 1);
+  GaussPairs pairs{};
+  std::copy_n(normals, 6, pairs.column);
+  std::copy_n(width, 2, pairs.width);
+  const std::size_t rows = band_blocks(c.count) * kBandBlock;
+  for (float*& at : pairs.at) columns.take(at, rows);
+  columns.take(pairs.share, rows);
+  for (std::size_t part = 0; part < kGaussSweepParts; ++part) {
+    columns.take(pairs.fresh[part], rows);
+    columns.take(pairs.sum[part], rows);
+  }
+  if (sweep.product != nullptr) *sweep.product = pairs;
   return sweep;
 }
 
 std::size_t slices_of(std::size_t rows, std::size_t size) { return (rows + size - 1) / size; }
 
+// Half of the pairs to each part.
+void split_pairs(const GaussSweep& sweep) {
+  const GaussBands& g = sweep.bands[0];
+  const std::size_t blocks = band_blocks(g.grid->count);
+  std::size_t* const split = sweep.product->split;
+  split[0] = 0, split[2] = blocks;
+  std::uint64_t seen = 0;
+  std::size_t b = 0;
+  for (; 2 * seen < *sweep.pairs && b < blocks; ++b)
+    for (std::uint32_t r = 0; r < g.runs[b].count; ++r)
+      seen += kBandBlock * (g.runs[b].end[r] - g.runs[b].first[r]);
+  split[1] = b;
+}
+
 void sort(const GaussSweep& sweep, std::size_t density) {
-  if (sweep.hat == Hat::product) return HWY_DYNAMIC_DISPATCH(sort_line)(sweep);
   const DirectionsView& c = sweep.contacts;
   const bool weighted = c.facing != nullptr || c.depth != nullptr;
   sweep.per_share[density] = weighted ? gauss_per_share(c) : 1.0f;
   sweep.pairs[density] = sort_bands(sweep.bands[density], c, sweep.per_share[density]);
+  if (sweep.product == nullptr) return;
+  HWY_DYNAMIC_DISPATCH(gather_rows)(sweep);
+  split_pairs(sweep);
 }
 
 void sum(const GaussSweep& sweep, std::size_t slice) {

@@ -1,15 +1,12 @@
 // gauss_sweep.h - the weights of gauss_weights.h for some thousand contacts: sorted, so that each
 // meets only those of a window.
 //
-// Hats over one sphere: gauss_bands.h. A product of two: contacts are sorted by their place along a
-// fixed line across the map of N. A hat reaches no farther along the line than it does on the map,
-// so a contact meets only those of a window; and since a hat is the same both ways, only those
-// behind it: one evaluation serves both densities.
+// gauss_bands.h sorts them, and sums hats over one sphere. Of a product of two, which costs more, a
+// pair is evaluated once: by a sum over lanes for one contact and a sum over rows for the others.
 //
-//     columns -> buckets along the line -> rows in order, with the end of every window
-//             -> sums of a row (over lanes) and of a column (over rows) -> weights
+//     columns -> bands, runs -> sums of rows and of columns, part by part -> weights
 //
-// Stages and slices are those of gauss_tree.h. Slices have their own sums, which are added in
+// Stages and slices are those of gauss_tree.h. Parts have their own sums, which are added in
 // order, so which thread runs what changes no bit.
 #pragma once
 #include "kernels/gauss_bands.h"
@@ -21,27 +18,23 @@ inline constexpr std::size_t kGaussSweepParts = 2;     // slices of a product's 
 inline constexpr std::size_t kGaussSweepMost = 32768;  // contacts; from there on gauss_tree
 inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536;  // a contact
 
-// The density of the product of two hats.
-struct GaussLine {
+// The pairs of a product of two hats.
+struct GaussPairs {
   const float* column[6];  // as they came
   float width[2];
-  // In order along the line, padded to whole tiles.
-  float *at[6], *share;
-  float* row;                                              // sums of rows
-  float *fresh[kGaussSweepParts], *sum[kGaussSweepParts];  // of columns, part by part
-  std::uint32_t* place;                                    // (count) where each contact went
-  std::uint32_t* end;                                      // of each row group's window
-  std::size_t* split;                                      // first row of each part
+  float *at[6], *share;                                    // in order of the bands
+  float *fresh[kGaussSweepParts], *sum[kGaussSweepParts];  // part by part
+  std::size_t split[kGaussSweepParts + 1];                 // first block of each
 };
 
 struct GaussSweep {
   DirectionsView contacts;
   Hat hat;
-  int densities;         // 2 for Hat::sum
-  GaussBands bands[2];   // of hats over one sphere
-  GaussLine line;        // of a product
+  int densities;  // 2 for Hat::sum
+  GaussBands bands[2];
+  GaussPairs* product;   // of Hat::product
   float* per_share;      // 1 / the largest s
-  std::uint64_t* pairs;  // (densities) that windows hold
+  std::uint64_t* pairs;  // (densities) that runs hold
   float* weight;
 };
 
