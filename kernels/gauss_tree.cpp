@@ -51,6 +51,7 @@ GaussTree with_columns(const DirectionsView& c, Hat hat, const GaussWidths& widt
     std::copy_n(normals + 3 * p, g.axes, g.column);
     g.width[0] = std::max(p == 0 ? widths.normal : widths.torque, kMinWidth);
     g.width[1] = std::max(widths.torque, kMinWidth);
+    g.unit = c.facing == nullptr && c.depth == nullptr;
     lay_out(g, c.count, columns);
   }
   return tree;

@@ -33,6 +33,7 @@ struct GaussDensity {
   int axes;                // 3, or 6: N and T
   const float* column[6];  // as they came
   float width[2];
+  bool unit;  // all s_j are 1
   // In order of the curve, leaf by leaf: 16 of each column, then 16 times s_j over the largest s.
   float* leaves;
   std::uint32_t *source, *key;

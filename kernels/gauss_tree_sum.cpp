@@ -32,7 +32,8 @@ constexpr std::size_t kOpened = 256;  // leaves before they are opened
 enum class Form { products, differences };
 
 // Columns of listed contacts. Over each sphere, form products: 2 x and e^2 - |x|^2, the first
-// sphere's times the share; form differences: x, the share first.
+// sphere's times the share; form differences: x, the share first. Where all shares are 1, form
+// products has no share, and x in the place of 2 x.
 template <int kAxes>
 struct List {
   static constexpr int kShare = 0, kFirst = 1;  // then 4 a sphere: x y z, rest
@@ -79,7 +80,7 @@ HWY_INLINE VF twice(VF v) { return hn::Add(v, v); }
 
 // ---- pairs
 
-template <int kAxes, Form kForm, std::size_t kCount>
+template <int kAxes, Form kForm, std::size_t kCount, bool kUnit = false>
 HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
   constexpr int kSpheres = kAxes / 3;
   const DF d;
@@ -94,10 +95,11 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
       at[r][k] = hn::Set(d, leaf_column(t.g, t.leaf, k)[first + r] - origin);
     }
     for (int s = 0; s < kSpheres; ++s) at2[r][s] = norm2_of(at[r] + 3 * s);
+    for (int k = 0; k < (kUnit ? kAxes : 0); ++k) at[r][k] = twice(at[r][k]);
     sum[r] = hn::Zero(d);
   }
   for (std::size_t k = 0; k < t.list.count; k += kLanes) {
-    const VF share = hn::Load(d, column[0] + k);
+    const VF share = kUnit ? hn::Zero(d) : hn::Load(d, column[0] + k);
     VF x[kSpheres][4];
     for (int s = 0; s < kSpheres; ++s)
       for (int a = 0; a < (kForm == Form::products ? 4 : 3); ++a)
@@ -109,7 +111,8 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
         const VF* a = at[r] + 3 * s;
         VF v;
         if constexpr (kForm == Form::products) {
-          v = s == 0 ? hn::NegMulAdd(share, at2[r][0], x[0][3]) : hn::Sub(x[s][3], at2[r][s]);
+          v = s == 0 && !kUnit ? hn::NegMulAdd(share, at2[r][0], x[0][3])
+                               : hn::Sub(x[s][3], at2[r][s]);
           for (int i = 0; i < 3; ++i) v = hn::MulAdd(x[s][i], a[i], v);
         } else {
           v = width2[s];
@@ -144,7 +147,9 @@ HWY_NOINLINE void work_off(Targets<kAxes>& t) {
   if (t.list.count == 0) return;
   for (auto& column : t.list.column) hn::StoreU(hn::Zero(d), d, column + t.list.count);
   for (std::size_t r = 0; r < kGaussLeaf; r += kCount) {
-    if (t.form == Form::products) {
+    if (t.form == Form::products && kAxes == 3 && t.g.unit) {
+      add_pairs<kAxes, Form::products, kCount, true>(t, r);
+    } else if (t.form == Form::products) {
       add_pairs<kAxes, Form::products, kCount>(t, r);
     } else {
       add_pairs<kAxes, Form::differences, kCount>(t, r);
@@ -156,10 +161,10 @@ HWY_NOINLINE void work_off(Targets<kAxes>& t) {
 // ---- what lies inside all supports
 
 // Adds nodes with first coefficients about their own centroids to the polynomial: `away` from the
-// targets' centre, gap = e^2 - |away|^2.
+// targets' centre, gap = e^2 - |away|^2. Coefficients of x, y, z are left halved.
 HWY_INLINE void join(VF* term, VF mass, VF a2, const VF* away, VF gap) {
   term[0] = hn::Add(term[0], hn::MulSub(mass, gap, a2));
-  for (int k = 0; k < 3; ++k) term[1 + k] = hn::MulAdd(mass, twice(away[k]), term[1 + k]);
+  for (int k = 0; k < 3; ++k) term[1 + k] = hn::MulAdd(mass, away[k], term[1 + k]);
   term[4] = hn::Sub(term[4], mass);
 }
 
@@ -213,7 +218,7 @@ HWY_NOINLINE void join_contacts(VF share, const VF* away, const VF* gap, VF* ter
 
 // Opens leaves. Sums and counts stay in registers: a leaf takes less time than a store that the
 // next one has to wait for.
-template <int kAxes, Form kForm>
+template <int kAxes, Form kForm, bool kUnit = false>
 HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
   constexpr int kSpheres = kAxes / 3;
   const DF d;
@@ -251,14 +256,14 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
       const auto append = [&](int k, VF v) HWY_ATTR {
         hn::StoreU(hn::Compress(v, cut), d, t.list.column[k] + count);
       };
-      append(0, share);
+      if (!kUnit) append(0, share);
       HWY_UNROLL(2)
       for (int s = 0; s < kSpheres; ++s) {
         VF factor = hn::Set(d, 2.0f), rest = gap[s];
-        if (s == 0) factor = hn::Mul(factor, share), rest = hn::Mul(rest, share);
+        if (s == 0 && !kUnit) factor = hn::Mul(factor, share), rest = hn::Mul(rest, share);
         for (int k = 0; k < 3; ++k)
           append(1 + 4 * s + k, kForm == Form::products
-                                    ? hn::Mul(factor, away[3 * s + k])
+                                    ? kUnit ? away[3 * s + k] : hn::Mul(factor, away[3 * s + k])
                                     : hn::Load(d, column + (3 * s + k) * kGaussLeaf));
         if (kForm == Form::products) append(4 + 4 * s, rest);
       }
@@ -278,7 +283,9 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
 
 template <int kAxes>
 HWY_INLINE void open(Targets<kAxes>& t) {
-  if (t.form == Form::products) {
+  if (t.form == Form::products && kAxes == 3 && t.g.unit) {
+    open_leaves<kAxes, Form::products, true>(t);
+  } else if (t.form == Form::products) {
     open_leaves<kAxes, Form::products>(t);
   } else {
     open_leaves<kAxes, Form::differences>(t);
@@ -371,6 +378,36 @@ HWY_INLINE VF density_of(const Targets<kAxes>& t, const float* term, std::size_t
   return sum;
 }
 
+// The middle of the box around those that weigh anything: nearer to the farthest than the centroid.
+template <int kAxes>
+HWY_INLINE void centre_targets(Targets<kAxes>& t) {
+  const DF d;
+  const float* const share = leaf_column(t.g, t.leaf, kAxes);
+  for (int s = 0; s < kAxes / 3; ++s) {
+    for (int k = 3 * s; k < 3 * s + 3; ++k) {
+      VF low = hn::Set(d, 1e30f), high = hn::Set(d, -1e30f);
+      for (std::size_t p = 0; p < kGaussLeaf; p += kLanes) {
+        const MF real = hn::Gt(hn::Load(d, share + p), hn::Zero(d));
+        const VF v = hn::Load(d, leaf_column(t.g, t.leaf, k) + p);
+        low = hn::Min(low, hn::IfThenElse(real, v, low));
+        high = hn::Max(high, hn::IfThenElse(real, v, high));
+      }
+      t.centre[k] =
+          0.5f * (hn::GetLane(hn::MinOfLanes(d, low)) + hn::GetLane(hn::MaxOfLanes(d, high)));
+    }
+    VF most = hn::Zero(d);
+    for (std::size_t p = 0; p < kGaussLeaf; p += kLanes) {
+      VF away[3];
+      for (int k = 0; k < 3; ++k)
+        away[k] = hn::Sub(hn::Load(d, leaf_column(t.g, t.leaf, 3 * s + k) + p),
+                          hn::Set(d, t.centre[3 * s + k]));
+      const MF real = hn::Gt(hn::Load(d, share + p), hn::Zero(d));
+      most = hn::Max(most, hn::IfThenElseZero(real, norm2_of(away)));
+    }
+    t.radius[s] = hn::GetLane(hn::MaxOfLanes(d, hn::Sqrt(most))) * 1.00001f;
+  }
+}
+
 template <int kAxes>
 HWY_INLINE void sum_leaf(const GaussDensity& g, std::size_t count, std::size_t leaf) {
   const DF d;
@@ -379,10 +416,9 @@ HWY_INLINE void sum_leaf(const GaussDensity& g, std::size_t count, std::size_t l
   HWY_ALIGN float phi[kGaussLeaf] = {};
   if (leaves.moment[kMass][leaf] > 0) {
     Targets<kAxes> t(g, leaf);
-    for (int k = 0; k < kAxes; ++k) t.centre[k] = leaves.centre[k][leaf];
+    centre_targets(t);
     float unit = 1;
     for (int s = 0; s < kAxes / 3; ++s) {
-      t.radius[s] = leaves.radius[s][leaf];
       t.width2[s] = g.width[s] * g.width[s];
       if (t.radius[s] > g.width[s]) t.form = Form::differences;
       unit /= t.width2[s];
@@ -393,6 +429,8 @@ HWY_INLINE void sum_leaf(const GaussDensity& g, std::size_t count, std::size_t l
     float term[Targets<kAxes>::kTerms];
     for (int k = 0; k < Targets<kAxes>::kTerms; ++k)
       term[k] = hn::GetLane(hn::SumOfLanes(d, t.term[k]));
+    if constexpr (kAxes == 3)
+      for (int k = 1; k < 4; ++k) term[k] *= 2;  // join has left them halved
     for (std::size_t r = 0; r < kGaussLeaf; ++r) {
       VF sum = hn::Load(d, t.sum[r]);
       for (std::size_t p = kLanes; p < kGaussLeaf; p += kLanes)
