@@ -1,9 +1,10 @@
 // gauss_tree_sum.cpp - densities at the contacts of a leaf, from the nodes of the tree.
 //
-// For the 16 targets of a leaf the tree is walked once, 16 sibling nodes at a time. Nodes that none
-// of the targets reaches are dropped; those that all of them hold inside their supports become one
-// polynomial about the targets' centre; the rest is opened. So are leaves: contacts in them are
-// dropped, join the polynomial, or go to a list that every target sums pair by pair.
+// For the 16 targets of a leaf, or of two that are near, the tree is walked once, 16 sibling nodes
+// at a time. Nodes that none of the targets reaches are dropped; those that all of them hold inside
+// their supports become one polynomial about the targets' centre; the rest is opened. So are
+// leaves: contacts in them are dropped, join the polynomial, or go to a list that every target sums
+// pair by pair.
 #include <cstring>
 
 #include "kernels/gauss_tree_stages.h"
@@ -24,8 +25,10 @@ using DF = hn::CappedTag<float, kGaussLeaf>;
 using VF = hn::Vec<DF>;
 using MF = hn::Mask<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
-constexpr std::size_t kListed = 512;  // contacts before a list is worked off
-constexpr std::size_t kOpened = 256;  // leaves before they are opened
+constexpr std::size_t kListed = 512;    // contacts before a list is worked off
+constexpr std::size_t kMostLeaves = 2;  // of targets
+constexpr float kTogether = 0.1f;       // of a width: leaves that share a walk, and how far apart
+constexpr std::size_t kOpened = 256;    // leaves before they are opened
 
 // Pairs in the form c + 2 t.x, with x and t from the targets' centre: exact enough while targets
 // are no farther from it than a width. Else by differences.
@@ -41,17 +44,22 @@ struct List {
   std::size_t count = 0;
 };
 
-// Targets of one leaf.
+// Targets of a leaf, or of two in a row.
 template <int kAxes>
 struct Targets {
   static constexpr int kSpheres = kAxes / 3;
   static constexpr int kTerms = kAxes == 3 ? 5 : 25;
   const GaussDensity& g;
-  std::size_t leaf;
+  std::size_t leaf, leaves;
   // What is large stays uninitialised.
-  Targets(const GaussDensity& density, std::size_t of) : g(density), leaf(of) {
+  Targets(const GaussDensity& density, std::size_t first, std::size_t count)
+      : g(density), leaf(first), leaves(count) {
     for (VF& v : term) v = hn::Zero(DF());
-    for (auto& row : sum) std::memset(row, 0, sizeof row);
+    std::memset(sum, 0, count * kGaussLeaf * sizeof *sum);
+  }
+  // Target r of all, in column k.
+  const float* at(int k, std::size_t r) const {
+    return leaf_column(g, leaf + r / kGaussLeaf, k) + r % kGaussLeaf;
   }
   Form form = Form::products;
   float centre[kAxes];
@@ -59,8 +67,8 @@ struct Targets {
   // Coefficients of 1, x, y, z, |x|^2 about the centre (products: of N's times T's), one sum a
   // lane.
   VF term[kTerms];
-  HWY_ALIGN float sum[kGaussLeaf][kGaussLeaf];  // of pairs, one sum a lane
-  std::uint32_t cut[kOpened + kGaussLeaf];      // leaves to open
+  HWY_ALIGN float sum[kMostLeaves * kGaussLeaf][kGaussLeaf];  // of pairs, one sum a lane
+  std::uint32_t cut[kOpened + kGaussLeaf];                    // leaves to open
   std::size_t cuts = 0;
   List<kAxes> list;
 };
@@ -92,7 +100,7 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
   for (std::size_t r = 0; r < kCount; ++r) {
     for (int k = 0; k < kAxes; ++k) {
       const float origin = kForm == Form::products ? t.centre[k] : 0.0f;
-      at[r][k] = hn::Set(d, leaf_column(t.g, t.leaf, k)[first + r] - origin);
+      at[r][k] = hn::Set(d, t.at(k, first)[r] - origin);
     }
     for (int s = 0; s < kSpheres; ++s) at2[r][s] = norm2_of(at[r] + 3 * s);
     for (int k = 0; k < (kUnit ? kAxes : 0); ++k) at[r][k] = twice(at[r][k]);
@@ -146,7 +154,7 @@ HWY_NOINLINE void work_off(Targets<kAxes>& t) {
   const DF d;
   if (t.list.count == 0) return;
   for (auto& column : t.list.column) hn::StoreU(hn::Zero(d), d, column + t.list.count);
-  for (std::size_t r = 0; r < kGaussLeaf; r += kCount) {
+  for (std::size_t r = 0; r < t.leaves * kGaussLeaf; r += kCount) {
     if (t.form == Form::products && kAxes == 3 && t.g.unit) {
       add_pairs<kAxes, Form::products, kCount, true>(t, r);
     } else if (t.form == Form::products) {
@@ -362,8 +370,7 @@ template <int kAxes>
 HWY_INLINE VF density_of(const Targets<kAxes>& t, const float* term, std::size_t p) {
   const DF d;
   VF at[kAxes], at2[kAxes / 3];
-  for (int k = 0; k < kAxes; ++k)
-    at[k] = hn::Sub(hn::Load(d, leaf_column(t.g, t.leaf, k) + p), hn::Set(d, t.centre[k]));
+  for (int k = 0; k < kAxes; ++k) at[k] = hn::Sub(hn::Load(d, t.at(k, p)), hn::Set(d, t.centre[k]));
   for (int s = 0; s < kAxes / 3; ++s) at2[s] = norm2_of(at + 3 * s);
   const auto row = [&](const float* c, const VF* x, VF x2) HWY_ATTR {
     VF sum = hn::MulAdd(hn::Set(d, c[4]), x2, hn::Set(d, c[0]));
@@ -382,40 +389,60 @@ HWY_INLINE VF density_of(const Targets<kAxes>& t, const float* term, std::size_t
 template <int kAxes>
 HWY_INLINE void centre_targets(Targets<kAxes>& t) {
   const DF d;
-  const float* const share = leaf_column(t.g, t.leaf, kAxes);
-  for (int s = 0; s < kAxes / 3; ++s) {
-    for (int k = 3 * s; k < 3 * s + 3; ++k) {
-      VF low = hn::Set(d, 1e30f), high = hn::Set(d, -1e30f);
-      for (std::size_t p = 0; p < kGaussLeaf; p += kLanes) {
-        const MF real = hn::Gt(hn::Load(d, share + p), hn::Zero(d));
-        const VF v = hn::Load(d, leaf_column(t.g, t.leaf, k) + p);
-        low = hn::Min(low, hn::IfThenElse(real, v, low));
-        high = hn::Max(high, hn::IfThenElse(real, v, high));
-      }
-      t.centre[k] =
-          0.5f * (hn::GetLane(hn::MinOfLanes(d, low)) + hn::GetLane(hn::MaxOfLanes(d, high)));
+  const std::size_t rows = t.leaves * kGaussLeaf;
+  for (int k = 0; k < kAxes; ++k) {
+    VF low = hn::Set(d, 1e30f), high = hn::Set(d, -1e30f);
+    for (std::size_t p = 0; p < rows; p += kLanes) {
+      const MF real = hn::Gt(hn::Load(d, t.at(kAxes, p)), hn::Zero(d));
+      const VF v = hn::Load(d, t.at(k, p));
+      low = hn::Min(low, hn::IfThenElse(real, v, low));
+      high = hn::Max(high, hn::IfThenElse(real, v, high));
     }
+    t.centre[k] =
+        0.5f * (hn::GetLane(hn::MinOfLanes(d, low)) + hn::GetLane(hn::MaxOfLanes(d, high)));
+  }
+  for (int s = 0; s < kAxes / 3; ++s) {
     VF most = hn::Zero(d);
-    for (std::size_t p = 0; p < kGaussLeaf; p += kLanes) {
+    for (std::size_t p = 0; p < rows; p += kLanes) {
       VF away[3];
       for (int k = 0; k < 3; ++k)
-        away[k] = hn::Sub(hn::Load(d, leaf_column(t.g, t.leaf, 3 * s + k) + p),
-                          hn::Set(d, t.centre[3 * s + k]));
-      const MF real = hn::Gt(hn::Load(d, share + p), hn::Zero(d));
+        away[k] = hn::Sub(hn::Load(d, t.at(3 * s + k, p)), hn::Set(d, t.centre[3 * s + k]));
+      const MF real = hn::Gt(hn::Load(d, t.at(kAxes, p)), hn::Zero(d));
       most = hn::Max(most, hn::IfThenElseZero(real, norm2_of(away)));
     }
     t.radius[s] = hn::GetLane(hn::MaxOfLanes(d, hn::Sqrt(most))) * 1.00001f;
   }
 }
 
+// Whether two leaves are so near each other that one walk serves both.
 template <int kAxes>
-HWY_INLINE void sum_leaf(const GaussDensity& g, std::size_t count, std::size_t leaf) {
-  const DF d;
+HWY_INLINE bool together(const GaussDensity& g, std::size_t leaf) {
   const GaussLevel& leaves = g.level[0];
-  const std::size_t first = leaf * kGaussLeaf, live = HWY_MIN(kGaussLeaf, count - first);
-  HWY_ALIGN float phi[kGaussLeaf] = {};
-  if (leaves.moment[kMass][leaf] > 0) {
-    Targets<kAxes> t(g, leaf);
+  if (!(leaves.moment[kMass][leaf] > 0 && leaves.moment[kMass][leaf + 1] > 0)) return false;
+  for (int s = 0; s < kAxes / 3; ++s) {
+    float gap2 = 0;
+    for (int k = 3 * s; k < 3 * s + 3; ++k) {
+      const float gap = leaves.centre[k][leaf] - leaves.centre[k][leaf + 1];
+      gap2 += gap * gap;
+    }
+    const float reach = kTogether * g.width[s];
+    if (!(leaves.radius[s][leaf] < reach && leaves.radius[s][leaf + 1] < reach &&
+          gap2 < reach * reach))
+      return false;
+  }
+  return true;
+}
+
+// Densities at the targets of some leaves.
+template <int kAxes>
+HWY_INLINE void sum_targets(const GaussDensity& g, std::size_t count, std::size_t leaf,
+                            std::size_t leaves) {
+  const DF d;
+  const std::size_t first = leaf * kGaussLeaf, rows = leaves * kGaussLeaf;
+  const std::size_t live = HWY_MIN(rows, count - first);
+  HWY_ALIGN float phi[kMostLeaves * kGaussLeaf] = {};
+  if (leaves > 1 || g.level[0].moment[kMass][leaf] > 0) {
+    Targets<kAxes> t(g, leaf, leaves);
     centre_targets(t);
     float unit = 1;
     for (int s = 0; s < kAxes / 3; ++s) {
@@ -431,13 +458,13 @@ HWY_INLINE void sum_leaf(const GaussDensity& g, std::size_t count, std::size_t l
       term[k] = hn::GetLane(hn::SumOfLanes(d, t.term[k]));
     if constexpr (kAxes == 3)
       for (int k = 1; k < 4; ++k) term[k] *= 2;  // join has left them halved
-    for (std::size_t r = 0; r < kGaussLeaf; ++r) {
+    for (std::size_t r = 0; r < rows; ++r) {
       VF sum = hn::Load(d, t.sum[r]);
       for (std::size_t p = kLanes; p < kGaussLeaf; p += kLanes)
         sum = hn::Add(sum, hn::Load(d, t.sum[r] + p));
       phi[r] = hn::GetLane(hn::SumOfLanes(d, sum));
     }
-    for (std::size_t p = 0; p < kGaussLeaf; p += kLanes) {
+    for (std::size_t p = 0; p < rows; p += kLanes) {
       const VF whole = hn::Add(hn::Load(d, phi + p), density_of(t, term, p));
       hn::Store(hn::Mul(whole, hn::Set(d, unit)), d, phi + p);
     }
@@ -445,14 +472,18 @@ HWY_INLINE void sum_leaf(const GaussDensity& g, std::size_t count, std::size_t l
   for (std::size_t r = 0; r < live; ++r) g.phi[g.source[first + r]] = phi[r];
 }
 
-void sum_leaves(const GaussDensity& g, std::size_t count, std::size_t begin, std::size_t end) {
-  for (std::size_t leaf = begin; leaf < end; ++leaf) {
-    if (g.axes == 3) {
-      sum_leaf<3>(g, count, leaf);
-    } else {
-      sum_leaf<6>(g, count, leaf);
-    }
+template <int kAxes>
+HWY_INLINE void sum_slice(const GaussDensity& g, std::size_t count, std::size_t begin,
+                          std::size_t end) {
+  for (std::size_t leaf = begin; leaf < end;) {
+    const std::size_t leaves = leaf + 1 < end && together<kAxes>(g, leaf) ? 2 : 1;
+    sum_targets<kAxes>(g, count, leaf, leaves);
+    leaf += leaves;
   }
+}
+
+void sum_leaves(const GaussDensity& g, std::size_t count, std::size_t begin, std::size_t end) {
+  g.axes == 3 ? sum_slice<3>(g, count, begin, end) : sum_slice<6>(g, count, begin, end);
 }
 
 void weigh_rows(const GaussTree& tree, std::size_t begin, std::size_t end) {
