@@ -1,4 +1,4 @@
-// gauss_bands.cpp - sorting, runs and sums of gauss_bands.h.
+// gauss_bands.cpp - sorting and runs of gauss_bands.h.
 #include "kernels/gauss_bands.h"
 
 #include <algorithm>
@@ -20,7 +20,6 @@ using DF = hn::CappedTag<float, kBandBlock>;
 using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
-constexpr std::size_t kParts = kBandBlock / kLanes;  // vectors that hold a block
 
 // No wall of a machine is square to the line, nor do two of its six directions meet on it; the
 // second stands across it.
@@ -28,8 +27,6 @@ constexpr float kLine[3] = {0.6104f, -0.3702f, 0.7003f};
 constexpr float kAcross[3] = {-0.7690f, -0.0652f, 0.6359f};
 constexpr std::size_t kSorted = 48;       // contacts from which sorting pays
 constexpr std::size_t kManyBands = 4096;  // contacts of a product from which several bands pay
-// Hats that are summed before they join the total: rounding grows with the number of sums.
-constexpr std::size_t kFresh = 128;
 
 // ---- order
 
@@ -264,10 +261,8 @@ HWY_INLINE std::uint64_t list_runs(const GaussBands& g, std::size_t blocks) {
   std::uint64_t met = 0;
   for (std::size_t b = 0; b < blocks; ++b) {
     BandRuns runs = runs_of(g, b);
-    if (g.order_only) {
-      keep_behind(b, runs);
-      g.runs[b] = runs;
-    }
+    if (g.order_only) keep_behind(b, runs);
+    g.runs[b] = runs;
     for (std::uint32_t r = 0; r < runs.count; ++r) met += runs.end[r] - runs.first[r];
   }
   return met * kBandBlock;
@@ -322,81 +317,6 @@ std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_
   return list_runs(g, blocks);
 }
 
-// ---- sums
-
-// A block, a lane each.
-struct Rows {
-  VF x[3][kParts];
-};
-HWY_INLINE Rows load_rows(const GaussBands& g, std::size_t block) {
-  Rows r;
-  VF mass;
-  for (std::size_t p = 0; p < kParts; ++p)
-    hn::LoadInterleaved4(DF(), g.at + 4 * (block * kBandBlock + p * kLanes), r.x[0][p], r.x[1][p],
-                         r.x[2][p], mass);
-  return r;
-}
-
-struct Sum {
-  VF phi[kParts];
-};
-
-// The hat of one contact at every lane.
-HWY_INLINE VF hat_at(const Rows& rows, std::size_t p, VF width2, const float* at) {
-  const DF d;
-  const VF gx = hn::Sub(rows.x[0][p], hn::Set(d, at[0]));
-  const VF gy = hn::Sub(rows.x[1][p], hn::Set(d, at[1]));
-  const VF gz = hn::Sub(rows.x[2][p], hn::Set(d, at[2]));
-  const VF v = hn::NegMulAdd(gy, gy, hn::NegMulAdd(gx, gx, width2));
-  return hn::Max(hn::NegMulAdd(gz, gz, v), hn::Zero(d));
-}
-
-// Contacts first .. end - 1, one by one. Several sums at a time: an addition takes longer than a
-// hat.
-HWY_INLINE void add_contacts(const GaussBands& g, const Rows& rows, VF width2, std::size_t first,
-                             std::size_t end, Sum& sum) {
-  constexpr std::size_t kSums = 4;
-  const DF d;
-  while (first < end) {
-    const std::size_t stop = HWY_MIN(first + kFresh, end);
-    HWY_UNROLL(4)
-    for (std::size_t p = 0; p < kParts; ++p) {
-      VF fresh[kSums];
-      for (VF& v : fresh) v = hn::Zero(d);
-      const float* at = g.at + 4 * first;
-      const float* const behind = g.at + 4 * stop;
-      for (; at + 4 * kSums <= behind; at += 4 * kSums) {
-        HWY_UNROLL(4)
-        for (std::size_t k = 0; k < kSums; ++k)
-          fresh[k] =
-              hn::MulAdd(hn::Set(d, at[4 * k + 3]), hat_at(rows, p, width2, at + 4 * k), fresh[k]);
-      }
-      for (; at < behind; at += 4)
-        fresh[0] = hn::MulAdd(hn::Set(d, at[3]), hat_at(rows, p, width2, at), fresh[0]);
-      const VF two[2] = {hn::Add(fresh[0], fresh[1]), hn::Add(fresh[2], fresh[3])};
-      sum.phi[p] = hn::Add(sum.phi[p], hn::Add(two[0], two[1]));
-    }
-    first = stop;
-  }
-}
-
-void sum_simd(const GaussBands& g, std::size_t begin, std::size_t end) {
-  const DF d;
-  const VF width2 = hn::Set(d, g.width * g.width);
-  const VF unit = hn::Set(d, 1 / (g.width * g.width));
-  end = HWY_MIN(end, band_blocks(g.grid->count));
-  for (std::size_t block = begin; block < end; ++block) {
-    const Rows rows = load_rows(g, block);
-    const BandRuns runs = runs_of(g, block);
-    Sum sum;
-    for (VF& phi : sum.phi) phi = hn::Zero(d);
-    for (std::uint32_t r = 0; r < runs.count; ++r)
-      add_contacts(g, rows, width2, runs.first[r], runs.end[r], sum);
-    for (std::size_t p = 0; p < kParts; ++p)
-      hn::Store(hn::Mul(sum.phi[p], unit), d, g.phi + block * kBandBlock + p * kLanes);
-  }
-}
-
 }  // namespace h6::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -404,21 +324,15 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(sort_simd);
-HWY_EXPORT(sum_simd);
 
 std::uint64_t sort_bands(const GaussBands& g, const DirectionsView& c, float per_share) {
   return HWY_DYNAMIC_DISPATCH(sort_simd)(g, c, per_share);
 }
-void sum_bands(const GaussBands& g, std::size_t begin, std::size_t end) {
-  HWY_DYNAMIC_DISPATCH(sum_simd)(g, begin, end);
-}
-
 void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns) {
   const std::size_t blocks = band_blocks(count), rows = blocks * kBandBlock;
   if (g.order_only) {
     columns.take(g.at, 2 * rows);
     columns.take(g.source, rows);
-    columns.take(g.runs, blocks);
   } else {
     for (float*& direction : g.direction) columns.take(direction, rows + kBandBlock);
     columns.take(g.mass, rows);
@@ -430,6 +344,7 @@ void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns) {
   columns.take(g.rank, rows);
   columns.take(g.start, band_cells(count) + 1);
   columns.take(g.cell_at, rows);
+  columns.take(g.runs, blocks);
   columns.take(g.grid, 1);
 }
 

@@ -40,10 +40,8 @@ struct GaussBands {
   std::uint32_t* rank;     // of each in its cell
   std::uint32_t* start;    // first of each cell, and the count
   std::uint32_t* cell_at;  // the cell of what is at a place
-  // (order_only) What is at a place, padded with 0; the runs of each block, from itself on: whole
-  // vectors.
-  std::uint32_t* source;
-  BandRuns* runs;
+  std::uint32_t* source;   // (order_only) what is at a place, padded with 0
+  BandRuns* runs;          // of each block; order_only: from itself on, whole vectors
   struct Grid {
     std::uint32_t count;                // of what is sorted
     std::uint32_t bands, cells, shift;  // cells of a band: 2^shift
