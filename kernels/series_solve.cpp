@@ -27,7 +27,7 @@ using DF = hn::Rebind<float, DD>;
 using VD = hn::Vec<DD>;
 
 constexpr float kDoubt = 1e-5f;  // of a sum of some ten floats: a hundred times their rounding
-constexpr std::size_t kManyToStart = 768;  // contacts from which a start is worth its time
+constexpr std::size_t kManyToStart = 256;  // contacts from which a start is worth its time
 
 HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
   return hn::PromoteTo(DD(), load_n(DF(), column + first, live));
