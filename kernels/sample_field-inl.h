@@ -88,6 +88,18 @@ HWY_INLINE Axis split_axis(VF q, std::int32_t bricks) {
           hn::Sub(q, hn::ConvertTo(DF(), unit))};
 }
 
+// Where a unit cell is: its brick's entry in the table, its first node in that brick.
+struct Cell {
+  VI slot, node;
+};
+
+HWY_INLINE Cell cell_of(const FieldView& field, const Axis& x, const Axis& y, const Axis& z) {
+  const DI di;
+  const VI plane = hn::Add(hn::Mul(z.brick, hn::Set(di, field.size[1])), y.brick);
+  return {hn::Add(hn::Mul(plane, hn::Set(di, field.size[0])), x.brick),
+          hn::Add(x.cell, hn::Add(hn::Mul(y.cell, hn::Set(di, 9)), hn::Mul(z.cell, hn::Set(di, 81))))};
+}
+
 // Position of a point in the 8-voxel cell, 0..1.
 HWY_INLINE VF far_fraction(const Axis& a) {
   const DF d;
@@ -126,9 +138,8 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   Axis x = split_axis(qx, field.size[0]);
   Axis y = split_axis(qy, field.size[1]);
   Axis z = split_axis(qz, field.size[2]);
-  const VI plane = hn::Add(hn::Mul(z.brick, hn::Set(di, field.size[1])), y.brick);
-  const VI slot = hn::Add(hn::Mul(plane, hn::Set(di, field.size[0])), x.brick);
-  const VI entry = hn::GatherIndex(di, field.table, slot);
+  const Cell cell = cell_of(field, x, y, z);
+  const VI entry = hn::GatherIndex(di, field.table, cell.slot);
 
   const auto far = hn::Lt(entry, hn::Zero(di));
   const bool any_far = !hn::AllFalse(di, far);
@@ -136,10 +147,8 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   VF quantum = hn::Set(d, kNearQuantum);
   VF slope = quantum;
   if (!hn::AllTrue(di, far)) {
-    const VI node =
-        hn::Add(x.cell, hn::Add(hn::Mul(y.cell, hn::Set(di, 9)), hn::Mul(z.cell, hn::Set(di, 81))));
     const VI offset = hn::IfThenZeroElse(
-        far, hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node)));
+        far, hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(cell.node)));
     pair[0] = gather_pairs(field.bricks, offset);
     pair[1] = gather_pairs(field.bricks + 9, offset);
     pair[2] = gather_pairs(field.bricks + 81, offset);

@@ -1,6 +1,8 @@
 // touch_groups.cpp - the SIMD twin of touch_groups_ref.cpp.
 #include "kernels/touch_groups.h"
 
+#include <hwy/cache_control.h>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/touch_groups.cpp"
 #include "kernels/simd.h"
@@ -13,15 +15,76 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
+// So many groups before they are sampled their entries of the table are asked for, and half as many
+// before their samples, which are found through those.
+constexpr std::size_t kAhead = 16;
+
+struct Ahead {
+  HWY_ALIGN std::int32_t slot[kAhead][kGroup], node[kAhead][kGroup];
+};
+
+void ask_for_table(const FieldView& field, const Affine& to_field, const PointsView& points,
+                   std::size_t group, std::size_t k, Ahead& ahead) {
+  const DF d;
+  const DI di;
+  const VF zero = hn::Zero(d);
+  std::int32_t* const slot = ahead.slot[k % kAhead];
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
+    const std::size_t row = kGroup * group + i;
+    const VF px = hn::LoadU(d, points.x + row), py = hn::LoadU(d, points.y + row);
+    const VF pz = hn::LoadU(d, points.z + row);
+    const auto axis = [&](int a) HWY_ATTR {
+      const VF q = affine_row(to_field.m[a], px, py, pz);
+      const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
+      const VF inside = hn::Min(hn::Max(q, zero), last);
+      // What is no number is sampled at the origin.
+      return split_axis(hn::IfThenElseZero(hn::Eq(q, q), inside), field.size[a]);
+    };
+    const Axis x = axis(0), y = axis(1), z = axis(2);
+    const Cell cell = cell_of(field, x, y, z);
+    hn::Store(cell.slot, di, slot + i);
+    hn::Store(cell.node, di, ahead.node[k % kAhead] + i);
+  }
+  for (std::size_t i = 0; i < kGroup; ++i) hwy::Prefetch(field.table + slot[i]);
+}
+
+void ask_for_samples(const FieldView& field, std::size_t k, const Ahead& ahead) {
+  const std::int32_t* const slot = ahead.slot[k % kAhead];
+  for (std::size_t i = 0; i < kGroup; ++i) {
+    const std::int32_t entry = field.table[slot[i]];
+    if (entry < 0) {
+      hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
+      continue;
+    }
+    const std::int16_t* const node =
+        field.bricks + std::ptrdiff_t{entry} * kBrickStride + ahead.node[k % kAhead][i];
+    hwy::Prefetch(node + 5);
+    hwy::Prefetch(node + 86);
+  }
+}
+
 std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
                               const PointsView& points, const std::uint32_t* groups,
-                              std::size_t count, float limit, const Touching& out, float* least) {
+                              std::size_t count, float limit, bool cold, const Touching& out,
+                              float* least) {
   const DF d;
   const DI di;
   static_assert(hn::MaxLanes(DF()) <= kGroup, "a vector is part of a group");
   const VF infinity = hn::Set(d, __builtin_huge_valf());
   std::size_t written = 0;
+  Ahead ahead;
+  if (cold) {
+    for (std::size_t k = 0; k < HWY_MIN(count, kAhead); ++k)
+      ask_for_table(field, to_field, points, groups[k], k, ahead);
+    for (std::size_t k = 0; k < HWY_MIN(count, kAhead / 2); ++k) ask_for_samples(field, k, ahead);
+  }
   for (std::size_t k = 0; k < count; ++k) {
+    if (cold) {
+      // A slot of the ring is free when its group's samples were asked for.
+      if (k + kAhead / 2 < count) ask_for_samples(field, k + kAhead / 2, ahead);
+      if (k + kAhead < count)
+        ask_for_table(field, to_field, points, groups[k + kAhead], k + kAhead, ahead);
+    }
     VF smallest = infinity;
     for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
       const std::size_t row = kGroup * groups[k] + i;
@@ -136,10 +199,10 @@ HWY_EXPORT(touch_groups_simd);
 HWY_EXPORT(make_contacts_simd);
 
 std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
-                         const std::uint32_t* groups, std::size_t count, float limit,
+                         const std::uint32_t* groups, std::size_t count, float limit, bool cold,
                          const Touching& out, float* least) {
-  return HWY_DYNAMIC_DISPATCH(touch_groups_simd)(field, to_field, points, groups, count, limit, out,
-                                                 least);
+  return HWY_DYNAMIC_DISPATCH(touch_groups_simd)(field, to_field, points, groups, count, limit,
+                                                 cold, out, least);
 }
 
 void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,

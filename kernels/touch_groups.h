@@ -15,13 +15,15 @@ struct Touching {
 // Samples points 16 g .. 16 g + 15 of every group g = groups[0..count-1] and writes those with a
 // distance below `limit`, in order; returns how many. Columns of `points` are readable to whole
 // groups; rows from points.count on are none. `out` has room for 16 count rows. least[k] is the
-// smallest distance in groups[k].
+// smallest distance in groups[k]. `cold`: the field is not in the caches, so memory is asked for
+// some groups before they are sampled; the result is the same.
 std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
-                         const std::uint32_t* groups, std::size_t count, float limit,
+                         const std::uint32_t* groups, std::size_t count, float limit, bool cold,
                          const Touching& out, float* least);
 std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
                              const PointsView& points, const std::uint32_t* groups,
-                             std::size_t count, float limit, const Touching& out, float* least);
+                             std::size_t count, float limit, bool cold, const Touching& out,
+                             float* least);
 
 // Contacts from rows that touch: columns of the engine, in the world frame and metres.
 struct ContactFrame {

@@ -10,7 +10,8 @@ namespace h6::kernels {
 
 std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
                              const PointsView& points, const std::uint32_t* groups,
-                             std::size_t count, float limit, const Touching& out, float* least) {
+                             std::size_t count, float limit, bool, const Touching& out,
+                             float* least) {
   std::size_t written = 0;
   for (std::size_t k = 0; k < count; ++k) {
     least[k] = std::numeric_limits<float>::infinity();

@@ -96,6 +96,7 @@ struct Search {
   float scale;  // voxels a metre
   bool wide;
   float margin;  // [voxel]
+  bool cold;     // after a pause others have had the caches
 
   std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
                    std::uint32_t* survivors, float* clearance) const {
@@ -109,7 +110,7 @@ struct Search {
     const Samples& samples = shell.samples;
     const std::size_t found = kernels::touch_groups(
         field, place, {samples.x.data, samples.y.data, samples.z.data, samples.x.count}, vectors,
-        count, margin, out, least);
+        count, margin, cold, out, least);
     std::size_t kept = 0;
     for (std::size_t k = 0; k < found; ++k) {
       const std::uint32_t row = samples.row[out.row[k]];
@@ -126,7 +127,7 @@ struct Search {
                     float* least) const {
     return kernels::touch_groups(field, place,
                                  {shell.x.data, shell.y.data, shell.z.data, shell.points}, groups,
-                                 count, margin, out, least);
+                                 count, margin, cold, out, least);
   }
 };
 
@@ -238,7 +239,8 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
                       shell_to_field(a, shell, b, field),
                       static_cast<float>(1.0 / field.voxel),
                       field.wide || margin > 0.5f,
-                      margin};
+                      margin,
+                      s.rested};
   const float now = travel(pair, search);
   pair.sampled = 0;
   pair.missed = 0;
@@ -250,9 +252,10 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     return kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
   };
   std::size_t count = expired_groups();
-  if (count > kFewGroups * blocks) {
+  if (count > kFewGroups * blocks && pair.cull_blocks.worth(blocks)) {
     const std::size_t left =
         search.cull(shell.blocks, t.open_blocks, blocks, t.survivors, t.clearance);
+    pair.cull_blocks.learn(blocks, left);
     for (std::size_t k = 0; k < blocks; ++k)
       pair.block_expiry[t.open_blocks[k]] = expiry_of(now, t.clearance[k]);
     std::copy_n(t.survivors, left, t.open_blocks);
@@ -263,14 +266,27 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   const auto number = static_cast<std::size_t>(&pair - s.pairs);
   if (is_coarse_anyway(s, number, used, blocks))
     return touch_coarsely(s, pair, t, search, blocks, used);
-  const std::size_t groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
-  for (std::size_t k = 0; k < count; ++k)
-    pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
+  std::size_t groups = count;
+  if (pair.cull_groups.worth(count)) {
+    groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
+    for (std::size_t k = 0; k < count; ++k)
+      pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
+    pair.cull_groups.learn(count, groups);
+  } else {
+    std::copy_n(t.frontier, count, t.survivors);
+  }
   // Each group waits for memory by itself otherwise.
   for (std::size_t k = 0; k < groups; ++k)
     for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
       __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+  if (search.cold)  // what their contacts will be made of
+    for (std::size_t k = 0; k < groups; ++k) {
+      for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
+        __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+      __builtin_prefetch(shell.point.data + kGroupRows * t.survivors[k]);
+    }
   if (must_be_coarse(s, number, used, blocks, groups)) {
+    pair.cull_groups.left_out = 0;
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
     return touch_coarsely(s, pair, t, search, blocks, used);
   }

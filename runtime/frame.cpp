@@ -15,6 +15,8 @@
 namespace h6 {
 namespace {
 
+constexpr std::int64_t kRest = 50000;  // ns between frames from which others have used the caches
+
 // A stage begins where the one before it ended: one reading of the clock each, not two.
 struct Stopwatch {
   h6Session& s;
@@ -32,6 +34,7 @@ struct Stopwatch {
 void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   s.report = {};
   s.report.frame = s.frame++;
+  s.rested = start - s.left_at > kRest;
   begin_anytime(s, start);
   for (std::size_t i = 0; i < s.body_count; ++i) {
     Body& body = s.bodies[i];
@@ -142,6 +145,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   note_helper(s, start);
   const std::int64_t now = sched::now_ns();
   s.report.frame_us = 1e-3 * static_cast<double>(now - start);
+  s.left_at = now;
   s.team->end_frame(start + static_cast<std::int64_t>(1e9 * s.dt));
   return s.report.status;
 }

@@ -63,6 +63,24 @@ struct TraverseScratch {
   std::size_t used = 0;  // candidates
 };
 
+// Whether a tier of spheres is worth testing: not where most of them survived the last time, until
+// there are many more or it has been left out often enough to ask again. Either way the contacts are
+// the same.
+struct CullBypass {
+  std::size_t asked = 0;  // spheres, when they were last tested
+  int left_out = 0;       // how often it will be
+
+  bool worth(std::size_t count) {
+    if (left_out == 0 || count > 2 * asked + 64) return true;
+    --left_out;
+    return false;
+  }
+  void learn(std::size_t count, std::size_t kept) {
+    asked = count;
+    left_out = 8 * kept > 7 * count ? 15 : 0;
+  }
+};
+
 // A shell body a against a field body b.
 struct Pair {
   std::int32_t a = -1, b = -1;
@@ -74,6 +92,7 @@ struct Pair {
   double travelled = -1;         // < 0: nothing is known
   std::size_t sampled = 0;       // groups, when it was last traversed
   std::size_t open_blocks = 0, open_groups = 0;  // near, when groups were last looked at
+  CullBypass cull_blocks, cull_groups;
   int found_by = 0;              // whose scratch holds its candidates
   float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
@@ -174,6 +193,8 @@ struct h6Session {
   h6::Anytime anytime;
   h6FrameReport report{};
   std::uint64_t frame = 0;
+  std::int64_t left_at = 0;  // when the last frame ended, by the clock [ns]
+  bool rested = false;       // that was long before this one: caches are cold
   h6::sched::FrameTeam* team = nullptr;
   h6::sched::FrameTeam* alone = nullptr;  // of lanes
   void* memory = nullptr;

@@ -77,6 +77,7 @@ void run_lanes(h6Session& s, ShellJob job) {
     lane.report = {};
     lane.report.coarse_pairs = s.report.coarse_pairs;
     lane.anytime = s.anytime;
+    lane.rested = s.rested;
   }
   s.team->for_slices(s.shell_count, [&](std::size_t i) {
     const std::size_t first = s.shell_pairs[i], end = s.shell_pairs[i + 1];

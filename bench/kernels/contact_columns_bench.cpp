@@ -54,7 +54,7 @@ struct Touch {
   std::size_t run(const Kernel& kernel, Columns& to) {
     return kernel(ball_field().view(), test::kIdentity,
                   PointsView{points.x.data(), points.y.data(), points.z.data(), points.x.size()},
-                  groups.data(), groups.size(), 0.0f,
+                  groups.data(), groups.size(), 0.0f, false,
                   Touching{row.data(), to[0].data(), to[1].data(), to[2].data(), to[3].data()},
                   least.data());
   }
