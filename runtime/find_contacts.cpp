@@ -18,8 +18,11 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSlice = 64;           // groups sampled at a time: some 2 us
-constexpr std::size_t kWorthSharing = 256;   // groups from which the helper is asked: some 8 us
+constexpr std::size_t kWorthSharing = 80;   // groups from which the helper is asked: some 6 us
+constexpr std::size_t kContactSlice = 512;  // contacts made at a time: some 1.5 us
+// Contacts from which making them is shared: what the other core made has to come over. 1,000 take
+// 3.1 us alone and 6.2 with it, 10,000 46 and 26.
+constexpr std::size_t kManyContacts = 4096;
 constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which pairs are shared out
 constexpr std::size_t kPairSlices = 32;
 constexpr float kSlack = 1e-3f;        // [voxel]
@@ -145,15 +148,15 @@ std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::s
     return found;
   };
   if (!s.touching.share(count)) return timed(by_myself());
-  const std::size_t slices = (count + kSlice - 1) / kSlice;
+  const std::size_t slices = (count + kTouchSlice - 1) / kTouchSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
-    const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
+    const std::size_t at = i * kTouchSlice, n = std::min(kTouchSlice, count - at);
     s.slice_count[i] = search.touch(t.survivors + at, n, candidates_from(t, used + at * kGroupRows),
                                     t.clearance + at);
   });
   std::size_t kept = s.slice_count[0];
   for (std::size_t i = 1; i < slices; ++i) {
-    move_candidates(t, used + kept, t, used + i * kSlice * kGroupRows, s.slice_count[i]);
+    move_candidates(t, used + kept, t, used + i * kTouchSlice * kGroupRows, s.slice_count[i]);
     kept += s.slice_count[i];
   }
   return timed(kept);
@@ -450,12 +453,19 @@ void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair)
     }
     for (int k = 0; k < 3; ++k) frame.arm[k] = static_cast<float>(arm[k]);
     frame.voxel = static_cast<float>(field.voxel);
-    kernels::make_contacts(
-        {shell.x.data, shell.y.data, shell.z.data, shell.nx.data, shell.ny.data, shell.nz.data,
-         shell.point.data},
-        candidates_from(s.traversal[0], pair.first), pair.candidates, frame,
-        {c.depth + first, c.nx + first, c.ny + first, c.nz + first, c.gx + first, c.gy + first,
-         c.gz + first, c.rx + first, c.ry + first, c.rz + first, c.point + first});
+    const kernels::ShellColumns columns{shell.x.data,    shell.y.data,  shell.z.data,
+                                        shell.nx.data,   shell.ny.data, shell.nz.data,
+                                        shell.point.data};
+    const bool many = pair.candidates >= kManyContacts;
+    const std::size_t size = many ? kContactSlice : pair.candidates;
+    const auto make = [&](std::size_t slice) {
+      const std::size_t at = slice * size, to = first + at;
+      kernels::make_contacts(columns, candidates_from(s.traversal[0], pair.first + at),
+                             std::min(size, pair.candidates - at), frame,
+                             {c.depth + to, c.nx + to, c.ny + to, c.nz + to, c.gx + to, c.gy + to,
+                              c.gz + to, c.rx + to, c.ry + to, c.rz + to, c.point + to});
+    };
+    s.team->for_slices(many ? (pair.candidates + size - 1) / size : 1, make);
     c.count += pair.candidates;
     if (pair.candidates > 0) pair.arms = arms_to_field(a, b, field);
     pair.begin = first;

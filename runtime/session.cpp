@@ -199,8 +199,8 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   s.cluster_cell = arena.take<std::uint64_t>(merged);
   const std::size_t weighing = weigh_scratch_bytes(s.contact, s.max_contacts);
   s.weigh_scratch = weighing ? arena.take<char>(weighing) : nullptr;
-  s.slice_count = arena.take<std::size_t>(n.groups / 64 + 1);
-  s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / 1024 + 1);
+  s.slice_count = arena.take<std::size_t>(n.groups / kTouchSlice + 1);
+  s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / kSumSlice + 1);
   s.shell_pairs = arena.take<std::uint32_t>(n.shells + 1);
   if (!n.lanes) return;
   s.lanes = arena.take<h6Session>(2);

@@ -4,6 +4,9 @@
 
 namespace h6 {
 
+inline constexpr std::size_t kTouchSlice = 32;  // groups sampled at a time: some 2 us
+inline constexpr std::size_t kSumSlice = 1024;  // contacts summed at a time; added in order
+
 // Shell points that touch a field: rows of the last level with a distance below zero, or (series)
 // below the margin.
 void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair);

@@ -12,16 +12,14 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSlice = 1024;  // contacts summed at a time; slices are added in order
-
 kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
                               const kernels::WrenchParameters& p) {
   const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
                                        c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
-  const std::size_t count = pair.end - pair.begin, slices = (count + kSlice - 1) / kSlice;
+  const std::size_t count = pair.end - pair.begin, slices = (count + kSumSlice - 1) / kSumSlice;
   const auto slice = [&](std::size_t i) {
-    return kernels::contact_wrench(columns, p, pair.begin + i * kSlice,
-                                   std::min(pair.begin + (i + 1) * kSlice, pair.end));
+    return kernels::contact_wrench(columns, p, pair.begin + i * kSumSlice,
+                                   std::min(pair.begin + (i + 1) * kSumSlice, pair.end));
   };
   kernels::WrenchSum total;
   if (slices <= 1 || s.team->threads() == 1) {
