@@ -57,19 +57,12 @@ class Layer {
     double most = away_[i];
     if (a > 0) most = std::min(most, away_[i - 1]);
     most += 8.1;
-    TriangleTree::Found found{float(most * most), kNone};
-    std::uint32_t tried[2] = {kNone, kNone};
-    const auto try_around = [&](std::size_t neighbour) {
-      const std::uint32_t place = nearest_[neighbour];
-      if (place == kNone || place / 8 == tried[0] || place / 8 == tried[1]) return;
-      tree_.try_around(p, place, found);
-      tried[tried[0] == kNone ? 0 : 1] = place / 8;
-    };
-    if (a > 0) try_around(i - 1);
-    try_around(i);
-    if (i + 1 < nearest_.size()) try_around(i + 1);
-    away_[i] = tree_.search(p, found);
-    nearest_[i] = found.nearest;
+    TriangleTree::Found found{float(most * most), kNone, 0};
+    const std::uint32_t start[TriangleTree::kStarts] = {
+        a > 0 ? nearest_[i - 1] : kNone, nearest_[i],
+        i + 1 < nearest_.size() ? nearest_[i + 1] : kNone};
+    away_[i] = tree_.search(p, start, found);
+    nearest_[i] = found.place;
     return away_[i];
   }
 

@@ -90,8 +90,12 @@ kernels::EightTurnedBoxes nothing_around() {
   return boxes;
 }
 
+struct EightCorners {
+  float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
+};
+
 // How far eight triangles reach along an axis. In steps of eight, which a compiler makes vectors of.
-void reach_along(const kernels::EightTriangles& t, const std::array<float, 3>& n, float& low,
+void reach_along(const EightCorners& t, const std::array<float, 3>& n, float& low,
                  float& high) {
   float least[8], most[8];
   for (std::size_t i = 0; i < 8; ++i) {
@@ -107,7 +111,7 @@ void reach_along(const kernels::EightTriangles& t, const std::array<float, 3>& n
 }
 
 // Around eight triangles: along the grid, or across and along their mean plane, whichever is less.
-void put_box_around(const kernels::EightTriangles& t, kernels::EightTurnedBoxes& boxes,
+void put_box_around(const EightCorners& t, kernels::EightTurnedBoxes& boxes,
                     std::size_t box) {
   float normal[3] = {0, 0, 0};
   for (std::size_t i = 0; i < 8; ++i) {
@@ -193,6 +197,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
     level_[0][node] = no_boxes();
     for (std::size_t l = 8 * node; l < std::min(leaves, 8 * node + 8); ++l) {
       kernels::EightBoxes& boxes = level_[0][node];
+      EightCorners corners;
       for (std::size_t i = 0; i < 8; ++i) {
         const auto& t = surface.triangles[triangle_[std::min(8 * l + i, count - 1)]];
         double c[3][3];
@@ -202,17 +207,18 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
           c[v][1] = p.y - middle_[1];
           c[v][2] = p.z - middle_[2];
         }
+        kernels::set_triangle(leaf_[l], i, c[0], c[1], c[2]);
         for (std::size_t k = 0; k < 3; ++k) {
-          leaf_[l].a[k][i] = float(c[0][k]);
-          leaf_[l].ab[k][i] = float(c[1][k] - c[0][k]);
-          leaf_[l].ac[k][i] = float(c[2][k] - c[0][k]);
+          corners.a[k][i] = float(c[0][k]);
+          corners.ab[k][i] = float(c[1][k] - c[0][k]);
+          corners.ac[k][i] = float(c[2][k] - c[0][k]);
           const double low = std::min({c[0][k], c[1][k], c[2][k]});
           const double high = std::max({c[0][k], c[1][k], c[2][k]});
           boxes.low[k][l % 8] = std::min(boxes.low[k][l % 8], float(low) - kRounded);
           boxes.high[k][l % 8] = std::max(boxes.high[k][l % 8], float(high) + kRounded);
         }
       }
-      put_box_around(leaf_[l], around_leaf_[node], l % 8);
+      put_box_around(corners, around_leaf_[node], l % 8);
     }
   });
   while (level_.back().size() > 1) {
@@ -225,6 +231,11 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
       }
     level_.push_back(std::move(above));
   }
+  tree_.leaf = leaf_.data();
+  tree_.around_leaf = around_leaf_.data();
+  for (std::size_t k = 0; k < level_.size(); ++k) tree_.level[k] = level_[k].data();
+  tree_.levels = std::uint32_t(level_.size());
+  tree_.triangles = std::uint32_t(count);
 }
 
 double TriangleTree::squared_to(const double (&p)[3], std::uint32_t place) const {
@@ -233,34 +244,6 @@ double TriangleTree::squared_to(const double (&p)[3], std::uint32_t place) const
              &c = surface_.vertices[t[2]];
   const double pa[3] = {a.x, a.y, a.z}, pb[3] = {b.x, b.y, b.z}, pc[3] = {c.x, c.y, c.z};
   return kernels::point_triangle_squared(p, pa, pb, pc);
-}
-
-// The same for corners as rounded to float, which are at hand.
-double TriangleTree::squared_about(const float (&at)[3], std::uint32_t place) const {
-  const kernels::EightTriangles& t = leaf_[place / 8];
-  double p[3], a[3], b[3], c[3];
-  for (std::size_t k = 0; k < 3; ++k) {
-    p[k] = at[k];
-    a[k] = t.a[k][place % 8];
-    b[k] = a[k] + t.ab[k][place % 8];
-    c[k] = a[k] + t.ac[k][place % 8];
-  }
-  return kernels::point_triangle_squared(p, a, b, c);
-}
-
-void TriangleTree::weigh(std::uint32_t leaf, const float (&at)[3], Found& found) const {
-  float near[8];
-  std::uint32_t hits = kernels::eight_triangles(leaf_[leaf], at, found.squared, near);
-  for (; hits != 0; hits &= hits - 1) {
-    const std::uint32_t i = std::uint32_t(std::countr_zero(hits)), place = 8 * leaf + i;
-    if (near[i] < found.squared && place < triangle_.size()) found = {near[i], place};
-  }
-}
-
-void TriangleTree::try_around(const double (&p)[3], std::uint32_t place, Found& found) const {
-  const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
-                       float(p[2] - middle_[2])};
-  weigh(place / 8, at, found);
 }
 
 // Looks at every leaf whose box is nearer than `most`, which may shrink meanwhile.
@@ -296,15 +279,23 @@ void TriangleTree::walk(const float (&at)[3], const float& most, Look&& look) co
   }
 }
 
-double TriangleTree::search(const double (&p)[3], Found& found) const {
+double TriangleTree::search(const double (&p)[3], const std::uint32_t (&start)[kStarts],
+                            Found& found) const {
   const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
                        float(p[2] - middle_[2])};
-  walk(at, found.squared, [&](std::uint32_t leaf) { weigh(leaf, at, found); });
-  if (found.nearest == kNone) return search_exactly(p, 1e18, found.nearest);
+  std::uint32_t leaf[kStarts];
+  std::size_t starts = 0;
+  for (const std::uint32_t place : start) {
+    if (place == kNone || std::find(leaf, leaf + starts, place / 8) != leaf + starts) continue;
+    leaf[starts++] = place / 8;
+  }
+  found.place = kNone;
+  kernels::nearest_search(tree_, at, leaf, starts, &found);
+  if (found.place == kNone) return search_exactly(p, 1e18, found.place);
   const double least = std::sqrt(double(found.squared));
-  if (std::sqrt(squared_about(at, found.nearest)) <= least + kTight - 2 * double(kRounded))
-    return std::max(0.0, least - double(kRounded));
-  return search_exactly(p, squared_to(p, found.nearest), found.nearest);  // a sliver, weighed low
+  const double most = least + kTight - 2 * double(kRounded);
+  if (double(found.above) <= most * most) return std::max(0.0, least - double(kRounded));
+  return search_exactly(p, squared_to(p, found.place), found.place);  // a sliver, or huge
 }
 
 double TriangleTree::search_exactly(const double (&p)[3], double best2,

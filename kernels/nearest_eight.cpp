@@ -25,10 +25,6 @@ HWY_INLINE V3 load(const float (&v)[3][8], std::size_t i) {
 HWY_INLINE V3 sub(const V3& a, const V3& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
-HWY_INLINE V3 cross(const V3& a, const V3& b) {
-  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
-          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
-}
 HWY_INLINE VF dot(const V3& a, const V3& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
@@ -42,96 +38,175 @@ HWY_INLINE std::uint32_t keep(VF found, float most, std::size_t i, float* square
   return std::uint32_t{bits[0]} << i;
 }
 
+// The squared distances of triangles i ... from below. In the frame of a triangle that is h^2 over
+// its inside, else h^2 + min over edges (off^2 + beyond^2), where beyond is how far the point lies
+// past the ends of the edge. A point that may be over the inside is taken to be: h is never more
+// than the distance. On a sliver, whose inside cannot be told like that, a foot in it is nowhere
+// farther from an edge than the radius of the circle inside.
+// `slack`: what rounding can have done to either side.
+HWY_INLINE VF triangles_from(const EightTriangles& t, const V3& at, std::size_t i, VF& slack) {
+  constexpr float kDigits = 4e-6f;
+  const D d;
+  const VF zero = hn::Zero(d);
+  const V3 q = sub(at, load(t.a, i));
+  const VF x = dot(load(t.frame[0], i), q), y = dot(load(t.frame[1], i), q),
+           h = dot(load(t.frame[2], i), q);
+  const VF x1 = hn::Load(d, t.along1[0] + i), y1 = hn::Load(d, t.along1[1] + i);
+  const VF x2 = hn::Load(d, t.along2[0] + i), y2 = hn::Load(d, t.along2[1] + i);
+  const VF half0 = hn::Load(d, t.half[0] + i), half2 = hn::Load(d, t.half[2] + i);
+  const VF from0 = hn::Sub(x, half0);
+  const VF from1 = hn::MulAdd(x1, x, hn::MulAdd(y1, y, hn::Load(d, t.from1 + i)));
+  const VF from2 = hn::MulAdd(x2, x, hn::MulAdd(y2, y, half2));
+  const VF off1 = hn::NegMulAdd(y1, x, hn::MulAdd(x1, y, hn::Load(d, t.off1 + i)));
+  const VF off2 = hn::NegMulAdd(y2, x, hn::Mul(x2, y));
+  const auto edge = [&](VF from, VF half, VF off) HWY_ATTR {
+    const VF beyond = hn::Max(hn::Sub(hn::Abs(from), half), zero);
+    return hn::MulAdd(beyond, beyond, hn::Mul(off, off));
+  };
+  const VF beside =
+      hn::Min(hn::Min(edge(from0, half0, y), edge(from1, hn::Load(d, t.half[1] + i), off1)),
+              edge(from2, half2, off2));
+  const VF inner = hn::Min(hn::Min(y, off1), off2);
+  const VF longest2 = hn::Load(d, t.longest2 + i);
+  // Not less than |q| and the longest edge together; no root.
+  const VF size =
+      hn::Add(hn::Add(hn::Abs(x), hn::Abs(y)), hn::Add(hn::Abs(h), hn::Add(half0, half0)));
+  const VF least = hn::Mul(hn::Neg(hn::Load(d, t.inside + i)), size);
+  const VF flat =
+      hn::IfThenZeroElse(hn::Ge(inner, least), hn::Sub(beside, hn::Load(d, t.width2 + i)));
+  slack = hn::Mul(hn::Set(d, kDigits), hn::Add(dot(q, q), longest2));
+  return hn::Max(hn::Sub(hn::MulAdd(h, h, flat), slack), zero);
+}
+
+std::uint32_t Triangles(const EightTriangles& triangles, const float* p, float most,
+                        float* squared) {
+  const D d;
+  const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
+  std::uint32_t below = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    VF slack;
+    below |= keep(triangles_from(triangles, at, i, slack), most, i, squared);
+  }
+  return below;
+}
+
+HWY_INLINE VF boxes_from(const EightBoxes& boxes, const V3& at, std::size_t i) {
+  const D d;
+  const VF zero = hn::Zero(d);
+  const VF p[3] = {at.x, at.y, at.z};
+  VF sum = zero;
+  for (int k = 0; k < 3; ++k) {
+    const VF gap = hn::Max(hn::Max(hn::Sub(hn::Load(d, boxes.low[k] + i), p[k]),
+                                   hn::Sub(p[k], hn::Load(d, boxes.high[k] + i))),
+                           zero);
+    sum = hn::MulAdd(gap, gap, sum);
+  }
+  return hn::Mul(sum, hn::Set(d, 1 - 1e-6f));
+}
+
+HWY_INLINE VF turned_boxes_from(const EightTurnedBoxes& boxes, const V3& at, std::size_t i) {
+  const D d;
+  const VF zero = hn::Zero(d);
+  VF sum = zero;
+  for (int k = 0; k < 3; ++k) {
+    const VF along = hn::Sub(dot(load(boxes.axis[k], i), at), hn::Load(d, boxes.middle[k] + i));
+    const VF gap = hn::Max(hn::Sub(hn::Abs(along), hn::Load(d, boxes.half[k] + i)), zero);
+    sum = hn::MulAdd(gap, gap, sum);
+  }
+  return hn::Mul(sum, hn::Set(d, 1 - 2e-6f));
+}
+
 std::uint32_t Boxes(const EightBoxes& boxes, const float* p, float most, float* squared) {
   const D d;
+  const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
   std::uint32_t below = 0;
-  const VF zero = hn::Zero(d);
-  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    VF sum = zero;
-    for (int k = 0; k < 3; ++k) {
-      const VF at = hn::Set(d, p[k]);
-      const VF gap = hn::Max(hn::Max(hn::Sub(hn::Load(d, boxes.low[k] + i), at),
-                                     hn::Sub(at, hn::Load(d, boxes.high[k] + i))), zero);
-      sum = hn::MulAdd(gap, gap, sum);
-    }
-    below |= keep(hn::Mul(sum, hn::Set(d, 1 - 1e-6f)), most, i, squared);
-  }
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+    below |= keep(boxes_from(boxes, at, i), most, i, squared);
   return below;
 }
 
 std::uint32_t TurnedBoxes(const EightTurnedBoxes& boxes, const float* p, float most,
                           float* squared) {
   const D d;
+  const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
   std::uint32_t below = 0;
-  const VF zero = hn::Zero(d);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+    below |= keep(turned_boxes_from(boxes, at, i), most, i, squared);
+  return below;
+}
+
+HWY_INLINE void weigh(const NearestTree& tree, std::uint32_t leaf, const V3& at,
+                      NearestFound& found) {
+  const D d;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
-    VF sum = zero;
-    for (int k = 0; k < 3; ++k) {
-      const VF along = hn::Sub(dot(load(boxes.axis[k], i), at), hn::Load(d, boxes.middle[k] + i));
-      const VF gap = hn::Max(hn::Sub(hn::Abs(along), hn::Load(d, boxes.half[k] + i)), zero);
-      sum = hn::MulAdd(gap, gap, sum);
+    VF slack;
+    const VF squared = triangles_from(tree.leaf[leaf], at, i, slack);
+    const auto nearer = hn::Lt(squared, hn::Set(d, found.squared));
+    if (hn::AllFalse(d, nearer)) continue;
+    // What was taken off is put back, and as much again; a square of 0 was off by less still.
+    const VF twice = hn::Add(slack, slack), width2 = hn::Load(d, tree.leaf[leaf].width2 + i);
+    alignas(32) float near[8], above[8];
+    hn::Store(squared, d, near);
+    hn::Store(hn::Add(squared, hn::Add(twice, hn::Add(width2, width2))), d, above);
+    for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
+      const std::uint32_t place = 8 * leaf + std::uint32_t(i + k);
+      if (near[k] < found.squared && place < tree.triangles) found = {near[k], place, above[k]};
     }
-    below |= keep(hn::Mul(sum, hn::Set(d, 1 - 2e-6f)), most, i, squared);
   }
-  return below;
 }
 
-// To the segment from the origin to e of a point at q.
-HWY_INLINE VF to_segment(const V3& q, const V3& e, VF length2) {
+// Those of the lanes that are alive, one after the other: first + lane, and what it holds. Returns
+// how many; whole vectors are stored. (Some processors compress slowly into memory.)
+template <class Mask>
+HWY_INLINE std::size_t keep_live(std::uint32_t first, VF squared, Mask live, std::uint32_t* what,
+                                 float* bound) {
   const D d;
-  const VF t = hn::Min(hn::Max(hn::Div(dot(q, e), hn::Max(length2, hn::Set(d, 1e-20f))),
-                               hn::Zero(d)), hn::Set(d, 1.0f));
-  const V3 gap = {hn::NegMulAdd(t, e.x, q.x), hn::NegMulAdd(t, e.y, q.y),
-                  hn::NegMulAdd(t, e.z, q.z)};
-  return dot(gap, gap);
+  const hn::RebindToUnsigned<D> du;
+  hn::StoreU(hn::Compress(hn::Iota(du, first), hn::RebindMask(du, live)), du, what);
+  hn::StoreU(hn::Compress(squared, live), d, bound);
+  return hn::CountTrue(d, live);
 }
 
-// Over the inside (barycentric v, w, 1 - v - w all positive) the height, else the nearest edge.
-// Rounding makes the normal of a long triangle wrong by an angle of |b||c|/area times that of float,
-// and the height by that times how far the first corner is; v and w likewise. A point that may be
-// over the inside is taken to be: the height is never more than the distance. On a
-// sliver, whose inside cannot be told like that, the foot of the height is nowhere farther from an
-// edge than the radius of the circle inside, which is twice the area over the girth.
-std::uint32_t Triangles(const EightTriangles& triangles, const float* p, float most,
-                        float* squared) {
-  constexpr float kDigits = 4e-6f, kSliver2 = 1e-4f;
+// Depth first. The start is nearly always the nearest: the order of what is left hardly matters.
+void Search(const NearestTree& tree, const float* p, const std::uint32_t* start, std::size_t starts,
+            NearestFound* best) {
+  constexpr std::uint32_t kLevel = 28, kNode = (1u << kLevel) - 1;
+  constexpr std::size_t kRoom = 8 * NearestTree::kMostLevels + 8;
   const D d;
-  const VF zero = hn::Zero(d);
-  std::uint32_t below = 0;
-  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
-    const V3 q = sub(at, load(triangles.a, i)), b = load(triangles.ab, i),
-             c = load(triangles.ac, i), bc = sub(c, b);
-    const VF bb = dot(b, b), cc = dot(c, c), b_c = dot(b, c), qb = dot(q, b), qc = dot(q, c),
-             qq = dot(q, q);
-    const VF edges = hn::Min(hn::Min(to_segment(q, b, bb), to_segment(q, c, cc)),
-                             to_segment(sub(q, b), bc, dot(bc, bc)));
-    const V3 n = cross(b, c);
-    const VF area = dot(n, n);
-    const VF v = hn::NegMulAdd(b_c, qc, hn::Mul(cc, qb));
-    const VF w = hn::NegMulAdd(b_c, qb, hn::Mul(bb, qc));
-    const VF longest2 = hn::Max(hn::Max(bb, cc), dot(bc, bc));
-    const VF away = hn::Sqrt(qq), longest = hn::Sqrt(longest2), sides = hn::Sqrt(hn::Mul(bb, cc));
-    const VF fuzz = hn::Mul(hn::Mul(hn::Set(d, kDigits), hn::Mul(sides, longest)),
-                            hn::Add(away, longest));
-    const auto inside = hn::And(hn::Ge(hn::Add(hn::Min(v, w), fuzz), zero),
-                                hn::Le(hn::Add(v, w), hn::Add(area, fuzz)));
-    const VF over = hn::Mul(hn::Set(d, kDigits), hn::Mul(away, sides));
-    const VF root = hn::Sqrt(hn::Max(area, hn::Set(d, 1e-20f)));
-    const VF high = hn::Max(hn::Div(hn::Sub(hn::Abs(dot(q, n)), over), root), zero);
-    const VF height = hn::Mul(high, high);
-    // (edge - width)^2 >= edge^2 - 2 edge width
-    const VF within = hn::Div(hn::MulAdd(hn::Set(d, kDigits), sides, root),
-                              hn::Max(hn::Add(longest, longest), hn::Set(d, 1e-10f)));
-    const VF sliver = hn::NegMulAdd(within, within, edges);
-    const auto thin = hn::Lt(area, hn::Mul(hn::Set(d, kSliver2), hn::Mul(longest2, longest2)));
-    const VF slack = hn::Mul(hn::Set(d, kDigits), hn::Add(qq, longest2));
-    const VF beside = hn::Sub(hn::IfThenElse(thin, sliver, edges), slack);
-    const VF found = hn::IfThenElse(hn::AndNot(thin, inside), hn::Min(height, beside), beside);
-    below |= keep(hn::Max(found, zero), most, i, squared);
+  const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
+  NearestFound found = *best;
+  for (std::size_t i = 0; i < starts; ++i) weigh(tree, start[i], at, found);
+  alignas(32) float bound[kRoom];
+  alignas(32) std::uint32_t what[kRoom];  // level and node
+  std::size_t depth = 1;
+  bound[0] = -1;
+  what[0] = (tree.levels - 1) << kLevel;
+  while (depth > 0) {
+    --depth;
+    if (bound[depth] >= found.squared) continue;
+    const std::uint32_t level = what[depth] >> kLevel, node = what[depth] & kNode;
+    if (level > 0) {
+      const EightBoxes& boxes = tree.level[level][node];
+      const std::uint32_t child = (level - 1) << kLevel | 8 * node;
+      for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+        const VF squared = boxes_from(boxes, at, i);
+        const auto live = hn::Lt(squared, hn::Set(d, found.squared));
+        depth += keep_live(child + std::uint32_t(i), squared, live, what + depth, bound + depth);
+      }
+      continue;
+    }
+    const EightTurnedBoxes& boxes = tree.around_leaf[node];
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      const VF squared = turned_boxes_from(boxes, at, i);
+      alignas(32) float near[8];
+      alignas(32) std::uint32_t leaf[8];
+      const auto live = hn::Lt(squared, hn::Set(d, found.squared));
+      const std::size_t count = keep_live(8 * node + std::uint32_t(i), squared, live, leaf, near);
+      for (std::size_t k = 0; k < count; ++k)
+        if (near[k] < found.squared) weigh(tree, leaf[k], at, found);
+    }
   }
-  return below;
+  *best = found;
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE
@@ -143,9 +218,9 @@ namespace h6::kernels {
 HWY_EXPORT(Boxes);
 HWY_EXPORT(TurnedBoxes);
 HWY_EXPORT(Triangles);
+HWY_EXPORT(Search);
 
-std::uint32_t eight_boxes(const EightBoxes& boxes, const float p[3], float most,
-                          float squared[8]) {
+std::uint32_t eight_boxes(const EightBoxes& boxes, const float p[3], float most, float squared[8]) {
   return HWY_DYNAMIC_DISPATCH(Boxes)(boxes, p, most, squared);
 }
 std::uint32_t eight_turned_boxes(const EightTurnedBoxes& boxes, const float p[3], float most,
@@ -155,6 +230,10 @@ std::uint32_t eight_turned_boxes(const EightTurnedBoxes& boxes, const float p[3]
 std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3], float most,
                               float squared[8]) {
   return HWY_DYNAMIC_DISPATCH(Triangles)(triangles, p, most, squared);
+}
+void nearest_search(const NearestTree& tree, const float p[3], const std::uint32_t* start,
+                    std::size_t starts, NearestFound* found) {
+  HWY_DYNAMIC_DISPATCH(Search)(tree, p, start, starts, found);
 }
 
 }  // namespace h6::kernels

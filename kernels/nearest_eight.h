@@ -26,14 +26,47 @@ std::uint32_t eight_turned_boxes(const EightTurnedBoxes& boxes, const float p[3]
                                  float squared[8]);
 void eight_turned_boxes_ref(const EightTurnedBoxes& boxes, const float p[3], float squared[8]);
 
+// Triangles as seen from their first corner: across, and in the plane, where every edge has a
+// direction and what lies off it on the triangle's side.
 struct EightTriangles {
-  alignas(32) float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
+  alignas(32) float a[3][8];                     // first corner
+  alignas(32) float frame[3][3][8];              // along the first edge, off it, across the plane
+  alignas(32) float along1[2][8], along2[2][8];  // the other edges, in the plane
+  alignas(32) float half[3][8];                  // lengths of edges
+  alignas(32) float from1[8], off1[8];  // of the first corner: from the middle of edge 1, off it
+  alignas(32) float longest2[8];        // squared length
+  alignas(32) float width2[8];          // slivers: squared radius of the circle inside; else 0
+  alignas(32) float inside[8];          // how far off an edge, for its distance, is still inside
 };
-// squared[i] <= squared distance of p to triangle i: by less than 1e-4 of it, save for
-// triangles a thousand times as large as their distance, and on slivers a little more.
-// Returns a bit for each that is below `most`.
+// Corners are x y z. A triangle no higher than 1e-6 becomes its longest edge.
+void set_triangle(EightTriangles& triangles, std::size_t i, const double a[3], const double b[3],
+                  const double c[3]);
+// squared[i] <= squared distance of p to triangle i, the first corner taken as rounded to float: by
+// less than 1e-4 of it, save for triangles a thousand times as large as their distance, and on
+// slivers a little more. Returns a bit for each that is below `most`.
 std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3], float most,
                               float squared[8]);
-void eight_triangles_ref(const EightTriangles& triangles, const float p[3], float squared[8]);
+// corners: 8 x 3 corners x 3 coordinates.
+void eight_triangles_ref(const double* corners, const float p[3], float squared[8]);
+
+// Triangles in eights, boxes around eights of triangles, boxes around eights of boxes ...
+struct NearestTree {
+  static constexpr std::size_t kMostLevels = 10;
+  const EightTriangles* leaf = nullptr;
+  const EightTurnedBoxes* around_leaf = nullptr;  // [i]: around leaves 8 i ...; these are level 0
+  const EightBoxes* level[kMostLevels] = {};  // [k][i]: around 8 i ... of level k - 1, k > 0; the
+                                              // last level has one
+  std::uint32_t levels = 0, triangles = 0;
+};
+struct NearestFound {
+  float squared;        // the least that eight_triangles says
+  std::uint32_t place;  // of that triangle in the tree
+  float above;          // certainly not less than the square of the distance to that triangle
+};
+// Looks for a triangle nearer than found->squared says, first in `starts` leaves, start[i].
+void nearest_search(const NearestTree& tree, const float p[3], const std::uint32_t* start,
+                    std::size_t starts, NearestFound* found);
+// All triangles, one after the other.
+void nearest_search_ref(const NearestTree& tree, const float p[3], NearestFound* found);
 
 }  // namespace h6::kernels

@@ -12,8 +12,8 @@ void eight_boxes_ref(const EightBoxes& boxes, const float p[3], float squared[8]
   for (int i = 0; i < 8; ++i) {
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
-      const double gap = std::max({double(boxes.low[k][i]) - p[k],
-                                   double(p[k]) - boxes.high[k][i], 0.0});
+      const double gap =
+          std::max({double(boxes.low[k][i]) - p[k], double(p[k]) - boxes.high[k][i], 0.0});
       sum += gap * gap;
     }
     squared[i] = float(sum);
@@ -33,16 +33,20 @@ void eight_turned_boxes_ref(const EightTurnedBoxes& boxes, const float p[3], flo
   }
 }
 
-void eight_triangles_ref(const EightTriangles& t, const float p[3], float squared[8]) {
-  for (int i = 0; i < 8; ++i) {
-    double at[3], a[3], b[3], c[3];
-    for (int k = 0; k < 3; ++k) {
-      at[k] = p[k];
-      a[k] = t.a[k][i];
-      b[k] = a[k] + t.ab[k][i];
-      c[k] = a[k] + t.ac[k][i];
-    }
-    squared[i] = float(point_triangle_squared(at, a, b, c));
+void eight_triangles_ref(const double* corners, const float p[3], float squared[8]) {
+  const double at[3] = {p[0], p[1], p[2]};
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double* c = corners + 9 * i;
+    squared[i] = float(point_triangle_squared(at, c, c + 3, c + 6));
+  }
+}
+
+void nearest_search_ref(const NearestTree& tree, const float p[3], NearestFound* found) {
+  for (std::uint32_t place = 0; place < tree.triangles; ++place) {
+    float squared[8];
+    eight_triangles(tree.leaf[place / 8], p, found->squared, squared);
+    if (squared[place % 8] < found->squared)
+      *found = {squared[place % 8], place, squared[place % 8]};
   }
 }
 

@@ -3,11 +3,15 @@
 
 #include <hwy/targets.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <vector>
 
 #include "kernels/nearest_eight.h"
+#include "kernels/triangle_distance.h"
 
 using namespace h6::kernels;
 
@@ -98,23 +102,27 @@ TEST_CASE("eight_triangles: a lower bound, tight where triangles are neither hug
     std::size_t too_long = 0, loose = 0, loose_slivers = 0, slivers = 0;
     for (int i = 0; i < 4000; ++i) {
       EightTriangles t;
+      double corner[8][3][3];
       const double size = i % 4 == 0 ? 800.0 : i % 4 == 1 ? 0.5 : 10.0;
       const bool sliver = i % 3 == 0;
       for (int b = 0; b < 8; ++b) {
         const float along = random(-0.5, 1.5);
         for (int k = 0; k < 3; ++k) {
-          t.a[k][b] = random(-1000, 1000);
-          t.ab[k][b] = random(-size, size);
-          t.ac[k][b] = sliver ? along * t.ab[k][b] + random(-1e-3 * size, 1e-3 * size)
-                              : random(-size, size);
+          const float a = random(-1000, 1000), ab = random(-size, size);
+          corner[b][0][k] = a;
+          corner[b][1][k] = a + ab;
+          corner[b][2][k] =
+              a + (sliver ? along * ab + random(-1e-3 * size, 1e-3 * size) : random(-size, size));
         }
+        set_triangle(t, std::size_t(b), corner[b][0], corner[b][1], corner[b][2]);
       }
       const int near = int(random(0, 7.99));
-      const float p[3] = {t.a[0][near] + random(-40, 40), t.a[1][near] + random(-40, 40),
-                          t.a[2][near] + random(-40, 40)};
+      const float p[3] = {float(corner[near][0][0]) + random(-40, 40),
+                          float(corner[near][0][1]) + random(-40, 40),
+                          float(corner[near][0][2]) + random(-40, 40)};
       float fast[8], exact[8];
       const std::uint32_t below = eight_triangles(t, p, 900, fast);
-      eight_triangles_ref(t, p, exact);
+      eight_triangles_ref(corner[0][0], p, exact);
       for (int b = 0; b < 8; ++b) {
         too_long += fast[b] > exact[b] || (below >> b & 1) != (fast[b] < 900);
         const bool low = std::sqrt(fast[b]) < std::sqrt(exact[b]) * 0.9995f - 0.05f;
@@ -141,25 +149,100 @@ TEST_CASE("eight_triangles: a lower bound over long triangles, far from their fi
       const double aside[3] = {-0.6 * std::sin(turn), 0.6 * std::cos(turn), 0.8};
       const double up[3] = {0.8 * std::sin(turn), -0.8 * std::cos(turn), 0.6};
       EightTriangles t;
+      double corner[8][3][3];
       float p[3];
       const double at = random(0.7, 0.99), off = random(0.01, 0.6);
       for (int k = 0; k < 3; ++k) {
         const float a = random(-300, 300);
         for (int b = 0; b < 8; ++b) {
-          t.a[k][b] = a;
-          t.ab[k][b] = float(length * along[k]);
-          t.ac[k][b] = float(length * along[k] + width * aside[k]);
+          corner[b][0][k] = a;
+          corner[b][1][k] = a + length * along[k];
+          corner[b][2][k] = a + length * along[k] + width * aside[k];
         }
         p[k] = float(a + at * length * along[k] + off * width * aside[k] + height * up[k]);
       }
+      for (std::size_t b = 0; b < 8; ++b)
+        set_triangle(t, b, corner[b][0], corner[b][1], corner[b][2]);
       float fast[8], exact[8];
       eight_triangles(t, p, 1e9f, fast);
-      eight_triangles_ref(t, p, exact);
+      eight_triangles_ref(corner[0][0], p, exact);
       too_long += fast[0] > exact[0] * (1 + 1e-6f);
       loose += width > 0.05 * length && std::sqrt(fast[0]) < std::sqrt(exact[0]) - 0.3f;
       all += 1;
     }
     CHECK(too_long == 0);
-    CHECK(loose < all / 50);
+    CHECK(loose < all / 40);
+  });
+}
+
+TEST_CASE("nearest_search: what looking at every triangle finds, from any start, on every target") {
+  constexpr std::uint32_t kTriangles = 8 * 8 * 9 - 3;  // not a whole number of leaves
+  constexpr std::size_t kLeaves = (kTriangles + 7) / 8, kNodes = (kLeaves + 7) / 8;
+  Random random;
+  std::vector<EightTriangles> leaf(kLeaves);
+  std::vector<EightTurnedBoxes> around(kNodes);
+  std::vector<EightBoxes> boxes(kNodes), top(1);
+  const auto empty = [](EightBoxes& b) {
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 8; ++i) b.low[k][i] = 1e9f, b.high[k][i] = -1e9f;
+  };
+  for (EightBoxes& b : boxes) empty(b);
+  empty(top[0]);
+  const auto widen = [](EightBoxes& b, std::size_t i, int k, double low, double high) {
+    b.low[k][i] = std::min(b.low[k][i], float(low - 1e-3));
+    b.high[k][i] = std::max(b.high[k][i], float(high + 1e-3));
+  };
+  std::vector<std::array<double, 9>> corners(8 * kLeaves);
+  for (std::size_t l = 0; l < 8 * kNodes; ++l) {
+    EightTurnedBoxes& b = around[l / 8];
+    for (int k = 0; k < 3; ++k) {
+      for (int c = 0; c < 3; ++c) b.axis[k][c][l % 8] = k == c;
+      b.middle[k][l % 8] = 1e9f;
+      b.half[k][l % 8] = -1;
+    }
+    if (l >= kLeaves) continue;
+    const double at[3] = {random(-100, 100), random(-100, 100), random(-100, 100)};
+    double low[3] = {1e9, 1e9, 1e9}, high[3] = {-1e9, -1e9, -1e9};
+    for (std::size_t i = 0; i < 8; ++i) {
+      double* c = corners[8 * l + i].data();
+      for (int v = 0; v < 9; ++v) {
+        c[v] = at[v % 3] + random(-4, 4);
+        low[v % 3] = std::min(low[v % 3], c[v]);
+        high[v % 3] = std::max(high[v % 3], c[v]);
+      }
+      set_triangle(leaf[l], i, c, c + 3, c + 6);
+    }
+    for (int k = 0; k < 3; ++k) {
+      b.middle[k][l % 8] = float((low[k] + high[k]) / 2);
+      b.half[k][l % 8] = float((high[k] - low[k]) / 2 + 1e-3);
+      widen(boxes[l / 64], l / 8 % 8, k, low[k], high[k]);
+      widen(top[0], l / 64, k, low[k], high[k]);
+    }
+  }
+  NearestTree tree;
+  tree.leaf = leaf.data();
+  tree.around_leaf = around.data();
+  tree.level[1] = boxes.data();
+  tree.level[2] = top.data();
+  tree.levels = 3;
+  tree.triangles = kTriangles;
+  on_every_target([&] {
+    for (int i = 0; i < 300; ++i) {
+      const double spread = i % 2 == 0 ? 120.0 : 400.0;
+      const float p[3] = {random(-spread, spread), random(-spread, spread),
+                          random(-spread, spread)};
+      NearestFound all{1e12f, 0, 0}, found{1e12f, 0, 0}, nothing{1e-3f, 7, 0};
+      nearest_search_ref(tree, p, &all);
+      const std::uint32_t start[3] = {std::uint32_t(random(0, kLeaves - 1)), all.place / 8, 0};
+      nearest_search(tree, p, start, std::size_t(i % 4), &found);
+      CHECK(found.squared == all.squared);
+      const double* c = corners[found.place].data();
+      const double at[3] = {p[0], p[1], p[2]};
+      const double exact = point_triangle_squared(at, c, c + 3, c + 6);
+      CHECK(std::sqrt(exact) >= std::sqrt(double(found.squared)) - 1e-4);
+      CHECK(std::sqrt(exact) <= std::sqrt(double(found.above)) + 1e-4);
+      nearest_search(tree, p, nullptr, 0, &nothing);
+      CHECK((nothing.place == 7) == (all.squared >= 1e-3f));
+    }
   });
 }
