@@ -8,6 +8,13 @@
 namespace h6::io::bake {
 namespace {
 
+constexpr std::size_t kLine = 16;  // of a ChainBrick
+
+// Bit y of the result: bit 8*y of the word.
+std::uint8_t column(std::uint64_t word) {
+  return std::uint8_t((word & 0x0101010101010101) * 0x0102040810204080 >> 56);
+}
+
 // Reached nodes by line of a brick: byte 8*z + y.
 std::array<std::uint8_t, 64> lines_of(const NodeMask& nodes) {
   std::array<std::uint8_t, 64> lines;
@@ -80,22 +87,31 @@ bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reac
         each_line([&](Chain* to, std::size_t line) { to[x_in] = from[8 * line + x_there]; });
     } else {
       const float* u = band.nodes(r);
+      const auto& wet = reached.node[r].z;
+      const std::size_t x = dx == 0 ? 7 : 0, y = dy == 0 ? 7 : 0;
       for (int z = kBegin[dz]; z < kEnd[dz]; ++z) {
         const std::size_t layer = std::size_t(z & 7);
-        const std::uint64_t wet = reached.node[r].z[layer] & kLines[dy] & kColumns[dx];
-        if (wet == 0) continue;
+        const std::uint64_t here = wet[layer] & kLines[dy] & kColumns[dx];
+        if (here == 0) continue;
         any = true;
-        if (middle) {
-          for (int y = kBegin[dy]; y < kEnd[dy]; ++y)
-            if (const auto mask = std::uint8_t(wet >> (8 * (y & 7))); mask != 0)
-              kernels::chain_seeds(u + 64 * layer + 8 * (y & 7), &mask, 1, offset,
-                                   out.v[z + 1][y + 1] + 1);
+        const float* from = u + 64 * layer;
+        if (middle) {  // whole lines
+          std::uint8_t mask[8];
+          for (std::size_t i = 0; i < 8; ++i) mask[i] = std::uint8_t(here >> (8 * i));
+          if (dy == 1)
+            kernels::chain_seeds(from, 8, mask, 8, offset, out.v[z + 1][1] + 1, kLine);
+          else
+            kernels::chain_seeds(from + 8 * y, 8, mask + y, 1, offset,
+                                 out.v[z + 1][dy == 0 ? 0 : 9] + 1, kLine);
+        } else if (dy == 1) {  // one node of each line
+          float side[8];
+          Chain seeds[8];
+          for (std::size_t i = 0; i < 8; ++i) side[i] = from[8 * i + x];
+          const std::uint8_t mask = column(here >> x);
+          kernels::chain_seeds(side, 8, &mask, 1, offset, seeds, 8);
+          for (std::size_t i = 0; i < 8; ++i) out.v[z + 1][i + 1][x_in] = seeds[i];
         } else {
-          for (std::uint64_t bits = wet; bits != 0; bits &= bits - 1) {
-            const std::size_t n = std::size_t(std::countr_zero(bits));
-            const std::size_t y = dy == 1 ? n / 8 + 1 : dy == 0 ? 0 : 9;
-            out.v[z + 1][y][x_in] = seed(u[64 * layer + n]);
-          }
+          out.v[z + 1][dy == 0 ? 0 : 9][x_in] = seed(from[8 * y + x]);
         }
       }
     }
@@ -123,8 +139,8 @@ Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
   sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
     if (slot_[r] < 0) return;
     Chain* to = chain_.data() + std::size_t(slot_[r]) * kBrickSamples;
-    kernels::chain_seeds(band_.nodes(r), lines_of(reached_.node[r]).data(), 64, float(grid_.offset),
-                         to);
+    kernels::chain_seeds(band_.nodes(r), 8, lines_of(reached_.node[r]).data(), 64,
+                         float(grid_.offset), to, 8);
     some_[std::size_t(slot_[r])] = reached_.node[r].any();
   });
 }
@@ -139,13 +155,8 @@ void Chains::pass() {
                            padded))
           return;  // nothing reached anywhere near, as yet
         some_[std::size_t(slot_[r])] = 1;
-        Chain* own = chain_.data() + std::size_t(slot_[r]) * kBrickSamples;
-        for (int step = 0; step < kStepsAPass; ++step) {
-          if (step > 0)
-            for (std::size_t line = 0; line < 64; ++line)
-              std::copy_n(own + 8 * line, 8, padded.v[line / 8 + 1][line % 8 + 1] + 1);
-          kernels::chain_step(padded, own);
-        }
+        kernels::chain_step(padded, kStepsAPass,
+                            chain_.data() + std::size_t(slot_[r]) * kBrickSamples);
       });
     });
 }

@@ -267,7 +267,7 @@ class Look {
       chain = chains_->nodes(r);
     } else {
       gather();
-      kernels::chain_step(d, stepped);
+      kernels::chain_step(d, 1, stepped);
     }
     const float* u = band_.nodes(r);
     const kernels::ChainLimits limits{offset_, kSlack, kCrooked,

@@ -22,7 +22,18 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr std::size_t kLine = 16, kLayer = 10 * kLine, kAll = 10 * kLayer, kPad = 64;
 
-void ChainStepOnce(const ChainBrick& brick, Chain* out) {
+// Places of a line that are nodes of the brick, 16 after 16.
+struct InLine {
+  alignas(64) Chain v[32 + 16];
+};
+constexpr InLine in_line() {
+  InLine in{};
+  for (std::size_t i = 0; i < 48; ++i) in.v[i] = i % 16 >= 1 && i % 16 <= 8 ? 1 : 0;
+  return in;
+}
+constexpr InLine kInLine = in_line();
+
+void ChainSteps(const ChainBrick& brick, int steps, Chain* out) {
   const hn::CappedTag<Chain, 32> d;
   const std::size_t lanes = hn::Lanes(d);
   alignas(64) Chain from[kPad + kAll + kPad], give[3][kAll + kPad];
@@ -30,47 +41,58 @@ void ChainStepOnce(const ChainBrick& brick, Chain* out) {
   from[kPad - 1] = from[kPad + kAll] = kChainFar;
   const auto straight = hn::Set(d, Chain(kChainStep[1])), aside = hn::Set(d, Chain(kChainStep[2])),
              across = hn::Set(d, Chain(kChainStep[3]));
-  for (std::size_t i = 0; i < kAll; i += lanes) {
-    const auto own = hn::Load(d, from + kPad + i);
-    const auto side = hn::Min(hn::LoadU(d, from + kPad + i - 1), hn::LoadU(d, from + kPad + i + 1));
-    hn::Store(hn::Min(own, hn::Add(side, straight)), d, give[0] + i);
-    hn::Store(hn::Min(hn::Add(own, straight), hn::Add(side, aside)), d, give[1] + i);
-    hn::Store(hn::Min(hn::Add(own, aside), hn::Add(side, across)), d, give[2] + i);
-  }
-  const auto far = hn::Set(d, kChainFar);
-  alignas(64) Chain took[8 * kLine + kPad];
-  for (std::size_t z = 0; z < 8; ++z) {
-    const std::size_t first = (z + 1) * kLayer + kLine;
-    for (std::size_t i = 0; i < 8 * kLine; i += lanes) {
-      const std::size_t at = first + i;
-      const auto get = [&](std::size_t k, std::size_t where)
-                           HWY_ATTR { return hn::LoadU(d, give[k] + where); };
-      auto least = hn::Min(far, get(0, at));
-      least = hn::Min(least, hn::Min(get(1, at - kLayer), get(1, at + kLayer)));
-      least = hn::Min(least, hn::Min(get(1, at - kLine), get(1, at + kLine)));
-      least = hn::Min(least, hn::Min(get(2, at - kLayer - kLine), get(2, at - kLayer + kLine)));
-      least = hn::Min(least, hn::Min(get(2, at + kLayer - kLine), get(2, at + kLayer + kLine)));
-      hn::Store(least, d, took + i);
+  const auto far = hn::Set(d, kChainFar), zero = hn::Zero(d);
+  for (int step = 0; step < steps; ++step) {
+    for (std::size_t i = 0; i < kAll; i += lanes) {
+      const auto own = hn::Load(d, from + kPad + i);
+      const auto side =
+          hn::Min(hn::LoadU(d, from + kPad + i - 1), hn::LoadU(d, from + kPad + i + 1));
+      hn::Store(hn::Min(own, hn::Add(side, straight)), d, give[0] + i);
+      hn::Store(hn::Min(hn::Add(own, straight), hn::Add(side, aside)), d, give[1] + i);
+      hn::Store(hn::Min(hn::Add(own, aside), hn::Add(side, across)), d, give[2] + i);
     }
-    for (std::size_t y = 0; y < 8; ++y) std::copy_n(took + y * kLine + 1, 8, out + 64 * z + 8 * y);
+    auto changed = zero;
+    for (std::size_t z = 0; z < 8; ++z) {
+      const std::size_t first = (z + 1) * kLayer + kLine;
+      for (std::size_t i = 0; i < 8 * kLine; i += lanes) {
+        const std::size_t at = first + i;
+        const auto get = [&](std::size_t k, std::size_t where)
+                             HWY_ATTR { return hn::LoadU(d, give[k] + where); };
+        auto least = hn::Min(far, get(0, at));
+        least = hn::Min(least, hn::Min(get(1, at - kLayer), get(1, at + kLayer)));
+        least = hn::Min(least, hn::Min(get(1, at - kLine), get(1, at + kLine)));
+        least = hn::Min(least, hn::Min(get(2, at - kLayer - kLine), get(2, at - kLayer + kLine)));
+        least = hn::Min(least, hn::Min(get(2, at + kLayer - kLine), get(2, at + kLayer + kLine)));
+        const auto old = hn::LoadU(d, from + kPad + at);
+        const auto inside = hn::Ne(hn::LoadU(d, kInLine.v + i % 16), zero);
+        const auto now = hn::IfThenElse(inside, least, old);
+        changed = hn::Or(changed, hn::Xor(now, old));
+        hn::StoreU(now, d, from + kPad + at);
+      }
+    }
+    if (hn::AllTrue(d, hn::Eq(changed, zero))) break;
   }
+  for (std::size_t line = 0; line < 64; ++line)
+    std::copy_n(from + kPad + (line / 8 + 1) * kLayer + (line % 8 + 1) * kLine + 1, 8,
+                out + 8 * line);
 }
 
-void ChainSeeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
-                Chain* out) {
+void ChainSeeds(const float* u, std::size_t u_apart, const std::uint8_t* mask, std::size_t lines,
+                float level, Chain* out, std::size_t out_apart) {
   const hn::CappedTag<float, 8> d;
   const hn::Rebind<std::int32_t, decltype(d)> d32;
   const hn::Rebind<Chain, decltype(d)> d16;
   const std::size_t lanes = hn::Lanes(d);
   const auto scale = hn::Set(d, 1 / kChainUnit), at = hn::Set(d, level);
   for (std::size_t line = 0; line < lines; ++line) {
-    Chain* to = out + 8 * line;
+    const float* from = u + line * u_apart;
+    Chain* to = out + line * out_apart;
     if (mask[line] == 0) {
       std::fill_n(to, 8, kChainFar);
       continue;
     }
     for (std::size_t x = 0; x < 8; x += lanes) {
-      const auto length = hn::Ceil(hn::Mul(hn::Sub(at, hn::LoadU(d, u + 8 * line + x)), scale));
+      const auto length = hn::Ceil(hn::Mul(hn::Sub(at, hn::LoadU(d, from + x)), scale));
       hn::StoreU(hn::DemoteTo(d16, hn::ConvertTo(d32, length)), d16, to + x);
     }
     if (mask[line] != 0xff)
@@ -117,17 +139,17 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace h6::kernels {
 
-HWY_EXPORT(ChainStepOnce);
+HWY_EXPORT(ChainSteps);
 HWY_EXPORT(ChainSeeds);
 HWY_EXPORT(ChainSidesOf);
 
-void chain_step(const ChainBrick& brick, Chain* out) {
-  HWY_DYNAMIC_DISPATCH(ChainStepOnce)(brick, out);
+void chain_step(const ChainBrick& brick, int steps, Chain* out) {
+  HWY_DYNAMIC_DISPATCH(ChainSteps)(brick, steps, out);
 }
 
-void chain_seeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
-                 Chain* out) {
-  HWY_DYNAMIC_DISPATCH(ChainSeeds)(u, mask, lines, level, out);
+void chain_seeds(const float* u, std::size_t u_apart, const std::uint8_t* mask, std::size_t lines,
+                 float level, Chain* out, std::size_t out_apart) {
+  HWY_DYNAMIC_DISPATCH(ChainSeeds)(u, u_apart, mask, lines, level, out, out_apart);
 }
 
 void chain_sides(const Chain* chain, const float* u, const ChainLimits& limits, ChainSides& out) {

@@ -18,16 +18,17 @@ struct ChainBrick {
   alignas(64) Chain v[10][10][16];
 };
 
-// out[n] = the least of the node's own length and its 26 neighbours' plus a step, at most far.
-void chain_step(const ChainBrick& brick, Chain* out);
-void chain_step_ref(const ChainBrick& brick, Chain* out);
+// `steps` times for all nodes of the brick: the least of the node's own length and its 26
+// neighbours' plus a step, at most far. What is around the brick stays as it is. `out`: the brick.
+void chain_step(const ChainBrick& brick, int steps, Chain* out);
+void chain_step_ref(const ChainBrick& brick, int steps, Chain* out);
 
-// `lines` times 8 nodes: level - u [voxel] rounded up where the mask has a bit, else far.
-// |level - u| < 90.
-void chain_seeds(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
-                 Chain* out);
-void chain_seeds_ref(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
-                     Chain* out);
+// `lines` times 8 nodes: level - u [voxel] rounded up where the mask has a bit, else far. The next
+// line is `u_apart` and `out_apart` further. |level - u| < 90.
+void chain_seeds(const float* u, std::size_t u_apart, const std::uint8_t* mask, std::size_t lines,
+                 float level, Chain* out, std::size_t out_apart);
+void chain_seeds_ref(const float* u, std::size_t u_apart, const std::uint8_t* mask,
+                     std::size_t lines, float level, Chain* out, std::size_t out_apart);
 
 // What the chains of a brick tell of the side its nodes are on, bit 8*y + x of word z; none of it
 // where a chain is far.

@@ -6,25 +6,31 @@
 
 namespace h6::kernels {
 
-void chain_step_ref(const ChainBrick& brick, Chain* out) {
-  for (int n = 0; n < 512; ++n) {
-    int least = kChainFar;
-    for (int i = 0; i < 27; ++i) {
-      const int d[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-      const int apart = (d[0] != 0) + (d[1] != 0) + (d[2] != 0);
-      least = std::min(least, brick.v[n / 64 + 1 + d[2]][n / 8 % 8 + 1 + d[1]][n % 8 + 1 + d[0]] +
-                                  kChainStep[apart]);
+void chain_step_ref(const ChainBrick& brick, int steps, Chain* out) {
+  ChainBrick now = brick;
+  for (int step = 0; step < steps; ++step) {
+    const ChainBrick last = now;
+    for (int n = 0; n < 512; ++n) {
+      int least = kChainFar;
+      for (int i = 0; i < 27; ++i) {
+        const int d[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+        const int apart = (d[0] != 0) + (d[1] != 0) + (d[2] != 0);
+        least = std::min(least, last.v[n / 64 + 1 + d[2]][n / 8 % 8 + 1 + d[1]][n % 8 + 1 + d[0]] +
+                                    kChainStep[apart]);
+      }
+      now.v[n / 64 + 1][n / 8 % 8 + 1][n % 8 + 1] = static_cast<Chain>(least);
     }
-    out[n] = static_cast<Chain>(least);
   }
+  for (int n = 0; n < 512; ++n) out[n] = now.v[n / 64 + 1][n / 8 % 8 + 1][n % 8 + 1];
 }
 
-void chain_seeds_ref(const float* u, const std::uint8_t* mask, std::size_t lines, float level,
-                     Chain* out) {
+void chain_seeds_ref(const float* u, std::size_t u_apart, const std::uint8_t* mask,
+                     std::size_t lines, float level, Chain* out, std::size_t out_apart) {
   for (std::size_t n = 0; n < 8 * lines; ++n)
-    out[n] = mask[n / 8] >> (n % 8) & 1
-                 ? static_cast<Chain>(std::ceil((level - u[n]) * (1 / kChainUnit)))
-                 : kChainFar;
+    out[n / 8 * out_apart + n % 8] =
+        mask[n / 8] >> (n % 8) & 1
+            ? static_cast<Chain>(std::ceil((level - u[n / 8 * u_apart + n % 8]) * (1 / kChainUnit)))
+            : kChainFar;
 }
 
 void chain_sides_ref(const Chain* chain, const float* u, const ChainLimits& limits,

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <random>
 #include <vector>
 
@@ -37,10 +38,14 @@ TEST_CASE("chain_step: every target says what the reference says") {
       for (auto& layer : brick.v)
         for (auto& line : layer)
           for (Chain& c : line) c = random() % 3 ? kChainFar : Chain(int(random() % 3000) - 1500);
-      std::vector<Chain> fast(512), exact(512);
-      chain_step(brick, fast.data());
-      chain_step_ref(brick, exact.data());
-      CHECK(fast == exact);
+      const ChainBrick before = brick;
+      for (const int steps : {0, 1, 2, 3, 9}) {
+        std::vector<Chain> fast(512), exact(512);
+        chain_step(brick, steps, fast.data());
+        chain_step_ref(brick, steps, exact.data());
+        CHECK(fast == exact);
+      }
+      CHECK(std::memcmp(&before, &brick, sizeof brick) == 0);
     }
   });
 }
@@ -49,16 +54,18 @@ TEST_CASE("chain_seeds: every target says what the reference says, never less th
   on_every_target([] {
     std::mt19937_64 random(4);
     for (std::size_t lines = 0; lines <= 67; ++lines) {
-      std::vector<float> u(8 * lines);
+      const std::size_t u_apart = lines % 3 == 0 ? 8 : 64, out_apart = lines % 2 == 0 ? 8 : 16;
+      std::vector<float> u(u_apart * lines);
       std::vector<std::uint8_t> mask(lines);
       for (float& v : u) v = float(random() % 100000) * 1e-4f;
       for (std::uint8_t& m : mask) m = std::uint8_t(random() % 4 ? random() : random() % 2 * 255);
-      std::vector<Chain> fast(8 * lines), exact(8 * lines);
-      chain_seeds(u.data(), mask.data(), lines, 0.9f, fast.data());
-      chain_seeds_ref(u.data(), mask.data(), lines, 0.9f, exact.data());
-      CHECK(fast == exact);
-      for (std::size_t n = 0; n < fast.size(); ++n)
-        if (fast[n] != kChainFar) CHECK(fast[n] * kChainUnit >= 0.9f - u[n]);
+      std::vector<Chain> fast(out_apart * lines, 7), exact(out_apart * lines, 7);
+      chain_seeds(u.data(), u_apart, mask.data(), lines, 0.9f, fast.data(), out_apart);
+      chain_seeds_ref(u.data(), u_apart, mask.data(), lines, 0.9f, exact.data(), out_apart);
+      CHECK(fast == exact);  // between the lines as well: nothing is written there
+      for (std::size_t n = 0; n < 8 * lines; ++n)
+        if (const Chain c = fast[n / 8 * out_apart + n % 8]; c != kChainFar)
+          CHECK(c * kChainUnit >= 0.9f - u[n / 8 * u_apart + n % 8]);
     }
   });
 }
@@ -96,7 +103,7 @@ TEST_CASE("chain_step: steps from one node are at least the distance, at most 13
     node(brick, seed) = 0;
     std::vector<Chain> out(512);
     for (int step = 0; step < 8; ++step) {
-      chain_step(brick, out.data());
+      chain_step(brick, 1, out.data());
       for (int n = 0; n < 512; ++n) node(brick, n) = out[std::size_t(n)];
     }
     for (int n = 0; n < 512; ++n) {
