@@ -295,7 +295,9 @@ double TriangleTree::search(const double (&p)[3], const std::uint32_t (&start)[k
   const double least = std::sqrt(double(found.squared));
   const double most = least + kTight - 2 * double(kRounded);
   if (double(found.above) <= most * most) return std::max(0.0, least - double(kRounded));
-  return search_exactly(p, squared_to(p, found.place), found.place);  // a sliver, or huge
+  const double squared = squared_to(p, found.place);
+  if (squared <= most * most) return std::max(0.0, least - double(kRounded));
+  return search_exactly(p, squared, found.place);  // a sliver, or huge: weighed low
 }
 
 double TriangleTree::search_exactly(const double (&p)[3], double best2,
