@@ -167,15 +167,11 @@ HWY_INLINE std::size_t keep_live(std::uint32_t first, VF squared, Mask live, std
   return hn::CountTrue(d, live);
 }
 
-// Depth first. The start is nearly always the nearest: the order of what is left hardly matters.
-void Search(const NearestTree& tree, const float* p, const std::uint32_t* start, std::size_t starts,
-            NearestFound* best) {
+// Depth first: the room does not depend on how many nodes are near.
+void search_deep(const NearestTree& tree, const V3& at, NearestFound& found) {
   constexpr std::uint32_t kLevel = 28, kNode = (1u << kLevel) - 1;
   constexpr std::size_t kRoom = 8 * NearestTree::kMostLevels + 8;
   const D d;
-  const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
-  NearestFound found = *best;
-  for (std::size_t i = 0; i < starts; ++i) weigh(tree, start[i], at, found);
   alignas(32) float bound[kRoom];
   alignas(32) std::uint32_t what[kRoom];  // level and node
   std::size_t depth = 1;
@@ -186,18 +182,16 @@ void Search(const NearestTree& tree, const float* p, const std::uint32_t* start,
     if (bound[depth] >= found.squared) continue;
     const std::uint32_t level = what[depth] >> kLevel, node = what[depth] & kNode;
     if (level > 0) {
-      const EightBoxes& boxes = tree.level[level][node];
       const std::uint32_t child = (level - 1) << kLevel | 8 * node;
       for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-        const VF squared = boxes_from(boxes, at, i);
+        const VF squared = boxes_from(tree.level[level][node], at, i);
         const auto live = hn::Lt(squared, hn::Set(d, found.squared));
         depth += keep_live(child + std::uint32_t(i), squared, live, what + depth, bound + depth);
       }
       continue;
     }
-    const EightTurnedBoxes& boxes = tree.around_leaf[node];
     for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const VF squared = turned_boxes_from(boxes, at, i);
+      const VF squared = turned_boxes_from(tree.around_leaf[node], at, i);
       alignas(32) float near[8];
       alignas(32) std::uint32_t leaf[8];
       const auto live = hn::Lt(squared, hn::Set(d, found.squared));
@@ -206,6 +200,48 @@ void Search(const NearestTree& tree, const float* p, const std::uint32_t* start,
         if (near[k] < found.squared) weigh(tree, leaf[k], at, found);
     }
   }
+}
+
+// Level by level: the start is nearly always the nearest, so what is near is known before, and a
+// processor works on many nodes at once where going deep would make it wait for each. False: there
+// is no room for so many.
+constexpr std::size_t kWide = 504;
+bool search_wide(const NearestTree& tree, const V3& at, NearestFound& found) {
+  const D d;
+  alignas(32) std::uint32_t list[2][kWide + 8];
+  alignas(32) float bound[kWide + 8];
+  const std::uint32_t* from = list[0];
+  std::uint32_t* to = list[1];
+  std::size_t count = 1;
+  list[0][0] = 0;
+  const VF most = hn::Set(d, found.squared);
+  for (std::uint32_t level = tree.levels; level-- > 0;) {
+    std::size_t next = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (next + 8 > kWide) return false;
+      for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+        const VF squared = level > 0 ? boxes_from(tree.level[level][from[k]], at, i)
+                                     : turned_boxes_from(tree.around_leaf[from[k]], at, i);
+        next += keep_live(8 * from[k] + std::uint32_t(i), squared, hn::Lt(squared, most), to + next,
+                          bound + next);
+      }
+    }
+    count = next;
+    from = to;
+    to = from == list[1] ? list[0] : list[1];
+  }
+  for (std::size_t k = 0; k < count; ++k)
+    if (bound[k] < found.squared) weigh(tree, from[k], at, found);
+  return true;
+}
+
+void Search(const NearestTree& tree, const float* p, const std::uint32_t* start, std::size_t starts,
+            NearestFound* best) {
+  const D d;
+  const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
+  NearestFound found = *best;
+  for (std::size_t i = 0; i < starts; ++i) weigh(tree, start[i], at, found);
+  if (starts == 0 || !search_wide(tree, at, found)) search_deep(tree, at, found);
   *best = found;
 }
 
