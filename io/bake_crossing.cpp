@@ -28,22 +28,36 @@ std::int64_t rounded(double voxels) {
   return std::int64_t(v + std::copysign(0.5, v));
 }
 
-// Where a line meets a triangle, from the corners' shares of the area > 0 and their places along
-// it: the node at or before the hit, and whether it is the hit.
+// A triangle along an axis: where its corners are, and what of the first one and of the ways from
+// it to the others a share of the area is worth.
+struct Along {
+  std::int64_t corner[3];
+  double first, second, third;  // [voxel]; the last two per area
+};
+Along make_along(const Point (&p)[3], std::size_t axis, std::int64_t area) {
+  Along a{{p[0][axis], p[1][axis], p[2][axis]}, 0, 0, 0};
+  const double scale = 1 / double(kVoxel), by_area = scale / double(area);
+  a.first = double(a.corner[0]) * scale;
+  a.second = double(a.corner[1] - a.corner[0]) * by_area;
+  a.third = double(a.corner[2] - a.corner[0]) * by_area;
+  return a;
+}
+
+// Where a line meets a triangle, from the corners' shares of the area > 0: the node at or before
+// the hit, and whether it is the hit.
 struct Hit {
   std::int64_t node;
   bool exact;
 };
-Hit locate(const std::int64_t (&share)[3], const std::int64_t (&along)[3], std::int64_t area) {
+Hit locate(const std::int64_t (&share)[3], const Along& along, std::int64_t area) {
   // Right to 1e-11 voxel, 2048 being the largest.
-  const double at = (double(share[0]) * double(along[0]) + double(share[1]) * double(along[1]) +
-                     double(share[2]) * double(along[2])) /
-                    (double(area) * double(kVoxel));
+  const double at =
+      along.first + (double(share[1]) * along.second + double(share[2]) * along.third);
   const std::int64_t before = std::int64_t(at) - (at < 0);
   const double rest = at - double(before);
   if (rest > 1e-9 && rest < 1 - 1e-9) return {before, false};
-  const Wide numerator =
-      Wide(share[0]) * along[0] + Wide(share[1]) * along[1] + Wide(share[2]) * along[2];
+  const auto& c = along.corner;
+  const Wide numerator = Wide(share[0]) * c[0] + Wide(share[1]) * c[1] + Wide(share[2]) * c[2];
   const Wide whole = Wide(area) << kFraction;
   Wide quotient = numerator / whole, remainder = numerator % whole;
   if (remainder < 0) --quotient;
@@ -57,23 +71,21 @@ using Rows = std::array<std::int32_t, 64>;
 
 // Lines along `axis` through nodes (j, k) of the other two axes. The edge from a node belongs to
 // the node's brick.
-void draw(const Point (&p)[3], std::size_t axis, const Rows& rows,
-          std::vector<Crossing>& crossings) {
+struct Lines {
+  std::int64_t first, last;  // that a triangle may meet, along an axis of the tile
+};
+void draw(const Point (&p)[3], std::size_t axis, const std::array<Lines, 3>& lines,
+          const Rows& rows, std::vector<Crossing>& crossings) {
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const auto [j0, j1] = lines[u];
+  const auto [k0, k1] = lines[v];
+  if (j0 > j1 || k0 > k1) return;
   std::int64_t area =
       (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
   if (area == 0) return;
   const std::int64_t turn = area > 0 ? 1 : -1;
   area *= turn;
-  const auto range = [&](std::size_t k) {
-    return std::pair{
-        std::max<std::int64_t>(0, ceil_voxel(std::min({p[0][k], p[1][k], p[2][k]}))),
-        std::min<std::int64_t>(kSide - 1, floor_voxel(std::max({p[0][k], p[1][k], p[2][k]})))};
-  };
-  const auto [j0, j1] = range(u);
-  const auto [k0, k1] = range(v);
-  if (j0 > j1 || k0 > k1) return;
-  const std::int64_t along[3] = {p[0][axis], p[1][axis], p[2][axis]};
+  const Along along = make_along(p, axis, area);
   std::int64_t line[3], per_j[3], per_k[3];  // barycentric, times area; and from line to line
   for (std::size_t i = 0; i < 3; ++i) {
     const Point &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
@@ -117,19 +129,28 @@ void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, Narr
     rows[std::size_t(i)] = in ? band.row[grid.cell(at[0], at[1], at[2])] : -1;
   }
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
+    const auto& corner = surface.triangles[tiles.triangle[i]];
+    const Vec3* v[3];
+    for (std::size_t c = 0; c < 3; ++c) v[c] = &surface.vertices[corner[c]];
+    // The tile's edges run from its first node to past its last.
+    const auto meets = [&](double a, double b, double c, std::size_t k) {
+      const double low = 8.0 * first[k];
+      return std::max({a, b, c}) >= low - 1e-5 && std::min({a, b, c}) <= low + double(kSide) + 1e-5;
+    };
+    if (!meets(v[0]->x, v[1]->x, v[2]->x, 0) || !meets(v[0]->y, v[1]->y, v[2]->y, 1) ||
+        !meets(v[0]->z, v[1]->z, v[2]->z, 2))
+      continue;
     Point p[3];
-    bool meets = true;
     for (std::size_t c = 0; c < 3; ++c) {
-      const Vec3& vertex = surface.vertices[surface.triangles[tiles.triangle[i]][c]];
-      const double at[3] = {vertex.x, vertex.y, vertex.z};
+      const double at[3] = {v[c]->x, v[c]->y, v[c]->z};
       for (std::size_t k = 0; k < 3; ++k) p[c][k] = rounded(at[k]) - 8 * first[k] * kVoxel;
     }
-    for (std::size_t k = 0; k < 3;
-         ++k)  // the tile's edges run from its first node to past its last
-      meets &= std::max({p[0][k], p[1][k], p[2][k]}) >= 0 &&
-               std::min({p[0][k], p[1][k], p[2][k]}) <= kSide * kVoxel;
-    if (!meets) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis) draw(p, axis, rows, band.crossing);
+    std::array<Lines, 3> lines;
+    for (std::size_t k = 0; k < 3; ++k)
+      lines[k] = {
+          std::max<std::int64_t>(0, ceil_voxel(std::min({p[0][k], p[1][k], p[2][k]}))),
+          std::min<std::int64_t>(kSide - 1, floor_voxel(std::max({p[0][k], p[1][k], p[2][k]})))};
+    for (std::size_t axis = 0; axis < 3; ++axis) draw(p, axis, lines, rows, band.crossing);
   }
   for (const std::int32_t row : rows) {
     if (row < 0) continue;
