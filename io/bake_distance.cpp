@@ -51,9 +51,9 @@ void add_part_near(std::vector<double>& corners, const Corner (&t)[3], double re
 struct Facets {
   std::vector<kernels::DistanceFacet> facet;
   std::vector<kernels::FacetRegion> region;  // at least as many; only what is in use is set
-  std::vector<std::uint64_t> near;  // bricks
-  std::vector<double> corners;      // 9 each, tile-local
-  std::vector<std::int32_t> owner;  // triangle
+  std::vector<std::uint64_t> near;           // bricks
+  std::vector<double> corners;               // 9 each, tile-local
+  std::vector<std::int32_t> owner;           // triangle
 };
 
 void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
@@ -79,14 +79,33 @@ void set_region(const Features& features, const Surface& surface, std::uint32_t 
   }
 }
 
-void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles,
-             const Features& features, std::size_t tile, Facets& out) {
+// What the next triangles of a list need lies anywhere: it is asked for in time.
+void ask_for(const Surface& surface, const Features& features, const Large<std::uint32_t>& list,
+             std::size_t i, std::size_t end) {
+  constexpr std::size_t kSoon = 6, kLater = 12;
+  if (i + kLater < end) {
+    const std::uint32_t t = list[i + kLater];
+    __builtin_prefetch(&surface.triangles[t]);
+    __builtin_prefetch(&features.owned[t]);
+    __builtin_prefetch(&features.across[3 * std::size_t(t)]);
+  }
+  if (i + kSoon < end)
+    for (const std::uint32_t v : surface.triangles[list[i + kSoon]]) {
+      __builtin_prefetch(&surface.vertices[v]);
+      __builtin_prefetch(&features.from[4 * std::size_t(v)]);
+    }
+}
+
+void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const Features& features,
+             std::size_t tile, Facets& out) {
   out.facet.clear();
   out.near.clear();
   out.corners.clear();
   out.owner.clear();
   const std::array<int, 3> brick = tiles.first_brick(tile);
-  for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
+  const std::size_t end = tiles.first[tile + 1];
+  for (std::size_t i = tiles.first[tile]; i < end; ++i) {
+    ask_for(surface, features, tiles.triangle, i, end);
     const std::uint32_t t = tiles.triangle[i];
     Corner corner[3];
     double farthest = 0;
@@ -150,8 +169,8 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
   for (; used != 0; used &= used - 1) {
     const int b = std::countr_zero(used);
     const int in[3] = {b % 4, b / 4 % 4, b / 16};
-    const std::size_t r = std::size_t(
-        band.row[grid.cell(brick[0] + in[0], brick[1] + in[1], brick[2] + in[2])]);
+    const std::size_t r =
+        std::size_t(band.row[grid.cell(brick[0] + in[0], brick[1] + in[1], brick[2] + in[2])]);
     float* u = band.nodes(r);
     if (weighed >> b & 1)
       kernels::brick_distance(*room, std::size_t(b), u);
