@@ -73,6 +73,7 @@ struct FrameTeam::Helper {
   std::atomic<bool> polling{false};         // a frame is on
   std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
   std::atomic<int> treatment{0};            // priority + 256 * (the haptic thread's core + 1)
+  std::atomic<int> frame_core{-1};          // where the last frame began
   alignas(64) std::atomic<std::uint64_t> ticket{0};
   alignas(64) std::atomic<std::uint32_t> done{0};  // slices of this job that are finished
   // Written before the ticket is published, read after a claim.
@@ -121,8 +122,14 @@ struct FrameTeam::Helper {
     int as = 0;
     while (!stop.load(std::memory_order_relaxed)) {
       if (!polling.load(std::memory_order_acquire)) {
-        if (const int asked = treatment.load(std::memory_order_relaxed); asked != as)
-          treated.set((as = asked) % 256, asked / 256 - 1);
+        int asked = treatment.load(std::memory_order_relaxed);
+        // Nobody said which core is the haptic thread's: not this one, it seems.
+        if (const int core = frame_core.load(std::memory_order_relaxed);
+            asked == 0 && core >= 0 && core == sched_getcpu())
+          asked = 256 * (core + 1);
+        else if (asked == 0)
+          asked = as;
+        if (asked != as) treated.set((as = asked) % 256, asked / 256 - 1);
         const std::int64_t due = next_frame.load(std::memory_order_relaxed) - kPollBefore;
         const std::int64_t now = now_ns();
         if (now < due)
@@ -179,6 +186,7 @@ void FrameTeam::begin_frame(std::int64_t now) {
   h.helped = {};
   const bool early = now < h.announced - kPollBefore;
   h.early = early ? h.early + (h.early < kInHaste) : 0;
+  h.frame_core.store(sched_getcpu(), std::memory_order_relaxed);
   h.polling.store(true, std::memory_order_release);
 }
 
