@@ -123,8 +123,8 @@ void add_run(CLI::App& app, Program& program) {
       ->check(number_within(0, 10000));
   run->add_option(
          "--budget", o->budget_us,
-         "Anytime mode: a frame that would take longer makes do with 8, 4, 2 or 1 points of sixteen; "
-         "not in virtual time; default off")
+         "Anytime mode: a frame that would take longer makes do with 8, 4, 2 or 1 points of "
+         "sixteen; not in virtual time; default off")
       ->option_text("MICROSECONDS")
       ->check(number_within(0, 1000000));
   run->add_option("--record", o->record, "Record every frame to this .h5 file")

@@ -140,8 +140,11 @@ class Process {
     return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            info.si_pid == pid_;
   }
-  // Its end, or SIGKILL after `limit` seconds.
+  // Its end, or SIGKILL after `limit` seconds; ThreadSanitizer has ten times as long.
   Ended wait(double limit = 30) {
+#if defined(__SANITIZE_THREAD__)
+    limit *= 10;
+#endif
     Ended ended;
     const auto begun = Clock::now();
     int status = 0;
