@@ -56,3 +56,15 @@ TEST_CASE("gauss_tree: contacts that face away weigh nothing, were they all to")
 TEST_CASE("gauss_tree: columns that are not numbers do no harm outside the weights") {
   check_not_numbers<Tree>();
 }
+
+TEST_CASE("gauss_tree: weights are right where contacts lie so dense that leaves share a walk") {
+  for (const bool weighted : {false, true}) {
+    Contacts c = contacts_of(Set::clump, 30011, kPaper);
+    const DirectionsView view = c.view(weighted);
+    const std::vector<float> want = reference_of(view, Hat::normal, kPaper, 750);
+    on_every_target([&](const std::string& target) {
+      if (target == "SCALAR") return;  // what the others do, slowly
+      CHECK(worst_of(weights_of<Tree>(view, Hat::normal, kPaper), want, 750) <= kTolerance);
+    });
+  }
+}
