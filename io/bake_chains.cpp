@@ -47,7 +47,7 @@ Around::Around(const Grid& grid, const NarrowBand& band, const Reached& reached,
 
 bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
                    const Chains* chains, const Around& around, std::uint32_t wanted,
-                   kernels::ChainBrick& out) {
+                   std::uint32_t through, kernels::ChainBrick& out) {
   const float offset = float(grid.offset), reach = float(grid.reach());
   constexpr int kBegin[3] = {-1, 0, 8}, kEnd[3] = {0, 8, 9};
   constexpr std::uint64_t kLines[3] = {std::uint64_t{0xff} << 56, ~std::uint64_t{0}, 0xff};
@@ -85,6 +85,19 @@ bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reac
         each_line([&](Chain* to, std::size_t line) { std::copy_n(from + 8 * line, 8, to + 1); });
       else
         each_line([&](Chain* to, std::size_t line) { to[x_in] = from[8 * line + x_there]; });
+    } else if (through >> i & 1) {
+      any = true;
+      const float* u = band.nodes(r);
+      const auto& wet = reached.node[r];
+      constexpr std::uint8_t kWhole = 0xff;
+      each_line([&](Chain* to, std::size_t line) {
+        float signed_u[8];
+        Chain seeds[8];
+        for (std::size_t x = 0; x < 8; ++x)
+          signed_u[x] = wet.get(8 * line + x) ? u[8 * line + x] : -u[8 * line + x];
+        kernels::chain_seeds(signed_u, 8, &kWhole, 1, offset, middle ? to + 1 : seeds, 8);
+        if (!middle) to[x_in] = seeds[x_there];
+      });
     } else {
       const float* u = band.nodes(r);
       const auto& wet = reached.node[r].z;
@@ -120,8 +133,14 @@ bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reac
 }
 
 Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
-               const std::vector<std::uint8_t>& rows, unsigned threads)
-    : grid_(grid), band_(band), reached_(reached), threads_(threads), slot_(band.rows(), -1) {
+               const std::vector<std::uint8_t>& rows, unsigned threads,
+               const std::vector<std::uint8_t>* buried)
+    : grid_(grid),
+      band_(band),
+      reached_(reached),
+      buried_(buried),
+      threads_(threads),
+      slot_(band.rows(), -1) {
   std::int32_t slots = 0;
   for (std::size_t r = 0; r < band.rows(); ++r)
     if (rows[r]) slot_[r] = slots++;
@@ -151,8 +170,12 @@ void Chains::pass() {
       each_row(grid_, band_, tiles[i], [&](std::size_t r) {
         if (slot_[r] < 0) return;
         kernels::ChainBrick padded;
-        if (!gather_chains(grid_, band_, reached_, this, Around(grid_, band_, reached_, r), kAround,
-                           padded))
+        const Around around(grid_, band_, reached_, r);
+        std::uint32_t through = 0;
+        for (std::size_t i = 0; i < 27 && buried_ != nullptr; ++i)
+          if (const std::int32_t next = around.row[i]; next >= 0)
+            through |= std::uint32_t(!(*buried_)[std::size_t(next)] && !holds(std::size_t(next))) << i;
+        if (!gather_chains(grid_, band_, reached_, this, around, kAround, through, padded))
           return;  // nothing reached anywhere near, as yet
         some_[std::size_t(slot_[r])] = 1;
         kernels::chain_step(padded, kStepsAPass,

@@ -71,8 +71,11 @@ void each_row(const Grid& grid, const NarrowBand& band, std::size_t tile, F&& f)
 inline constexpr int kStepsAPass = 3;
 class Chains {
  public:
+  // `buried`: which rows have a buried sheet in or beside them, read by `pass` too; through the
+  // others chains go where they are not held. Without it they do not.
   Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
-         const std::vector<std::uint8_t>& rows, unsigned threads);
+         const std::vector<std::uint8_t>& rows, unsigned threads,
+         const std::vector<std::uint8_t>* buried = nullptr);
   void pass();
   bool holds(std::size_t row) const { return slot_[row] >= 0; }
   bool some(std::size_t row) const { return some_[std::size_t(slot_[row])] != 0; }
@@ -84,6 +87,7 @@ class Chains {
   const Grid& grid_;
   const NarrowBand& band_;
   const Reached& reached_;
+  const std::vector<std::uint8_t>* buried_;
   unsigned threads_;
   std::vector<std::int32_t> slot_;  // (rows) or -1
   std::vector<Chain, SampleAllocator<Chain>> chain_;
@@ -95,8 +99,10 @@ class Chains {
 // `wanted`: bit i for neighbour i; the others' nodes are as if nothing were reached there. False:
 // there is no chain at all, all is far.
 inline constexpr std::uint32_t kAround = (1u << 27) - 1;
+// `through`: neighbours whose nodes that are not reached count too, u + offset from R: the sheets
+// in and beside them border R.
 bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
                    const Chains* chains, const Around& around, std::uint32_t wanted,
-                   kernels::ChainBrick& out);
+                   std::uint32_t through, kernels::ChainBrick& out);
 
 }  // namespace h6::io::bake

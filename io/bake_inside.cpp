@@ -235,7 +235,7 @@ class Look {
       any |= deep[r];
     }
     if (!any) return true;
-    chains_ = std::make_shared<Chains>(grid_, band_, reached_, deep, threads_);
+    chains_ = std::make_shared<Chains>(grid_, band_, reached_, deep, threads_, &corrected_);
     const int steps = std::max(kDeepPasses + int(offset_), hops_across());
     const int passes = (steps + kStepsAPass - 1) / kStepsAPass;
     for (int pass = 0; pass < passes; ++pass) {
@@ -258,7 +258,7 @@ class Look {
     bool gathered = false;
     const auto gather = [&] {
       if (!gathered)
-        gather_chains(grid_, band_, reached_, chains_.get(), around, neighbours_of(todo), d);
+        gather_chains(grid_, band_, reached_, chains_.get(), around, neighbours_of(todo), 0, d);
       gathered = true;
     };
     Chain stepped[kBrickSamples];
