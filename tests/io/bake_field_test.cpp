@@ -212,6 +212,41 @@ TEST_CASE("bake_field: two overlapping boxes are one solid, and the walls inside
   MESSAGE("way out too short by at most ", too_short, " voxel, too long by ", too_long);
 }
 
+TEST_CASE("bake_field: where walls are buried aslant, no node is deeper than the next outside is far") {
+  // Part of the second box is buried in the first: bricks that know of it lie beside bricks that do
+  // not, and the way out leads through those.
+  struct Second {
+    Vec3 low, high;
+    double turn, tilt;
+  };
+  for (const Second& second : {Second{{0.218, -0.545, 0.010}, {0.888, -0.243, 0.803}, 0.839, 0.362},
+                               Second{{-0.28, -0.51, -0.516}, {0.712, 0.002, 0.256}, 0.064, 0.581}}) {
+    Mesh mesh = box({-1, -1, -0.6}, {1, 1, 0.6}, 3);
+    add(mesh, turned(box(second.low, second.high, 3), second.turn, second.tilt));
+    const FieldData f = must_bake(mesh, small_bake(96));
+    std::size_t wrong = 0, seen = 0;
+    double worst = 0;
+    for_nodes(f, [&](std::array<int, 3> n, double d) {
+      const double depth = -d / f.voxel_size;
+      if (depth <= 0 || depth > 3.5) return;
+      double way = 9;  // [voxel] to the next node outside
+      for (int i = 0; i < 9 * 9 * 9; ++i) {
+        const int by[3] = {i % 9 - 4, i / 9 % 9 - 4, i / 81 - 4};
+        const float* there = node_sample(f, {n[0] + by[0], n[1] + by[1], n[2] + by[2]});
+        if (there != nullptr && *there > 0)
+          way = std::min(way, std::sqrt(double(by[0] * by[0] + by[1] * by[1] + by[2] * by[2])));
+      }
+      if (way > 4) return;
+      ++seen;
+      wrong += depth > way + 1e-3;
+      worst = std::max(worst, depth - way);
+    });
+    CHECK(seen > 2000);
+    INFO("deeper by ", worst, " voxel");
+    CHECK(wrong == 0);
+  }
+}
+
 TEST_CASE("bake_field: an open sheet becomes a plate two offsets thick") {
   const Mesh mesh = turned(patch(6, 6, [](double s, double t) { return Vec3{s, t, 0}; }), 0.3, 0.5);
   FieldBakeReport report;
