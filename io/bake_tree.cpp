@@ -94,9 +94,9 @@ struct EightCorners {
   float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
 };
 
-// How far eight triangles reach along an axis. In steps of eight, which a compiler makes vectors of.
-void reach_along(const EightCorners& t, const std::array<float, 3>& n, float& low,
-                 float& high) {
+// How far eight triangles reach along an axis. In steps of eight, which a compiler makes vectors
+// of.
+void reach_along(const EightCorners& t, const std::array<float, 3>& n, float& low, float& high) {
   float least[8], most[8];
   for (std::size_t i = 0; i < 8; ++i) {
     const float a = n[0] * t.a[0][i] + n[1] * t.a[1][i] + n[2] * t.a[2][i];
@@ -111,14 +111,13 @@ void reach_along(const EightCorners& t, const std::array<float, 3>& n, float& lo
 }
 
 // Around eight triangles: along the grid, or across and along their mean plane, whichever is less.
-void put_box_around(const EightCorners& t, kernels::EightTurnedBoxes& boxes,
-                    std::size_t box) {
+void put_box_around(const EightCorners& t, kernels::EightTurnedBoxes& boxes, std::size_t box) {
   float normal[3] = {0, 0, 0};
   for (std::size_t i = 0; i < 8; ++i) {
     float n[3];
     for (std::size_t k = 0; k < 3; ++k)
-      n[k] = t.ab[(k + 1) % 3][i] * t.ac[(k + 2) % 3][i] -
-             t.ab[(k + 2) % 3][i] * t.ac[(k + 1) % 3][i];
+      n[k] =
+          t.ab[(k + 1) % 3][i] * t.ac[(k + 2) % 3][i] - t.ab[(k + 2) % 3][i] * t.ac[(k + 1) % 3][i];
     const float along = normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2];
     for (std::size_t k = 0; k < 3; ++k) normal[k] += along < 0 ? -n[k] : n[k];
   }
@@ -141,8 +140,8 @@ void put_box_around(const EightCorners& t, kernels::EightTurnedBoxes& boxes,
     return size;
   };
   const float along_grid = put({{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, 1e30f);
-  const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] +
-                                 normal[2] * normal[2]);
+  const float length =
+      std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   if (!(length > 1e-6f)) return;
   for (float& c : normal) c /= length;
   std::size_t least = 0;
@@ -155,8 +154,8 @@ void put_box_around(const EightCorners& t, kernels::EightTurnedBoxes& boxes,
   axis[1][l1] = -normal[l2] / across;
   axis[1][l2] = normal[l1] / across;
   for (std::size_t k = 0; k < 3; ++k)
-    axis[2][k] = axis[0][(k + 1) % 3] * axis[1][(k + 2) % 3] -
-                 axis[0][(k + 2) % 3] * axis[1][(k + 1) % 3];
+    axis[2][k] =
+        axis[0][(k + 1) % 3] * axis[1][(k + 2) % 3] - axis[0][(k + 2) % 3] * axis[1][(k + 1) % 3];
   put(axis, along_grid);
 }
 
@@ -176,8 +175,10 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
       const auto cell = [](double sum) {  // 2 voxels; the grid has at most 2048
         return std::uint32_t(std::clamp(sum / 6, 0.0, 1023.0));
       };
-      words[i] = std::uint64_t(hilbert(cell(a.x + b.x + c.x), cell(a.y + b.y + c.y),
-                                      cell(a.z + b.z + c.z))) << 32 | i;
+      words[i] = std::uint64_t(
+                     hilbert(cell(a.x + b.x + c.x), cell(a.y + b.y + c.y), cell(a.z + b.z + c.z)))
+                     << 32 |
+                 i;
     }
   });
   sort_by_code(words, threads);
@@ -262,16 +263,14 @@ void TriangleTree::walk(const float (&at)[3], const float& most, Look&& look) co
     // The start is nearly always the nearest: the order of what is left hardly matters.
     float squared[8];
     if (entry.level > 0) {
-      std::uint32_t live =
-          kernels::eight_boxes(level_[entry.level][entry.node], at, most, squared);
+      std::uint32_t live = kernels::eight_boxes(level_[entry.level][entry.node], at, most, squared);
       for (; live != 0; live &= live - 1) {
         const std::uint32_t i = std::uint32_t(std::countr_zero(live));
         stack[depth++] = {squared[i], entry.level - 1, 8 * entry.node + i};
       }
       continue;
     }
-    std::uint32_t live =
-        kernels::eight_turned_boxes(around_leaf_[entry.node], at, most, squared);
+    std::uint32_t live = kernels::eight_turned_boxes(around_leaf_[entry.node], at, most, squared);
     for (; live != 0; live &= live - 1) {
       const std::uint32_t child = std::uint32_t(std::countr_zero(live));
       if (squared[child] < most) look(8 * entry.node + child);
@@ -279,18 +278,16 @@ void TriangleTree::walk(const float (&at)[3], const float& most, Look&& look) co
   }
 }
 
-double TriangleTree::search(const double (&p)[3], const std::uint32_t (&start)[kStarts],
-                            Found& found) const {
+double TriangleTree::search(const double (&p)[3], std::span<const std::uint32_t> start,
+                            double enough, Found& found) const {
   const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
                        float(p[2] - middle_[2])};
   std::uint32_t leaf[kStarts];
-  std::size_t starts = 0;
-  for (const std::uint32_t place : start) {
-    if (place == kNone || std::find(leaf, leaf + starts, place / 8) != leaf + starts) continue;
-    leaf[starts++] = place / 8;
-  }
+  for (std::size_t i = 0; i < start.size(); ++i) leaf[i] = start[i] / 8;
+  const float enough2 = enough > 0 ? float(enough * enough) : -1;
   found.place = kNone;
-  kernels::nearest_search(tree_, at, leaf, starts, &found);
+  kernels::nearest_search(tree_, at, leaf, start.size(), enough2, &found);
+  if (found.squared <= enough2) return 0;
   if (found.place == kNone) return search_exactly(p, 1e18, found.place);
   const double least = std::sqrt(double(found.squared));
   const double most = least + kTight - 2 * double(kRounded);

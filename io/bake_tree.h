@@ -1,5 +1,7 @@
 // bake_tree.h - the distance of any point to the surface. Private to bake_*.cpp.
 #pragma once
+#include <span>
+
 #include "io/bake_grid.h"
 #include "kernels/nearest_eight.h"
 
@@ -16,9 +18,12 @@ class TriangleTree {
   using Found = kernels::NearestFound;  // [voxel^2]; place in this tree
   // A lower bound of the distance [voxel], by less than kTight. `found`: on entry the square of
   // anything above the distance; on return a place to start from at points near by. Looks around
-  // up to kStarts places first; kNone is none.
-  static constexpr std::size_t kStarts = 3;
-  double search(const double (&p)[3], const std::uint32_t (&start)[kStarts], Found& found) const;
+  // up to kStarts places first, no two of them together(), and where one of these is within
+  // `enough`, no further: 0.
+  static constexpr std::size_t kStarts = 4;
+  double search(const double (&p)[3], std::span<const std::uint32_t> start, double enough,
+                Found& found) const;
+  static bool together(std::uint32_t place, std::uint32_t other) { return place / 8 == other / 8; }
   static constexpr double kTight = 0.02;
 
  private:

@@ -236,12 +236,14 @@ bool search_wide(const NearestTree& tree, const V3& at, NearestFound& found) {
 }
 
 void Search(const NearestTree& tree, const float* p, const std::uint32_t* start, std::size_t starts,
-            NearestFound* best) {
+            float enough, NearestFound* best) {
   const D d;
   const V3 at = {hn::Set(d, p[0]), hn::Set(d, p[1]), hn::Set(d, p[2])};
   NearestFound found = *best;
-  for (std::size_t i = 0; i < starts; ++i) weigh(tree, start[i], at, found);
-  if (starts == 0 || !search_wide(tree, at, found)) search_deep(tree, at, found);
+  for (std::size_t i = 0; i < starts && found.squared > enough; ++i)
+    weigh(tree, start[i], at, found);
+  if (found.squared > enough && (starts == 0 || !search_wide(tree, at, found)))
+    search_deep(tree, at, found);
   *best = found;
 }
 
@@ -268,8 +270,8 @@ std::uint32_t eight_triangles(const EightTriangles& triangles, const float p[3],
   return HWY_DYNAMIC_DISPATCH(Triangles)(triangles, p, most, squared);
 }
 void nearest_search(const NearestTree& tree, const float p[3], const std::uint32_t* start,
-                    std::size_t starts, NearestFound* found) {
-  HWY_DYNAMIC_DISPATCH(Search)(tree, p, start, starts, found);
+                    std::size_t starts, float enough, NearestFound* found) {
+  HWY_DYNAMIC_DISPATCH(Search)(tree, p, start, starts, enough, found);
 }
 
 }  // namespace h6::kernels

@@ -28,7 +28,7 @@ FieldData must_bake(const Mesh& mesh, const FieldBake& options) {
 }  // namespace
 
 TEST_CASE("bake_field: at a million random points the far bound is safe, and at its own nodes within "
-          "a twentieth of a voxel of the truth on average") {
+          "a third of a voxel of the truth on average") {
   // |far| is 1-Lipschitz-safe from each corner of a cell: the best corner less the way to it. On
   // average over the corners themselves it must not be loose.
   const auto check = [](const Mesh& mesh, const FieldBake& options, int points) {
@@ -63,7 +63,7 @@ TEST_CASE("bake_field: at a million random points the far bound is safe, and at 
     }
     CHECK(unsafe == 0);
     CHECK(corners > 1000);
-    CHECK(gap / double(corners) < 0.05);
+    CHECK(gap / double(corners) < 0.3);
     CHECK(gap >= 0);
     MESSAGE("loose by ", gap / double(corners), " voxel on average");
   };

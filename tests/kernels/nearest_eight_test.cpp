@@ -234,15 +234,23 @@ TEST_CASE("nearest_search: what looking at every triangle finds, from any start,
       NearestFound all{1e12f, 0, 0}, found{1e12f, 0, 0}, nothing{1e-3f, 7, 0};
       nearest_search_ref(tree, p, &all);
       const std::uint32_t start[3] = {std::uint32_t(random(0, kLeaves - 1)), all.place / 8, 0};
-      nearest_search(tree, p, start, std::size_t(i % 4), &found);
+      nearest_search(tree, p, start, std::size_t(i % 4), -1, &found);
       CHECK(found.squared == all.squared);
       const double* c = corners[found.place].data();
       const double at[3] = {p[0], p[1], p[2]};
       const double exact = point_triangle_squared(at, c, c + 3, c + 6);
       CHECK(std::sqrt(exact) >= std::sqrt(double(found.squared)) - 1e-4);
       CHECK(std::sqrt(exact) <= std::sqrt(double(found.above)) + 1e-4);
-      nearest_search(tree, p, nullptr, 0, &nothing);
+      nearest_search(tree, p, nullptr, 0, -1, &nothing);
       CHECK((nothing.place == 7) == (all.squared >= 1e-3f));
+      // Content with what the first leaf has, or not.
+      NearestFound first{1e12f, 0, 0}, content{1e12f, 0, 0}, never{1e12f, 0, 0};
+      nearest_search(tree, p, start, 1, 1e11f, &first);
+      CHECK(first.place / 8 == start[0]);
+      nearest_search(tree, p, start, 1, first.squared, &content);
+      CHECK(content.squared == first.squared);
+      nearest_search(tree, p, start, 1, 0.999f * all.squared - 1e-6f, &never);
+      CHECK(never.squared == all.squared);
     }
   });
 }
