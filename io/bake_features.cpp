@@ -95,15 +95,17 @@ void look_at_corner(const Surface& surface, const Rings& rings, std::uint32_t ve
   Vec3 sum{0, 0, 0};
   for (std::uint32_t i = begin; i < end; ++i)
     for (std::uint32_t v : surface.triangles[rings.triangle[i]]) {
-      if (v == vertex) continue;
+      // Most ends are met twice: what is known is asked before what is long.
+      const auto stop = end_of.begin() + std::ptrdiff_t(count);
+      if (v == vertex || (i > begin && (has(own, v) || std::find(end_of.begin(), stop, v) != stop)))
+        continue;
       Vec3 d = minus(surface.vertices[v], p);
       const double length = std::sqrt(dot(d, d));
       if (!(length > 1e-9)) continue;
       d = {d.x / length, d.y / length, d.z / length};
       if (i == begin) {
         sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
-      } else if (const auto stop = end_of.begin() + std::ptrdiff_t(count);
-                 !has(own, v) && std::find(end_of.begin(), stop, v) == stop) {
+      } else {
         direction[count] = d;
         end_of[count++] = v;
       }
