@@ -11,20 +11,33 @@ namespace {
 constexpr double kFar = 100;  // [voxel]
 
 using Corner = std::array<double, 3>;
-using Polygon = std::vector<Corner>;
+
+// Which corners and edges (edge e from corner e to the next) of a triangle a part of it has; -1:
+// none.
+constexpr std::int8_t kOwn = -1;
+struct Part {
+  std::array<std::int8_t, 3> corner, edge;
+};
+constexpr Part kWhole{{0, 1, 2}, {0, 1, 2}};
+
+struct PolygonCorner {
+  Corner at;
+  std::int8_t corner, edge;  // as in Part; the edge that leaves it
+};
+using Polygon = std::vector<PolygonCorner>;
 
 // Keeps the part of a convex polygon with side * (p[axis] - level) <= 0.
 void cut(Polygon& polygon, std::size_t axis, double level, double side, Polygon& kept) {
   kept.clear();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Corner &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
-    const double at = side * (p[axis] - level), next = side * (q[axis] - level);
-    if (at <= 0) kept.push_back(p);
+    const PolygonCorner &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
+    const double at = side * (p.at[axis] - level), next = side * (q.at[axis] - level);
+    if (at <= 0) kept.push_back({p.at, p.corner, at == 0 && next > 0 ? kOwn : p.edge});
     if ((at < 0 && next > 0) || (at > 0 && next < 0)) {
       const double s = at / (at - next);
       Corner c;
-      for (std::size_t k = 0; k < 3; ++k) c[k] = p[k] + s * (q[k] - p[k]);
-      kept.push_back(c);
+      for (std::size_t k = 0; k < 3; ++k) c[k] = p.at[k] + s * (q.at[k] - p.at[k]);
+      kept.push_back({c, kOwn, next > 0 ? kOwn : p.edge});
     }
   }
   polygon.swap(kept);
@@ -37,14 +50,19 @@ void add_triangle(std::vector<double>& corners, const Corner& a, const Corner& b
 }
 
 // What of a large triangle can be within reach of the tile, as a fan.
-void add_part_near(std::vector<double>& corners, const Corner (&t)[3], double reach) {
-  Polygon polygon(t, t + 3), scratch;
+void add_part_near(std::vector<double>& corners, std::vector<Part>& parts, const Corner (&t)[3],
+                   double reach) {
+  Polygon polygon{{t[0], 0, 0}, {t[1], 1, 1}, {t[2], 2, 2}}, scratch;
   for (std::size_t k = 0; k < 3; ++k) {
     cut(polygon, k, 8.0 * kernels::kTileBricks + reach, 1.0, scratch);
     cut(polygon, k, -1.0 - reach, -1.0, scratch);
   }
-  for (std::size_t i = 2; i < polygon.size(); ++i)
-    add_triangle(corners, polygon[0], polygon[i - 1], polygon[i]);
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    const PolygonCorner &a = polygon[0], &b = polygon[i - 1], &c = polygon[i];
+    add_triangle(corners, a.at, b.at, c.at);
+    parts.push_back({{a.corner, b.corner, c.corner},
+                     {i == 2 ? a.edge : kOwn, b.edge, i + 1 == polygon.size() ? c.edge : kOwn}});
+  }
 }
 
 // The triangles of a tile, cut and ready.
@@ -53,29 +71,37 @@ struct Facets {
   std::vector<kernels::FacetRegion> region;  // at least as many; only what is in use is set
   std::vector<std::uint64_t> near;           // bricks
   std::vector<double> corners;               // 9 each, tile-local
+  std::vector<Part> part;                    // what they are of their triangle
   std::vector<std::int32_t> owner;           // triangle
 };
 
 void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
-               const Corner& zero_at) {
+               const double* zero_at) {
   region.gx[k] = g[0];
   region.gy[k] = g[1];
   region.gz[k] = g[2];
   region.c[k] = float(-(g[0] * zero_at[0] + g[1] * zero_at[1] + g[2] * zero_at[2]));
 }
 
-void set_region(const Features& features, const Surface& surface, std::uint32_t t,
-                const Corner (&corner)[3], kernels::FacetRegion& region) {
+// Where triangle t may be the nearest, as far as its part with these corners shows it. Beyond an
+// edge that cutting made, or that two parts share, no part is the nearest within reach: the whole
+// triangle goes on there. What lies behind both of the triangle's edges at a corner lies behind
+// every edge between them, so behind those of the part.
+void set_region(const Features& features, const Surface& surface, std::uint32_t t, const Part& part,
+                const double* corners, kernels::FacetRegion& region) {
   region.everywhere = false;
-  region.edges = features.owned[t] & 7;
-  region.corners = std::uint8_t(features.owned[t] >> 3);
   for (std::size_t k = 0; k < 3; ++k) {
-    if (region.edges >> k & 1)
-      set_plane(region, k, features.across[3 * std::size_t(t) + k], corner[k]);
-    if (region.corners >> k & 1)
+    const double* zero_at = corners + 3 * k;
+    if (const int edge = part.edge[k]; edge >= 0 && (features.owned[t] >> edge & 1)) {
+      region.edges |= std::uint8_t(1u << k);
+      set_plane(region, k, features.across[3 * std::size_t(t) + std::size_t(edge)], zero_at);
+    }
+    if (const int corner = part.corner[k]; corner >= 0 && (features.owned[t] >> (3 + corner) & 1)) {
+      region.corners |= std::uint8_t(1u << k);
+      const std::size_t vertex = surface.triangles[t][std::size_t(corner)];
       for (std::size_t i = 0; i < 4; ++i)
-        set_plane(region, 3 + 4 * k + i,
-                  features.from[4 * std::size_t(surface.triangles[t][k]) + i], corner[k]);
+        set_plane(region, 3 + 4 * k + i, features.from[4 * vertex + i], zero_at);
+    }
   }
 }
 
@@ -101,6 +127,7 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
   out.facet.clear();
   out.near.clear();
   out.corners.clear();
+  out.part.clear();
   out.owner.clear();
   const std::array<int, 3> brick = tiles.first_brick(tile);
   const std::size_t end = tiles.first[tile + 1];
@@ -114,22 +141,25 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
       corner[k] = {v.x - 8.0 * brick[0], v.y - 8.0 * brick[1], v.z - 8.0 * brick[2]};
       for (double c : corner[k]) farthest = std::max(farthest, std::fabs(c));
     }
-    if (farthest < kFar)
+    if (farthest < kFar) {
       add_triangle(out.corners, corner[0], corner[1], corner[2]);
-    else
-      add_part_near(out.corners, corner, grid.reach());
-    for (std::size_t f = out.facet.size(); f < out.corners.size() / 9; ++f) {
-      out.facet.push_back(kernels::make_distance_facet(out.corners.data() + 9 * f));
+      out.part.push_back(kWhole);
+    } else {
+      add_part_near(out.corners, out.part, corner, grid.reach());
+    }
+    for (std::size_t f = out.facet.size(); f < out.part.size(); ++f) {
+      const double* corners = out.corners.data() + 9 * f;
+      out.facet.push_back(kernels::make_distance_facet(corners));
       out.near.push_back(tiles.near[i]);
       out.owner.push_back(std::int32_t(t));
       if (out.region.size() < out.facet.size()) out.region.emplace_back();
       kernels::FacetRegion& region = out.region[out.facet.size() - 1];
       region.edges = region.corners = 0;
       region.everywhere = true;
+      // What has no area is weighed everywhere.
+      if (out.facet.back().inside_from <= 0)
+        set_region(features, surface, t, out.part[f], corners, region);
     }
-    // A triangle cut, or without area, is weighed everywhere.
-    if (farthest < kFar && out.facet.back().inside_from <= 0)
-      set_region(features, surface, t, corner, out.region[out.facet.size() - 1]);
   }
 }
 

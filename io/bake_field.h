@@ -52,7 +52,7 @@ struct FieldBakeReport {
 // distance - offset between that sheet and the zero set. Where sheets lie buried in the solid
 // (parts that run into each other) the way out is up to 0.74 voxel + 13 % too short; in a few
 // places too long (bake_inside.cpp).
-// far_grid: outside tight to 0.03 voxel; inside a lower bound.
+// far_grid: a lower bound of the distance, outside by a voxel at most.
 Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                              const Progress& progress = {});
 
