@@ -6,130 +6,157 @@
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
-namespace {
 
-constexpr std::size_t kLine = 16;  // of a ChainBrick
-
-// Bit y of the result: bit 8*y of the word.
-std::uint8_t column(std::uint64_t word) {
-  return std::uint8_t((word & 0x0101010101010101) * 0x0102040810204080 >> 56);
+TileRows::TileRows(const Grid& grid, const NarrowBand& band, const Reached& reached,
+                   std::size_t tile) {
+  const std::array<int, 3> low = band.tiles.first_brick(tile);
+  row.fill(-1);
+  outside.fill(true);
+  const int first = low[0] > 0 ? -1 : 0, end = std::min(kSide - 1, grid.bricks[0] - low[0]);
+  for (int c = -1; c < kSide - 1; ++c) {
+    if (low[2] + c < 0 || low[2] + c >= grid.bricks[2]) continue;
+    for (int b = -1; b < kSide - 1; ++b) {
+      if (low[1] + b < 0 || low[1] + b >= grid.bricks[1]) continue;
+      const std::size_t cell = grid.cell(low[0] + first, low[1] + b, low[2] + c);
+      const std::size_t to = place(first, b, c);
+      for (std::size_t i = 0; i < std::size_t(end - first); ++i) {
+        row[to + i] = band.row[cell + i];
+        outside[to + i] = band.row[cell + i] < 0 && reached.cell[cell + i] != 0;
+      }
+    }
+  }
 }
 
-// Reached nodes by line of a brick: byte 8*z + y.
-std::array<std::uint8_t, 64> lines_of(const NodeMask& nodes) {
-  std::array<std::uint8_t, 64> lines;
-  for (std::size_t n = 0; n < 64; ++n) lines[n] = std::uint8_t(nodes.z[n / 8] >> (8 * (n % 8)));
-  return lines;
+// What of a brick lies in the room: all of it, or the side of a brick around the tile.
+struct ChainRoom::Box {
+  std::uint8_t x, y, z;               // its first node there
+  std::uint8_t width, lines, layers;  // 8 or 1
+  std::uint32_t to;                   // where that node is
+  std::size_t node(std::size_t j, std::size_t k) const { return 64 * (z + k) + 8 * (y + j); }
+};
+
+constexpr std::array<ChainRoom::Box, TileRows::kPlaces> ChainRoom::make_boxes() {
+  std::array<Box, TileRows::kPlaces> boxes{};
+  for (std::size_t p = 0; p < boxes.size(); ++p) {
+    const std::array<int, 3> at = TileRows::brick(p);
+    const auto first = [&](std::size_t k) { return std::uint8_t(at[k] < 0 ? 7 : 0); };
+    const auto count = [&](std::size_t k) {
+      return std::uint8_t(at[k] < 0 || at[k] == kernels::kTileBricks ? 1 : 8);
+    };
+    boxes[p] = {
+        first(0),
+        first(1),
+        first(2),
+        count(0),
+        count(1),
+        count(2),
+        std::uint32_t(node(8 * at[0] + first(0), 8 * at[1] + first(1), 8 * at[2] + first(2)))};
+  }
+  return boxes;
+}
+
+namespace {
+
+template <class T>
+void ask_for(const T* brick, const auto& box) {
+  const std::size_t apart = std::max<std::size_t>(1, 64 / (8 * sizeof(T)));
+  for (std::size_t k = 0; k < box.layers; ++k)
+    for (std::size_t j = 0; j < box.lines; j += apart) __builtin_prefetch(brick + box.node(j, k));
 }
 
 }  // namespace
 
-Around::Around(const Grid& grid, const NarrowBand& band, const Reached& reached, std::size_t r) {
-  const std::array<int, 3> at = grid.place(band.cell[r]);
-  const std::size_t cell = band.cell[r];
-  const std::ptrdiff_t up[3] = {1, grid.bricks[0], std::ptrdiff_t(grid.bricks[0]) * grid.bricks[1]};
-  bool inner = true;
-  for (std::size_t k = 0; k < 3; ++k) inner &= at[k] > 0 && at[k] + 1 < grid.bricks[k];
-  for (int i = 0; i < 27; ++i) {
-    const int by[3] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-    bool in = inner;
-    if (!inner) {
-      in = true;
-      for (std::size_t k = 0; k < 3; ++k)
-        in &= at[k] + by[k] >= 0 && at[k] + by[k] < grid.bricks[k];
+void ChainRoom::fill_with(const Box& box, Chain value) {
+  for (std::size_t k = 0; k < box.layers; ++k)
+    for (std::size_t j = 0; j < box.lines; ++j) {
+      Chain* to = v_ + box.to + k * kLayer + j * kLine;
+      if (box.width == 8)
+        std::fill_n(to, 8, value);
+      else
+        *to = value;
     }
-    const std::size_t there =
-        std::size_t(std::ptrdiff_t(cell) + by[0] * up[0] + by[1] * up[1] + by[2] * up[2]);
-    row[std::size_t(i)] = in ? band.row[there] : -1;
-    outside[std::size_t(i)] = !in || (row[std::size_t(i)] < 0 && reached.cell[there] != 0);
-  }
 }
 
-bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
-                   const Chains* chains, const Around& around, std::uint32_t wanted,
-                   std::uint32_t through, kernels::ChainBrick& out) {
-  const float offset = float(grid.offset), reach = float(grid.reach());
-  constexpr int kBegin[3] = {-1, 0, 8}, kEnd[3] = {0, 8, 9};
-  constexpr std::uint64_t kLines[3] = {std::uint64_t{0xff} << 56, ~std::uint64_t{0}, 0xff};
-  constexpr std::uint64_t kColumns[3] = {0x8080808080808080, ~std::uint64_t{0}, 0x0101010101010101};
-  const auto seed = [&](float u) {
-    return Chain(int((offset - u) * (1 / kChainUnit) + 30000) - 29999);  // rounded up
-  };
-  const Chain clear = seed(reach);
-  std::fill_n(&out.v[0][0][0], 10 * 10 * 16, kChainFar);
-  bool any = false;
-  for (std::size_t i = 0; i < 27; ++i) {
-    if (!(wanted >> i & 1)) continue;
-    const std::size_t dx = i % 3, dy = i / 3 % 3, dz = i / 9;
-    const bool middle = dx == 1;
-    const std::size_t x_in = dx == 0 ? 0 : 9, x_there = dx == 0 ? 7 : 0;
-    // Calls f(place of the line in `out`, line of the neighbour).
-    const auto each_line = [&](auto&& f) {
-      for (int z = kBegin[dz]; z < kEnd[dz]; ++z)
-        for (int y = kBegin[dy]; y < kEnd[dy]; ++y)
-          f(out.v[z + 1][y + 1], std::size_t((z & 7) * 8 + (y & 7)));
-    };
-    const std::size_t r = std::size_t(around.row[i]);
-    if (around.row[i] < 0) {
-      if (!around.outside[i]) continue;
-      any = true;
-      if (middle)
-        each_line([&](Chain* to, std::size_t) { std::fill_n(to + 1, 8, clear); });
+void ChainRoom::copy(const Box& box, const Chain* from) {
+  for (std::size_t k = 0; k < box.layers; ++k)
+    for (std::size_t j = 0; j < box.lines; ++j) {
+      Chain* to = v_ + box.to + k * kLayer + j * kLine;
+      if (box.width == 8)
+        std::copy_n(from + box.node(j, k), 8, to);
       else
-        each_line([&](Chain* to, std::size_t) { to[x_in] = clear; });
-    } else if (chains != nullptr && chains->holds(r)) {
-      if (!chains->some(r)) continue;
-      any = true;
-      const Chain* from = chains->nodes(r);
-      if (middle)
-        each_line([&](Chain* to, std::size_t line) { std::copy_n(from + 8 * line, 8, to + 1); });
-      else
-        each_line([&](Chain* to, std::size_t line) { to[x_in] = from[8 * line + x_there]; });
-    } else if (through >> i & 1) {
-      any = true;
-      const float* u = band.nodes(r);
-      const auto& wet = reached.node[r];
-      constexpr std::uint8_t kWhole = 0xff;
-      each_line([&](Chain* to, std::size_t line) {
-        float signed_u[8];
-        Chain seeds[8];
-        for (std::size_t x = 0; x < 8; ++x)
-          signed_u[x] = wet.get(8 * line + x) ? u[8 * line + x] : -u[8 * line + x];
-        kernels::chain_seeds(signed_u, 8, &kWhole, 1, offset, middle ? to + 1 : seeds, 8);
-        if (!middle) to[x_in] = seeds[x_there];
-      });
-    } else {
-      const float* u = band.nodes(r);
-      const auto& wet = reached.node[r].z;
-      const std::size_t x = dx == 0 ? 7 : 0, y = dy == 0 ? 7 : 0;
-      for (int z = kBegin[dz]; z < kEnd[dz]; ++z) {
-        const std::size_t layer = std::size_t(z & 7);
-        const std::uint64_t here = wet[layer] & kLines[dy] & kColumns[dx];
-        if (here == 0) continue;
-        any = true;
-        const float* from = u + 64 * layer;
-        if (middle) {  // whole lines
-          std::uint8_t mask[8];
-          for (std::size_t i = 0; i < 8; ++i) mask[i] = std::uint8_t(here >> (8 * i));
-          if (dy == 1)
-            kernels::chain_seeds(from, 8, mask, 8, offset, out.v[z + 1][1] + 1, kLine);
-          else
-            kernels::chain_seeds(from + 8 * y, 8, mask + y, 1, offset,
-                                 out.v[z + 1][dy == 0 ? 0 : 9] + 1, kLine);
-        } else if (dy == 1) {  // one node of each line
-          float side[8];
-          Chain seeds[8];
-          for (std::size_t i = 0; i < 8; ++i) side[i] = from[8 * i + x];
-          const std::uint8_t mask = column(here >> x);
-          kernels::chain_seeds(side, 8, &mask, 1, offset, seeds, 8);
-          for (std::size_t i = 0; i < 8; ++i) out.v[z + 1][i + 1][x_in] = seeds[i];
-        } else {
-          out.v[z + 1][dy == 0 ? 0 : 9][x_in] = seed(from[8 * y + x]);
-        }
-      }
+        *to = from[box.node(j, k) + box.x];
     }
+}
+
+// Where nothing is reached, and nothing passes, all is far.
+void ChainRoom::seed(const Box& box, const NodeMask& wet, const float* u, float offset,
+                     bool passes) {
+  std::uint64_t mask[8], any = 0;
+  for (std::size_t k = 0; k < box.layers; ++k) {
+    mask[k] = wet.z[box.z + k] >> (8 * box.y);
+    any |= mask[k];
   }
-  return any;
+  if (any == 0 && !passes) return fill_with(box, kChainFar);
+  const kernels::ChainSeeds seeds{offset, passes, box.layers, box.lines};
+  Chain* to = v_ + box.to;
+  if (box.width == 8)
+    return kernels::chain_seeds(u + box.node(0, 0), mask, seeds, to, kLine, kLayer);
+  Chain all[kBrickSamples];
+  kernels::chain_seeds(u + box.node(0, 0), mask, seeds, all, 8, 64);
+  for (std::size_t k = 0; k < box.layers; ++k)
+    for (std::size_t j = 0; j < box.lines; ++j)
+      to[k * kLayer + j * kLine] = all[64 * k + 8 * j + box.x];
+}
+
+void ChainRoom::fill(const Grid& grid, const NarrowBand& band, const Reached& reached,
+                     const Chains* chains, const TileRows& rows,
+                     const std::vector<std::size_t>& places,
+                     const std::vector<std::uint8_t>* through) {
+  static constexpr std::array<Box, TileRows::kPlaces> kBoxes = make_boxes();
+  constexpr std::uint64_t kBeside = 7 | 7 << TileRows::kSide | 7 << 2 * TileRows::kSide;
+  constexpr int kLayerPlaces = TileRows::kSide * TileRows::kSide;
+  const float offset = float(grid.offset);
+  const Chain clear =
+      Chain(int((offset - float(grid.reach())) * (1 / kChainUnit) + 30000) - 29999);  // rounded up
+  std::uint64_t wanted[TileRows::kSide] = {};
+  for (const std::size_t p : places) {
+    const std::array<int, 3> at = TileRows::brick(p);
+    for (int c = 0; c < 3; ++c) wanted[at[2] + c] |= kBeside << (TileRows::kSide * at[1] + at[0]);
+  }
+  std::array<std::uint8_t, TileRows::kPlaces> from;  // places whose bricks lie in memory
+  std::size_t count = 0;
+  for (int c = 0; c < TileRows::kSide; ++c)
+    for (; wanted[c] != 0; wanted[c] &= wanted[c] - 1) {
+      const std::size_t p = std::size_t(c * kLayerPlaces + std::countr_zero(wanted[c]));
+      const std::int32_t r = rows.row[p];
+      if (r < 0)
+        fill_with(kBoxes[p], rows.outside[p] ? clear : kChainFar);
+      else
+        from[count++] = std::uint8_t(p);
+    }
+  // They lie anywhere: they are asked for in time.
+  constexpr std::size_t kLater = 8, kSoon = 3;
+  const auto row = [&](std::size_t i) { return std::size_t(rows.row[from[i]]); };
+  const auto held = [&](std::size_t r) { return chains != nullptr && chains->holds(r); };
+  for (std::size_t i = 0; i < count + kLater; ++i) {
+    if (i < count && !held(row(i))) __builtin_prefetch(&reached.node[row(i)]);
+    if (const std::size_t k = i + kSoon - kLater; i + kSoon >= kLater && k < count) {
+      const Box& box = kBoxes[from[k]];
+      if (held(row(k)))
+        ask_for(chains->nodes(row(k)), box);
+      else
+        ask_for(band.nodes(row(k)), box);
+    }
+    if (i < kLater) continue;
+    const std::size_t r = row(i - kLater);
+    const Box& box = kBoxes[from[i - kLater]];
+    if (!held(r))
+      seed(box, reached.node[r], band.nodes(r), offset, through != nullptr && !(*through)[r]);
+    else if (chains->some(r))
+      copy(box, chains->nodes(r));
+    else
+      fill_with(box, kChainFar);
+  }
 }
 
 Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
@@ -142,13 +169,13 @@ Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
       threads_(threads),
       slot_(band.rows(), -1) {
   std::int32_t slots = 0;
-  for (std::size_t r = 0; r < band.rows(); ++r)
-    if (rows[r]) slot_[r] = slots++;
   for (std::size_t tile = 0; tile < band.tiles.count(); ++tile) {
     if (band.tiles.first[tile] == band.tiles.first[tile + 1]) continue;
-    bool any = false;
-    each_row(grid, band, tile, [&](std::size_t r) { any |= slot_[r] >= 0; });
-    if (!any) continue;
+    const std::int32_t before = slots;
+    TileRows(grid, band, reached, tile).each([&](std::size_t, std::size_t r) {
+      if (rows[r]) slot_[r] = slots++;
+    });
+    if (slots == before) continue;
     const std::array<int, 3> at = band.tiles.first_brick(tile);
     tiles_[std::size_t((at[0] / 4 & 1) + 2 * (at[1] / 4 & 1) + 4 * (at[2] / 4 & 1))].push_back(
         std::uint32_t(tile));
@@ -158,30 +185,41 @@ Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
   sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
     if (slot_[r] < 0) return;
     Chain* to = chain_.data() + std::size_t(slot_[r]) * kBrickSamples;
-    kernels::chain_seeds(band_.nodes(r), 8, lines_of(reached_.node[r]).data(), 64,
-                         float(grid_.offset), to, 8);
+    kernels::chain_seeds(band_.nodes(r), reached_.node[r].z.data(), {float(grid_.offset), false},
+                         to, 8, 64);
     some_[std::size_t(slot_[r])] = reached_.node[r].any();
   });
 }
 
 void Chains::pass() {
   for (const std::vector<std::uint32_t>& tiles : tiles_)
-    sched::parallel_for(tiles.size(), threads_, [&](std::size_t i) {
-      each_row(grid_, band_, tiles[i], [&](std::size_t r) {
-        if (slot_[r] < 0) return;
-        kernels::ChainBrick padded;
-        const Around around(grid_, band_, reached_, r);
-        std::uint32_t through = 0;
-        for (std::size_t i = 0; i < 27 && buried_ != nullptr; ++i)
-          if (const std::int32_t next = around.row[i]; next >= 0)
-            through |= std::uint32_t(!(*buried_)[std::size_t(next)] && !holds(std::size_t(next))) << i;
-        if (!gather_chains(grid_, band_, reached_, this, around, kAround, through, padded))
-          return;  // nothing reached anywhere near, as yet
-        some_[std::size_t(slot_[r])] = 1;
-        kernels::chain_step(padded, kStepsAPass,
-                            chain_.data() + std::size_t(slot_[r]) * kBrickSamples);
-      });
-    });
+    sched::parallel_for(tiles.size(), threads_, [&](std::size_t i) { pass_tile(tiles[i]); });
+}
+
+void Chains::pass_tile(std::size_t tile) {
+  thread_local const auto room = std::make_unique<ChainRoom>();
+  thread_local std::vector<std::size_t> places;
+  const TileRows rows(grid_, band_, reached_, tile);
+  places.clear();
+  rows.each([&](std::size_t place, std::size_t r) {
+    if (slot_[r] >= 0) places.push_back(place);
+  });
+  room->fill(grid_, band_, reached_, this, rows, places, buried_);
+  constexpr std::size_t kLine = ChainRoom::kLine, kLayer = ChainRoom::kLayer;
+  for (const std::size_t place : places) {
+    Chain* first = room->first(place);
+    bool changed = false;
+    for (int step = 0; step < kStepsAPass; ++step) {
+      if (!kernels::chain_step(first, kLine, kLayer, first, kLine, kLayer)) break;
+      changed = true;
+    }
+    if (!changed) continue;
+    const std::size_t slot = std::size_t(slot_[std::size_t(rows.row[place])]);
+    Chain* to = chain_.data() + slot * kBrickSamples;
+    for (std::size_t n = 0; n < kBrickSamples; n += 8)
+      std::copy_n(first + n / 64 * kLayer + n / 8 % 8 * kLine, 8, to + n);
+    some_[slot] = 1;
+  }
 }
 
 }  // namespace h6::io::bake

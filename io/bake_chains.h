@@ -15,11 +15,47 @@ using kernels::kChainUnit;
 inline constexpr float kSlack = 0.15f, kCornerSlack = 0.74f;
 inline constexpr float kCrooked = 1.135f;  // longest chain over straight line, rounding included
 
+// The rows of a tile and of the bricks around it. Bricks (a,b,c), from -1 to 4, have the place
+// (6*(c + 1) + b + 1)*6 + a + 1.
+struct TileRows {
+  static constexpr int kSide = kernels::kTileBricks + 2;
+  static constexpr std::size_t kPlaces = std::size_t(kSide) * kSide * kSide;
+  std::array<std::int32_t, kPlaces> row;  // -1: no row
+  std::array<bool, kPlaces> outside;  // where there is no row: all reached; beyond the grid it is
+  TileRows(const Grid& grid, const NarrowBand& band, const Reached& reached, std::size_t tile);
+
+  static constexpr std::size_t place(int a, int b, int c) {
+    return std::size_t((kSide * (c + 1) + b + 1) * kSide + a + 1);
+  }
+  static constexpr std::array<int, 3> brick(std::size_t place) {
+    const int at = int(place);
+    return {at % kSide - 1, at / kSide % kSide - 1, at / (kSide * kSide) - 1};
+  }
+  // Neighbour i = 13 + dx + 3*dy + 9*dz of a place.
+  static constexpr std::size_t beside(std::size_t place, int i) {
+    return place + std::size_t(kSide * (kSide * (i / 9) + i / 3 % 3) + i % 3) -
+           std::size_t(kSide * kSide + kSide + 1);
+  }
+  // The tile's own rows, in order: f(place, row).
+  template <class F>
+  void each(F&& f) const {
+    for (int c = 0; c < kernels::kTileBricks; ++c)
+      for (int b = 0; b < kernels::kTileBricks; ++b)
+        for (int a = 0; a < kernels::kTileBricks; ++a)
+          if (const std::int32_t r = row[place(a, b, c)]; r >= 0) f(place(a, b, c), std::size_t(r));
+  }
+};
+
 // A brick and its 26 neighbours: entry 13 + dx + 3*dy + 9*dz.
 struct Around {
-  std::array<std::int32_t, 27> row;  // -1: no row
-  std::array<bool, 27> outside;      // where there is no row: all reached; beyond the grid it is
-  Around(const Grid& grid, const NarrowBand& band, const Reached& reached, std::size_t r);
+  std::array<std::int32_t, 27> row;
+  std::array<bool, 27> outside;
+  Around(const TileRows& rows, std::size_t place) {
+    for (int i = 0; i < 27; ++i) {
+      row[std::size_t(i)] = rows.row[TileRows::beside(place, i)];
+      outside[std::size_t(i)] = rows.outside[TileRows::beside(place, i)];
+    }
+  }
   // Where a node lies whose coordinates leave the brick by at most 8.
   static std::size_t entry(int x, int y, int z) {
     return std::size_t(13 + ((x + 8) / 8 - 1) + 3 * ((y + 8) / 8 - 1) + 9 * ((z + 8) / 8 - 1));
@@ -29,9 +65,8 @@ struct Around {
 inline constexpr NodeMask kAllNodes{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
 
 // The nodes of the middle brick that have one of the given nodes among the 27 around them.
-// `mask(i)`: those of neighbour i.
-template <class Mask>
-NodeMask spread(const Around&, Mask&& mask) {
+// `nodes[i]`: those of neighbour i.
+inline NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
   constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
   std::uint64_t layer[10];  // z = -1 .. 8, spread along x and y
   for (int z = -1; z <= 8; ++z) {
@@ -40,7 +75,8 @@ NodeMask spread(const Around&, Mask&& mask) {
     std::uint64_t low = 0, mid = 0, high = 0;  // rows y = -1, 0 .. 7, 8, spread along x
     for (int dy = -1; dy <= 1; ++dy) {
       const std::size_t i = std::size_t(13 + 3 * dy + 9 * dz);
-      const std::uint64_t left = mask(i - 1).z[at], own = mask(i).z[at], right = mask(i + 1).z[at];
+      const std::uint64_t left = nodes[i - 1]->z[at], own = nodes[i]->z[at],
+                          right = nodes[i + 1]->z[at];
       const std::uint64_t along = own | (own & kNotX7) << 1 | (own & kNotX0) >> 1 |
                                   (left >> 7 & 0x0101010101010101) |
                                   (right & 0x0101010101010101) << 7;
@@ -51,18 +87,6 @@ NodeMask spread(const Around&, Mask&& mask) {
   NodeMask out;
   for (std::size_t z = 0; z < 8; ++z) out.z[z] = layer[z] | layer[z + 1] | layer[z + 2];
   return out;
-}
-
-// The rows of a tile, in order.
-template <class F>
-void each_row(const Grid& grid, const NarrowBand& band, std::size_t tile, F&& f) {
-  const std::array<int, 3> low = band.tiles.first_brick(tile);
-  int high[3];
-  for (std::size_t k = 0; k < 3; ++k) high[k] = std::min(low[k] + 4, grid.bricks[k]);
-  for (int c = low[2]; c < high[2]; ++c)
-    for (int b = low[1]; b < high[1]; ++b)
-      for (int a = low[0]; a < high[0]; ++a)
-        if (const std::int32_t r = band.row[grid.cell(a, b, c)]; r >= 0) f(std::size_t(r));
 }
 
 // Chains of some rows, tile by tile: tiles of one parity are never neighbours and the rows of a
@@ -84,25 +108,47 @@ class Chains {
   }
 
  private:
+  void pass_tile(std::size_t tile);
+
   const Grid& grid_;
   const NarrowBand& band_;
   const Reached& reached_;
   const std::vector<std::uint8_t>* buried_;
   unsigned threads_;
-  std::vector<std::int32_t> slot_;  // (rows) or -1
+  std::vector<std::int32_t> slot_;  // (rows) or -1; tile by tile
   std::vector<Chain, SampleAllocator<Chain>> chain_;
   std::vector<std::uint8_t> some_;  // (slots) whether the row may have a chain at all
   std::array<std::vector<std::uint32_t>, 8> tiles_;  // that have such rows, by parity
 };
 
-// What is known around a brick: chains of rows that are held, and of the others the reached nodes.
-// `wanted`: bit i for neighbour i; the others' nodes are as if nothing were reached there. False:
-// there is no chain at all, all is far.
-inline constexpr std::uint32_t kAround = (1u << 27) - 1;
-// `through`: neighbours whose nodes that are not reached count too, u + offset from R: the sheets
-// in and beside them border R.
-bool gather_chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
-                   const Chains* chains, const Around& around, std::uint32_t wanted,
-                   std::uint32_t through, kernels::ChainBrick& out);
+// What is known of the nodes of a tile and of one layer around it: chains of rows that are held, of
+// the others the reached nodes. 0.1 MB.
+class ChainRoom {
+ public:
+  static constexpr std::size_t kLine = 48, kLayer = kLine * 34;
+  // The room is for bricks at these places and the nodes around them; elsewhere it says nothing.
+  // `through`: in rows that are neither held nor marked here, nodes that are not reached count too,
+  // u + offset from R: the sheets in and beside them border R.
+  void fill(const Grid& grid, const NarrowBand& band, const Reached& reached, const Chains* chains,
+            const TileRows& rows, const std::vector<std::size_t>& places,
+            const std::vector<std::uint8_t>* through);
+  // The first node of a brick.
+  Chain* first(std::size_t place) {
+    const std::array<int, 3> at = TileRows::brick(place);
+    return v_ + node(8 * at[0], 8 * at[1], 8 * at[2]);
+  }
+
+ private:
+  struct Box;
+  static constexpr std::size_t node(int x, int y, int z) {
+    return std::size_t(z + 1) * kLayer + std::size_t(y + 1) * kLine + std::size_t(x + 8);
+  }
+  static constexpr std::array<Box, TileRows::kPlaces> make_boxes();
+  void fill_with(const Box& box, Chain value);
+  void copy(const Box& box, const Chain* from);
+  void seed(const Box& box, const NodeMask& wet, const float* u, float offset, bool passes);
+
+  alignas(64) Chain v_[kLayer * 34];
+};
 
 }  // namespace h6::io::bake

@@ -51,56 +51,40 @@ constexpr NodeMask kNoNodes{};
 
 // Nodes with a reached node among the 27 around them, themselves included; `nodes` tells those of a
 // row.
-template <class Nodes>
-NodeMask beside_any(const Around& around, const Nodes& nodes) {
-  return spread(around, [&](std::size_t i) -> const NodeMask& {
-    if (around.row[i] >= 0) return nodes[std::size_t(around.row[i])];
-    return around.outside[i] ? kAllNodes : kNoNodes;
-  });
+NodeMask beside_any(const Around& around, const Masks& nodes) {
+  std::array<const NodeMask*, 27> at;
+  for (std::size_t i = 0; i < 27; ++i)
+    at[i] = around.row[i] >= 0  ? &nodes[std::size_t(around.row[i])]
+            : around.outside[i] ? &kAllNodes
+                                : &kNoNodes;
+  return spread(at);
 }
 
 // Nodes with one that is not reached among the 27 around them, themselves included.
 NodeMask beside_dry(const Around& around, const Reached& reached) {
-  return spread(around, [&](std::size_t i) -> NodeMask {
-    if (around.row[i] < 0) return around.outside[i] ? kNoNodes : kAllNodes;
-    NodeMask dry = reached.node[std::size_t(around.row[i])];
-    for (std::uint64_t& z : dry.z) z = ~z;
-    return dry;
-  });
+  std::array<NodeMask, 27> dry;
+  std::array<const NodeMask*, 27> at;
+  for (std::size_t i = 0; i < 27; ++i) {
+    at[i] = around.outside[i] ? &kNoNodes : &kAllNodes;
+    if (around.row[i] < 0) continue;
+    dry[i] = reached.node[std::size_t(around.row[i])];
+    for (std::uint64_t& z : dry[i].z) z = ~z;
+    at[i] = &dry[i];
+  }
+  return spread(at);
 }
 
-// Neighbours (entry 13 + dx + 3*dy + 9*dz) that one of these nodes has among the 27 around it.
-std::uint32_t neighbours_of(const NodeMask& nodes) {
-  std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};
-  for (std::uint64_t z : nodes.z) layer[1] |= z;
-  constexpr std::uint64_t kY[3] = {0xff, ~std::uint64_t{0}, std::uint64_t{0xff} << 56};
-  constexpr std::uint64_t kX[3] = {0x0101010101010101, ~std::uint64_t{0}, 0x8080808080808080};
-  std::uint32_t bits = 0;
-  for (int i = 0; i < 27; ++i)
-    bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
-  return bits;
-}
-
-// A node so close to a sheet that chains cannot tell the side: the nearest way to R goes through q;
-// R's side is where u grows, so q is farther from the sheet than its mirror image.
-bool faces_outside(const Grid& grid, const NarrowBand& band, const Around& around,
-                   const kernels::ChainBrick& d, int x, int y, int z) {
-  int nearest = kChainFar, at[3] = {0, 0, 0};
-  for (int dz = -1; dz <= 1; ++dz)
-    for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int apart = (dx != 0) + (dy != 0) + (dz != 0);
-        const int way = d.v[z + 1 + dz][y + 1 + dy][x + 1 + dx] + kernels::kChainStep[apart];
-        if (apart == 0 || way >= nearest) continue;
-        nearest = way;
-        at[0] = dx, at[1] = dy, at[2] = dz;
-      }
+// Whether u at a node's neighbour (entry 13 + dx + 3*dy + 9*dz) is more than at the one across.
+bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& around, int node,
+                   int neighbour) {
+  const int by[3] = {neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1};
+  const int x = node % 8, y = node / 8 % 8, z = node / 64;
   const auto u = [&](int i, int j, int k) {
     const std::int32_t row = around.row[Around::entry(i, j, k)];
     return row < 0 ? float(grid.reach())
                    : band.nodes(std::size_t(row))[((k & 7) * 8 + (j & 7)) * 8 + (i & 7)];
   };
-  return u(x + at[0], y + at[1], z + at[2]) > u(x - at[0], y - at[1], z - at[2]);
+  return u(x + by[0], y + by[1], z + by[2]) > u(x - by[0], y - by[1], z - by[2]);
 }
 
 // The steps of look_inside, with what they share.
@@ -128,13 +112,8 @@ class Look {
     find_corrected();
     Masks().swap(band_.free);  // not needed any more, and it is large
     if (!lay_chains()) return false;
-    if (offset_ > 0 &&
-        !steps_.run("sign", 0.7, 0.8, band_.tiles.count(), threads_, [&](std::size_t tile) {
-          if (band_.tiles.first[tile] == band_.tiles.first[tile + 1]) return;
-          each_row(grid_, band_, tile, [&](std::size_t r) {
-            if (live_[r]) look(r);
-          });
-        }))
+    if (offset_ > 0 && !steps_.run("sign", 0.7, 0.8, band_.tiles.count(), threads_,
+                                   [&](std::size_t tile) { look(tile); }))
       return false;
     inside_.chains = std::move(chains_);
     inside_.corrected = std::move(corrected_);
@@ -147,16 +126,23 @@ class Look {
   int hops_in_sight() const { return offset_ > 0 ? int(std::ceil(offset_ + 0.05f)) : 0; }
   int hops_across() const { return offset_ > 0 ? int(std::ceil(2 * offset_ + 0.2f)) : 0; }
 
+  // Calls f(rows) for the tiles that have rows.
+  template <class F>
+  void each_tile(F&& f) {
+    sched::parallel_for(band_.tiles.count(), threads_, [&](std::size_t tile) {
+      if (band_.tiles.first[tile] != band_.tiles.first[tile + 1])
+        f(TileRows(grid_, band_, reached_, tile));
+    });
+  }
+
   // Which rows are needed, and have nodes inside, sheets buried there, thin walls.
   void inspect_rows() {
     beside_.resize(offset_ > 0 ? band_.rows() : 0);
-    constexpr std::size_t kSlice = 1024;
     std::atomic<std::size_t> thin{0}, dry{0};
-    sched::parallel_for((band_.rows() + kSlice - 1) / kSlice, threads_, [&](std::size_t slice) {
-      const std::size_t end = std::min(band_.rows(), (slice + 1) * kSlice);
+    each_tile([&](const TileRows& rows) {
       std::size_t thin_here = 0, dry_here = 0;
-      for (std::size_t r = slice * kSlice; r < end; ++r) {
-        const Around around(grid_, band_, reached_, r);
+      rows.each([&](std::size_t place, std::size_t r) {
+        const Around around(rows, place);
         const bool outside = near_outside(reached_, around);
         inside_.needed[r] = outside && near_zero_set(band_, around);
         inside_.in_sight[r] = {};
@@ -169,7 +155,7 @@ class Look {
                        : outside            ? beside_any(around, reached_.node)
                                             : kNoNodes;
         if (!band_.crossing.empty()) inspect_crossings(around, r, thin_here);
-      }
+      });
       thin.fetch_add(thin_here, std::memory_order_relaxed);
       dry.fetch_add(dry_here, std::memory_order_relaxed);
     });
@@ -205,27 +191,31 @@ class Look {
     for (int hop = 1; hop + 1 < hops_across() && !beside_.empty(); ++hop) {
       last = hop == 1 ? beside_ : wide;
       wide.resize(band_.rows());
-      sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
-        wide[r] = beside_any(Around(grid_, band_, reached_, r), last);
+      each_tile([&](const TileRows& rows) {
+        rows.each([&](std::size_t place, std::size_t r) {
+          wide[r] = beside_any(Around(rows, place), last);
+        });
       });
     }
     const Masks& before = wide.empty() ? beside_ : wide;
     const bool one_more = hops_across() > 1;
-    sched::parallel_for(band_.rows(), threads_, [&](std::size_t r) {
-      bool buried = buried_[r] != 0;
-      if (!buried && live_[r] && !before.empty()) {
-        NodeMask deep;
-        for (std::size_t z = 0; z < 8; ++z) deep.z[z] = ~band_.free[r].z[z] & ~before[r].z[z];
-        if (deep.any() && one_more) {
-          const NodeMask near = beside_any(Around(grid_, band_, reached_, r), before);
-          for (std::size_t z = 0; z < 8; ++z) deep.z[z] &= ~near.z[z];
+    each_tile([&](const TileRows& rows) {
+      rows.each([&](std::size_t place, std::size_t r) {
+        bool buried = buried_[r] != 0;
+        if (!buried && live_[r] && !before.empty()) {
+          NodeMask deep;
+          for (std::size_t z = 0; z < 8; ++z) deep.z[z] = ~band_.free[r].z[z] & ~before[r].z[z];
+          if (deep.any() && one_more) {
+            const NodeMask near = beside_any(Around(rows, place), before);
+            for (std::size_t z = 0; z < 8; ++z) deep.z[z] &= ~near.z[z];
+          }
+          buried = deep.any();
         }
-        buried = deep.any();
-      }
-      if (!buried) return;
-      for (const std::int32_t next : Around(grid_, band_, reached_, r).row)
-        if (next >= 0)
-          std::atomic_ref(corrected_[std::size_t(next)]).store(1, std::memory_order_relaxed);
+        if (!buried) return;
+        for (const std::int32_t next : Around(rows, place).row)
+          if (next >= 0)
+            std::atomic_ref(corrected_[std::size_t(next)]).store(1, std::memory_order_relaxed);
+      });
     });
   }
 
@@ -247,51 +237,80 @@ class Look {
     return true;
   }
 
-  // Which side of its sheet a node is on, where u alone does not tell.
-  void look(std::size_t r) {
-    if (offset_ == 0) return;
-    const bool held = chains_ && chains_->holds(r);
+  // A row to look at, its nodes in question and what is known of them.
+  struct Asked {
+    std::size_t place, row;
+    bool held;
     NodeMask todo;
-    for (std::size_t z = 0; z < 8; ++z)
-      todo.z[z] = ~reached_.node[r].z[z] & (held ? ~std::uint64_t{0} : beside_[r].z[z]);
-    if (!todo.any()) return;
-    const Around around(grid_, band_, reached_, r);
-    kernels::ChainBrick d;
-    bool gathered = false;
-    const auto gather = [&] {
-      if (!gathered)
-        gather_chains(grid_, band_, reached_, chains_.get(), around, neighbours_of(todo), 0, d);
-      gathered = true;
-    };
-    Chain stepped[kBrickSamples];
-    const Chain* chain = stepped;
-    if (held) {
-      chain = chains_->nodes(r);
-    } else {
-      gather();
-      kernels::chain_step(d, 1, stepped);
-    }
-    const float* u = band_.nodes(r);
-    const kernels::ChainLimits limits{offset_, kSlack, kCrooked,
-                                      0.5f * (kSlack + (kCrooked - 1) * offset_)};
     kernels::ChainSides sides;
-    kernels::chain_sides(chain, u, limits, sides);
+  };
+
+  // Which side of its sheet a node is on, where u alone does not tell. Chains that are held tell it
+  // by themselves; the nodes around a brick are needed for the others, and where a sheet is close.
+  void look(std::size_t tile) {
+    if (band_.tiles.first[tile] == band_.tiles.first[tile + 1]) return;
+    thread_local const auto room = std::make_unique<ChainRoom>();
+    thread_local std::array<Asked, 64> asked;
+    thread_local std::vector<std::size_t> places;
+    const TileRows rows(grid_, band_, reached_, tile);
+    places.clear();
+    std::size_t count = 0;
+    rows.each([&](std::size_t place, std::size_t r) {
+      if (!live_[r]) return;
+      Asked& row = asked[count];
+      row.place = place;
+      row.row = r;
+      row.held = chains_ && chains_->holds(r);
+      std::uint64_t here = 0;
+      for (std::size_t z = 0; z < 8; ++z)
+        here |= row.todo.z[z] =
+            ~reached_.node[r].z[z] & (row.held ? ~std::uint64_t{0} : beside_[r].z[z]);
+      if (here == 0) return;
+      if (row.held) {
+        here = 0;
+        kernels::chain_sides(chains_->nodes(r), band_.nodes(r), limits(), row.sides);
+        for (std::size_t z = 0; z < 8; ++z) here |= row.todo.z[z] & row.sides.close[z];
+      }
+      if (here != 0) places.push_back(place);
+      ++count;
+    });
+    room->fill(grid_, band_, reached_, chains_.get(), rows, places, nullptr);
+    for (std::size_t i = 0; i < count; ++i) look(rows, *room, asked[i]);
+  }
+  kernels::ChainLimits limits() const {
+    return {offset_, kSlack, kCrooked, 0.5f * (kSlack + (kCrooked - 1) * offset_)};
+  }
+  void look(const TileRows& rows, ChainRoom& room, Asked& row) {
+    const std::size_t r = row.row;
+    const Chain* first = room.first(row.place);
+    Chain stepped[kBrickSamples];
+    if (!row.held) {
+      kernels::chain_step(first, ChainRoom::kLine, ChainRoom::kLayer, stepped, 8, 64);
+      kernels::chain_sides(stepped, band_.nodes(r), limits(), row.sides);
+    }
     NodeMask& in_sight = inside_.in_sight[r];
     for (std::size_t z = 0; z < 8; ++z) {
-      in_sight.z[z] |= todo.z[z] & sides.in_sight[z];
-      for (std::uint64_t bits = held ? 0 : todo.z[z] & sides.dented[z]; bits != 0;
+      in_sight.z[z] |= row.todo.z[z] & row.sides.in_sight[z];
+      for (std::uint64_t bits = row.held ? 0 : row.todo.z[z] & row.sides.dented[z]; bits != 0;
            bits &= bits - 1) {
         const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
-        const float dent = (float(chain[n]) * kChainUnit - kSlack) / kCrooked;
+        const float dent = (float(stepped[n]) * kChainUnit - kSlack) / kCrooked;
         inside_.depths[r].push_back({std::uint32_t(n), dent});
       }
-      for (std::uint64_t bits = todo.z[z] & sides.close[z]; bits != 0; bits &= bits - 1) {
-        const int n = std::countr_zero(bits);
-        gather();
-        if (faces_outside(grid_, band_, around, d, n % 8, n / 8, int(z)))
-          in_sight.z[z] |= std::uint64_t{1} << n;
-      }
     }
+    // So close to a sheet chains cannot tell the side: the nearest way to R goes through q; R's
+    // side is where u grows, so q is farther from the sheet than its mirror image.
+    NodeMask close;
+    for (std::size_t z = 0; z < 8; ++z) close.z[z] = row.todo.z[z] & row.sides.close[z];
+    if (!close.any()) return;
+    std::uint8_t nearest[kBrickSamples];
+    kernels::chain_nearest(first, ChainRoom::kLine, ChainRoom::kLayer, close.z.data(), nearest);
+    const Around around(rows, row.place);
+    for (std::size_t z = 0; z < 8; ++z)
+      for (std::uint64_t bits = close.z[z]; bits != 0; bits &= bits - 1) {
+        const int n = int(64 * z) + std::countr_zero(bits);
+        if (rises_towards(grid_, band_, around, n, nearest[n])) in_sight.set(std::size_t(n));
+      }
   }
 
   const Grid& grid_;

@@ -13,22 +13,27 @@ inline constexpr float kChainUnit = 1.0f / 256;  // [voxel]
 inline constexpr Chain kChainFar = 24000;
 inline constexpr int kChainStep[4] = {0, 256, 363, 444};
 
-// A brick and one layer around it: node (x,y,z) at v[z+1][y+1][x+1].
-struct ChainBrick {
-  alignas(64) Chain v[10][10][16];
+// One step for all nodes of a brick: the least of the node's own length and its 26 neighbours' plus
+// a step, at most far. `from`: the first node; the next line of nodes is `line` further, the next
+// layer `layer`. The nodes around the brick are there too and stay as they are. `to`: the brick,
+// likewise; it may be `from` itself, else it is apart from it. Says whether a length has changed.
+bool chain_step(const Chain* from, std::size_t line, std::size_t layer, Chain* to,
+                std::size_t to_line, std::size_t to_layer);
+bool chain_step_ref(const Chain* from, std::size_t line, std::size_t layer, Chain* to,
+                    std::size_t to_line, std::size_t to_layer);
+
+// Lengths at nodes of a brick, `layers` times `lines` times 8 of them: level - u [voxel], rounded
+// up, where the mask (bit 8*y + x of word z) has a bit; elsewhere level + u if `through`, else far.
+// `u` is a brick's from the first of these nodes on. |level +- u| < 90.
+struct ChainSeeds {
+  float level;  // [voxel]
+  bool through;
+  int layers = 8, lines = 8;
 };
-
-// `steps` times for all nodes of the brick: the least of the node's own length and its 26
-// neighbours' plus a step, at most far. What is around the brick stays as it is. `out`: the brick.
-void chain_step(const ChainBrick& brick, int steps, Chain* out);
-void chain_step_ref(const ChainBrick& brick, int steps, Chain* out);
-
-// `lines` times 8 nodes: level - u [voxel] rounded up where the mask has a bit, else far. The next
-// line is `u_apart` and `out_apart` further. |level - u| < 90.
-void chain_seeds(const float* u, std::size_t u_apart, const std::uint8_t* mask, std::size_t lines,
-                 float level, Chain* out, std::size_t out_apart);
-void chain_seeds_ref(const float* u, std::size_t u_apart, const std::uint8_t* mask,
-                     std::size_t lines, float level, Chain* out, std::size_t out_apart);
+void chain_seeds(const float* u, const std::uint64_t* mask, const ChainSeeds& seeds, Chain* to,
+                 std::size_t to_line, std::size_t to_layer);
+void chain_seeds_ref(const float* u, const std::uint64_t* mask, const ChainSeeds& seeds, Chain* to,
+                     std::size_t to_line, std::size_t to_layer);
 
 // What the chains of a brick tell of the side its nodes are on, bit 8*y + x of word z; none of it
 // where a chain is far.
@@ -43,5 +48,13 @@ struct ChainLimits {
 void chain_sides(const Chain* chain, const float* u, const ChainLimits& limits, ChainSides& out);
 void chain_sides_ref(const Chain* chain, const float* u, const ChainLimits& limits,
                      ChainSides& out);
+
+// The neighbour (13 + dx + 3*dy + 9*dz) that the shortest chain to a node comes from: the first of
+// those with the least length plus step, 13 if all are far. For whole lines of nodes that have a
+// bit in the mask (bit 8*y + x of word z); the others of `nearest`, 512, are left as they are.
+void chain_nearest(const Chain* from, std::size_t line, std::size_t layer,
+                   const std::uint64_t* mask, std::uint8_t* nearest);
+void chain_nearest_ref(const Chain* from, std::size_t line, std::size_t layer,
+                       const std::uint64_t* mask, std::uint8_t* nearest);
 
 }  // namespace h6::kernels

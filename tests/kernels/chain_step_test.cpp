@@ -3,10 +3,8 @@
 
 #include <hwy/targets.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <random>
 #include <vector>
 
@@ -26,47 +24,103 @@ void on_every_target(F&& check) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
-Chain& node(ChainBrick& brick, int n) { return brick.v[n / 64 + 1][n / 8 % 8 + 1][n % 8 + 1]; }
+// A brick and the nodes around it, at some strides.
+struct Room {
+  std::size_t line, layer;
+  std::vector<Chain> v;
+  Room(std::size_t line, std::size_t layer) : line(line), layer(layer), v(10 * layer, kChainFar) {}
+  std::size_t at(int n) const {
+    return std::size_t(n / 64 + 1) * layer + std::size_t(n / 8 % 8 + 1) * line +
+           std::size_t(n % 8 + 1);
+  }
+  Chain* first() { return v.data() + at(0); }
+};
 
 }  // namespace
 
-TEST_CASE("chain_step: every target says what the reference says") {
+TEST_CASE("chain_step: every target says what the reference says, in place and apart") {
   on_every_target([] {
     std::mt19937_64 random(3);
-    for (int i = 0; i < 40; ++i) {
-      ChainBrick brick;
-      for (auto& layer : brick.v)
-        for (auto& line : layer)
-          for (Chain& c : line) c = random() % 3 ? kChainFar : Chain(int(random() % 3000) - 1500);
-      const ChainBrick before = brick;
-      for (const int steps : {0, 1, 2, 3, 9}) {
-        std::vector<Chain> fast(512), exact(512);
-        chain_step(brick, steps, fast.data());
-        chain_step_ref(brick, steps, exact.data());
-        CHECK(fast == exact);
+    for (int i = 0; i < 60; ++i) {
+      Room room(10 + std::size_t(i) % 7, 200 + std::size_t(i) % 5);
+      const unsigned far = i % 4 == 3 ? 60 : 3;
+      for (Chain& c : room.v) c = random() % far ? kChainFar : Chain(int(random() % 3000) - 1500);
+      Room in_place = room;
+      for (int step = 0; step < 9; ++step) {
+        std::vector<Chain> exact(512), fast(10 * 9 + 80 * 8, 7);
+        const bool changed =
+            chain_step_ref(room.first(), room.line, room.layer, exact.data(), 8, 64);
+        const std::vector<Chain> before = room.v;
+        CHECK(chain_step(room.first(), room.line, room.layer, fast.data(), 9, 80) == changed);
+        CHECK(room.v == before);
+        CHECK(chain_step(in_place.first(), room.line, room.layer, in_place.first(), room.line,
+                         room.layer) == changed);
+        bool same = true;
+        for (int n = 0; n < 512; ++n) {
+          room.v[room.at(n)] = exact[std::size_t(n)];
+          same &=
+              fast[std::size_t(80 * (n / 64) + 9 * (n / 8 % 8) + n % 8)] == exact[std::size_t(n)];
+        }
+        CHECK(same);
+        CHECK(in_place.v == room.v);  // around the brick as well: nothing is written there
+        for (std::size_t y = 0; y < 8; ++y) CHECK(fast[9 * y + 8] == 7);
       }
-      CHECK(std::memcmp(&before, &brick, sizeof brick) == 0);
     }
   });
+}
+
+TEST_CASE("chain_step: it tells when nothing changes any more") {
+  Room room(16, 160);
+  room.v[room.at(100)] = 0;
+  int steps = 0;
+  while (chain_step(room.first(), 16, 160, room.first(), 16, 160)) REQUIRE(++steps < 20);
+  CHECK(steps == 6);  // node (4,4,1) to the layer z = 7
 }
 
 TEST_CASE("chain_seeds: every target says what the reference says, never less than the truth") {
   on_every_target([] {
     std::mt19937_64 random(4);
-    for (std::size_t lines = 0; lines <= 67; ++lines) {
-      const std::size_t u_apart = lines % 3 == 0 ? 8 : 64, out_apart = lines % 2 == 0 ? 8 : 16;
-      std::vector<float> u(u_apart * lines);
-      std::vector<std::uint8_t> mask(lines);
+    for (int i = 0; i < 60; ++i) {
+      const ChainSeeds seeds{0.9f, i % 2 == 1, i % 3 == 0 ? 1 : 8, i % 5 == 0 ? 1 : 8};
+      const std::size_t line = i % 7 == 0 ? 8 : 48, layer = line * 9;
+      std::vector<float> u(512);
+      std::uint64_t mask[8];
       for (float& v : u) v = float(random() % 100000) * 1e-4f;
-      for (std::uint8_t& m : mask) m = std::uint8_t(random() % 4 ? random() : random() % 2 * 255);
-      std::vector<Chain> fast(out_apart * lines, 7), exact(out_apart * lines, 7);
-      chain_seeds(u.data(), u_apart, mask.data(), lines, 0.9f, fast.data(), out_apart);
-      chain_seeds_ref(u.data(), u_apart, mask.data(), lines, 0.9f, exact.data(), out_apart);
+      for (std::uint64_t& m : mask) m = random() % 4 ? random() & random() >> 7 : random() % 2 - 1;
+      std::vector<Chain> fast(8 * layer, 7), exact(8 * layer, 7);
+      chain_seeds(u.data(), mask, seeds, fast.data(), line, layer);
+      chain_seeds_ref(u.data(), mask, seeds, exact.data(), line, layer);
       CHECK(fast == exact);  // between the lines as well: nothing is written there
-      for (std::size_t n = 0; n < 8 * lines; ++n)
-        if (const Chain c = fast[n / 8 * out_apart + n % 8]; c != kChainFar)
-          CHECK(c * kChainUnit >= 0.9f - u[n / 8 * u_apart + n % 8]);
+      for (std::size_t n = 0; n < 512; ++n) {
+        if (n / 64 >= std::size_t(seeds.layers) || n / 8 % 8 >= std::size_t(seeds.lines)) continue;
+        const bool in = mask[n / 64] >> (n % 64) & 1;
+        const Chain c = fast[n / 64 * layer + n / 8 % 8 * line + n % 8];
+        if (in || seeds.through)
+          CHECK(c * kChainUnit >= 0.9f + (in ? -u[n] : u[n]));
+        else
+          CHECK(c == kChainFar);
+      }
     }
+  });
+}
+
+TEST_CASE("chain_nearest: every target says what the reference says, the first of equals") {
+  on_every_target([] {
+    std::mt19937_64 random(6);
+    std::size_t found = 0;
+    for (int i = 0; i < 60; ++i) {
+      Room room(10 + std::size_t(i) % 7, 200);
+      const unsigned far = i % 4 == 3 ? 60 : 3;
+      for (Chain& c : room.v) c = random() % far ? kChainFar : Chain(int(random() % 4) * 107);
+      std::uint64_t mask[8];
+      for (std::uint64_t& m : mask) m = random() & random() & random() & random();
+      std::vector<std::uint8_t> fast(512, 99), exact(512, 99);
+      chain_nearest(room.first(), room.line, room.layer, mask, fast.data());
+      chain_nearest_ref(room.first(), room.line, room.layer, mask, exact.data());
+      CHECK(fast == exact);
+      for (std::size_t n = 0; n < 512; ++n) found += exact[n] < 27 && exact[n] != 13;
+    }
+    CHECK(found > 1000);
   });
 }
 
@@ -98,19 +152,14 @@ TEST_CASE("chain_sides: every target says what the reference says, on the limits
 
 TEST_CASE("chain_step: steps from one node are at least the distance, at most 13.5 % more") {
   for (const int seed : {0, 73, 511, 292}) {
-    ChainBrick brick;
-    std::fill_n(&brick.v[0][0][0], sizeof brick.v / sizeof(Chain), kChainFar);
-    node(brick, seed) = 0;
-    std::vector<Chain> out(512);
-    for (int step = 0; step < 8; ++step) {
-      chain_step(brick, 1, out.data());
-      for (int n = 0; n < 512; ++n) node(brick, n) = out[std::size_t(n)];
-    }
+    Room room(16, 160);
+    room.v[room.at(seed)] = 0;
+    for (int step = 0; step < 8; ++step) chain_step(room.first(), 16, 160, room.first(), 16, 160);
     for (int n = 0; n < 512; ++n) {
       const double d[3] = {double(n % 8 - seed % 8), double(n / 8 % 8 - seed / 8 % 8),
                            double(n / 64 - seed / 64)};
       const double straight = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-      const double chain = double(out[std::size_t(n)]) * kChainUnit;
+      const double chain = double(room.v[room.at(n)]) * kChainUnit;
       CHECK(chain >= straight - 1e-9);
       CHECK(chain <= 1.135 * straight);
     }
