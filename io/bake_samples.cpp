@@ -8,6 +8,7 @@
 
 #include "io/bake_chains.h"
 #include "io/bake_grid.h"
+#include "kernels/sign_brick.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -15,64 +16,27 @@ namespace {
 
 constexpr std::size_t kBatch = 2048;  // rows: 4 MiB
 
-// Depths along chains, where they tell more than the nearest sheet does [m].
-void deepen(const Grid& grid, const NodeMask& wet, const NodeMask& in_sight, bool corrected,
-            const float* u, const Chain* chain, float* out) {
-  const float offset = float(grid.offset), voxel = float(grid.voxel);
-  for (std::size_t z = 0; z < 8; ++z)
-    for (std::uint64_t bits = ~wet.z[z]; bits != 0; bits &= bits - 1) {
-      const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
-      if (chain[n] >= kChainFar) continue;
-      const float there = float(chain[n]) * kChainUnit;
-      const float sheet = u[n] + offset;
-      if (there < sheet && in_sight.get(n))
-        out[n] = -std::max((there - kSlack) / kCrooked, std::max(offset - u[n], 0.0f)) * voxel;
-      else if (corrected && there >= sheet && !in_sight.get(n))
-        out[n] = -std::max((there - kCornerSlack) / kCrooked, sheet) * voxel;
-    }
-}
-
 // The signed distances of one row [m].
 void sign_row(const Grid& grid, const NarrowBand& band, const Reached& reached,
               const Inside& inside, std::size_t r, float* out) {
   const float offset = float(grid.offset), voxel = float(grid.voxel);
-  const float* u = band.nodes(r);
-  for (std::size_t line = 0; line < 64; ++line) {
-    const std::size_t z = line / 8, shift = 8 * (line % 8);
-    const std::uint64_t wet = reached.node[r].z[z] >> shift & 0xff;
-    const std::uint64_t near = inside.in_sight[r].z[z] >> shift & 0xff;
-    const float* from = u + 8 * line;
-    float* to = out + 8 * line;
-    if (wet == 0xff) {
-      for (int x = 0; x < 8; ++x) to[x] = (from[x] - offset) * voxel;
-    } else if ((wet | near) == 0) {
-      for (int x = 0; x < 8; ++x) to[x] = -(from[x] + offset) * voxel;
-    } else {
-      for (int x = 0; x < 8; ++x) {
-        const float d = wet >> x & 1    ? from[x] - offset
-                        : near >> x & 1 ? std::min(from[x] - offset, 0.0f)
-                                        : -(from[x] + offset);
-        to[x] = d * voxel;
-      }
-    }
-  }
-  if (inside.chains && inside.chains->holds(r))
-    deepen(grid, reached.node[r], inside.in_sight[r], inside.corrected[r] != 0, u,
-           inside.chains->nodes(r), out);
-  if (!band.crossing.empty())
+  const bool held = inside.chains && inside.chains->holds(r);
+  const kernels::BrickSides sides{reached.node[r].z.data(), inside.in_sight[r].z.data(),
+                                  held ? inside.chains->nodes(r) : nullptr,
+                                  held && inside.corrected[r] != 0};
+  kernels::sign_brick(band.nodes(r), sides, {offset, kSlack, kCornerSlack, kCrooked, voxel}, out);
+  if (!band.crossing.empty() && offset == 0)
     for (std::size_t z = 0; z < 8; ++z)
       for (std::uint64_t on = band.crossing[r].on.z[z] & ~reached.node[r].z[z]; on != 0;
-           on &= on - 1) {
-        const std::size_t n = 64 * z + std::size_t(std::countr_zero(on));
-        if (offset == 0) out[n] = 0;
-      }
+           on &= on - 1)
+        out[64 * z + std::size_t(std::countr_zero(on))] = 0;
   for (const Inside::Depth& d : inside.depths[r]) out[d.node] = -d.depth * voxel;
 }
 
 }  // namespace
 
-void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached,
-                   const Inside& inside, unsigned threads, FieldData& field) {
+void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, const Inside& inside,
+                   unsigned threads, FieldData& field) {
   field.brick_index.assign(grid.cells(), -1);
   std::vector<std::uint32_t> kept;
   for (std::size_t r = 0; r < band.rows(); ++r) {
