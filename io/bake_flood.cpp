@@ -145,13 +145,10 @@ void Flood::offer_all(Slab& slab, std::size_t cell) {
 
 void Flood::offer(Slab& slab, std::size_t cell, const NodeMask& nodes) {
   const std::size_t r = std::size_t(band_.row[cell]);
-  bool any = false;
-  for (std::size_t z = 0; z < 8; ++z) {
-    const std::uint64_t bits = nodes.z[z] & free_[r].z[z] & ~wet_[r].z[z];
-    new_[r].z[z] |= bits;
-    any |= bits != 0;
-  }
-  if (any) push(slab, cell);
+  const NodeMask bits = nodes & free_[r] & ~wet_[r];
+  if (!bits.any()) return;
+  new_[r] = new_[r] | bits;
+  push(slab, cell);
 }
 
 void Flood::flood(Slab& slab) {
@@ -218,12 +215,25 @@ void Flood::spill(Slab& slab, std::size_t cell, const NodeMask& wet, const Cross
   const std::array<int, 3> at = grid_.place(cell);
   const std::ptrdiff_t stride[3] = {1, grid_.bricks[0],
                                     std::ptrdiff_t(grid_.bricks[0]) * grid_.bricks[1]};
+  // The neighbours lie anywhere in memory: all are asked for before the first is needed.
+  std::int32_t rows[6];
+  for (std::size_t i = 0; i < 6; ++i) {
+    const int to = at[i / 2] + (i % 2 ? 1 : -1);
+    rows[i] = to < 0 || to >= grid_.bricks[i / 2]
+                  ? -1
+                  : band_.row[std::size_t(std::ptrdiff_t(cell) + (to - at[i / 2]) * stride[i / 2])];
+  }
+  for (const std::int32_t r : rows)
+    if (r >= 0) {
+      __builtin_prefetch(&free_[std::size_t(r)]);
+      __builtin_prefetch(&wet_[std::size_t(r)]);
+    }
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (int step : {-1, 1}) {
       const int to = at[axis] + step;
       if (to < 0 || to >= grid_.bricks[axis]) continue;
       const std::size_t next = std::size_t(std::ptrdiff_t(cell) + step * stride[axis]);
-      const std::int32_t r = band_.row[next];
+      const std::int32_t r = rows[2 * axis + (step > 0)];
       const bool leaves = axis == 2 && (to < slab.first || to >= slab.end);
       if (r < 0 && !leaves && cell_[next]) continue;
       if (whole && r < 0) {
