@@ -109,19 +109,19 @@ void ChainRoom::seed(const Box& box, const NodeMask& wet, const float* u, float 
 }
 
 void ChainRoom::fill(const Grid& grid, const NarrowBand& band, const Reached& reached,
-                     const Chains* chains, const TileRows& rows,
-                     const std::vector<std::size_t>& places,
+                     const Chains* chains, const TileRows& rows, const std::vector<Wanted>& bricks,
                      const std::vector<std::uint8_t>* through) {
   static constexpr std::array<Box, TileRows::kPlaces> kBoxes = make_boxes();
-  constexpr std::uint64_t kBeside = 7 | 7 << TileRows::kSide | 7 << 2 * TileRows::kSide;
   constexpr int kLayerPlaces = TileRows::kSide * TileRows::kSide;
   const float offset = float(grid.offset);
   const Chain clear =
       Chain(int((offset - float(grid.reach())) * (1 / kChainUnit) + 30000) - 29999);  // rounded up
   std::uint64_t wanted[TileRows::kSide] = {};
-  for (const std::size_t p : places) {
-    const std::array<int, 3> at = TileRows::brick(p);
-    for (int c = 0; c < 3; ++c) wanted[at[2] + c] |= kBeside << (TileRows::kSide * at[1] + at[0]);
+  for (const Wanted& brick : bricks) {
+    const std::array<int, 3> at = TileRows::brick(brick.place);
+    for (int i = 0; i < 9; ++i)
+      wanted[at[2] + i / 3] |= std::uint64_t{brick.around >> (3 * i) & 7}
+                               << (TileRows::kSide * (at[1] + i % 3) + at[0]);
   }
   std::array<std::uint8_t, TileRows::kPlaces> from;  // places whose bricks lie in memory
   std::size_t count = 0;
@@ -198,23 +198,23 @@ void Chains::pass() {
 
 void Chains::pass_tile(std::size_t tile) {
   thread_local const auto room = std::make_unique<ChainRoom>();
-  thread_local std::vector<std::size_t> places;
+  thread_local std::vector<ChainRoom::Wanted> bricks;
   const TileRows rows(grid_, band_, reached_, tile);
-  places.clear();
+  bricks.clear();
   rows.each([&](std::size_t place, std::size_t r) {
-    if (slot_[r] >= 0) places.push_back(place);
+    if (slot_[r] >= 0) bricks.push_back({place, ChainRoom::kAllAround});
   });
-  room->fill(grid_, band_, reached_, this, rows, places, buried_);
+  room->fill(grid_, band_, reached_, this, rows, bricks, buried_);
   constexpr std::size_t kLine = ChainRoom::kLine, kLayer = ChainRoom::kLayer;
-  for (const std::size_t place : places) {
-    Chain* first = room->first(place);
+  for (const ChainRoom::Wanted& brick : bricks) {
+    Chain* first = room->first(brick.place);
     bool changed = false;
     for (int step = 0; step < kStepsAPass; ++step) {
       if (!kernels::chain_step(first, kLine, kLayer, first, kLine, kLayer)) break;
       changed = true;
     }
     if (!changed) continue;
-    const std::size_t slot = std::size_t(slot_[std::size_t(rows.row[place])]);
+    const std::size_t slot = std::size_t(slot_[std::size_t(rows.row[brick.place])]);
     Chain* to = chain_.data() + slot * kBrickSamples;
     for (std::size_t n = 0; n < kBrickSamples; n += 8)
       std::copy_n(first + n / 64 * kLayer + n / 8 % 8 * kLine, 8, to + n);

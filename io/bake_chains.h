@@ -31,11 +31,13 @@ struct TileRows {
     const int at = int(place);
     return {at % kSide - 1, at / kSide % kSide - 1, at / (kSide * kSide) - 1};
   }
-  // Neighbour i = 13 + dx + 3*dy + 9*dz of a place.
-  static constexpr std::size_t beside(std::size_t place, int i) {
-    return place + std::size_t(kSide * (kSide * (i / 9) + i / 3 % 3) + i % 3) -
-           std::size_t(kSide * kSide + kSide + 1);
-  }
+  // Neighbour i = 13 + dx + 3*dy + 9*dz is so much further.
+  static constexpr std::array<int, 27> kBeside = [] {
+    std::array<int, 27> by{};
+    for (int i = 0; i < 27; ++i)
+      by[std::size_t(i)] = (kSide * (i / 9 - 1) + i / 3 % 3 - 1) * kSide + i % 3 - 1;
+    return by;
+  }();
   // The tile's own rows, in order: f(place, row).
   template <class F>
   void each(F&& f) const {
@@ -51,9 +53,10 @@ struct Around {
   std::array<std::int32_t, 27> row;
   std::array<bool, 27> outside;
   Around(const TileRows& rows, std::size_t place) {
-    for (int i = 0; i < 27; ++i) {
-      row[std::size_t(i)] = rows.row[TileRows::beside(place, i)];
-      outside[std::size_t(i)] = rows.outside[TileRows::beside(place, i)];
+    for (std::size_t i = 0; i < 27; ++i) {
+      const std::size_t at = place + std::size_t(TileRows::kBeside[i]);
+      row[i] = rows.row[at];
+      outside[i] = rows.outside[at];
     }
   }
   // Where a node lies whose coordinates leave the brick by at most 8.
@@ -126,11 +129,18 @@ class Chains {
 class ChainRoom {
  public:
   static constexpr std::size_t kLine = 48, kLayer = kLine * 34;
-  // The room is for bricks at these places and the nodes around them; elsewhere it says nothing.
+  // A brick, and which of its neighbours are wanted: bit i as in Around, 13 for itself.
+  struct Wanted {
+    std::size_t place;
+    std::uint32_t around;
+  };
+  static constexpr std::uint32_t kAllAround = (1u << 27) - 1;
+  // The room is for these bricks and the nodes of neighbours next to them; elsewhere it holds
+  // anything.
   // `through`: in rows that are neither held nor marked here, nodes that are not reached count too,
   // u + offset from R: the sheets in and beside them border R.
   void fill(const Grid& grid, const NarrowBand& band, const Reached& reached, const Chains* chains,
-            const TileRows& rows, const std::vector<std::size_t>& places,
+            const TileRows& rows, const std::vector<Wanted>& bricks,
             const std::vector<std::uint8_t>* through);
   // The first node of a brick.
   Chain* first(std::size_t place) {

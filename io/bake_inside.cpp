@@ -74,6 +74,18 @@ NodeMask beside_dry(const Around& around, const Reached& reached) {
   return spread(at);
 }
 
+// Neighbours (bit 13 + dx + 3*dy + 9*dz) that one of these nodes has among the 27 around it.
+std::uint32_t neighbours_of(const NodeMask& nodes) {
+  std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};
+  for (std::uint64_t z : nodes.z) layer[1] |= z;
+  constexpr std::uint64_t kY[3] = {0xff, ~std::uint64_t{0}, std::uint64_t{0xff} << 56};
+  constexpr std::uint64_t kX[3] = {0x0101010101010101, ~std::uint64_t{0}, 0x8080808080808080};
+  std::uint32_t bits = 0;
+  for (int i = 0; i < 27; ++i)
+    bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
+  return bits;
+}
+
 // Whether u at a node's neighbour (entry 13 + dx + 3*dy + 9*dz) is more than at the one across.
 bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& around, int node,
                    int neighbour) {
@@ -106,11 +118,15 @@ class Look {
   bool run() {
     if (!steps_.tell("sign", 0.65)) return false;
     inside_.needed.resize(band_.rows());
-    inside_.in_sight.resize(band_.rows());
     inside_.depths.resize(band_.rows());
     inspect_rows();
     find_corrected();
-    Masks().swap(band_.free);  // not needed any more, and it is large
+    inside_.in_sight = std::move(band_.free);  // not needed any more, but the room is
+    constexpr std::size_t kSlice = 4096;
+    sched::parallel_for((band_.rows() + kSlice - 1) / kSlice, threads_, [&](std::size_t slice) {
+      const std::size_t first = slice * kSlice, end = std::min(band_.rows(), first + kSlice);
+      std::fill_n(inside_.in_sight.begin() + std::ptrdiff_t(first), end - first, NodeMask{});
+    });
     if (!lay_chains()) return false;
     if (offset_ > 0 && !steps_.run("sign", 0.7, 0.8, band_.tiles.count(), threads_,
                                    [&](std::size_t tile) { look(tile); }))
@@ -145,7 +161,6 @@ class Look {
         const Around around(rows, place);
         const bool outside = near_outside(reached_, around);
         inside_.needed[r] = outside && near_zero_set(band_, around);
-        inside_.in_sight[r] = {};
         std::size_t wet = 0;
         for (std::uint64_t w : reached_.node[r].z) wet += std::size_t(std::popcount(w));
         dry_here += kBrickSamples - wet;
@@ -251,9 +266,9 @@ class Look {
     if (band_.tiles.first[tile] == band_.tiles.first[tile + 1]) return;
     thread_local const auto room = std::make_unique<ChainRoom>();
     thread_local std::array<Asked, 64> asked;
-    thread_local std::vector<std::size_t> places;
+    thread_local std::vector<ChainRoom::Wanted> bricks;
     const TileRows rows(grid_, band_, reached_, tile);
-    places.clear();
+    bricks.clear();
     std::size_t count = 0;
     rows.each([&](std::size_t place, std::size_t r) {
       if (!live_[r]) return;
@@ -261,20 +276,18 @@ class Look {
       row.place = place;
       row.row = r;
       row.held = chains_ && chains_->holds(r);
-      std::uint64_t here = 0;
       for (std::size_t z = 0; z < 8; ++z)
-        here |= row.todo.z[z] =
-            ~reached_.node[r].z[z] & (row.held ? ~std::uint64_t{0} : beside_[r].z[z]);
-      if (here == 0) return;
+        row.todo.z[z] = ~reached_.node[r].z[z] & (row.held ? ~std::uint64_t{0} : beside_[r].z[z]);
+      if (!row.todo.any()) return;
+      NodeMask unsure = row.todo;
       if (row.held) {
-        here = 0;
         kernels::chain_sides(chains_->nodes(r), band_.nodes(r), limits(), row.sides);
-        for (std::size_t z = 0; z < 8; ++z) here |= row.todo.z[z] & row.sides.close[z];
+        for (std::size_t z = 0; z < 8; ++z) unsure.z[z] &= row.sides.close[z];
       }
-      if (here != 0) places.push_back(place);
+      if (unsure.any()) bricks.push_back({place, neighbours_of(unsure)});
       ++count;
     });
-    room->fill(grid_, band_, reached_, chains_.get(), rows, places, nullptr);
+    room->fill(grid_, band_, reached_, chains_.get(), rows, bricks, nullptr);
     for (std::size_t i = 0; i < count; ++i) look(rows, *room, asked[i]);
   }
   kernels::ChainLimits limits() const {
