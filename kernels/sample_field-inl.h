@@ -32,17 +32,78 @@ using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 using VI = hn::Vec<DI>;
 
-// Two int16 at each byte offset.
-HWY_INLINE VI gather_pairs(const std::int16_t* pool, VI offset) {
+// ---- reading what lies anywhere: one lane after the other, four to a register. Gathers are
+// microcode on many processors, and take longer.
+
+HWY_INLINE std::int32_t load_32(const void* from) {
+  std::int32_t value;  // pairs are aligned to 16 bits
+  std::memcpy(&value, from, sizeof value);
+  return value;
+}
+
+#if HWY_TARGET != HWY_SCALAR
+using D4 = hn::CappedTag<std::int32_t, 4>;
+using V4 = hn::Vec<D4>;
+constexpr std::size_t kFours = hn::MaxLanes(DF()) / 4;
+
+HWY_INLINE V4 four_of(const void* a, const void* b, const void* c, const void* e) {
+  const D4 d;
+  const hn::RepartitionToWide<D4> d2;
+  const V4 ab = hn::InterleaveLower(d, hn::Set(d, load_32(a)), hn::Set(d, load_32(b)));
+  const V4 ce = hn::InterleaveLower(d, hn::Set(d, load_32(c)), hn::Set(d, load_32(e)));
+  return hn::BitCast(d, hn::InterleaveLower(d2, hn::BitCast(d2, ab), hn::BitCast(d2, ce)));
+}
+
+template <class D>
+HWY_INLINE hn::Vec<D> join_fours(D d, const V4* four) {
+  if constexpr (hn::MaxLanes(D()) == 4) {
+    return four[0];
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, join_fours(half, four + hn::MaxLanes(half) / 4), join_fours(half, four));
+  }
+}
+#endif
+
+// The int32 at each index of a vector's worth.
+HWY_INLINE VI gather_entries(const std::int32_t* table, const std::int32_t* at) {
+  const DI di;
 #if HWY_TARGET == HWY_SCALAR
-  // Highway's one-lane gather reads through an int32 pointer, which pairs are not aligned for.
-  std::int32_t pair;
-  std::memcpy(&pair, reinterpret_cast<const char*>(pool) + hn::GetLane(offset), sizeof pair);
-  return hn::Set(DI(), pair);
+  return hn::Set(di, table[at[0]]);
 #else
-  return hn::GatherOffset(DI(), reinterpret_cast<const std::int32_t*>(pool), offset);
+  V4 four[kFours];
+  HWY_UNROLL(4)
+  for (std::size_t k = 0; k < kFours; ++k)
+    four[k] = four_of(table + at[4 * k], table + at[4 * k + 1], table + at[4 * k + 2],
+                      table + at[4 * k + 3]);
+  return join_fours(di, four);
 #endif
 }
+
+// Two int16 so many bytes behind each byte offset of `pool`.
+HWY_INLINE void gather_pairs(const std::int16_t* pool, const std::int32_t* at,
+                             const int (&behind)[4], VI (&pair)[4]) {
+  const DI di;
+  const char* const bytes = reinterpret_cast<const char*>(pool);
+#if HWY_TARGET == HWY_SCALAR
+  for (int k = 0; k < 4; ++k) pair[k] = hn::Set(di, load_32(bytes + at[0] + behind[k]));
+#else
+  V4 four[4][kFours];
+  HWY_UNROLL(4)
+  for (std::size_t i = 0; i < kFours; ++i) {
+    const char *const a = bytes + at[4 * i], *const b = bytes + at[4 * i + 1];
+    const char *const c = bytes + at[4 * i + 2], *const e = bytes + at[4 * i + 3];
+    HWY_UNROLL(4)
+    for (int k = 0; k < 4; ++k)
+      four[k][i] = four_of(a + behind[k], b + behind[k], c + behind[k], e + behind[k]);
+  }
+  for (int k = 0; k < 4; ++k) pair[k] = join_fours(di, four[k]);
+#endif
+}
+
+// Bytes from a cell's first corner to the others: a row and a plane on in a brick, in a far cell.
+constexpr int kNearCorners[4] = {0, 2 * 9, 2 * 81, 2 * 90};
+constexpr int kFarCorners[4] = {0, 4, 8, 12};
 
 HWY_INLINE VF low_half(VI pair) {
   return hn::ConvertTo(DF(), hn::ShiftRight<16>(hn::ShiftLeft<16>(pair)));
@@ -96,8 +157,9 @@ struct Cell {
 HWY_INLINE Cell cell_of(const FieldView& field, const Axis& x, const Axis& y, const Axis& z) {
   const DI di;
   const VI plane = hn::Add(hn::Mul(z.brick, hn::Set(di, field.size[1])), y.brick);
-  return {hn::Add(hn::Mul(plane, hn::Set(di, field.size[0])), x.brick),
-          hn::Add(x.cell, hn::Add(hn::Mul(y.cell, hn::Set(di, 9)), hn::Mul(z.cell, hn::Set(di, 81))))};
+  return {
+      hn::Add(hn::Mul(plane, hn::Set(di, field.size[0])), x.brick),
+      hn::Add(x.cell, hn::Add(hn::Mul(y.cell, hn::Set(di, 9)), hn::Mul(z.cell, hn::Set(di, 81))))};
 }
 
 // Position of a point in the 8-voxel cell, 0..1.
@@ -129,17 +191,54 @@ HWY_INLINE VF far_bound(const VF low[4], const VF step[4], const Axis& x, const 
   return hn::CopySign(hn::Sqrt(square), value);
 }
 
+// Byte offsets of first corners among the bricks.
+HWY_INLINE VI near_offset(VI entry, VI node) {
+  const DI di;
+  return hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node));
+}
+
+// Pairs along x, and then along y and z, at fractions of the cell.
+struct Corners {
+  VF low[4], step[4];  // c[z][y] at x, and what is added to it at x + 1
+};
+HWY_INLINE Corners corners_of(const VI (&pair)[4]) {
+  Corners c;
+  HWY_UNROLL(4)
+  for (int k = 0; k < 4; ++k) {
+    c.low[k] = low_half(pair[k]);
+    c.step[k] = hn::Sub(high_half(pair[k]), c.low[k]);
+  }
+  return c;
+}
+template <bool kGradient>
+HWY_INLINE void interpolate(const Corners& c, VF x, VF y, VF z, VF quantum, VF slope, VF& value,
+                            VF& gx, VF& gy, VF& gz) {
+  const VF a00 = hn::MulAdd(x, c.step[0], c.low[0]), a01 = hn::MulAdd(x, c.step[1], c.low[1]);
+  const VF a10 = hn::MulAdd(x, c.step[2], c.low[2]), a11 = hn::MulAdd(x, c.step[3], c.low[3]);
+  const VF h0 = hn::Sub(a01, a00), h1 = hn::Sub(a11, a10);
+  const VF b0 = hn::MulAdd(y, h0, a00), b1 = hn::MulAdd(y, h1, a10);
+  const VF k = hn::Sub(b1, b0);
+  value = hn::Mul(hn::MulAdd(z, k, b0), quantum);
+  if (kGradient) {
+    gx = hn::Mul(lerp(lerp(c.step[0], c.step[1], y), lerp(c.step[2], c.step[3], y), z), slope);
+    gy = hn::Mul(lerp(h0, h1, z), slope);
+    gz = hn::Mul(k, slope);
+  }
+}
+
 // Value and gradient at points inside the grid.
 template <bool kGradient>
 HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& value, VF& gx,
                               VF& gy, VF& gz) {
   const DF d;
   const DI di;
+  HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
   Axis x = split_axis(qx, field.size[0]);
   Axis y = split_axis(qy, field.size[1]);
   Axis z = split_axis(qz, field.size[2]);
   const Cell cell = cell_of(field, x, y, z);
-  const VI entry = hn::GatherIndex(di, field.table, cell.slot);
+  hn::Store(cell.slot, di, at);
+  const VI entry = gather_entries(field.table, at);
 
   const auto far = hn::Lt(entry, hn::Zero(di));
   const bool any_far = !hn::AllFalse(di, far);
@@ -147,22 +246,17 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   VF quantum = hn::Set(d, kNearQuantum);
   VF slope = quantum;
   if (!hn::AllTrue(di, far)) {
-    const VI offset = hn::IfThenZeroElse(
-        far, hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(cell.node)));
-    pair[0] = gather_pairs(field.bricks, offset);
-    pair[1] = gather_pairs(field.bricks + 9, offset);
-    pair[2] = gather_pairs(field.bricks + 81, offset);
-    pair[3] = gather_pairs(field.bricks + 90, offset);
+    hn::Store(hn::IfThenZeroElse(far, near_offset(entry, cell.node)), di, at);
+    gather_pairs(field.bricks, at, kNearCorners, pair);
   } else {
     pair[0] = pair[1] = pair[2] = pair[3] = hn::Zero(di);
   }
   if (any_far) {
     const VI row = hn::Sub(hn::Set(di, -1), entry);
-    const VI offset = hn::IfThenElseZero(far, hn::ShiftLeft<4>(row));
-    HWY_UNROLL(4)
-    for (int k = 0; k < 4; ++k) {
-      pair[k] = hn::IfThenElse(far, gather_pairs(field.far + 2 * k, offset), pair[k]);
-    }
+    hn::Store(hn::IfThenElseZero(far, hn::ShiftLeft<4>(row)), di, at);
+    VI corner[4];
+    gather_pairs(field.far, at, kFarCorners, corner);
+    for (int k = 0; k < 4; ++k) pair[k] = hn::IfThenElse(far, corner[k], pair[k]);
     const auto far_f = hn::RebindMask(d, far);
     x.fraction = hn::IfThenElse(far_f, far_fraction(x), x.fraction);
     y.fraction = hn::IfThenElse(far_f, far_fraction(y), y.fraction);
@@ -170,27 +264,11 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
     quantum = hn::IfThenElse(far_f, hn::Set(d, kFarQuantum), quantum);
     slope = hn::IfThenElse(far_f, hn::Set(d, kFarQuantum / 8), slope);
   }
-
-  // c[z][y] along x, then along y, then along z.
-  const VF c00 = low_half(pair[0]), c01 = low_half(pair[1]);
-  const VF c10 = low_half(pair[2]), c11 = low_half(pair[3]);
-  const VF e00 = hn::Sub(high_half(pair[0]), c00), e01 = hn::Sub(high_half(pair[1]), c01);
-  const VF e10 = hn::Sub(high_half(pair[2]), c10), e11 = hn::Sub(high_half(pair[3]), c11);
-  const VF a00 = hn::MulAdd(x.fraction, e00, c00), a01 = hn::MulAdd(x.fraction, e01, c01);
-  const VF a10 = hn::MulAdd(x.fraction, e10, c10), a11 = hn::MulAdd(x.fraction, e11, c11);
-  const VF h0 = hn::Sub(a01, a00), h1 = hn::Sub(a11, a10);
-  const VF b0 = hn::MulAdd(y.fraction, h0, a00), b1 = hn::MulAdd(y.fraction, h1, a10);
-  const VF k = hn::Sub(b1, b0);
-  value = hn::Mul(hn::MulAdd(z.fraction, k, b0), quantum);
+  const Corners c = corners_of(pair);
+  interpolate<kGradient>(c, x.fraction, y.fraction, z.fraction, quantum, slope, value, gx, gy, gz);
   if (any_far) {
-    const VF low[4] = {c00, c01, c10, c11}, step[4] = {e00, e01, e10, e11};
-    value = hn::IfThenElse(hn::RebindMask(d, far), far_bound(low, step, x, y, z, value, field.band),
-                           value);
-  }
-  if (kGradient) {
-    gx = hn::Mul(lerp(lerp(e00, e01, y.fraction), lerp(e10, e11, y.fraction), z.fraction), slope);
-    gy = hn::Mul(lerp(h0, h1, z.fraction), slope);
-    gz = hn::Mul(k, slope);
+    const VF bound = far_bound(c.low, c.step, x, y, z, value, field.band);
+    value = hn::IfThenElse(hn::RebindMask(d, far), bound, value);
   }
 }
 

@@ -15,52 +15,107 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-// So many groups before they are sampled their entries of the table are asked for, and half as many
-// before their samples, which are found through those.
-constexpr std::size_t kAhead = 16;
+// Groups go through three steps, some groups apart, so that none waits for the one before: where
+// they are in the table; where in the bricks; their samples. After a pause each step asks for the
+// memory of the next one too.
+//
+//     group  k + ahead: locate   k + ahead / 2: look_up   k: sample
+constexpr std::size_t kRing = 16;
+constexpr std::size_t kAhead = 4;  // with what is read in the caches; kRing where it is not
 
-struct Ahead {
-  HWY_ALIGN std::int32_t slot[kAhead][kGroup], node[kAhead][kGroup];
+struct Ring {
+  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // of the table, then bytes among the bricks
+  HWY_ALIGN std::int32_t node[kRing][kGroup];
+  HWY_ALIGN float fraction[3][kRing][kGroup];
+  bool plain[kRing];  // all in bricks: other groups are sampled anew
 };
 
-void ask_for_table(const FieldView& field, const Affine& to_field, const PointsView& points,
-                   std::size_t group, std::size_t k, Ahead& ahead) {
+HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const PointsView& points,
+                       std::size_t group, std::size_t k, bool cold, Ring& ring) {
   const DF d;
   const DI di;
   const VF zero = hn::Zero(d);
-  std::int32_t* const slot = ahead.slot[k % kAhead];
+  bool plain = kGroup * (group + 1) <= points.count;
   for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
     const std::size_t row = kGroup * group + i;
     const VF px = hn::LoadU(d, points.x + row), py = hn::LoadU(d, points.y + row);
     const VF pz = hn::LoadU(d, points.z + row);
-    const auto axis = [&](int a) HWY_ATTR {
-      const VF q = affine_row(to_field.m[a], px, py, pz);
+    VF q[3];
+    auto inside = hn::FirstN(d, hn::Lanes(d));
+    HWY_UNROLL(3)
+    for (int a = 0; a < 3; ++a) {
+      q[a] = affine_row(to_field.m[a], px, py, pz);
       const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
-      const VF inside = hn::Min(hn::Max(q, zero), last);
-      // What is no number is sampled at the origin.
-      return split_axis(hn::IfThenElseZero(hn::Eq(q, q), inside), field.size[a]);
-    };
-    const Axis x = axis(0), y = axis(1), z = axis(2);
-    const Cell cell = cell_of(field, x, y, z);
-    hn::Store(cell.slot, di, slot + i);
-    hn::Store(cell.node, di, ahead.node[k % kAhead] + i);
+      inside = hn::And(inside, hn::And(hn::Ge(q[a], zero), hn::Le(q[a], last)));
+    }
+    plain = plain && hn::AllTrue(d, inside);
+    Axis axis[3];
+    HWY_UNROLL(3)
+    for (int a = 0; a < 3; ++a) {
+      axis[a] = split_axis(hn::IfThenElseZero(inside, q[a]), field.size[a]);
+      hn::Store(axis[a].fraction, d, ring.fraction[a][k] + i);
+    }
+    const Cell cell = cell_of(field, axis[0], axis[1], axis[2]);
+    hn::Store(cell.slot, di, ring.slot[k] + i);
+    hn::Store(cell.node, di, ring.node[k] + i);
   }
-  for (std::size_t i = 0; i < kGroup; ++i) hwy::Prefetch(field.table + slot[i]);
+  ring.plain[k] = plain;
+  if (cold)
+    for (const std::int32_t slot : ring.slot[k]) hwy::Prefetch(field.table + slot);
 }
 
-void ask_for_samples(const FieldView& field, std::size_t k, const Ahead& ahead) {
-  const std::int32_t* const slot = ahead.slot[k % kAhead];
-  for (std::size_t i = 0; i < kGroup; ++i) {
-    const std::int32_t entry = field.table[slot[i]];
-    if (entry < 0) {
-      hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
-      continue;
+HWY_INLINE void look_up(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
+  const DI di;
+  if (cold)
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      const std::int32_t entry = field.table[ring.slot[k][i]];
+      if (entry < 0) {
+        hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
+        continue;
+      }
+      const std::int16_t* const node =
+          field.bricks + std::ptrdiff_t{entry} * kBrickStride + ring.node[k][i];
+      hwy::Prefetch(node + 5);
+      hwy::Prefetch(node + 86);
     }
-    const std::int16_t* const node =
-        field.bricks + std::ptrdiff_t{entry} * kBrickStride + ahead.node[k % kAhead][i];
-    hwy::Prefetch(node + 5);
-    hwy::Prefetch(node + 86);
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di)) {
+    const VI entry = gather_entries(field.table, ring.slot[k] + i);
+    ring.plain[k] = ring.plain[k] && hn::AllFalse(di, hn::Lt(entry, hn::Zero(di)));
+    hn::Store(near_offset(entry, hn::Load(di, ring.node[k] + i)), di, ring.slot[k] + i);
   }
+}
+
+struct Samples {
+  VF distance, gx, gy, gz;
+};
+
+HWY_INLINE Samples sample_plain(const FieldView& field, const Ring& ring, std::size_t k,
+                                std::size_t i) {
+  const DF d;
+  const VF quantum = hn::Set(d, kNearQuantum);
+  VI pair[4];
+  gather_pairs(field.bricks, ring.slot[k] + i, kNearCorners, pair);
+  Samples s;
+  interpolate<true>(corners_of(pair), hn::Load(d, ring.fraction[0][k] + i),
+                    hn::Load(d, ring.fraction[1][k] + i), hn::Load(d, ring.fraction[2][k] + i),
+                    quantum, quantum, s.distance, s.gx, s.gy, s.gz);
+  return s;
+}
+
+Samples sample_anew(const FieldView& field, const Affine& to_field, const PointsView& points,
+                    std::size_t row) {
+  const DF d;
+  const VF px = hn::LoadU(d, points.x + row), py = hn::LoadU(d, points.y + row);
+  const VF pz = hn::LoadU(d, points.z + row);
+  Samples s;
+  sample_points<true>(field, affine_row(to_field.m[0], px, py, pz),
+                      affine_row(to_field.m[1], px, py, pz), affine_row(to_field.m[2], px, py, pz),
+                      s.distance, s.gx, s.gy, s.gz);
+  if (row + hn::Lanes(d) > points.count) {
+    const std::size_t live = row < points.count ? points.count - row : 0;
+    s.distance = hn::IfThenElse(hn::FirstN(d, live), s.distance, hn::Set(d, __builtin_huge_valf()));
+  }
+  return s;
 }
 
 std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
@@ -70,48 +125,40 @@ std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
   const DF d;
   const DI di;
   static_assert(hn::MaxLanes(DF()) <= kGroup, "a vector is part of a group");
-  const VF infinity = hn::Set(d, __builtin_huge_valf());
+  const std::size_t ahead = cold ? kRing : kAhead, half = ahead / 2;
+  const VI iota = hn::Iota(di, 0);
   std::size_t written = 0;
-  Ahead ahead;
-  if (cold) {
-    for (std::size_t k = 0; k < HWY_MIN(count, kAhead); ++k)
-      ask_for_table(field, to_field, points, groups[k], k, ahead);
-    for (std::size_t k = 0; k < HWY_MIN(count, kAhead / 2); ++k) ask_for_samples(field, k, ahead);
-  }
+  Ring ring;
+  const auto locate_at = [&](std::size_t k) HWY_ATTR {
+    if (k < count) locate(field, to_field, points, groups[k], k % kRing, cold, ring);
+  };
+  const auto look_up_at = [&](std::size_t k) HWY_ATTR {
+    if (k < count) look_up(field, k % kRing, cold, ring);
+  };
+  for (std::size_t k = 0; k < ahead; ++k) locate_at(k);
+  for (std::size_t k = 0; k < half; ++k) look_up_at(k);
   for (std::size_t k = 0; k < count; ++k) {
-    if (cold) {
-      // A slot of the ring is free when its group's samples were asked for.
-      if (k + kAhead / 2 < count) ask_for_samples(field, k + kAhead / 2, ahead);
-      if (k + kAhead < count)
-        ask_for_table(field, to_field, points, groups[k + kAhead], k + kAhead, ahead);
-    }
-    VF smallest = infinity;
+    look_up_at(k + half);
+    VF smallest = hn::Set(d, __builtin_huge_valf());
     for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
       const std::size_t row = kGroup * groups[k] + i;
-      const VF px = hn::LoadU(d, points.x + row), py = hn::LoadU(d, points.y + row);
-      const VF pz = hn::LoadU(d, points.z + row);
-      VF distance, gx, gy, gz;
-      sample_points<true>(field, affine_row(to_field.m[0], px, py, pz),
-                          affine_row(to_field.m[1], px, py, pz),
-                          affine_row(to_field.m[2], px, py, pz), distance, gx, gy, gz);
-      if (HWY_UNLIKELY(row + hn::Lanes(d) > points.count)) {
-        const std::size_t live = row < points.count ? points.count - row : 0;
-        distance = hn::IfThenElse(hn::FirstN(d, live), distance, infinity);
-      }
-      smallest = hn::Min(smallest, distance);
-      const auto touching = hn::Lt(distance, hn::Set(d, limit));
-      const std::size_t n = hn::CountTrue(d, touching);
-      if (n == 0) continue;
-      const VI id = hn::Iota(di, static_cast<std::int32_t>(row));
+      const Samples s = HWY_LIKELY(ring.plain[k % kRing])
+                            ? sample_plain(field, ring, k % kRing, i)
+                            : sample_anew(field, to_field, points, row);
+      smallest = hn::Min(smallest, s.distance);
+      // Whole vectors are written, whatever touches: a branch would be guessed wrong too often.
+      const auto touching = hn::Lt(s.distance, hn::Set(d, limit));
+      const VI id = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(row)));
       hn::StoreU(hn::Compress(id, hn::RebindMask(di, touching)), di,
                  reinterpret_cast<std::int32_t*>(out.row + written));
-      hn::StoreU(hn::Compress(distance, touching), d, out.distance + written);
-      hn::StoreU(hn::Compress(gx, touching), d, out.gx + written);
-      hn::StoreU(hn::Compress(gy, touching), d, out.gy + written);
-      hn::StoreU(hn::Compress(gz, touching), d, out.gz + written);
-      written += n;
+      hn::StoreU(hn::Compress(s.distance, touching), d, out.distance + written);
+      hn::StoreU(hn::Compress(s.gx, touching), d, out.gx + written);
+      hn::StoreU(hn::Compress(s.gy, touching), d, out.gy + written);
+      hn::StoreU(hn::Compress(s.gz, touching), d, out.gz + written);
+      written += hn::CountTrue(d, touching);
     }
     least[k] = hn::GetLane(hn::MinOfLanes(d, smallest));
+    locate_at(k + ahead);
   }
   return written;
 }
