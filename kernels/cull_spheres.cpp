@@ -23,6 +23,19 @@ HWY_INLINE VF reach_of(VF s, bool wide) {
   return hn::IfThenElseZero(hn::Gt(s, hn::Zero(d)), reach);
 }
 
+// cull_clearance of every lane.
+HWY_INLINE VF clearance_of(VF distance, bool wide) {
+  const DF d;
+  const VF left = hn::Sub(distance, hn::Set(d, kReachRounding));
+  const VF long_form = hn::Sub(left, hn::Set(d, kSqrt3));
+  if (wide) return long_form;
+  const VF short_form = hn::Mul(left, hn::Set(d, 1.0f / kSqrt3));
+  const VF edge = hn::Set(d, kShortReach);
+  const VF far_form = hn::IfThenElse(hn::Gt(long_form, edge), long_form,
+                                     hn::Set(d, kShortReach - 1e-4f));
+  return hn::IfThenElse(hn::Lt(short_form, edge), short_form, far_form);
+}
+
 struct Culling {
   const FieldView& field;
   const Affine& to_field;

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <cstring>
 
-#include "kernels/cull_spheres.h"
 #include "kernels/views.h"
 
 // Per-target include guard.
@@ -66,12 +65,11 @@ HWY_INLINE hn::Vec<D> join_fours(D d, const V4* four) {
 }
 #endif
 
-// What stands at each index of a vector's worth: int32, or a float's bits.
-template <class T>
-HWY_INLINE VI gather_entries(const T* table, const std::int32_t* at) {
+// The int32 at each index of a vector's worth.
+HWY_INLINE VI gather_entries(const std::int32_t* table, const std::int32_t* at) {
   const DI di;
 #if HWY_TARGET == HWY_SCALAR
-  return hn::Set(di, load_32(table + at[0]));
+  return hn::Set(di, table[at[0]]);
 #else
   V4 four[kFours];
   HWY_UNROLL(4)
@@ -324,19 +322,6 @@ HWY_INLINE void sample_points(const FieldView& field, VF x, VF y, VF z, VF& dist
       gz = hn::IfThenElseZero(finite, gz);
     }
   }
-}
-
-// cull_clearance of every lane.
-HWY_INLINE VF clearance_of(VF distance, bool wide) {
-  const DF d;
-  const VF left = hn::Sub(distance, hn::Set(d, kReachRounding));
-  const VF long_form = hn::Sub(left, hn::Set(d, kSqrt3));
-  if (wide) return long_form;
-  const VF short_form = hn::Mul(left, hn::Set(d, 1.0f / kSqrt3));
-  const VF edge = hn::Set(d, kShortReach);
-  const VF far_form = hn::IfThenElse(hn::Gt(long_form, edge), long_form,
-                                     hn::Set(d, kShortReach - 1e-4f));
-  return hn::IfThenElse(hn::Lt(short_form, edge), short_form, far_form);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

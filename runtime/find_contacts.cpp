@@ -10,7 +10,7 @@
 
 #include "kernels/cull_spheres.h"
 #include "kernels/expiry.h"
-#include "kernels/touch_points.h"
+#include "kernels/touch_groups.h"
 #include "runtime/anytime.h"
 #include "runtime/stages.h"
 #include "sched/clock.h"
@@ -18,7 +18,7 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kWorthSharing = 80;   // times sixteen points from which the helper is asked
+constexpr std::size_t kWorthSharing = 80;   // groups from which the helper is asked: some 6 us
 constexpr std::size_t kContactSlice = 512;  // contacts made at a time: some 1.5 us
 // Contacts from which making them is shared: what the other core made has to come over. 1,000 take
 // 3.1 us alone and 6.2 with it, 10,000 46 and 26.
@@ -107,13 +107,13 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
-  // Rows of `samples`; `out` names rows of the shell as ever.
-  std::size_t touch_samples(const std::uint32_t* rows, std::size_t count,
-                            const kernels::Touching& out, float* distance) const {
+  // Samples that stand in `vectors`; `out` names rows of the shell as ever.
+  std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
+                            const kernels::Touching& out, float* least) const {
     const Samples& samples = shell.samples;
-    const std::size_t found = kernels::touch_points(
-        field, place, {samples.x.data, samples.y.data, samples.z.data, samples.x.count}, rows,
-        count, margin, cold, out, distance);
+    const std::size_t found = kernels::touch_groups(
+        field, place, {samples.x.data, samples.y.data, samples.z.data, samples.x.count}, vectors,
+        count, margin, cold, out, least);
     std::size_t kept = 0;
     for (std::size_t k = 0; k < found; ++k) {
       const std::uint32_t row = samples.row[out.row[k]];
@@ -126,37 +126,37 @@ struct Search {
     }
     return kept;
   }
-  std::size_t touch(const std::uint32_t* rows, std::size_t count, const kernels::Touching& out,
-                    float* distance) const {
-    return kernels::touch_points(field, place,
-                                 {shell.x.data, shell.y.data, shell.z.data, shell.points}, rows,
-                                 count, margin, cold, out, distance);
+  std::size_t touch(const std::uint32_t* groups, std::size_t count, const kernels::Touching& out,
+                    float* least) const {
+    return kernels::touch_groups(field, place,
+                                 {shell.x.data, shell.y.data, shell.z.data, shell.points}, groups,
+                                 count, margin, cold, out, least);
   }
 };
 
-// Which of the first `count` of t.rows touch, in order, whatever runs the slices. Behind `used`.
-// `alone`: this is a slice itself.
+// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`. `alone`: this
+// is a slice itself.
 std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::size_t count,
                   std::size_t used, bool alone) {
   const auto by_myself = [&] {
-    return search.touch(t.rows, count, candidates_from(t, used), t.distance);
+    return search.touch(t.survivors, count, candidates_from(t, used), t.clearance);
   };
-  constexpr std::size_t kSlice = kTouchSlice * kGroupRows;
-  if (alone || count < kWorthSharing * kGroupRows || s.team->threads() == 1) return by_myself();
+  if (alone || count < kWorthSharing || s.team->threads() == 1) return by_myself();
   const std::int64_t since = sched::now_ns();
   const auto timed = [&](std::size_t found) {
     s.touching.took(static_cast<double>(sched::now_ns() - since));
     return found;
   };
   if (!s.touching.share(count)) return timed(by_myself());
-  const std::size_t slices = (count + kSlice - 1) / kSlice;
+  const std::size_t slices = (count + kTouchSlice - 1) / kTouchSlice;
   s.team->for_slices(slices, [&](std::size_t i) {
-    const std::size_t at = i * kSlice, n = std::min(kSlice, count - at);
-    s.slice_count[i] = search.touch(t.rows + at, n, candidates_from(t, used + at), t.distance + at);
+    const std::size_t at = i * kTouchSlice, n = std::min(kTouchSlice, count - at);
+    s.slice_count[i] = search.touch(t.survivors + at, n, candidates_from(t, used + at * kGroupRows),
+                                    t.clearance + at);
   });
   std::size_t kept = s.slice_count[0];
   for (std::size_t i = 1; i < slices; ++i) {
-    move_candidates(t, used + kept, t, used + i * kSlice, s.slice_count[i]);
+    move_candidates(t, used + kept, t, used + i * kTouchSlice * kGroupRows, s.slice_count[i]);
     kept += s.slice_count[i];
   }
   return timed(kept);
@@ -180,20 +180,15 @@ double motion_bound(const kernels::Affine& from, const kernels::Affine& to, doub
 // When what is clear by this much may touch. kSlack takes up the rounding of both to float.
 float expiry_of(float now, float clearance) { return now + std::max(clearance - kSlack, 0.0f); }
 
-// The expiry of a group of which nothing is known, nor of its points: it has passed.
-constexpr float kUnknown = -1;
-
 // Where the shell has got to, as length of the way; starts anew when that becomes too long for
 // float, or nothing is known.
 float travel(Pair& pair, const Search& search) {
   const Shell& shell = search.shell;
-  if (pair.travelled >= 0) {
-    pair.step = motion_bound(pair.last_place, search.place, shell.radius * (1 + 1e-6));
-    pair.travelled += pair.step;
-  }
+  if (pair.travelled >= 0)
+    pair.travelled += motion_bound(pair.last_place, search.place, shell.radius * (1 + 1e-6));
   if (!(pair.travelled >= 0 && pair.travelled < kLongestWay)) {
     pair.travelled = 0;
-    std::fill_n(pair.group_expiry, shell.groups.count, kUnknown);
+    std::fill_n(pair.group_expiry, shell.groups.count, 0.0f);
     std::fill(pair.group_expiry + shell.groups.count, pair.group_expiry + 16 * shell.blocks.count,
               HUGE_VALF);
     std::fill_n(pair.block_expiry, shell.blocks.count, 0.0f);
@@ -214,68 +209,22 @@ std::size_t touch_coarsely(h6Session& s, Pair& pair, TraverseScratch& t, const S
   do {
     const int tier = s.anytime.tier;
     const std::size_t each = std::size_t{1} << tier;
-    const std::size_t of_block = each * kGroupRows;
     for (std::size_t k = 0; k < blocks; ++k)
-      for (std::size_t i = 0; i < of_block; ++i)
-        t.rows[k * of_block + i] =
-            static_cast<std::uint32_t>(t.open_blocks[k] * Samples::kOfGroup * kGroupRows + i);
+      for (std::size_t j = 0; j < each; ++j)
+        t.frontier[k * each + j] =
+            static_cast<std::uint32_t>(t.open_blocks[k] * Samples::kOfGroup + j);
     const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
-    found = search.touch_samples(t.rows, blocks * of_block, candidates_from(t, used), t.distance);
+    found = search.touch_samples(t.frontier, blocks * each, candidates_from(t, used), t.clearance);
     learn_sampling(s, blocks * each, pair.open_groups, found, since);
     pair.missed = 0;
     for (std::size_t k = 0; k < blocks; ++k) {
       const float reach = search.scale * samples.reach[tier][t.open_blocks[k]];
-      const float* const distance = t.distance + k * of_block;
-      const float least = *std::min_element(distance, distance + of_block);
+      const float least = *std::min_element(t.clearance + k * each, t.clearance + (k + 1) * each);
       // The long form: cells far inside hold no samples.
       pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - least);
     }
   } while (must_be_coarser(s, number, used, found, blocks));
   return found;
-}
-
-// The points of a group of which nothing is known are looked at when it is.
-void forget_points(const Pair& pair, const Shell& shell, std::uint32_t group) {
-  if (!pair.point_expiry || pair.group_expiry[group] != kUnknown) return;
-  const std::size_t first = kGroupRows * group;
-  const std::size_t real = std::min(kGroupRows, shell.points - first);
-  std::fill_n(pair.point_expiry + first, real, kUnknown);
-  std::fill_n(pair.point_expiry + first + real, kGroupRows - real, HUGE_VALF);
-}
-
-// Rows of `groups` groups that may have come within reach since they were last sampled.
-std::size_t rows_to_sample(const Pair& pair, TraverseScratch& t, const Shell& shell,
-                           std::size_t groups, float now) {
-  if (pair.point_expiry) {
-    for (std::size_t k = 0; k < groups; ++k) forget_points(pair, shell, t.survivors[k]);
-    // Those too that will in the next two such steps: each would open the group once more.
-    const float soon = now + 2 * static_cast<float>(pair.step);
-    return kernels::expired(pair.point_expiry, t.survivors, groups, soon, t.rows);
-  }
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < groups; ++k)
-    for (std::size_t i = 0; i < kGroupRows; ++i)
-      t.rows[count++] = static_cast<std::uint32_t>(kGroupRows * t.survivors[k] + i);
-  // Only the last group may have fewer.
-  return count > 0 ? std::min(count, count + shell.points - 1 - t.rows[count - 1]) : 0;
-}
-
-// What t.distance, of `count` rows, says of when these and their groups may touch.
-void note_distances(const Pair& pair, const TraverseScratch& t, const Search& search,
-                    std::size_t groups, std::size_t count, float now) {
-  const auto expiry = [&](float distance) {
-    return expiry_of(now, kernels::cull_clearance(distance - search.margin, search.wide));
-  };
-  if (pair.point_expiry) {
-    kernels::note_expiry(t.rows, t.distance, count, search.margin, search.wide, now, kSlack,
-                         pair.point_expiry);
-    return kernels::least_of_blocks(pair.point_expiry, t.survivors, groups, pair.group_expiry);
-  }
-  for (std::size_t k = 0; k < groups; ++k) {
-    const float *const first = t.distance + kGroupRows * k, *const end = t.distance + count;
-    pair.group_expiry[t.survivors[k]] =
-        expiry(*std::min_element(first, std::min(first + kGroupRows, end)));
-  }
 }
 
 // Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
@@ -323,22 +272,18 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   std::size_t groups = count;
   if (pair.cull_groups.worth(count)) {
     groups = search.cull(shell.groups, t.frontier, count, t.survivors, t.clearance);
-    // Survivors have expired, and stay so.
-    for (std::size_t k = 0; k < count; ++k) {
-      const float expiry = expiry_of(now, t.clearance[k]);
-      if (!(expiry > now)) continue;
-      forget_points(pair, shell, t.frontier[k]);
-      pair.group_expiry[t.frontier[k]] = expiry;
-    }
+    for (std::size_t k = 0; k < count; ++k)
+      pair.group_expiry[t.frontier[k]] = expiry_of(now, t.clearance[k]);
     pair.cull_groups.learn(count, groups);
   } else {
     std::copy_n(t.frontier, count, t.survivors);
   }
-  if (search.cold)  // and what their contacts will be made of
+  // Each group waits for memory by itself otherwise.
+  for (std::size_t k = 0; k < groups; ++k)
+    for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
+      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+  if (search.cold)  // what their contacts will be made of
     for (std::size_t k = 0; k < groups; ++k) {
-      if (pair.point_expiry) __builtin_prefetch(pair.point_expiry + kGroupRows * t.survivors[k]);
-      for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
-        __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
       for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
         __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
       __builtin_prefetch(shell.point.data + kGroupRows * t.survivors[k]);
@@ -349,15 +294,16 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     return touch_coarsely(s, pair, t, search, blocks, used);
   }
   const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
-  const std::size_t rows = rows_to_sample(pair, t, shell, groups, now);
-  const std::size_t found = touch(s, t, search, rows, used, alone);
-  pair.sampled = (rows + kGroupRows - 1) / kGroupRows;
-  learn_sampling(s, pair.sampled, groups, found, since);
+  const std::size_t found = touch(s, t, search, groups, used, alone);
+  learn_sampling(s, groups, groups, found, since);
   if (must_be_coarser(s, number, used, found, blocks)) {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
     return touch_coarsely(s, pair, t, search, blocks, used);
   }
-  note_distances(pair, t, search, groups, rows, now);
+  pair.sampled = groups;
+  for (std::size_t k = 0; k < groups; ++k)
+    pair.group_expiry[t.survivors[k]] =
+        expiry_of(now, kernels::cull_clearance(t.clearance[k] - margin, search.wide));
   kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
   return found;
 }

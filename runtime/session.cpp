@@ -156,18 +156,14 @@ std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>&
   return islands;
 }
 
-// Of pairs with many points together: 64 MB. Those past them look at whole groups.
-constexpr std::size_t kMostPointExpiries = 16 << 20;
-
 struct Sizes {
   std::size_t bodies, pairs, hands;
   std::size_t groups, blocks;  // of the largest shell, and (all) of all pairs together
   std::size_t all_groups, all_blocks;
-  std::size_t all_points = 0;  // of pairs that remember when each may touch
-  std::size_t shells = 0;      // bodies that are the shell of a pair
-  bool shares = false;         // pairs between two threads
-  bool lanes = false;          // shell bodies between two threads
-  std::vector<bool> touches;   // (bodies) the body is the shell of a pair
+  std::size_t shells = 0;     // bodies that are the shell of a pair
+  bool shares = false;        // pairs between two threads
+  bool lanes = false;         // shell bodies between two threads
+  std::vector<bool> touches;  // (bodies) the body is the shell of a pair
 };
 
 // Called twice: with an empty arena to count, then to take.
@@ -190,15 +186,12 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
     t.survivors = arena.take<std::uint32_t>(n.groups);
     t.open_blocks = arena.take<std::uint32_t>(n.blocks);
     t.clearance = arena.take<float>(n.groups);
-    t.rows = arena.take<std::uint32_t>(kGroupRows * n.groups);
-    t.distance = arena.take<float>(kGroupRows * n.groups);
     t.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
     for (float** column : {&t.candidate_distance, &t.gradient_x, &t.gradient_y, &t.gradient_z})
       *column = arena.take<float>(s.candidate_capacity);
   }
   s.group_expiry = arena.take<float>(n.all_groups);
   s.block_expiry = arena.take<float>(n.all_blocks);
-  s.point_expiry = arena.take<float>(n.all_points);
   s.scratch_depth = arena.take<float>(s.candidate_capacity);
   const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
   s.cluster_order = arena.take<std::uint32_t>(merged);
@@ -218,26 +211,13 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const std::vector<h6PairDef> pairs = pairs_of(def);
-  Sizes n{def.body_count,
-          pairs.size(),
-          def.hand_count,
-          16,
-          16,
-          0,
-          0,
-          0,
-          0,
-          false,
-          false,
+  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0, 0, false, false,
           std::vector<bool>(def.body_count)};
   for (const h6PairDef& p : pairs) {
     const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
     n.groups = std::max(n.groups, 16 * shell.blocks.count);
     n.blocks = std::max(n.blocks, shell.blocks.x.count);
     n.all_groups += 16 * shell.blocks.count;
-    if (const std::size_t rows = kBlockRows * shell.blocks.count;
-        n.all_points + rows <= kMostPointExpiries)
-      n.all_points += rows;
     n.all_blocks += shell.blocks.x.count;
     n.shares = n.shares || (def.threads > 1 && n.touches[p.shell_body]);
     n.shells += !n.touches[p.shell_body];
@@ -264,7 +244,6 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   for (std::size_t i = 0; i < n.bodies; ++i) set_body(s, i, def.bodies[i], pairs);
   s.pair_count = n.pairs;
   float *group_expiry = s.group_expiry, *block_expiry = s.block_expiry;
-  std::size_t points = 0;
   for (std::size_t i = 0; i < n.pairs; ++i) {
     new (&s.pairs[i]) Pair();
     s.pairs[i].a = pairs[i].shell_body;
@@ -272,11 +251,6 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
     s.pairs[i].group_expiry = group_expiry;
     s.pairs[i].block_expiry = block_expiry;
     const Shell& shell = s.model->shells[s.bodies[s.pairs[i].a].shell];
-    if (const std::size_t rows = kBlockRows * shell.blocks.count;
-        points + rows <= kMostPointExpiries) {
-      s.pairs[i].point_expiry = s.point_expiry + points;
-      points += rows;
-    }
     group_expiry += 16 * shell.blocks.count;
     block_expiry += shell.blocks.x.count;
     if (i == 0 || pairs[i - 1].shell_body != pairs[i].shell_body)

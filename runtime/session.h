@@ -57,8 +57,6 @@ struct TraverseScratch {
   std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's groups)
   std::uint32_t* open_blocks = nullptr;                     // (largest shell's blocks)
   float* clearance = nullptr;                               // (largest shell's groups) [voxel]
-  std::uint32_t* rows = nullptr;                            // (its points, in whole groups)
-  float* distance = nullptr;                                // (likewise) [voxel]
   std::uint32_t* candidate = nullptr;                       // (candidate_capacity) shell's rows
   float* candidate_distance = nullptr;                      // [voxel]
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
@@ -91,10 +89,8 @@ struct Pair {
   // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch
   // before `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
   float *group_expiry = nullptr, *block_expiry = nullptr;
-  float* point_expiry = nullptr;  // of each point of a known group; null: no memory was spent
   double travelled = -1;         // < 0: nothing is known
-  double step = 0;               // what was added to it last [voxel]
-  std::size_t sampled = 0;       // times sixteen points, when it was last traversed
+  std::size_t sampled = 0;       // groups, when it was last traversed
   std::size_t open_blocks = 0, open_groups = 0;  // near, when groups were last looked at
   CullBypass cull_blocks, cull_groups;
   int found_by = 0;              // whose scratch holds its candidates
@@ -178,7 +174,6 @@ struct h6Session {
   // several pairs; whoever finds them, candidates end up in the first.
   h6::TraverseScratch traversal[2];
   float *group_expiry = nullptr, *block_expiry = nullptr;   // of all pairs
-  float* point_expiry = nullptr;                            // of the pairs that have them
   float* scratch_depth = nullptr;                           // to find the deepest
   std::size_t candidate_capacity = 0;
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)

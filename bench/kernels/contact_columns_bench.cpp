@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/kernels/field_bench.h"
-#include "kernels/touch_points.h"
+#include "kernels/touch_groups.h"
 
 namespace {
 
@@ -40,30 +40,30 @@ Columns directions(std::size_t vectors, std::size_t rows) {
 // Points about a ball: half of them touch.
 struct Touch {
   ShellPoints points;
-  std::vector<std::uint32_t> rows, row;
+  std::vector<std::uint32_t> groups, row;
   Columns out, want;  // distance and gradient
-  std::vector<float> distance;
+  std::vector<float> least;
   std::size_t count = 0, want_count = 0;
 
   explicit Touch(std::size_t n)
-      : points(n, 2), row(n), out(columns(4, n)), want(columns(4, n)), distance(n) {
-    for (std::uint32_t i = 0; i < n; ++i) rows.push_back(i);
-    want_count = run(touch_points_ref, want);
+      : points(n, 2), row(n), out(columns(4, n)), want(columns(4, n)), least(n / kGroup) {
+    for (std::uint32_t g = 0; g < n / kGroup; ++g) groups.push_back(g);
+    want_count = run(touch_groups_ref, want);
   }
   template <class Kernel>
   std::size_t run(const Kernel& kernel, Columns& to) {
     return kernel(ball_field().view(), test::kIdentity,
                   PointsView{points.x.data(), points.y.data(), points.z.data(), points.x.size()},
-                  rows.data(), rows.size(), 0.0f, false,
+                  groups.data(), groups.size(), 0.0f, false,
                   Touching{row.data(), to[0].data(), to[1].data(), to[2].data(), to[3].data()},
-                  distance.data());
+                  least.data());
   }
 };
 
 Case touch(std::size_t n) {
   auto t = std::make_shared<Touch>(n);
-  return {[=] { t->count = t->run(touch_points, t->out); },
-          [=] { t->count = t->run(touch_points_ref, t->out); },
+  return {[=] { t->count = t->run(touch_groups, t->out); },
+          [=] { t->count = t->run(touch_groups_ref, t->out); },
           [=] { return t->count == t->want_count && near(t->out, t->want, t->count, 1e-3f); }};
 }
 
@@ -122,7 +122,7 @@ Case torque(std::size_t n) {
 const bool registered = [] {
   for (std::size_t n : {1024, 10000}) {
     const std::string size = "/n:" + std::to_string(n);
-    add("kernels/touch_points" + size, n, [=] { return touch(n / kGroup * kGroup); });
+    add("kernels/touch_groups" + size, n, [=] { return touch(n / kGroup * kGroup); });
     add("kernels/make_contacts" + size, n, [=] { return make(n); });
     add("kernels/torque_directions" + size, n, [=] { return torque(n); });
   }

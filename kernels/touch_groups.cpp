@@ -1,10 +1,10 @@
-// touch_points.cpp - the SIMD twin of touch_points_ref.cpp.
-#include "kernels/touch_points.h"
+// touch_groups.cpp - the SIMD twin of touch_groups_ref.cpp.
+#include "kernels/touch_groups.h"
 
 #include <hwy/cache_control.h>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "kernels/touch_points.cpp"
+#define HWY_TARGET_INCLUDE "kernels/touch_groups.cpp"
 #include "kernels/simd.h"
 // After simd.h.
 #include "hwy/foreach_target.h"
@@ -15,11 +15,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-// Sixteen points at a time go through three steps, some of these apart, so that none waits for the
-// one before: where they are in the table; where in the bricks; their samples. After a pause each
-// step asks for the memory of the next one too.
+// Groups go through three steps, some groups apart, so that none waits for the one before: where
+// they are in the table; where in the bricks; their samples. After a pause each step asks for the
+// memory of the next one too.
 //
-//     batch  k + ahead: locate   k + ahead / 2: look_up   k: sample
+//     group  k + ahead: locate   k + ahead / 2: look_up   k: sample
 constexpr std::size_t kRing = 16;
 constexpr std::size_t kAhead = 4;  // with what is read in the caches; kRing where it is not
 
@@ -27,47 +27,32 @@ struct Ring {
   HWY_ALIGN std::int32_t slot[kRing][kGroup];  // of the table, then bytes among the bricks
   HWY_ALIGN std::int32_t node[kRing][kGroup];
   HWY_ALIGN float fraction[3][kRing][kGroup];
-  bool plain[kRing];  // all in bricks: other batches are sampled anew
+  bool plain[kRing];  // all in bricks: other groups are sampled anew
 };
-
-struct Vec3F {
-  VF v[3];
-};
-
-// Where a vector of rows is in the field. `in_a_row`: they follow each other.
-HWY_INLINE Vec3F places_of(const PointsView& points, const Affine& to_field,
-                           const std::int32_t* rows, bool in_a_row) {
-  const DF d;
-  const float* const columns[3] = {points.x, points.y, points.z};
-  Vec3F p, q;
-  HWY_UNROLL(3)
-  for (int a = 0; a < 3; ++a)
-    p.v[a] = in_a_row ? hn::LoadU(d, columns[a] + rows[0])
-                      : hn::BitCast(d, gather_entries(columns[a], rows));
-  HWY_UNROLL(3)
-  for (int a = 0; a < 3; ++a) q.v[a] = affine_row(to_field.m[a], p.v[0], p.v[1], p.v[2]);
-  return q;
-}
 
 HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const PointsView& points,
-                       const std::int32_t* rows, bool in_a_row, std::size_t k, bool cold,
-                       Ring& ring) {
+                       std::size_t group, std::size_t k, bool cold, Ring& ring) {
   const DF d;
   const DI di;
-  bool plain = true;
+  const VF zero = hn::Zero(d);
+  bool plain = kGroup * (group + 1) <= points.count;
   for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
-    const Vec3F q = places_of(points, to_field, rows + i, in_a_row);
+    const std::size_t row = kGroup * group + i;
+    const VF px = hn::LoadU(d, points.x + row), py = hn::LoadU(d, points.y + row);
+    const VF pz = hn::LoadU(d, points.z + row);
+    VF q[3];
     auto inside = hn::FirstN(d, hn::Lanes(d));
     HWY_UNROLL(3)
     for (int a = 0; a < 3; ++a) {
+      q[a] = affine_row(to_field.m[a], px, py, pz);
       const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
-      inside = hn::And(inside, hn::And(hn::Ge(q.v[a], hn::Zero(d)), hn::Le(q.v[a], last)));
+      inside = hn::And(inside, hn::And(hn::Ge(q[a], zero), hn::Le(q[a], last)));
     }
     plain = plain && hn::AllTrue(d, inside);
     Axis axis[3];
     HWY_UNROLL(3)
     for (int a = 0; a < 3; ++a) {
-      axis[a] = split_axis(hn::IfThenElseZero(inside, q.v[a]), field.size[a]);
+      axis[a] = split_axis(hn::IfThenElseZero(inside, q[a]), field.size[a]);
       hn::Store(axis[a].fraction, d, ring.fraction[a][k] + i);
     }
     const Cell cell = cell_of(field, axis[0], axis[1], axis[2]);
@@ -118,55 +103,53 @@ HWY_INLINE Samples sample_plain(const FieldView& field, const Ring& ring, std::s
 }
 
 Samples sample_anew(const FieldView& field, const Affine& to_field, const PointsView& points,
-                    const std::int32_t* rows) {
-  const Vec3F q = places_of(points, to_field, rows, false);
+                    std::size_t row) {
+  const DF d;
+  const VF px = hn::LoadU(d, points.x + row), py = hn::LoadU(d, points.y + row);
+  const VF pz = hn::LoadU(d, points.z + row);
   Samples s;
-  sample_points<true>(field, q.v[0], q.v[1], q.v[2], s.distance, s.gx, s.gy, s.gz);
+  sample_points<true>(field, affine_row(to_field.m[0], px, py, pz),
+                      affine_row(to_field.m[1], px, py, pz), affine_row(to_field.m[2], px, py, pz),
+                      s.distance, s.gx, s.gy, s.gz);
+  if (row + hn::Lanes(d) > points.count) {
+    const std::size_t live = row < points.count ? points.count - row : 0;
+    s.distance = hn::IfThenElse(hn::FirstN(d, live), s.distance, hn::Set(d, __builtin_huge_valf()));
+  }
   return s;
 }
 
-std::size_t touch_points_simd(const FieldView& field, const Affine& to_field,
-                              const PointsView& points, const std::uint32_t* rows,
+std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
+                              const PointsView& points, const std::uint32_t* groups,
                               std::size_t count, float limit, bool cold, const Touching& out,
-                              float* distance) {
+                              float* least) {
   const DF d;
   const DI di;
-  static_assert(hn::MaxLanes(DF()) <= kGroup, "a vector is part of a batch");
+  static_assert(hn::MaxLanes(DF()) <= kGroup, "a vector is part of a group");
   const std::size_t ahead = cold ? kRing : kAhead, half = ahead / 2;
-  const std::size_t whole = count / kGroup, batches = (count + kGroup - 1) / kGroup;
-  // The last batch is filled up with its last row.
-  std::int32_t tail[kGroup];
-  for (std::size_t i = 0; whole < batches && i < kGroup; ++i)
-    tail[i] = static_cast<std::int32_t>(rows[HWY_MIN(kGroup * whole + i, count - 1)]);
-  const auto batch = [&](std::size_t k) {
-    return k < whole ? reinterpret_cast<const std::int32_t*>(rows) + kGroup * k : tail;
-  };
+  const VI iota = hn::Iota(di, 0);
   std::size_t written = 0;
   Ring ring;
   const auto locate_at = [&](std::size_t k) HWY_ATTR {
-    if (k >= batches) return;
-    const std::int32_t* const row = batch(k);
-    const bool in_a_row = k < whole && row[kGroup - 1] - row[0] == kGroup - 1;
-    locate(field, to_field, points, row, in_a_row, k % kRing, cold, ring);
+    if (k < count) locate(field, to_field, points, groups[k], k % kRing, cold, ring);
   };
   const auto look_up_at = [&](std::size_t k) HWY_ATTR {
-    if (k < batches) look_up(field, k % kRing, cold, ring);
+    if (k < count) look_up(field, k % kRing, cold, ring);
   };
   for (std::size_t k = 0; k < ahead; ++k) locate_at(k);
   for (std::size_t k = 0; k < half; ++k) look_up_at(k);
-  for (std::size_t k = 0; k < batches; ++k) {
+  for (std::size_t k = 0; k < count; ++k) {
     look_up_at(k + half);
-    const std::int32_t* const row = batch(k);
+    VF smallest = hn::Set(d, __builtin_huge_valf());
     for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
-      if (kGroup * k + i >= count) break;
-      const std::size_t live = count - kGroup * k - i;
+      const std::size_t row = kGroup * groups[k] + i;
       const Samples s = HWY_LIKELY(ring.plain[k % kRing])
                             ? sample_plain(field, ring, k % kRing, i)
-                            : sample_anew(field, to_field, points, row + i);
-      store_n(s.distance, d, distance + kGroup * k + i, live);
+                            : sample_anew(field, to_field, points, row);
+      smallest = hn::Min(smallest, s.distance);
       // Whole vectors are written, whatever touches: a branch would be guessed wrong too often.
-      const auto touching = hn::And(hn::FirstN(d, live), hn::Lt(s.distance, hn::Set(d, limit)));
-      hn::StoreU(hn::Compress(hn::LoadU(di, row + i), hn::RebindMask(di, touching)), di,
+      const auto touching = hn::Lt(s.distance, hn::Set(d, limit));
+      const VI id = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(row)));
+      hn::StoreU(hn::Compress(id, hn::RebindMask(di, touching)), di,
                  reinterpret_cast<std::int32_t*>(out.row + written));
       hn::StoreU(hn::Compress(s.distance, touching), d, out.distance + written);
       hn::StoreU(hn::Compress(s.gx, touching), d, out.gx + written);
@@ -174,22 +157,10 @@ std::size_t touch_points_simd(const FieldView& field, const Affine& to_field,
       hn::StoreU(hn::Compress(s.gz, touching), d, out.gz + written);
       written += hn::CountTrue(d, touching);
     }
+    least[k] = hn::GetLane(hn::MinOfLanes(d, smallest));
     locate_at(k + ahead);
   }
   return written;
-}
-
-void note_expiry_simd(const std::uint32_t* rows, const float* distance, std::size_t count,
-                      float margin, bool wide, float now, float slack, float* expiry) {
-  const DF d;
-  HWY_ALIGN float until[hn::MaxLanes(d)];
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const std::size_t live = HWY_MIN(count - i, hn::Lanes(d));
-    const VF left = clearance_of(hn::Sub(load_n(d, distance + i, live), hn::Set(d, margin)), wide);
-    const VF wait = hn::Max(hn::Sub(left, hn::Set(d, slack)), hn::Zero(d));
-    hn::Store(hn::Add(hn::Set(d, now), wait), d, until);
-    for (std::size_t k = 0; k < live; ++k) expiry[rows[i + k]] = until[k];
-  }
 }
 
 HWY_INLINE VF rotated(const float* R, VF x, VF y, VF z) {
@@ -271,20 +242,14 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace h6::kernels {
 
-HWY_EXPORT(touch_points_simd);
-HWY_EXPORT(note_expiry_simd);
+HWY_EXPORT(touch_groups_simd);
 HWY_EXPORT(make_contacts_simd);
 
-std::size_t touch_points(const FieldView& field, const Affine& to_field, const PointsView& points,
-                         const std::uint32_t* rows, std::size_t count, float limit, bool cold,
-                         const Touching& out, float* distance) {
-  return HWY_DYNAMIC_DISPATCH(touch_points_simd)(field, to_field, points, rows, count, limit, cold,
-                                                 out, distance);
-}
-
-void note_expiry(const std::uint32_t* rows, const float* distance, std::size_t count, float margin,
-                 bool wide, float now, float slack, float* expiry) {
-  HWY_DYNAMIC_DISPATCH(note_expiry_simd)(rows, distance, count, margin, wide, now, slack, expiry);
+std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
+                         const std::uint32_t* groups, std::size_t count, float limit, bool cold,
+                         const Touching& out, float* least) {
+  return HWY_DYNAMIC_DISPATCH(touch_groups_simd)(field, to_field, points, groups, count, limit,
+                                                 cold, out, least);
 }
 
 void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,

@@ -1,33 +1,34 @@
-// touch_points_ref.cpp - the specification of touch_points.h.
+// touch_groups_ref.cpp - the specification of touch_groups and make_contacts.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include "kernels/cull_spheres.h"
 #include "kernels/sample_field.h"
-#include "kernels/touch_points.h"
+#include "kernels/touch_groups.h"
 
 namespace h6::kernels {
 
-std::size_t touch_points_ref(const FieldView& field, const Affine& to_field,
-                             const PointsView& points, const std::uint32_t* rows, std::size_t count,
-                             float limit, bool, const Touching& out, float* distance) {
+std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
+                             const PointsView& points, const std::uint32_t* groups,
+                             std::size_t count, float limit, bool, const Touching& out,
+                             float* least) {
   std::size_t written = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    float gx, gy, gz;
-    sample_field_ref(field, to_field, points, rows + i, 1, distance + i, &gx, &gy, &gz);
-    if (!(distance[i] < limit)) continue;
-    out.row[written] = rows[i];
-    out.distance[written] = distance[i];
-    out.gx[written] = gx, out.gy[written] = gy, out.gz[written] = gz;
-    ++written;
+  for (std::size_t k = 0; k < count; ++k) {
+    least[k] = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      const auto row = static_cast<std::uint32_t>(kGroup * groups[k] + i);
+      if (row >= points.count) continue;
+      float d, gx, gy, gz;
+      sample_field_ref(field, to_field, points, &row, 1, &d, &gx, &gy, &gz);
+      least[k] = std::min(least[k], d);
+      if (!(d < limit)) continue;
+      out.row[written] = row;
+      out.distance[written] = d;
+      out.gx[written] = gx, out.gy[written] = gy, out.gz[written] = gz;
+      ++written;
+    }
   }
   return written;
-}
-
-void note_expiry_ref(const std::uint32_t* rows, const float* distance, std::size_t count,
-                     float margin, bool wide, float now, float slack, float* expiry) {
-  for (std::size_t i = 0; i < count; ++i)
-    expiry[rows[i]] = now + std::max(cull_clearance(distance[i] - margin, wide) - slack, 0.0f);
 }
 
 void make_contacts_ref(const ShellColumns& shell, const Touching& rows, std::size_t count,

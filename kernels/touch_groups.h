@@ -1,0 +1,50 @@
+// touch_groups.h - which points of groups of 16 touch a field, and their contacts.
+#pragma once
+#include "kernels/views.h"
+
+namespace h6::kernels {
+
+inline constexpr std::size_t kGroup = 16;  // points that stand next to each other
+
+// Points that touch: rows of the shell, distance and gradient as sample_field gives them [voxel].
+struct Touching {
+  std::uint32_t* row;
+  float *distance, *gx, *gy, *gz;
+};
+
+// Samples points 16 g .. 16 g + 15 of every group g = groups[0..count-1] and writes those with a
+// distance below `limit`, in order; returns how many. Columns of `points` are readable to whole
+// groups; rows from points.count on are none. `out` has room for 16 count rows. least[k] is the
+// smallest distance in groups[k]. `cold`: the field is not in the caches, so memory is asked for
+// some groups before they are sampled; the result is the same.
+std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
+                         const std::uint32_t* groups, std::size_t count, float limit, bool cold,
+                         const Touching& out, float* least);
+std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
+                             const PointsView& points, const std::uint32_t* groups,
+                             std::size_t count, float limit, bool cold, const Touching& out,
+                             float* least);
+
+// Contacts from rows that touch: columns of the engine, in the world frame and metres.
+struct ContactFrame {
+  float Ra[9], Rb[9];  // rotations of the shell's and the field's body, row major
+  float arm[3];        // of the shell's centre from the centre of mass  [m]
+  float voxel;         // [m]
+};
+struct ShellColumns {
+  const float *x, *y, *z, *nx, *ny, *nz;
+  const std::uint32_t* point;
+};
+struct MadeContacts {
+  float *depth, *nx, *ny, *nz, *gx, *gy, *gz, *rx, *ry, *rz;
+  std::uint32_t* point;
+};
+// depth = -voxel distance, n = Ra n, g = Rb gradient / |gradient| (n where that vanishes, on a
+// medial sheet), r = Ra p + arm, for rows 0..count-1. Columns of the shell are readable to whole
+// groups of 16. Fast where rows of a group follow each other, as touch_groups writes them.
+void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,
+                   const ContactFrame& frame, const MadeContacts& out);
+void make_contacts_ref(const ShellColumns& shell, const Touching& rows, std::size_t count,
+                       const ContactFrame& frame, const MadeContacts& out);
+
+}  // namespace h6::kernels
