@@ -332,7 +332,7 @@ TEST_CASE("one thread and two give the same bits, frame by frame") {
     mode.set(one);
     mode.set(two);
     CAPTURE(std::string(mode.name));
-    check_same_bits(one, two, kFrames, 100);
+    check_same_bits(one, two, std::max(kFrames, 40), 100);  // some modes take longer to get there
   }
 }
 
