@@ -165,7 +165,7 @@ TEST_CASE("bake_field's fields agree with their meshes: closed, overlapping, ope
     CHECK(c.far > 3000);
     CHECK(c.far_wrong == 0);
     CHECK(c.worst_deep < 2.5);
-    CHECK(c.corner_gap < 0.1);
+    CHECK(c.corner_gap < 0.3);
   }
   // With a hole it drains: every distance is right, and the votes tell the side that was lost.
   Mesh open = torus(1.0, 0.4);
