@@ -94,8 +94,7 @@ struct EightCorners {
   float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
 };
 
-// How far eight triangles reach along an axis. In steps of eight, which a compiler makes vectors
-// of.
+// How far eight triangles reach along an axis: in steps of eight, of which compilers make vectors.
 void reach_along(const EightCorners& t, const std::array<float, 3>& n, float& low, float& high) {
   float least[8], most[8];
   for (std::size_t i = 0; i < 8; ++i) {

@@ -64,7 +64,7 @@ struct NearestFound {
   float above;          // certainly not less than the square of the distance to that triangle
 };
 // Looks for a triangle nearer than found->squared says, first in `starts` leaves, start[i]; one
-// that is not above `enough` will do.
+// whose square is not above `enough` will do.
 void nearest_search(const NearestTree& tree, const float p[3], const std::uint32_t* start,
                     std::size_t starts, float enough, NearestFound* found);
 // All triangles, one after the other.

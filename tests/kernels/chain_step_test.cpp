@@ -1,28 +1,18 @@
 // Chains of nodes: SIMD against the reference, and against the straight line.
 #include <doctest/doctest.h>
 
-#include <hwy/targets.h>
-
 #include <cmath>
 #include <cstdint>
 #include <random>
 #include <vector>
 
 #include "kernels/chain_step.h"
+#include "tests/kernels/kernel_test.h"
 
 using namespace h6::kernels;
+using h6::kernels::test::on_every_target;
 
 namespace {
-
-template <class F>
-void on_every_target(F&& check) {
-  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    INFO("target " << hwy::TargetName(target));
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
 
 // A brick and the nodes around it, at some strides.
 struct Room {
@@ -39,7 +29,7 @@ struct Room {
 }  // namespace
 
 TEST_CASE("chain_step: every target says what the reference says, in place and apart") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     std::mt19937_64 random(3);
     for (int i = 0; i < 60; ++i) {
       Room room(10 + std::size_t(i) % 7, 200 + std::size_t(i) % 5);
@@ -78,7 +68,7 @@ TEST_CASE("chain_step: it tells when nothing changes any more") {
 }
 
 TEST_CASE("chain_seeds: every target says what the reference says, never less than the truth") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     std::mt19937_64 random(4);
     for (int i = 0; i < 60; ++i) {
       const ChainSeeds seeds{0.9f, i % 2 == 1, i % 3 == 0 ? 1 : 8, i % 5 == 0 ? 1 : 8};
@@ -105,7 +95,7 @@ TEST_CASE("chain_seeds: every target says what the reference says, never less th
 }
 
 TEST_CASE("chain_nearest: every target says what the reference says, the first of equals") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     std::mt19937_64 random(6);
     std::size_t found = 0;
     for (int i = 0; i < 60; ++i) {
@@ -125,7 +115,7 @@ TEST_CASE("chain_nearest: every target says what the reference says, the first o
 }
 
 TEST_CASE("chain_sides: every target says what the reference says, on the limits too") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     std::mt19937_64 random(5);
     const ChainLimits limits{0.875f, 0.15f, 1.135f, 0.25f};
     std::size_t found[3] = {0, 0, 0};

@@ -1,8 +1,6 @@
 // One point against eight boxes and triangles: never more than the truth, and hardly less.
 #include <doctest/doctest.h>
 
-#include <hwy/targets.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,8 +10,10 @@
 
 #include "kernels/nearest_eight.h"
 #include "kernels/triangle_distance.h"
+#include "tests/kernels/kernel_test.h"
 
 using namespace h6::kernels;
+using h6::kernels::test::on_every_target;
 
 namespace {
 
@@ -24,20 +24,10 @@ struct Random {
   }
 };
 
-template <class F>
-void on_every_target(F&& check) {
-  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    INFO("target " << hwy::TargetName(target));
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
-
 }  // namespace
 
 TEST_CASE("eight_boxes: a lower bound, tight to a millionth") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     for (int i = 0; i < 300; ++i) {
       EightBoxes boxes;
@@ -60,7 +50,7 @@ TEST_CASE("eight_boxes: a lower bound, tight to a millionth") {
 }
 
 TEST_CASE("eight_turned_boxes: a lower bound but for rounding along the axes, tight to as much") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     std::size_t wrong = 0;
     for (int i = 0; i < 3000; ++i) {
@@ -97,7 +87,7 @@ TEST_CASE("eight_turned_boxes: a lower bound but for rounding along the axes, ti
 }
 
 TEST_CASE("eight_triangles: a lower bound, tight where triangles are neither huge nor slivers") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     std::size_t too_long = 0, loose = 0, loose_slivers = 0, slivers = 0;
     for (int i = 0; i < 4000; ++i) {
@@ -138,7 +128,7 @@ TEST_CASE("eight_triangles: a lower bound, tight where triangles are neither hug
 }
 
 TEST_CASE("eight_triangles: a lower bound over long triangles, far from their first corner") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     std::size_t too_long = 0, loose = 0, all = 0;
     for (int i = 0; i < 4000; ++i) {
@@ -226,7 +216,7 @@ TEST_CASE("nearest_search: what looking at every triangle finds, from any start,
   tree.level[2] = top.data();
   tree.levels = 3;
   tree.triangles = kTriangles;
-  on_every_target([&] {
+  on_every_target([&](const std::string&) {
     for (int i = 0; i < 300; ++i) {
       const double spread = i % 2 == 0 ? 120.0 : 400.0;
       const float p[3] = {random(-spread, spread), random(-spread, spread),

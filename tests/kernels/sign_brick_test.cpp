@@ -1,28 +1,18 @@
 // Samples of a brick: SIMD against the reference, and what they promise.
 #include <doctest/doctest.h>
 
-#include <hwy/targets.h>
-
 #include <cstdint>
 #include <cstring>
 #include <random>
 #include <vector>
 
 #include "kernels/sign_brick.h"
+#include "tests/kernels/kernel_test.h"
 
 using namespace h6::kernels;
+using h6::kernels::test::on_every_target;
 
 namespace {
-
-template <class F>
-void on_every_target(F&& check) {
-  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    INFO("target " << hwy::TargetName(target));
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
 
 struct Brick {
   std::vector<float> u = std::vector<float>(512);
@@ -42,7 +32,7 @@ constexpr SignLimits kLimits{0.875f, 0.15f, 0.74f, 1.135f, 0.001f};
 }  // namespace
 
 TEST_CASE("sign_brick: every target says what the reference says, in place and apart") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     for (std::uint64_t seed = 0; seed < 60; ++seed) {
       Brick brick(seed);
       const BrickSides sides{brick.reached, brick.in_sight, seed % 3 ? brick.chain.data() : nullptr,

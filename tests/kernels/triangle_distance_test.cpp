@@ -3,8 +3,6 @@
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
-#include <hwy/targets.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -13,8 +11,10 @@
 #include <vector>
 
 #include "kernels/triangle_distance.h"
+#include "tests/kernels/kernel_test.h"
 
 using namespace h6::kernels;
+using h6::kernels::test::on_every_target;
 
 namespace {
 
@@ -48,20 +48,10 @@ double worst_gap(const Triangles& t, float reach) {
   return worst;
 }
 
-template <class F>
-void on_every_target(F&& check) {
-  for (std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    INFO("target " << hwy::TargetName(target));
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
-
 }  // namespace
 
 TEST_CASE("triangle_distance: SIMD agrees with the reference on every target, for every count") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     for (std::size_t count = 0; count <= 67; ++count)
       CHECK(worst_gap(random_triangles(count, 2.0, random), 5.0f) < 2e-5);
@@ -71,7 +61,7 @@ TEST_CASE("triangle_distance: SIMD agrees with the reference on every target, fo
 }
 
 TEST_CASE("triangle_distance: slivers, needles and points count as what is left of them") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     for (double width : {0.0, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2}) {
       Triangles t;
@@ -127,8 +117,9 @@ TEST_CASE("triangle_distance: the winding and the first corner do not matter") {
   }
 }
 
-TEST_CASE("tile_distance: the order of the facets does not change a bit, nor a brick's place much") {
-  on_every_target([] {
+TEST_CASE(
+    "tile_distance: the order of the facets does not change a bit, nor a brick's place much") {
+  on_every_target([](const std::string&) {
     Random random;
     const Triangles t = random_triangles(60, 3.0, random);
     std::vector<DistanceFacet> up(60), down(60);
@@ -160,8 +151,10 @@ TEST_CASE("tile_distance: the order of the facets does not change a bit, nor a b
   });
 }
 
-TEST_CASE("tile_distance: a brick's name is that of the facet nearest to its middle, the least of equals") {
-  on_every_target([] {
+TEST_CASE(
+    "tile_distance: a brick's name is that of the facet nearest to its middle, the least of "
+    "equals") {
+  on_every_target([](const std::string&) {
     Random random;
     constexpr std::size_t kCount = 40;
     Triangles t = random_triangles(kCount, 3.0, random);
@@ -196,7 +189,7 @@ TEST_CASE("tile_distance: a brick's name is that of the facet nearest to its mid
 }
 
 TEST_CASE("bricks_within_reach: never misses a brick that has a node within reach") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     std::size_t named = 0, real = 0;
     for (int i = 0; i < 60; ++i) {
@@ -221,7 +214,7 @@ TEST_CASE("bricks_within_reach: never misses a brick that has a node within reac
 }
 
 TEST_CASE("nodes_above: a bit for each node that is farther, the level itself is not") {
-  on_every_target([] {
+  on_every_target([](const std::string&) {
     Random random;
     std::vector<float> u(kBrickSamples);
     for (std::size_t n = 0; n < u.size(); ++n) u[n] = n % 5 == 0 ? 0.75f : float(random(0, 1.5));
