@@ -19,6 +19,7 @@ std::size_t expired_simd(const float* values, const std::uint32_t* blocks, std::
                          float now, std::uint32_t* out) {
   const DF d;
   const DI di;
+  const auto iota = hn::Iota(di, 0);
   std::size_t written = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t first = kBlock * (blocks != nullptr ? blocks[k] : k);
@@ -26,7 +27,7 @@ std::size_t expired_simd(const float* values, const std::uint32_t* blocks, std::
       const auto gone = hn::Le(hn::LoadU(d, values + i), hn::Set(d, now));
       const std::size_t n = hn::CountTrue(d, gone);
       if (n == 0) continue;
-      const auto index = hn::Iota(di, static_cast<std::int32_t>(i));
+      const auto index = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(i)));
       hn::StoreU(hn::Compress(index, hn::RebindMask(di, gone)), di,
                  reinterpret_cast<std::int32_t*>(out + written));
       written += n;

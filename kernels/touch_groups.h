@@ -12,18 +12,31 @@ struct Touching {
   float *distance, *gx, *gy, *gz;
 };
 
-// Samples points 16 g .. 16 g + 15 of every group g = groups[0..count-1] and writes those with a
-// distance below `limit`, in order; returns how many. Columns of `points` are readable to whole
-// groups; rows from points.count on are none. `out` has room for 16 count rows. least[k] is the
-// smallest distance in groups[k]. `cold`: the field is not in the caches, so memory is asked for
-// some groups before they are sampled; the result is the same.
+// Which points of groups are looked at, and what is learnt of each group.
+struct GroupLook {
+  const std::uint16_t* rows;  // bit i: point i of the group is looked at; null: all are
+  float* least;               // the smallest distance of those looked at, or infinity
+  // Unless `rows` is null, of groups of which all are looked at: bit i of near_rows: point i is
+  // nearer than max(near, kNearLeast least); rest: the smallest distance of the others, or infinity.
+  std::uint16_t* near_rows;
+  float* rest;
+  float near;  // [voxel]
+};
+inline constexpr std::uint16_t kAllRows = 0xffff;
+inline constexpr float kNearLeast = 3;
+
+// Samples points of groups g = groups[0..count-1], which are 16 g .. 16 g + 15, and writes those
+// with a distance below `limit`, in order; returns how many. Columns of `points` are readable to
+// whole groups; rows from points.count on are none. `out` has room for 16 count rows, columns of
+// `look` for count. `cold`: the field is not in the caches, so memory is asked for some groups
+// before they are sampled; the result is the same.
 std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
                          const std::uint32_t* groups, std::size_t count, float limit, bool cold,
-                         const Touching& out, float* least);
+                         const GroupLook& look, const Touching& out);
 std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
                              const PointsView& points, const std::uint32_t* groups,
-                             std::size_t count, float limit, bool cold, const Touching& out,
-                             float* least);
+                             std::size_t count, float limit, bool cold, const GroupLook& look,
+                             const Touching& out);
 
 // Contacts from rows that touch: columns of the engine, in the world frame and metres.
 struct ContactFrame {

@@ -10,23 +10,35 @@ namespace h6::kernels {
 
 std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
                              const PointsView& points, const std::uint32_t* groups,
-                             std::size_t count, float limit, bool, const Touching& out,
-                             float* least) {
+                             std::size_t count, float limit, bool, const GroupLook& look,
+                             const Touching& out) {
+  constexpr float kNone = std::numeric_limits<float>::infinity();
   std::size_t written = 0;
   for (std::size_t k = 0; k < count; ++k) {
-    least[k] = std::numeric_limits<float>::infinity();
+    const unsigned rows = look.rows ? look.rows[k] : kAllRows;
+    float distance[kGroup], least = kNone;
     for (std::size_t i = 0; i < kGroup; ++i) {
+      distance[i] = kNone;
       const auto row = static_cast<std::uint32_t>(kGroup * groups[k] + i);
-      if (row >= points.count) continue;
-      float d, gx, gy, gz;
-      sample_field_ref(field, to_field, points, &row, 1, &d, &gx, &gy, &gz);
-      least[k] = std::min(least[k], d);
-      if (!(d < limit)) continue;
+      if (row >= points.count || !(rows >> i & 1u)) continue;
+      float gx, gy, gz;
+      sample_field_ref(field, to_field, points, &row, 1, &distance[i], &gx, &gy, &gz);
+      least = std::min(least, distance[i]);
+      if (!(distance[i] < limit)) continue;
       out.row[written] = row;
-      out.distance[written] = d;
+      out.distance[written] = distance[i];
       out.gx[written] = gx, out.gy[written] = gy, out.gz[written] = gz;
       ++written;
     }
+    look.least[k] = least;
+    if (!look.rows || rows != kAllRows) continue;
+    look.near_rows[k] = 0;
+    look.rest[k] = kNone;
+    for (std::size_t i = 0; i < kGroup; ++i)
+      if (distance[i] < std::max(look.near, kNearLeast * least))
+        look.near_rows[k] = static_cast<std::uint16_t>(look.near_rows[k] | 1u << i);
+      else
+        look.rest[k] = std::min(look.rest[k], distance[i]);
   }
   return written;
 }

@@ -184,14 +184,21 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
     TraverseScratch& t = s.traversal[i];
     t.frontier = arena.take<std::uint32_t>(n.groups);
     t.survivors = arena.take<std::uint32_t>(n.groups);
+    t.far = arena.take<std::uint32_t>(n.groups);
+    t.far_survivors = arena.take<std::uint32_t>(n.groups);
     t.open_blocks = arena.take<std::uint32_t>(n.blocks);
     t.clearance = arena.take<float>(n.groups);
+    t.rest = arena.take<float>(n.groups);
+    t.rows = arena.take<std::uint16_t>(n.groups);
+    t.near_rows = arena.take<std::uint16_t>(n.groups);
     t.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
     for (float** column : {&t.candidate_distance, &t.gradient_x, &t.gradient_y, &t.gradient_z})
       *column = arena.take<float>(s.candidate_capacity);
   }
   s.group_expiry = arena.take<float>(n.all_groups);
   s.block_expiry = arena.take<float>(n.all_blocks);
+  s.rest_expiry = arena.take<float>(n.all_groups);
+  s.near_rows = arena.take<std::uint16_t>(n.all_groups);
   s.scratch_depth = arena.take<float>(s.candidate_capacity);
   const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
   s.cluster_order = arena.take<std::uint32_t>(merged);
@@ -211,7 +218,16 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const std::vector<h6PairDef> pairs = pairs_of(def);
-  Sizes n{def.body_count, pairs.size(), def.hand_count, 16, 16, 0, 0, 0, false, false,
+  Sizes n{def.body_count,
+          pairs.size(),
+          def.hand_count,
+          16,
+          16,
+          0,
+          0,
+          0,
+          false,
+          false,
           std::vector<bool>(def.body_count)};
   for (const h6PairDef& p : pairs) {
     const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
@@ -250,6 +266,8 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
     s.pairs[i].b = pairs[i].field_body;
     s.pairs[i].group_expiry = group_expiry;
     s.pairs[i].block_expiry = block_expiry;
+    s.pairs[i].rest_expiry = s.rest_expiry + (group_expiry - s.group_expiry);
+    s.pairs[i].near_rows = s.near_rows + (group_expiry - s.group_expiry);
     const Shell& shell = s.model->shells[s.bodies[s.pairs[i].a].shell];
     group_expiry += 16 * shell.blocks.count;
     block_expiry += shell.blocks.x.count;

@@ -44,19 +44,22 @@ struct Body : RigidState {
   Vec6 f = Vec6::Zero();
   Mat6 K = Mat6::Zero(), D = Mat6::Zero();
 
-  double traverse_ns = 0;  // what the pairs of this body's shell took last
+  double traverse_ns = 0;     // what the pairs of this body's shell took last
   bool pairs_shared = false;  // between the threads, then
   double shell_ns = 0;        // what traversal, contacts and weights of its shell took last
 
-  double series_y[6] = {};  // `series`: the spring's extension in the last frame, a warm start
+  double series_y[6] = {};   // `series`: the spring's extension in the last frame, a warm start
   ContactPort contact_port;  // of this body's shell
 };
 
 // What a thread needs to traverse a pair, and the points that it found to touch.
 struct TraverseScratch {
   std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (largest shell's groups)
+  std::uint32_t *far = nullptr, *far_survivors = nullptr;   // (largest shell's groups)
   std::uint32_t* open_blocks = nullptr;                     // (largest shell's blocks)
   float* clearance = nullptr;                               // (largest shell's groups) [voxel]
+  std::uint16_t *rows = nullptr, *near_rows = nullptr;      // (largest shell's groups)
+  float* rest = nullptr;                                    // (largest shell's groups) [voxel]
   std::uint32_t* candidate = nullptr;                       // (candidate_capacity) shell's rows
   float* candidate_distance = nullptr;                      // [voxel]
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;
@@ -64,8 +67,8 @@ struct TraverseScratch {
 };
 
 // Whether a tier of spheres is worth testing: not where most of them survived the last time, until
-// there are many more or it has been left out often enough to ask again. Either way the contacts are
-// the same.
+// there are many more or it has been left out often enough to ask again. Either way the contacts
+// are the same.
 struct CullBypass {
   std::size_t asked = 0;  // spheres, when they were last tested
   int left_out = 0;       // how often it will be
@@ -87,12 +90,18 @@ struct Pair {
   std::size_t begin = 0, end = 0;         // its rows among a's contacts
   std::size_t candidates = 0, first = 0;  // its rows among the candidates
   // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch
-  // before `travelled` has passed the group's expiry; a block's is the least of its groups'. [voxel]
+  // before `travelled` has passed the group's expiry; a block's is the least of its groups'.
+  // [voxel]
   float *group_expiry = nullptr, *block_expiry = nullptr;
-  double travelled = -1;         // < 0: nothing is known
-  std::size_t sampled = 0;       // groups, when it was last traversed
+  // Of a group, bit i: its point i was near when all of them were last looked at. None of the
+  // others can touch before rest_expiry.
+  std::uint16_t* near_rows = nullptr;
+  float* rest_expiry = nullptr;
+  double travelled = -1;                         // < 0: nothing is known
+  std::size_t sampled = 0;                       // groups, when it was last traversed
   std::size_t open_blocks = 0, open_groups = 0;  // near, when groups were last looked at
   CullBypass cull_blocks, cull_groups;
+  CullBypass look_at_rows;  // of points, by themselves
   int found_by = 0;              // whose scratch holds its candidates
   float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
@@ -107,8 +116,8 @@ struct Pair {
   // the net stiffness, as if all fields of the shell body moved alike).
   Vec6 f = Vec6::Zero();
   Mat6 B = Mat6::Zero();
-  Vec6 u = Vec6::Zero();    // a against b at a's centre of mass, before the step
-  Vec3 arm = Vec3::Zero();  // x_a - x_b then
+  Vec6 u = Vec6::Zero();       // a against b at a's centre of mass, before the step
+  Vec3 arm = Vec3::Zero();     // x_a - x_b then
   Vec6 relief = Vec6::Zero();  // scratch of the passivity controller
 };
 
@@ -118,9 +127,9 @@ struct Hand {
   h6CouplingDef coupling{};  // with no zeros left
   double manipulandum_mass = 0.1, driver_stiffness = 0, driver_damping = 0;
   double motion_scale = 1, rotation_scale = 1;  // from the device to the scene
-  h6DeviceSample sample{};     // the last good one
-  bool seen = false;           // there was one
-  bool clutched = false;       // it moves alone
+  h6DeviceSample sample{};                      // the last good one
+  bool seen = false;                            // there was one
+  bool clutched = false;                        // it moves alone
   HandFilter filter;
   RigidState manipulandum;     // where the hand holds the body's centre of mass; pseudo-admittance:
                                // a body of its own
@@ -170,17 +179,19 @@ struct h6Session {
   std::size_t island_count = 0;
   h6::Contacts* contacts = nullptr;  // (bodies); capacity 0 without a shell
 
-  // Scratch of traversal and one shell body's contacts. The helper's is there where a shell body has
-  // several pairs; whoever finds them, candidates end up in the first.
+  // Scratch of traversal and one shell body's contacts. The helper's is there where a shell body
+  // has several pairs; whoever finds them, candidates end up in the first.
   h6::TraverseScratch traversal[2];
-  float *group_expiry = nullptr, *block_expiry = nullptr;   // of all pairs
-  float* scratch_depth = nullptr;                           // to find the deepest
+  float *group_expiry = nullptr, *block_expiry = nullptr;  // of all pairs
+  std::uint16_t* near_rows = nullptr;
+  float* rest_expiry = nullptr;
+  float* scratch_depth = nullptr;  // to find the deepest
   std::size_t candidate_capacity = 0;
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)
   std::uint64_t* cluster_cell = nullptr;                            // (max_contacts)
-  char* weigh_scratch = nullptr;  // weigh_scratch_bytes of max_contacts, or null
-  std::size_t* slice_count = nullptr;                               // (slices) survivors of each
-  h6::kernels::WrenchSum* slice_sum = nullptr;                      // (slices)
+  char* weigh_scratch = nullptr;                // weigh_scratch_bytes of max_contacts, or null
+  std::size_t* slice_count = nullptr;           // (slices) survivors of each
+  h6::kernels::WrenchSum* slice_sum = nullptr;  // (slices)
 
   std::uint32_t* shell_pairs = nullptr;  // (shell_count + 1) first pair of each shell body
   std::size_t shell_count = 0;

@@ -55,8 +55,8 @@ struct Touch {
     return kernel(ball_field().view(), test::kIdentity,
                   PointsView{points.x.data(), points.y.data(), points.z.data(), points.x.size()},
                   groups.data(), groups.size(), 0.0f, false,
-                  Touching{row.data(), to[0].data(), to[1].data(), to[2].data(), to[3].data()},
-                  least.data());
+                  GroupLook{nullptr, least.data(), nullptr, nullptr, 0},
+                  Touching{row.data(), to[0].data(), to[1].data(), to[2].data(), to[3].data()});
   }
 };
 

@@ -23,6 +23,17 @@ struct Hits {
   Touching columns() { return {row.data(), d.data(), gx.data(), gy.data(), gz.data()}; }
 };
 
+struct Learnt {
+  std::vector<float> least, rest;
+  std::vector<std::uint16_t> near_rows;
+  explicit Learnt(std::size_t n) : least(n), rest(n), near_rows(n) {}
+  GroupLook columns(const std::uint16_t* rows) {
+    return {rows, least.data(), near_rows.data(), rest.data(), 0.3f};
+  }
+};
+
+bool near(float a, float b) { return a == b || std::fabs(a - b) < 1e-3f; }
+
 }  // namespace
 
 TEST_CASE("expiry: SIMD finds the same indices and the same least values on every target") {
@@ -71,22 +82,34 @@ TEST_CASE("touch_groups: SIMD finds the same points as the reference, and writes
         if (g % 3 != 1) list.push_back(g);
       for (const float limit : {0.0f, 0.5f, 4.0f}) {
         Hits got(16 * list.size()), want(16 * list.size());
-        std::vector<float> least(list.size()), least_want(list.size());
-        const std::size_t n = touch_groups_ref(field.view(), kIdentity, points, list.data(),
-                                               list.size(), limit, false, want.columns(),
-                                               least_want.data());
+        // All points of some groups, some of others, none of a few.
+        std::vector<std::uint16_t> rows(list.size());
+        for (std::size_t k = 0; k < rows.size(); ++k)
+          rows[k] = k % 2 ? kAllRows : std::uint16_t(k % 8 ? random.below(65536) : 0);
+        const bool some = limit > 0;
+        Learnt learnt(list.size()), learnt_want(list.size());
+        const GroupLook look = learnt.columns(some ? rows.data() : nullptr);
+        const GroupLook look_want = learnt_want.columns(look.rows);
+        const std::size_t n =
+            touch_groups_ref(field.view(), kIdentity, points, list.data(), list.size(), limit,
+                             false, look_want, want.columns());
         const bool cold = count % 2 == 1;  // changes nothing but when memory is asked for
         REQUIRE(touch_groups(field.view(), kIdentity, points, list.data(), list.size(), limit, cold,
-                             got.columns(), least.data()) == n);
+                             look, got.columns()) == n);
         for (std::size_t i = 0; i < n; ++i) {
           CHECK(got.row[i] == want.row[i]);
           CHECK(got.row[i] < count);
           CHECK(std::fabs(got.d[i] - want.d[i]) < 1e-3f);
           CHECK(std::fabs(got.gx[i] - want.gx[i]) + std::fabs(got.gy[i] - want.gy[i]) +
-                    std::fabs(got.gz[i] - want.gz[i]) < 1e-3f);
+                    std::fabs(got.gz[i] - want.gz[i]) <
+                1e-3f);
         }
-        for (std::size_t k = 0; k < least.size(); ++k)
-          CHECK((least[k] == least_want[k] || std::fabs(least[k] - least_want[k]) < 1e-3f));
+        for (std::size_t k = 0; k < list.size(); ++k) {
+          CHECK(near(learnt.least[k], learnt_want.least[k]));
+          if (!some || rows[k] != kAllRows) continue;
+          CHECK(learnt.near_rows[k] == learnt_want.near_rows[k]);
+          CHECK(near(learnt.rest[k], learnt_want.rest[k]));
+        }
       }
     }
   });
@@ -122,8 +145,8 @@ TEST_CASE("make_contacts: SIMD agrees with the reference on every target and cou
       const auto of = [&](std::vector<float>& v, std::vector<std::uint32_t>& p) {
         float* at[10];
         for (std::size_t k = 0; k < 10; ++k) at[k] = v.data() + k * (n + 3);
-        return MadeContacts{at[0], at[1], at[2], at[3], at[4], at[5],
-                              at[6], at[7], at[8], at[9], p.data()};
+        return MadeContacts{at[0], at[1], at[2], at[3], at[4],   at[5],
+                            at[6], at[7], at[8], at[9], p.data()};
       };
       make_contacts(columns, hits.columns(), n, frame, of(got, got_point));
       make_contacts_ref(columns, hits.columns(), n, frame, of(want, want_point));

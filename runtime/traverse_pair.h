@@ -1,0 +1,30 @@
+// traverse_pair.h - the points of one shell that touch one field; find_contacts.cpp makes contacts
+// of them.
+#pragma once
+#include "kernels/touch_groups.h"
+#include "runtime/session.h"
+
+namespace h6 {
+
+inline constexpr std::size_t kWorthSharing =
+    80;  // groups from which the helper is asked: some 6 us
+
+// Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
+// points; of each only what may have come within reach since it was last looked at. Where time is
+// short it ends with the deepest tier that is complete: what was not looked at stays expired.
+// `alone`: the other thread has work of its own.
+std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::size_t used,
+                          bool alone);
+
+kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);
+// From one's scratch to another's, or within one; the two may overlap.
+void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
+                     std::size_t from_row, std::size_t count);
+
+// Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
+kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
+                               const Field& field);
+// `series` needs the points that are about to touch. [voxel]
+float margin_of(const h6Session& s);
+
+}  // namespace h6
