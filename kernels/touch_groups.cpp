@@ -188,6 +188,29 @@ Samples sample_anew(const FieldView& field, const Affine& to_field, const Points
   return s;
 }
 
+// Which distances are samples: of points in the grid, and there in a brick.
+template <class Points>
+hn::Mask<DF> in_bricks(const FieldView& field, const Affine& to_field, const Points& points,
+                       std::size_t at) {
+  const DF d;
+  const DI di;
+  const VF px = points.x(at), py = points.y(at), pz = points.z(at), zero = hn::Zero(d);
+  VF q[3];
+  auto inside = hn::FirstN(d, hn::Lanes(d));
+  for (int a = 0; a < 3; ++a) {
+    q[a] = affine_row(to_field.m[a], px, py, pz);
+    const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
+    inside = hn::And(inside, hn::And(hn::Ge(q[a], zero), hn::Le(q[a], last)));
+  }
+  const Cell cell = cell_of(field, split_axis(hn::IfThenElseZero(inside, q[0]), field.size[0]),
+                            split_axis(hn::IfThenElseZero(inside, q[1]), field.size[1]),
+                            split_axis(hn::IfThenElseZero(inside, q[2]), field.size[2]));
+  HWY_ALIGN std::int32_t slot[hn::MaxLanes(di)];
+  hn::Store(cell.slot, di, slot);
+  const VI entry = gather_entries(field.table, slot);
+  return hn::AndNot(hn::RebindMask(d, hn::Lt(entry, hn::Zero(di))), inside);
+}
+
 // Writes what touches of so many batches behind what is written, and returns where that ends.
 template <class Points>
 HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_field,
@@ -219,7 +242,10 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
       points.keep(at, s.distance);
       smallest = hn::Min(smallest, s.distance);
       // Whole vectors are written, whatever touches: a branch would be guessed wrong too often.
-      const auto touching = hn::Lt(s.distance, hn::Set(d, limit));
+      auto touching = hn::Lt(s.distance, hn::Set(d, limit));
+      if (HWY_UNLIKELY(!ring.plain[k % kRing]) && limit > 0 && !hn::AllFalse(d, touching))
+        touching = hn::Or(hn::Lt(s.distance, hn::Zero(d)),
+                          hn::And(touching, in_bricks(field, to_field, points, at)));
       hn::StoreU(hn::Compress(points.row(at), hn::RebindMask(di, touching)), di,
                  reinterpret_cast<std::int32_t*>(out.row + written));
       hn::StoreU(hn::Compress(s.distance, touching), d, out.distance + written);

@@ -26,7 +26,8 @@ inline constexpr std::uint16_t kAllRows = 0xffff;
 inline constexpr float kNearLeast = 3;
 
 // Samples points of groups g = groups[0..count-1], which are 16 g .. 16 g + 15, and writes those
-// with a distance below `limit`, in order; returns how many. Columns of `points` are readable to
+// with a distance below 0, and below `limit` where it is a sample of a brick and not a bound, in
+// order; returns how many. Columns of `points` are readable to
 // whole groups; rows from points.count on are none. `out` has room for 16 count rows, columns of
 // `look` for count. `cold`: the field is not in the caches, so memory is asked for some groups
 // before they are sampled; the result is the same.

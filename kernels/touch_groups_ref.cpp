@@ -7,6 +7,23 @@
 #include "kernels/touch_groups.h"
 
 namespace h6::kernels {
+namespace {
+
+// Of every axis: f32 as affine_row of sample_field-inl.h has it, so that both see the same cell.
+bool in_brick(const FieldView& field, const Affine& to_field, const PointsView& points,
+              std::uint32_t row) {
+  std::int32_t brick[3];
+  for (int k = 0; k < 3; ++k) {
+    const float* m = to_field.m[k];
+    const float q = std::fma(m[0], points.x[row],
+                             std::fma(m[1], points.y[row], std::fma(m[2], points.z[row], m[3])));
+    if (!(q >= 0 && q <= static_cast<float>(8 * field.size[k] - 1))) return false;
+    brick[k] = std::min(static_cast<std::int32_t>(q), 8 * field.size[k] - 2) / 8;
+  }
+  return field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]] >= 0;
+}
+
+}  // namespace
 
 std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
                              const PointsView& points, const std::uint32_t* groups,
@@ -24,7 +41,8 @@ std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
       float gx, gy, gz;
       sample_field_ref(field, to_field, points, &row, 1, &distance[i], &gx, &gy, &gz);
       least = std::min(least, distance[i]);
-      if (!(distance[i] < limit)) continue;
+      const bool sampled = limit > 0 && in_brick(field, to_field, points, row);
+      if (!(distance[i] < (sampled ? limit : 0))) continue;
       out.row[written] = row;
       out.distance[written] = distance[i];
       out.gx[written] = gx, out.gy[written] = gy, out.gz[written] = gz;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "kernels/keep_nearest.h"
 #include "runtime/stages.h"
 #include "runtime/traverse_pair.h"
 #include "sched/clock.h"
@@ -30,56 +31,19 @@ kernels::Affine arms_to_field(const Body& a, const Body& b, const Field& field) 
   return affine;
 }
 
-// Is the distance there a sample? Far from the surface it is only a bound, and no gap can be told.
-bool is_sampled(const kernels::FieldView& field, const kernels::Affine& to_field, float x, float y,
-                float z) {
-  std::int32_t brick[3];
-  for (int k = 0; k < 3; ++k) {
-    const float* m = to_field.m[k];
-    const float q = m[0] * x + (m[1] * y + (m[2] * z + m[3]));
-    if (!(q >= 0 && q <= static_cast<float>(8 * field.size[k] - 1))) return false;
-    brick[k] = std::min(static_cast<std::int32_t>(q), 8 * field.size[k] - 2) / 8;
-  }
-  return field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]] >= 0;
-}
-
 // Keeps the `most` deepest of `count` candidates, in their order. Ties go to the first.
 std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair* pairs,
                          std::size_t pair_count) {
-  const TraverseScratch& t = s.traversal[0];
-  std::copy_n(t.candidate_distance, count, s.scratch_depth);
-  std::nth_element(s.scratch_depth, s.scratch_depth + (most - 1), s.scratch_depth + count);
-  const float limit = s.scratch_depth[most - 1];
-  std::size_t below = 0;
-  for (std::size_t i = 0; i < count; ++i) below += t.candidate_distance[i] < limit;
-  std::size_t ties = most - below, n = 0;
+  const kernels::Touching all = candidates_from(s.traversal[0], 0);
+  const kernels::NearestLimit at = kernels::nearest_limit(all.distance, count, most);
+  std::size_t ties = most - at.below, n = 0;
   for (std::size_t p = 0; p < pair_count; ++p) {
-    const std::size_t first = n;
-    for (std::size_t i = pairs[p].first; i < pairs[p].first + pairs[p].candidates; ++i) {
-      const float d = t.candidate_distance[i];
-      if (d > limit || (d == limit && ties == 0)) continue;
-      ties -= d == limit;
-      move_candidates(t, n++, t, i, 1);
-    }
-    pairs[p].candidates = n - first;
-    pairs[p].first = first;
+    const std::size_t begin = pairs[p].first, end = begin + pairs[p].candidates;
+    pairs[p].first = n;
+    pairs[p].candidates = kernels::keep_nearest(all, begin, end, at.limit, ties, n);
+    n += pairs[p].candidates;
   }
   return n;
-}
-
-// Points that are only about to touch count where their gap is a sample.
-void drop_unsampled(h6Session& s, Pair& pair, const Shell& shell, const Field& field,
-                    const kernels::Affine& to_field) {
-  const TraverseScratch& t = s.traversal[0];
-  std::size_t n = pair.first;
-  for (std::size_t i = pair.first; i < pair.first + pair.candidates; ++i) {
-    const std::uint32_t row = t.candidate[i];
-    if (!(t.candidate_distance[i] < 0) &&
-        !is_sampled(field.view, to_field, shell.x[row], shell.y[row], shell.z[row]))
-      continue;
-    move_candidates(t, n++, t, i, 1);
-  }
-  pair.candidates = n - pair.first;
 }
 
 std::size_t traverse_in_order(h6Session& s, std::size_t first_pair, std::size_t end_pair,
@@ -172,13 +136,11 @@ void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
 void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   Contacts& c = s.contacts[s.pairs[first_pair].a];
   c.count = 0;
-  const float margin = margin_of(s);
   for (std::size_t p = first_pair; p < end_pair; ++p) {
     Pair& pair = s.pairs[p];
     const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
     const Shell& shell = s.model->shells[a.shell];
     const Field& field = s.model->fields[b.field];
-    if (margin > 0) drop_unsampled(s, pair, shell, field, shell_to_field(a, shell, b, field));
     const std::size_t first = c.count;
     kernels::ContactFrame frame;
     const Vec3 arm = a.R * (shell.centre - a.com);
