@@ -1,16 +1,18 @@
 #include "sched/periodic_thread.h"
 
-#include <algorithm>
-
-#include "sched/frame_team.h"
-
 #include "sched/clock.h"
+#include "sched/frame_team.h"
+#include "sched/wake_ahead.h"
 
 namespace h6::sched {
 namespace {
 
-void wait_for(std::int64_t deadline, std::int64_t spin) {
-  if (now_ns() < deadline - spin) sleep_until_ns(deadline - spin);
+void wait_for(std::int64_t deadline, WakeAhead& ahead) {
+  const std::int64_t now = now_ns(), aim = ahead.aim(now, deadline);
+  if (aim > now) {
+    sleep_until_ns(aim);
+    ahead.learn(aim, now_ns());
+  }
   while (now_ns() < deadline) {
   }
 }
@@ -42,15 +44,15 @@ void PeriodicThread::run() {
   if (work_.begin) work_.begin(grant);
 
   const auto period = static_cast<std::int64_t>(1e9 / options_.rate);
-  const auto spin = static_cast<std::int64_t>(1e3 * options_.spin_us);
-  std::int64_t deadline = now_ns() + period;
+  WakeAhead ahead(period, static_cast<std::int64_t>(1e3 * options_.spin_us));
+  std::int64_t deadline = ahead.place(now_ns() + period);
   TickTiming timing;
   for (std::uint64_t frame = 0; !stop_.load(std::memory_order_relaxed); ++frame) {
     bool more;
     if (options_.virtual_time) {
       more = work_.tick(frame, timing, 0.0);
     } else {
-      wait_for(deadline, spin);
+      wait_for(deadline, ahead);
       const std::int64_t cpu_before = thread_cpu_ns(), waited_before = FrameTeam::waited_ns();
       const std::int64_t start = now_ns();
       const double wakeup_us = 1e-3 * static_cast<double>(start - deadline);
@@ -64,7 +66,7 @@ void PeriodicThread::run() {
                 late == Late::no ? 0.0 : 1e-3 * static_cast<double>(end - deadline - period),
                 1e-3 * static_cast<double>(cpu)};
       deadline += period;
-      if (end > deadline + period) deadline = end + period;
+      if (end > deadline + period) deadline = ahead.place(end + period);
     }
     if (work_.done) work_.done(frame, timing);
     if (!more) break;

@@ -3,8 +3,9 @@
 //   deadline n          deadline n+1
 //   |--wakeup--[=== tick ===]---sleep---[spin]|--
 //
-// Deadlines are start + n * period, so that a late frame does not delay the next ones. After more
-// than a whole period is lost the schedule moves: a burst of catch-up frames would be a jolt.
+// Deadlines are n periods apart, so that a late frame does not delay the next ones. After more than
+// a whole period is lost the schedule moves by whole ones: a burst of catch-up frames would be a
+// jolt.
 #pragma once
 #include <atomic>
 #include <cstdint>

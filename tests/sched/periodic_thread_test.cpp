@@ -1,16 +1,20 @@
 // Deadlines are absolute, late frames have one cause, denormals are flushed only in scope.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "sched/clock.h"
 #include "sched/frame_team.h"
 #include "sched/periodic_thread.h"
+#include "sched/wake_ahead.h"
 
 using namespace h6::sched;
 
@@ -47,6 +51,63 @@ TEST_CASE("a frame never starts before its deadline") {
                                   nullptr});
   thread.join();
   CHECK(earliest >= 0);
+}
+
+TEST_CASE(
+    "sleep ends early by what the machine takes to wake a sleeper, as far as the spin is long") {
+  std::mt19937 random(1);
+  for (const double usual : {20e3, 45e3, 94e3, 300e3}) {
+    // Every hundredth is 5 ms late: stolen.
+    std::lognormal_distribution<double> late(std::log(usual), 0.3);
+    WakeAhead ahead(1000000, 100000);
+    std::int64_t deadline = 0;
+    int whole = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const std::int64_t now = deadline += 1000000, next = deadline + 1000000;
+      const std::int64_t aim = ahead.aim(now, next);
+      CHECK(aim > now);
+      CHECK(aim <= next - 100000);
+      CHECK(aim >= next - 200000);
+      const std::int64_t woken =
+          aim + (i % 100 == 99 ? 5000000 : static_cast<std::int64_t>(late(random)));
+      ahead.learn(aim, woken);
+      if (i >= 1000) whole += woken <= next - 100000;
+    }
+    CAPTURE(usual);
+    if (usual < 100e3)
+      CHECK(std::abs(whole - 1500) < 150);
+    else
+      CHECK(ahead.early() == 100000);
+  }
+}
+
+TEST_CASE("deadlines are a period apart, and what may be a tick comes before their spin") {
+  for (const std::int64_t period : {100000, 250000, 500000, 1000000, 10000000})
+    for (const std::int64_t spin : {0, 50000, 100000, 180000}) {
+      const WakeAhead ahead(period, spin);
+      for (std::int64_t time = 7; time < 40000000; time += 999983) {
+        const std::int64_t deadline = ahead.place(time);
+        CHECK(deadline >= time);
+        CHECK(deadline < time + period);
+        CHECK(ahead.place(deadline) == deadline);
+        CHECK(ahead.place(deadline + 1) == deadline + period);
+        if (spin + 50000 < period) CHECK((deadline - spin - 50000) % period == 0);
+      }
+    }
+}
+
+TEST_CASE("who polls before every deadline sleeps nevertheless, and never into the spin") {
+  WakeAhead ahead(250000, 100000);
+  for (int i = 0; i < 1000; ++i) ahead.learn(0, 200000);
+  for (std::int64_t now = 0; now < 250000; now += 1000) {
+    const std::int64_t aim = ahead.aim(now, 250000);
+    CHECK(aim <= std::max<std::int64_t>(now, 150000));
+    if (now < 130000) CHECK(aim >= now + 250000 / 16);
+  }
+  // Without a spin it sleeps until the deadline, however late it is woken.
+  WakeAhead plain(250000, 0);
+  for (int i = 0; i < 1000; ++i) plain.learn(0, 200000);
+  CHECK(plain.aim(0, 250000) == 250000);
 }
 
 TEST_CASE("a frame that computes too long is late by its own computation; one that sleeps is not") {
