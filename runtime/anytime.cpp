@@ -4,7 +4,6 @@
 #include <bit>
 
 #include "runtime/session.h"
-#include "sched/clock.h"
 
 namespace h6 {
 namespace {
@@ -71,7 +70,10 @@ double contact_ns(const Anytime& a, double contacts) {
   return kUnknown;
 }
 
-double elapsed_ns(const Anytime& a) { return static_cast<double>(sched::now_ns() - a.start); }
+// Of a frame that cannot keep its budget any more: halfway from there to being late.
+double latest_ns(const h6Session& s) { return 0.5 * (s.anytime.budget_ns + 1e9 * s.dt); }
+
+double elapsed_ns(const Anytime& a) { return static_cast<double>(a.clock() - a.start); }
 
 // What a frame takes from its beginning when this pair and all that follow (as they were last) are
 // traversed in `tier`.
@@ -149,12 +151,16 @@ void begin_anytime(h6Session& s, std::int64_t start) {
   Anytime& a = s.anytime;
   a.start = start;
   a.coarse = false;
+  a.few = false;
   a.fitting = Anytime::kAll;
   a.by_clock = a.forced == Anytime::kByClock && a.budget_ns > 0 && !a.no_clock;
   if (a.forced == Anytime::kByClock) return;
   const std::size_t pairs = std::min<std::size_t>(a.forced, s.pair_count);
-  if (pairs > 0) become_coarse(s, s.pair_count - pairs, std::bit_width(a.forced_points) - 1);
+  const std::uint32_t points = std::max(a.forced_points, 1u);
+  if (pairs > 0) become_coarse(s, s.pair_count - pairs, std::bit_width(points) - 1);
   a.coarse = false;  // pair by pair
+  a.few = pairs > 0 && a.forced_points == 0;
+  if (a.few) s.report.coarse_points = 0;
   a.forced = Anytime::kByClock;
 }
 
@@ -191,7 +197,7 @@ bool must_be_coarser(h6Session& s, std::size_t pair, std::size_t used, std::size
   // All coarse pairs of a frame are so in the same tier.
   if (!a.by_clock || tier == 0 || (a.coarse && pair + s.report.coarse_pairs != s.pair_count))
     return false;
-  const double most = 0.5 * (a.budget_ns + 1e9 * s.dt), n = static_cast<double>(used + found);
+  const double most = latest_ns(s), n = static_cast<double>(used + found);
   const double elapsed = elapsed_ns(a);
   if (elapsed + n * contact_ns(a, n) + a.rest_ns <= most) return false;
   int coarser = tier;
@@ -207,11 +213,27 @@ bool must_be_coarser(h6Session& s, std::size_t pair, std::size_t used, std::size
   return true;
 }
 
+bool must_be_few(h6Session& s, std::size_t first, std::size_t found) {
+  Anytime& a = s.anytime;
+  if (!a.by_clock || a.few) return a.few;
+  // What was coarse in shell bodies before this one has its contacts by now.
+  if (!a.coarse || a.tier > 0 || s.report.coarse_pairs + first > s.pair_count) return false;
+  // What so many cost is to be seen now and then, or few would follow few for ever.
+  // The first frame has everything from memory.
+  const double n = static_cast<double>(found);
+  const Anytime::Cost& seen = a.contact[size_of(n)];
+  if (a.frames > 0 && (seen.times == 0 || a.frames - seen.when >= kFresh)) return false;
+  if (elapsed_ns(a) + n * contact_ns(a, n) + a.rest_ns <= latest_ns(s)) return false;
+  a.few = true;
+  s.report.coarse_points = 0;
+  return true;
+}
+
 void learn_sampling(h6Session& s, std::size_t groups, std::size_t near, std::size_t found,
                     std::int64_t since) {
   Anytime& a = s.anytime;
   if (!a.by_clock || groups < kTelling || near < kTelling) return;
-  learn(a.group_ns, static_cast<double>(sched::now_ns() - since) / static_cast<double>(groups));
+  learn(a.group_ns, static_cast<double>(a.clock() - since) / static_cast<double>(groups));
   const double all = a.coarse ? static_cast<double>(found << (Anytime::kAll - a.tier))
                               : static_cast<double>(found);
   learn(a.contacts_per_group, all / static_cast<double>(near));
@@ -225,8 +247,9 @@ void learn_frame(h6Session& s) {
   learn(a.rest_ns, 1e3 * (us[H6_STAGE_COUPLING] + us[H6_STAGE_INTEGRATE] + us[H6_STAGE_OUTPUT]));
   std::size_t contacts = 0;
   for (std::size_t p = 0; p < s.pair_count; ++p) contacts += s.pairs[p].candidates;
-  learn_contacts(a, static_cast<double>(contacts),
-                 1e3 * (us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH]));
+  if (!a.few)
+    learn_contacts(a, static_cast<double>(contacts),
+                   1e3 * (us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH]));
   const int tier = a.coarse ? a.tier : Anytime::kAll;
   a.calm = a.fitting > a.finest ? a.calm + 1 : 0;
   a.strikes = tier < a.finest ? a.strikes + 1 : 0;

@@ -1,5 +1,6 @@
 // api.cpp - a session seen through the contract.
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 #include "runtime/stages.h"
@@ -76,7 +77,7 @@ h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceComma
 
 void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points) {
   session->anytime.forced = pairs;
-  session->anytime.forced_points = points >= 8 ? 8 : points >= 4 ? 4 : points >= 2 ? 2 : 1;
+  session->anytime.forced_points = std::bit_floor(std::min(points, 8u));
 }
 
 h6BodyState h6GetBody(const h6Session* session, int32_t index) {

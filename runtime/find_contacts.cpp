@@ -31,12 +31,14 @@ kernels::Affine arms_to_field(const Body& a, const Body& b, const Field& field) 
   return affine;
 }
 
-// Keeps the `most` deepest of `count` candidates, in their order. Ties go to the first.
+// Keeps the `most` deepest of the candidates of these pairs, up to `count`, in their order. Ties go
+// to the first.
 std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair* pairs,
                          std::size_t pair_count) {
+  std::size_t n = pairs[0].first;
   const kernels::Touching all = candidates_from(s.traversal[0], 0);
-  const kernels::NearestLimit at = kernels::nearest_limit(all.distance, count, most);
-  std::size_t ties = most - at.below, n = 0;
+  const kernels::NearestLimit at = kernels::nearest_limit(all.distance + n, count - n, most);
+  std::size_t ties = most - at.below;
   for (std::size_t p = 0; p < pair_count; ++p) {
     const std::size_t begin = pairs[p].first, end = begin + pairs[p].candidates;
     pairs[p].first = n;
@@ -44,6 +46,23 @@ std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair
     n += pairs[p].candidates;
   }
   return n;
+}
+
+// Where there is no time for the contacts of coarse pairs: the few deepest of them. Returns how
+// many candidates there are then.
+std::size_t keep_few(h6Session& s, std::size_t first_pair, std::size_t end_pair, std::size_t used) {
+  const std::size_t first = std::max(
+      first_pair, s.pair_count - std::min<std::size_t>(s.report.coarse_pairs, s.pair_count));
+  if (first >= end_pair) return used;
+  const std::size_t coarse = used - s.pairs[first].first;
+  if (coarse <= Anytime::kFew || !must_be_few(s, first_pair, used)) return used;
+  used = keep_deepest(s, used, Anytime::kFew, s.pairs + first, end_pair - first);
+  float least = -HUGE_VALF;  // of the distances that are kept: what goes is no deeper
+  for (std::size_t i = s.pairs[first].first; i < used; ++i)
+    least = std::max(least, s.traversal[0].candidate_distance[i]);
+  for (std::size_t p = first; p < end_pair; ++p)
+    s.pairs[p].missed = std::max(s.pairs[p].missed, -least);
+  return used;
 }
 
 std::size_t traverse_in_order(h6Session& s, std::size_t first_pair, std::size_t end_pair,
@@ -123,6 +142,7 @@ void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
   a.pairs_shared =
       worth_sharing(s, a, first_pair, end_pair) && traverse_shared(s, first_pair, end_pair, &used);
   if (!a.pairs_shared) used = traverse_in_order(s, first_pair, end_pair, most);
+  used = keep_few(s, first_pair, end_pair, used);
   if (used > most) {
     keep_deepest(s, used, most, s.pairs + first_pair, end_pair - first_pair);
     s.report.status |= H6_CONTACTS_DROPPED;

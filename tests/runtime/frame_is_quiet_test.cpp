@@ -232,7 +232,7 @@ bool forbid_calls() {
   for (long i = 0; i < frames; ++i) {
     const auto k = static_cast<std::size_t>(i % 1000);
     // Every tenth with a budget's decision, so that both ways of traversal are walked.
-    if (i % 10 == 9) h6SetCoarse(scene.session, 1, 1u << i / 10 % 4);
+    if (i % 10 == 9) h6SetCoarse(scene.session, 1, 1u << i / 10 % 5 & 15u);
     h6Step(scene.session, &samples[k], commands.data());
     counts.helped += h6GetFrame(scene.session).contacts >= 256;
   }

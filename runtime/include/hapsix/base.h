@@ -51,8 +51,8 @@ enum {
   /* Energy would have been made at a hand or a contact: the passivity controller damped it. */
   H6_PASSIVITY = 1u << 10,
   /* The frame would have overrun h6SessionDef.frame_budget_us: contacts of the last
-   * h6FrameReport.coarse_pairs pairs are those of coarse_points points in sixteen. Raise the budget,
-   * lower the rate, or give the shell fewer points. */
+   * h6FrameReport.coarse_pairs pairs are those of coarse_points points in sixteen, or few. Raise the
+   * budget, lower the rate, or give the shell fewer points. */
   H6_COARSE = 1u << 11
 };
 

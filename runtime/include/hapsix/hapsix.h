@@ -71,8 +71,8 @@ H6_API void       h6DestroySession(h6Session* session);
 H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
 /* For the next step only: so many pairs, the last ones in their order, are traversed coarsely, with
- * so many points of each sixteen (8, 4, 2, else 1), whatever the clock says. With coarse_pairs and
- * coarse_points of h6FrameReport a run in anytime mode is repeated to the bit. */
+ * so many points of each sixteen (8, 4, 2, 1, or 0: few of 1), whatever the clock says. What stands
+ * in h6FrameReport as coarse_pairs and coarse_points repeats a run in anytime mode to the bit. */
 H6_API void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points);
 
 /* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */

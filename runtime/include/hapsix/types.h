@@ -314,8 +314,8 @@ typedef struct h6FrameReport {
                                          its time in slices                                        */
   uint32_t helper_slices;
   uint32_t coarse_pairs;             /* so many pairs, the last ones, were traversed coarsely       */
-  uint32_t coarse_points;            /* of each sixteen points so many were looked at there: 1, 2, 4
-                                        or 8; 0 without                                             */
+  uint32_t coarse_points;            /* of each sixteen points so many were looked at there: 1, 2, 4,
+                                        8; 0: 1, and a shell body kept its 64 deepest contacts there */
   double   missed_depth_voxels;      /* H6_COARSE: no point that was left out is deeper, as long as
                                         none is deeper than its field's band                        */
 } h6FrameReport;
