@@ -6,155 +6,47 @@
 // for a sixth of that on a std::thread that sleeps until the next tick. HAPSIX_BENCH_SECONDS=3 in
 // the environment: 3 s. Socket: 10,000 contacts on a part that follows the hand exactly, with a
 // budget of 0.8 periods (anytime mode). Load, on both cores: a host that saturates TBB and a
-// streamer of memory. Before times are reported the first frames are stepped again on one thread
-// and must have the same hashes. HAPSIX_BENCH_LATE=1: each late frame is printed, stage by stage.
+// streamer of memory. Before times are reported all frames are stepped again on one thread and must
+// have the same hashes. HAPSIX_BENCH_LATE=1: each late frame is printed, stage by stage, with its
+// page faults and the core's speed before and after it.
+//
+// late_compute: of which the thread's CPU time was over the period. On a virtual machine that clock
+// runs on while the host has the core and does not say so, and in interrupts. So these frames are
+// timed once more when all are stepped again: late_compute_again is how many of them take longer
+// than a period then too, again_max_us what the longest takes. unstolen_wakeup: of frames without a
+// sign of stolen time, that is wall and CPU time agree and the machine's count of stolen ticks
+// stands still about then.
 //
 // Arithmetic: on the same thread a sum in registers that takes a coarse frame's time and touches no
 // memory. It cannot be late by its own work, so what it counts as that is what the machine took
 // from it and put on its CPU time; the rows above have that too.
 #include <benchmark/benchmark.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "io/load_scene.h"
-#include "io/scenes/scenes.h"
+#include "bench/realtime_scenes.h"
 #include "sched/clock.h"
 #include "sched/parallel_for.h"
 #include "sched/periodic_thread.h"
-#include "tests/support/frame_scenes.h"
 
 namespace {
 
 using namespace h6;
+using namespace h6::bench;
 using Clock = std::chrono::steady_clock;
-
-struct SessionDeleter {
-  void operator()(h6Session* s) const { h6DestroySession(s); }
-};
-struct LoopDeleter {
-  void operator()(h6Loop* l) const { h6DestroyLoop(l); }
-};
-using Session = std::unique_ptr<h6Session, SessionDeleter>;
-using Loop = std::unique_ptr<h6Loop, LoopDeleter>;
 
 double seconds_at(double rate) {
   const char* asked = std::getenv("HAPSIX_BENCH_SECONDS");
   const double seconds = asked ? std::atof(asked) : 0;
   return seconds > 0 ? seconds : rate > 1000 ? 20 : 60;
-}
-
-// ---- what is run: sessions of one scene, and a hand for it
-
-class Scene {
- public:
-  virtual ~Scene() = default;
-  virtual Session session(double rate, unsigned threads, bool budget) = 0;
-  virtual h6Device hand() = 0;
-  virtual double least_contacts() const = 0;
-};
-
-class Alpha : public Scene {
- public:
-  Alpha() : loaded_(io::load_scene(*io::make_scene("alpha-shortcut"))) {}
-  Session session(double rate, unsigned threads, bool) override {
-    h6SessionDef def = (*loaded_)->session_def();
-    def.rate = rate, def.threads = threads;
-    return Session(h6CreateSession((*loaded_)->model.get(), &def, nullptr));
-  }
-  h6Device hand() override {
-    h6Device device{};
-    device.self = this;
-    device.read = [](void* self, double t, h6DeviceSample* out) {
-      const io::LoadedScene& scene = **static_cast<Alpha*>(self)->loaded_;
-      const io::Path& path = scene.scene.hands[0].path;
-      const double whole = path.back().t, at = std::fmod(t, 2 * whole);
-      *out = {};
-      out->pose = io::sample_path(path, at < whole ? at : 2 * whole - at);
-      return 0;
-    };
-    device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
-    return device;
-  }
-  double least_contacts() const override { return 10; }
-
- private:
-  Result<std::unique_ptr<io::LoadedScene>> loaded_;
-};
-
-// A part in a socket that fits it, pushed in until 10,000 of its points touch, trembling by 0.02
-// voxel.
-class Socket : public Scene {
- public:
-  Socket() : model_(bench::make_model(true)) {
-    const Session probe = session(1000, 1, false);
-    double low = 0, high = 8;
-    for (int i = 0; i < 20; ++i) {
-      push_ = 0.5 * (low + high);
-      const h6DeviceSample sample = at(push_);
-      h6Step(probe.get(), &sample, nullptr);
-      (h6GetFrame(probe.get()).contacts < 10000 ? low : high) = push_;
-    }
-  }
-  ~Socket() override { h6DestroyModel(model_); }
-  Session session(double rate, unsigned threads, bool budget) override {
-    h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0;
-    h6HandDef hand = h6DefaultHandDef();
-    hand.body = 1;
-    hand.coupling.mode = H6_COUPLING_DIRECT;
-    h6SessionDef def = h6DefaultSessionDef();
-    def.bodies = bodies, def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
-    def.rate = rate, def.threads = threads;
-    def.frame_budget_us = budget ? 0.8e6 / rate : 0;
-    return Session(h6CreateSession(model_, &def, nullptr));
-  }
-  h6Device hand() override {
-    h6Device device{};
-    device.self = this;
-    device.read = [](void* self, double t, h6DeviceSample* out) {
-      const Socket& s = *static_cast<Socket*>(self);
-      return *out = s.at(s.push_ + 0.01 * std::sin(30 * t)), 0;
-    };
-    device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
-    return device;
-  }
-  double least_contacts() const override { return 500; }
-
- private:
-  h6DeviceSample at(double push) const {
-    h6DeviceSample sample{};
-    const double v = bench::kVoxel * push;
-    sample.pose = {{0.7 * v, 0.6 * v, -0.387 * v}, {1, 0, 0, 0}};
-    return sample;
-  }
-  h6Model* model_;
-  double push_ = 0;
-};
-
-// One at a time: the socket's field is hundreds of megabytes.
-Scene& scene_named(const std::string& name) {
-  static std::unique_ptr<Scene> scene;
-  static std::string held;
-  if (held != name) {
-    scene.reset();
-    if (name == "alpha")
-      scene = std::make_unique<Alpha>();
-    else
-      scene = std::make_unique<Socket>();
-    held = name;
-  }
-  return *scene;
 }
 
 // ---- load on both cores, while in scope
@@ -217,9 +109,84 @@ struct Times {
   }
 };
 
-void print_late(const h6FrameRecord& row) {
+bool asked_for_late() {
   static const bool asked = std::getenv("HAPSIX_BENCH_LATE") != nullptr;
-  if (!asked || row.late == 0) return;
+  return asked;
+}
+
+// What all cores together had stolen from them, as far as the machine says so; in ticks of 10 ms.
+long stolen_ticks() {
+  long cpu[8] = {};
+  if (std::FILE* file = std::fopen("/proc/stat", "r")) {
+    const int got = std::fscanf(file, "cpu %ld %ld %ld %ld %ld %ld %ld %ld", &cpu[0], &cpu[1],
+                                &cpu[2], &cpu[3], &cpu[4], &cpu[5], &cpu[6], &cpu[7]);
+    if (got != 8) cpu[7] = 0;
+    std::fclose(file);
+  }
+  return cpu[7];
+}
+
+// A hand that notes, at the beginning of a frame, what may make it long: page faults since the one
+// before it, and how fast the core computes in registers.
+struct NotingHand {
+  struct Note {
+    long faults = 0;
+    double speed_us = 0;
+  };
+  h6Device inner{};
+  double rate = 0;
+  std::vector<Note> notes;  // room for all frames
+
+  h6Device device() {
+    h6Device device = inner;
+    device.self = this;
+    device.read = [](void* self, double time, h6DeviceSample* out) {
+      auto& hand = *static_cast<NotingHand*>(self);
+      const auto frame = static_cast<std::size_t>(time * hand.rate + 0.5);
+      if (frame < hand.notes.size()) hand.notes[frame] = take();
+      return hand.inner.read(hand.inner.self, time, out);
+    };
+    device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+    return device;
+  }
+  static Note take() {
+    rusage usage{};
+    getrusage(RUSAGE_THREAD, &usage);
+    const std::int64_t start = sched::now_ns();
+    std::uint32_t x = 1;
+    for (int i = 0; i < 500; ++i) {
+      x = x * 1664525u + 1013904223u;
+      benchmark::DoNotOptimize(x);
+    }
+    return {usage.ru_minflt + usage.ru_majflt, 1e-3 * static_cast<double>(sched::now_ns() - start)};
+  }
+};
+
+// What is kept of each frame, to step it again.
+struct Stepped {
+  h6DeviceSample hand;
+  std::uint64_t hash;
+  std::uint32_t pairs, points;
+  bool own;  // counted as late by its own work
+  double again_us = 0;
+};
+
+// All frames once more, on one thread, in virtual time: the same bits. Those that were late by
+// their own work, as the thread's CPU time has it, find cold caches this time and are timed by the
+// same clock: what they take now is their work, and the rest was the machine's.
+bool same_again(Scene& scene, double rate, std::vector<Stepped>& frames) {
+  const Session session = scene.session(rate, 1, false);
+  for (Stepped& frame : frames) {
+    const std::int64_t before = sched::thread_cpu_ns();
+    h6SetCoarse(session.get(), frame.pairs, frame.points);
+    h6Step(session.get(), &frame.hand, nullptr);
+    frame.again_us = 1e-3 * static_cast<double>(sched::thread_cpu_ns() - before);
+    if (h6GetFrame(session.get()).state_hash != frame.hash) return false;
+  }
+  return !frames.empty();
+}
+
+void print_late(const h6FrameRecord& row, const NotingHand& hand, double again_us) {
   const h6FrameReport& r = row.report;
   const char* why = row.late & H6_LATE_COMPUTE  ? "own"
                     : row.late & H6_LATE_STOLEN ? "stolen"
@@ -228,21 +195,16 @@ void print_late(const h6FrameRecord& row) {
                "frame %llu late by %.0f us (%s): wake-up %.0f wall %.0f cpu %.0f us, %u contacts "
                "of %u in 16 points;",
                static_cast<unsigned long long>(r.frame), row.late_us, why, row.wakeup_us,
-               r.frame_us, row.cpu_us, r.contacts, r.coarse_points ? r.coarse_points : 16u);
+               r.frame_us, row.cpu_us, r.contacts, r.coarse_pairs ? r.coarse_points : 16u);
   for (int i = 0; i < H6_STAGE_COUNT; ++i)
     std::fprintf(stderr, " %s %.0f", h6StageName(static_cast<h6Stage>(i)), r.stage_us[i]);
-  std::fprintf(stderr, "; helper %.0f us in %u slices\n", r.helper_us, r.helper_slices);
-}
-
-// The first frames once more, on one thread, in virtual time.
-bool same_again(Scene& scene, double rate, const std::vector<h6FrameRecord>& rows) {
-  const Session session = scene.session(rate, 1, false);
-  for (const h6FrameRecord& row : rows) {
-    h6SetCoarse(session.get(), row.report.coarse_pairs, row.report.coarse_points);
-    h6Step(session.get(), row.hand, nullptr);
-    if (h6GetFrame(session.get()).state_hash != row.report.state_hash) return false;
-  }
-  return !rows.empty();
+  std::fprintf(stderr, "; helper %.0f us in %u slices;", r.helper_us, r.helper_slices);
+  const std::size_t n = r.frame;
+  if (n + 1 < hand.notes.size())
+    std::fprintf(stderr, " %ld page faults, arithmetic %.2f and %.2f us;",
+                 hand.notes[n + 1].faults - hand.notes[n].faults, hand.notes[n].speed_us,
+                 hand.notes[n + 1].speed_us);
+  std::fprintf(stderr, " again %.0f us\n", again_us);
 }
 
 // What one writes first: a thread that sleeps until the next tick.
@@ -256,7 +218,8 @@ std::uint64_t plain_thread(Scene& scene, double rate, double seconds, Times& tim
     };
     const auto period = std::chrono::nanoseconds(static_cast<long>(1e9 / rate));
     auto next = Clock::now() + period;
-    for (int i = 0; i < static_cast<int>(seconds * rate); ++i, next += period) {
+    const auto last = next + std::chrono::nanoseconds(static_cast<long>(1e9 * seconds));
+    for (int i = 0; next < last; ++i, next += period) {
       std::this_thread::sleep_until(next);
       const auto start = Clock::now();
       h6DeviceSample sample{};
@@ -281,32 +244,67 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
     h6LoopDef def = h6DefaultLoopDef();
     def.duration = seconds, def.spin_us = spin_us;
     def.ring_frames = 4096;
-    const h6Device device = scene.hand();
+    NotingHand noting{scene.hand(), rate, {}};
+    if (asked_for_late()) noting.notes.resize(static_cast<std::size_t>(seconds * rate) + 1);
+    const h6Device device = asked_for_late() ? noting.device() : noting.inner;
     h6Error error{};
     const Loop loop(h6StartLoop(session.get(), &device, &def, &error));
     if (!loop) return state.SkipWithError(error.message);
     Times times;
-    double contacts = 0;
-    std::vector<h6FrameRecord> rows(256), first;
+    double contacts = 0, missed = 0, period_us = 1e6 / rate;
+    std::vector<h6FrameRecord> rows(256), late;
+    std::vector<Stepped> stepped;
+    std::vector<bool> robbed;  // each frame: something was stolen in it, or about its time
+    std::uint64_t few = 0;
+    long ticks = stolen_ticks();
+    bool had_stolen = false;
     for (bool more = true; more;) {
       more = h6LoopRunning(loop.get());
+      const long now = stolen_ticks();
+      const bool stolen = now != ticks;
+      ticks = now;
       while (const std::size_t n = h6ReadRecords(loop.get(), rows.data(), rows.size()))
         for (std::size_t i = 0; i < n; ++i) {
-          times.add(rows[i].wakeup_us, rows[i].report.frame_us);
-          print_late(rows[i]);
-          contacts += rows[i].report.contacts;
-          if (rows[i].report.frame == first.size() && first.size() < 1000) first.push_back(rows[i]);
+          const h6FrameRecord& row = rows[i];
+          const h6FrameReport& r = row.report;
+          times.add(row.wakeup_us, r.frame_us);
+          robbed.push_back(stolen || had_stolen || r.frame_us > row.cpu_us + 2);
+          if (row.late != 0 && asked_for_late()) late.push_back(row);
+          contacts += r.contacts;
+          few += r.coarse_pairs > 0 && r.coarse_points == 0;
+          missed = std::max(missed, r.missed_depth_voxels);
+          stepped.push_back({row.hand[0], r.state_hash, r.coarse_pairs, r.coarse_points,
+                             (row.late & H6_LATE_COMPUTE) != 0});
         }
+      had_stolen = stolen;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     const h6LoopReport result = h6JoinLoop(loop.get());
     Times plain;
     const std::uint64_t plain_late = plain_thread(scene, rate, seconds / 6, plain);
     contacts /= static_cast<double>(times.total.size());
-    if (!same_again(scene, rate, first)) return state.SkipWithError("bits differ the second time");
+    if (result.ring_overruns == 0 && !same_again(scene, rate, stepped))
+      return state.SkipWithError("bits differ the second time");
+    for (const h6FrameRecord& row : late)
+      print_late(row, noting, stepped[std::min(row.report.frame, stepped.size() - 1)].again_us);
     // In the first seconds the alpha's hand is still free.
     if (seconds >= 10 && contacts < scene.least_contacts())
       return state.SkipWithError("too few contacts");
+    std::vector<double> kept;
+    for (std::size_t i = 0; i < robbed.size(); ++i)
+      if (!robbed[i]) kept.push_back(times.wakeup[i]);
+    state.counters["unstolen_frames"] = static_cast<double>(kept.size());
+    report(state, "unstolen_wakeup", kept);
+    double again_us = 0, late_again = 0;
+    for (const Stepped& frame : stepped)
+      if (frame.own) {
+        again_us = std::max(again_us, frame.again_us);
+        late_again += frame.again_us > period_us;
+      }
+    state.counters["late_compute_again"] = late_again;
+    state.counters["again_max_us"] = again_us;
+    state.counters["few"] = static_cast<double>(few);
+    state.counters["missed_voxels"] = missed;
     times.tell(state, "");
     plain.tell(state, "plain_");
     state.counters["contacts"] = contacts;
