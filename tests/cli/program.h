@@ -26,6 +26,8 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/sanitized.h"
+
 namespace h6::test {
 
 namespace fs = std::filesystem;
@@ -142,9 +144,7 @@ class Process {
   }
   // Its end, or SIGKILL after `limit` seconds; ThreadSanitizer has ten times as long.
   Ended wait(double limit = 30) {
-#if defined(__SANITIZE_THREAD__)
-    limit *= 10;
-#endif
+    if (kThreadSanitized) limit *= 10;
     Ended ended;
     const auto begun = Clock::now();
     int status = 0;

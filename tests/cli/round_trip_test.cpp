@@ -4,6 +4,7 @@
 #include <string>
 
 #include "tests/cli/program.h"
+#include "tests/support/sanitized.h"
 
 using namespace h6::test;
 
@@ -13,9 +14,16 @@ TEST_CASE("an exported scene runs like the scene it came from") {
   for (const Json& scene : list["scenes"]) {
     const std::string name = scene["name"];
     CAPTURE(name);
-    const Json named = result_of(box, {"run", name, "--virtual-time"});
+    // Minutes each, and their bakes' threads are seen at work on smaller meshes.
+    if (kSanitized && (name == "engine-bay" || name == "landing-gear")) continue;
+    const auto run_of = [&](const std::string& what) {
+      Args args{"run", what, "--virtual-time"};
+      if (kThreadSanitized) args.insert(args.end(), {"--duration", "0.2"});
+      return result_of(box, args);
+    };
+    const Json named = run_of(name);
     REQUIRE(run(box, {"scene", "export", name, name}).code == 0);
-    const Json exported = result_of(box, {"run", name + "/scene.json", "--virtual-time"});
+    const Json exported = run_of(name + "/scene.json");
     CHECK(exported["verdict"] == named["verdict"]);
     CHECK(exported["frames"] == named["frames"]);
     // Meshes go through single precision: the last digits may move, and with them a contact.

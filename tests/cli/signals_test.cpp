@@ -10,16 +10,13 @@
 #include <thread>
 
 #include "tests/cli/program.h"
+#include "tests/support/sanitized.h"
 
 using namespace h6::test;
 
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kSlower = 15;
-#else
-constexpr double kSlower = 1;
-#endif
+constexpr double kSlower = kSanitized ? 15 : 1;
 
 void pause_seconds(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
 

@@ -9,16 +9,13 @@
 #include <vector>
 
 #include "tests/cli/program.h"
+#include "tests/support/sanitized.h"
 
 using namespace h6::test;
 
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kSlower = 15;
-#else
-constexpr double kSlower = 1;
-#endif
+constexpr double kSlower = kSanitized ? 15 : 1;
 
 // What holds for every mistake; `words` must be in the sentence.
 void check_refusal(const Ended& ended, int code, const std::vector<std::string>& words) {

@@ -19,14 +19,9 @@
 #include <vector>
 
 #include "tests/device/spacemouse_samples.h"
+#include "tests/support/sanitized.h"
 
 namespace h6::test {
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr bool kSanitized = true;
-#else
-inline constexpr bool kSanitized = false;
-#endif
 
 // Only what is used, as umockdev.h declares it; GError is not looked into.
 struct Umockdev {

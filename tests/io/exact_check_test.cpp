@@ -16,6 +16,7 @@
 #include "io/bake_plan.h"
 #include "io/ray_votes.h"
 #include "tests/io/field_check.h"
+#include "tests/support/sanitized.h"
 
 using namespace field_check;
 using namespace h6::io;
@@ -75,7 +76,7 @@ TEST_CASE("distances by Embree are exact in double: near, far, far from the orig
     const auto rays = rays_at(mesh);
     const Judge judge(mesh);
     Random random(5);
-    for (int i = 0; i < 3000; ++i) {
+    for (int i = 0; i < h6::test::repeated(3000, 300); ++i) {
       const double reach = i % 3 == 0 ? 30 : 1.2;
       const Vec3 p = by + reach * Vec3{random(-1, 1), random(-1, 1), random(-1, 1)};
       const double truth = judge.distance(p), found = rays->distance(p);
@@ -89,7 +90,7 @@ TEST_CASE("a ray meets every triangle of its way, in order, and the first one at
   const auto rays = rays_at(mesh);
   Random random(7);
   std::vector<Crossing> way;
-  for (int i = 0; i < 500; ++i) {
+  for (int i = 0; i < h6::test::repeated(500, 100); ++i) {
     Dice dice(1, std::uint64_t(i));
     const Vec3 along = dice.direction();
     CHECK(norm(along) > 0.999999);

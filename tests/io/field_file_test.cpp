@@ -20,14 +20,11 @@
 #include "io/field_file.h"
 #include "io/file_seal.h"
 #include "tests/io/field_check.h"
+#include "tests/support/sanitized.h"
 
 // OpenVDB allocates by the length of a compressed block; a damaged one is a bad_alloc that
 // read_field catches, but this sanitizer ends the program instead of throwing.
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool kHugeAllocationsThrow = false;
-#else
-constexpr bool kHugeAllocationsThrow = true;
-#endif
+constexpr bool kHugeAllocationsThrow = !h6::test::kAddressSanitized;
 
 using namespace field_check;
 using namespace h6::io;
@@ -103,7 +100,8 @@ FieldData scattered(int bricks) {
   f.brick_index.assign(n * n * n, -1);
   for (std::size_t c = 0; c < f.brick_index.size(); ++c)
     if (c % n % 16 == 5 && c / n % n % 16 == 15 && c / n / n % 16 == 0)
-      f.brick_index[c] = std::int32_t(f.samples.size() / 512), f.samples.resize(f.samples.size() + 512);
+      f.brick_index[c] = std::int32_t(f.samples.size() / 512),
+      f.samples.resize(f.samples.size() + 512);
   Random random(3);
   for (float& v : f.samples) v = float(random(-2e-3, 2e-3));
   f.far_grid.resize((n + 1) * (n + 1) * (n + 1));
@@ -254,8 +252,7 @@ TEST_CASE("field_file: a field of another version of the format is refused, and 
   REQUIRE(write_field(file, baked(), Compression::none));
   const openvdb::GridPtrVec grids = read_with_openvdb(file);
   for (const auto& grid : grids)
-    if (grid->getName() == "distance")
-      grid->insertMeta("hapsix_format", openvdb::Int32Metadata(1));
+    if (grid->getName() == "distance") grid->insertMeta("hapsix_format", openvdb::Int32Metadata(1));
   openvdb::io::File out(file.string());
   out.write(grids);
   out.close();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "kernels/targets.h"
+#include "tests/support/sanitized.h"
 
 namespace h6::kernels::test {
 
@@ -42,10 +43,8 @@ class Random {
 inline std::vector<std::string> all_targets() {
   const char* names[32];
   const std::size_t count = supported_targets(names, 32);
-#if defined(__SANITIZE_THREAD__)
-  // What they share is the same in all of them, and each takes a hundred times as long.
-  if (count > 2) return {names[0], names[count - 1]};
-#endif
+  // What they share is the same in all of them.
+  if (h6::test::kThreadSanitized && count > 2) return {names[0], names[count - 1]};
   return {names, names + count};
 }
 

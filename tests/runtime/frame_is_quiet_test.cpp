@@ -25,6 +25,7 @@
 
 #include "hapsix/hapsix.h"
 #include "tests/support/ball_in_bowl.h"
+#include "tests/support/sanitized.h"
 
 namespace {
 // Counted on the stepping thread only, the test runner may do as it likes; or on all of them.
@@ -288,12 +289,7 @@ TEST_CASE("ten thousand frames call neither allocator, lock nor system, on one t
 
 namespace {
 
-// ThreadSanitizer makes each frame a hundred times as long.
-#if defined(__SANITIZE_THREAD__)
-constexpr int kFrames = 16;
-#else
-constexpr int kFrames = 60;
-#endif
+constexpr int kFrames = repeated(60, 16);
 
 void check_same_bits(BallInBowl& one, BallInBowl& two, int frames, std::uint32_t touching) {
   one.open();
