@@ -18,6 +18,11 @@ namespace {
 
 constexpr double kSlower = kSanitized ? 15 : 1;
 
+// Work that takes long, however it is built.
+const std::string kVoxels = kThreadSanitized ? "640" : "2048";
+const std::string kPoints = kThreadSanitized ? "300000" : "2000000";
+constexpr std::size_t kTriangles = repeated(2'000'000, 300'000);
+
 void pause_seconds(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
 
 // A pseudo terminal; what was written to it can be read once all its writers are gone.
@@ -106,7 +111,7 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
   const std::set<std::string> before = box.files();
   for (const double seconds : {0.3, 1.2}) {
     Process process(box,
-                    {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "2048", "--json"});
+                    {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", kVoxels, "--json"});
     REQUIRE(soon([&] { return process.handles(SIGINT); }, 20));
     pause_seconds(seconds);
     process.send(SIGINT);
@@ -118,7 +123,8 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
   }
   // The same bake on its way into the cache.
   spill(box.file("scene.json"), R"({"hapsix": 1, "units": "m", "bodies": [
-    {"name": "ball", "fixed": true, "field": {"mesh": "ball.stl", "voxels": 2048}}]})");
+    {"name": "ball", "fixed": true, "field": {"mesh": "ball.stl", "voxels": )" +
+                                    kVoxels + "}}]}");
   Process process(box, {"run", "scene.json"});
   REQUIRE(soon([&] { return process.handles(SIGINT); }, 20));
   pause_seconds(1);
@@ -156,18 +162,18 @@ TEST_CASE("Ctrl-C ends bakes of fields and of millions of points within half a s
   Sandbox box;
   spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
   for (const double after : {0.2, 0.9}) {
-    check_interrupted(box, {"bake", "field", "-o", "ball.vdb", "--voxels", "2048", "ball.stl"},
+    check_interrupted(box, {"bake", "field", "-o", "ball.vdb", "--voxels", kVoxels, "ball.stl"},
                       after);
-    check_interrupted(box, {"bake", "shell", "-o", "ball.ply", "--points", "2000000", "ball.stl"},
+    check_interrupted(box, {"bake", "shell", "-o", "ball.ply", "--points", kPoints, "ball.stl"},
                       after);
   }
 }
 
 TEST_CASE("Ctrl-C ends the reading of a large mesh within half a second") {
   Sandbox box;
-  // Two million triangles, every corner another one.
+  // Every corner another one.
   std::string bytes(80, '\0');
-  const std::uint32_t count = 2'000'000;
+  const auto count = static_cast<std::uint32_t>(kTriangles);
   bytes.append(reinterpret_cast<const char*>(&count), 4);
   bytes.resize(84 + 50 * std::size_t{count});
   for (std::size_t t = 0; t < count; ++t)
@@ -187,7 +193,7 @@ TEST_CASE("a second Ctrl-C does not wait") {
   Sandbox box;
   spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
   const std::set<std::string> before = box.files();
-  Process process(box, {"bake", "shell", "ball.stl", "-o", "ball.ply", "--points", "5000000"});
+  Process process(box, {"bake", "shell", "ball.stl", "-o", "ball.ply", "--points", kPoints});
   pause_seconds(0.7);
   process.send(SIGINT);
   pause_seconds(0.05);
@@ -227,7 +233,7 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
     // A bake tells the same: a share that only grows, and an estimate.
     Terminal terminal;
     spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
-    Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "2048"}, "",
+    Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", kVoxels}, "",
                     dup(terminal.theirs));
     pause_seconds(2.5 * std::min(kSlower, 4.0));
     process.send(SIGINT);
