@@ -6,6 +6,8 @@
 //
 // No allocation, lock, print, exception or wait in here or below; slices of work may run on the
 // helper of `team`, joined in index order: any number of threads gives the same bits.
+#include <algorithm>
+
 #include "kernels/contact_columns.h"
 #include "runtime/net_stiffness.h"
 #include "runtime/stages.h"
@@ -17,17 +19,21 @@ namespace {
 
 constexpr std::int64_t kRest = 50000;  // ns between frames from which others have used the caches
 
-// A stage begins where the one before it ended: one reading of the clock each, not two.
+// A stage begins where the one before it ended: one reading each, not two.
 struct Stopwatch {
   h6Session& s;
-  std::int64_t last;
+  std::int64_t last;  // [ticks]
+
+  double ns_since(std::int64_t begin) const {
+    return static_cast<double>(std::max<std::int64_t>(last - begin, 0)) * s.tick_length.ns();
+  }
 
   template <class F>
   void timed(h6Stage stage, F&& work) {
     work();
-    const std::int64_t now = sched::now_ns();
-    s.report.stage_us[stage] += 1e-3 * static_cast<double>(now - last);
-    last = now;
+    const std::int64_t begin = last;
+    last = sched::ticks();
+    s.report.stage_us[stage] += 1e-3 * ns_since(begin);
   }
 };
 
@@ -68,7 +74,7 @@ void note_depths(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
 // One shell body against all it can touch, up to the sums over its contacts: whoever weighed them
 // has them in his cache.
 void weigh_shell(h6Session& s, std::size_t first, std::size_t end) {
-  Stopwatch watch{s, sched::now_ns()};
+  Stopwatch watch{s, sched::ticks()};
   watch.timed(H6_STAGE_TRAVERSE, [&] { traverse(s, first, end); });
   const std::int64_t since = watch.last;
   watch.timed(H6_STAGE_CONTACTS, [&] {
@@ -77,7 +83,7 @@ void weigh_shell(h6Session& s, std::size_t first, std::size_t end) {
   });
   watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(s, first, end); });
   // Contacts too: their columns come back from the helper's cache.
-  s.weighing.took(static_cast<double>(watch.last - since));
+  s.weighing.took(watch.ns_since(since));
   if (s.contact.method == H6_METHOD_SERIES) return;
   watch.timed(H6_STAGE_WRENCH, [&] {
     for (std::size_t p = first; p < end; ++p) sum_contacts(s, s.pairs[p]);
@@ -114,11 +120,12 @@ void note_helper(h6Session& s, std::int64_t start) {
 
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands) {
   const sched::FlushDenormals flush;
-  const std::int64_t start = sched::now_ns();
+  const std::int64_t start_ticks = sched::ticks(), start = sched::now_ns();
+  s.tick_length.see(start, start_ticks);
   s.team->begin_frame(start);
   begin(s, samples, start);
   weigh_shells(s);
-  Stopwatch watch{s, sched::now_ns()};
+  Stopwatch watch{s, sched::ticks()};
   watch.timed(H6_STAGE_WRENCH, [&] {
     for (std::size_t i = 0; i < s.shell_count; ++i)
       add_shell(s, s.shell_pairs[i], s.shell_pairs[i + 1]);
@@ -143,9 +150,10 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   s.report.passivity_energy = least_energy(s);
   s.report.state_hash = state_hash(s, samples);
   note_helper(s, start);
-  const std::int64_t now = sched::now_ns();
-  s.report.frame_us = 1e-3 * static_cast<double>(now - start);
-  s.left_at = now;
+  watch.last = sched::ticks();
+  const double took = watch.ns_since(start_ticks);
+  s.report.frame_us = 1e-3 * took;
+  s.left_at = start + static_cast<std::int64_t>(took);
   s.team->end_frame(start + static_cast<std::int64_t>(1e9 * s.dt));
   return s.report.status;
 }

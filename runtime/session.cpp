@@ -317,6 +317,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   } catch (const std::exception& e) {  // threads, small tables
     fail(error, "the session could not be made: %s", e.what());
   }
+  s->tick_length.see(sched::now_ns(), sched::ticks());
   if (ready) return s;
   h6DestroySession(s);
   return nullptr;

@@ -12,6 +12,7 @@
 #include "runtime/safety.h"
 #include "runtime/share_gate.h"
 #include "runtime/shell_lanes.h"
+#include "sched/clock.h"
 #include "sched/frame_team.h"
 
 namespace h6 {
@@ -101,7 +102,7 @@ struct Pair {
   std::size_t sampled = 0;                       // groups, when it was last traversed
   std::size_t open_blocks = 0, open_groups = 0;  // near, when groups were last looked at
   CullBypass cull_blocks, cull_groups;
-  CullBypass look_at_rows;  // of points, by themselves
+  CullBypass look_at_rows;       // of points, by themselves
   int found_by = 0;              // whose scratch holds its candidates
   float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
@@ -204,6 +205,7 @@ struct h6Session {
   h6::Anytime anytime;
   h6FrameReport report{};
   std::uint64_t frame = 0;
+  h6::sched::TickLength tick_length;
   std::int64_t left_at = 0;  // when the last frame ended, by the clock [ns]
   bool rested = false;       // that was long before this one: caches are cold
   h6::sched::FrameTeam* team = nullptr;

@@ -104,14 +104,9 @@ void sum_contacts(h6Session& s, Pair& pair) {
 }
 
 void add_wrench(h6Session& s, Pair& pair) {
-  pair.Kab.setZero();
-  pair.Kba.setZero();
-  pair.Dab.setZero();
-  pair.Dba.setZero();
+  if (pair.begin != pair.end) return spread_wrench(s, pair, pair.sum);
+  for (Mat6* block : {&pair.Kab, &pair.Kba, &pair.Dab, &pair.Dba, &pair.B}) block->setZero();
   pair.f.setZero();
-  pair.B.setZero();
-  if (pair.begin == pair.end) return;
-  spread_wrench(s, pair, pair.sum);
 }
 
 }  // namespace h6

@@ -6,7 +6,6 @@
 #include "runtime/traverse_pair.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -244,6 +243,14 @@ void choose_rows(const Pair& pair, TraverseScratch& t, const Search& search, std
   }
 }
 
+// A call to the library, where the processor is not known to have an instruction for it.
+std::size_t bits_of(unsigned rows) {
+  rows -= rows >> 1 & 0x5555u;
+  rows = (rows & 0x3333u) + (rows >> 2 & 0x3333u);
+  rows = (rows + (rows >> 4)) & 0x0f0fu;
+  return (rows + (rows >> 8)) & 0x1fu;
+}
+
 // When groups that were sampled may touch again, and which of their points are near.
 void note_groups(Pair& pair, const TraverseScratch& t, const Search& search, std::size_t groups,
                  float now) {
@@ -268,7 +275,7 @@ void note_groups(Pair& pair, const TraverseScratch& t, const Search& search, std
       pair.near_rows[g] = t.clearance[k] < kFarGroup ? t.near_rows[k] : 0;
       pair.rest_expiry[g] = until(t.rest[k]);
     }
-    near += static_cast<std::size_t>(std::popcount(pair.near_rows[g]));
+    near += bits_of(pair.near_rows[g]);
     pair.group_expiry[g] = std::min(until(t.clearance[k]), pair.rest_expiry[g]);
   }
   pair.look_at_rows.learn(kGroupRows * groups, near);
