@@ -199,7 +199,6 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   s.block_expiry = arena.take<float>(n.all_blocks);
   s.rest_expiry = arena.take<float>(n.all_groups);
   s.near_rows = arena.take<std::uint16_t>(n.all_groups);
-  s.scratch_depth = arena.take<float>(s.candidate_capacity);
   const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
   s.cluster_order = arena.take<std::uint32_t>(merged);
   s.cluster_root = arena.take<std::uint32_t>(merged);
@@ -211,8 +210,8 @@ void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
   s.shell_pairs = arena.take<std::uint32_t>(n.shells + 1);
   if (!n.lanes) return;
   s.lanes = arena.take<h6Session>(2);
-  s.lane_scratch = {arena.take<float>(s.candidate_capacity), arena.take<std::uint32_t>(merged),
-                    arena.take<std::uint32_t>(merged), arena.take<std::uint64_t>(merged),
+  s.lane_scratch = {arena.take<std::uint32_t>(merged), arena.take<std::uint32_t>(merged),
+                    arena.take<std::uint64_t>(merged),
                     weighing ? arena.take<char>(weighing) : nullptr};
 }
 

@@ -186,7 +186,6 @@ struct h6Session {
   float *group_expiry = nullptr, *block_expiry = nullptr;  // of all pairs
   std::uint16_t* near_rows = nullptr;
   float* rest_expiry = nullptr;
-  float* scratch_depth = nullptr;  // to find the deepest
   std::size_t candidate_capacity = 0;
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;  // (max_contacts)
   std::uint64_t* cluster_cell = nullptr;                            // (max_contacts)

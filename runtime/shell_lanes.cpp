@@ -49,7 +49,6 @@ void open_lanes(h6Session& s) {
     lane.traversal[1] = {};
   }
   h6Session& second = s.lanes[1];
-  second.scratch_depth = s.lane_scratch.depth;
   second.cluster_order = s.lane_scratch.cluster_order;
   second.cluster_root = s.lane_scratch.cluster_root;
   second.cluster_cell = s.lane_scratch.cluster_cell;

@@ -15,7 +15,6 @@ namespace h6 {
 // Scratch of the second lane; the first one has the session's. What a session gets in scratch that
 // traversal, contacts or weights write to, it gets here too.
 struct LaneScratch {
-  float* depth = nullptr;  // (candidate_capacity)
   std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;
   std::uint64_t* cluster_cell = nullptr;
   char* weigh = nullptr;

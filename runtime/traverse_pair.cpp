@@ -17,24 +17,6 @@
 
 namespace h6 {
 
-kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
-                               const Field& field) {
-  const Mat3 m = b.R.transpose() * a.R / field.voxel;
-  const Vec3 b_mesh = b.x - b.R * b.com;  // origin of b's mesh frame in the world
-  const Vec3 centre = a.x + a.R * (shell.centre - a.com);
-  const Vec3 t = (b.R.transpose() * (centre - b_mesh) - field.origin) / field.voxel;
-  kernels::Affine affine;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
-    affine.m[r][3] = static_cast<float>(t[r]);
-  }
-  return affine;
-}
-
-float margin_of(const h6Session& s) {
-  return s.contact.method == H6_METHOD_SERIES ? static_cast<float>(s.contact.margin_voxels) : 0.0f;
-}
-
 kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at) {
   return {t.candidate + at, t.candidate_distance + at, t.gradient_x + at, t.gradient_y + at,
           t.gradient_z + at};
@@ -52,6 +34,26 @@ void move_candidates(const TraverseScratch& to, std::size_t to_row, const Traver
 }
 
 namespace {
+
+// Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
+kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
+                               const Field& field) {
+  const Mat3 m = b.R.transpose() * a.R / field.voxel;
+  const Vec3 b_mesh = b.x - b.R * b.com;  // origin of b's mesh frame in the world
+  const Vec3 centre = a.x + a.R * (shell.centre - a.com);
+  const Vec3 t = (b.R.transpose() * (centre - b_mesh) - field.origin) / field.voxel;
+  kernels::Affine affine;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
+    affine.m[r][3] = static_cast<float>(t[r]);
+  }
+  return affine;
+}
+
+// `series` needs the points that are about to touch. [voxel]
+float margin_of(const h6Session& s) {
+  return s.contact.method == H6_METHOD_SERIES ? static_cast<float>(s.contact.margin_voxels) : 0.0f;
+}
 
 constexpr float kSlack = 1e-3f;        // [voxel]
 constexpr std::size_t kFewGroups = 4;  // of a block: looked at sooner than the block's sphere

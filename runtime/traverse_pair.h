@@ -21,10 +21,4 @@ kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);
 void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
                      std::size_t from_row, std::size_t count);
 
-// Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
-kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
-                               const Field& field);
-// `series` needs the points that are about to touch. [voxel]
-float margin_of(const h6Session& s);
-
 }  // namespace h6
