@@ -195,7 +195,7 @@ TEST_CASE(
     Random random(10);
     const double h = 1.0 / 64;
     int near = 0, far = 0, outside = 0, turned = 0;
-    for (int i = 0; i < h6::test::repeated(4000, 1000); ++i) {
+    for (int i = 0; i < h6::test::repeated(4000, 2000); ++i) {
       const double q[3] = {random.uniform(-20, 147), random.uniform(-20, 155),
                            random.uniform(-20, 163)};
       double c[3];
@@ -249,7 +249,7 @@ TEST_CASE("sample_field: the distance is continuous across the faces between bri
   on_every_target([&](const std::string&) {
     Random random(12);
     int crossings = 0;
-    for (int i = 0; i < h6::test::repeated(4000, 1000); ++i) {
+    for (int i = 0; i < h6::test::repeated(4000, 2000); ++i) {
       double a[3] = {random.uniform(1, 126), random.uniform(1, 134), random.uniform(1, 142)};
       const int axis = i % 3;
       a[axis] = 8 * std::max(1.0, std::floor(a[axis] / 8));
@@ -271,7 +271,7 @@ TEST_CASE(
   on_every_target([&](const std::string&) {
     Random random(14);
     int tested = 0;
-    for (int i = 0; i < h6::test::repeated(3000, 1000); ++i) {
+    for (int i = 0; i < h6::test::repeated(3000, 2000); ++i) {
       const Point p{random.uniform(-200, 330), random.uniform(-200, 330),
                     random.uniform(-200, 330)};
       const double ox = p.x - std::clamp(p.x, 0.0, field.last(0));
