@@ -416,7 +416,7 @@ TEST_CASE("bake_field: every cell nearer than the band to the zero set has all i
     const Judge judge(mesh);
     Random random(3);
     std::size_t missing = 0, near = 0;
-    for (int i = 0; i < h6::test::repeated(60000, 3000); ++i) {
+    for (int i = 0; i < h6::test::repeated(60000, 15000); ++i) {
       const Vec3 p = field.origin + Vec3{random(0, 8 * field.bricks[0] - 1) * field.voxel_size,
                                          random(0, 8 * field.bricks[1] - 1) * field.voxel_size,
                                          random(0, 8 * field.bricks[2] - 1) * field.voxel_size};
