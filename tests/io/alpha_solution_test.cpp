@@ -16,6 +16,7 @@
 #include "io/scenes/shapes.h"
 #include "io/verdict.h"
 #include "tests/support/near.h"
+#include "tests/support/sanitized.h"
 
 using namespace h6;
 using namespace h6::io;
@@ -176,7 +177,8 @@ TEST_CASE(
   MESSAGE("least distance of the tubes: " << tightest / kMm << " mm");
 }
 
-TEST_CASE("the meshes' own distance, triangle by triangle, is no less than the tubes'") {
+TEST_CASE("the meshes' own distance, triangle by triangle, is no less than the tubes'" *
+          doctest::skip(h6::test::kThreadSanitized)) {
   const Scene scene = solution();
   const Mesh& mesh = *scene.bodies[0].field->mesh_data;
   const std::vector<h6Vec3> chain = chain_of(mesh);
@@ -207,7 +209,8 @@ TEST_CASE("hooked at the start, as the shortcut's alphas are, and not at the end
   CHECK(length(path.back().pose.p) > 149 * kMm);
 }
 
-TEST_CASE("no point of the tool moves faster than 60 mm/s, and the hand's velocity never jumps") {
+TEST_CASE("no point of the tool moves faster than 60 mm/s, and the hand's velocity never jumps" *
+          doctest::skip(h6::test::kThreadSanitized)) {
   const Scene scene = solution();
   const Mesh& mesh = *scene.bodies[0].field->mesh_data;
   const Path& path = scene.hands.front().path;
