@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "tests/cli/program.h"
+#include "tests/support/sanitized.h"
 
 using namespace h6::test;
 
@@ -65,7 +66,8 @@ TEST_CASE("the same experiment gives the same figures, and -o writes a report an
   CHECK(info["whole"] == true);
 }
 
-TEST_CASE("studies say what they measured for every method") {
+// Minutes under ThreadSanitizer, and nothing that the others do not show it.
+TEST_CASE("studies say what they measured for every method" * doctest::skip(kThreadSanitized)) {
   Sandbox box;
   const Json result = result_of(box, {"experiments", "plate-share", "smoothness", "net-stiffness"});
   CHECK(result["scenes"].empty());
@@ -97,7 +99,8 @@ TEST_CASE("studies say what they measured for every method") {
   CHECK(wall["robust"]["derivative"].get<double>() < 5);
 }
 
-TEST_CASE("two inclined planes are as stiff as their normals say, whatever the weights") {
+TEST_CASE("two inclined planes are as stiff as their normals say, whatever the weights" *
+          doctest::skip(kThreadSanitized)) {
   Sandbox box;
   const Json planes = result_of(box, {"experiments", "two-planes"})["studies"]["two-planes"];
   CHECK(planes["alpha"].size() == 9);
@@ -112,7 +115,8 @@ TEST_CASE("two inclined planes are as stiff as their normals say, whatever the w
   CHECK(std::abs(steep["z"].get<double>() - 0.134) < 0.01);
 }
 
-TEST_CASE("global scaling fails where it is said to, and with less stiffness where it does not") {
+TEST_CASE("global scaling fails where it is said to, and with less stiffness where it does not" *
+          doctest::skip(kThreadSanitized)) {
   Sandbox box;
   const Json found = result_of(box, {"experiments", "global"})["studies"]["global"];
   for (const char* scene : {"cone-in-gap", "rod-between-tubes", "peg-in-hole", "box-over-post"})
