@@ -12,6 +12,7 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/fold-inl.h"
 #include "kernels/tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -101,27 +102,6 @@ HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, s
   hn::Store(sum, d, column + j);
 }
 
-// Adds the sums of four vectors' lanes to to[0..3].
-HWY_INLINE void add_sums(const VF* sum, float* to) {
-  const DF d;
-#if HWY_TARGET == HWY_SCALAR
-  for (std::size_t r = 0; r < kRows; ++r) to[r] += hn::GetLane(hn::SumOfLanes(d, sum[r]));
-#else
-  const auto fold = [&](VF a, VF b) HWY_ATTR {
-    return hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b));
-  };
-  // In every block of four: rows 0 1 2 3.
-  const VF rows = fold(fold(sum[0], sum[2]), fold(sum[1], sum[3]));
-  const hn::CappedTag<float, 4> d4;
-  HWY_ALIGN float blocks[kBandBlock];
-  hn::Store(rows, d, blocks);
-  auto total = hn::Load(d4, blocks);
-  for (std::size_t block = 4; block < kLanes; block += 4)
-    total = hn::Add(total, hn::Load(d4, blocks + block));
-  hn::StoreU(hn::Add(total, hn::LoadU(d4, to)), d4, to);
-#endif
-}
-
 // A group's rows from `i` on, with columns from `j` to `end`.
 HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
                           std::size_t end, float* fresh, float* total) {
@@ -135,7 +115,7 @@ HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, 
   }
   for (; j < HWY_MIN(i + kRows, end); j += kLanes) add_tile<true>(g, width2, i, j, fresh, rows);
   for (; j < end; j += kLanes) add_tile<false>(g, width2, i, j, fresh, rows);
-  add_sums(rows.sum, total + i);
+  add_four_sums(d, rows.sum, total + i);
 }
 
 void sum_pairs(const GaussSweep& sweep, std::size_t part) {

@@ -1,5 +1,5 @@
-// gauss_tree_bench.cpp - density on the Gauss map by the tree and by the sweep, where the flat
-// kernel is quadratic.
+// gauss_tree_bench.cpp - density on the Gauss map by the tree, by the sweep and, of few contacts,
+// by every pair once, where the flat kernel is quadratic.
 //
 // Sets: spread (directions everywhere), clump (as wide as the hats), walls (six, rough, wall by
 // wall, torque directions of arms on them), one-normal (a flat wall), equal.
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench/kernels/kernel_bench.h"
+#include "kernels/gauss_few.h"
 #include "kernels/gauss_sweep.h"
 
 namespace {
@@ -89,7 +90,7 @@ struct Contacts {
   }
 };
 
-enum class Way { tree, sweep, flat };
+enum class Way { tree, sweep, flat, few };
 
 // On the same contacts each, which says where one begins to pay.
 Case make(const std::string& set, std::size_t n, const Rule& rule, Way way) {
@@ -100,6 +101,8 @@ Case make(const std::string& set, std::size_t n, const Rule& rule, Way way) {
   return {[=] {
             if (way == Way::flat) {
               gauss_weights(view, rule.hat, rule.widths, 0, n, c->weight.data());
+            } else if (way == Way::few) {
+              gauss_weights_few(view, rule.hat, rule.widths, c->weight.data());
             } else if (way == Way::sweep) {
               gauss_weights_sweep(view, rule.hat, rule.widths, c->memory.data(), c->weight.data());
             } else {
@@ -119,7 +122,7 @@ const bool registered = [] {
                            Rule{"gauss6", Hat::sum, {0.01f, 0.01f}, false},
                            Rule{"robust", Hat::product, {0.05f, 1.0f}, true}}) {
     for (const char* set : {"spread", "clump", "walls", "one-normal", "equal"}) {
-      for (std::size_t n : {320, 1000, 10000, 100000}) {
+      for (std::size_t n : {50, 64, 90, 120, 320, 1000, 10000, 100000}) {
         const std::string name = std::string(rule.name) + "/" + set + "/n:" + std::to_string(n);
         // The reference takes a minute where contacts are many.
         const bool all = n <= 10000;
@@ -129,6 +132,9 @@ const bool registered = [] {
           add(
               "kernels/gauss_sweep/" + name, n, [=] { return make(set, n, rule, Way::sweep); },
               false);
+        if (n <= kGaussFew)
+          add(
+              "kernels/gauss_few/" + name, n, [=] { return make(set, n, rule, Way::few); }, false);
         if (n <= 1000)
           add(
               "kernels/gauss_flat/" + name, n, [=] { return make(set, n, rule, Way::flat); },
