@@ -142,9 +142,10 @@ class Process {
     return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            info.si_pid == pid_;
   }
-  // Its end, or SIGKILL after `limit` seconds; ThreadSanitizer has ten times as long.
-  Ended wait(double limit = 30) {
-    if (kThreadSanitized) limit *= 10;
+  // Its end, or SIGKILL after `limit` seconds: more than a busy machine takes; ThreadSanitizer has
+  // ten times as long, AddressSanitizer three times.
+  Ended wait(double limit = 100) {
+    if (kSanitized) limit *= kThreadSanitized ? 10 : 3;
     Ended ended;
     const auto begun = Clock::now();
     int status = 0;
