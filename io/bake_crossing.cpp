@@ -70,13 +70,15 @@ constexpr std::int64_t kSide = 8 * kernels::kTileBricks;  // nodes
 using Rows = std::array<std::int32_t, 64>;
 
 // Lines along `axis` through nodes (j, k) of the other two axes. The edge from a node belongs to
-// the node's brick.
+// the node's brick. Which lines meet a triangle cannot be guessed, so none is branched on: those
+// that do are listed first.
 struct Lines {
   std::int64_t first, last;  // that a triangle may meet, along an axis of the tile
 };
-void draw(const Point (&p)[3], std::size_t axis, const std::array<Lines, 3>& lines,
-          const Rows& rows, std::vector<Crossing>& crossings) {
-  const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+template <std::size_t axis>
+void draw(const Point (&p)[3], const std::array<Lines, 3>& lines, const Rows& rows,
+          std::vector<Crossing>& crossings) {
+  constexpr std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
   const auto [j0, j1] = lines[u];
   const auto [k0, k1] = lines[v];
   if (j0 > j1 || k0 > k1) return;
@@ -85,7 +87,6 @@ void draw(const Point (&p)[3], std::size_t axis, const std::array<Lines, 3>& lin
   if (area == 0) return;
   const std::int64_t turn = area > 0 ? 1 : -1;
   area *= turn;
-  const Along along = make_along(p, axis, area);
   std::int64_t line[3], per_j[3], per_k[3];  // barycentric, times area; and from line to line
   for (std::size_t i = 0; i < 3; ++i) {
     const Point &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
@@ -94,25 +95,35 @@ void draw(const Point (&p)[3], std::size_t axis, const std::array<Lines, 3>& lin
     per_j[i] = -dv * kVoxel;
     per_k[i] = du * kVoxel;
   }
-  std::size_t to[3];
-  for (std::int64_t k = k0; k <= k1; ++k) {
-    std::int64_t share[3] = {line[0], line[1], line[2]};
-    for (std::int64_t j = j0; j <= j1; ++j) {
-      if ((share[0] | share[1] | share[2]) >= 0) {
-        const Hit hit = locate(share, along, area);
-        if (hit.node >= 0 && hit.node < kSide) {
-          to[axis] = std::size_t(hit.node);
-          to[u] = std::size_t(j);
-          to[v] = std::size_t(k);
-          const std::int32_t r = rows[(to[2] / 8 * 4 + to[1] / 8) * 4 + to[0] / 8];
-          const std::size_t node = ((to[2] & 7) * 8 + (to[1] & 7)) * 8 + (to[0] & 7);
-          if (r >= 0 && hit.exact) crossings[std::size_t(r)].on.set(node);
-          if (r >= 0 && !hit.exact) crossings[std::size_t(r)].edge[axis].set(node);
-        }
-      }
+  std::uint16_t met[kSide * kSide];
+  std::size_t count = 0;
+  std::int64_t of_row[3] = {line[0], line[1], line[2]};
+  for (std::int64_t k = 0; k <= k1 - k0; ++k) {
+    std::int64_t share[3] = {of_row[0], of_row[1], of_row[2]};
+    for (std::int64_t j = 0; j <= j1 - j0; ++j) {
+      met[count] = std::uint16_t(k * kSide + j);
+      count += std::size_t((share[0] | share[1] | share[2]) >= 0);
       for (std::size_t i = 0; i < 3; ++i) share[i] += per_j[i];
     }
-    for (std::size_t i = 0; i < 3; ++i) line[i] += per_k[i];
+    for (std::size_t i = 0; i < 3; ++i) of_row[i] += per_k[i];
+  }
+  if (count == 0) return;
+  const Along along = make_along(p, axis, area);
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::int64_t j = met[n] % kSide, k = met[n] / kSide;
+    std::int64_t share[3];
+    for (std::size_t i = 0; i < 3; ++i) share[i] = line[i] + j * per_j[i] + k * per_k[i];
+    const Hit hit = locate(share, along, area);
+    if (hit.node < 0 || hit.node >= kSide) continue;
+    std::array<std::size_t, 3> to;
+    to[axis] = std::size_t(hit.node);
+    to[u] = std::size_t(j0 + j);
+    to[v] = std::size_t(k0 + k);
+    const std::int32_t r = rows[(to[2] / 8 * 4 + to[1] / 8) * 4 + to[0] / 8];
+    if (r < 0) continue;
+    const std::size_t node = ((to[2] & 7) * 8 + (to[1] & 7)) * 8 + (to[0] & 7);
+    Crossing& c = crossings[std::size_t(r)];
+    (hit.exact ? c.on : c.edge[axis]).set(node);
   }
 }
 
@@ -150,7 +161,9 @@ void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, Narr
       lines[k] = {
           std::max<std::int64_t>(0, ceil_voxel(std::min({p[0][k], p[1][k], p[2][k]}))),
           std::min<std::int64_t>(kSide - 1, floor_voxel(std::max({p[0][k], p[1][k], p[2][k]})))};
-    for (std::size_t axis = 0; axis < 3; ++axis) draw(p, axis, lines, rows, band.crossing);
+    draw<0>(p, lines, rows, band.crossing);
+    draw<1>(p, lines, rows, band.crossing);
+    draw<2>(p, lines, rows, band.crossing);
   }
   for (const std::int32_t row : rows) {
     if (row < 0) continue;
