@@ -105,21 +105,27 @@ void set_region(const Features& features, const Surface& surface, std::uint32_t 
   }
 }
 
-// What the next triangles of a list need lies anywhere: it is asked for in time.
-void ask_for(const Surface& surface, const Features& features, const Large<std::uint32_t>& list,
-             std::size_t i, std::size_t end) {
-  constexpr std::size_t kSoon = 6, kLater = 12;
-  if (i + kLater < end) {
-    const std::uint32_t t = list[i + kLater];
-    __builtin_prefetch(&surface.triangles[t]);
-    __builtin_prefetch(&features.owned[t]);
-    __builtin_prefetch(&features.across[3 * std::size_t(t)]);
+// All cache lines of a small thing.
+template <class T>
+void ask_for(const T* first, std::size_t count = 1) {
+  const char* at = reinterpret_cast<const char*>(first);
+  __builtin_prefetch(at);
+  __builtin_prefetch(at + count * sizeof(T) - 1);
+}
+
+// What the triangles of a list need lies anywhere: it is asked for in time, what a triangle names
+// when that is there.
+void ask_for_triangle(const Surface& surface, const Features& features, std::uint32_t t) {
+  ask_for(&surface.triangles[t]);
+  __builtin_prefetch(&features.owned[t]);
+  ask_for(&features.across[3 * std::size_t(t)], 3);
+}
+void ask_for_corners(const Surface& surface, const Features& features, std::uint32_t t) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t v = surface.triangles[t][k];
+    ask_for(&surface.vertices[v]);
+    if (features.owned[t] >> (3 + k) & 1) ask_for(&features.from[4 * v], 4);
   }
-  if (i + kSoon < end)
-    for (const std::uint32_t v : surface.triangles[list[i + kSoon]]) {
-      __builtin_prefetch(&surface.vertices[v]);
-      __builtin_prefetch(&features.from[4 * std::size_t(v)]);
-    }
 }
 
 void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const Features& features,
@@ -130,9 +136,15 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
   out.part.clear();
   out.owner.clear();
   const std::array<int, 3> brick = tiles.first_brick(tile);
-  const std::size_t end = tiles.first[tile + 1];
-  for (std::size_t i = tiles.first[tile]; i < end; ++i) {
-    ask_for(surface, features, tiles.triangle, i, end);
+  constexpr std::size_t kSoon = 6, kLater = 12;
+  const std::size_t begin = tiles.first[tile], end = tiles.first[tile + 1];
+  for (std::size_t i = begin; i < std::min(end, begin + kLater); ++i)
+    ask_for_triangle(surface, features, tiles.triangle[i]);
+  for (std::size_t i = begin; i < std::min(end, begin + kSoon); ++i)
+    ask_for_corners(surface, features, tiles.triangle[i]);
+  for (std::size_t i = begin; i < end; ++i) {
+    if (i + kLater < end) ask_for_triangle(surface, features, tiles.triangle[i + kLater]);
+    if (i + kSoon < end) ask_for_corners(surface, features, tiles.triangle[i + kSoon]);
     const std::uint32_t t = tiles.triangle[i];
     Corner corner[3];
     double farthest = 0;
@@ -196,6 +208,8 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
   std::uint64_t used = 0, weighed = 0;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) used |= tiles.near[i];
   for (std::uint64_t near : facets.near) weighed |= near;
+  for (const std::int32_t owner : room->nearest)
+    if (owner != kernels::kNobody) __builtin_prefetch(&surface.source[std::size_t(owner)]);
   for (; used != 0; used &= used - 1) {
     const int b = std::countr_zero(used);
     const int in[3] = {b % 4, b / 4 % 4, b / 16};
