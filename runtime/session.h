@@ -91,14 +91,14 @@ struct Pair {
   std::size_t begin = 0, end = 0;         // its rows among a's contacts
   std::size_t candidates = 0, first = 0;  // its rows among the candidates
   // Coherence of its traversal: METHOD.md, Sec. 6. No point of a group of the shell can touch
-  // before `travelled` has passed the group's expiry; a block's is the least of its groups'.
+  // before the way has passed the group's expiry; a block's is the least of its groups'.
   // [voxel]
   float *group_expiry = nullptr, *block_expiry = nullptr;
   // Of a group, bit i: its point i was near when all of them were last looked at. None of the
   // others can touch before rest_expiry.
   std::uint16_t* near_rows = nullptr;
   float* rest_expiry = nullptr;
-  double travelled = -1;                         // < 0: nothing is known
+  double travelled = -1;                         // to the anchor; < 0: nothing is known
   std::size_t sampled = 0;                       // groups, when it was last traversed
   std::size_t open_blocks = 0, open_groups = 0;  // near, when groups were last looked at
   CullBypass cull_blocks, cull_groups;
@@ -106,6 +106,7 @@ struct Pair {
   int found_by = 0;              // whose scratch holds its candidates
   float missed = 0;              // of a coarse traversal: nothing left out is deeper [voxel]
   kernels::Affine last_place{};  // of the shell in the field, when it was last traversed
+  kernels::Affine anchor{};      // the same, where it has stayed near to since
   kernels::Affine arms{};        // the same for arms of contacts [m], when they were gathered
   kernels::WrenchSum sum{};      // of its contacts
   // When both move: how each one's motion changes the other's wrench.

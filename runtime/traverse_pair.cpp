@@ -58,6 +58,7 @@ float margin_of(const h6Session& s) {
 constexpr float kSlack = 1e-3f;        // [voxel]
 constexpr std::size_t kFewGroups = 4;  // of a block: looked at sooner than the block's sphere
 constexpr double kLongestWay = 256;    // [voxel] float has 3e-5 left there
+constexpr double kStays = 0.04;        // [voxel] from its anchor, for a shell that moves to and fro
 // Points of a group that are looked at by themselves: nearer than kNearest and what so many steps
 // like the last one take.
 constexpr float kNearest = 0.05f;  // [voxel]
@@ -155,21 +156,36 @@ double motion_bound(const kernels::Affine& from, const kernels::Affine& to, doub
   return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
 }
 
-// When what is clear by this much may touch. kSlack takes up the rounding of both to float.
-float expiry_of(float now, float clearance) { return now + std::max(clearance - kSlack, 0.0f); }
+// Where the shell is on its way, which does not grow while it moves to and fro. [voxel]
+struct Way {
+  float now;   // to the anchor, and on from there
+  float from;  // to the anchor, less from there: what is clear here counts from this
+};
 
-// Where the shell has got to, as length of the way; starts anew when that becomes too long for
-// float, or nothing is known.
-float travel(Pair& pair, Search& search) {
+// When what is clear by this much may touch. kSlack takes up the rounding of both to float.
+float expiry_of(const Way& way, float clearance) {
+  return way.from + std::max(clearance - kSlack, 0.0f);
+}
+
+// The way starts anew when it becomes too long for float, or nothing is known.
+Way travel(Pair& pair, Search& search) {
   const Shell& shell = search.shell;
+  double away = 0;
   if (pair.travelled >= 0) {
-    const double step = motion_bound(pair.last_place, search.place, shell.radius * (1 + 1e-6));
-    pair.travelled += step;
+    const double radius = shell.radius * (1 + 1e-6);
+    const double step = motion_bound(pair.last_place, search.place, radius);
     if (step < kSlowStep)
       search.near = search.margin + kNearest + static_cast<float>(kStepsNear * step);
+    away = motion_bound(pair.anchor, search.place, radius);
+    if (!(away < kStays)) {
+      pair.travelled += away;
+      pair.anchor = search.place;
+      away = 0;
+    }
   }
   if (!(pair.travelled >= 0 && pair.travelled < kLongestWay)) {
-    pair.travelled = 0;
+    pair.travelled = away = 0;
+    pair.anchor = search.place;
     std::fill_n(pair.group_expiry, shell.groups.count, 0.0f);
     std::fill_n(pair.near_rows, shell.groups.count, std::uint16_t{0});
     std::fill(pair.group_expiry + shell.groups.count, pair.group_expiry + 16 * shell.blocks.count,
@@ -179,7 +195,7 @@ float travel(Pair& pair, Search& search) {
               HUGE_VALF);
   }
   pair.last_place = search.place;
-  return static_cast<float>(pair.travelled);
+  return {static_cast<float>(pair.travelled + away), static_cast<float>(pair.travelled - away)};
 }
 
 // Some points of each group of `blocks` blocks, and how deep any of the others may be. Again, with
@@ -213,7 +229,7 @@ std::size_t touch_coarsely(h6Session& s, Pair& pair, TraverseScratch& t, const S
 // Groups to sample of `count` in t.frontier, in t.survivors. Those that were near when last looked
 // at are so still, or nearly; of the others only what their spheres let through.
 std::size_t find_near_groups(Pair& pair, TraverseScratch& t, const Search& search,
-                             std::size_t count, float now) {
+                             std::size_t count, const Way& way) {
   std::size_t near = 0, far = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t g = t.frontier[k];
@@ -226,7 +242,7 @@ std::size_t find_near_groups(Pair& pair, TraverseScratch& t, const Search& searc
   if (far > 0 && pair.cull_groups.worth(far)) {
     left = search.cull(search.shell.groups, t.far, far, t.far_survivors, t.clearance);
     for (std::size_t k = 0; k < far; ++k)
-      pair.group_expiry[t.far[k]] = expiry_of(now, t.clearance[k]);
+      pair.group_expiry[t.far[k]] = expiry_of(way, t.clearance[k]);
     pair.cull_groups.learn(far, left);
     others = t.far_survivors;
   }
@@ -255,9 +271,9 @@ std::size_t bits_of(unsigned rows) {
 
 // When groups that were sampled may touch again, and which of their points are near.
 void note_groups(Pair& pair, const TraverseScratch& t, const Search& search, std::size_t groups,
-                 float now) {
+                 const Way& way) {
   const auto until = [&](float distance) {
-    return expiry_of(now, kernels::cull_clearance(distance - search.margin, search.wide));
+    return expiry_of(way, kernels::cull_clearance(distance - search.margin, search.wide));
   };
   if (!(search.near > 0)) {
     for (std::size_t k = 0; k < groups; ++k) {
@@ -299,15 +315,15 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
                 field.wide || margin > 0.5f,
                 margin,
                 s.rested};
-  const float now = travel(pair, search);
+  const Way way = travel(pair, search);
   pair.sampled = 0;
   pair.missed = 0;
 
-  std::size_t blocks =
-      kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16, now, t.open_blocks);
+  std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16,
+                                        way.now, t.open_blocks);
   if (blocks == 0) return 0;
   const auto expired_groups = [&] {
-    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, now, t.frontier);
+    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, way.now, t.frontier);
   };
   std::size_t count = expired_groups();
   if (count > kFewGroups * blocks && pair.cull_blocks.worth(blocks)) {
@@ -315,7 +331,7 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
         search.cull(shell.blocks, t.open_blocks, blocks, t.survivors, t.clearance);
     pair.cull_blocks.learn(blocks, left);
     for (std::size_t k = 0; k < blocks; ++k)
-      pair.block_expiry[t.open_blocks[k]] = expiry_of(now, t.clearance[k]);
+      pair.block_expiry[t.open_blocks[k]] = expiry_of(way, t.clearance[k]);
     std::copy_n(t.survivors, left, t.open_blocks);
     blocks = left;
     if (blocks == 0) return 0;
@@ -324,7 +340,7 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
   const auto number = static_cast<std::size_t>(&pair - s.pairs);
   if (is_coarse_anyway(s, number, used, blocks))
     return touch_coarsely(s, pair, t, search, blocks, used);
-  const std::size_t groups = find_near_groups(pair, t, search, count, now);
+  const std::size_t groups = find_near_groups(pair, t, search, count, way);
   // Each group waits for memory by itself otherwise.
   for (std::size_t k = 0; k < groups; ++k)
     for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
@@ -341,7 +357,7 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     return touch_coarsely(s, pair, t, search, blocks, used);
   }
   if (search.near > 0 && !pair.look_at_rows.worth(kGroupRows * groups)) search.near = 0;
-  choose_rows(pair, t, search, groups, now);
+  choose_rows(pair, t, search, groups, way.now);
   const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(s, t, search, groups, used, alone);
   learn_sampling(s, groups, groups, found, since);
@@ -350,7 +366,7 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     return touch_coarsely(s, pair, t, search, blocks, used);
   }
   pair.sampled = groups;
-  note_groups(pair, t, search, groups, now);
+  note_groups(pair, t, search, groups, way);
   kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
   return found;
 }

@@ -288,3 +288,28 @@ TEST_CASE("contacts do not depend on what the session saw before, nor on the hel
   h6DestroySession(one);
   h6DestroySession(two);
 }
+
+TEST_CASE("what is clear of a field is not looked at again while the shell trembles") {
+  FieldArrays field = field_of(clutter);
+  ShellArrays shell = sphere_points(kRadius, 9000);
+  Model model({def_of(field)}, {shell.def()});
+  h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
+  bodies[0].fixed = true, bodies[0].field = 0;
+  bodies[1].fixed = false, bodies[1].shell = 0;
+  h6SessionDef def = h6DefaultSessionDef();
+  def.bodies = bodies, def.body_count = 2;
+  h6Session* s = h6CreateSession(model.handle, &def, nullptr);
+  REQUIRE(s);
+  std::size_t looked = 0;
+  // 60 voxels in all, more than anything is clear by.
+  for (int i = 0; i < 2000; ++i) {
+    h6BodyState state{};
+    state.pose = pose(0.03 * mm * (i % 2), 0, 0);
+    h6SetBody(s, 1, &state);
+    h6Step(s, nullptr, nullptr);
+    if (i > 1) looked += s->pairs[0].sampled;
+    CHECK(h6GetFrame(s).contacts == 0);
+  }
+  CHECK(looked == 0);
+  h6DestroySession(s);
+}
