@@ -5,7 +5,7 @@
 // columns, from which each row of the result is summed:
 //
 //     columns (float) -> stage: J, J_g, kw J, kw e, kw depth (double, 128 contacts)
-//                     -> lanes of 69 sums -> one reduction at the end
+//                     -> lanes of 33 or 69 sums -> one reduction at the end
 #include "kernels/contact_wrench.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -35,12 +35,13 @@ struct Stage {
   HWY_ALIGN double kwd[kStage];
 };
 
-// Lanes of every sum. B is symmetric: column `col` of row `row` from `row` on.
+// Lanes of every sum: force, elastic, B, K. Of B, which is symmetric, column `col` of row `row`
+// from `row` on.
+constexpr int kElastic = 6, kB = 12, kK = 33, kSums = 69;
+constexpr int row_of_b(int row) { return kB + 6 * row - row * (row - 1) / 2 - row; }  // column 0
+
 struct Sums {
-  HWY_ALIGN double force[6][kWidth];
-  HWY_ALIGN double elastic[6][kWidth];
-  HWY_ALIGN double damping[6][6][kWidth];
-  HWY_ALIGN double stiffness[6][6][kWidth];
+  HWY_ALIGN double lanes[kSums + 1][kWidth];
 };
 
 HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
@@ -99,14 +100,18 @@ HWY_INLINE std::size_t fill(const WrenchColumns& c, const WrenchParameters& p, s
   return at;
 }
 
-// sum[col] += factor * columns[col] over the stage, for col from kFrom on.
+// sum[col] += factor * columns[col] over the stage, for col from kFrom on; `fresh`: to nothing.
 template <int kFrom>
 HWY_INLINE void add_row(const double* factor, const double (*columns)[kStage], std::size_t count,
-                        double (*sum)[kWidth]) {
+                        bool fresh, double (*sum)[kWidth]) {
   const DD d;
   VD lanes[6];
   HWY_UNROLL(8)
-  for (int col = kFrom; col < 6; ++col) lanes[col] = hn::Load(d, sum[col]);
+  for (int col = kFrom; col < 6; ++col) lanes[col] = hn::Zero(d);
+  if (!fresh) {
+    HWY_UNROLL(8)
+    for (int col = kFrom; col < 6; ++col) lanes[col] = hn::Load(d, sum[col]);
+  }
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const VD f = hn::Load(d, factor + i);
     HWY_UNROLL(8)
@@ -118,38 +123,64 @@ HWY_INLINE void add_row(const double* factor, const double (*columns)[kStage], s
   for (int col = kFrom; col < 6; ++col) hn::Store(lanes[col], d, sum[col]);
 }
 
-HWY_INLINE double total(const double* lanes) {
+#if HWY_TARGET != HWY_SCALAR
+// Halves are added until two lanes are left.
+template <class D>
+HWY_INLINE void store_two(D d, hn::Vec<D> both, double* to) {
+  if constexpr (hn::MaxLanes(D()) > 2) {
+    const hn::Half<D> half;
+    store_two(half, hn::Add(hn::LowerHalf(half, both), hn::UpperHalf(half, both)), to);
+  } else {
+    hn::StoreU(both, d, to);
+  }
+}
+#endif
+
+// The sums of lanes, two at a time.
+HWY_INLINE void total(const Sums& sums, int count, double* to) {
   const DD d;
-  return hn::GetLane(hn::SumOfLanes(d, hn::Load(d, lanes)));
+  for (int k = 0; k < count; k += 2) {
+    const VD a = hn::Load(d, sums.lanes[k]), b = hn::Load(d, sums.lanes[k + 1]);
+#if HWY_TARGET == HWY_SCALAR
+    to[k] = hn::GetLane(a), to[k + 1] = hn::GetLane(b);
+#else
+    store_two(d, hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b)), to + k);
+#endif
+  }
 }
 
 void contact_wrench_simd(const WrenchColumns& contacts, const WrenchParameters& parameters,
                          std::size_t begin, std::size_t end, WrenchSum& out) {
   Stage stage;
-  Sums sums{};
-  for (std::size_t first = begin; first < end;) {
-    std::size_t count;
-    first = fill(contacts, parameters, first, end, stage, count);
-    add_row<0>(stage.kwe, stage.J, count, sums.force);
-    add_row<0>(stage.kwd, stage.J, count, sums.elastic);
-    add_row<0>(stage.kwJ[0], stage.J, count, sums.damping[0]);
-    add_row<1>(stage.kwJ[1], stage.J, count, sums.damping[1]);
-    add_row<2>(stage.kwJ[2], stage.J, count, sums.damping[2]);
-    add_row<3>(stage.kwJ[3], stage.J, count, sums.damping[3]);
-    add_row<4>(stage.kwJ[4], stage.J, count, sums.damping[4]);
-    add_row<5>(stage.kwJ[5], stage.J, count, sums.damping[5]);
+  Sums sums;
+  const int count = parameters.exact ? kSums : kK;
+  hn::Store(hn::Zero(DD()), DD(), sums.lanes[count]);  // beside the last one
+  std::size_t first = begin;
+  do {
+    const bool fresh = first == begin;
+    std::size_t staged;
+    first = fill(contacts, parameters, first, end, stage, staged);
+    add_row<0>(stage.kwe, stage.J, staged, fresh, sums.lanes);
+    add_row<0>(stage.kwd, stage.J, staged, fresh, sums.lanes + kElastic);
+    add_row<0>(stage.kwJ[0], stage.J, staged, fresh, sums.lanes + row_of_b(0));
+    add_row<1>(stage.kwJ[1], stage.J, staged, fresh, sums.lanes + row_of_b(1));
+    add_row<2>(stage.kwJ[2], stage.J, staged, fresh, sums.lanes + row_of_b(2));
+    add_row<3>(stage.kwJ[3], stage.J, staged, fresh, sums.lanes + row_of_b(3));
+    add_row<4>(stage.kwJ[4], stage.J, staged, fresh, sums.lanes + row_of_b(4));
+    add_row<5>(stage.kwJ[5], stage.J, staged, fresh, sums.lanes + row_of_b(5));
     if (!parameters.exact) continue;
-    for (int row = 0; row < 6; ++row) {
-      add_row<0>(stage.kwJ[row], stage.Jg, count, sums.stiffness[row]);
-    }
-  }
+    for (int row = 0; row < 6; ++row)
+      add_row<0>(stage.kwJ[row], stage.Jg, staged, fresh, sums.lanes + kK + 6 * row);
+  } while (first < end);
+  double totals[kSums + 1];
+  total(sums, count + 1, totals);
   for (int row = 0; row < 6; ++row) {
-    out.force[row] = total(sums.force[row]);
-    out.elastic[row] = total(sums.elastic[row]);
+    out.force[row] = totals[row];
+    out.elastic[row] = totals[kElastic + row];
     for (int col = 0; col < 6; ++col) {
-      const double b = total(col < row ? sums.damping[col][row] : sums.damping[row][col]);
-      out.damping[6 * row + col] = b;
-      out.stiffness[6 * row + col] = parameters.exact ? total(sums.stiffness[row][col]) : b;
+      const double damping = totals[col < row ? row_of_b(col) + row : row_of_b(row) + col];
+      out.damping[6 * row + col] = damping;
+      out.stiffness[6 * row + col] = parameters.exact ? totals[kK + 6 * row + col] : damping;
     }
   }
 }
@@ -162,11 +193,9 @@ namespace h6::kernels {
 
 HWY_EXPORT(contact_wrench_simd);
 
-WrenchSum contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
-                         std::size_t begin, std::size_t end) {
-  WrenchSum sum;
+void contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
+                    std::size_t begin, std::size_t end, WrenchSum& sum) {
   HWY_DYNAMIC_DISPATCH(contact_wrench_simd)(contacts, parameters, begin, end, sum);
-  return sum;
 }
 
 }  // namespace h6::kernels

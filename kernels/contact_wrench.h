@@ -41,9 +41,15 @@ struct WrenchParameters {
   bool exact;
 };
 
-// Adds contacts begin..end-1 to a zero sum and returns it.
-WrenchSum contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
-                         std::size_t begin, std::size_t end);
+// The sum over contacts begin..end-1, in the place of what is in `sum`.
+void contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
+                    std::size_t begin, std::size_t end, WrenchSum& sum);
+inline WrenchSum contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
+                                std::size_t begin, std::size_t end) {
+  WrenchSum sum;
+  contact_wrench(contacts, parameters, begin, end, sum);
+  return sum;
+}
 // The specification, for float and (gradient tests) double columns.
 template <class T>
 WrenchSum contact_wrench_ref(const WrenchColumnsT<T>& contacts, const WrenchParameters& parameters,

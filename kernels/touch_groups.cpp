@@ -315,79 +315,6 @@ std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
   return written;
 }
 
-HWY_INLINE VF rotated(const float* R, VF x, VF y, VF z) {
-  const DF d;
-  return hn::MulAdd(hn::Set(d, R[0]), x,
-                    hn::MulAdd(hn::Set(d, R[1]), y, hn::Mul(hn::Set(d, R[2]), z)));
-}
-
-// Shell columns of `rows`, as they are: a gather costs more than reading whole vectors of a group
-// and keeping what touches, where rows come in runs.
-HWY_INLINE void pick_rows(const ShellColumns& shell, const std::uint32_t* rows, std::size_t count,
-                          float* const* out, std::uint32_t* point) {
-  const DF d;
-  const DI di;
-  constexpr std::int32_t kPlace = static_cast<std::int32_t>(hn::MaxLanes(DF())) - 1;
-  const float* const columns[6] = {shell.x, shell.y, shell.z, shell.nx, shell.ny, shell.nz};
-  for (std::size_t i = 0; i < count;) {
-    const std::size_t live = count - i;
-    const VI row = load_n(di, reinterpret_cast<const std::int32_t*>(rows) + i, live);
-    const VI place = hn::And(row, hn::Set(di, kPlace));
-    const std::uint32_t base = rows[i] & ~static_cast<std::uint32_t>(kPlace);
-    const auto here = hn::Eq(hn::Sub(row, place), hn::Set(di, static_cast<std::int32_t>(base)));
-    const auto index = hn::IndicesFromVec(d, place);
-    for (int k = 0; k < 6; ++k)
-      store_n(hn::TableLookupLanes(hn::LoadU(d, columns[k] + base), index), d, out[k] + i, live);
-    const auto id = hn::LoadU(di, reinterpret_cast<const std::int32_t*>(shell.point) + base);
-    store_n(hn::TableLookupLanes(id, hn::IndicesFromVec(di, place)), di,
-            reinterpret_cast<std::int32_t*>(point) + i, live);
-    // What was written past the run is written again.
-    const auto end = hn::FindFirstTrue(di, hn::Not(here));
-    i += end < 0 ? hn::Lanes(d) : static_cast<std::size_t>(end);
-  }
-}
-
-void make_contacts_simd(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                        const ContactFrame& frame, const MadeContacts& out) {
-  constexpr std::size_t kStage = 512;  // contacts that stay in the first cache
-  const DF d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    if (i % kStage == 0) {
-      float* const raw[6] = {out.rx + i, out.ry + i, out.rz + i,
-                             out.nx + i, out.ny + i, out.nz + i};
-      pick_rows(shell, rows.row + i, HWY_MIN(kStage, count - i), raw, out.point + i);
-    }
-    const std::size_t live = count - i;  // load_n and store_n stop at a whole vector
-    const VF x = load_n(d, out.rx + i, live), y = load_n(d, out.ry + i, live);
-    const VF z = load_n(d, out.rz + i, live);
-    store_n(hn::Add(rotated(frame.Ra, x, y, z), hn::Set(d, frame.arm[0])), d, out.rx + i, live);
-    store_n(hn::Add(rotated(frame.Ra + 3, x, y, z), hn::Set(d, frame.arm[1])), d, out.ry + i, live);
-    store_n(hn::Add(rotated(frame.Ra + 6, x, y, z), hn::Set(d, frame.arm[2])), d, out.rz + i, live);
-
-    const VF mx = load_n(d, out.nx + i, live), my = load_n(d, out.ny + i, live);
-    const VF mz = load_n(d, out.nz + i, live);
-    const VF nx = rotated(frame.Ra, mx, my, mz), ny = rotated(frame.Ra + 3, mx, my, mz);
-    const VF nz = rotated(frame.Ra + 6, mx, my, mz);
-    store_n(nx, d, out.nx + i, live);
-    store_n(ny, d, out.ny + i, live);
-    store_n(nz, d, out.nz + i, live);
-
-    const VF ux = load_n(d, rows.gx + i, live), uy = load_n(d, rows.gy + i, live);
-    const VF uz = load_n(d, rows.gz + i, live);
-    const VF gx = rotated(frame.Rb, ux, uy, uz), gy = rotated(frame.Rb + 3, ux, uy, uz);
-    const VF gz = rotated(frame.Rb + 6, ux, uy, uz);
-    const VF length = hn::Sqrt(hn::MulAdd(gx, gx, hn::MulAdd(gy, gy, hn::Mul(gz, gz))));
-    const auto clear = hn::Gt(length, hn::Set(d, 1e-6f));
-    const VF unit = hn::Div(hn::Set(d, 1.0f), length);
-    store_n(hn::IfThenElse(clear, hn::Mul(gx, unit), nx), d, out.gx + i, live);
-    store_n(hn::IfThenElse(clear, hn::Mul(gy, unit), ny), d, out.gy + i, live);
-    store_n(hn::IfThenElse(clear, hn::Mul(gz, unit), nz), d, out.gz + i, live);
-
-    const VF distance = load_n(d, rows.distance + i, live);
-    store_n(hn::Mul(distance, hn::Set(d, -frame.voxel)), d, out.depth + i, live);
-  }
-}
-
 }  // namespace h6::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -395,18 +322,12 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(touch_groups_simd);
-HWY_EXPORT(make_contacts_simd);
 
 std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
                          const std::uint32_t* groups, std::size_t count, float limit, bool cold,
                          const GroupLook& look, const Touching& out) {
   return HWY_DYNAMIC_DISPATCH(touch_groups_simd)(field, to_field, points, groups, count, limit,
                                                  cold, look, out);
-}
-
-void make_contacts(const ShellColumns& shell, const Touching& rows, std::size_t count,
-                   const ContactFrame& frame, const MadeContacts& out) {
-  HWY_DYNAMIC_DISPATCH(make_contacts_simd)(shell, rows, count, frame, out);
 }
 
 }  // namespace h6::kernels

@@ -12,31 +12,33 @@
 namespace h6 {
 namespace {
 
-kernels::WrenchSum sum_slices(h6Session& s, const Contacts& c, const Pair& pair,
-                              const kernels::WrenchParameters& p) {
+// Into pair.sum.
+void sum_slices(h6Session& s, const Contacts& c, Pair& pair, const kernels::WrenchParameters& p) {
   const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
                                        c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
   const std::size_t count = pair.end - pair.begin, slices = (count + kSumSlice - 1) / kSumSlice;
-  const auto slice = [&](std::size_t i) {
-    return kernels::contact_wrench(columns, p, pair.begin + i * kSumSlice,
-                                   std::min(pair.begin + (i + 1) * kSumSlice, pair.end));
+  const auto sum_slice = [&](std::size_t i, kernels::WrenchSum& sum) {
+    kernels::contact_wrench(columns, p, pair.begin + i * kSumSlice,
+                            std::min(pair.begin + (i + 1) * kSumSlice, pair.end), sum);
   };
-  kernels::WrenchSum total;
   if (slices <= 1 || s.team->threads() == 1) {
-    total = slice(0);
-    for (std::size_t i = 1; i < slices; ++i) total.add(slice(i));
-    return total;
+    sum_slice(0, pair.sum);
+    for (std::size_t i = 1; i < slices; ++i) {
+      kernels::WrenchSum next;
+      sum_slice(i, next);
+      pair.sum.add(next);
+    }
+    return;
   }
   const std::int64_t since = sched::now_ns();
-  const auto keep = [&](std::size_t i) { s.slice_sum[i] = slice(i); };
+  const auto keep = [&](std::size_t i) { sum_slice(i, s.slice_sum[i]); };
   if (s.summing.share(count))
     s.team->for_slices(slices, keep);
   else
     for (std::size_t i = 0; i < slices; ++i) keep(i);
   s.summing.took(static_cast<double>(sched::now_ns() - since));
-  total = s.slice_sum[0];
-  for (std::size_t i = 1; i < slices; ++i) total.add(s.slice_sum[i]);
-  return total;
+  pair.sum = s.slice_sum[0];
+  for (std::size_t i = 1; i < slices; ++i) pair.sum.add(s.slice_sum[i]);
 }
 
 }  // namespace
@@ -100,7 +102,7 @@ void sum_contacts(h6Session& s, Pair& pair) {
   if (pair.begin == pair.end) return;
   kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
   Vec6::Map(p.velocity) = pair_velocity(s, pair);
-  pair.sum = sum_slices(s, s.contacts[pair.a], pair, p);
+  sum_slices(s, s.contacts[pair.a], pair, p);
 }
 
 void add_wrench(h6Session& s, Pair& pair) {
