@@ -67,6 +67,8 @@ Pull pull_of(const h6Session& s, const Hand& hand, const RigidState& target,
   const Saturated force =
       limit(c.stiffness * (target.x - pulled.x) + b * (target.v - pulled.v), c.max_force);
   Pull pull;
+  clear(pull.K);
+  clear(pull.D);
   pull.wrench.head<3>() = force.value;
   pull.K.topLeftCorner<3, 3>() = -(c.stiffness * force.P);
   pull.D.topLeftCorner<3, 3>() = -(b * force.P);

@@ -45,8 +45,8 @@ void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   for (std::size_t i = 0; i < s.body_count; ++i) {
     Body& body = s.bodies[i];
     body.f.setZero();
-    body.K.setZero();
-    body.D.setZero();
+    clear(body.K);
+    clear(body.D);
     if (!body.fixed) body.f.head<3>() = body.mass * s.gravity;
   }
   for (std::size_t i = 0; i < s.hand_count; ++i) {

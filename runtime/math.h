@@ -18,6 +18,13 @@ inline Quat from(const h6Quat& q) { return {q.w, q.x, q.y, q.z}; }
 inline h6Vec3 to(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 inline h6Quat to(const Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
+// Zeros. By halves: the fill of a whole matrix becomes a string instruction, which takes some 40
+// cycles to begin.
+inline void clear(Mat6& m) {
+  m.topRows<3>().setZero();
+  m.bottomRows<3>().setZero();
+}
+
 // [v]x: the matrix with [v]x w = v x w.
 inline Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;

@@ -74,23 +74,48 @@ void add_between_fields(const h6Session& s, const Island& island, Matrix<N>& K, 
   }
 }
 
+// What a body brings along, whatever it touches: its drag damps it and pushes.
+struct OwnTerms {
+  Mat6 M, D;
+  Vec6 u, f;
+};
+OwnTerms own_terms(const Body& body) {
+  OwnTerms own;
+  own.M = mass_matrix(body, body, body.mass);
+  own.D = body.D;
+  own.u = velocity(body);
+  own.f = driving(body);
+  if (body.drag > 0) {
+    const Mat6 B = drag_matrix(body);
+    own.D -= B;
+    own.f -= B * own.u;
+  }
+  return own;
+}
+
 // The island's system. With one body it is that body's own 6x6 one, whatever it touches.
 template <int N>
 bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
   const double h = s.dt;
-  Matrix<N> K = Matrix<N>::Zero(), D = Matrix<N>::Zero(), M = Matrix<N>::Zero();
-  Vector<N> u, f;
-  for (int i = 0; i < N; ++i) {
-    const Body& body = s.bodies[island.body[i]];
-    M.template block<6, 6>(6 * i, 6 * i) = mass_matrix(body, body, body.mass);
-    K.template block<6, 6>(6 * i, 6 * i) = body.K;
-    D.template block<6, 6>(6 * i, 6 * i) = body.D;
-    if (body.drag > 0) D.template block<6, 6>(6 * i, 6 * i) -= drag_matrix(body);
-    u.template segment<6>(6 * i) = velocity(body);
-    f.template segment<6>(6 * i) = driving(body);
-    if (body.drag > 0) f.template segment<6>(6 * i) -= drag_matrix(body) * velocity(body);
-  }
-  if constexpr (N > 1) {
+  Matrix<N> A;
+  Vector<N> rhs;
+  if constexpr (N == 1) {
+    const Body& body = s.bodies[island.body[0]];
+    const OwnTerms own = own_terms(body);
+    A = own.M - h * own.D - h * h * body.K;
+    rhs = h * (own.f + h * (body.K * own.u));
+  } else {
+    Matrix<N> K = Matrix<N>::Zero(), D = Matrix<N>::Zero(), M = Matrix<N>::Zero();
+    Vector<N> u, f;
+    for (int i = 0; i < N; ++i) {
+      const Body& body = s.bodies[island.body[i]];
+      const OwnTerms own = own_terms(body);
+      M.template block<6, 6>(6 * i, 6 * i) = own.M;
+      K.template block<6, 6>(6 * i, 6 * i) = body.K;
+      D.template block<6, 6>(6 * i, 6 * i) = own.D;
+      u.template segment<6>(6 * i) = own.u;
+      f.template segment<6>(6 * i) = own.f;
+    }
     for (std::size_t p = 0; p < s.pair_count; ++p) {
       const int a = place_in(island, s.pairs[p].a), b = place_in(island, s.pairs[p].b);
       if (a < 0 || b < 0) continue;
@@ -100,9 +125,9 @@ bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
       D.template block<6, 6>(6 * b, 6 * a) += s.pairs[p].Dba;
     }
     if (s.contact.method == H6_METHOD_SERIES) add_between_fields<N>(s, island, K, D);
+    A = M - h * D - h * h * K;
+    rhs = h * (f + h * (K * u));
   }
-  Matrix<N> A = M - h * D - h * h * K;
-  Vector<N> rhs = h * (f + h * (K * u));
   for (int i = 0; i < N; ++i)
     if (s.bodies[island.body[i]].translation_only) hold_rotation(A, rhs, i);
   return solve_system(s.gradient, A, rhs, du);
@@ -125,7 +150,8 @@ void step_island(h6Session& s, const Island& island) {
 }  // namespace
 
 Mat6 mass_matrix(const Body& body, const RigidState& state, double mass) {
-  Mat6 m = Mat6::Zero();
+  Mat6 m;
+  clear(m);
   m.topLeftCorner<3, 3>() = mass * Mat3::Identity();
   m.bottomRightCorner<3, 3>() = state.R * (mass / body.mass * body.inertia) * state.R.transpose();
   return m;

@@ -50,7 +50,7 @@ void step_static(h6Session& s, Body& body);
 // pose and velocity of the one that is pulled.
 struct Pull {
   Vec6 wrench = Vec6::Zero();
-  Mat6 K = Mat6::Zero(), D = Mat6::Zero();
+  Mat6 K, D;
   bool cut = false;
 };
 Pull pull_of(const h6Session& s, const Hand& hand, const RigidState& target,
