@@ -20,7 +20,7 @@ namespace {
 
 struct Sweep {
   static constexpr int kStages = kGaussSweepStages;
-  static constexpr std::size_t kMany = 9000, kEqual = 7000;
+  static constexpr std::size_t kMany = 9000, kMost = 7000;
   static constexpr auto bytes = gauss_sweep_bytes;
   static constexpr auto all = gauss_weights_sweep;
   static constexpr auto make = gauss_sweep;

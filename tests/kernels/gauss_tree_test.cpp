@@ -19,7 +19,7 @@ namespace {
 
 struct Tree {
   static constexpr int kStages = kGaussStages;
-  static constexpr std::size_t kMany = 9001, kEqual = 70000;
+  static constexpr std::size_t kMany = 9001, kMost = 70000;
   static constexpr auto bytes = gauss_tree_bytes;
   static constexpr auto all = gauss_weights_tree;
   static constexpr auto make = gauss_tree;

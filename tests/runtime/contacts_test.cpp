@@ -34,8 +34,8 @@ double box(double x, double y, double z, const double c[3], const double half[3]
 
 double clutter(double x, double y, double z) {
   const double c[3][3] = {{30 * mm, 0, 0}, {-5 * mm, 34 * mm, 8 * mm}, {-30 * mm, -25 * mm, 0}};
-  const double half[3][3] = {{6 * mm, 30 * mm, 4 * mm}, {14 * mm, 5 * mm, 9 * mm},
-                             {4 * mm, 4 * mm, 40 * mm}};
+  const double half[3][3] = {
+      {6 * mm, 30 * mm, 4 * mm}, {14 * mm, 5 * mm, 9 * mm}, {4 * mm, 4 * mm, 40 * mm}};
   double d = std::hypot(x, y - 10 * mm, z + 34 * mm) - 10 * mm;
   for (int i = 0; i < 3; ++i) d = std::min(d, box(x, y, z, c[i], half[i]));
   return d;
@@ -164,8 +164,8 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
     const float margin = w.method == H6_METHOD_SERIES ? float(def.contact.margin_voxels) : 0.0f;
     for (int shift = 0; shift < 2; ++shift) {
       const h6::Shell& rows = model->shells[0];
-      const h6::Vec3 local = rows.centre + h6::Vec3(rows.x[deepest], rows.y[deepest],
-                                                    rows.z[deepest]);
+      const h6::Vec3 local =
+          rows.centre + h6::Vec3(rows.x[deepest], rows.y[deepest], rows.z[deepest]);
       const h6::Vec3 at = p + q * local;
       double d, g[3];
       h6SampleField(model, 0, at.data(), 1, &d, g, nullptr);
@@ -226,8 +226,16 @@ TEST_CASE("contacts in the scenes of the benches are all points that touch and n
     const std::unique_ptr<h6Model, void (*)(h6Model*)> model(h6::bench::make_model(socket, size),
                                                              h6DestroyModel);
     REQUIRE(model);
-    const Walk w{socket ? "socket" : "clutter", H6_METHOD_GAUSS6, h6::bench::kVoxel,
-           model->shells[0].radius, (socket ? 1 : full ? 6 : 2) * h6::bench::kVoxel, false, 50};
+    const Walk w{socket ? "socket" : "clutter",
+                 H6_METHOD_GAUSS6,
+                 h6::bench::kVoxel,
+                 model->shells[0].radius,
+                 (socket ? 1
+                  : full ? 6
+                         : 2) *
+                     h6::bench::kVoxel,
+                 false,
+                 50};
     CAPTURE(w.name);
     Found all;
     for (const double step : {0.005, 0.1, 6.0}) {
@@ -245,23 +253,34 @@ TEST_CASE("contacts in the scenes of the benches are all points that touch and n
   }
 }
 
-TEST_CASE("contacts do not depend on what the session saw before, nor on the helper") {
+namespace {
+
+// A ball of many points among things.
+struct BallInClutter {
   FieldArrays field = field_of(clutter);
   ShellArrays shell = sphere_points(kRadius, 9000);
-  Model model({def_of(field)}, {shell.def()});
+  Model model{{def_of(field)}, {shell.def()}};
   h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
-  bodies[0].fixed = true, bodies[0].field = 0;
-  bodies[1].fixed = false, bodies[1].shell = 0;
   h6SessionDef def = h6DefaultSessionDef();
-  def.bodies = bodies, def.body_count = 2;
-  def.contact.method = H6_METHOD_GAUSS6;
-  const auto make = [&](unsigned threads) {
+  BallInClutter() {
+    bodies[0].fixed = true, bodies[0].field = 0;
+    bodies[1].fixed = false, bodies[1].shell = 0;
+    def.bodies = bodies, def.body_count = 2;
+  }
+  h6Session* open(unsigned threads) {
     def.threads = threads;
     h6Session* s = h6CreateSession(model.handle, &def, nullptr);
     REQUIRE(s);
     return s;
-  };
-  h6Session *one = make(1), *two = make(2);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("contacts do not depend on what the session saw before, nor on the helper") {
+  BallInClutter scene;
+  scene.def.contact.method = H6_METHOD_GAUSS6;
+  h6Session *one = scene.open(1), *two = scene.open(2);
   std::mt19937_64 random(3);
   int contacts = 0;
   for (int i = 0; i < 200; ++i) {
@@ -271,7 +290,7 @@ TEST_CASE("contacts do not depend on what the session saw before, nor on the hel
     p += size * mm * h6::Vec3(uniform(random), uniform(random), uniform(random));
     if (p.norm() > 15 * mm) p *= 15 * mm / p.norm();
     state.pose = pose(p.x(), p.y(), p.z());
-    h6Session* fresh = make(1);
+    h6Session* fresh = scene.open(1);
     std::uint64_t hash[3];
     int k = 0;
     for (h6Session* s : {one, two, fresh}) {
@@ -290,16 +309,8 @@ TEST_CASE("contacts do not depend on what the session saw before, nor on the hel
 }
 
 TEST_CASE("what is clear of a field is not looked at again while the shell trembles") {
-  FieldArrays field = field_of(clutter);
-  ShellArrays shell = sphere_points(kRadius, 9000);
-  Model model({def_of(field)}, {shell.def()});
-  h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
-  bodies[0].fixed = true, bodies[0].field = 0;
-  bodies[1].fixed = false, bodies[1].shell = 0;
-  h6SessionDef def = h6DefaultSessionDef();
-  def.bodies = bodies, def.body_count = 2;
-  h6Session* s = h6CreateSession(model.handle, &def, nullptr);
-  REQUIRE(s);
+  BallInClutter scene;
+  h6Session* s = scene.open(1);
   std::size_t looked = 0;
   // 60 voxels in all, more than anything is clear by.
   for (int i = 0; i < 2000; ++i) {
