@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::size_t kMaxBricks = 1'400'000;
 constexpr std::size_t kMaxPairs = 200'000'000;
-constexpr std::size_t kSlice = 1024;  // triangles
+constexpr std::size_t kSlice = 1024;             // triangles
 constexpr int kTile = 8 * kernels::kTileBricks;  // nodes along a side
-constexpr long kFew = 12;             // tiles
-constexpr double kRounding = 4e-3;    // float at 2048 voxels, several times over
+constexpr long kFew = 12;                        // tiles
+constexpr double kRounding = 4e-3;               // float at 2048 voxels, several times over
 
 struct Range {
   int low[3], high[3];  // tiles, inclusive
@@ -41,9 +41,8 @@ struct Separators {
 
 Separators make_separators(const double (&p)[3][3]) {
   Separators s;
-  const auto both_sides = [&](double (&axis)[3]) {
-    const double length =
-        std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  const auto both_sides = [&](double(&axis)[3]) {
+    const double length = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
     if (length < 1e-9) return;
     for (double& c : axis) c /= length;
     double low = std::numeric_limits<double>::max(), high = -low;
@@ -115,8 +114,7 @@ struct Pair {
 // The same facet as seen from `by` further on.
 kernels::DistanceFacet moved(const kernels::DistanceFacet& facet, const float (&by)[3]) {
   kernels::DistanceFacet f = facet;
-  for (std::size_t k = 0; k < 7; ++k)
-    f.c[k] += f.gx[k] * by[0] + f.gy[k] * by[1] + f.gz[k] * by[2];
+  for (std::size_t k = 0; k < 7; ++k) f.c[k] += f.gx[k] * by[0] + f.gy[k] * by[1] + f.gz[k] * by[2];
   for (std::size_t k = 0; k < 3; ++k) {
     f.low[k] -= by[k];
     f.high[k] -= by[k];
@@ -134,15 +132,26 @@ std::uint64_t bricks_there(const Grid& grid, const int (&tile)[3]) {
   return there;
 }
 
-void bin_triangle(const Surface& surface, const Grid& grid, const Tiles& tiles, std::size_t t,
-                  std::vector<Pair>& out) {
-  double p[3][3];
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3& v = surface.vertices[surface.triangles[t][i]];
-    p[i][0] = v.x;
-    p[i][1] = v.y;
-    p[i][2] = v.z;
-  }
+// A triangle and the tiles that its box, made larger by the reach, meets: any, if low <= high.
+struct Boxed {
+  std::uint32_t triangle;
+  Range tiles;
+};
+
+// Triangles that are looked at together. Corners are seen from the first node of the first tile.
+struct Batch {
+  static constexpr std::size_t kMost = 64;
+  std::vector<Boxed> boxed;
+  std::vector<double> corners;  // 9 each
+  std::vector<kernels::DistanceFacet> facets;
+};
+
+void box_triangle(const Surface& surface, const Grid& grid, const Tiles& tiles, std::size_t t,
+                  Batch& batch) {
+  const Vec3* v[3];
+  for (std::size_t i = 0; i < 3; ++i) v[i] = &surface.vertices[surface.triangles[t][i]];
+  const double p[3][3] = {
+      {v[0]->x, v[0]->y, v[0]->z}, {v[1]->x, v[1]->y, v[1]->z}, {v[2]->x, v[2]->y, v[2]->z}};
   const double reach = grid.reach();
   Range r;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -152,29 +161,48 @@ void bin_triangle(const Surface& surface, const Grid& grid, const Tiles& tiles, 
     r.high[k] = std::min(tiles.size[k] - 1, int(std::floor((high + reach) / kTile)));
     if (r.low[k] > r.high[k]) return;
   }
-  for (auto& corner : p)
-    for (int k = 0; k < 3; ++k) corner[k] -= kTile * r.low[k];
-  const kernels::DistanceFacet facet = kernels::make_distance_facet(p[0]);
+  for (const auto& corner : p)
+    for (int k = 0; k < 3; ++k) batch.corners.push_back(corner[k] - kTile * r.low[k]);
+  batch.boxed.push_back({std::uint32_t(t), r});
+}
+
+void bin_triangle(const Grid& grid, const Tiles& tiles, const Boxed& boxed, const double* corners,
+                  const kernels::DistanceFacet& facet, std::vector<Pair>& out) {
+  const Range& r = boxed.tiles;
+  const double reach = grid.reach();
   const auto add = [&](int a, int b, int c) {
     const int tile[3] = {a, b, c};
     const float by[3] = {float(kTile * (a - r.low[0])), float(kTile * (b - r.low[1])),
                          float(kTile * (c - r.low[2]))};
-    std::uint64_t near =
-        kernels::bricks_within_reach(moved(facet, by), float(reach + kRounding));
+    std::uint64_t near = kernels::bricks_within_reach(moved(facet, by), float(reach + kRounding));
     if (near == 0) return;
     if (4 * a + 4 > grid.bricks[0] || 4 * b + 4 > grid.bricks[1] || 4 * c + 4 > grid.bricks[2])
       near &= bricks_there(grid, tile);
     if (near != 0)
-      out.push_back({near, std::uint32_t(tiles.of({4 * a, 4 * b, 4 * c})), std::uint32_t(t)});
+      out.push_back({near, std::uint32_t(tiles.of({4 * a, 4 * b, 4 * c})), boxed.triangle});
   };
   if (r.size() > kFew) {
-    for (auto& corner : p)
-      for (int k = 0; k < 3; ++k) corner[k] += kTile * r.low[k];
+    double p[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) p[i][k] = corners[3 * i + k] + kTile * r.low[k];
     return visit(make_separators(p), r, reach, add);
   }
   for (int c = r.low[2]; c <= r.high[2]; ++c)
     for (int b = r.low[1]; b <= r.high[1]; ++b)
       for (int a = r.low[0]; a <= r.high[0]; ++a) add(a, b, c);
+}
+
+// Triangles begin ... end.
+void bin_triangles(const Surface& surface, const Grid& grid, const Tiles& tiles, std::size_t begin,
+                   std::size_t end, std::vector<Pair>& out) {
+  thread_local Batch batch;
+  batch.boxed.clear();
+  batch.corners.clear();
+  for (std::size_t t = begin; t < end; ++t) box_triangle(surface, grid, tiles, t, batch);
+  batch.facets.resize(batch.boxed.size());
+  kernels::make_distance_facets(batch.corners.data(), batch.facets.size(), batch.facets.data());
+  for (std::size_t i = 0; i < batch.boxed.size(); ++i)
+    bin_triangle(grid, tiles, batch.boxed[i], batch.corners.data() + 9 * i, batch.facets[i], out);
 }
 
 // Rows in the order of cells, layer by layer; returns how many. They are not made if too many.
@@ -237,10 +265,10 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
   std::atomic<std::size_t> total{0};
   sched::parallel_for(slices, threads, [&](std::size_t s) {
     const std::size_t end = std::min(surface.triangles.size(), (s + 1) * kSlice);
-    for (std::size_t t = s * kSlice; t < end; ++t) {
+    for (std::size_t t = s * kSlice; t < end; t += Batch::kMost) {
       if (total.load(std::memory_order_relaxed) > kMaxPairs) return;
       const std::size_t before = pairs[s].size();
-      bin_triangle(surface, grid, tiles, t, pairs[s]);
+      bin_triangles(surface, grid, tiles, t, std::min(end, t + Batch::kMost), pairs[s]);
       for (std::size_t i = before; i < pairs[s].size(); ++i) {
         count[pairs[s][i].tile].fetch_add(1, std::memory_order_relaxed);
         used[pairs[s][i].tile].fetch_or(pairs[s][i].near, std::memory_order_relaxed);

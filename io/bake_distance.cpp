@@ -18,7 +18,32 @@ constexpr std::int8_t kOwn = -1;
 struct Part {
   std::array<std::int8_t, 3> corner, edge;
 };
-constexpr Part kWhole{{0, 1, 2}, {0, 1, 2}};
+
+// A triangle that is not cut, its corners in such an order that the edges it is weighed along come
+// first.
+struct Whole {
+  Part part;
+  std::uint8_t weighed;
+};
+// By `owned` of Features. A corner that it answers for is the end of an edge it is weighed along.
+constexpr Whole make_whole(unsigned owned) {
+  unsigned edges = owned & 7;
+  const unsigned ends = edges | edges << 1 | edges >> 2;
+  edges |= owned >> 3 & ~ends & 7;
+  Whole whole{};
+  whole.weighed = std::uint8_t(std::popcount(edges));
+  unsigned first = 0;
+  while (((edges << 3 | edges) >> first & 7) != (1u << whole.weighed) - 1) ++first;
+  for (unsigned i = 0; i < 3; ++i)
+    whole.part.corner[i] = whole.part.edge[i] = std::int8_t((first + i) % 3);
+  return whole;
+}
+constexpr std::array<Whole, 64> make_wholes() {
+  std::array<Whole, 64> wholes{};
+  for (unsigned owned = 0; owned < 64; ++owned) wholes[owned] = make_whole(owned);
+  return wholes;
+}
+constexpr std::array<Whole, 64> kWholes = make_wholes();
 
 struct PolygonCorner {
   Corner at;
@@ -51,8 +76,9 @@ void add_triangle(std::vector<double>& corners, const Corner& a, const Corner& b
 
 // What of a large triangle can be within reach of the tile, as a fan.
 void add_part_near(std::vector<double>& corners, std::vector<Part>& parts, const Corner (&t)[3],
-                   double reach) {
-  Polygon polygon{{t[0], 0, 0}, {t[1], 1, 1}, {t[2], 2, 2}}, scratch;
+                   const Part& whole, double reach) {
+  Polygon polygon, scratch;
+  for (std::size_t i = 0; i < 3; ++i) polygon.push_back({t[i], whole.corner[i], whole.edge[i]});
   for (std::size_t k = 0; k < 3; ++k) {
     cut(polygon, k, 8.0 * kernels::kTileBricks + reach, 1.0, scratch);
     cut(polygon, k, -1.0 - reach, -1.0, scratch);
@@ -73,6 +99,7 @@ struct Facets {
   std::vector<double> corners;               // 9 each, tile-local
   std::vector<Part> part;                    // what they are of their triangle
   std::vector<std::int32_t> owner;           // triangle
+  std::vector<std::uint8_t> weighed;         // edges; what was cut is along its seams too
 };
 
 void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
@@ -130,11 +157,11 @@ void ask_for_corners(const Surface& surface, const Features& features, std::uint
 
 void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const Features& features,
              std::size_t tile, Facets& out) {
-  out.facet.clear();
   out.near.clear();
   out.corners.clear();
   out.part.clear();
   out.owner.clear();
+  out.weighed.clear();
   const std::array<int, 3> brick = tiles.first_brick(tile);
   constexpr std::size_t kSoon = 6, kLater = 12;
   const std::size_t begin = tiles.first[tile], end = tiles.first[tile + 1];
@@ -146,32 +173,39 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
     if (i + kLater < end) ask_for_triangle(surface, features, tiles.triangle[i + kLater]);
     if (i + kSoon < end) ask_for_corners(surface, features, tiles.triangle[i + kSoon]);
     const std::uint32_t t = tiles.triangle[i];
+    const Whole& whole = kWholes[features.owned[t]];
     Corner corner[3];
     double farthest = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3& v = surface.vertices[surface.triangles[t][k]];
+      const Vec3& v = surface.vertices[surface.triangles[t][std::size_t(whole.part.corner[k])]];
       corner[k] = {v.x - 8.0 * brick[0], v.y - 8.0 * brick[1], v.z - 8.0 * brick[2]};
       for (double c : corner[k]) farthest = std::max(farthest, std::fabs(c));
     }
     if (farthest < kFar) {
       add_triangle(out.corners, corner[0], corner[1], corner[2]);
-      out.part.push_back(kWhole);
+      out.part.push_back(whole.part);
     } else {
-      add_part_near(out.corners, out.part, corner, grid.reach());
+      add_part_near(out.corners, out.part, corner, whole.part, grid.reach());
     }
-    for (std::size_t f = out.facet.size(); f < out.part.size(); ++f) {
-      const double* corners = out.corners.data() + 9 * f;
-      out.facet.push_back(kernels::make_distance_facet(corners));
+    for (std::size_t f = out.owner.size(); f < out.part.size(); ++f) {
       out.near.push_back(tiles.near[i]);
       out.owner.push_back(std::int32_t(t));
-      if (out.region.size() < out.facet.size()) out.region.emplace_back();
-      kernels::FacetRegion& region = out.region[out.facet.size() - 1];
-      region.edges = region.corners = 0;
-      region.everywhere = true;
-      // What has no area is weighed everywhere.
-      if (out.facet.back().inside_from <= 0)
-        set_region(features, surface, t, out.part[f], corners, region);
+      out.weighed.push_back(farthest < kFar ? whole.weighed : std::uint8_t{3});
     }
+  }
+  out.facet.resize(out.part.size());
+  kernels::make_distance_facets(out.corners.data(), out.facet.size(), out.facet.data());
+  if (out.region.size() < out.facet.size()) out.region.resize(out.facet.size());
+  for (std::size_t f = 0; f < out.facet.size(); ++f) {
+    kernels::FacetRegion& region = out.region[f];
+    region.edges = region.corners = 0;
+    region.weighed = 3;
+    region.everywhere = true;
+    // What has no area is weighed everywhere.
+    if (out.facet[f].inside_from > 0) continue;
+    region.weighed = out.weighed[f];
+    set_region(features, surface, std::uint32_t(out.owner[f]), out.part[f],
+               out.corners.data() + 9 * f, region);
   }
 }
 

@@ -9,7 +9,9 @@
 //
 // In the frame of a triangle the distance is h^2 + min over edges (w^2 + beyond^2), where beyond is
 // how far the point lies past the ends of the edge; h^2 alone over the inside. All seven functions
-// are affine: on a block they are a constant pattern plus one number.
+// are affine: on a block they are a constant pattern plus one number. Where other triangles answer
+// for an edge and its ends, it is left out of the minimum: on a closed mesh that is half of all
+// edges. What is left is the distance of a part of the triangle, so never too little.
 #include "kernels/triangle_distance.h"
 
 #include <algorithm>
@@ -34,11 +36,12 @@ namespace h6::kernels {
 inline constexpr std::size_t kBlock = 16;  // nodes: 4 x 2 x 2
 inline constexpr std::size_t kBlocks = kBrickSamples / kBlock;
 inline constexpr float kBlockHalf[3] = {1.5f, 0.5f, 0.5f};
-inline constexpr float kRadius = 1.6584f;  // |kBlockHalf|, rounded up
+inline constexpr float kRadius = 1.6584f;       // |kBlockHalf|, rounded up
 inline constexpr float kBrickRadius = 6.0622f;  // 3.5 sqrt(3), rounded up
 inline constexpr std::size_t kFunctions = 7;
 inline constexpr std::size_t kPlanes = 16;
 inline constexpr std::uint32_t kEachVisit = 4;
+inline constexpr float kNobodyNear = 1e30f;
 inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
 inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [voxel]
 
@@ -88,15 +91,17 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, kBlock>;
 using VF = hn::Vec<D>;
 
-// The part of |p - triangle|^2 that is not h^2.
+// The part of |p - triangle|^2 that is not h^2, for the triangle's inside and first edges.
+template <int kEdges>
 HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF (&w)[3]) {
   const D d;
   const VF zero = hn::Zero(d);
-  const auto edge = [&](int e) HWY_ATTR {
+  VF nearest = hn::Set(d, kNobodyNear);
+  for (int e = 0; e < kEdges; ++e) {
     const VF beyond = hn::Max(hn::Sub(hn::Abs(s[e]), hn::Set(d, f.half[e])), zero);
-    return hn::MulAdd(beyond, beyond, hn::Mul(w[e], w[e]));
-  };
-  const VF nearest = hn::Min(hn::Min(edge(0), edge(1)), edge(2));
+    const VF squared = hn::MulAdd(beyond, beyond, hn::Mul(w[e], w[e]));
+    nearest = e == 0 ? squared : hn::Min(nearest, squared);
+  }
   const VF inner = hn::Min(hn::Min(w[0], w[1]), w[2]);
   return hn::IfThenZeroElse(hn::Ge(inner, hn::Set(d, f.inside_from)), nearest);
 }
@@ -138,8 +143,7 @@ HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::si
   for (std::size_t k = 0; k < count; k += hn::Lanes(d))
     hn::Store(hn::MulAdd(hn::Set(d, half[0]), hn::Abs(hn::LoadU(d, gx + k)),
                          hn::MulAdd(hn::Set(d, half[1]), hn::Abs(hn::LoadU(d, gy + k)),
-                                    hn::MulAdd(hn::Set(d, half[2]),
-                                               hn::Abs(hn::LoadU(d, gz + k)),
+                                    hn::MulAdd(hn::Set(d, half[2]), hn::Abs(hn::LoadU(d, gz + k)),
                                                hn::Set(d, kLeeway)))),
               d, out + k);
 }
@@ -159,12 +163,10 @@ HWY_INLINE void set_gains(const DistanceFacet& f, const FacetRegion& r, const fl
 HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains& gain,
                       const float* plane, VF x, VF y, VF z, const VF (&s)[3], const VF (&w)[3]) {
   const D d;
-  const auto below = [&](VF value, float level) HWY_ATTR {
-    return hn::Le(value, hn::Set(d, level));
-  };
-  const auto above = [&](VF value, float level) HWY_ATTR {
-    return hn::Ge(value, hn::Set(d, level));
-  };
+  const auto below = [&](VF value, float level)
+                         HWY_ATTR { return hn::Le(value, hn::Set(d, level)); };
+  const auto above = [&](VF value, float level)
+                         HWY_ATTR { return hn::Ge(value, hn::Set(d, level)); };
   const auto below_plane = [&](std::size_t k) HWY_ATTR {
     return below(hn::MulAdd(x, hn::Set(d, r.gx[k]),
                             hn::MulAdd(y, hn::Set(d, r.gy[k]),
@@ -180,16 +182,18 @@ HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains&
   for (std::size_t v = 0; v < 3; ++v)
     if (r.corners >> v & 1) {
       const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
-      there = hn::Or(there, hn::And(hn::And(hn::And(below(s[v], g[v] - f.half[v]),
-                                                    above(s[u], f.half[u] - g[u])),
-                                            hn::And(below_plane(p), below_plane(p + 1))),
-                                    hn::And(below_plane(p + 2), below_plane(p + 3))));
+      there = hn::Or(
+          there,
+          hn::And(hn::And(hn::And(below(s[v], g[v] - f.half[v]), above(s[u], f.half[u] - g[u])),
+                          hn::And(below_plane(p), below_plane(p + 1))),
+                  hn::And(below_plane(p + 2), below_plane(p + 3))));
     }
   return there;
 }
 
-// Those of the bricks that may meet the region. On the way the triangle is weighed at the middles of
-// the bricks, and of some beside them, which does no harm.
+// Those of the bricks that may meet the region. On the way the triangle is weighed at the middles
+// of the bricks, and of some beside them, which does no harm.
+template <int kEdges>
 HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r,
                                     std::uint64_t bricks, std::int32_t name, TileRoom& room) {
   constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
@@ -210,11 +214,11 @@ HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r
                                    hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
     };
     const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
-    const VF away = hn::MulAdd(h, h, beside_squared(f, s, w)), least = hn::Load(d, room.middle + b);
+    const VF away = hn::MulAdd(h, h, beside_squared<kEdges>(f, s, w)),
+             least = hn::Load(d, room.middle + b);
     const auto named = hn::Load(d32, room.nearest + b), own = hn::Set(d32, name);
-    const auto nearer = hn::Or(
-        hn::Lt(away, least),
-        hn::And(hn::Eq(away, least), hn::RebindMask(d, hn::Lt(own, named))));
+    const auto nearer = hn::Or(hn::Lt(away, least),
+                               hn::And(hn::Eq(away, least), hn::RebindMask(d, hn::Lt(own, named))));
     hn::Store(hn::Min(away, least), d, room.middle + b);
     hn::Store(hn::IfThenElse(hn::RebindMask(d32, nearer), own, named), d32, room.nearest + b);
     if (all) continue;
@@ -225,63 +229,182 @@ HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r
   return all ? bricks : bricks & met;
 }
 
-// One triangle, prepared for all bricks of its tile.
+// One triangle, prepared for all bricks of its tile. What a block's middle must be at least or at
+// most is kept for the tile's first node: a brick further on only moves it.
 struct Ready {
   Ready(const DistanceFacet& facet, const FacetRegion& where) : f(facet), region(where) {}
   const DistanceFacet& f;
   const FacetRegion& region;
   Pattern<kBlock> nodes;
   Pattern<kBlocks> middles;
+  alignas(64) float planes[kPlanes][kBlocks];  // as in Pattern; those in use
+  alignas(64) float inside_from[3][kBlocks];  // what nodes of a block at the first node must be off
+                                              // an edge to lie inside it in this block
   Gains gain = {};
 };
-
-// The blocks of a brick where the triangle may lower a distance. `first` and `plane` are its
-// functions and the planes of its region at the first node, `most` the farthest squares so far.
-HWY_INLINE std::uint32_t live_blocks(const Ready& t, const float* first, const float* plane,
-                                     const float* most) {
+HWY_INLINE void make_ready(Ready& t) {
   const D d;
-  const DistanceFacet& f = t.f;
-  std::uint32_t live = 0;
-  for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d)) {
-    const auto at = [&](std::size_t k) HWY_ATTR {
-      return hn::Add(hn::Load(d, t.middles.v[k] + b), hn::Set(d, first[k]));
-    };
-    const VF h = at(6), farthest = hn::Load(d, most + b);
-    const VF gap = hn::Max(hn::Sub(hn::Abs(h), hn::Set(d, t.gain.function[6])), hn::Zero(d));
-    auto in = hn::Le(hn::Mul(gap, gap), farthest);
-    if (hn::AllFalse(d, in)) continue;
-    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)};
-    if (t.region.everywhere) {
-      const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared(f, s, w)));
-      in = hn::And(in, hn::Le(hn::Sub(away, hn::Set(d, kRadius + kRounding)), hn::Sqrt(farthest)));
-    } else {
-      in = hn::And(in, meets(f, t.region, t.gain, plane, hn::Load(d, kNodes.middle_x + b),
-                             hn::Load(d, kNodes.middle_y + b), hn::Load(d, kNodes.middle_z + b), s,
-                             w));
-    }
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, in, bits);
-    live |= (std::uint32_t{bits[0]} | std::uint32_t{bits[1]} << 8) << b;
+  const FacetRegion& r = t.region;
+  make_pattern(t.f, kNodes.in_x, kNodes.in_y, kNodes.in_z, t.nodes);
+  make_pattern(t.f, kNodes.middle_x, kNodes.middle_y, kNodes.middle_z, t.middles);
+  for (std::size_t e = r.weighed; e < 3; ++e)
+    for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d))
+      hn::Store(hn::Sub(hn::Set(d, t.f.inside_from), hn::Load(d, t.middles.v[3 + e] + b)), d,
+                t.inside_from[e] + b);
+  set_gains(t.f, r, kBlockHalf, t.gain);
+  const std::uint32_t corners = r.corners;
+  std::uint32_t used = r.edges | (corners & 1) * 0x0078u | (corners >> 1 & 1) * 0x0780u |
+                       (corners >> 2 & 1) * 0x7800u;
+  for (; used != 0; used &= used - 1) {
+    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(used);
+    for (std::size_t b = 0; b < kBlocks; b += hn::Lanes(d))
+      hn::Store(
+          hn::MulAdd(hn::Load(d, kNodes.middle_x + b), hn::Set(d, r.gx[k]),
+                     hn::MulAdd(hn::Load(d, kNodes.middle_y + b), hn::Set(d, r.gy[k]),
+                                hn::Mul(hn::Load(d, kNodes.middle_z + b), hn::Set(d, r.gz[k])))),
+          d, t.planes[k] + b);
   }
-  return live;
+}
+
+// A triangle as seen from the first node of a brick: its functions and the planes of its region
+// there.
+struct FirstNode {
+  alignas(64) float function[8], plane[kPlanes];
+};
+
+// The blocks of a brick whose middles pass tests of one pattern after the other: all vectors of a
+// brick at once, since what they are tested against would else be spread out again for each.
+struct Blocks {
+  static constexpr std::size_t kLanes = hn::MaxLanes(D()), kVectors = kBlocks / kLanes;
+  hn::Mask<D> in[kVectors];
+  HWY_INLINE void from(const float* pattern, float least) {
+    const D d;
+    for (std::size_t v = 0; v < kVectors; ++v)
+      in[v] = hn::Ge(hn::Load(d, pattern + v * kLanes), hn::Set(d, least));
+  }
+  HWY_INLINE void to(const float* pattern, float most) {
+    const D d;
+    for (std::size_t v = 0; v < kVectors; ++v)
+      in[v] = hn::Le(hn::Load(d, pattern + v * kLanes), hn::Set(d, most));
+  }
+  HWY_INLINE void and_from(const float* pattern, float least) {
+    Blocks other;
+    other.from(pattern, least);
+    for (std::size_t v = 0; v < kVectors; ++v) in[v] = hn::And(in[v], other.in[v]);
+  }
+  HWY_INLINE void and_to(const float* pattern, float most) {
+    Blocks other;
+    other.to(pattern, most);
+    for (std::size_t v = 0; v < kVectors; ++v) in[v] = hn::And(in[v], other.in[v]);
+  }
+  HWY_INLINE void add(const Blocks& other) {
+    for (std::size_t v = 0; v < kVectors; ++v) in[v] = hn::Or(in[v], other.in[v]);
+  }
+  HWY_INLINE std::uint32_t bits() const {
+    const D d;
+    std::uint32_t all = 0;
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      std::uint8_t bytes[8] = {};
+      hn::StoreMaskBits(d, in[v], bytes);
+      all |= (std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8) << v * kLanes;
+    }
+    return all;
+  }
+};
+
+// The blocks of a brick where the triangle may lower a distance; `most`: the farthest squares so
+// far.
+HWY_INLINE std::uint32_t live_blocks(const Ready& t, const FirstNode& first, const float* most) {
+  const D d;
+  const FacetRegion& r = t.region;
+  const float *g = t.gain.function, *half = t.f.half, *at = first.function;
+  const auto& pattern = t.middles.v;
+  const auto to_plane = [&](Blocks& blocks, std::size_t k) HWY_ATTR {
+    blocks.and_to(t.planes[k], t.gain.plane[k] - first.plane[k]);
+  };
+  Blocks live;
+  live.from(pattern[3], -g[3] - at[3]);
+  live.and_from(pattern[4], -g[4] - at[4]);
+  live.and_from(pattern[5], -g[5] - at[5]);
+  for (std::size_t e = 0; e < 3; ++e)
+    if (r.edges >> e & 1) {
+      Blocks beyond;
+      beyond.to(pattern[3 + e], g[3 + e] - at[3 + e]);
+      to_plane(beyond, e);
+      beyond.and_from(pattern[e], -(half[e] + g[e]) - at[e]);
+      beyond.and_to(pattern[e], half[e] + g[e] - at[e]);
+      live.add(beyond);
+    }
+  for (std::size_t v = 0; v < 3; ++v)
+    if (r.corners >> v & 1) {
+      const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
+      Blocks beyond;
+      beyond.to(pattern[v], g[v] - half[v] - at[v]);
+      beyond.and_from(pattern[u], half[u] - g[u] - at[u]);
+      for (std::size_t k = p; k < p + 4; ++k) to_plane(beyond, k);
+      live.add(beyond);
+    }
+  for (std::size_t v = 0; v < Blocks::kVectors; ++v) {
+    const std::size_t b = v * Blocks::kLanes;
+    const VF h = hn::Add(hn::Load(d, pattern[6] + b), hn::Set(d, at[6]));
+    const VF gap = hn::Max(hn::Sub(hn::Abs(h), hn::Set(d, g[6])), hn::Zero(d));
+    live.in[v] = hn::And(live.in[v], hn::Le(hn::Mul(gap, gap), hn::Load(d, most + b)));
+  }
+  return live.bits();
+}
+
+// The same for a triangle that may be the nearest everywhere.
+HWY_NOINLINE std::uint32_t live_blocks_everywhere(const Ready& t, const FirstNode& first,
+                                                  const float* most) {
+  const D d;
+  Blocks live;
+  for (std::size_t v = 0; v < Blocks::kVectors; ++v) {
+    const std::size_t b = v * Blocks::kLanes;
+    const auto at = [&](std::size_t k) HWY_ATTR {
+      return hn::Add(hn::Load(d, t.middles.v[k] + b), hn::Set(d, first.function[k]));
+    };
+    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
+    const VF away = hn::Sqrt(hn::MulAdd(h, h, beside_squared<3>(t.f, s, w)));
+    live.in[v] =
+        hn::Le(hn::Sub(away, hn::Set(d, kRadius + kRounding)), hn::Sqrt(hn::Load(d, most + b)));
+  }
+  return live.bits();
 }
 
 // Lowers the squared distances of the blocks in `live`.
+template <int kEdges>
 HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t live, float* best) {
   const D d;
   const DistanceFacet& f = t.f;
+  const VF zero = hn::Zero(d);
   for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
-    VF node[kFunctions];  // at the nodes of a block whose middle is the brick's first node
-    for (std::size_t k = 0; k < kFunctions; ++k)
-      node[k] = hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
+    // At the nodes of a block whose middle is the brick's first node.
+    const auto node = [&](std::size_t k) HWY_ATTR {
+      return hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
+    };
+    const VF s[3] = {node(0), node(1), node(2)}, w[3] = {node(3), node(4), node(5)}, h = node(6);
     for (std::uint32_t left = live; left != 0; left &= left - 1) {
       const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
-      const auto at = [&](std::size_t k) HWY_ATTR {
-        return hn::Add(node[k], hn::Set(d, t.middles.v[k][b]));
-      };
-      const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
+      const auto at = [&](VF value, std::size_t k)
+                          HWY_ATTR { return hn::Add(value, hn::Set(d, t.middles.v[k][b])); };
+      VF nearest = hn::Set(d, kNobodyNear);
+      hn::Mask<D> inside;
+      for (std::size_t e = 0; e < 3; ++e) {
+        hn::Mask<D> in;
+        if (e < kEdges) {
+          const VF along = at(s[e], e), off = at(w[e], 3 + e);
+          const VF beyond = hn::Max(hn::Sub(hn::Abs(along), hn::Set(d, f.half[e])), zero);
+          const VF squared = hn::MulAdd(beyond, beyond, hn::Mul(off, off));
+          nearest = e == 0 ? squared : hn::Min(nearest, squared);
+          in = hn::Ge(off, hn::Set(d, f.inside_from));
+        } else {  // all that is asked of it
+          in = hn::Ge(w[e], hn::Set(d, t.inside_from[e][b]));
+        }
+        inside = e == 0 ? in : hn::And(inside, in);
+      }
+      const VF at_h = at(h, 6), beside = hn::IfThenZeroElse(inside, nearest);
       float* to = best + b * kBlock + n;
-      hn::Store(hn::Min(hn::Load(d, to), hn::MulAdd(h, h, beside_squared(f, s, w))), d, to);
+      hn::Store(hn::Min(hn::Load(d, to), hn::MulAdd(at_h, at_h, beside)), d, to);
     }
   }
 }
@@ -295,6 +418,36 @@ HWY_INLINE void tell_farthest(std::uint32_t lowered, const float* best, float* m
     for (std::size_t n = hn::Lanes(d); n < kBlock; n += hn::Lanes(d))
       farthest = hn::Max(farthest, hn::Load(d, best + b * kBlock + n));
     most[b] = hn::GetLane(hn::MaxOfLanes(d, farthest));
+  }
+}
+
+// Weighs one triangle in the bricks of `near`.
+template <int kEdges>
+HWY_INLINE void weigh(const DistanceFacet& f, const FacetRegion& r, std::uint64_t near,
+                      std::int32_t name, TileRoom& room) {
+  std::uint64_t bricks = bricks_met<kEdges>(f, r, near, name, room);
+  if (bricks == 0) return;
+  Ready t(f, r);
+  make_ready(t);
+  for (; bricks != 0; bricks &= bricks - 1) {
+    const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(bricks);
+    const float x = float(8 * (b % 4)), y = float(8 * (b / 4 % 4)), z = float(8 * (b / 16));
+    FirstNode first;
+    values_at(f.gx, f.gy, f.gz, f.c, 8, x, y, z, first.function);
+    if ((r.edges | r.corners) != 0) values_at(r.gx, r.gy, r.gz, r.c, kPlanes, x, y, z, first.plane);
+    float *squared = room.squared + b * kBrickSamples, *most = room.most + b * kBlocks;
+    // What was the farthest stays an upper bound: it need not be told anew each time.
+    const std::uint32_t visit = room.visits[b]++;
+    if (visit < kEachVisit || visit % kEachVisit == 0) {
+      tell_farthest(room.lowered[b], squared, most);
+      room.lowered[b] = 0;
+    }
+    const std::uint32_t live =
+        r.everywhere ? live_blocks_everywhere(t, first, most) : live_blocks(t, first, most);
+    if (live != 0) {
+      lower_blocks<kEdges>(t, first.function, live, squared);
+      room.lowered[b] |= live;
+    }
   }
 }
 
@@ -312,33 +465,12 @@ void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
     room.lowered[b] = room.visits[b] = 0;
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const DistanceFacet& f = facets[i];
-    const FacetRegion& r = regions[i];
-    std::uint64_t bricks = near[i];
-    if (bricks != 0) bricks = bricks_met(f, r, bricks, names[i], room);
-    if (bricks == 0) continue;
-    Ready t(f, r);
-    make_pattern(f, kNodes.in_x, kNodes.in_y, kNodes.in_z, t.nodes);
-    make_pattern(f, kNodes.middle_x, kNodes.middle_y, kNodes.middle_z, t.middles);
-    set_gains(f, r, kBlockHalf, t.gain);
-    for (; bricks != 0; bricks &= bricks - 1) {
-      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero64(bricks);
-      const float x = float(8 * (b % 4)), y = float(8 * (b / 4 % 4)), z = float(8 * (b / 16));
-      alignas(64) float first[8], plane[kPlanes];
-      values_at(f.gx, f.gy, f.gz, f.c, 8, x, y, z, first);
-      if ((r.edges | r.corners) != 0) values_at(r.gx, r.gy, r.gz, r.c, kPlanes, x, y, z, plane);
-      float *squared = room.squared + b * kBrickSamples, *most = room.most + b * kBlocks;
-      // What was the farthest stays an upper bound: it need not be told anew each time.
-      const std::uint32_t visit = room.visits[b]++;
-      if (visit < kEachVisit || visit % kEachVisit == 0) {
-        tell_farthest(room.lowered[b], squared, most);
-        room.lowered[b] = 0;
-      }
-      if (const std::uint32_t live = live_blocks(t, first, plane, most); live != 0) {
-        lower_blocks(t, first, live, squared);
-        room.lowered[b] |= live;
-      }
-    }
+    if (near[i] == 0) continue;
+    const auto weighed = regions[i].weighed == 0   ? weigh<0>
+                         : regions[i].weighed == 1 ? weigh<1>
+                         : regions[i].weighed == 2 ? weigh<2>
+                                                   : weigh<3>;
+    weighed(facets[i], regions[i], near[i], names[i], room);
   }
 }
 
@@ -354,41 +486,61 @@ void BrickDistance(const TileRoom& room, std::size_t brick, float* distance) {
     }
 }
 
+// BricksWithinReach of one vector of bricks. Apart from the loop over all, so that compilers take
+// numbers from where they are: few triangles come near more than one vector.
+HWY_NOINLINE std::uint64_t some_within_reach(const DistanceFacet& f, const float* extent,
+                                             float reach, std::size_t b) {
+  const D d;
+  const VF p[3] = {hn::Load(d, kTile.x + b), hn::Load(d, kTile.y + b), hn::Load(d, kTile.z + b)};
+  VF value[kFunctions];
+  for (std::size_t k = 0; k < kFunctions; ++k)
+    value[k] = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
+                          hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
+                                     hn::MulAdd(p[2], hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
+  // Planes: of the triangle, both sides, and through its edges, away from it.
+  const VF s[3] = {value[0], value[1], value[2]}, w[3] = {value[3], value[4], value[5]};
+  auto in = hn::Le(hn::Abs(value[6]), hn::Set(d, extent[6]));
+  for (std::size_t e = 0; e < 3; ++e) in = hn::And(in, hn::Ge(w[e], hn::Set(d, -extent[3 + e])));
+  // The ball around the brick.
+  const float ball = reach + kBrickRadius + kRounding;
+  in = hn::And(in, hn::Le(hn::MulAdd(value[6], value[6], beside_squared<3>(f, s, w)),
+                          hn::Set(d, ball * ball)));
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(d, in, bits);
+  return std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8;
+}
+
 std::uint64_t BricksWithinReach(const DistanceFacet& f, float reach) {
   const D d;
-  const VF zero = hn::Zero(d), half = hn::Set(d, 3.5f), within = hn::Set(d, reach + kRounding);
+  const VF zero = hn::Zero(d);
+  const float within = reach + kRounding;
+  const hn::CappedTag<float, 8> d8;
+  alignas(32) float extent[8];  // of a brick and its reach along the functions
+  for (std::size_t k = 0; k < 8; k += hn::Lanes(d8))
+    hn::Store(hn::MulAdd(hn::Set(d8, 3.5f),
+                         hn::Add(hn::Add(hn::Abs(hn::LoadU(d8, f.gx + k)),
+                                         hn::Abs(hn::LoadU(d8, f.gy + k))),
+                                 hn::Abs(hn::LoadU(d8, f.gz + k))),
+                         hn::Set(d8, within)),
+              d8, extent + k);
   std::uint64_t near = 0;
   for (std::size_t b = 0; b < 64; b += hn::Lanes(d)) {
-    const VF p[3] = {hn::Load(d, kTile.x + b), hn::Load(d, kTile.y + b), hn::Load(d, kTile.z + b)};
+    const float* middle[3] = {kTile.x + b, kTile.y + b, kTile.z + b};
     VF box2 = zero;
     for (int k = 0; k < 3; ++k) {
-      const VF gap = hn::Max(hn::Sub(hn::Sub(hn::Set(d, f.low[k]), p[k]), half),
-                             hn::Sub(hn::Sub(p[k], hn::Set(d, f.high[k])), half));
+      const VF p = hn::Load(d, middle[k]);
+      const VF gap = hn::Max(hn::Sub(hn::Set(d, f.low[k] - 3.5f), p),
+                             hn::Sub(p, hn::Set(d, f.high[k] + 3.5f)));
       const VF apart = hn::Max(gap, zero);
       box2 = hn::MulAdd(apart, apart, box2);
     }
-    auto in = hn::Le(box2, hn::Mul(within, within));
+    const auto in = hn::Le(box2, hn::Set(d, within * within));
     if (hn::AllFalse(d, in)) continue;
-    VF value[kFunctions];
-    for (std::size_t k = 0; k < kFunctions; ++k)
-      value[k] = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
-                            hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
-                                       hn::MulAdd(p[2], hn::Set(d, f.gz[k]),
-                                                  hn::Set(d, f.c[k]))));
-    // Planes: of the triangle, both sides, and through its edges, away from it.
-    for (std::size_t k = 3; k < kFunctions; ++k) {
-      const float extent = 3.5f * (std::fabs(f.gx[k]) + std::fabs(f.gy[k]) + std::fabs(f.gz[k]));
-      const VF away = k == 6 ? hn::Abs(value[k]) : hn::Neg(value[k]);
-      in = hn::And(in, hn::Le(away, hn::Set(d, extent + reach + kRounding)));
-    }
-    // The ball around the brick.
-    const VF s[3] = {value[0], value[1], value[2]}, w[3] = {value[3], value[4], value[5]};
-    const VF ball = hn::Set(d, reach + kBrickRadius + kRounding);
-    in = hn::And(in, hn::Le(hn::MulAdd(value[6], value[6], beside_squared(f, s, w)),
-                            hn::Mul(ball, ball)));
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, in, bits);
-    near |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;
+    near |= ((std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) &
+             some_within_reach(f, extent, reach, b))
+            << b;
   }
   return near;
 }

@@ -27,6 +27,8 @@ struct DistanceFacet {
 
 // `corners` is 3 corners x 3 coordinates. A triangle without area becomes its longest edge.
 DistanceFacet make_distance_facet(const double* corners);
+// The same of many, to the same bits: `corners` is count x 3 corners x 3 coordinates.
+void make_distance_facets(const double* corners, std::size_t count, DistanceFacet* facets);
 
 // Bit (c*4 + b)*4 + a: brick (a,b,c) of the tile may have a node within reach of the triangle.
 // Certain where it says no; where it says yes, wrong only around edges and corners.
@@ -40,10 +42,13 @@ std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach);
 // The nearest point of a mesh lies inside a triangle, inside an edge or on a corner. On an edge,
 // the place is beyond it as seen in the plane of EACH triangle that has the edge; on a corner,
 // behind the start of EACH edge that leaves it. So it is enough when one triangle answers for each
-// edge and corner, and planes for another triangle's edge or other edges keep its region small.
+// edge and corner, and planes for another triangle's edge or other edges keep its region small. It
+// is enough too to weigh it over its inside and along its first `weighed` edges, when those hold
+// all edges and corners that it answers for and all edges that it shares with nobody.
 struct FacetRegion {
   float gx[16] = {}, gy[16] = {}, gz[16] = {}, c[16] = {};
   std::uint8_t edges = 0, corners = 0;  // bits: those it answers for
+  std::uint8_t weighed = 3;
   bool everywhere = true;               // nothing is known of its neighbours
 };
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <random>
 #include <vector>
@@ -78,6 +79,29 @@ TEST_CASE("triangle_distance: slivers, needles and points count as what is left 
     }
     const Triangles point = {3.5, 3.5, 3.5, 3.5, 3.5, 3.5, 3.5, 3.5, 3.5};
     CHECK(worst_gap(point, 20.0f) < 1e-6);
+  });
+}
+
+TEST_CASE("make_distance_facets: the same bits as one triangle at a time, without area too") {
+  on_every_target([](const std::string&) {
+    Random random;
+    for (std::size_t count = 0; count <= 21; ++count) {
+      Triangles t = random_triangles(count, 20.0, random);
+      for (std::size_t i = 0; i < count; i += 5) {  // a line
+        double* c = t.data() + 9 * i;
+        for (std::size_t k = 0; k < 3; ++k) c[6 + k] = 3 * c[k] - 2 * c[3 + k];
+      }
+      for (std::size_t i = 3; i < count; i += 7)  // a point
+        for (std::size_t k = 3; k < 9; ++k) t[9 * i + k] = t[9 * i + k % 3];
+      std::vector<DistanceFacet> many(count + 1);
+      many[count].half[0] = -7;
+      make_distance_facets(t.data(), count, many.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        const DistanceFacet one = make_distance_facet(t.data() + 9 * i);
+        CHECK(std::memcmp(&one, &many[i], sizeof one) == 0);
+      }
+      CHECK(many[count].half[0] == -7);  // and no further
+    }
   });
 }
 
