@@ -100,6 +100,10 @@ struct Facets {
   std::vector<Part> part;                    // what they are of their triangle
   std::vector<std::int32_t> owner;           // triangle
   std::vector<std::uint8_t> weighed;         // edges; what was cut is along its seams too
+  struct Place {
+    std::uint32_t facet, k, source;  // edge or corner k of the facet; where Features tell of it
+  };
+  std::vector<Place> edge, end;  // that the triangle answers for
 };
 
 void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
@@ -110,26 +114,12 @@ void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Grad
   region.c[k] = float(-(g[0] * zero_at[0] + g[1] * zero_at[1] + g[2] * zero_at[2]));
 }
 
-// Where triangle t may be the nearest, as far as its part with these corners shows it. Beyond an
-// edge that cutting made, or that two parts share, no part is the nearest within reach: the whole
-// triangle goes on there. What lies behind both of the triangle's edges at a corner lies behind
-// every edge between them, so behind those of the part.
-void set_region(const Features& features, const Surface& surface, std::uint32_t t, const Part& part,
-                const double* corners, kernels::FacetRegion& region) {
-  region.everywhere = false;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double* zero_at = corners + 3 * k;
-    if (const int edge = part.edge[k]; edge >= 0 && (features.owned[t] >> edge & 1)) {
-      region.edges |= std::uint8_t(1u << k);
-      set_plane(region, k, features.across[3 * std::size_t(t) + std::size_t(edge)], zero_at);
-    }
-    if (const int corner = part.corner[k]; corner >= 0 && (features.owned[t] >> (3 + corner) & 1)) {
-      region.corners |= std::uint8_t(1u << k);
-      const std::size_t vertex = surface.triangles[t][std::size_t(corner)];
-      for (std::size_t i = 0; i < 4; ++i)
-        set_plane(region, 3 + 4 * k + i, features.from[4 * vertex + i], zero_at);
-    }
-  }
+// Bit k: the triangle answers for the edge or corner that is place k of this part of it.
+template <class Places>
+std::uint8_t owned_places(const Places& places, unsigned owned) {
+  unsigned bits = 0;
+  for (unsigned k = 0; k < 3; ++k) bits |= (places[k] >= 0 ? owned >> places[k] & 1 : 0) << k;
+  return std::uint8_t(bits);
 }
 
 // All cache lines of a small thing.
@@ -145,13 +135,54 @@ void ask_for(const T* first, std::size_t count = 1) {
 void ask_for_triangle(const Surface& surface, const Features& features, std::uint32_t t) {
   ask_for(&surface.triangles[t]);
   __builtin_prefetch(&features.owned[t]);
-  ask_for(&features.across[3 * std::size_t(t)], 3);
 }
-void ask_for_corners(const Surface& surface, const Features& features, std::uint32_t t) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::size_t v = surface.triangles[t][k];
-    ask_for(&surface.vertices[v]);
-    if (features.owned[t] >> (3 + k) & 1) ask_for(&features.from[4 * v], 4);
+void ask_for_corners(const Surface& surface, std::uint32_t t) {
+  for (const std::uint32_t v : surface.triangles[t]) ask_for(&surface.vertices[v]);
+}
+
+// Where facets may be the nearest, as far as the parts of triangles show it. Beyond an edge that
+// cutting made, or that two parts share, no part is the nearest within reach: the whole triangle
+// goes on there. What lies behind both of the triangle's edges at a corner lies behind every edge
+// between them, so behind those of the part.
+//
+// Which edges and corners a triangle answers for cannot be guessed, so none is branched on: they
+// are listed first.
+void set_regions(const Surface& surface, const Features& features, Facets& out) {
+  const std::size_t count = out.facet.size();
+  if (out.region.size() < count) out.region.resize(count);
+  out.edge.resize(3 * count);
+  out.end.resize(3 * count);
+  std::size_t edges = 0, ends = 0;
+  for (std::size_t f = 0; f < count; ++f) {
+    const std::uint32_t t = std::uint32_t(out.owner[f]);
+    const unsigned owned = features.owned[t];
+    const Part& part = out.part[f];
+    kernels::FacetRegion& region = out.region[f];
+    region.everywhere = out.facet[f].inside_from > 0;  // has no area
+    region.weighed = region.everywhere ? std::uint8_t{3} : out.weighed[f];
+    region.edges = region.everywhere ? std::uint8_t{0} : owned_places(part.edge, owned);
+    region.corners = region.everywhere ? std::uint8_t{0} : owned_places(part.corner, owned >> 3);
+    for (unsigned k = 0; k < 3; ++k) {
+      out.edge[edges] = {std::uint32_t(f), k, 3 * t + std::uint32_t(part.edge[k] & 3)};
+      edges += region.edges >> k & 1;
+      out.end[ends] = {std::uint32_t(f), k,
+                       surface.triangles[t][std::size_t(part.corner[k] & 3) % 3]};
+      ends += region.corners >> k & 1;
+    }
+  }
+  constexpr std::size_t kSoon = 12;
+  const auto zero_at = [&](const Facets::Place& p) { return &out.corners[9 * p.facet + 3 * p.k]; };
+  for (std::size_t i = 0; i < edges; ++i) {
+    if (i + kSoon < edges) ask_for(&features.across[out.edge[i + kSoon].source]);
+    const Facets::Place& p = out.edge[i];
+    set_plane(out.region[p.facet], p.k, features.across[p.source], zero_at(p));
+  }
+  for (std::size_t i = 0; i < ends; ++i) {
+    if (i + kSoon < ends) ask_for(&features.from[4 * std::size_t(out.end[i + kSoon].source)], 4);
+    const Facets::Place& p = out.end[i];
+    for (std::size_t n = 0; n < 4; ++n)
+      set_plane(out.region[p.facet], 3 + 4 * p.k + n, features.from[4 * std::size_t(p.source) + n],
+                zero_at(p));
   }
 }
 
@@ -168,10 +199,10 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
   for (std::size_t i = begin; i < std::min(end, begin + kLater); ++i)
     ask_for_triangle(surface, features, tiles.triangle[i]);
   for (std::size_t i = begin; i < std::min(end, begin + kSoon); ++i)
-    ask_for_corners(surface, features, tiles.triangle[i]);
+    ask_for_corners(surface, tiles.triangle[i]);
   for (std::size_t i = begin; i < end; ++i) {
     if (i + kLater < end) ask_for_triangle(surface, features, tiles.triangle[i + kLater]);
-    if (i + kSoon < end) ask_for_corners(surface, features, tiles.triangle[i + kSoon]);
+    if (i + kSoon < end) ask_for_corners(surface, tiles.triangle[i + kSoon]);
     const std::uint32_t t = tiles.triangle[i];
     const Whole& whole = kWholes[features.owned[t]];
     Corner corner[3];
@@ -195,18 +226,7 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
   }
   out.facet.resize(out.part.size());
   kernels::make_distance_facets(out.corners.data(), out.facet.size(), out.facet.data());
-  if (out.region.size() < out.facet.size()) out.region.resize(out.facet.size());
-  for (std::size_t f = 0; f < out.facet.size(); ++f) {
-    kernels::FacetRegion& region = out.region[f];
-    region.edges = region.corners = 0;
-    region.weighed = 3;
-    region.everywhere = true;
-    // What has no area is weighed everywhere.
-    if (out.facet[f].inside_from > 0) continue;
-    region.weighed = out.weighed[f];
-    set_region(features, surface, std::uint32_t(out.owner[f]), out.part[f],
-               out.corners.data() + 9 * f, region);
-  }
+  set_regions(surface, features, out);
 }
 
 NodeMask above(const float* u, float level) {
