@@ -111,17 +111,6 @@ struct Pair {
   std::uint32_t tile, triangle;
 };
 
-// The same facet as seen from `by` further on.
-kernels::DistanceFacet moved(const kernels::DistanceFacet& facet, const float (&by)[3]) {
-  kernels::DistanceFacet f = facet;
-  for (std::size_t k = 0; k < 7; ++k) f.c[k] += f.gx[k] * by[0] + f.gy[k] * by[1] + f.gz[k] * by[2];
-  for (std::size_t k = 0; k < 3; ++k) {
-    f.low[k] -= by[k];
-    f.high[k] -= by[k];
-  }
-  return f;
-}
-
 // Bricks of a tile that lie in the grid.
 std::uint64_t bricks_there(const Grid& grid, const int (&tile)[3]) {
   std::uint64_t there = 0;
@@ -172,9 +161,9 @@ void bin_triangle(const Grid& grid, const Tiles& tiles, const Boxed& boxed, cons
   const double reach = grid.reach();
   const auto add = [&](int a, int b, int c) {
     const int tile[3] = {a, b, c};
-    const float by[3] = {float(kTile * (a - r.low[0])), float(kTile * (b - r.low[1])),
-                         float(kTile * (c - r.low[2]))};
-    std::uint64_t near = kernels::bricks_within_reach(moved(facet, by), float(reach + kRounding));
+    const float first[3] = {float(kTile * (a - r.low[0])), float(kTile * (b - r.low[1])),
+                            float(kTile * (c - r.low[2]))};
+    std::uint64_t near = kernels::bricks_within_reach(facet, first, float(reach + kRounding));
     if (near == 0) return;
     if (4 * a + 4 > grid.bricks[0] || 4 * b + 4 > grid.bricks[1] || 4 * c + 4 > grid.bricks[2])
       near &= bricks_there(grid, tile);

@@ -29,82 +29,13 @@
 // After foreach_target.h.
 #include <hwy/highway.h>
 
-#ifndef H6_TRIANGLE_DISTANCE_TABLES
-#define H6_TRIANGLE_DISTANCE_TABLES
-namespace h6::kernels {
-
-inline constexpr std::size_t kBlock = 16;  // nodes: 4 x 2 x 2
-inline constexpr std::size_t kBlocks = kBrickSamples / kBlock;
-inline constexpr float kBlockHalf[3] = {1.5f, 0.5f, 0.5f};
-inline constexpr float kRadius = 1.6584f;       // |kBlockHalf|, rounded up
-inline constexpr float kBrickRadius = 6.0622f;  // 3.5 sqrt(3), rounded up
-inline constexpr std::size_t kFunctions = 7;
-inline constexpr std::size_t kPlanes = 16;
-inline constexpr std::uint32_t kEachVisit = 16;
-inline constexpr float kNobodyNear = 1e30f;
-inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
-inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [voxel]
-
-// x fastest within a block and among blocks.
-struct BlockNodes {
-  alignas(64) float middle_x[kBlocks], middle_y[kBlocks], middle_z[kBlocks];
-  alignas(64) float in_x[kBlock], in_y[kBlock], in_z[kBlock];  // from the middle of a block
-};
-
-constexpr BlockNodes block_nodes() {
-  BlockNodes m{};
-  for (std::size_t n = 0; n < kBlock; ++n) {
-    m.in_x[n] = float(n % 4) - kBlockHalf[0];
-    m.in_y[n] = float(n / 4 % 2) - kBlockHalf[1];
-    m.in_z[n] = float(n / 8) - kBlockHalf[2];
-  }
-  for (std::size_t b = 0; b < kBlocks; ++b) {
-    m.middle_x[b] = float(4 * (b % 2)) + kBlockHalf[0];
-    m.middle_y[b] = float(2 * (b / 2 % 4)) + kBlockHalf[1];
-    m.middle_z[b] = float(2 * (b / 8)) + kBlockHalf[2];
-  }
-  return m;
-}
-inline constexpr BlockNodes kNodes = block_nodes();
-
-// Middles of the 64 bricks of a tile.
-struct TileBricks {
-  alignas(64) float x[64], y[64], z[64];
-};
-constexpr TileBricks tile_bricks() {
-  TileBricks t{};
-  for (std::size_t b = 0; b < 64; ++b) {
-    t.x[b] = float(8 * (b % 4)) + 3.5f;
-    t.y[b] = float(8 * (b / 4 % 4)) + 3.5f;
-    t.z[b] = float(8 * (b / 16)) + 3.5f;
-  }
-  return t;
-}
-inline constexpr TileBricks kTile = tile_bricks();
-
-}  // namespace h6::kernels
-#endif
+#include "kernels/bricks_met-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<float, kBlock>;
-using VF = hn::Vec<D>;
 
-// The part of |p - triangle|^2 that is not h^2, for the triangle's inside and first edges.
-template <int kEdges>
-HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF (&w)[3]) {
-  const D d;
-  const VF zero = hn::Zero(d);
-  VF nearest = hn::Set(d, kNobodyNear);
-  for (int e = 0; e < kEdges; ++e) {
-    const VF beyond = hn::Max(hn::Sub(hn::Abs(s[e]), hn::Set(d, f.half[e])), zero);
-    const VF squared = hn::MulAdd(beyond, beyond, hn::Mul(w[e], w[e]));
-    nearest = e == 0 ? squared : hn::Min(nearest, squared);
-  }
-  const VF inner = hn::Min(hn::Min(w[0], w[1]), w[2]);
-  return hn::IfThenZeroElse(hn::Ge(inner, hn::Set(d, f.inside_from)), nearest);
-}
+inline constexpr std::uint32_t kEachVisit = 16;
 
 // The functions of a triangle at places given from a first one, less their value there.
 template <std::size_t kCount>
@@ -134,99 +65,6 @@ HWY_INLINE void values_at(const float* gx, const float* gy, const float* gz, con
                          hn::MulAdd(y, hn::LoadU(d, gy + k),
                                     hn::MulAdd(z, hn::LoadU(d, gz + k), hn::LoadU(d, c + k)))),
               d, out + k);
-}
-
-// What functions gain over half a box at most, and the leeway.
-HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::size_t count,
-                      const float (&half)[3], float* out) {
-  const hn::CappedTag<float, 8> d;
-  for (std::size_t k = 0; k < count; k += hn::Lanes(d))
-    hn::Store(hn::MulAdd(hn::Set(d, half[0]), hn::Abs(hn::LoadU(d, gx + k)),
-                         hn::MulAdd(hn::Set(d, half[1]), hn::Abs(hn::LoadU(d, gy + k)),
-                                    hn::MulAdd(hn::Set(d, half[2]), hn::Abs(hn::LoadU(d, gz + k)),
-                                               hn::Set(d, kLeeway)))),
-              d, out + k);
-}
-
-// Boxes of one size, as a triangle's functions and the planes of its region see them.
-struct Gains {
-  alignas(64) float function[8], plane[kPlanes];
-};
-HWY_INLINE void set_gains(const DistanceFacet& f, const FacetRegion& r, const float (&half)[3],
-                          Gains& gain) {
-  gains(f.gx, f.gy, f.gz, 8, half, gain.function);
-  if ((r.edges | r.corners) != 0) gains(r.gx, r.gy, r.gz, kPlanes, half, gain.plane);
-}
-
-// Whether boxes may meet the region: their middles are at (x, y, z), where the functions are s and
-// w; `plane` is what the planes are at (0, 0, 0).
-HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains& gain,
-                      const float* plane, VF x, VF y, VF z, const VF (&s)[3], const VF (&w)[3]) {
-  const D d;
-  const auto below = [&](VF value, float level)
-                         HWY_ATTR { return hn::Le(value, hn::Set(d, level)); };
-  const auto above = [&](VF value, float level)
-                         HWY_ATTR { return hn::Ge(value, hn::Set(d, level)); };
-  const auto below_plane = [&](std::size_t k) HWY_ATTR {
-    return below(hn::MulAdd(x, hn::Set(d, r.gx[k]),
-                            hn::MulAdd(y, hn::Set(d, r.gy[k]),
-                                       hn::MulAdd(z, hn::Set(d, r.gz[k]), hn::Set(d, plane[k])))),
-                 gain.plane[k]);
-  };
-  const float* g = gain.function;
-  auto there = hn::And(hn::And(above(w[0], -g[3]), above(w[1], -g[4])), above(w[2], -g[5]));
-  for (std::size_t e = 0; e < 3; ++e)
-    if (r.edges >> e & 1)
-      there = hn::Or(there, hn::And(hn::And(below(w[e], g[3 + e]), below_plane(e)),
-                                    below(hn::Abs(s[e]), f.half[e] + g[e])));
-  for (std::size_t v = 0; v < 3; ++v)
-    if (r.corners >> v & 1) {
-      const std::size_t u = (v + 2) % 3, p = 3 + 4 * v;
-      there = hn::Or(
-          there,
-          hn::And(hn::And(hn::And(below(s[v], g[v] - f.half[v]), above(s[u], f.half[u] - g[u])),
-                          hn::And(below_plane(p), below_plane(p + 1))),
-                  hn::And(below_plane(p + 2), below_plane(p + 3))));
-    }
-  return there;
-}
-
-// Those of the bricks that may meet the region. On the way the triangle is weighed at the middles
-// of the bricks, and of some beside them, which does no harm.
-template <int kEdges>
-HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r,
-                                    std::uint64_t bricks, std::int32_t name, TileRoom& room) {
-  constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
-  const D d;
-  const hn::RebindToSigned<D> d32;
-  // One brick is as soon weighed as tested.
-  const bool all = r.everywhere || (bricks & (bricks - 1)) == 0;
-  Gains gain = {};
-  if (!all) set_gains(f, r, kBrickHalf, gain);
-  std::uint64_t met = 0;
-  for (std::size_t b = 0; b < 64; b += hn::Lanes(d)) {
-    if ((bricks >> b & ((std::uint64_t{1} << hn::Lanes(d)) - 1)) == 0) continue;
-    const VF x = hn::Load(d, kTile.x + b), y = hn::Load(d, kTile.y + b),
-             z = hn::Load(d, kTile.z + b);
-    const auto at = [&](std::size_t k) HWY_ATTR {
-      return hn::MulAdd(x, hn::Set(d, f.gx[k]),
-                        hn::MulAdd(y, hn::Set(d, f.gy[k]),
-                                   hn::MulAdd(z, hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
-    };
-    const VF s[3] = {at(0), at(1), at(2)}, w[3] = {at(3), at(4), at(5)}, h = at(6);
-    const VF away = hn::MulAdd(h, h, beside_squared<kEdges>(f, s, w)),
-             least = hn::Load(d, room.middle + b);
-    const auto named = hn::Load(d32, room.nearest + b), own = hn::Set(d32, name);
-    const auto nearer = hn::Or(hn::Lt(away, least),
-                               hn::And(hn::Eq(away, least), hn::RebindMask(d, hn::Lt(own, named))));
-    hn::Store(hn::Min(away, least), d, room.middle + b);
-    hn::Store(hn::IfThenElse(hn::RebindMask(d32, nearer), own, named), d32, room.nearest + b);
-    if (all) continue;
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, meets(f, r, gain, r.c, x, y, z, s, w), bits);
-    met |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << b;
-  }
-  return all ? bricks : bricks & met;
 }
 
 // One triangle, prepared for all bricks of its tile. What a block's middle must be at least or at
@@ -474,91 +312,6 @@ void TileDistance(const DistanceFacet* facets, const FacetRegion* regions,
   }
 }
 
-void BrickDistance(const TileRoom& room, std::size_t brick, float* distance) {
-  const hn::CappedTag<float, 4> d;
-  const float* from = room.squared + brick * kBrickSamples;
-  for (std::size_t b = 0; b < kBlocks; ++b)
-    for (std::size_t row = 0; row < 4; ++row) {
-      const std::size_t x = 4 * (b % 2), y = 2 * (b / 2 % 4) + row % 2, z = 2 * (b / 8) + row / 2;
-      for (std::size_t n = 0; n < 4; n += hn::Lanes(d))
-        hn::StoreU(hn::Sqrt(hn::LoadU(d, from + b * kBlock + 4 * row + n)), d,
-                   distance + (z * 8 + y) * 8 + x + n);
-    }
-}
-
-// BricksWithinReach of one vector of bricks. Apart from the loop over all, so that compilers take
-// numbers from where they are: few triangles come near more than one vector.
-HWY_NOINLINE std::uint64_t some_within_reach(const DistanceFacet& f, const float* extent,
-                                             float reach, std::size_t b) {
-  const D d;
-  const VF p[3] = {hn::Load(d, kTile.x + b), hn::Load(d, kTile.y + b), hn::Load(d, kTile.z + b)};
-  VF value[kFunctions];
-  for (std::size_t k = 0; k < kFunctions; ++k)
-    value[k] = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
-                          hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
-                                     hn::MulAdd(p[2], hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
-  // Planes: of the triangle, both sides, and through its edges, away from it.
-  const VF s[3] = {value[0], value[1], value[2]}, w[3] = {value[3], value[4], value[5]};
-  auto in = hn::Le(hn::Abs(value[6]), hn::Set(d, extent[6]));
-  for (std::size_t e = 0; e < 3; ++e) in = hn::And(in, hn::Ge(w[e], hn::Set(d, -extent[3 + e])));
-  // The ball around the brick.
-  const float ball = reach + kBrickRadius + kRounding;
-  in = hn::And(in, hn::Le(hn::MulAdd(value[6], value[6], beside_squared<3>(f, s, w)),
-                          hn::Set(d, ball * ball)));
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(d, in, bits);
-  return std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8;
-}
-
-std::uint64_t BricksWithinReach(const DistanceFacet& f, float reach) {
-  const D d;
-  const VF zero = hn::Zero(d);
-  const float within = reach + kRounding;
-  const hn::CappedTag<float, 8> d8;
-  alignas(32) float extent[8];  // of a brick and its reach along the functions
-  for (std::size_t k = 0; k < 8; k += hn::Lanes(d8))
-    hn::Store(hn::MulAdd(hn::Set(d8, 3.5f),
-                         hn::Add(hn::Add(hn::Abs(hn::LoadU(d8, f.gx + k)),
-                                         hn::Abs(hn::LoadU(d8, f.gy + k))),
-                                 hn::Abs(hn::LoadU(d8, f.gz + k))),
-                         hn::Set(d8, within)),
-              d8, extent + k);
-  std::uint64_t near = 0;
-  for (std::size_t b = 0; b < 64; b += hn::Lanes(d)) {
-    const float* middle[3] = {kTile.x + b, kTile.y + b, kTile.z + b};
-    VF box2 = zero;
-    for (int k = 0; k < 3; ++k) {
-      const VF p = hn::Load(d, middle[k]);
-      const VF gap = hn::Max(hn::Sub(hn::Set(d, f.low[k] - 3.5f), p),
-                             hn::Sub(p, hn::Set(d, f.high[k] + 3.5f)));
-      const VF apart = hn::Max(gap, zero);
-      box2 = hn::MulAdd(apart, apart, box2);
-    }
-    const auto in = hn::Le(box2, hn::Set(d, within * within));
-    if (hn::AllFalse(d, in)) continue;
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, in, bits);
-    near |= ((std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) &
-             some_within_reach(f, extent, reach, b))
-            << b;
-  }
-  return near;
-}
-
-void NodesAbove(const float* distance, float level, std::uint64_t* words) {
-  const hn::CappedTag<float, 16> d;
-  const auto limit = hn::Set(d, level);
-  for (std::size_t z = 0; z < kBrickSamples / 64; ++z) {
-    std::uint64_t word = 0;
-    for (std::size_t n = 0; n < 64; n += hn::Lanes(d)) {
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, hn::Gt(hn::LoadU(d, distance + 64 * z + n), limit), bits);
-      word |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << n;
-    }
-    words[z] = word;
-  }
-}
-
 }  // namespace h6::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -566,26 +319,11 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(TileDistance);
-HWY_EXPORT(BrickDistance);
-HWY_EXPORT(BricksWithinReach);
-HWY_EXPORT(NodesAbove);
-
-std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach) {
-  return HWY_DYNAMIC_DISPATCH(BricksWithinReach)(facet, reach);
-}
 
 void tile_distance(const DistanceFacet* facets, const FacetRegion* regions,
                    const std::uint64_t* near, const std::int32_t* names, std::size_t count,
                    float reach, TileRoom& room) {
   HWY_DYNAMIC_DISPATCH(TileDistance)(facets, regions, near, names, count, reach, room);
-}
-
-void brick_distance(const TileRoom& room, std::size_t brick, float* distance) {
-  HWY_DYNAMIC_DISPATCH(BrickDistance)(room, brick, distance);
-}
-
-void nodes_above(const float* distance, float level, std::uint64_t words[8]) {
-  HWY_DYNAMIC_DISPATCH(NodesAbove)(distance, level, words);
 }
 
 void triangle_distance(const double* corners, std::size_t count, float reach, float* distance) {

@@ -30,9 +30,10 @@ DistanceFacet make_distance_facet(const double* corners);
 // The same of many, to the same bits: `corners` is count x 3 corners x 3 coordinates.
 void make_distance_facets(const double* corners, std::size_t count, DistanceFacet* facets);
 
-// Bit (c*4 + b)*4 + a: brick (a,b,c) of the tile may have a node within reach of the triangle.
+// Bit (c*4 + b)*4 + a: brick (a,b,c) of the tile whose first node is at `first`, in the frame of the
+// facet's corners, may have a node within reach of the triangle.
 // Certain where it says no; where it says yes, wrong only around edges and corners.
-std::uint64_t bricks_within_reach(const DistanceFacet& facet, float reach);
+std::uint64_t bricks_within_reach(const DistanceFacet& facet, const float first[3], float reach);
 
 // Where a triangle of a mesh may be the nearest of all: over its inside; beyond edge e (from corner
 // e to the next), where it answers for it, below plane e; beyond corner v, where it answers for it,

@@ -4,6 +4,7 @@
 #include "tests/support/near.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -219,7 +220,11 @@ TEST_CASE("bricks_within_reach: never misses a brick that has a node within reac
     for (int i = 0; i < 60; ++i) {
       Triangles t = random_triangles(1, i % 2 ? 3.0 : 15.0, random);
       for (double& c : t) c = 2.5 * c + 6;
-      const std::uint64_t near = bricks_within_reach(make_distance_facet(t.data()), 5.0f);
+      const std::array<float, 3> first = {float(random(-90, 90)), 32, -64};
+      Triangles seen = t;
+      for (std::size_t k = 0; k < 9; ++k) seen[k] += double(first[k % 3]);
+      const std::uint64_t near =
+          bricks_within_reach(make_distance_facet(seen.data()), first.data(), 5.0f);
       for (int b = 0; b < 64; ++b) {
         Triangles there = t;
         const double at[3] = {8.0 * (b % 4), 8.0 * (b / 4 % 4), 8.0 * (b / 16)};
