@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "io/bake_grid.h"
+#include "kernels/lattice_hits.h"
 
 namespace h6::io::bake {
 namespace {
@@ -43,21 +44,23 @@ Along make_along(const Point (&p)[3], std::size_t axis, std::int64_t area) {
   return a;
 }
 
-// Where a line meets a triangle, from the corners' shares of the area > 0: the node at or before
-// the hit, and whether it is the hit.
+// Where a line meets a triangle: the node at or before the hit, and whether it is the hit.
 struct Hit {
   std::int64_t node;
   bool exact;
 };
-Hit locate(const std::int64_t (&share)[3], const Along& along, std::int64_t area) {
-  // Right to 1e-11 voxel, 2048 being the largest.
-  const double at =
-      along.first + (double(share[1]) * along.second + double(share[2]) * along.third);
+// `at` is right to 1e-11 voxel; integers() is asked where that does not tell.
+template <class Integers>
+Hit locate(double at, Integers&& integers) {
   const std::int64_t before = std::int64_t(at) - (at < 0);
   const double rest = at - double(before);
-  if (rest > 1e-9 && rest < 1 - 1e-9) return {before, false};
-  const auto& c = along.corner;
-  const Wide numerator = Wide(share[0]) * c[0] + Wide(share[1]) * c[1] + Wide(share[2]) * c[2];
+  return rest > 1e-9 && rest < 1 - 1e-9 ? Hit{before, false} : integers();
+}
+// From where the corners are along the line, and their shares > 0 of the area.
+Hit locate_exactly(const std::int64_t (&corner)[3], const std::int64_t (&share)[3],
+                   std::int64_t area) {
+  const Wide numerator =
+      Wide(share[0]) * corner[0] + Wide(share[1]) * corner[1] + Wide(share[2]) * corner[2];
   const Wide whole = Wide(area) << kFraction;
   Wide quotient = numerator / whole, remainder = numerator % whole;
   if (remainder < 0) --quotient;
@@ -65,19 +68,68 @@ Hit locate(const std::int64_t (&share)[3], const Along& along, std::int64_t area
 }
 
 constexpr std::int64_t kSide = 8 * kernels::kTileBricks;  // nodes
+static_assert(kSide == kernels::kLatticeSide && kVoxel == std::int64_t(kernels::kLatticeVoxel));
 
 // A tile's rows, by brick.
 using Rows = std::array<std::int32_t, 64>;
 
-// Lines along `axis` through nodes (j, k) of the other two axes. The edge from a node belongs to
-// the node's brick. Which lines meet a triangle cannot be guessed, so none is branched on: those
-// that do are listed first.
+// The line along `axis` through nodes (j, k) of the other two axes meets a triangle. The edge from
+// a node belongs to the node's brick.
+template <std::size_t axis>
+void mark(const Hit& hit, std::int64_t j, std::int64_t k, const Rows& rows,
+          std::vector<Crossing>& crossings) {
+  if (hit.node < 0 || hit.node >= kSide) return;
+  std::array<std::size_t, 3> at;
+  at[axis] = std::size_t(hit.node);
+  at[(axis + 1) % 3] = std::size_t(j);
+  at[(axis + 2) % 3] = std::size_t(k);
+  const std::int32_t r = rows[(at[2] / 8 * 4 + at[1] / 8) * 4 + at[0] / 8];
+  if (r < 0) return;
+  const std::size_t node = ((at[2] & 7) * 8 + (at[1] & 7)) * 8 + (at[0] & 7);
+  Crossing& c = crossings[std::size_t(r)];
+  (hit.exact ? c.on : c.edge[axis]).set(node);
+}
+
+// Twice the area that the line (j, k) makes with each two corners, and that of the triangle.
+template <std::size_t axis>
+std::int64_t shares(const Point (&p)[3], std::int64_t j, std::int64_t k, std::int64_t (&share)[3]) {
+  constexpr std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+  std::int64_t whole = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Point &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
+    share[i] = (b[u] - a[u]) * (k * kVoxel - a[v]) - (b[v] - a[v]) * (j * kVoxel - a[u]);
+    whole += share[i];
+  }
+  if (whole < 0)
+    for (std::int64_t& part : share) part = -part;
+  return std::abs(whole);
+}
+
+template <std::size_t axis>
+void mark_small(const Point (&p)[3], const kernels::LatticeHits& hits,
+                const std::int32_t (&first)[3], const Rows& rows,
+                std::vector<Crossing>& crossings) {
+  for (std::size_t n = 0; n < hits.count[axis]; ++n) {
+    const std::size_t slot = hits.slot[axis][n], shift = hits.shift[axis];
+    const std::int64_t j = first[(axis + 1) % 3] + std::int64_t(slot & ((1u << shift) - 1));
+    const std::int64_t k = first[(axis + 2) % 3] + std::int64_t(slot >> shift);
+    const Hit hit = locate(hits.at[axis][slot], [&] {
+      std::int64_t share[3];
+      const std::int64_t area = shares<axis>(p, j, k, share);
+      return locate_exactly({p[0][axis], p[1][axis], p[2][axis]}, share, area);
+    });
+    mark<axis>(hit, j, k, rows, crossings);
+  }
+}
+
+// For triangles whose areas doubles do not hold. Which lines meet one cannot be guessed, so none is
+// branched on: those that do are listed first.
 struct Lines {
   std::int64_t first, last;  // that a triangle may meet, along an axis of the tile
 };
 template <std::size_t axis>
-void draw(const Point (&p)[3], const std::array<Lines, 3>& lines, const Rows& rows,
-          std::vector<Crossing>& crossings) {
+void draw_large(const Point (&p)[3], const std::array<Lines, 3>& lines, const Rows& rows,
+                std::vector<Crossing>& crossings) {
   constexpr std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
   const auto [j0, j1] = lines[u];
   const auto [k0, k1] = lines[v];
@@ -113,17 +165,10 @@ void draw(const Point (&p)[3], const std::array<Lines, 3>& lines, const Rows& ro
     const std::int64_t j = met[n] % kSide, k = met[n] / kSide;
     std::int64_t share[3];
     for (std::size_t i = 0; i < 3; ++i) share[i] = line[i] + j * per_j[i] + k * per_k[i];
-    const Hit hit = locate(share, along, area);
-    if (hit.node < 0 || hit.node >= kSide) continue;
-    std::array<std::size_t, 3> to;
-    to[axis] = std::size_t(hit.node);
-    to[u] = std::size_t(j0 + j);
-    to[v] = std::size_t(k0 + k);
-    const std::int32_t r = rows[(to[2] / 8 * 4 + to[1] / 8) * 4 + to[0] / 8];
-    if (r < 0) continue;
-    const std::size_t node = ((to[2] & 7) * 8 + (to[1] & 7)) * 8 + (to[0] & 7);
-    Crossing& c = crossings[std::size_t(r)];
-    (hit.exact ? c.on : c.edge[axis]).set(node);
+    const double at =
+        along.first + (double(share[1]) * along.second + double(share[2]) * along.third);
+    const Hit hit = locate(at, [&] { return locate_exactly(along.corner, share, area); });
+    mark<axis>(hit, j0 + j, k0 + k, rows, crossings);
   }
 }
 
@@ -139,6 +184,7 @@ void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, Narr
     const bool in = at[0] < grid.bricks[0] && at[1] < grid.bricks[1] && at[2] < grid.bricks[2];
     rows[std::size_t(i)] = in ? band.row[grid.cell(at[0], at[1], at[2])] : -1;
   }
+  thread_local const auto hits = std::make_unique<kernels::LatticeHits>();
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
     const auto& corner = surface.triangles[tiles.triangle[i]];
     const Vec3* v[3];
@@ -161,9 +207,26 @@ void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, Narr
       lines[k] = {
           std::max<std::int64_t>(0, ceil_voxel(std::min({p[0][k], p[1][k], p[2][k]}))),
           std::min<std::int64_t>(kSide - 1, floor_voxel(std::max({p[0][k], p[1][k], p[2][k]})))};
-    draw<0>(p, lines, rows, band.crossing);
-    draw<1>(p, lines, rows, band.crossing);
-    draw<2>(p, lines, rows, band.crossing);
+    std::int32_t small[3][3], low[3], high[3];
+    std::int64_t farthest = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::int32_t(lines[k].first);
+      high[k] = std::int32_t(lines[k].last);
+      for (std::size_t c = 0; c < 3; ++c) {
+        small[c][k] = std::int32_t(p[c][k]);
+        farthest = std::max(farthest, std::abs(p[c][k]));
+      }
+    }
+    if (farthest < kernels::kLatticeMost) {
+      kernels::lattice_hits(small, low, high, *hits);
+      mark_small<0>(p, *hits, low, rows, band.crossing);
+      mark_small<1>(p, *hits, low, rows, band.crossing);
+      mark_small<2>(p, *hits, low, rows, band.crossing);
+    } else {
+      draw_large<0>(p, lines, rows, band.crossing);
+      draw_large<1>(p, lines, rows, band.crossing);
+      draw_large<2>(p, lines, rows, band.crossing);
+    }
   }
   for (const std::int32_t row : rows) {
     if (row < 0) continue;

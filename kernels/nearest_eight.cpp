@@ -162,7 +162,8 @@ HWY_INLINE std::size_t keep_live(std::uint32_t first, VF squared, Mask live, std
                                  float* bound) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  hn::StoreU(hn::Compress(hn::Iota(du, first), hn::RebindMask(du, live)), du, what);
+  hn::StoreU(hn::Compress(hn::Add(hn::Iota(du, 0), hn::Set(du, first)), hn::RebindMask(du, live)),
+             du, what);
   hn::StoreU(hn::Compress(squared, live), d, bound);
   return hn::CountTrue(d, live);
 }
