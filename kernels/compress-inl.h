@@ -79,7 +79,7 @@ HWY_INLINE std::uint32_t bits_of(D d, hn::Mask<D> mask) {
 
 // The same by a mask.
 template <class D>
-HWY_INLINE hn::Vec<D> compress(D d, hn::Vec<D> v, hn::Mask<D> mask) {
+HWY_INLINE hn::Vec<D> compress([[maybe_unused]] D d, hn::Vec<D> v, hn::Mask<D> mask) {
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET > HWY_AVX3
   return compress_by_bits(d, v, bits_of(d, mask));
 #else

@@ -8,6 +8,7 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/compress-inl.h"
 #include "kernels/sample_field-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -75,8 +76,10 @@ HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uin
   if (kept == 0) return 0;
 
   const VI id =
-      lanes.rows != nullptr ? row : hn::Iota(di, static_cast<std::int32_t>(first + lanes.first));
-  const VI ids = hn::Compress(id, hn::RebindMask(di, keep));
+      lanes.rows != nullptr
+          ? row
+          : hn::Add(hn::Iota(di, 0), hn::Set(di, static_cast<std::int32_t>(first + lanes.first)));
+  const VI ids = compress(di, id, hn::RebindMask(di, keep));
   const bool whole = lanes.live >= hn::Lanes(d);
   store_n(ids, di, reinterpret_cast<std::int32_t*>(survivors), whole ? lanes.live : kept);
   return kept;

@@ -9,6 +9,8 @@
 // After foreach_target.h.
 #include "hwy/highway.h"
 
+#include "kernels/compress-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -28,7 +30,7 @@ std::size_t expired_simd(const float* values, const std::uint32_t* blocks, std::
       const std::size_t n = hn::CountTrue(d, gone);
       if (n == 0) continue;
       const auto index = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(i)));
-      hn::StoreU(hn::Compress(index, hn::RebindMask(di, gone)), di,
+      hn::StoreU(compress(di, index, hn::RebindMask(di, gone)), di,
                  reinterpret_cast<std::int32_t*>(out + written));
       written += n;
     }

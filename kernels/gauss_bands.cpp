@@ -11,6 +11,7 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/compress-inl.h"
 #include "kernels/tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -79,9 +80,9 @@ HWY_INLINE Items items_of(const GaussBands& g, const DirectionsView& c, float pe
     const std::size_t live = c.count - i;
     const auto fresh = differing(g, i, live);
     for (int k = 0; k < 3; ++k)
-      hn::StoreU(hn::Compress(load_n(d, g.column[k] + i, live), fresh), d, g.direction[k] + left);
-    const auto at = hn::Iota(di, static_cast<std::int32_t>(i));
-    hn::StoreU(hn::Compress(at, hn::RebindMask(di, fresh)), di,
+      hn::StoreU(compress(d, load_n(d, g.column[k] + i, live), fresh), d, g.direction[k] + left);
+    const auto at = hn::Add(hn::Iota(di, 0), hn::Set(di, static_cast<std::int32_t>(i)));
+    hn::StoreU(compress(di, at, hn::RebindMask(di, fresh)), di,
                reinterpret_cast<std::int32_t*>(g.head) + left);
     left += hn::CountTrue(d, fresh);
   }

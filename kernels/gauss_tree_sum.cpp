@@ -14,6 +14,7 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/compress-inl.h"
 #include "kernels/gauss_targets-inl.h"
 #include "kernels/tail-inl.h"
 
@@ -60,7 +61,7 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
       }
       const MF cut = hn::AndNot(inside, near);
       const auto append = [&](int k, VF v) HWY_ATTR {
-        hn::StoreU(hn::Compress(v, cut), d, t.list.column[k] + count);
+        hn::StoreU(compress(d, v, cut), d, t.list.column[k] + count);
       };
       if (!kUnit) append(0, share);
       HWY_UNROLL(2)

@@ -13,6 +13,7 @@
 #include <hwy/foreach_target.h>
 // After foreach_target.h.
 #include <hwy/highway.h>
+#include "kernels/compress-inl.h"
 #include "kernels/tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -96,11 +97,11 @@ std::size_t KeepRows(const Touching& p, std::size_t begin, std::size_t end, floa
     // A whole vector is stored, over rows that were read: to <= i.
     const auto row = hn::LoadU(du, p.row + i);
     const VF x = hn::LoadU(d, p.gx + i), y = hn::LoadU(d, p.gy + i), z = hn::LoadU(d, p.gz + i);
-    hn::StoreU(hn::Compress(v, keep), d, p.distance + to);
-    hn::StoreU(hn::Compress(row, hn::RebindMask(du, keep)), du, p.row + to);
-    hn::StoreU(hn::Compress(x, keep), d, p.gx + to);
-    hn::StoreU(hn::Compress(y, keep), d, p.gy + to);
-    hn::StoreU(hn::Compress(z, keep), d, p.gz + to);
+    hn::StoreU(compress(d, v, keep), d, p.distance + to);
+    hn::StoreU(compress(du, row, hn::RebindMask(du, keep)), du, p.row + to);
+    hn::StoreU(compress(d, x, keep), d, p.gx + to);
+    hn::StoreU(compress(d, y, keep), d, p.gy + to);
+    hn::StoreU(compress(d, z, keep), d, p.gz + to);
     to += hn::CountTrue(d, keep);
   }
   return to - first + keep_nearest_ref(p, i, end, limit, ties, to);

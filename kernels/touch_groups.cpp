@@ -10,6 +10,7 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/compress-inl.h"
 #include "kernels/sample_field-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -56,13 +57,13 @@ HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* grou
       const auto here = hn::TestBit(hn::Set(di, static_cast<std::int32_t>(looked >> i)), bit);
       const auto put = [&](const float* from, float* to) HWY_ATTR {
         const VF v = hn::LoadU(d, from + first + i);
-        hn::StoreU(hn::Compress(v, hn::RebindMask(d, here)), d, to + n);
+        hn::StoreU(compress(d, v, hn::RebindMask(d, here)), d, to + n);
       };
       put(points.x, stage.x);
       put(points.y, stage.y);
       put(points.z, stage.z);
       const VI row = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(first + i)));
-      hn::StoreU(hn::Compress(row, here), di, stage.row + n);
+      hn::StoreU(compress(di, row, here), di, stage.row + n);
       n += hn::CountTrue(di, here);
     }
   }
@@ -246,12 +247,12 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
       if (HWY_UNLIKELY(!ring.plain[k % kRing]) && limit > 0 && !hn::AllFalse(d, touching))
         touching = hn::Or(hn::Lt(s.distance, hn::Zero(d)),
                           hn::And(touching, in_bricks(field, to_field, points, at)));
-      hn::StoreU(hn::Compress(points.row(at), hn::RebindMask(di, touching)), di,
+      hn::StoreU(compress(di, points.row(at), hn::RebindMask(di, touching)), di,
                  reinterpret_cast<std::int32_t*>(out.row + written));
-      hn::StoreU(hn::Compress(s.distance, touching), d, out.distance + written);
-      hn::StoreU(hn::Compress(s.gx, touching), d, out.gx + written);
-      hn::StoreU(hn::Compress(s.gy, touching), d, out.gy + written);
-      hn::StoreU(hn::Compress(s.gz, touching), d, out.gz + written);
+      hn::StoreU(compress(d, s.distance, touching), d, out.distance + written);
+      hn::StoreU(compress(d, s.gx, touching), d, out.gx + written);
+      hn::StoreU(compress(d, s.gy, touching), d, out.gy + written);
+      hn::StoreU(compress(d, s.gz, touching), d, out.gz + written);
       written += hn::CountTrue(d, touching);
     }
     points.end(k, smallest);
