@@ -1,9 +1,9 @@
 // bake_samples.cpp - from unsigned distances to the samples of the field, in place.
 //
-// Rows become bricks in the same order, and no brick lies behind its row. As soon as enough rows
-// were left out, the next ones are signed right into the room of those before them; until then a
-// few thousand at a time are signed into a buffer and moved down. A field of a gigabyte is never
-// there twice.
+// Rows become bricks in the same order, and no brick lies behind its row. Chunks are signed side by
+// side, each in order, right into the room of their bricks. Where that is room of rows that a chunk
+// before may still read, bricks wait in a buffer; when it is full all chunks are waited for. A
+// field of a gigabyte is never there twice.
 #include <algorithm>
 
 #include "io/bake_chains.h"
@@ -14,7 +14,30 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr std::size_t kBatch = 2048;  // rows: 4 MiB
+constexpr std::size_t kChunk = 1024;   // bricks
+constexpr std::size_t kBuffer = 2048;  // bricks: 4 MiB
+
+struct Chunk {
+  std::size_t begin, end;            // bricks
+  std::size_t late_begin, late_end;  // of them, those that wait
+  std::size_t buffer;                // where in it
+};
+
+// Chunks from this brick on whose late bricks fit the buffer.
+std::vector<Chunk> next_chunks(const std::vector<std::uint32_t>& kept, std::size_t begin) {
+  std::vector<Chunk> chunks;
+  const std::size_t first_row = kept[begin];  // all rows before have been read
+  for (std::size_t at = begin, buffered = 0; at < kept.size(); at += kChunk) {
+    const std::size_t end = std::min(kept.size(), at + kChunk);
+    const std::size_t late = std::clamp(first_row, at, end);
+    const std::size_t late_end =
+        at == begin ? late : std::clamp<std::size_t>(kept[at - 1] + 1, late, end);
+    if (buffered + (late_end - late) > kBuffer) break;
+    chunks.push_back({at, end, late, late_end, buffered});
+    buffered += late_end - late;
+  }
+  return chunks;
+}
 
 // The signed distances of one row [m].
 void sign_row(const Grid& grid, const NarrowBand& band, const Reached& reached,
@@ -47,21 +70,30 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, c
   if (!band.part.empty()) field.part.resize(kept.size());
   field.triangle.resize(kept.size());
   Samples buffer;
-  for (std::size_t begin = 0, end; begin < kept.size(); begin = end) {
-    const std::size_t left_out = kept[begin] - begin;
-    const bool direct = left_out >= kBatch;
-    end = std::min(kept.size(), begin + (direct ? left_out : kBatch));
-    if (!direct) buffer.resize(kBatch * kBrickSamples);
-    sched::parallel_for(end - begin, threads, [&](std::size_t i) {
-      const std::size_t r = kept[begin + i];
-      sign_row(grid, band, reached, inside, r,
-               direct ? band.nodes(begin + i) : buffer.data() + i * kBrickSamples);
-      if (!band.part.empty()) field.part[begin + i] = band.part[r];
-      field.triangle[begin + i] = band.triangle[r];
+  for (std::size_t begin = 0; begin < kept.size();) {
+    const std::vector<Chunk> chunks = next_chunks(kept, begin);
+    begin = chunks.back().end;
+    const std::size_t buffered =
+        chunks.back().buffer + (chunks.back().late_end - chunks.back().late_begin);
+    if (buffer.size() < buffered * kBrickSamples) buffer.resize(kBuffer * kBrickSamples);
+    sched::parallel_for(chunks.size(), threads, [&](std::size_t c) {
+      const Chunk& chunk = chunks[c];
+      for (std::size_t i = chunk.begin; i < chunk.end; ++i) {
+        const std::size_t r = kept[i];
+        const bool late = i >= chunk.late_begin && i < chunk.late_end;
+        sign_row(grid, band, reached, inside, r,
+                 late ? buffer.data() + (chunk.buffer + i - chunk.late_begin) * kBrickSamples
+                      : band.nodes(i));
+        if (!band.part.empty()) field.part[i] = band.part[r];
+        field.triangle[i] = band.triangle[r];
+      }
     });
-    if (direct) continue;
-    sched::parallel_for(end - begin, threads, [&](std::size_t i) {
-      std::copy_n(buffer.data() + i * kBrickSamples, kBrickSamples, band.nodes(begin + i));
+    if (buffered == 0) continue;
+    sched::parallel_for(chunks.size(), threads, [&](std::size_t c) {
+      const Chunk& chunk = chunks[c];
+      std::copy_n(buffer.data() + chunk.buffer * kBrickSamples,
+                  (chunk.late_end - chunk.late_begin) * kBrickSamples,
+                  band.nodes(chunk.late_begin));
     });
   }
   band.u.resize(kept.size() * kBrickSamples);

@@ -6,8 +6,23 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <atomic>
+#include <memory>
+#include <vector>
 
 namespace h6::sched {
+namespace {
+
+// An arena of our own: the host's TBB work can neither enter it nor be held up by it. The calling
+// thread keeps it, since making one and getting workers into it takes longer than many a loop.
+oneapi::tbb::task_arena& own_arena(unsigned threads) {
+  thread_local std::vector<std::unique_ptr<oneapi::tbb::task_arena>> arenas;
+  if (arenas.size() <= threads) arenas.resize(threads + 1);
+  auto& arena = arenas[threads];
+  if (!arena) arena = std::make_unique<oneapi::tbb::task_arena>(static_cast<int>(threads));
+  return *arena;
+}
+
+}  // namespace
 
 unsigned machine_threads() {
   return static_cast<unsigned>(oneapi::tbb::info::default_concurrency());
@@ -26,9 +41,7 @@ void parallel_for(std::size_t count, unsigned threads,
   // into a TBB that was built without it.
   std::atomic<std::size_t> order{0};
   order.store(1, std::memory_order_release);
-  // An arena of our own: the host's TBB work can neither enter it nor be held up by it.
-  oneapi::tbb::task_arena arena(static_cast<int>(threads));
-  arena.execute([&] {
+  own_arena(threads).execute([&] {
     oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count),
                               [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
                                 (void)order.load(std::memory_order_acquire);
