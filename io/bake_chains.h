@@ -65,8 +65,6 @@ struct Around {
   }
 };
 
-inline constexpr NodeMask kAllNodes{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
-
 // The nodes of the middle brick that have one of the given nodes among the 27 around them.
 // `nodes[i]`: those of neighbour i.
 inline NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {

@@ -14,7 +14,7 @@ inline constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7
 inline constexpr std::uint64_t kX0 = 0x0101010101010101, kX7 = 0x8080808080808080;
 inline constexpr std::uint64_t kY0 = 0xff, kY7 = std::uint64_t{0xff} << 56;
 
-inline const Crossing kOpen{};
+inline const Crossing kOpenEdges{};
 
 // Nodes of the face towards a neighbour, as nodes of the neighbour, through edges that are not cut.
 inline NodeMask through(const NodeMask& nodes, const Crossing& edges, std::size_t axis, int step) {
@@ -70,21 +70,26 @@ inline NodeMask after(const NodeMask& m, std::size_t axis) {
 
 // Layers of bricks make slabs. A slab is flooded by one thread at a time; what runs over into the
 // slabs above and below waits there as drops for the next round.
+//
+// A row whose nodes are all passable, by every edge, is like a brick without a row: it takes all
+// its water at once. These are open cells. Those that hang together with the border are found as
+// bits, 64 cells at a time, and the rows between them draw from them; only what is left is handed
+// on from brick to brick.
 class Flood {
  public:
   enum class Edges { cut, open };
+  enum class Over { cells, rows };  // whether bricks without a row are passable
   // `free` must outlive the flood.
-  Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges, unsigned threads);
+  Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges, unsigned threads,
+        Over over = Over::cells);
 
-  // From all around: the border of the grid is outside, and connected.
+  // From all around: the border of the grid is outside, and connected. Over cells.
   void from_border();
 
   // From more nodes, as far as they are passable and dry; false: none is. Bricks without a row that
   // are reached now get the tag.
   bool from_nodes(const Masks& seeds, std::uint8_t tag);
-
-  // Marks all bricks without a row as reached already: rows only.
-  void close_cells() { std::fill(cell_.begin(), cell_.end(), std::uint8_t{1}); }
+  bool from_nodes(const std::vector<RowNodes>& seeds, std::uint8_t tag);
 
   const Masks& wet() const { return wet_; }
   Masks take_wet() { return std::move(wet_); }
@@ -98,26 +103,31 @@ class Flood {
   struct Slab {
     int first = 0, end = 0;  // layers
     std::size_t first_row = 0, end_row = 0;
-    std::vector<std::uint32_t> coarse, queue;  // cells without and with a row
+    std::vector<std::uint32_t> whole, queue;  // cells that are open, and others
     std::vector<Drop> down, up;
-    bool busy() const { return !coarse.empty() || !queue.empty(); }
+    std::vector<RowNodes> given;  // what rows found with their neighbours
+    bool any = false;             // of the seeds, a node was dry and passable
+    bool busy() const { return !whole.empty() || !queue.empty(); }
   };
+  // What is known of a cell: bits. Full: it has all the water it can have. Dirty: water came that
+  // has not spread in it.
+  static constexpr std::uint8_t kQueued = 1, kOpen = 2, kFull = 4, kDirty = 8;
 
   const Crossing& crossing(std::size_t r) const {
-    return edges_ == Edges::open || band_.crossing.empty() ? kOpen : band_.crossing[r];
+    return edges_ == Edges::open || band_.crossing.empty() ? kOpenEdges : band_.crossing[r];
   }
-  void push(Slab& slab, std::size_t cell) {
-    if (queued_[cell]) return;
-    queued_[cell] = 1;
-    (band_.row[cell] < 0 ? slab.coarse : slab.queue).push_back(std::uint32_t(cell));
-  }
+  bool is_open(std::size_t r) const;
+  std::vector<std::uint64_t> open_from_border() const;
+  template <class F>
+  NodeMask drawn(std::size_t r, bool uncut, F&& source) const;
   void run();
   void flood(Slab& slab);
   void absorb(Slab& slab, const std::vector<Drop>& drops, std::size_t layer);
   void spread(std::size_t r);
-  void spill(Slab& slab, std::size_t cell, const NodeMask& wet, const Crossing& own, bool whole);
+  void spill(Slab& slab, std::size_t cell);
   void offer(Slab& slab, std::size_t cell, const NodeMask& nodes);
-  void offer_all(Slab& slab, std::size_t cell);
+  bool take(std::size_t r, const NodeMask& nodes);
+  void fill_cell(std::size_t cell);
   template <class F>
   void each_slab(F&& f);
 
@@ -125,10 +135,13 @@ class Flood {
   const NarrowBand& band_;
   const Masks& free_;
   Edges edges_;
+  Over over_;
   unsigned threads_;
-  Masks wet_, new_;
-  std::vector<std::uint8_t> queued_, cell_;  // (cells)
+  Masks wet_;
+  std::vector<std::uint8_t> state_, cell_;  // (cells)
   std::vector<Slab> slabs_;
+  int thick_ = 1;      // layers of a slab
+  std::size_t words_;  // of a line of cells
   std::uint8_t tag_ = 0;
 };
 

@@ -30,12 +30,12 @@ using kernels::kBrickSamples;
 // Nodes in a box around the mesh, centred on it: a symmetric part gets a symmetric field, and a
 // mesh far from the origin loses no digits.
 struct Grid {
-  Vec3 centre{};                        // of the mesh's box, mesh frame [m]
-  double voxel = 0;                     // [m]
+  Vec3 centre{};     // of the mesh's box, mesh frame [m]
+  double voxel = 0;  // [m]
   std::array<std::int32_t, 3> bricks{};
-  double offset = 0;                    // sigma [voxel]
-  double band = 0;                      // [voxel]
-  double seal = 0;                      // width of holes to close [voxel]; 0 once they are closed
+  double offset = 0;  // sigma [voxel]
+  double band = 0;    // [voxel]
+  double seal = 0;    // width of holes to close [voxel]; 0 once they are closed
 
   // u is exact up to here.
   double reach() const { return std::max(offset + band + 2.0, seal / 2 + 1.0); }
@@ -71,11 +71,11 @@ struct Surface {
   Large<std::array<std::uint32_t, 3>> triangles;
   Large<std::int32_t> part;    // (triangles) or empty
   Large<std::int32_t> source;  // (triangles) of the mesh; -1: a plug
-  Vec3 low{}, high{};              // [m]
+  Vec3 low{}, high{};          // [m]
   std::size_t duplicates = 0, flat = 0;
-  std::size_t open_edges = 0;      // of one face
-  std::size_t odd_edges = 0;       // of an odd number of faces
-  bool closed = false;             // every edge has an even number of faces
+  std::size_t open_edges = 0;  // of one face
+  std::size_t odd_edges = 0;   // of an odd number of faces
+  bool closed = false;         // every edge has an even number of faces
 };
 Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
@@ -92,7 +92,13 @@ struct NodeMask {
     return all != 0;
   }
 };
+inline constexpr NodeMask kAllNodes{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
 using Masks = Large<NodeMask>;  // (rows) not cleared
+// Nodes of a row.
+struct RowNodes {
+  std::uint32_t row;
+  NodeMask nodes;
+};
 
 // Where the surface runs between nodes: bit n of edge[k] is the edge from node n along axis k.
 // Touching counts. Nodes exactly on the surface are in `on`.
@@ -105,9 +111,9 @@ struct Crossing {
 // within reach of; the order within a tile means nothing.
 struct Tiles {
   std::array<int, 3> size{};
-  std::vector<std::size_t> first;       // (tiles + 1) into the lists
+  std::vector<std::size_t> first;  // (tiles + 1) into the lists
   Large<std::uint32_t> triangle;
-  Large<std::uint64_t> near;            // bit (c*4 + b)*4 + a
+  Large<std::uint64_t> near;  // bit (c*4 + b)*4 + a
   std::size_t count() const { return first.size() - 1; }
   std::size_t of(const std::array<int, 3>& brick) const {
     return (std::size_t(brick[2] / 4) * std::size_t(size[1]) + std::size_t(brick[1] / 4)) *
@@ -141,7 +147,7 @@ struct NarrowBand {
   std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
   std::vector<std::uint32_t> cell;     // (rows)
   Samples u;                           // (rows x 512) unsigned distance, at most reach [voxel]
-  Masks free;          // (rows) u > offset, and not on the surface
+  Masks free;                          // (rows) u > offset, and not on the surface
   std::vector<float> first_node;       // (rows) u of the row's first node
   std::vector<std::uint32_t> towards;  // (rows) bit i: near neighbour i is the zero set
   std::vector<Crossing> crossing;      // (rows), or empty where offset >= 0.5: not needed there
@@ -186,21 +192,22 @@ std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned thread
 
 // bake_sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
 struct Reached {
-  Masks node;        // (rows)
-  std::vector<std::uint8_t> cell;    // (cells) all of it, where it has no row
+  Masks node;                      // (rows)
+  std::vector<std::uint8_t> cell;  // (cells) all of it, where it has no row
 };
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads);
 // bake_pockets.cpp: those of the candidates from which a reached node can be reached after all.
-Masks reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                const Masks& candidates, const Masks& wet, unsigned threads);
+std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                                const std::vector<RowNodes>& candidates, const Masks& wet,
+                                unsigned threads);
 
 class Chains;  // bake_chains.h
 
 // bake_inside.cpp: what the signed distances need besides u, and which rows are needed at all.
 struct Inside {
   std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within band of the zero set
-  Masks in_sight;    // (rows) not reached, yet R is on this side of the sheet
+  Masks in_sight;                    // (rows) not reached, yet R is on this side of the sheet
   // Where sheets are buried: lengths of the ways out; a row that has them may be corrected by them.
   std::shared_ptr<const Chains> chains;
   std::vector<std::uint8_t> corrected;  // (rows)
@@ -210,14 +217,14 @@ struct Inside {
     float depth;  // [voxel]
   };
   std::vector<std::vector<Depth>> depths;
-  std::size_t thin_edges = 0;        // surface between two outside nodes with no inside node near
+  std::size_t thin_edges = 0;  // surface between two outside nodes with no inside node near
   std::size_t inside_nodes = 0;
 };
-bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached,
-                 unsigned threads, const Steps& steps, Inside& inside);
+bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
+                 const Steps& steps, Inside& inside);
 // bake_samples.cpp: the needed rows' signed distances [m], in place of u, and where they are.
-void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached,
-                   const Inside& inside, unsigned threads, FieldData& field);
+void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, const Inside& inside,
+                   unsigned threads, FieldData& field);
 
 // bake_far.cpp: lower bounds [m] with sign at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,

@@ -12,8 +12,8 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr int kView = 2;    // nodes, along each axis; never beyond the triangles a row knows
-constexpr int kFine = 8;    // steps a voxel
+constexpr int kView = 2;  // nodes, along each axis; never beyond the triangles a row knows
+constexpr int kFine = 8;  // steps a voxel
 constexpr int kSide = 2 * kView * kFine + 1;
 
 struct Facet {
@@ -39,8 +39,7 @@ bool meets(const Vec3& p, const Vec3& d, const Facet& t) {
 
 class View {
  public:
-  View(const Surface& surface, const Grid& grid, const NarrowBand& band,
-       const Masks& wet)
+  View(const Surface& surface, const Grid& grid, const NarrowBand& band, const Masks& wet)
       : surface_(surface), grid_(grid), band_(band), wet_(wet) {}
 
   // The facets that nodes of a row can have near them.
@@ -137,22 +136,25 @@ class View {
 
 }  // namespace
 
-Masks reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                const Masks& candidates, const Masks& wet, unsigned threads) {
-  Masks seen(band.rows(), NodeMask{});
+std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                                const std::vector<RowNodes>& candidates, const Masks& wet,
+                                unsigned threads) {
+  std::vector<RowNodes> seen(candidates);
   const View view(surface, grid, band, wet);
-  sched::parallel_for(band.rows(), threads, [&](std::size_t r) {
-    if (!candidates[r].any()) return;
+  sched::parallel_for(candidates.size(), threads, [&](std::size_t i) {
+    const std::size_t r = candidates[i].row;
     const std::array<int, 3> place = grid.place(band.cell[r]);
     const std::vector<Facet> facets = view.facets_of(r);
+    seen[i].nodes = NodeMask{};
     for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t bits = candidates[r].z[z]; bits != 0; bits &= bits - 1) {
+      for (std::uint64_t bits = candidates[i].nodes.z[z]; bits != 0; bits &= bits - 1) {
         const int n = std::countr_zero(bits);
-        if (view.reaches_outside(facets, {8 * place[0] + n % 8, 8 * place[1] + n / 8,
-                                  8 * place[2] + int(z)}))
-          seen[r].set(64 * z + std::size_t(n));
+        if (view.reaches_outside(
+                facets, {8 * place[0] + n % 8, 8 * place[1] + n / 8, 8 * place[2] + int(z)}))
+          seen[i].nodes.set(64 * z + std::size_t(n));
       }
   });
+  std::erase_if(seen, [](const RowNodes& row) { return !row.nodes.any(); });
   return seen;
 }
 

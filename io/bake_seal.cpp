@@ -36,8 +36,7 @@ Masks for_rows(const NarrowBand& band, unsigned threads, F&& mask) {
 NodeMask farther_than(const float* u, float level) {
   NodeMask mask;
   for (std::size_t z = 0; z < 8; ++z)
-    for (std::size_t n = 0; n < 64; ++n)
-      mask.z[z] |= std::uint64_t(u[64 * z + n] > level) << n;
+    for (std::size_t n = 0; n < 64; ++n) mask.z[z] |= std::uint64_t(u[64 * z + n] > level) << n;
   return mask;
 }
 
@@ -45,8 +44,7 @@ NodeMask farther_than(const float* u, float level) {
 Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, double radius,
             unsigned threads) {
   std::vector<std::uint8_t> rows(band.rows());
-  for (std::size_t r = 0; r < rows.size(); ++r)
-    rows[r] = (band.free[r] & ~wide.node[r]).any();
+  for (std::size_t r = 0; r < rows.size(); ++r) rows[r] = (band.free[r] & ~wide.node[r]).any();
   Chains chains(grid, band, wide, rows, threads);
   for (int steps = 0; steps < int(radius) + 2; steps += kStepsAPass) chains.pass();
   const int touch = int(grid.offset / double(kChainUnit));
@@ -75,8 +73,7 @@ Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, unsi
     left[r] = band.free[r] & ~open[r];
     deep[r] = left[r] & ~near[r];
   }
-  Flood behind(grid, band, left, Flood::Edges::open, threads);
-  behind.close_cells();
+  Flood behind(grid, band, left, Flood::Edges::open, threads, Flood::Over::rows);
   behind.from_nodes(deep, 1);
   for (std::size_t r = 0; r < left.size(); ++r) open[r] = open[r] | (left[r] & ~behind.wet()[r]);
   return behind.take_wet();
@@ -98,8 +95,7 @@ class Plugs {
             to[axis] < grid_.bricks[axis] ? band_.row[grid_.cell(to[0], to[1], to[2])] : -1;
         const auto ahead = [&](const Masks& side) {
           NodeMask mask = before(side[r], axis);
-          return next < 0 ? mask
-                          : mask | through(side[std::size_t(next)], kOpen, axis, -1);
+          return next < 0 ? mask : mask | through(side[std::size_t(next)], kOpenEdges, axis, -1);
         };
         const NodeMask cut = (open[r] & ahead(closed)) | (closed[r] & ahead(open));
         for (std::size_t z = 0; z < 8; ++z)
@@ -120,8 +116,7 @@ class Plugs {
                                   << 26 |
                               std::uint64_t(twice[0] + 1);
     const auto [at, is_new] = corner_.try_emplace(key, std::uint32_t(surface_.vertices.size()));
-    if (is_new)
-      surface_.vertices.push_back({0.5 * twice[0], 0.5 * twice[1], 0.5 * twice[2]});
+    if (is_new) surface_.vertices.push_back({0.5 * twice[0], 0.5 * twice[1], 0.5 * twice[2]});
     return at->second;
   }
   void facet(const std::array<int, 3>& node, std::size_t axis, std::int32_t part) {
@@ -152,9 +147,8 @@ std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned thread
                        Surface& surface) {
   const double radius = grid.seal / 2;
   if (radius <= grid.offset) return 0;  // the offset closes as much
-  const Masks roomy = for_rows(band, threads, [&](std::size_t r) {
-    return farther_than(band.nodes(r), float(radius));
-  });
+  const Masks roomy = for_rows(
+      band, threads, [&](std::size_t r) { return farther_than(band.nodes(r), float(radius)); });
   Flood flood(grid, band, roomy, Flood::Edges::open, threads);
   flood.from_border();
   const Reached wide{flood.take_wet(), std::move(flood.cells())};

@@ -20,8 +20,7 @@ Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& fre
   Reached empty{flood.wet(), {}};
   Masks last = flood.wet(), wall(band.rows());
   for (std::size_t r = 0; r < band.rows(); ++r) wall[r] = ~free[r];
-  Flood walls(grid, band, wall, Flood::Edges::open, threads);
-  walls.close_cells();
+  Flood walls(grid, band, wall, Flood::Edges::open, threads, Flood::Over::rows);
   for (std::uint8_t depth = 1; depth < 250; ++depth) {
     Masks seeds = neighbours(grid, band, last, threads);
     const Masks before_wall = walls.wet();
@@ -44,7 +43,8 @@ Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& fre
 
 // Dry nodes that hang together with no roomy place, a node with six free edges to dry nodes:
 // bottoms of grooves, and tips of solids.
-Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry, unsigned threads) {
+std::vector<RowNodes> cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry,
+                                    unsigned threads) {
   Masks roomy(dry.size());
   sched::parallel_for(dry.size(), threads, [&](std::size_t r) {
     roomy[r] = dry[r];
@@ -60,31 +60,32 @@ Masks cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry, 
         to[axis] += step;
         const bool in = to[axis] >= 0 && to[axis] < grid.bricks[axis];
         const std::int32_t next = in ? band.row[grid.cell(to[0], to[1], to[2])] : -1;
-        NodeMask full;
-        full.z.fill(~std::uint64_t{0});
-        const NodeMask& there = next >= 0 ? dry[std::size_t(next)] : full;
-        const Crossing& theirs = next >= 0 ? band.crossing[std::size_t(next)] : kOpen;
-        const NodeMask across = through(there, step > 0 ? kOpen : theirs, axis, -step);
+        const NodeMask& there = next >= 0 ? dry[std::size_t(next)] : kAllNodes;
+        const Crossing& theirs = next >= 0 ? band.crossing[std::size_t(next)] : kOpenEdges;
+        const NodeMask across = through(there, step > 0 ? kOpenEdges : theirs, axis, -step);
         linked = linked | (step > 0 ? across & ~own.edge[axis] : across);
         roomy[r] = roomy[r] & linked;
       }
   });
-  Flood solid(grid, band, dry, Flood::Edges::cut, threads);
-  solid.close_cells();
+  Flood solid(grid, band, dry, Flood::Edges::cut, threads, Flood::Over::rows);
   solid.from_nodes(roomy, 1);
-  for (std::size_t r = 0; r < dry.size(); ++r) roomy[r] = dry[r] & ~solid.wet()[r];
-  return roomy;
+  std::vector<RowNodes> cramped;
+  for (std::size_t r = 0; r < dry.size(); ++r)
+    if (const NodeMask left = dry[r] & ~solid.wet()[r]; left.any())
+      cramped.push_back({std::uint32_t(r), left});
+  return cramped;
 }
 
 void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& band,
                    const Masks& free, unsigned threads, Flood& outside) {
   Masks dry(band.rows());
-  for (std::size_t r = 0; r < dry.size(); ++r) dry[r] = free[r] & ~outside.wet()[r];
-  const Masks candidates = cramped_nodes(grid, band, dry, threads);
+  sched::parallel_for(dry.size(), threads,
+                      [&](std::size_t r) { dry[r] = free[r] & ~outside.wet()[r]; });
+  std::vector<RowNodes> left = cramped_nodes(grid, band, dry, threads);
   constexpr int kRounds = 8;  // down a groove, a few voxels at a time
   for (int i = 0; i < kRounds; ++i) {
-    Masks left(candidates);
-    for (std::size_t r = 0; r < left.size(); ++r) left[r] = left[r] & ~outside.wet()[r];
+    for (RowNodes& row : left) row.nodes = row.nodes & ~outside.wet()[row.row];
+    std::erase_if(left, [](const RowNodes& row) { return !row.nodes.any(); });
     if (!outside.from_nodes(reachable(surface, grid, band, left, outside.wet(), threads), 1))
       return;
   }
