@@ -20,6 +20,7 @@
 // the edge of the others came out up to 1.4 voxel too deep.
 #include <algorithm>
 #include <atomic>
+#include <optional>
 
 #include "io/bake_chains.h"
 #include "io/bake_grid.h"
@@ -49,29 +50,36 @@ bool near_outside(const Reached& reached, const Around& around) {
 
 constexpr NodeMask kNoNodes{};
 
+std::size_t count(const NodeMask& nodes) {
+  std::size_t n = 0;
+  for (std::uint64_t z : nodes.z) n += std::size_t(std::popcount(z));
+  return n;
+}
+
 // Nodes with a reached node among the 27 around them, themselves included; `nodes` tells those of a
-// row.
+// row. With kOthers: with one that is not reached.
+template <bool kOthers = false>
 NodeMask beside_any(const Around& around, const Masks& nodes) {
   std::array<const NodeMask*, 27> at;
   for (std::size_t i = 0; i < 27; ++i)
     at[i] = around.row[i] >= 0  ? &nodes[std::size_t(around.row[i])]
             : around.outside[i] ? &kAllNodes
                                 : &kNoNodes;
-  return spread(at);
+  return spread<kOthers>(at);
 }
 
-// Nodes with one that is not reached among the 27 around them, themselves included.
-NodeMask beside_dry(const Around& around, const Reached& reached) {
-  std::array<NodeMask, 27> dry;
-  std::array<const NodeMask*, 27> at;
-  for (std::size_t i = 0; i < 27; ++i) {
-    at[i] = around.outside[i] ? &kNoNodes : &kAllNodes;
-    if (around.row[i] < 0) continue;
-    dry[i] = reached.node[std::size_t(around.row[i])];
-    for (std::uint64_t& z : dry[i].z) z = ~z;
-    at[i] = &dry[i];
+// The same as far as the brick alone tells: mostly enough. `flip`: of the others.
+NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
+  constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
+  std::uint64_t layer[10] = {};
+  for (std::size_t z = 0; z < 8; ++z) {
+    const std::uint64_t own = nodes.z[z] ^ flip,
+                        along = own | (own & kNotX7) << 1 | (own & kNotX0) >> 1;
+    layer[z + 1] = along | along << 8 | along >> 8;
   }
-  return spread(at);
+  NodeMask out;
+  for (std::size_t z = 0; z < 8; ++z) out.z[z] = layer[z] | layer[z + 1] | layer[z + 2];
+  return out;
 }
 
 // Neighbours (bit 13 + dx + 3*dy + 9*dz) that one of these nodes has among the 27 around it.
@@ -158,18 +166,26 @@ class Look {
     each_tile([&](const TileRows& rows) {
       std::size_t thin_here = 0, dry_here = 0;
       rows.each([&](std::size_t place, std::size_t r) {
-        const Around around(rows, place);
-        const bool outside = near_outside(reached_, around);
-        inside_.needed[r] = outside && near_zero_set(band_, around);
-        std::size_t wet = 0;
-        for (std::uint64_t w : reached_.node[r].z) wet += std::size_t(std::popcount(w));
-        dry_here += kBrickSamples - wet;
-        live_[r] = inside_.needed[r] && wet < kBrickSamples;
+        const NodeMask& nodes = reached_.node[r];
+        std::uint64_t some = 0, all = ~std::uint64_t{0};
+        for (std::uint64_t w : nodes.z) {
+          some |= w;
+          all &= w;
+        }
+        const bool whole = all == ~std::uint64_t{0};
+        // A row alone mostly tells enough; what is around it lies in 27 places.
+        const bool near = band_.towards[r] >> 13 & 1;
+        std::optional<Around> around;
+        if (some == 0 || !near) around.emplace(rows, place);
+        const bool outside = some != 0 || near_outside(reached_, *around);
+        inside_.needed[r] = outside && (near || near_zero_set(band_, *around));
+        if (!whole) dry_here += some == 0 ? kBrickSamples : kBrickSamples - count(nodes);
+        live_[r] = inside_.needed[r] && !whole;
         if (!beside_.empty())
-          beside_[r] = wet == kBrickSamples ? kAllNodes
-                       : outside            ? beside_any(around, reached_.node)
-                                            : kNoNodes;
-        if (!band_.crossing.empty()) inspect_crossings(around, r, thin_here);
+          beside_[r] = whole     ? kAllNodes
+                       : outside ? beside_any(Around(rows, place), reached_.node)
+                                 : kNoNodes;
+        if (!band_.crossing.empty()) inspect_crossings(rows, place, r, thin_here);
       });
       thin.fetch_add(thin_here, std::memory_order_relaxed);
       dry.fetch_add(dry_here, std::memory_order_relaxed);
@@ -182,26 +198,37 @@ class Look {
   //   buried in the solid. (Next to reached nodes it may be a groove narrower than a voxel.)
   // - Crossed edges between reached nodes without a node inside anywhere around: a wall thinner
   //   than the spacing. A sharp rim has nodes inside close by and does not count.
-  void inspect_crossings(const Around& around, std::size_t r, std::size_t& thin) {
+  void inspect_crossings(const TileRows& rows, std::size_t place, std::size_t r,
+                         std::size_t& thin) {
     const Crossing& c = band_.crossing[r];
-    std::uint64_t any = 0;
+    NodeMask met;
     for (std::size_t z = 0; z < 8; ++z)
-      any |= c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z];
-    if (any == 0) return;
-    const NodeMask near = beside_.empty() ? beside_any(around, reached_.node) : beside_[r];
-    std::uint64_t buried = 0;
-    for (std::size_t z = 0; z < 8; ++z)
-      buried |= (c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z]) & ~near.z[z];
-    buried_[r] = buried != 0;
-    if (offset_ > 0) return;
-    const NodeMask dry = beside_dry(around, reached_);
+      met.z[z] = c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z];
+    if (!met.any()) return;
+    const auto outside_of = [&](const NodeMask& nodes) {
+      std::uint64_t left = 0;
+      for (std::size_t z = 0; z < 8; ++z) left |= met.z[z] & ~nodes.z[z];
+      return left != 0;
+    };
+    const Masks& reached = reached_.node;
+    if (!beside_.empty())
+      buried_[r] = outside_of(beside_[r]);
+    else
+      buried_[r] = outside_of(beside_here(reached[r])) &&
+                   outside_of(beside_any(Around(rows, place), reached));
+    if (offset_ > 0 || !outside_of(beside_here(reached[r], ~std::uint64_t{0}))) return;
+    NodeMask deep = beside_any<true>(Around(rows, place), reached);
+    for (std::uint64_t& z : deep.z) z = ~z;
     for (const NodeMask& edge : c.edge)
-      for (std::size_t z = 0; z < 8; ++z) thin += std::size_t(std::popcount(edge.z[z] & ~dry.z[z]));
+      for (std::size_t z = 0; z < 8; ++z)
+        if (const std::uint64_t bits = edge.z[z] & deep.z[z]; bits != 0)
+          thin += std::size_t(std::popcount(bits));
   }
 
   // With an offset, what lies within it of a sheet and farther from R than the far side of a sheet
   // that borders R is buried. Depths are corrected there and one brick around.
   void find_corrected() {
+    if (beside_.empty() && std::find(buried_.begin(), buried_.end(), 1) == buried_.end()) return;
     Masks wide, last;
     for (int hop = 1; hop + 1 < hops_across() && !beside_.empty(); ++hop) {
       last = hop == 1 ? beside_ : wide;
