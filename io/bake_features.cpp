@@ -8,7 +8,7 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr std::size_t kSlice = 4096;
+constexpr std::size_t kSlice = 1024;
 constexpr std::uint32_t kLook = 48;  // triangles around a vertex; more are not looked at
 
 Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -21,12 +21,12 @@ struct Rings {
   Large<std::uint32_t> triangle;
   Rings(const Surface& surface, unsigned threads)
       : first(surface.vertices.size() + 1, 0), triangle(3 * surface.triangles.size()) {
-    constexpr std::size_t kRanges = 4;
+    const std::size_t ranges = threads == 0 ? sched::machine_threads() : threads;
     const std::size_t vertices = surface.vertices.size();
     const auto corners = [&](auto&& take) {
-      sched::parallel_for(kRanges, threads, [&](std::size_t range) {
-        const auto low = std::uint32_t(vertices * range / kRanges);
-        const auto count = std::uint32_t(vertices * (range + 1) / kRanges) - low;
+      sched::parallel_for(ranges, threads, [&](std::size_t range) {
+        const auto low = std::uint32_t(vertices * range / ranges);
+        const auto count = std::uint32_t(vertices * (range + 1) / ranges) - low;
         for (std::size_t i = surface.triangles.size(); i-- > 0;)
           for (std::uint32_t v : surface.triangles[i])
             if (v - low < count) take(v, std::uint32_t(i));
@@ -40,9 +40,35 @@ struct Rings {
   std::uint32_t count(std::uint32_t v) const { return first[v + 1] - first[v]; }
 };
 
-bool has(const std::array<std::uint32_t, 3>& t, std::uint32_t v) {
-  return t[0] == v || t[1] == v || t[2] == v;
-}
+// The edges at a vertex, in the order in which its triangles name their other ends.
+struct Spokes {
+  struct Triangles {
+    std::uint32_t first, second;  // the first two that have the edge; equal: there is one
+  };
+  std::size_t count = 0;
+  std::array<std::uint32_t, 2 * kLook> end;
+  std::array<Triangles, 2 * kLook> of;
+
+  Spokes(const Surface& surface, const Rings& rings, std::uint32_t vertex) {
+    const std::uint32_t begin = rings.first[vertex];
+    const std::uint32_t stop = std::min(rings.first[vertex + 1], begin + kLook);
+    for (std::uint32_t i = begin; i < stop; ++i) {
+      const std::uint32_t t = rings.triangle[i];
+      for (std::uint32_t v : surface.triangles[t]) {
+        if (v == vertex) continue;
+        std::size_t k = 0;
+        while (k < count && end[k] != v) ++k;
+        if (k == count) {
+          end[k] = v;
+          of[k] = {t, t};
+          ++count;
+        } else if (of[k].second == of[k].first) {
+          of[k].second = t;
+        }
+      }
+    }
+  }
+};
 
 // Into the plane of the triangle, across its edge from a to b; zero when that is rounding.
 Features::Gradient inwards(const Surface& surface, std::uint32_t triangle, std::uint32_t a,
@@ -60,62 +86,55 @@ Features::Gradient inwards(const Surface& surface, std::uint32_t triangle, std::
   return {float(in.x / length), float(in.y / length), float(in.z / length)};
 }
 
-// Edge a-b of a triangle: another triangle that has it, if this one answers for it.
-void look_at_edge(const Surface& surface, const Rings& rings, std::uint32_t triangle,
-                  std::size_t edge, Features& out) {
-  const auto& t = surface.triangles[triangle];
+// Of an edge's triangles the first one answers for it. `owned` (3 triangles): by which edge.
+void look_at_edge(const Surface& surface, const Rings& rings, std::uint32_t vertex,
+                  std::uint32_t end, const Spokes::Triangles& of, std::vector<std::uint8_t>& owned,
+                  Features& out) {
+  const auto& t = surface.triangles[of.first];
+  std::size_t edge = 0;
+  while (!(t[edge] == vertex && t[(edge + 1) % 3] == end) &&
+         !(t[edge] == end && t[(edge + 1) % 3] == vertex))
+    ++edge;
   std::uint32_t a = t[edge], b = t[(edge + 1) % 3];
   if (rings.count(b) < rings.count(a)) std::swap(a, b);
-  std::uint32_t other = triangle;
-  if (rings.count(a) <= kLook)
-    for (std::uint32_t i = rings.first[a]; i < rings.first[a + 1]; ++i) {
-      const std::uint32_t candidate = rings.triangle[i];
-      if (candidate == triangle || !has(surface.triangles[candidate], b)) continue;
-      if (candidate < triangle) return;
-      other = candidate;
-      break;
-    }
-  out.owned[triangle] |= std::uint8_t(1u << edge);
-  if (other != triangle)
-    out.across[3 * std::size_t(triangle) + edge] = inwards(surface, other, a, b);
+  const std::size_t at = 3 * std::size_t(of.first) + edge;
+  owned[at] = 1;
+  out.across[at] = of.second == of.first ? Features::Gradient{} : inwards(surface, of.second, a, b);
 }
 
 // Up to four edges from a vertex that are not the first triangle's own: each next one the one that
 // leans away most from those before.
-void look_at_corner(const Surface& surface, const Rings& rings, std::uint32_t vertex,
+void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t vertex,
                     Features& out) {
-  const std::uint32_t begin = rings.first[vertex];
-  const std::uint32_t end = std::min(rings.first[vertex + 1], begin + kLook);
-  if (begin == end) return;
-  const auto& own = surface.triangles[rings.triangle[begin]];
   const Vec3& p = surface.vertices[vertex];
   std::array<Vec3, 2 * kLook> direction;
-  std::array<std::uint32_t, 2 * kLook> end_of;
   std::size_t count = 0;
   Vec3 sum{0, 0, 0};
-  for (std::uint32_t i = begin; i < end; ++i)
-    for (std::uint32_t v : surface.triangles[rings.triangle[i]]) {
-      // Most ends are met twice: what is known is asked before what is long.
-      const auto stop = end_of.begin() + std::ptrdiff_t(count);
-      if (v == vertex || (i > begin && (has(own, v) || std::find(end_of.begin(), stop, v) != stop)))
-        continue;
-      Vec3 d = minus(surface.vertices[v], p);
-      const double length = std::sqrt(dot(d, d));
-      if (!(length > 1e-9)) continue;
-      d = {d.x / length, d.y / length, d.z / length};
-      if (i == begin) {
-        sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
-      } else {
-        direction[count] = d;
-        end_of[count++] = v;
-      }
+  for (std::size_t i = 0; i < spokes.count; ++i) {
+    Vec3 d = minus(surface.vertices[spokes.end[i]], p);
+    const double length = std::sqrt(dot(d, d));
+    if (!(length > 1e-9)) continue;
+    d = {d.x / length, d.y / length, d.z / length};
+    if (i < 2)  // the first triangle's
+      sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
+    else
+      direction[count++] = d;
+  }
+  for (std::size_t k = 0; k < 4; ++k) {
+    Features::Gradient& from = out.from[4 * std::size_t(vertex) + k];
+    if (count == 0) {
+      from = {};
+      continue;
     }
-  for (std::size_t k = 0; k < 4 && count > 0; ++k) {
     std::size_t best = 0;
+    double least = dot(direction[0], sum);
     for (std::size_t i = 1; i < count; ++i)
-      if (dot(direction[i], sum) < dot(direction[best], sum)) best = i;
+      if (const double lean = dot(direction[i], sum); lean < least) {
+        best = i;
+        least = lean;
+      }
     const Vec3 d = direction[best];
-    out.from[4 * std::size_t(vertex) + k] = {float(d.x), float(d.y), float(d.z)};
+    from = {float(d.x), float(d.y), float(d.z)};
     sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
     direction[best] = direction[--count];
   }
@@ -129,21 +148,37 @@ void find_features(const Surface& surface, unsigned threads, Features& out) {
   out.owned.resize(triangles);
   out.across.resize(3 * triangles);
   out.from.resize(4 * vertices);
-  sched::parallel_for((triangles + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
-    for (std::size_t t = s * kSlice; t < std::min(triangles, (s + 1) * kSlice); ++t) {
-      out.owned[t] = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        out.across[3 * t + k] = {};
-        look_at_edge(surface, rings, std::uint32_t(t), k, out);
-        const std::uint32_t corner = surface.triangles[t][k];
-        if (rings.triangle[rings.first[corner]] == t) out.owned[t] |= std::uint8_t(8u << k);
+  // Each edge is looked at from the end that has fewer triangles around it.
+  std::vector<std::uint8_t> owned(3 * triangles, 0);
+  sched::parallel_for((vertices + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
+    for (std::size_t i = s * kSlice; i < std::min(vertices, (s + 1) * kSlice); ++i) {
+      const auto v = std::uint32_t(i);
+      const Spokes spokes(surface, rings, v);
+      look_at_corner(surface, spokes, v, out);
+      const std::uint32_t count = rings.count(v);
+      if (count > kLook) continue;
+      for (std::size_t k = 0; k < spokes.count; ++k) {
+        const std::uint32_t end = spokes.end[k], there = rings.count(end);
+        if (count < there || (count == there && v < end))
+          look_at_edge(surface, rings, v, end, spokes.of[k], owned, out);
       }
     }
   });
-  sched::parallel_for((vertices + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
-    for (std::size_t v = s * kSlice; v < std::min(vertices, (s + 1) * kSlice); ++v) {
-      std::fill_n(out.from.begin() + std::ptrdiff_t(4 * v), 4, Features::Gradient{});
-      look_at_corner(surface, rings, std::uint32_t(v), out);
+  sched::parallel_for((triangles + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
+    for (std::size_t t = s * kSlice; t < std::min(triangles, (s + 1) * kSlice); ++t) {
+      const auto& corner = surface.triangles[t];
+      std::uint8_t bits = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t at = 3 * t + k;
+        // With more around both ends nobody looked.
+        if (rings.count(corner[k]) > kLook && rings.count(corner[(k + 1) % 3]) > kLook) {
+          owned[at] = 1;
+          out.across[at] = {};
+        }
+        bits |= std::uint8_t(owned[at] << k);
+        if (rings.triangle[rings.first[corner[k]]] == t) bits |= std::uint8_t(8u << k);
+      }
+      out.owned[t] = bits;
     }
   });
 }
