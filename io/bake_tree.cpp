@@ -9,72 +9,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "io/bake_leaves.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
 namespace {
 
 constexpr float kRounded = 2.5e-4f;  // [voxel] float at 1024 voxels from the middle, four times
-
-// Steps of eight, of which compilers make vectors.
-using Eight = std::array<std::uint32_t, 8>;
-
-// Ten bits each, interleaved.
-std::uint32_t apart(std::uint32_t v) {
-  v &= 0x3ff;
-  v = (v | v << 16) & 0x030000ff;
-  v = (v | v << 8) & 0x0300f00f;
-  v = (v | v << 4) & 0x030c30c3;
-  return (v | v << 2) & 0x09249249;
-}
-
-// The places of eight cells on Hilbert's curve, which leaves no cube before it has been everywhere
-// in it and never jumps: what follows each other lies together (J. Skilling, "Programming the
-// Hilbert curve", 2004: reflect and exchange axes from the largest cube down, then undo the Gray
-// code).
-Eight hilbert(std::array<Eight, 3> c) {
-  for (std::uint32_t half = 512; half > 1; half /= 2)
-    for (Eight& axis : c)
-      for (std::size_t i = 0; i < 8; ++i) {
-        const std::uint32_t low = half - 1, upper = (axis[i] & half) != 0 ? ~0u : 0u;
-        const std::uint32_t exchange = (c[0][i] ^ axis[i]) & low & ~upper;
-        c[0][i] ^= exchange | (low & upper);
-        axis[i] ^= exchange;
-      }
-  Eight place;
-  for (std::size_t i = 0; i < 8; ++i) {
-    const std::uint32_t x = c[0][i], y = c[1][i] ^ x, z = c[2][i] ^ y;
-    std::uint32_t flip = 0;
-    for (std::uint32_t half = 512; half > 1; half /= 2)
-      flip ^= (z & half) != 0 ? half - 1 : 0u;
-    place[i] = apart(z ^ flip) | apart(y ^ flip) << 1 | apart(x ^ flip) << 2;
-  }
-  return place;
-}
-
-// By the upper half of the words, which has 30 bits; equal ones keep their order. Slices count and
-// move side by side; each knows its places from the counts of all.
-void sort_by_code(Large<std::uint64_t>& words, unsigned threads) {
-  constexpr std::size_t kSlice = 65536, kDigits = 1024;
-  Large<std::uint64_t> other(words.size());
-  const std::size_t slices = (words.size() + kSlice - 1) / kSlice;
-  std::vector<std::array<std::uint32_t, kDigits>> place(slices);
-  for (int shift = 32; shift < 62; shift += 10) {
-    const auto each = [&](auto&& body) {
-      sched::parallel_for(slices, threads, [&](std::size_t s) {
-        for (std::size_t i = s * kSlice; i < std::min(words.size(), (s + 1) * kSlice); ++i)
-          body(place[s][words[i] >> shift & (kDigits - 1)], words[i]);
-      });
-    };
-    for (auto& counts : place) counts.fill(0);
-    each([](std::uint32_t& count, std::uint64_t) { ++count; });
-    std::uint32_t sum = 0;
-    for (std::size_t digit = 0; digit < kDigits; ++digit)
-      for (auto& counts : place) sum += std::exchange(counts[digit], sum);
-    each([&](std::uint32_t& to, std::uint64_t word) { other[to++] = word; });
-    words.swap(other);
-  }
-}
 
 kernels::EightBoxes no_boxes() {
   kernels::EightBoxes boxes;
@@ -168,37 +109,7 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
     : surface_(surface) {
   for (int k = 0; k < 3; ++k) middle_[k] = grid.middle(k);
   const std::size_t count = surface.triangles.size();
-  constexpr std::size_t kSlice = 8192;
-  Large<std::uint64_t> words(count);
-  sched::parallel_for((count + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
-    const std::size_t end = std::min(count, (s + 1) * kSlice);
-    for (std::size_t first = s * kSlice; first < end; first += 8) {
-      const std::size_t some = std::min<std::size_t>(8, end - first);
-      std::array<Eight, 3> cells{};
-      for (std::size_t i = 0; i < some; ++i) {
-        const auto& t = surface.triangles[first + i];
-        const Vec3 &a = surface.vertices[t[0]], &b = surface.vertices[t[1]],
-                   &c = surface.vertices[t[2]];
-        const auto cell = [](double sum) {  // 2 voxels; the grid has at most 2048
-          return std::uint32_t(int(std::clamp(sum / 6, 0.0, 1023.0)));
-        };
-        cells[0][i] = cell(a.x + b.x + c.x);
-        cells[1][i] = cell(a.y + b.y + c.y);
-        cells[2][i] = cell(a.z + b.z + c.z);
-      }
-      const Eight places = hilbert(cells);
-      for (std::size_t i = 0; i < some; ++i)
-        words[first + i] = std::uint64_t{places[i]} << 32 | (first + i);
-    }
-  });
-  sort_by_code(words, threads);
-  triangle_.resize(count);
-  sched::parallel_for((count + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
-    for (std::size_t i = s * kSlice; i < std::min(count, (s + 1) * kSlice); ++i)
-      triangle_[i] = std::uint32_t(words[i]);
-  });
-  Large<std::uint64_t>().swap(words);
-
+  triangle_ = order_for_leaves(surface, threads);
   const std::size_t leaves = (count + 7) / 8;
   leaf_.resize(leaves);
   around_leaf_.resize((leaves + 7) / 8);

@@ -162,8 +162,10 @@ HWY_INLINE std::size_t keep_live(std::uint32_t first, VF squared, Mask live, std
                                  float* bound) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  hn::StoreU(hn::Compress(hn::Add(hn::Iota(du, 0), hn::Set(du, first)), hn::RebindMask(du, live)),
-             du, what);
+  // Not lanes from `first` on, compressed: a compiler writes those one by one and reads them as a
+  // vector, which has to wait for all of them.
+  const auto lanes = hn::Compress(hn::Iota(du, 0), hn::RebindMask(du, live));
+  hn::StoreU(hn::Add(lanes, hn::Set(du, first)), du, what);
   hn::StoreU(hn::Compress(squared, live), d, bound);
   return hn::CountTrue(d, live);
 }
