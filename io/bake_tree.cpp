@@ -35,74 +35,6 @@ kernels::EightTurnedBoxes nothing_around() {
   return boxes;
 }
 
-struct EightCorners {
-  float a[3][8], ab[3][8], ac[3][8];  // first corner, edges from it
-};
-
-// How far eight triangles reach along an axis: in steps of eight, of which compilers make vectors.
-void reach_along(const EightCorners& t, const std::array<float, 3>& n, float& low, float& high) {
-  float least[8], most[8];
-  for (std::size_t i = 0; i < 8; ++i) {
-    const float a = n[0] * t.a[0][i] + n[1] * t.a[1][i] + n[2] * t.a[2][i];
-    const float b = n[0] * t.ab[0][i] + n[1] * t.ab[1][i] + n[2] * t.ab[2][i];
-    const float c = n[0] * t.ac[0][i] + n[1] * t.ac[1][i] + n[2] * t.ac[2][i];
-    const float under = b < c ? b : c, over = b > c ? b : c;
-    least[i] = a + (under < 0.0f ? under : 0.0f);
-    most[i] = a + (over > 0.0f ? over : 0.0f);
-  }
-  low = *std::min_element(least, least + 8);
-  high = *std::max_element(most, most + 8);
-}
-
-// Around eight triangles: along the grid, or across and along their mean plane, whichever is less.
-void put_box_around(const EightCorners& t, kernels::EightTurnedBoxes& boxes, std::size_t box) {
-  float normal[3] = {0, 0, 0};
-  for (std::size_t i = 0; i < 8; ++i) {
-    float n[3];
-    for (std::size_t k = 0; k < 3; ++k)
-      n[k] =
-          t.ab[(k + 1) % 3][i] * t.ac[(k + 2) % 3][i] - t.ab[(k + 2) % 3][i] * t.ac[(k + 1) % 3][i];
-    const float along = normal[0] * n[0] + normal[1] * n[1] + normal[2] * n[2];
-    for (std::size_t k = 0; k < 3; ++k) normal[k] += along < 0 ? -n[k] : n[k];
-  }
-  using Frame = std::array<std::array<float, 3>, 3>;
-  const auto put = [&](const Frame& axis, float largest) {
-    float middle[3], half[3], size = 1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      float low, high;
-      reach_along(t, axis[k], low, high);
-      middle[k] = (low + high) / 2;
-      half[k] = (high - low) / 2 + 4 * kRounded;
-      size *= half[k] + 0.5f;
-    }
-    if (size >= largest) return size;
-    for (std::size_t k = 0; k < 3; ++k) {
-      for (std::size_t c = 0; c < 3; ++c) boxes.axis[k][c][box] = axis[k][c];
-      boxes.middle[k][box] = middle[k];
-      boxes.half[k][box] = half[k];
-    }
-    return size;
-  };
-  const float along_grid = put({{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, 1e30f);
-  const float length =
-      std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-  if (!(length > 1e-6f)) return;
-  for (float& c : normal) c /= length;
-  std::size_t least = 0;
-  for (std::size_t k = 1; k < 3; ++k)
-    if (std::fabs(normal[k]) < std::fabs(normal[least])) least = k;
-  const std::size_t l1 = (least + 1) % 3, l2 = (least + 2) % 3;
-  const float across = std::sqrt(normal[l1] * normal[l1] + normal[l2] * normal[l2]);
-  Frame axis{};
-  axis[0] = {normal[0], normal[1], normal[2]};
-  axis[1][l1] = -normal[l2] / across;
-  axis[1][l2] = normal[l1] / across;
-  for (std::size_t k = 0; k < 3; ++k)
-    axis[2][k] =
-        axis[0][(k + 1) % 3] * axis[1][(k + 2) % 3] - axis[0][(k + 2) % 3] * axis[1][(k + 1) % 3];
-  put(axis, along_grid);
-}
-
 }  // namespace
 
 TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned threads)
@@ -118,29 +50,17 @@ TriangleTree::TriangleTree(const Surface& surface, const Grid& grid, unsigned th
     around_leaf_[node] = nothing_around();
     level_[0][node] = no_boxes();
     for (std::size_t l = 8 * node; l < std::min(leaves, 8 * node + 8); ++l) {
-      kernels::EightBoxes& boxes = level_[0][node];
-      EightCorners corners;
+      kernels::LeafCorners corners;
       for (std::size_t i = 0; i < 8; ++i) {
         const auto& t = surface.triangles[triangle_[std::min(8 * l + i, count - 1)]];
-        double c[3][3];
         for (std::size_t v = 0; v < 3; ++v) {
           const Vec3& p = surface.vertices[t[v]];
-          c[v][0] = p.x - middle_[0];
-          c[v][1] = p.y - middle_[1];
-          c[v][2] = p.z - middle_[2];
-        }
-        kernels::set_triangle(leaf_[l], i, c[0], c[1], c[2]);
-        for (std::size_t k = 0; k < 3; ++k) {
-          corners.a[k][i] = float(c[0][k]);
-          corners.ab[k][i] = float(c[1][k] - c[0][k]);
-          corners.ac[k][i] = float(c[2][k] - c[0][k]);
-          const double low = std::min({c[0][k], c[1][k], c[2][k]});
-          const double high = std::max({c[0][k], c[1][k], c[2][k]});
-          boxes.low[k][l % 8] = std::min(boxes.low[k][l % 8], float(low) - kRounded);
-          boxes.high[k][l % 8] = std::max(boxes.high[k][l % 8], float(high) + kRounded);
+          corners.at[v][0][i] = p.x - middle_[0];
+          corners.at[v][1][i] = p.y - middle_[1];
+          corners.at[v][2][i] = p.z - middle_[2];
         }
       }
-      put_box_around(corners, around_leaf_[node], l % 8);
+      kernels::set_leaf(corners, leaf_[l], around_leaf_[node], level_[0][node], l % 8);
     }
   });
   while (level_.back().size() > 1) {

@@ -41,6 +41,17 @@ struct EightTriangles {
 // Corners are x y z. A triangle no higher than 1e-6 becomes its longest edge.
 void set_triangle(EightTriangles& triangles, std::size_t i, const double a[3], const double b[3],
                   const double c[3]);
+// Corners of eight triangles, as close as 1024 to the origin.
+struct LeafCorners {
+  alignas(64) double at[3][3][8];  // [corner][coordinate][triangle]
+};
+// All eight, box `box` around them along the grid and the turned one: along the grid or across and
+// along their mean plane, whichever is less. Boxes are larger by their margin.
+inline constexpr float kBoxMargin = 2.5e-4f, kTurnedMargin = 1e-3f;
+void set_leaf(const LeafCorners& corners, EightTriangles& triangles, EightTurnedBoxes& turned,
+              EightBoxes& boxes, std::size_t box);
+void set_leaf_ref(const LeafCorners& corners, EightTriangles& triangles, EightTurnedBoxes& turned,
+                  EightBoxes& boxes, std::size_t box);
 // squared[i] <= squared distance of p to triangle i, the first corner taken as rounded to float: by
 // less than 1e-4 of it, save for triangles a thousand times as large as their distance, and on
 // slivers a little more. Returns a bit for each that is below `most`.

@@ -165,6 +165,77 @@ TEST_CASE("eight_triangles: a lower bound over long triangles, far from their fi
   });
 }
 
+TEST_CASE(
+    "set_leaf: the triangles and boxes of the specification, flat ones and slivers too, on "
+    "every target") {
+  on_every_target([](const std::string&) {
+    Random random;
+    std::size_t far_off = 0, outside = 0, larger = 0, touched = 0;
+    for (int i = 0; i < 2000; ++i) {
+      // A patch of a slanted plane, more or less; flat triangles, points and slivers among it.
+      LeafCorners corners;
+      const double size = i % 4 == 0 ? 300 : i % 4 == 1 ? 0.3 : 6, rough = i % 3 == 0 ? 1 : 0.02;
+      double at[3], along[2][3];
+      for (int k = 0; k < 3; ++k) {
+        at[k] = random(-700, 700);
+        for (auto& axis : along) axis[k] = random(-1, 1);
+      }
+      for (std::size_t t = 0; t < 8; ++t)
+        for (std::size_t v = 0; v < 3; ++v) {
+          const double s = random(-size, size), u = random(-size, size);
+          for (std::size_t k = 0; k < 3; ++k)
+            corners.at[v][k][t] =
+                at[k] + s * along[0][k] + u * along[1][k] + rough * random(-size, size);
+        }
+      const auto same = [&](std::size_t to, std::size_t from, std::size_t t, double off) {
+        for (std::size_t k = 0; k < 3; ++k)
+          corners.at[to][k][t] = corners.at[from][k][t] + off * (k == 1);
+      };
+      same(1, 0, 2, 0);
+      if (i % 2 == 0) same(2, 0, 2, 0);
+      same(2, 1, 5, 1e-3);
+      const std::size_t box = std::size_t(i % 8);
+      EightTriangles fast{}, exact{};
+      EightTurnedBoxes fast_turned{}, exact_turned{};
+      EightBoxes fast_boxes{}, exact_boxes{};
+      set_leaf(corners, fast, fast_turned, fast_boxes, box);
+      set_leaf_ref(corners, exact, exact_turned, exact_boxes, box);
+      for (int q = 0; q < 8; ++q) {
+        float p[3], near_fast[8], near_exact[8];
+        for (int k = 0; k < 3; ++k) p[k] = float(at[k]) + random(-2 * size - 20, 2 * size + 20);
+        eight_triangles(fast, p, 1e9f, near_fast);
+        eight_triangles(exact, p, 1e9f, near_exact);
+        for (std::size_t t = 0; t < 8; ++t)
+          far_off += std::fabs(std::sqrt(near_fast[t]) - std::sqrt(near_exact[t])) >
+                     1e-3 + 1e-5 * std::sqrt(near_exact[t]);
+      }
+      double volume[2] = {1, 1};
+      for (std::size_t k = 0; k < 3; ++k) {
+        far_off += std::fabs(fast_boxes.low[k][box] - exact_boxes.low[k][box]) > 1e-4f;
+        far_off += std::fabs(fast_boxes.high[k][box] - exact_boxes.high[k][box]) > 1e-4f;
+        volume[0] *= 2 * double(fast_turned.half[k][box]) + 1;
+        volume[1] *= 2 * double(exact_turned.half[k][box]) + 1;
+        touched += fast_turned.half[k][(box + 1) % 8] != 0 || fast_boxes.low[k][(box + 1) % 8] != 0;
+        for (std::size_t t = 0; t < 8; ++t)
+          for (std::size_t v = 0; v < 3; ++v) {
+            double turned = -double(fast_turned.middle[k][box]);
+            for (std::size_t c = 0; c < 3; ++c)
+              turned += double(fast_turned.axis[k][c][box]) * corners.at[v][c][t];
+            outside += std::fabs(turned) > double(fast_turned.half[k][box]) - 4e-4;
+            outside += corners.at[v][k][t] < double(fast_boxes.low[k][box]) ||
+                       corners.at[v][k][t] > double(fast_boxes.high[k][box]);
+          }
+      }
+      // The mean plane is not the same where normals turn against each other.
+      larger += rough < 1 && volume[0] > 1.05 * volume[1] + 0.1;
+    }
+    CHECK(far_off == 0);
+    CHECK(outside == 0);
+    CHECK(larger < 20);
+    CHECK(touched == 0);
+  });
+}
+
 TEST_CASE("nearest_search: what looking at every triangle finds, from any start, on every target") {
   constexpr std::uint32_t kTriangles = 8 * 8 * 9 - 3;  // not a whole number of leaves
   constexpr std::size_t kLeaves = (kTriangles + 7) / 8, kNodes = (kLeaves + 7) / 8;
