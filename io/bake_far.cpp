@@ -6,9 +6,10 @@
 //
 // Between them most searches are spared. With q over the surface
 //   d(p)^2 - |p|^2 = min over q of (|q|^2 - 2 p.q)
-// is a least of linear functions of p, so it is concave: at the middle p of nodes c it is not less
-// than their mean, which says d(p)^2 >= mean of (d(c)^2 - |c - p|^2). Lower bounds of d(c) will do.
-// Where a triangle near one of the c shows that this is not far off, it is taken.
+// is a least of linear functions of p, so it is concave: half way between two nodes c it is not
+// less than their mean, which says d(p)^2 >= mean of (d(c)^2 - |c - p|^2). Lower bounds of d(c)
+// will do. Of the pairs of nodes around p the one that lies most along the way to the surface says
+// most. Where a triangle near one of the c shows that this is not far off, it is taken.
 #include <algorithm>
 #include <cmath>
 
@@ -49,7 +50,7 @@ double bound(double u, double offset, bool inside) {
 // What a bound may be below the distance: this [voxel], and an eighth of it. That is a tenth of a
 // voxel on average over the nodes of a soup. Between nodes the engine's bound then stays within a
 // voxel of the truth on average wherever exact nodes would keep it there.
-constexpr double kLoose = 1;
+constexpr double kLoose = 0.9;
 
 constexpr double kSpacing = 8;  // of nodes [voxel]
 
@@ -106,7 +107,7 @@ class Nodes {
     const int odd[3] = {a & 1, b & 1, c & 1}, axes = odd[0] + odd[1] + odd[2];
     if (axes == 0) return double(away_[at(a, b, c)]);
     Start start;
-    double squares = 0;
+    double squares[8];
     int corners = 0;  // some at the end of the field are missing
     for (int z = c - odd[2]; z <= c + odd[2]; z += 2)
       for (int y = b - odd[1]; y <= b + odd[1]; y += 2)
@@ -114,11 +115,13 @@ class Nodes {
           if (x >= count_[0] || y >= count_[1] || z >= count_[2]) continue;
           const std::size_t i = at(x, y, z);
           start.add(away_[i], nearest_[i]);
-          squares += double(away_[i]) * double(away_[i]);
-          ++corners;
+          squares[corners++] = double(away_[i]) * double(away_[i]);
         }
     const double way2 = axes * kSpacing * kSpacing;
-    const double low2 = corners == 1 << axes ? squares / corners - way2 : -1;
+    double low2 = -1;
+    if (corners == 1 << axes)
+      for (int i = 0; i < corners / 2; ++i)
+        low2 = std::max(low2, (squares[i] + squares[corners - 1 - i]) / 2 - way2);
     const double low = std::sqrt(std::max(0.0, low2));
     const double enough = low2 > 0 ? low + std::min(kLoose, low / 8) : -1;
     std::uint32_t nearest;
