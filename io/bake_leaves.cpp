@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "kernels/box_halves.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -16,6 +17,11 @@ namespace {
 
 // Steps of eight, of which compilers make vectors.
 using Eight = std::array<std::uint32_t, 8>;
+
+// Cells along an axis, and how wide they are: the grid has at most 2048 voxels. No smaller, since
+// what lies in one is put in order by halving.
+constexpr std::uint32_t kCells = 256;
+constexpr double kCell = 8;  // [voxel]
 
 // Ten bits each, interleaved.
 std::uint32_t apart(std::uint32_t v) {
@@ -31,7 +37,7 @@ std::uint32_t apart(std::uint32_t v) {
 // Hilbert curve", 2004: reflect and exchange axes from the largest cube down, then undo the Gray
 // code).
 Eight hilbert(std::array<Eight, 3> c) {
-  for (std::uint32_t half = 512; half > 1; half /= 2)
+  for (std::uint32_t half = kCells / 2; half > 1; half /= 2)
     for (Eight& axis : c)
       for (std::size_t i = 0; i < 8; ++i) {
         const std::uint32_t low = half - 1, upper = (axis[i] & half) != 0 ? ~0u : 0u;
@@ -43,20 +49,21 @@ Eight hilbert(std::array<Eight, 3> c) {
   for (std::size_t i = 0; i < 8; ++i) {
     const std::uint32_t x = c[0][i], y = c[1][i] ^ x, z = c[2][i] ^ y;
     std::uint32_t flip = 0;
-    for (std::uint32_t half = 512; half > 1; half /= 2) flip ^= (z & half) != 0 ? half - 1 : 0u;
+    for (std::uint32_t half = kCells / 2; half > 1; half /= 2)
+      flip ^= (z & half) != 0 ? half - 1 : 0u;
     place[i] = apart(z ^ flip) | apart(y ^ flip) << 1 | apart(x ^ flip) << 2;
   }
   return place;
 }
 
-// By the upper half of the words, which has 30 bits; equal ones keep their order. Slices count and
+// By the upper half of the words, which has 24 bits; equal ones keep their order. Slices count and
 // move side by side; each knows its places from the counts of all.
 void sort_by_code(Large<std::uint64_t>& words, unsigned threads) {
-  constexpr std::size_t kSlice = 65536, kDigits = 1024;
+  constexpr std::size_t kSlice = 65536, kDigits = 4096;
   Large<std::uint64_t> other(words.size());
   const std::size_t slices = (words.size() + kSlice - 1) / kSlice;
   std::vector<std::array<std::uint32_t, kDigits>> place(slices);
-  for (int shift = 32; shift < 62; shift += 10) {
+  for (int shift = 32; shift < 56; shift += 12) {
     const auto each = [&](auto&& body) {
       sched::parallel_for(slices, threads, [&](std::size_t s) {
         for (std::size_t i = s * kSlice; i < std::min(words.size(), (s + 1) * kSlice); ++i)
@@ -79,78 +86,61 @@ class Halves {
   static constexpr std::size_t kMost = 512;
 
   void order(const Surface& surface, std::uint32_t* triangles, std::size_t count) {
-    double low[3] = {1e30, 1e30, 1e30}, high[3] = {-1e30, -1e30, -1e30};
+    // First all indices, then all corners: few of them wait for each other.
+    std::array<std::uint32_t, 3> corners[kMost];
+    for (std::size_t i = 0; i < count; ++i) corners[i] = surface.triangles[triangles[i]];
+    float low[3][kMost], high[3][kMost];
     for (std::size_t i = 0; i < count; ++i) {
-      const auto& t = surface.triangles[triangles[i]];
-      const Vec3 &a = surface.vertices[t[0]], &b = surface.vertices[t[1]],
-                 &c = surface.vertices[t[2]];
-      const double corner[3][3] = {{a.x, b.x, c.x}, {a.y, b.y, c.y}, {a.z, b.z, c.z}};
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double* v = corner[k];
-        const double sum = v[0] + v[1] + v[2];
-        low[k] = std::min(low[k], sum);
-        high[k] = std::max(high[k], sum);
-        middle_[k][i] = sum;
-        reach_[i].least[k] = float(std::min({v[0], v[1], v[2]}));
-        reach_[i].least[4 + k] = -float(std::max({v[0], v[1], v[2]}));
-      }
-      reach_[i].least[3] = reach_[i].least[7] = 0;
+      const Vec3 &a = surface.vertices[corners[i][0]], &b = surface.vertices[corners[i][1]],
+                 &c = surface.vertices[corners[i][2]];
+      const auto put = [&](std::size_t k, float u, float v, float w) {
+        low[k][i] = std::min(std::min(u, v), w);
+        high[k][i] = std::max(std::max(u, v), w);
+      };
+      put(0, float(a.x), float(b.x), float(c.x));
+      put(1, float(a.y), float(b.y), float(c.y));
+      put(2, float(a.z), float(b.z), float(c.z));
     }
-    for (std::size_t k = 0; k < 3; ++k) sort(k, low[k], high[k], count);
+    float from[3], width = 1e-3f;
+    for (std::size_t k = 0; k < 3; ++k) {
+      from[k] = *std::min_element(low[k], low[k] + count);
+      width = std::max(width, *std::max_element(high[k], high[k] + count) - from[k]);
+    }
+    const float scale = float(kernels::ShortBox::kMost) / width;
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < count; ++i) {
+        box_[i].least[k] = std::int16_t(int((low[k][i] - from[k]) * scale));
+        box_[i].least[4 + k] = std::int16_t(-int((high[k][i] - from[k]) * scale));
+      }
+      sort(k, count);
+    }
+    for (std::size_t i = 0; i < count; ++i) box_[i].least[3] = box_[i].least[7] = 0;
     halve(0, count);
-    std::uint32_t from[kMost];
-    std::copy_n(triangles, count, from);
-    for (std::size_t i = 0; i < count; ++i) triangles[i] = from[sorted_[0][i]];
+    std::uint32_t before[kMost];
+    std::copy_n(triangles, count, before);
+    for (std::size_t i = 0; i < count; ++i) triangles[i] = before[sorted_[0][i]];
   }
 
  private:
   using Index = std::uint16_t;
-  // Along three axes from where, and minus to where: both are minima.
-  struct alignas(32) Reach {
-    float least[8];
-  };
 
-  // Along an axis; in steps of a 1024th of all, whose order is left as it is.
-  void sort(std::size_t k, double low, double high, std::size_t count) {
-    constexpr std::size_t kDigits = 1024;
-    Index digit[kMost], place[kDigits] = {};
-    const double scale = high > low ? (double(kDigits) - 1) / (high - low) : 0;
-    for (std::size_t i = 0; i < count; ++i) digit[i] = Index(int((middle_[k][i] - low) * scale));
+  // By the middles along an axis, in steps; the order within a step is left as it is.
+  void sort(std::size_t k, std::size_t count) {
+    constexpr int kStep = 128;
+    Index digit[kMost], place[2 * kernels::ShortBox::kMost / kStep + 1] = {};
+    for (std::size_t i = 0; i < count; ++i)
+      digit[i] = Index((box_[i].least[k] - box_[i].least[4 + k]) / kStep);
     for (std::size_t i = 0; i < count; ++i) ++place[digit[i]];
     Index sum = 0;
     for (Index& p : place) sum = Index(sum + std::exchange(p, sum));
     for (std::size_t i = 0; i < count; ++i) sorted_[k][place[digit[i]]++] = Index(i);
   }
 
-  // The squared size of the box around some.
-  float size2(const Index* some, std::size_t count) const {
-    Reach all = reach_[some[0]];
-    for (std::size_t i = 1; i < count; ++i) {
-      const Reach& one = reach_[some[i]];
-      for (std::size_t k = 0; k < 8; ++k)
-        all.least[k] = one.least[k] < all.least[k] ? one.least[k] : all.least[k];
-    }
-    float sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const float width = all.least[k] + all.least[4 + k];
-      sum += width * width;
-    }
-    return sum;
-  }
-
   void halve(std::size_t first, std::size_t count) {
     if (count <= 8) return;
     const std::size_t half = std::bit_ceil(count) / 2, rest = count - half;
-    std::size_t axis = 0;
-    float least = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index* some = sorted_[k] + first;
-      const float size = size2(some, half) + size2(some + half, rest);
-      if (k == 0 || size < least) {
-        least = size;
-        axis = k;
-      }
-    }
+    const Index* const orders[3] = {sorted_[0] + first, sorted_[1] + first, sorted_[2] + first};
+    const std::size_t axis = kernels::smallest_halves(box_, orders, count, half);
     if (count <= 16) {
       if (axis != 0) std::copy_n(sorted_[axis] + first, count, sorted_[0] + first);
       return;
@@ -173,8 +163,7 @@ class Halves {
     halve(first + half, rest);
   }
 
-  Reach reach_[kMost];
-  double middle_[3][kMost];
+  kernels::ShortBox box_[kMost];  // in parts of the box around all
   Index sorted_[3][kMost];
   std::uint8_t upper_[kMost];
 };
@@ -194,8 +183,8 @@ Large<std::uint32_t> order_for_leaves(const Surface& surface, unsigned threads) 
         const auto& t = surface.triangles[first + i];
         const Vec3 &a = surface.vertices[t[0]], &b = surface.vertices[t[1]],
                    &c = surface.vertices[t[2]];
-        const auto cell = [](double sum) {  // 2 voxels; the grid has at most 2048
-          return std::uint32_t(int(std::clamp(sum / 6, 0.0, 1023.0)));
+        const auto cell = [](double sum) {
+          return std::uint32_t(int(std::clamp(sum / (3 * kCell), 0.0, kCells - 1.0)));
         };
         cells[0][i] = cell(a.x + b.x + c.x);
         cells[1][i] = cell(a.y + b.y + c.y);
