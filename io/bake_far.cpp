@@ -9,8 +9,10 @@
 // is a least of linear functions of p, so it is concave: half way between two nodes c it is not
 // less than their mean, which says d(p)^2 >= mean of (d(c)^2 - |c - p|^2). Lower bounds of d(c)
 // will do. Of the pairs of nodes around p the one that lies most along the way to the surface says
-// most. Where a triangle near one of the c shows that this is not far off, it is taken.
+// most; nodes that have a bound serve as c of others. Where a triangle near one of the c shows that
+// the bound is not far off, it is taken.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "io/bake_grid.h"
@@ -47,109 +49,146 @@ double bound(double u, double offset, bool inside) {
   return std::sqrt(std::max(0.0, certain * certain - offset * offset));
 }
 
-// What a bound may be below the distance: this [voxel], and an eighth of it. That is a tenth of a
+// What a bound may be below the distance: this [voxel], and an eighth of it. That is a twelfth of a
 // voxel on average over the nodes of a soup. Between nodes the engine's bound then stays within a
 // voxel of the truth on average wherever exact nodes would keep it there.
-constexpr double kLoose = 0.9;
+constexpr double kLoose = 0.67;
 
 constexpr double kSpacing = 8;  // of nodes [voxel]
 
-// Where to start a search: what is known of nodes near by.
-struct Start {
-  double least = 1e5;  // of their distances [voxel]
-  std::size_t count = 0;
-  std::uint32_t place[TriangleTree::kStarts];
-  // A node's distance, and where that was found or kNone.
-  void add(float away, std::uint32_t nearest) {
-    const bool first = double(away) < least;
-    least = std::min(least, double(away));
-    if (nearest == TriangleTree::kNone || count == TriangleTree::kStarts) return;
-    for (std::size_t i = 0; i < count; ++i)
-      if (TriangleTree::together(place[i], nearest)) return;
-    place[count++] = nearest;
-    if (first) std::swap(place[0], place[count - 1]);
-  }
-};
-
-// Distances from below [voxel] of the nodes (8a, 8b, 8c): first those of even a, b and c, by
-// layers.
+// Distances from below [voxel] of the nodes (8a, 8b, 8c): first those of even a, b and c, then the
+// others of odd c, then those of even c; by layers, in which those with more odd places come first.
 class Nodes {
  public:
   Nodes(const Grid& grid, const TriangleTree& tree) : tree_(tree) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      count_[k] = grid.bricks[k] + 1;
-      even_[k] = std::size_t(grid.bricks[k] / 2 + 1);
-    }
-    away_.resize(even_[0] * even_[1] * even_[2]);
-    nearest_.resize(away_.size());
+    for (std::size_t k = 0; k < 3; ++k) count_[k] = grid.bricks[k] + 1;
+    stride_[1] = count_[0];
+    stride_[2] = stride_[1] * count_[1];
+    node_.resize(std::size_t(stride_[2] * count_[2]));
+    for (int odd = 1; odd < 8; ++odd) find_pairs(odd);
   }
   int count(std::size_t k) const { return count_[k]; }
-  std::size_t even(std::size_t k) const { return even_[k]; }
-
-  // In the order of a, then b: each is looked for around what those before it found. `known`: the
-  // distance if no search is needed, else negative.
-  void search_even(int a, int b, int c, double known) {
-    const std::size_t i = at(a, b, c), row = even_[0];
-    nearest_[i] = TriangleTree::kNone;
-    Start start;
-    if (a > 0) start.add(away_[i - 1], nearest_[i - 1]);
-    if (b > 0) start.add(away_[i - row], nearest_[i - row]);
-    if (b > 0 && a + 2 < count_[0]) start.add(away_[i - row + 1], nearest_[i - row + 1]);
-    const double away = known >= 0
-                            ? certain(known)
-                            : search(a, b, c, start, std::sqrt(8.0) * kSpacing, -1, nearest_[i]);
-    away_[i] = std::nextafter(float(away), 0.0f);
+  std::size_t at(int a, int b, int c) const {
+    return std::size_t(c * stride_[2] + b * stride_[1] + a);
   }
 
-  // Of any node, when all the even ones around it are known.
-  double away(int a, int b, int c, double known) const {
-    if (known >= 0) return certain(known);
-    const int odd[3] = {a & 1, b & 1, c & 1}, axes = odd[0] + odd[1] + odd[2];
-    if (axes == 0) return double(away_[at(a, b, c)]);
-    Start start;
-    double squares[8];
-    int corners = 0;  // some at the end of the field are missing
-    for (int z = c - odd[2]; z <= c + odd[2]; z += 2)
-      for (int y = b - odd[1]; y <= b + odd[1]; y += 2)
-        for (int x = a - odd[0]; x <= a + odd[0]; x += 2) {
-          if (x >= count_[0] || y >= count_[1] || z >= count_[2]) continue;
-          const std::size_t i = at(x, y, z);
-          start.add(away_[i], nearest_[i]);
-          squares[corners++] = double(away_[i]) * double(away_[i]);
-        }
-    const double way2 = axes * kSpacing * kSpacing;
-    double low2 = -1;
-    if (corners == 1 << axes)
-      for (int i = 0; i < corners / 2; ++i)
-        low2 = std::max(low2, (squares[i] + squares[corners - 1 - i]) / 2 - way2);
-    const double low = std::sqrt(std::max(0.0, low2));
-    const double enough = low2 > 0 ? low + std::min(kLoose, low / 8) : -1;
-    std::uint32_t nearest;
-    return std::max(low, search(a, b, c, start, std::sqrt(way2), enough, nearest));
+  // `known`: the distance if no search is needed, else negative. Even nodes in the order of a, then
+  // b: each is looked for around what those before it found. Others when the nodes around them that
+  // come first are known.
+  double away(int a, int b, int c, double known) {
+    const std::size_t i = at(a, b, c);
+    const int odd = (a & 1) | (b & 1) << 1 | (c & 1) << 2;
+    node_[i].nearest = TriangleTree::kNone;
+    const double away = known >= 0 ? std::max(0.0, known - kSlack - 1e-6 * known)
+                        : odd == 0 ? even(a, b, c)
+                                   : between(a, b, c, odd);
+    node_[i].away = std::nextafter(float(away), 0.0f);
+    return double(node_[i].away);
   }
 
  private:
-  static double certain(double u) { return std::max(0.0, u - kSlack - 1e-6 * u); }
-  std::size_t at(int a, int b, int c) const {
-    return (std::size_t(c / 2) * even_[1] + std::size_t(b / 2)) * even_[0] + std::size_t(a / 2);
+  struct Node {
+    float away;
+    std::uint32_t nearest;  // place in the tree, or kNone
+  };
+  // Two nodes, one as far this way as the other that way.
+  struct Pair {
+    std::ptrdiff_t step;
+    double way, way2;
+    int along;  // bit k: not 0 along axis k
+  };
+  // Where to start a search: what is known of nodes near by.
+  struct Start {
+    double most = 1e5;  // [voxel] the distance is less
+    std::size_t count = 0;
+    std::uint32_t place[TriangleTree::kStarts];
+    void add(std::uint32_t nearest) {
+      if (nearest == TriangleTree::kNone || count == TriangleTree::kStarts) return;
+      for (std::size_t i = 0; i < count; ++i)
+        if (TriangleTree::together(place[i], nearest)) return;
+      place[count++] = nearest;
+    }
+  };
+
+  // Around nodes whose places are odd where `odd` has a bit: those that are known before them.
+  void find_pairs(int odd) {
+    for (int z = -1; z <= 1; ++z)
+      for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x) {
+          const std::ptrdiff_t step = z * stride_[2] + y * stride_[1] + x;
+          const int along = (x & 1) | (y & 1) << 1 | (z & 1) << 2, there = odd ^ along;
+          const bool before =
+              there == 0 || std::popcount(unsigned(there)) > std::popcount(unsigned(odd));
+          if (!before || z * 9 + y * 3 + x <= 0) continue;
+          // What is not even in an even layer comes later.
+          if ((odd & along & 4) != 0 && there != 0) continue;
+          const double way2 = (x * x + y * y + z * z) * kSpacing * kSpacing;
+          pairs_[odd].push_back({step, std::sqrt(way2), way2, along});
+        }
   }
-  // `way`: to the nodes of `start`; a distance grows by it at most. 0 where something is `enough`
-  // near.
-  double search(int a, int b, int c, const Start& start, double way, double enough,
-                std::uint32_t& nearest) const {
+
+  double even(int a, int b, int c) {
+    const std::size_t i = at(a, b, c), row = std::size_t(2 * stride_[1]);
+    std::size_t near[3], count = 0, first = 0;
+    if (a > 0) near[count++] = i - 2;
+    if (b > 0) near[count++] = i - row;
+    if (b > 0 && a + 2 < count_[0]) near[count++] = i - row + 2;
+    Start start;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (node_[near[k]].away < node_[near[first]].away) first = k;
+      start.most =
+          std::min(start.most, double(node_[near[k]].away) + std::sqrt(8.0) * kSpacing + 0.1);
+    }
+    for (std::size_t k = 0; k < count; ++k) start.add(node_[near[(first + k) % count]].nearest);
+    return search(a, b, c, start, -1);
+  }
+
+  double between(int a, int b, int c, int odd) {
+    const std::size_t i = at(a, b, c);
+    const auto at_end = [](int n, int count) { return n == 0 || n + 1 == count; };
+    const int end =
+        int(at_end(a, count_[0])) | int(at_end(b, count_[1])) << 1 | int(at_end(c, count_[2])) << 2;
+    Start start;
+    double low2 = -1;
+    const Pair* best = nullptr;
+    for (const Pair& pair : pairs_[odd]) {
+      if ((pair.along & end) != 0) continue;
+      const double u = double(node_[i - std::size_t(pair.step)].away);
+      const double v = double(node_[i + std::size_t(pair.step)].away);
+      const double bound2 = (u * u + v * v) / 2 - pair.way2;
+      start.most = std::min(start.most, std::min(u, v) + pair.way + kLoose + 0.1);
+      if (best != nullptr && bound2 <= low2) continue;
+      low2 = bound2;
+      best = &pair;
+    }
+    if (best != nullptr) {
+      start.add(node_[i - std::size_t(best->step)].nearest);
+      start.add(node_[i + std::size_t(best->step)].nearest);
+    }
+    if (start.count == 0) {
+      const Node& even = node_[at(a & ~1, b & ~1, c & ~1)];
+      start.most = std::min(start.most, double(even.away) + std::sqrt(3.0) * kSpacing + 0.1);
+      start.add(even.nearest);
+    }
+    const double low = std::sqrt(std::max(0.0, low2));
+    const double enough = low2 > 0 ? low + std::min(kLoose, low / 8) : -1;
+    return std::max(low, search(a, b, c, start, enough));
+  }
+
+  // 0 where something is `enough` near.
+  double search(int a, int b, int c, const Start& start, double enough) {
     const double p[3] = {kSpacing * a, kSpacing * b, kSpacing * c};
-    const double most = start.least + way + 0.1;
-    TriangleTree::Found found{float(most * most), TriangleTree::kNone, 0};
+    TriangleTree::Found found{float(start.most * start.most), TriangleTree::kNone, 0};
     const double away = tree_.search(p, {start.place, start.count}, enough, found);
-    nearest = found.place;
+    node_[at(a, b, c)].nearest = found.place;
     return away;
   }
 
   const TriangleTree& tree_;
   int count_[3];
-  std::size_t even_[3];
-  std::vector<float> away_;             // (even nodes)
-  std::vector<std::uint32_t> nearest_;  // (even nodes) place in the tree, or kNone
+  std::ptrdiff_t stride_[3] = {1, 0, 0};
+  std::vector<Pair> pairs_[8];  // of nodes with these odd places
+  std::vector<Node> node_;
 };
 
 }  // namespace
@@ -160,26 +199,39 @@ Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand
   const TriangleTree tree(surface, grid, threads);
   if (!steps.tell("far field", 0.88)) return Failure{"cancelled"};
   Nodes nodes(grid, tree);
-  const auto known_of = [&](int a, int b, int c) { return look_up(grid, band, reached, a, b, c); };
-  if (!steps.run("far field", 0.88, 0.92, nodes.even(2), threads, [&](std::size_t layer) {
-        const int c = int(2 * layer);
-        for (int b = 0; b < nodes.count(1); b += 2)
-          for (int a = 0; a < nodes.count(0); a += 2)
-            nodes.search_even(a, b, c, known_of(a, b, c).u);
-      }))
-    return Failure{"cancelled"};
   const int nx = nodes.count(0), ny = nodes.count(1), nz = nodes.count(2);
   far.resize(std::size_t(nx) * std::size_t(ny) * std::size_t(nz));
-  if (!steps.run("far field", 0.92, 1.0, std::size_t(nz), threads, [&](std::size_t layer) {
-        float* to = far.data() + layer * std::size_t(ny) * std::size_t(nx);
-        const int c = int(layer);
-        for (int b = 0; b < ny; ++b)
-          for (int a = 0; a < nx; ++a) {
-            const Known known = known_of(a, b, c);
-            const double u = bound(nodes.away(a, b, c, known.u), grid.offset, known.inside);
-            *to++ = float((known.inside ? -u : u) * grid.voxel * (1 - 1e-6));
-          }
-      }))
+  // Every second node of a row. What is known of a row is looked up at once: else each search waits
+  // for it.
+  const auto row = [&](int first, int b, int c, std::vector<Known>& known) {
+    for (int a = first; a < nx; a += 2)
+      known[std::size_t(a / 2)] = look_up(grid, band, reached, a, b, c);
+    for (int a = first; a < nx; a += 2) {
+      const auto [inside, near] = known[std::size_t(a / 2)];
+      const double u = bound(nodes.away(a, b, c, near), grid.offset, inside);
+      far[nodes.at(a, b, c)] = float((inside ? -u : u) * grid.voxel * (1 - 1e-6));
+    }
+  };
+  const auto even_nodes = [&](std::size_t layer) {
+    std::vector<Known> known(std::size_t(nx) / 2 + 1);
+    for (int b = 0; b < ny; b += 2) row(0, b, int(2 * layer), known);
+  };
+  // Row by row: searches find in the caches what those next to them have looked at.
+  const auto others = [&](int c) {
+    std::vector<Known> known(std::size_t(nx) / 2 + 1);
+    for (int b = 0; b < ny; b += 2) {
+      if (b + 1 < ny)
+        for (const int first : {1, 0}) row(first, b + 1, c, known);
+      row(1, b, c, known);
+      if ((c & 1) != 0) row(0, b, c, known);
+    }
+  };
+  const std::size_t odd_layers = std::size_t(nz / 2), even_layers = std::size_t(nz) - odd_layers;
+  if (!steps.run("far field", 0.88, 0.92, even_layers, threads, even_nodes) ||
+      !steps.run("far field", 0.92, 0.96, odd_layers, threads,
+                 [&](std::size_t layer) { others(int(2 * layer + 1)); }) ||
+      !steps.run("far field", 0.96, 1.0, even_layers, threads,
+                 [&](std::size_t layer) { others(int(2 * layer)); }))
     return Failure{"cancelled"};
   return Done{};
 }
