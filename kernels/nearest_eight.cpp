@@ -9,6 +9,8 @@
 // After foreach_target.h.
 #include <hwy/highway.h>
 
+#include "kernels/compress-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -164,9 +166,9 @@ HWY_INLINE std::size_t keep_live(std::uint32_t first, VF squared, Mask live, std
   const hn::RebindToUnsigned<D> du;
   // Not lanes from `first` on, compressed: a compiler writes those one by one and reads them as a
   // vector, which has to wait for all of them.
-  const auto lanes = hn::Compress(hn::Iota(du, 0), hn::RebindMask(du, live));
+  const auto lanes = compress(du, hn::Iota(du, 0), hn::RebindMask(du, live));
   hn::StoreU(hn::Add(lanes, hn::Set(du, first)), du, what);
-  hn::StoreU(hn::Compress(squared, live), d, bound);
+  hn::StoreU(compress(d, squared, live), d, bound);
   return hn::CountTrue(d, live);
 }
 
