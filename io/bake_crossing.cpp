@@ -174,7 +174,8 @@ void draw_large(const Point (&p)[3], const std::array<Lines, 3>& lines, const Ro
 
 }  // namespace
 
-void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band) {
+void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile,
+                std::span<const std::uint32_t> triangles, NarrowBand& band) {
   const Tiles& tiles = band.tiles;
   if (tiles.first[tile] == tiles.first[tile + 1]) return;
   const std::array<int, 3> first = tiles.first_brick(tile);
@@ -185,18 +186,9 @@ void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, Narr
     rows[std::size_t(i)] = in ? band.row[grid.cell(at[0], at[1], at[2])] : -1;
   }
   thread_local const auto hits = std::make_unique<kernels::LatticeHits>();
-  for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
-    const auto& corner = surface.triangles[tiles.triangle[i]];
+  for (const std::uint32_t t : triangles) {
     const Vec3* v[3];
-    for (std::size_t c = 0; c < 3; ++c) v[c] = &surface.vertices[corner[c]];
-    // The tile's edges run from its first node to past its last.
-    const auto meets = [&](double a, double b, double c, std::size_t k) {
-      const double low = 8.0 * first[k];
-      return std::max({a, b, c}) >= low - 1e-5 && std::min({a, b, c}) <= low + double(kSide) + 1e-5;
-    };
-    if (!meets(v[0]->x, v[1]->x, v[2]->x, 0) || !meets(v[0]->y, v[1]->y, v[2]->y, 1) ||
-        !meets(v[0]->z, v[1]->z, v[2]->z, 2))
-      continue;
+    for (std::size_t c = 0; c < 3; ++c) v[c] = &surface.vertices[surface.triangles[t][c]];
     Point p[3];
     for (std::size_t c = 0; c < 3; ++c) {
       const double at[3] = {v[c]->x, v[c]->y, v[c]->z};

@@ -76,9 +76,8 @@ void add_triangle(std::vector<double>& corners, const Corner& a, const Corner& b
 
 // What of a large triangle can be within reach of the tile, as a fan.
 void add_part_near(std::vector<double>& corners, std::vector<Part>& parts, const Corner (&t)[3],
-                   const Part& whole, double reach) {
-  Polygon polygon, scratch;
-  for (std::size_t i = 0; i < 3; ++i) polygon.push_back({t[i], whole.corner[i], whole.edge[i]});
+                   double reach) {
+  Polygon polygon{{t[0], 0, 0}, {t[1], 1, 1}, {t[2], 2, 2}}, scratch;
   for (std::size_t k = 0; k < 3; ++k) {
     cut(polygon, k, 8.0 * kernels::kTileBricks + reach, 1.0, scratch);
     cut(polygon, k, -1.0 - reach, -1.0, scratch);
@@ -103,7 +102,16 @@ struct Facets {
   struct Place {
     std::uint32_t facet, k, source;  // edge or corner k of the facet; where Features tell of it
   };
-  std::vector<Place> edge, end;  // that the triangle answers for
+  std::vector<Place> edge, end;        // that the triangle answers for
+  std::vector<std::size_t> large;      // entries of the tile's list that are cut
+  std::vector<std::uint32_t> in_tile;  // triangles that may meet the tile itself
+  void resize(std::size_t count) {
+    near.resize(count);
+    corners.resize(9 * count);
+    part.resize(count);
+    owner.resize(count);
+    weighed.resize(count);
+  }
 };
 
 void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Gradient& g,
@@ -186,16 +194,30 @@ void set_regions(const Surface& surface, const Features& features, Facets& out) 
   }
 }
 
+// The tile's edges between nodes run from its first node to past its last.
+void list_in_tile(Facets& out) {
+  constexpr float kLast = 8.0f * kernels::kTileBricks, kRounding = 1e-3f;
+  out.in_tile.resize(out.facet.size());
+  std::size_t count = 0;
+  for (std::size_t f = 0; f < out.facet.size(); ++f) {
+    const kernels::DistanceFacet& facet = out.facet[f];
+    bool in = count == 0 || out.in_tile[count - 1] != std::uint32_t(out.owner[f]);
+    for (std::size_t k = 0; k < 3; ++k)
+      in = in & (facet.low[k] <= kLast + kRounding) & (facet.high[k] >= -kRounding);
+    out.in_tile[count] = std::uint32_t(out.owner[f]);
+    count += in;
+  }
+  out.in_tile.resize(count);
+}
+
 void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const Features& features,
              std::size_t tile, Facets& out) {
-  out.near.clear();
-  out.corners.clear();
-  out.part.clear();
-  out.owner.clear();
-  out.weighed.clear();
   const std::array<int, 3> brick = tiles.first_brick(tile);
   constexpr std::size_t kSoon = 6, kLater = 12;
   const std::size_t begin = tiles.first[tile], end = tiles.first[tile + 1];
+  out.resize(end - begin);
+  out.large.clear();
+  std::size_t count = 0;
   for (std::size_t i = begin; i < std::min(end, begin + kLater); ++i)
     ask_for_triangle(surface, features, tiles.triangle[i]);
   for (std::size_t i = begin; i < std::min(end, begin + kSoon); ++i)
@@ -205,28 +227,42 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
     if (i + kSoon < end) ask_for_corners(surface, tiles.triangle[i + kSoon]);
     const std::uint32_t t = tiles.triangle[i];
     const Whole& whole = kWholes[features.owned[t]];
-    Corner corner[3];
+    double* corner = &out.corners[9 * count];
     double farthest = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3& v = surface.vertices[surface.triangles[t][std::size_t(whole.part.corner[k])]];
+      corner[3 * k] = v.x - 8.0 * brick[0];
+      corner[3 * k + 1] = v.y - 8.0 * brick[1];
+      corner[3 * k + 2] = v.z - 8.0 * brick[2];
+      for (std::size_t c = 0; c < 3; ++c)
+        farthest = std::max(farthest, std::fabs(corner[3 * k + c]));
+    }
+    if (farthest >= kFar) {
+      out.large.push_back(i);
+      continue;
+    }
+    out.part[count] = whole.part;
+    out.near[count] = tiles.near[i];
+    out.owner[count] = std::int32_t(t);
+    out.weighed[count++] = whole.weighed;
+  }
+  out.resize(count);
+  for (const std::size_t i : out.large) {
+    const std::uint32_t t = tiles.triangle[i];
+    Corner corner[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& v = surface.vertices[surface.triangles[t][k]];
       corner[k] = {v.x - 8.0 * brick[0], v.y - 8.0 * brick[1], v.z - 8.0 * brick[2]};
-      for (double c : corner[k]) farthest = std::max(farthest, std::fabs(c));
     }
-    if (farthest < kFar) {
-      add_triangle(out.corners, corner[0], corner[1], corner[2]);
-      out.part.push_back(whole.part);
-    } else {
-      add_part_near(out.corners, out.part, corner, whole.part, grid.reach());
-    }
-    for (std::size_t f = out.owner.size(); f < out.part.size(); ++f) {
-      out.near.push_back(tiles.near[i]);
-      out.owner.push_back(std::int32_t(t));
-      out.weighed.push_back(farthest < kFar ? whole.weighed : std::uint8_t{3});
-    }
+    add_part_near(out.corners, out.part, corner, grid.reach());
+    out.near.resize(out.part.size(), tiles.near[i]);
+    out.owner.resize(out.part.size(), std::int32_t(t));
+    out.weighed.resize(out.part.size(), 3);
   }
   out.facet.resize(out.part.size());
   kernels::make_distance_facets(out.corners.data(), out.facet.size(), out.facet.data());
   set_regions(surface, features, out);
+  list_in_tile(out);
 }
 
 NodeMask above(const float* u, float level) {
@@ -249,9 +285,10 @@ std::uint32_t looked_at_by(const NodeMask& nodes) {
 
 }  // namespace
 
-void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band) {
+std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& grid,
+                                            std::size_t tile, NarrowBand& band) {
   const Tiles& tiles = band.tiles;
-  if (tiles.first[tile] == tiles.first[tile + 1]) return;
+  if (tiles.first[tile] == tiles.first[tile + 1]) return {};
   thread_local Facets facets;
   thread_local const auto room = std::make_unique<kernels::TileRoom>();
   prepare(surface, grid, tiles, band.features, tile, facets);
@@ -284,6 +321,7 @@ void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, Na
     band.triangle[r] = surface.source[std::size_t(owner)];
     if (!band.part.empty()) band.part[r] = surface.part[std::size_t(owner)];
   }
+  return facets.in_tile;
 }
 
 }  // namespace h6::io::bake

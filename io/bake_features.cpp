@@ -83,7 +83,8 @@ Features::Gradient inwards(const Surface& surface, std::uint32_t triangle, std::
   in = minus(in, {part * along.x, part * along.y, part * along.z});
   const double length = std::sqrt(dot(in, in));
   if (!(length * length > 1e-12 * slanted2) || !(length > 1e-6)) return {};
-  return {float(in.x / length), float(in.y / length), float(in.z / length)};
+  const double over = 1 / length;
+  return {float(in.x * over), float(in.y * over), float(in.z * over)};
 }
 
 // Of an edge's triangles the first one answers for it. `owned` (3 triangles): by which edge.
@@ -114,7 +115,8 @@ void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t 
     Vec3 d = minus(surface.vertices[spokes.end[i]], p);
     const double length = std::sqrt(dot(d, d));
     if (!(length > 1e-9)) continue;
-    d = {d.x / length, d.y / length, d.z / length};
+    const double over = 1 / length;
+    d = {d.x * over, d.y * over, d.z * over};
     if (i < 2)  // the first triangle's
       sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
     else

@@ -125,8 +125,8 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
   if (!surface.part.empty()) band.part.resize(band.rows());
   band.triangle.resize(band.rows(), -1);
   if (!steps.run("distance", from + 0.05, to, band.tiles.count(), threads, [&](std::size_t tile) {
-        measure_tile(surface, grid, tile, band);
-        if (!band.crossing.empty()) cross_tile(surface, grid, tile, band);
+        const auto triangles = measure_tile(surface, grid, tile, band);
+        if (!band.crossing.empty()) cross_tile(surface, grid, tile, triangles, band);
       }))
     return Failure{"cancelled"};
   band.features = {};

@@ -14,6 +14,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -183,8 +184,12 @@ class Steps {
 Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
                         NarrowBand& band);
 // bake_distance.cpp, bake_crossing.cpp: what is known of the rows of one tile.
-void measure_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band);
-void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile, NarrowBand& band);
+// The first returns the triangles that may meet the tile itself, which the second needs; they are
+// there until the thread measures another.
+std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& grid,
+                                            std::size_t tile, NarrowBand& band);
+void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile,
+                std::span<const std::uint32_t> triangles, NarrowBand& band);
 
 // bake_seal.cpp: facets across holes up to grid.seal wide; returns how many, a square voxel each.
 std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads,
