@@ -35,6 +35,19 @@ NodeMask border_nodes(const Grid& grid, const std::array<int, 3>& at) {
   return m;
 }
 
+// Along a line of nodes that are `by` bits apart, there and back, where one, two and four steps up
+// lead.
+std::uint64_t flow(std::uint64_t wet, std::uint64_t one, std::uint64_t two, std::uint64_t four,
+                   int by) {
+  wet |= (wet & one) << by;
+  wet |= (wet & two) << 2 * by;
+  wet |= (wet & four) << 4 * by;
+  wet |= wet >> by & one;
+  wet |= wet >> 2 * by & two;
+  wet |= wet >> 4 * by & four;
+  return wet;
+}
+
 }  // namespace
 
 Flood::Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges,
@@ -285,20 +298,7 @@ void Flood::spread(std::size_t r) {
     for (std::size_t z = 1; z < 8; ++z) wet[z] |= wet[z - 1] & up[z - 1];
     for (std::size_t z = 7; z-- > 0;) wet[z] |= wet[z + 1] & up[z];
     for (std::size_t z = 0; z < 8; ++z) {
-      std::uint64_t w = wet[z];
-      w |= (w & x1[z]) << 1;
-      w |= (w & x2[z]) << 2;
-      w |= (w & x4[z]) << 4;
-      w |= w >> 1 & x1[z];
-      w |= w >> 2 & x2[z];
-      w |= w >> 4 & x4[z];
-      w |= (w & y1[z]) << 8;
-      w |= (w & y2[z]) << 16;
-      w |= (w & y4[z]) << 32;
-      w |= w >> 8 & y1[z];
-      w |= w >> 16 & y2[z];
-      w |= w >> 32 & y4[z];
-      wet[z] = w;
+      wet[z] = flow(flow(wet[z], x1[z], x2[z], x4[z], 1), y1[z], y2[z], y4[z], 8);
     }
   } while (wet != before);
   wet_[r].z = wet;

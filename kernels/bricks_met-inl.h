@@ -18,6 +18,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
 // What functions gain over half a box at most, and the leeway.
 HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::size_t count,
                       const float (&half)[3], float* out) {

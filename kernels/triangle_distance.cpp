@@ -67,8 +67,7 @@ HWY_INLINE void values_at(const float* gx, const float* gy, const float* gz, con
               d, out + k);
 }
 
-// One triangle, prepared for all bricks of its tile. What a block's middle must be at least or at
-// most is kept for the tile's first node: a brick further on only moves it.
+// One triangle, prepared for all bricks of its tile.
 struct Ready {
   Ready(const DistanceFacet& facet, const FacetRegion& where) : f(facet), region(where) {}
   const DistanceFacet& f;
