@@ -11,11 +11,6 @@ namespace {
 
 constexpr double kGripLever = 0.05;  // of a hand that twists (METHOD.md, Sec. 4) [m]
 
-template <int Bodies>
-using Matrix = Eigen::Matrix<double, 6 * Bodies, 6 * Bodies>;
-template <int Bodies>
-using Vector = Eigen::Matrix<double, 6 * Bodies, 1>;
-
 bool sane(const RigidState& state) {
   return state.x.allFinite() && state.v.allFinite() && state.w.allFinite() &&
          state.q.coeffs().allFinite();
@@ -48,7 +43,8 @@ Vec6 explicit_change(const h6Session& s, const Body& body) {
   Vec6 rhs = M * du - s.dt * (B * velocity(body));
   M += s.dt * B;
   if (body.translation_only) hold_rotation(M, rhs, 0);
-  return M.ldlt().solve(rhs);
+  Vec6 damped;
+  return solve_system(H6_SYMMETRIC, M, rhs, damped) ? damped : du;
 }
 
 int place_in(const Island& island, std::int32_t body) {
@@ -58,8 +54,8 @@ int place_in(const Island& island, std::int32_t body) {
 }
 
 // `series`: field bodies that one shell body touches feel one another.
-template <int N>
-void add_between_fields(const h6Session& s, const Island& island, Matrix<N>& K, Matrix<N>& D) {
+void add_between_fields(const h6Session& s, const Island& island, IslandMatrix& K,
+                        IslandMatrix& D) {
   for (std::size_t first = 0, end; first < s.pair_count; first = end) {
     end = pairs_of_shell(s, first);
     if (place_in(island, s.pairs[first].a) < 0) continue;
@@ -67,8 +63,8 @@ void add_between_fields(const h6Session& s, const Island& island, Matrix<N>& K, 
       for (std::size_t q = first; q < end; ++q) {
         const int b = place_in(island, s.pairs[p].b), other = place_in(island, s.pairs[q].b);
         if (p == q || b < 0 || other < 0) continue;
-        K.template block<6, 6>(6 * b, 6 * other) += s.pairs[p].left * s.pairs[q].right;
-        D.template block<6, 6>(6 * b, 6 * other) +=
+        K.block<6, 6>(6 * b, 6 * other) += s.pairs[p].left * s.pairs[q].right;
+        D.block<6, 6>(6 * b, 6 * other) +=
             s.contact.damping * s.pairs[p].left * s.pairs[q].right_d;
       }
   }
@@ -93,55 +89,59 @@ OwnTerms own_terms(const Body& body) {
   return own;
 }
 
-// The island's system. With one body it is that body's own 6x6 one, whatever it touches.
-template <int N>
-bool solve(const h6Session& s, const Island& island, Vector<N>& du) {
+// A body that is coupled to no other, whatever it touches.
+bool solve_one(const h6Session& s, const Body& body, Vec6& du) {
   const double h = s.dt;
-  Matrix<N> A;
-  Vector<N> rhs;
-  if constexpr (N == 1) {
-    const Body& body = s.bodies[island.body[0]];
-    const OwnTerms own = own_terms(body);
-    A = own.M - h * own.D - h * h * body.K;
-    rhs = h * (own.f + h * (body.K * own.u));
-  } else {
-    Matrix<N> K = Matrix<N>::Zero(), D = Matrix<N>::Zero(), M = Matrix<N>::Zero();
-    Vector<N> u, f;
-    for (int i = 0; i < N; ++i) {
-      const Body& body = s.bodies[island.body[i]];
-      const OwnTerms own = own_terms(body);
-      M.template block<6, 6>(6 * i, 6 * i) = own.M;
-      K.template block<6, 6>(6 * i, 6 * i) = body.K;
-      D.template block<6, 6>(6 * i, 6 * i) = own.D;
-      u.template segment<6>(6 * i) = own.u;
-      f.template segment<6>(6 * i) = own.f;
-    }
-    for (std::size_t p = 0; p < s.pair_count; ++p) {
-      const int a = place_in(island, s.pairs[p].a), b = place_in(island, s.pairs[p].b);
-      if (a < 0 || b < 0) continue;
-      K.template block<6, 6>(6 * a, 6 * b) += s.pairs[p].Kab;
-      K.template block<6, 6>(6 * b, 6 * a) += s.pairs[p].Kba;
-      D.template block<6, 6>(6 * a, 6 * b) += s.pairs[p].Dab;
-      D.template block<6, 6>(6 * b, 6 * a) += s.pairs[p].Dba;
-    }
-    if (s.contact.method == H6_METHOD_SERIES) add_between_fields<N>(s, island, K, D);
-    A = M - h * D - h * h * K;
-    rhs = h * (f + h * (K * u));
-  }
-  for (int i = 0; i < N; ++i)
-    if (s.bodies[island.body[i]].translation_only) hold_rotation(A, rhs, i);
+  const OwnTerms own = own_terms(body);
+  Mat6 A = own.M - h * own.D - h * h * body.K;
+  Vec6 rhs = h * (own.f + h * (body.K * own.u));
+  if (body.translation_only) hold_rotation(A, rhs, 0);
   return solve_system(s.gradient, A, rhs, du);
 }
 
-template <int N>
+bool solve_together(const h6Session& s, const Island& island, IslandVector& du) {
+  const double h = s.dt;
+  const int n = 6 * island.count;
+  IslandMatrix K = IslandMatrix::Zero(n, n), D = K, A = K;
+  IslandVector u(n), f(n);
+  for (int i = 0; i < island.count; ++i) {
+    const Body& body = s.bodies[island.body[i]];
+    const OwnTerms own = own_terms(body);
+    A.block<6, 6>(6 * i, 6 * i) = own.M;
+    K.block<6, 6>(6 * i, 6 * i) = body.K;
+    D.block<6, 6>(6 * i, 6 * i) = own.D;
+    u.segment<6>(6 * i) = own.u;
+    f.segment<6>(6 * i) = own.f;
+  }
+  for (std::size_t p = 0; p < s.pair_count; ++p) {
+    const int a = place_in(island, s.pairs[p].a), b = place_in(island, s.pairs[p].b);
+    if (a < 0 || b < 0) continue;
+    K.block<6, 6>(6 * a, 6 * b) += s.pairs[p].Kab;
+    K.block<6, 6>(6 * b, 6 * a) += s.pairs[p].Kba;
+    D.block<6, 6>(6 * a, 6 * b) += s.pairs[p].Dab;
+    D.block<6, 6>(6 * b, 6 * a) += s.pairs[p].Dba;
+  }
+  if (s.contact.method == H6_METHOD_SERIES) add_between_fields(s, island, K, D);
+  A -= h * D + h * h * K;
+  f += h * K.lazyProduct(u);
+  f *= h;
+  for (int i = 0; i < island.count; ++i)
+    if (s.bodies[island.body[i]].translation_only) hold_rotation(A, f, i);
+  return solve_system(s.gradient, A, f, du);
+}
+
 void step_island(h6Session& s, const Island& island) {
-  Vector<N> du;
-  if (s.integrator == H6_IMPLICIT && solve<N>(s, island, du)) {
-    for (int i = 0; i < N; ++i) advance(s, s.bodies[island.body[i]], du.template segment<6>(6 * i));
+  IslandVector du;
+  Vec6 alone;
+  const bool one = island.count == 1;
+  if (s.integrator == H6_IMPLICIT && (one ? solve_one(s, s.bodies[island.body[0]], alone)
+                                          : solve_together(s, island, du))) {
+    for (int i = 0; i < island.count; ++i)
+      advance(s, s.bodies[island.body[i]], one ? alone : Vec6(du.segment<6>(6 * i)));
     return;
   }
   if (s.integrator == H6_IMPLICIT) s.report.status |= H6_SOLVE_FAILED;
-  for (int i = 0; i < N; ++i) {
+  for (int i = 0; i < island.count; ++i) {
     Body& body = s.bodies[island.body[i]];
     advance(s, body, explicit_change(s, body));
   }
@@ -193,23 +193,7 @@ void step_bodies(h6Session& s) {
     Body& body = s.bodies[s.hands[h].body];
     if (body.motion == Motion::quasi_static && s.hands[h].seen) step_static(s, body);
   }
-  for (std::size_t i = 0; i < s.island_count; ++i) {
-    const Island& island = s.islands[i];
-    switch (island.count) {
-      case 1:
-        step_island<1>(s, island);
-        break;
-      case 2:
-        step_island<2>(s, island);
-        break;
-      case 3:
-        step_island<3>(s, island);
-        break;
-      case 4:
-        step_island<4>(s, island);
-        break;
-    }
-  }
+  for (std::size_t i = 0; i < s.island_count; ++i) step_island(s, s.islands[i]);
 }
 
 }  // namespace h6

@@ -12,6 +12,7 @@
 #include "runtime/safety.h"
 #include "runtime/share_gate.h"
 #include "runtime/shell_lanes.h"
+#include "runtime/solve.h"
 #include "sched/clock.h"
 #include "sched/frame_team.h"
 
@@ -151,8 +152,7 @@ void set_rating(Hand& hand, const h6DeviceCapabilities& capabilities);
 // So many seconds lie between the last command and the next one: late, when a frame is missing.
 void note_interval(Hand& hand, double dt, double seconds);
 
-// Moving bodies that pairs connect: solved together when there are at most four.
-inline constexpr int kIslandBodies = 4;
+// Moving bodies that pairs connect, solved together when there are not too many.
 struct Island {
   std::int32_t body[kIslandBodies];
   int count;
