@@ -10,6 +10,10 @@
 // free is kept. Getting it from the machine costs .13 ms a megabyte here at best, and where a
 // virtual machine has given idle memory back to its host 2 ms and more, whoever is first. ms_cold
 // is the time of a bake that has to, on as many threads; OpenVDB is timed in the same way.
+//
+// bake/scaling/MESH/voxels:N bakes with one thread and with two in turn, since machines change their
+// speed: how many times faster two are, as a whole and stage by stage, medians over the rounds. Both
+// fields must be the same bits.
 #include <benchmark/benchmark.h>
 
 #ifdef __GLIBC__
@@ -215,6 +219,50 @@ void bake_field(benchmark::State& state, const Lazy& make, int voxels, unsigned 
         benchmark::Counter(1e3 * seconds, benchmark::Counter::kAvgIterations);
 }
 
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+void bake_scaling(benchmark::State& state, const Lazy& make, int voxels) {
+  constexpr int kRounds = 9, kWarmUp = 3;
+  const InputPtr input = make();
+  const KeepMemory keep;
+  io::FieldData field[2];
+  std::vector<double> seconds[2], faster;
+  std::map<std::string, std::vector<double>> stages;
+  for (auto _ : state)
+    for (int round = -kWarmUp; round < kRounds; ++round) {
+      std::map<std::string, double> stage[2];
+      double took[2];
+      for (unsigned i = 0; i < 2; ++i) {
+        io::FieldBake options;
+        options.voxels = voxels;
+        options.threads = 1 + i;
+        io::FieldBakeReport report;
+        field[i] = {};
+        const std::int64_t begin = sched::now_ns();
+        auto made = io::bake_field(input->mesh, options, &report);
+        took[i] = 1e-9 * double(sched::now_ns() - begin);
+        if (!made) return state.SkipWithError(made.error().c_str());
+        field[i] = std::move(*made);
+        for (const auto& s : report.stages) stage[i][s.name] += s.seconds;
+      }
+      if (field[0].brick_index != field[1].brick_index || field[0].samples != field[1].samples ||
+          field[0].far_grid != field[1].far_grid)
+        return state.SkipWithError("fields with one thread and with two are not the same");
+      if (round < 0) continue;
+      for (int i = 0; i < 2; ++i) seconds[i].push_back(took[i]);
+      faster.push_back(took[0] / took[1]);
+      for (const auto& [name, s] : stage[0]) stages[name].push_back(s / stage[1][name]);
+    }
+  state.counters["ms_one"] = 1e3 * median(seconds[0]);
+  state.counters["ms_two"] = 1e3 * median(seconds[1]);
+  state.counters["times_faster"] = median(faster);
+  for (const auto& [name, ratios] : stages) state.counters["times_" + name] = median(ratios);
+}
+
 void level_set(benchmark::State& state, const Lazy& make, int voxels, unsigned threads) {
   const InputPtr input = make();
   io::Vec3 low = input->mesh.vertices[0], high = low;
@@ -280,6 +328,15 @@ void add_shells(const std::string& name, const Lazy& input) {
           ->UseRealTime();
 }
 
+void add_scaling(const std::string& name, const Lazy& input, int voxels) {
+  benchmark::RegisterBenchmark(
+      ("bake/scaling/" + name + "/voxels:" + std::to_string(voxels)).c_str(), bake_scaling, input,
+      voxels)
+      ->Unit(benchmark::kMillisecond)
+      ->Iterations(1)
+      ->UseRealTime();
+}
+
 InputPtr plain(io::Mesh mesh) {
   auto input = std::make_shared<Input>();
   input->mesh = std::move(mesh);
@@ -300,14 +357,17 @@ InputPtr industrial(io::IndustrialInput&& made) {
   add_shells("alpha", alpha);
   add_fields("gear100k", ring, {256, 512}, true);
   add_shells("gear100k", ring);
+  add_scaling("gear100k", ring, 512);
   // Large inputs take seconds to bake, and their peer minutes: only when asked for.
   const char* which = std::getenv("HAPSIX_BENCH_SOUPS");
   if (which != nullptr && *which != '\0' && *which != '0') {
     constexpr std::size_t kProbes = 400;
-    add_fields("soup500k", once([] { return industrial(io::make_engine_bay(kProbes)); }),
-               {512, 1024}, true);
-    add_fields("soup1800k", once([] { return industrial(io::make_landing_gear(kProbes)); }), {1024},
-               true);
+    const Lazy bay = once([] { return industrial(io::make_engine_bay(kProbes)); }),
+               gear = once([] { return industrial(io::make_landing_gear(kProbes)); });
+    add_fields("soup500k", bay, {512, 1024}, true);
+    add_fields("soup1800k", gear, {1024}, true);
+    for (const int voxels : {512, 1024}) add_scaling("soup500k", bay, voxels);
+    add_scaling("soup1800k", gear, 1024);
   }
   if (const char* list = std::getenv("HAPSIX_BENCH_MESHES")) {
     std::stringstream files(list);

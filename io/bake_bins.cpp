@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <utility>
 
 #include "io/bake_grid.h"
 #include "sched/parallel_for.h"
@@ -195,15 +196,14 @@ void bin_triangles(const Surface& surface, const Grid& grid, const Tiles& tiles,
 }
 
 // Rows in the order of cells, layer by layer; returns how many. They are not made if too many.
-std::size_t number_rows(const Grid& grid, const std::vector<std::atomic<std::uint64_t>>& used,
-                        unsigned threads, NarrowBand& band) {
+std::size_t number_rows(const Grid& grid, const std::vector<std::uint64_t>& used, unsigned threads,
+                        NarrowBand& band) {
   const Tiles& tiles = band.tiles;
   // Calls f(cell) for the cells of a layer that have a row, in order.
   const auto each_cell = [&](int c, auto&& f) {
     for (int b = 0; b < grid.bricks[1]; ++b)
       for (int a = 0; a < grid.bricks[0]; a += 4) {
-        const std::uint64_t bits = used[tiles.of({a, b, c})].load(std::memory_order_relaxed);
-        const std::uint64_t line = bits >> Tiles::bit({a, b, c}) & 0xf;
+        const std::uint64_t line = used[tiles.of({a, b, c})] >> Tiles::bit({a, b, c}) & 0xf;
         for (int i = 0; i < 4; ++i)
           if (line >> i & 1) f(grid.cell(a + i, b, c));
       }
@@ -248,44 +248,60 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
   const std::size_t tile_count =
       std::size_t(tiles.size[0]) * std::size_t(tiles.size[1]) * std::size_t(tiles.size[2]);
   const std::size_t slices = (surface.triangles.size() + kSlice - 1) / kSlice;
-  std::vector<std::vector<Pair>> pairs(slices);
-  std::vector<std::atomic<std::uint32_t>> count(tile_count);
-  std::vector<std::atomic<std::uint64_t>> used(tile_count);  // bricks
-  std::atomic<std::size_t> total{0};
-  sched::parallel_for(slices, threads, [&](std::size_t s) {
-    const std::size_t end = std::min(surface.triangles.size(), (s + 1) * kSlice);
-    for (std::size_t t = s * kSlice; t < end; t += Batch::kMost) {
-      if (total.load(std::memory_order_relaxed) > kMaxPairs) return;
-      const std::size_t before = pairs[s].size();
-      bin_triangles(surface, grid, tiles, t, std::min(end, t + Batch::kMost), pairs[s]);
-      for (std::size_t i = before; i < pairs[s].size(); ++i) {
-        count[pairs[s][i].tile].fetch_add(1, std::memory_order_relaxed);
-        used[pairs[s][i].tile].fetch_or(pairs[s][i].near, std::memory_order_relaxed);
+  // Each worker takes slices until none is left, and counts what it finds in them for itself: tiles
+  // next to one another in space are so in the mesh, and two threads would wait for one another.
+  struct Worker {
+    std::vector<std::vector<Pair>> slices;
+    std::vector<std::uint64_t> used;   // (tiles) bricks
+    std::vector<std::size_t> place;   // (tiles) how many pairs, then where the next one goes
+  };
+  std::vector<Worker> workers(threads != 0 ? threads : sched::machine_threads());
+  std::atomic<std::size_t> next{0}, total{0};
+  sched::parallel_for(workers.size(), threads, [&](std::size_t w) {
+    Worker& mine = workers[w];
+    mine.used.assign(tile_count, 0);
+    mine.place.assign(tile_count, 0);
+    for (std::size_t s; (s = next.fetch_add(1, std::memory_order_relaxed)) < slices;) {
+      std::vector<Pair>& pairs = mine.slices.emplace_back();
+      const std::size_t end = std::min(surface.triangles.size(), (s + 1) * kSlice);
+      for (std::size_t t = s * kSlice; t < end; t += Batch::kMost) {
+        if (total.load(std::memory_order_relaxed) > kMaxPairs) return;
+        const std::size_t before = pairs.size();
+        bin_triangles(surface, grid, tiles, t, std::min(end, t + Batch::kMost), pairs);
+        for (std::size_t i = before; i < pairs.size(); ++i) {
+          ++mine.place[pairs[i].tile];
+          mine.used[pairs[i].tile] |= pairs[i].near;
+        }
+        total.fetch_add(pairs.size() - before, std::memory_order_relaxed);
       }
-      if (pairs[s].size() != before)
-        total.fetch_add(pairs[s].size() - before, std::memory_order_relaxed);
     }
   });
   if (total > kMaxPairs) return too_many(grid, 4.0);
 
+  tiles.first.assign(tile_count + 1, 0);
+  std::vector<std::uint64_t> used(tile_count, 0);
+  std::size_t at = 0;
+  for (std::size_t t = 0; t < tile_count; ++t) {
+    for (Worker& worker : workers) {
+      used[t] |= worker.used[t];
+      at += std::exchange(worker.place[t], at);
+    }
+    tiles.first[t + 1] = at;
+  }
   const std::size_t rows = number_rows(grid, used, threads, band);
   if (rows > kMaxBricks) return too_many(grid, double(rows) / kMaxBricks);
 
-  tiles.first.assign(tile_count + 1, 0);
-  for (std::size_t t = 0; t < tile_count; ++t) {
-    tiles.first[t + 1] = tiles.first[t] + count[t];
-    count[t] = 0;  // from here on: how many are in place
-  }
   tiles.triangle.resize(total);
   tiles.near.resize(total);
-  sched::parallel_for(slices, threads, [&](std::size_t s) {
-    for (const Pair& p : pairs[s]) {
-      const std::size_t at =
-          tiles.first[p.tile] + count[p.tile].fetch_add(1, std::memory_order_relaxed);
-      tiles.triangle[at] = p.triangle;
-      tiles.near[at] = p.near;
+  sched::parallel_for(workers.size(), threads, [&](std::size_t w) {
+    for (std::vector<Pair>& pairs : workers[w].slices) {
+      for (const Pair& p : pairs) {
+        const std::size_t to = workers[w].place[p.tile]++;
+        tiles.triangle[to] = p.triangle;
+        tiles.near[to] = p.near;
+      }
+      std::vector<Pair>().swap(pairs);
     }
-    std::vector<Pair>().swap(pairs[s]);
   });
   return Done{};
 }
