@@ -11,9 +11,9 @@
 // virtual machine has given idle memory back to its host 2 ms and more, whoever is first. ms_cold
 // is the time of a bake that has to, on as many threads; OpenVDB is timed in the same way.
 //
-// bake/scaling/MESH/voxels:N bakes with one thread and with two in turn, since machines change their
-// speed: how many times faster two are, as a whole and stage by stage, medians over the rounds. Both
-// fields must be the same bits.
+// bake/scaling/MESH/voxels:N bakes with one thread and with two in turn, since machines change
+// their speed: how many times faster two are, as a whole and stage by stage, medians over the
+// rounds. Both fields must be the same bits.
 #include <benchmark/benchmark.h>
 
 #ifdef __GLIBC__

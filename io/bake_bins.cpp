@@ -252,7 +252,7 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
   // next to one another in space are so in the mesh, and two threads would wait for one another.
   struct Worker {
     std::vector<std::vector<Pair>> slices;
-    std::vector<std::uint64_t> used;   // (tiles) bricks
+    std::vector<std::uint64_t> used;  // (tiles) bricks
     std::vector<std::size_t> place;   // (tiles) how many pairs, then where the next one goes
   };
   std::vector<Worker> workers(threads != 0 ? threads : sched::machine_threads());

@@ -64,8 +64,7 @@ void add_between_fields(const h6Session& s, const Island& island, IslandMatrix& 
         const int b = place_in(island, s.pairs[p].b), other = place_in(island, s.pairs[q].b);
         if (p == q || b < 0 || other < 0) continue;
         K.block<6, 6>(6 * b, 6 * other) += s.pairs[p].left * s.pairs[q].right;
-        D.block<6, 6>(6 * b, 6 * other) +=
-            s.contact.damping * s.pairs[p].left * s.pairs[q].right_d;
+        D.block<6, 6>(6 * b, 6 * other) += s.contact.damping * s.pairs[p].left * s.pairs[q].right_d;
       }
   }
 }
@@ -134,8 +133,8 @@ void step_island(h6Session& s, const Island& island) {
   IslandVector du;
   Vec6 alone;
   const bool one = island.count == 1;
-  if (s.integrator == H6_IMPLICIT && (one ? solve_one(s, s.bodies[island.body[0]], alone)
-                                          : solve_together(s, island, du))) {
+  if (s.integrator == H6_IMPLICIT &&
+      (one ? solve_one(s, s.bodies[island.body[0]], alone) : solve_together(s, island, du))) {
     for (int i = 0; i < island.count; ++i)
       advance(s, s.bodies[island.body[i]], one ? alone : Vec6(du.segment<6>(6 * i)));
     return;

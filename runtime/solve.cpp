@@ -1,4 +1,4 @@
-// solve.cpp - Eigen's factorisations are here and nowhere else in a step: they take long to compile.
+// solve.cpp - Eigen's factorisations are here, and nowhere else in a step: they compile slowly.
 #include "runtime/solve.h"
 
 #include <Eigen/Cholesky>

@@ -25,8 +25,8 @@ void check_random_systems(int n) {
     // Units a million apart, as newtons and newton metres of a small part are.
     V scale = V::Ones(n);
     for (int k = 0; k < n; ++k) scale[k] = k % 6 < 3 ? 1 : 1e-3;
-    const M A = scale.asDiagonal() * (J * J.transpose() + 1e-3 * M::Identity(n, n)) *
-                scale.asDiagonal();
+    const M A =
+        scale.asDiagonal() * (J * J.transpose() + 1e-3 * M::Identity(n, n)) * scale.asDiagonal();
     REQUIRE(solve_system(H6_SYMMETRIC, A, b, x));
     const V rest = A * x - b;
     CHECK(rest.norm() <= 1e-9 * (A.norm() * x.norm() + b.norm()));
