@@ -23,13 +23,14 @@ export class Browser {
   #waiting = new Map();
   #next = 1;
 
-  static async open(program) {
+  static async open(program, { webgl = true } = {}) {
     const b = new Browser();
     b.folder = mkdtempSync(join(tmpdir(), 'hapsix-view-'));
     // Software GL: the machine may have no graphics card. /dev/shm may be small.
     b.process = spawn(program, ['--headless=new', '--no-sandbox', '--disable-dev-shm-usage',
-      '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars',
-      '--no-first-run', '--disable-extensions', '--disable-background-networking',
+      ...(webgl ? ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']
+        : ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis']),
+      '--hide-scrollbars', '--no-first-run', '--disable-extensions', '--disable-background-networking',
       '--window-size=1280,860', '--remote-debugging-port=0', `--user-data-dir=${b.folder}`,
       'about:blank'], { stdio: 'ignore' });
     const file = join(b.folder, 'DevToolsActivePort');

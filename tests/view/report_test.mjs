@@ -71,3 +71,17 @@ test('nothing was fetched and nothing went wrong', async () => {
   assert.deepEqual(browser.problems, []);
   assert.equal(await browser.value('performance.getEntriesByType("resource").filter((r) => r.name.startsWith("http")).length'), 0);
 });
+
+test('a browser without WebGL says so, and shows all but the parts', async () => {
+  const poor = await Browser.open(process.env.HAPSIX_CHROMIUM, { webgl: false });
+  try {
+    await poor.go(pathToFileURL(report).href);
+    await until(() => poor.value('Boolean(window.hapsix?.ready)'), 'the report is ready');
+    assert.match(await poor.value('document.getElementById("space").innerText'), /no WebGL/);
+    const text = await poor.value('document.body.innerText');
+    for (const word of ['global', 'robust', 'Late frames', 'Configuration']) assert.ok(text.includes(word), word);
+    await poor.picture(join(pictures, 'report-no-webgl.png'));
+  } finally {
+    await poor.close();
+  }
+});

@@ -60,7 +60,15 @@ export class View3D {
   private heads: BodyHead[] = [];
 
   constructor(private where: HTMLElement) {
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    try {
+      this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+    } catch (error) {
+      const sentence = document.createElement('p');
+      sentence.textContent = 'This browser offers no WebGL, so the parts cannot be drawn here. Allow hardware'
+        + ' acceleration, or WebGL by software, in its settings, or use another browser.';
+      where.append(sentence);
+      throw error;
+    }
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     where.appendChild(this.renderer.domElement);
     this.scene.background = new THREE.Color('#10141b');
