@@ -255,7 +255,8 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
     std::vector<std::uint64_t> used;  // (tiles) bricks
     std::vector<std::size_t> place;   // (tiles) how many pairs, then where the next one goes
   };
-  std::vector<Worker> workers(threads != 0 ? threads : sched::machine_threads());
+  std::vector<Worker> workers(
+      std::min<std::size_t>(threads != 0 ? threads : sched::machine_threads(), slices));
   std::atomic<std::size_t> next{0}, total{0};
   sched::parallel_for(workers.size(), threads, [&](std::size_t w) {
     Worker& mine = workers[w];
