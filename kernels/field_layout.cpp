@@ -9,8 +9,12 @@
 //     I(D^2) - I(|x|^2) <= D(x)^2 - |x|^2,
 // and I(|x|^2) - |x|^2 = H^2 sum_a t_a (1 - t_a), hence
 //     D(x)^2 >= I(L^2) - H^2 sum_a t_a (1 - t_a).
-// Equality is possible, where the surface is a single point under a cell's middle: nothing tighter
-// follows from the corners alone. But a far cell lies outside the band, too.
+// Equality is possible, where the surface is a single point under a cell's middle. But a far cell
+// lies outside the band, too: call the larger of both J(x). And D changes no faster than one moves:
+//     D(x) >= D(c) - |x - c| >= J(c) - |x - c|   for every c of the cell.
+// What J lacks at a flat surface falls as 1 / D, so a c farther away is better, straight away from
+// the surface, where D grows as fast as one moves. The sampler takes the way of the squares'
+// gradient to the cell's end; were that another way, the bound would be loose, not wrong.
 // Corners are rounded down by 1/1024 voxel at least, so I by 2e-6 of itself at the farthest and by
 // more where they are near: more than the sampler's own rounding.
 #include "kernels/field_layout.h"

@@ -168,27 +168,77 @@ HWY_INLINE VF far_fraction(const Axis& a) {
   return hn::Mul(hn::Add(a.fraction, hn::ConvertTo(d, a.cell)), hn::Set(d, 0.125f));
 }
 
-// The bound of far cells from the values at their corners, as pairs along x [quanta], and the
-// fractions: views.h. The sign is that of the interpolated value.
-HWY_INLINE VF far_bound(const VF low[4], const VF step[4], const Axis& x, const Axis& y,
-                        const Axis& z, VF value, float band) {
+// Squares at the corners of far cells [quanta^2], as pairs along x, interpolated.
+struct Squares {
+  VF low[4], step[4];
+};
+HWY_INLINE VF interpolate_squares(const Squares& s, VF x, VF y, VF z) {
+  const VF a = lerp(hn::MulAdd(s.step[0], x, s.low[0]), hn::MulAdd(s.step[1], x, s.low[1]), y);
+  const VF b = lerp(hn::MulAdd(s.step[2], x, s.low[2]), hn::MulAdd(s.step[3], x, s.low[3]), y);
+  return hn::Mul(lerp(a, b, z), hn::Set(DF(), kFarQuantum * kFarQuantum));
+}
+
+// J of views.h.
+HWY_INLINE VF far_bound_at(VF whole, VF x, VF y, VF z, float band) {
+  const DF d;
+  const VF one = hn::Set(d, 1.0f);
+  const VF sag =
+      hn::MulAdd(x, hn::Sub(one, x), hn::MulAdd(y, hn::Sub(one, y), hn::Mul(z, hn::Sub(one, z))));
+  return hn::Sqrt(hn::Max(hn::NegMulAdd(sag, hn::Set(d, 64.0f), whole),
+                          hn::Min(whole, hn::Set(d, band * band))));
+}
+
+// How far a place can go in a direction n before its cell ends along one axis: over / under [n].
+struct WayOut {
+  VF over, under;
+};
+HWY_INLINE WayOut way_out(VF fraction, VF n) {
+  const DF d;
+  const auto up = hn::Gt(n, hn::Zero(d));
+  return {hn::IfThenElse(up, hn::Sub(hn::Set(d, 1.0f), fraction), fraction), hn::Abs(n)};
+}
+HWY_INLINE WayOut shorter(const WayOut& a, const WayOut& b) {
+  const auto less = hn::Lt(hn::Mul(a.over, b.under), hn::Mul(b.over, a.under));
+  return {hn::IfThenElse(less, a.over, b.over), hn::IfThenElse(less, a.under, b.under)};
+}
+
+// Of a gradient of squares [quanta^2 a cell]: below it there is none.
+constexpr float kLeastSlope = 1e-6f;
+
+// J where the gradient of the squares leaves the cell, less the way there [voxel].
+HWY_INLINE VF bound_from_farther(const Squares& s, VF x, VF y, VF z, float band) {
   const DF d;
   VF row[4];
   HWY_UNROLL(4)
+  for (int k = 0; k < 4; ++k) row[k] = hn::MulAdd(s.step[k], x, s.low[k]);
+  VF nx = lerp(lerp(s.step[0], s.step[1], y), lerp(s.step[2], s.step[3], y), z);
+  VF ny = lerp(hn::Sub(row[1], row[0]), hn::Sub(row[3], row[2]), z);
+  VF nz = hn::Sub(lerp(row[2], row[3], y), lerp(row[0], row[1], y));
+  const WayOut end = shorter(way_out(z, nz), shorter(way_out(y, ny), way_out(x, nx)));
+  const VF way = hn::Div(end.over, hn::Max(end.under, hn::Set(d, kLeastSlope)));  // in gradients
+  const VF length2 = hn::MulAdd(nx, nx, hn::MulAdd(ny, ny, hn::Mul(nz, nz)));
+  x = hn::MulAdd(way, nx, x), y = hn::MulAdd(way, ny, y), z = hn::MulAdd(way, nz, z);
+  return hn::NegMulAdd(hn::Mul(way, hn::Set(d, 8.0f)), hn::Sqrt(length2),
+                       far_bound_at(interpolate_squares(s, x, y, z), x, y, z, band));
+}
+
+// The bound of far cells from the values at their corners, as pairs along x [quanta], and the
+// fractions: views.h. The sign is that of the interpolated value.
+HWY_INLINE VF far_bound(const VF low[4], const VF step[4], VF x, VF y, VF z, VF value, float band) {
+  const DF d;
+  Squares s;
+  HWY_UNROLL(4)
   for (int k = 0; k < 4; ++k) {
     const VF high = hn::Add(low[k], step[k]);
-    row[k] = lerp(hn::Mul(low[k], low[k]), hn::Mul(high, high), x.fraction);
+    s.low[k] = hn::Mul(low[k], low[k]);
+    s.step[k] = hn::Sub(hn::Mul(high, high), s.low[k]);
   }
-  const VF whole =
-      hn::Mul(lerp(lerp(row[0], row[1], y.fraction), lerp(row[2], row[3], y.fraction), z.fraction),
-              hn::Set(d, kFarQuantum * kFarQuantum));
-  const VF one = hn::Set(d, 1.0f);
-  const VF sag = hn::MulAdd(x.fraction, hn::Sub(one, x.fraction),
-                            hn::MulAdd(y.fraction, hn::Sub(one, y.fraction),
-                                       hn::Mul(z.fraction, hn::Sub(one, z.fraction))));
-  const VF square = hn::Max(hn::NegMulAdd(sag, hn::Set(d, 64.0f), whole),
-                            hn::Min(whole, hn::Set(d, band * band)));
-  return hn::CopySign(hn::Sqrt(square), value);
+  const VF whole = interpolate_squares(s, x, y, z);
+  VF bound = far_bound_at(whole, x, y, z, band);
+  const auto close = hn::Lt(whole, hn::Set(d, kAskFarther * kAskFarther));
+  if (!hn::AllFalse(d, close))
+    bound = hn::IfThenElse(close, hn::Max(bound, bound_from_farther(s, x, y, z, band)), bound);
+  return hn::CopySign(bound, value);
 }
 
 // Byte offsets of first corners among the bricks.
@@ -267,7 +317,8 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   const Corners c = corners_of(pair);
   interpolate<kGradient>(c, x.fraction, y.fraction, z.fraction, quantum, slope, value, gx, gy, gz);
   if (any_far) {
-    const VF bound = far_bound(c.low, c.step, x, y, z, value, field.band);
+    const VF bound =
+        far_bound(c.low, c.step, x.fraction, y.fraction, z.fraction, value, field.band);
     value = hn::IfThenElse(hn::RebindMask(d, far), bound, value);
   }
 }

@@ -8,6 +8,9 @@
 namespace h6::kernels {
 namespace {
 
+// Of a direction and of the squares' gradient: below it there is none.
+constexpr float kLeastSlope = 1e-6f, kLeastSlope2 = 1e-12f;
+
 struct Sample {
   float value;
   float gradient[3];
@@ -40,21 +43,44 @@ Sample sample_near(const std::int16_t* brick, const std::int32_t cell[3], const 
   return trilinear(corner, t);
 }
 
+// J of views.h, from the squares at the corners and their trilinear value.
+float far_bound(float whole, float band, const float u[3]) {
+  float sag = 0;
+  for (int axis = 0; axis < 3; ++axis) sag += 64 * (u[axis] * (1 - u[axis]));
+  return std::sqrt(std::max(whole - sag, std::min(whole, band * band)));
+}
+
+// J where the gradient of the squares leaves the cell, less the way there [voxel].
+float bound_from_farther(const float square[8], const Sample& whole, float band, const float u[3]) {
+  float length2 = 0;
+  for (float slope : whole.gradient) length2 += slope * slope;
+  const float inverse = 1 / std::sqrt(std::max(length2, kLeastSlope2));
+  float n[3], way = std::numeric_limits<float>::max();  // in cells
+  for (int axis = 0; axis < 3; ++axis) {
+    n[axis] = whole.gradient[axis] * inverse;
+    const float room = n[axis] > 0 ? 1 - u[axis] : u[axis];
+    way = std::min(way, room / std::max(std::fabs(n[axis]), kLeastSlope));
+  }
+  float there[3];
+  for (int axis = 0; axis < 3; ++axis) there[axis] = u[axis] + way * n[axis];
+  return far_bound(trilinear(square, there).value, band, there) - 8 * way;
+}
+
 Sample sample_far(const std::int16_t* far, float band, const std::int32_t cell[3],
                   const float t[3]) {
-  float corner[8], square[8], u[3], sag = 0;
+  float corner[8], square[8], u[3];
   for (int k = 0; k < 8; ++k) {
     corner[k] = kFarQuantum * far[k];
     square[k] = corner[k] * corner[k];
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    u[axis] = (cell[axis] + t[axis]) / 8;
-    sag += 64 * (u[axis] * (1 - u[axis]));
-  }
+  for (int axis = 0; axis < 3; ++axis) u[axis] = (cell[axis] + t[axis]) / 8;
   Sample s = trilinear(corner, u);
   for (float& slope : s.gradient) slope /= 8;  // per voxel
-  const float whole = trilinear(square, u).value;
-  s.value = std::copysign(std::sqrt(std::max(whole - sag, std::min(whole, band * band))), s.value);
+  const Sample whole = trilinear(square, u);
+  float bound = far_bound(whole.value, band, u);
+  if (whole.value < kAskFarther * kAskFarther)
+    bound = std::max(bound, bound_from_farther(square, whole, band, u));
+  s.value = std::copysign(bound, s.value);
   return s;
 }
 

@@ -14,7 +14,10 @@ namespace h6::kernels {
 //   <  0  no samples. Row -1 - entry in `far`: bounds of |d| at the 8 corners of the cell, x
 //         fastest, int16 in 1/32 voxel, with the sign of the side; all 0 where nothing is known. At
 //         fractions t in between |d| is at least (field_layout.cpp has the proof)
-//             sqrt(max(I - 64 sum_a t_a (1 - t_a), min(I, band^2))),   I = trilinear of squares
+//             J(t) = sqrt(max(I - 64 sum_a t_a (1 - t_a), min(I, band^2))),   I = trilinear of
+//             squares
+//         and, where I < 32^2, J at the place where the gradient of I leaves the cell, less the way
+//         there: the farther from the surface, the tighter J.
 //
 //        table (bx*by*bz)       bricks                       far
 //        [ 0][-1][-2][ 1] ...   [729 int16, padded][...]     [8 int16][8 int16]...
@@ -31,6 +34,7 @@ inline constexpr int kBrickStride = 736;  // int16 a brick; a multiple of 32 byt
 inline constexpr std::size_t kMaxBricks = 0x7fffffffu / (kBrickStride * sizeof(std::int16_t));
 inline constexpr float kNearQuantum = 1.0f / 1024.0f;  // voxels
 inline constexpr float kFarQuantum = 1.0f / 32.0f;     // voxels
+inline constexpr float kAskFarther = 32.0f;            // voxels: see `far`
 
 // q = m * (p, 1): body coordinates [m] to field coordinates [voxel], node (0,0,0) at the origin.
 struct Affine {
