@@ -271,18 +271,6 @@ NodeMask above(const float* u, float level) {
   return mask;
 }
 
-// Neighbours (entry 13 + dx + 3*dy + 9*dz) whose side of the brick has one of these nodes.
-std::uint32_t looked_at_by(const NodeMask& nodes) {
-  std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};  // dz = -1, 0, 1
-  for (std::uint64_t z : nodes.z) layer[1] |= z;
-  constexpr std::uint64_t kY[3] = {0xff, ~std::uint64_t{0}, std::uint64_t{0xff} << 56};
-  constexpr std::uint64_t kX[3] = {0x0101010101010101, ~std::uint64_t{0}, 0x8080808080808080};
-  std::uint32_t bits = 0;
-  for (int i = 0; i < 27; ++i)
-    bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
-  return bits;
-}
-
 }  // namespace
 
 std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& grid,
@@ -315,7 +303,7 @@ std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& 
     band.free[r] = above(u, float(grid.offset));
     NodeMask near = above(u, std::nextafter(zero_set, 0.0f));
     for (std::uint64_t& z : near.z) z = ~z;
-    band.towards[r] = looked_at_by(near);
+    band.towards[r] = neighbours_of(near);
     const std::int32_t owner = room->nearest[b];
     if (owner == kernels::kNobody) continue;
     band.triangle[r] = surface.source[std::size_t(owner)];

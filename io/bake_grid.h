@@ -94,6 +94,17 @@ struct NodeMask {
   }
 };
 inline constexpr NodeMask kAllNodes{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
+// Of the 27 around a brick (bit 13 + dx + 3*dy + 9*dz) those with a node beside one of these.
+inline std::uint32_t neighbours_of(const NodeMask& nodes) {
+  std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};
+  for (std::uint64_t z : nodes.z) layer[1] |= z;
+  constexpr std::uint64_t kY[3] = {0xff, ~std::uint64_t{0}, std::uint64_t{0xff} << 56};
+  constexpr std::uint64_t kX[3] = {0x0101010101010101, ~std::uint64_t{0}, 0x8080808080808080};
+  std::uint32_t bits = 0;
+  for (int i = 0; i < 27; ++i)
+    bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
+  return bits;
+}
 using Masks = Large<NodeMask>;  // (rows) not cleared
 // Nodes of a row.
 struct RowNodes {

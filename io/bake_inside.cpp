@@ -82,18 +82,6 @@ NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
   return out;
 }
 
-// Neighbours (bit 13 + dx + 3*dy + 9*dz) that one of these nodes has among the 27 around it.
-std::uint32_t neighbours_of(const NodeMask& nodes) {
-  std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};
-  for (std::uint64_t z : nodes.z) layer[1] |= z;
-  constexpr std::uint64_t kY[3] = {0xff, ~std::uint64_t{0}, std::uint64_t{0xff} << 56};
-  constexpr std::uint64_t kX[3] = {0x0101010101010101, ~std::uint64_t{0}, 0x8080808080808080};
-  std::uint32_t bits = 0;
-  for (int i = 0; i < 27; ++i)
-    bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
-  return bits;
-}
-
 // Whether u at a node's neighbour (entry 13 + dx + 3*dy + 9*dz) is more than at the one across.
 bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& around, int node,
                    int neighbour) {
