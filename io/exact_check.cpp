@@ -209,7 +209,11 @@ class Check {
   // Of a node, as far as bake_field.h says what it is.
   void distance(double d, const RayScene::Near& near, Dice& dice, Tally& t) const {
     const double u = near.distance / h_;
-    if (options_.sealed && d + offset_ < u - kNodeSlack && d > -offset_) {
+    // Of a sheet moved out by the offset, or of a solid at least.
+    const bool solid = d <= -offset_;
+    const double to_surface = solid ? -d : d + offset_,
+                 to_mesh = solid ? std::fabs(offset_ - u) : u;
+    if (options_.sealed && to_surface < to_mesh - kNodeSlack) {
       ++t.sum.nearer;
     } else if (d >= 0) {
       t.node.add(std::fabs(d + offset_ - u));

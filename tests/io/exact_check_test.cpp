@@ -178,6 +178,29 @@ TEST_CASE("bake_field's fields agree with their meshes: closed, overlapping, ope
   CHECK(c.far_wrong == 0);
 }
 
+TEST_CASE(
+    "a sealed hole is nearer than the mesh, from outside and from within, and that is right") {
+  Mesh holed = box({0, 0, 0}, {1, 1, 1}, 24);
+  std::erase_if(holed.triangles, [&](const auto& t) {
+    const Vec3 m = (1.0 / 3) * (holed.vertices[t[0]] + holed.vertices[t[1]] + holed.vertices[t[2]]);
+    return m.z > 1 - 1e-9 && std::fabs(m.x - 0.5) < 0.2 && std::fabs(m.y - 0.5) < 0.2;
+  });
+  FieldBake options;
+  options.voxels = 64, options.seal = 0.6;
+  auto field = bake_field(holed, options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  ExactCheckOptions asked;
+  asked.sealed = true;
+  auto c = check_exactly(holed, *field, asked);
+  REQUIRE_MESSAGE(c, c.error());
+  CHECK(c->nearer > 30);
+  CHECK(c->agrees());
+  asked.sealed = false;  // what was done is not what was said
+  c = check_exactly(holed, *field, asked);
+  REQUIRE_MESSAGE(c, c.error());
+  CHECK(!c->agrees());
+}
+
 TEST_CASE("whatever is wrong with a field shows, and where") {
   const Mesh mesh = torus(1.0, 0.4);
   const FieldData good = bake(mesh);
