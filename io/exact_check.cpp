@@ -27,14 +27,14 @@ struct Worst {
 };
 
 struct Tally {
-  Worst node, between, gap, corner, deep;
+  Worst node, between, gap, inside_gap, corner, deep;
   ExactCheck sum;  // its counts
   double excess = 0;
   std::size_t lost = 0;  // places near the mesh where the field has no samples
 
   void add(const Tally& o) {
-    node.add(o.node), between.add(o.between), gap.add(o.gap), corner.add(o.corner),
-        deep.add(o.deep);
+    node.add(o.node), between.add(o.between), gap.add(o.gap), inside_gap.add(o.inside_gap),
+        corner.add(o.corner), deep.add(o.deep);
     excess = std::max(excess, o.excess), lost += o.lost;
     for (const auto count : {&ExactCheck::buried, &ExactCheck::nearer, &ExactCheck::voted,
                              &ExactCheck::doubtful, &ExactCheck::drained, &ExactCheck::filled,
@@ -69,8 +69,11 @@ class FarBounds {
           0;
     if (below != 0 && below != 8) return false;
     inside = below == 8;
-    const kernels::FieldView view{
-        {def_.bricks[0], def_.bricks[1], def_.bricks[2]}, table_.data(), nullptr, far_.data()};
+    const kernels::FieldView view{{def_.bricks[0], def_.bricks[1], def_.bricks[2]},
+                                  table_.data(),
+                                  nullptr,
+                                  far_.data(),
+                                  kernels::layout_band(def_)};
     const kernels::Affine same{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     const float p[3] = {float(g.x), float(g.y), float(g.z)};
     float d = 0;
@@ -148,22 +151,29 @@ class Check {
     }
     const Vec3 p = view_.to_metres(g);
     t.sum.far = 1;
-    const double u = promise(p, bound, inside, t.gap, dice, t);
+    const Kept kept = promise(p, bound, inside, dice, t);
+    if (!inside) t.gap.add(kept.gap);
     corner(g, dice, t);
-    // A tenth of them is asked for its side too: rays cost more than distances.
-    if (i % 10 == 0 && u > std::max(2 * offset_, kNodeSlack)) side(p, inside, u, dice, t);
+    // A tenth of them is asked by rays too, which cost more than distances.
+    if (i % 10 != 0) return t;
+    if (kept.near.distance / h_ > std::max(2 * offset_, kNodeSlack))
+      side(p, inside, kept.near.distance / h_, dice, t);
+    if (inside && outer(kept.near, dice)) t.inside_gap.add(kept.gap);
     return t;
   }
 
  private:
-  // A bound in a place, both in voxels; the distance to the mesh.
-  double promise(const Vec3& p, double bound, bool inside, Worst& gap, Dice& dice, Tally& t) const {
+  // What a bound promised, and by how much it was below the distance [voxel].
+  struct Kept {
+    RayScene::Near near;
+    double gap;
+  };
+  Kept promise(const Vec3& p, double bound, bool inside, Dice& dice, Tally& t) const {
     const RayScene::Near near = rays_.nearest(p);
     const double u = near.distance / h_, most = inside ? u + offset_ : u - offset_;
-    if (!inside) gap.add(most - bound);
     if (bound > most + kFarSlack && (!inside || outer(near, dice)))
       t.sum.far_wrong = 1, t.excess = std::max(t.excess, bound - most);
-    return u;
+    return {near, most - bound};
   }
   // The far grid where it is given, at a corner of the place's cell.
   void corner(const Vec3& g, Dice& dice, Tally& t) const {
@@ -171,8 +181,10 @@ class Check {
     const std::size_t nx = std::size_t(field_.bricks[0]) + 1,
                       ny = std::size_t(field_.bricks[1]) + 1;
     const double far = double(field_.far_grid[(c[2] * ny + c[1]) * nx + c[0]]) / h_;
-    promise(view_.to_metres({8.0 * double(c[0]), 8.0 * double(c[1]), 8.0 * double(c[2])}),
-            std::fabs(far), far < 0, t.corner, dice, t);
+    const Kept kept =
+        promise(view_.to_metres({8.0 * double(c[0]), 8.0 * double(c[1]), 8.0 * double(c[2])}),
+                std::fabs(far), far < 0, dice, t);
+    if (far >= 0) t.corner.add(kept.gap);
   }
   // Whether there is outside on either side of the mesh there: else it is buried in the solid, and
   // the way out is longer than to the mesh.
@@ -305,6 +317,7 @@ Result<ExactCheck> check_exactly(const Mesh& mesh, const FieldData& field,
   out.between = sum.between.count;
   out.worst_between = sum.between.most, out.mean_between = sum.between.mean();
   out.far_excess = sum.excess, out.far_gap = sum.gap.mean();
+  out.inside = sum.inside_gap.count, out.inside_gap = sum.inside_gap.mean();
   out.deep = sum.deep.count, out.worst_deep = sum.deep.most;
   out.corner_gap = sum.corner.mean();
   return out;

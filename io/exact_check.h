@@ -43,6 +43,9 @@ struct ExactCheck {
   std::size_t far = 0, far_wrong = 0;
   double far_excess = 0, far_gap = 0;  // most above the distance, mean below it where outside
   double corner_gap = 0;               // likewise of the far grid itself, at its own nodes
+  // A tenth of those inside, where what is nearest has outside beyond it.
+  std::size_t inside = 0;
+  double inside_gap = 0;
 
   std::size_t wrong_sides() const { return drained + filled; }
   // A closed mesh, and nothing wrong with its field; of a soup the sides are a matter of opinion.

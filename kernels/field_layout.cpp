@@ -156,6 +156,10 @@ FieldLayoutSize field_layout_size(const h6FieldDef& def) {
   return size;
 }
 
+float layout_band(const h6FieldDef& def) {
+  return static_cast<float>(def.band / def.voxel_size * (1 - 1e-6));
+}
+
 void layout_table(const h6FieldDef& def, std::int32_t* table) {
   std::int32_t bricks = 0, far_cells = 0;
   for (std::size_t slot = 0; slot < slot_count(def); ++slot) {

@@ -16,6 +16,9 @@ struct FieldLayoutSize {
 };
 FieldLayoutSize field_layout_size(const h6FieldDef& def);
 
+// FieldView::band: less than the definition's by what float rounds.
+float layout_band(const h6FieldDef& def);
+
 // Fills table (one entry a brick): rows in order of the table for both kinds.
 void layout_table(const h6FieldDef& def, std::int32_t* table);
 

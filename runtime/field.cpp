@@ -98,7 +98,7 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
   field->view.table = field->table.data;
   field->view.bricks = field->bricks.data;
   field->view.far = field->far.data;
-  field->view.band = static_cast<float>(def.band / def.voxel_size * (1 - 1e-6));
+  field->view.band = kernels::layout_band(def);
   return true;
 }
 

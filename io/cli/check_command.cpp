@@ -79,7 +79,9 @@ ordered_json exact_json(const io::ExactCheck& c) {
           {"far_above", c.far_wrong},
           {"far_excess_max", c.far_excess},
           {"far_gap_mean", c.far_gap},
-          {"far_grid_gap_mean", c.corner_gap}};
+          {"far_grid_gap_mean", c.corner_gap},
+          {"far_inside", c.inside},
+          {"far_inside_gap_mean", c.inside_gap}};
 }
 
 void print(const ordered_json& m, const Subject& s, const io::Walls& walls, const io::FieldPlan& p,
@@ -125,10 +127,10 @@ void print(const io::ExactCheck& c) {
       "    sides     %zu votes: %zu outside that should be inside, %zu inside that should be "
       "outside; %zu cavities, %zu doubtful\n"
       "    far       %zu places: %zu bounds above the distance, %.2g voxel below it on average "
-      "(%.2g where the far grid is given)\n",
+      "outside (%.2g where the far grid is given), %.2g inside\n",
       c.agrees() ? "agrees with the mesh" : "DISAGREES with the mesh", c.nodes, c.worst_node,
       c.worst_between, c.mean_between, c.voted, c.drained, c.filled, c.enclosed, c.doubtful, c.far,
-      c.far_wrong, c.far_gap, c.corner_gap);
+      c.far_wrong, c.far_gap, c.corner_gap, c.inside_gap);
 }
 
 // What is worth a sentence of its own.

@@ -168,6 +168,14 @@ TEST_CASE("bake_field's fields agree with their meshes: closed, overlapping, ope
     CHECK(c.worst_deep < 2.5);
     CHECK(c.corner_gap < 0.3);
   }
+  // Its bounds are tight on either side.
+  const Mesh ball = sphere({0, 0, 0}, 1.0);
+  const ExactCheck both = check(ball, bake(ball));
+  CHECK(both.agrees());
+  CHECK(both.far_gap < 1);
+  CHECK(both.inside > 30);
+  CHECK(both.inside_gap > 0);
+  CHECK(both.inside_gap < 1);
   // With a hole it drains: every distance is right, and the votes tell the side that was lost.
   Mesh open = torus(1.0, 0.4);
   open.triangles.resize(open.triangles.size() - 40);

@@ -78,7 +78,7 @@ class AnalyticField {
             table_.data(),
             bricks_.data(),
             far_nodes_.data(),
-            static_cast<float>(def_.band / def_.voxel_size * (1 - 1e-6))};
+            layout_band(def_)};
   }
   double distance(const Point& p) const { return distance_(p); }
   double last(int axis) const { return 8.0 * def_.bricks[axis] - 1; }
