@@ -20,7 +20,7 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::int32_t> part;        // (triangles) index into part_names; empty: one part
   std::vector<std::string> part_names;
-  std::vector<std::string> remarks;      // sentences: what the file has and the mesh has not
+  std::vector<std::string> remarks;      // sentences: what was left out or seems wrong
 };
 
 // The same triangles in the same order over welded vertices: equal coordinates (-0 is +0) are one

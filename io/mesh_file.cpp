@@ -49,10 +49,12 @@ using Reader = Mesh (*)(const MeshSource&);
 struct Format {
   const char* ending;
   Reader read;
+  bool has_unit = false;
 };
 // Another format is one more line here and one more reader.
-constexpr Format kFormats[] = {{".stl", read_stl},   {".obj", read_obj},  {".ply", read_ply},
-                               {".gltf", read_gltf}, {".glb", read_gltf}, {".dae", read_collada}};
+constexpr Format kFormats[] = {{".stl", read_stl},        {".obj", read_obj},
+                               {".ply", read_ply},        {".gltf", read_gltf, true},
+                               {".glb", read_gltf, true}, {".dae", read_collada, true}};
 
 std::string lower_case(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -74,7 +76,8 @@ Named format_of(const std::string& name) {
     if (ending == format.ending) return {&format, gz};
   const std::string what = ending.empty() ? "the name has no ending that says what it is"
                                           : "'" + ending + "' files are not read";
-  throw BadMesh{name + ": " + what + "; export the mesh as .stl, .obj, .ply, .glb or .dae (.gz is fine too)."};
+  throw BadMesh{name + ": " + what +
+                "; export the mesh as .stl, .obj, .ply, .glb or .dae (.gz is fine too)."};
 }
 
 // Mistakes that look the same in every format.
@@ -86,12 +89,31 @@ void check_start(std::string_view bytes, const MeshSource& source) {
     source.fail("this is a Git LFS pointer, not the mesh; fetch it with 'git lfs pull'");
 }
 
+// Nobody holds what is larger in the hand; millimetres taken for metres are.
+constexpr double kLargest = 20;  // [m]
+void remark_size(const MeshSource& source, Mesh& mesh) {
+  Vec3 low = mesh.vertices.front(), high = low;
+  for (const Vec3& p : mesh.vertices) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const double across = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  if (across <= kLargest) return;
+  char text[128];
+  std::snprintf(text, sizeof text,
+                ": it is %.4g m across. If its numbers are millimetres, say so: --units mm, or "
+                "\"units\": \"mm\" in a scene.",
+                across);
+  mesh.remarks.push_back(source.name + text);
+}
+
 Mesh parse(std::string_view bytes, const std::string& name, const Format& format, Unit unit,
            const fs::path* folder) {
   const MeshSource source{bytes, name, metres(unit), folder};
   check_start(bytes, source);
   Mesh mesh = format.read(source);
   if (mesh.triangles.empty()) source.fail("there is no triangle in it");
+  if (!format.has_unit && unit == Unit::m) remark_size(source, mesh);
   return mesh;
 }
 
@@ -237,8 +259,9 @@ std::string unwritable(const Mesh& mesh, double scale) {
 Outcome write_triangles(const fs::path& file, const Mesh& mesh, Unit unit) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> out(std::fopen(file.c_str(), "wbe"),
                                                             std::fclose);
-  const auto fault = [&] { return Failure{"Cannot write " + file.string() + ": " +
-                                          std::strerror(errno) + "."}; };
+  const auto fault = [&] {
+    return Failure{"Cannot write " + file.string() + ": " + std::strerror(errno) + "."};
+  };
   if (!out) return fault();
   // Must not start with "solid": readers that look no further would take it for text.
   static constexpr const char* kUnits[] = {"m", "mm", "cm", "in"};
@@ -259,8 +282,8 @@ Outcome write_triangles(const fs::path& file, const Mesh& mesh, Unit unit) {
   constexpr std::size_t kBlock = 4096;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& triangle = mesh.triangles[t];
-    block.push_back(stl_triangle({in_unit(triangle[0]), in_unit(triangle[1]),
-                                  in_unit(triangle[2])}));
+    block.push_back(
+        stl_triangle({in_unit(triangle[0]), in_unit(triangle[1]), in_unit(triangle[2])}));
     if (block.size() < kBlock && t + 1 < mesh.triangles.size()) continue;
     if (std::fwrite(block.data(), sizeof(StlTriangle), block.size(), out.get()) != block.size())
       return fault();
@@ -298,10 +321,14 @@ const char* unit_name(Unit unit) {
 
 double metres(Unit unit) {
   switch (unit) {
-    case Unit::m: return 1;
-    case Unit::mm: return 1e-3;
-    case Unit::cm: return 1e-2;
-    case Unit::in: return 0.0254;
+    case Unit::m:
+      return 1;
+    case Unit::mm:
+      return 1e-3;
+    case Unit::cm:
+      return 1e-2;
+    case Unit::in:
+      return 0.0254;
   }
   return 1;
 }
@@ -327,17 +354,15 @@ Result<Mesh> read_mesh(const fs::path& file, Unit unit) {
 }
 
 Result<Mesh> parse_mesh(const std::string& bytes, const std::string& name, Unit unit) {
-  return caught(name, [&]() -> Result<Mesh> {
-    return parse_named(bytes, name, format_of(name), unit);
-  });
+  return caught(name,
+                [&]() -> Result<Mesh> { return parse_named(bytes, name, format_of(name), unit); });
 }
 
 Outcome write_stl(const fs::path& file, const Mesh& mesh, Unit unit) {
   const std::string why = unwritable(mesh, metres(unit));
   if (!why.empty()) return Failure{"Cannot write " + file.string() + ": " + why + "."};
-  return write_aside(file, [&](const fs::path& aside) {
-    return write_triangles(aside, mesh, unit);
-  });
+  return write_aside(file,
+                     [&](const fs::path& aside) { return write_triangles(aside, mesh, unit); });
 }
 
 }  // namespace h6::io

@@ -1,8 +1,8 @@
 // mesh_file_test.cpp - meshes out of files: the right ones whole, the wrong ones with a sentence.
 #include <doctest/doctest.h>
-#include "tests/support/near.h"
 #include <sys/stat.h>
 #include <unistd.h>
+#include "tests/support/near.h"
 
 #include <array>
 #include <cmath>
@@ -140,6 +140,21 @@ TEST_CASE("units have names, and millimetres are a thousandth") {
   }
   CHECK_FALSE(unit_from_name("furlong"));
   CHECK_FALSE(unit_from_name(""));
+}
+
+TEST_CASE("a part of thirty metres is asked whether it is one of thirty millimetres") {
+  const std::string part = "v 0 0 0\nv 30 0 0\nv 0 1 0\nf 1 2 3\n";
+  const auto asked = parse_mesh(part, "part.obj");
+  REQUIRE(asked);
+  REQUIRE(asked->remarks.size() == 1);
+  CHECK(asked->remarks[0].find("30 m across") != std::string::npos);
+  CHECK(asked->remarks[0].find("--units mm") != std::string::npos);
+  for (const Unit said : {Unit::mm, Unit::cm, Unit::in}) {
+    const auto told = parse_mesh(part, "part.obj", said);
+    REQUIRE(told);
+    CHECK(told->remarks.empty());
+  }
+  CHECK(parse_mesh(with(part, "30", "19"), "part.obj")->remarks.empty());
 }
 
 TEST_CASE("OBJ: groups are parts, indices may count backwards, lines may go on, CR LF is fine") {
