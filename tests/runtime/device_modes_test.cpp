@@ -3,55 +3,34 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <deque>
 #include <functional>
 #include <string>
 #include <utility>
 
 #include "hapsix/hapsix.h"
-#include "tests/support/analytic.h"
+#include "tests/support/box_on_floor.h"
 #include "tests/support/near.h"
 
 using namespace h6::test;
 
 namespace {
 
-constexpr double mm = 1e-3, ms = 1e-3;
-
-double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-h6Vec3 minus(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-bool same_bits(const h6Quat& a, const h6Quat& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+constexpr double ms = 1e-3;
 
 // A box of 0.1 kg on or above a floor z < 0 that carries with k = 1e4 N/m as a whole; 5 N at most.
-struct BoxOnFloor {
-  FieldArrays field = sample_analytic([](double, double, double z) { return z; },
-                                      {-64 * mm, -64 * mm, -32 * mm}, mm, 16, 16, 8);
-  ShellArrays shell = bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
-  Model model{{def_of(field)}, {shell.def()}};
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
+struct PushedBox : BoxOnFloor {
   h6DeviceCommand told{};
 
-  explicit BoxOnFloor(std::uint32_t mode, double height = 5.2 * mm) {
-    bodies[0].fixed = true;
-    bodies[0].field = 0;
-    bodies[1].shell = 0;
+  explicit PushedBox(std::uint32_t mode, double height = 5.2 * mm) {
     bodies[1].pose = pose(0, 0, height);
+    bodies[1].com = {0, 0, 0};
     set_mass(0.1);
-    hand.body = 1;
-    hand.safety.soft_start = 0;  // has tests of its own
     hand.mode = mode;
     def.contact.method = H6_METHOD_GAUSS3;
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
   }
-  ~BoxOnFloor() { h6DestroySession(session); }
   void set_mass(double mass) {
     const double a = mass / 12 * (400 + 100) * mm * mm, c = mass / 12 * 800 * mm * mm;
     const double inertia[6] = {a, a, c, 0, 0, 0};
@@ -59,10 +38,7 @@ struct BoxOnFloor {
     bodies[1].mass = mass;
   }
   void open() {
-    h6Error error;
-    h6DestroySession(session);
-    session = h6CreateSession(model.handle, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
+    BoxOnFloor::open();
     told.pose = bodies[1].pose;
   }
   // The device is where it was told to be, and is pushed.
@@ -74,7 +50,6 @@ struct BoxOnFloor {
     }
     return h6GetFrame(session).status;
   }
-  h6BodyState body() const { return h6GetBody(session, 1); }
   double depth() const { return h6GetFrame(session).max_depth; }
 };
 
@@ -85,7 +60,7 @@ h6Wrench torque(double x, double y, double z) { return {{0, 0, 0}, {x, y, z}}; }
 
 TEST_CASE("admittance: however hard the push, the body sinks to F_max/k only") {
   for (const double pushed : {2.0, 50.0, 1e6}) {
-    BoxOnFloor scene(H6_ADMITTANCE);
+    PushedBox scene(H6_ADMITTANCE);
     scene.open();
     const h6Status status = scene.push(force(0, 0, -pushed), 3000);
     const double most = h6GetCoupling(scene.session, 0).max_force;
@@ -99,7 +74,7 @@ TEST_CASE("admittance: however hard the push, the body sinks to F_max/k only") {
 }
 
 TEST_CASE("admittance: a twist is bounded by the largest torque") {
-  BoxOnFloor scene(H6_ADMITTANCE, 200 * mm);
+  PushedBox scene(H6_ADMITTANCE, 200 * mm);
   scene.hand.coupling.max_torque = 0.01;
   scene.hand.admittance_damping = 50;
   scene.open();
@@ -114,7 +89,7 @@ TEST_CASE("admittance: a twist is bounded by the largest torque") {
 TEST_CASE("admittance: a free body goes at the speed F/b, and stops when let go") {
   for (const h6Integrator integrator : {H6_IMPLICIT, H6_EXPLICIT})
     for (const double b : {0.0, 2.0, 40.0, 1e5}) {  // explicitly, 1e5 would be far from stable
-      BoxOnFloor scene(H6_ADMITTANCE, 100 * mm);
+      PushedBox scene(H6_ADMITTANCE, 100 * mm);
       scene.hand.admittance_damping = b;
       scene.def.integrator = integrator;
       scene.open();
@@ -131,7 +106,7 @@ TEST_CASE("admittance: a free body goes at the speed F/b, and stops when let go"
 }
 
 TEST_CASE("admittance: what the device is told is the motion of the mesh frame") {
-  BoxOnFloor scene(H6_ADMITTANCE, 100 * mm);
+  PushedBox scene(H6_ADMITTANCE, 100 * mm);
   scene.bodies[1].com = {3 * mm, 0, 4 * mm};
   scene.open();
   double worst = 0, fastest = 0;
@@ -153,7 +128,7 @@ TEST_CASE("admittance: what the device is told is the motion of the mesh frame")
 TEST_CASE("a wrench without numbers counts as none, and the frame says so") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE})
     for (const double wrong : {static_cast<double>(NAN), HUGE_VAL}) {
-      BoxOnFloor scene(mode);
+      PushedBox scene(mode);
       scene.open();
       h6Wrench wrench = force(0.5, 0, 0);
       wrench.torque.y = wrong;
@@ -163,13 +138,13 @@ TEST_CASE("a wrench without numbers counts as none, and the frame says so") {
       CHECK(scene.told.pose.p.x > 0.1 * mm);
     }
   // Nobody reads it in impedance mode.
-  BoxOnFloor scene(H6_IMPEDANCE);
+  PushedBox scene(H6_IMPEDANCE);
   scene.open();
   CHECK(scene.push(force(NAN, 0, 0), 5) == H6_OK);
 }
 
 TEST_CASE("a few poses without numbers do not make the admittance hand deaf, many do") {
-  BoxOnFloor scene(H6_ADMITTANCE, 100 * mm);
+  PushedBox scene(H6_ADMITTANCE, 100 * mm);
   scene.open();
   scene.push({}, 1);
   h6DeviceSample sample{scene.told.pose, {}, 0, force(0.5, 0, 0), 0};
@@ -187,7 +162,7 @@ TEST_CASE("admittance: stable with a stiff person behind 5 ms of delay, free and
   for (const double mass : {0.02, 0.1, 1.0})
     for (const int delay : {0, 2, 5})
       for (const double target : {60 * mm, 2 * mm}) {
-        BoxOnFloor scene(H6_ADMITTANCE, target > 10 * mm ? 58 * mm : 5.2 * mm);
+        PushedBox scene(H6_ADMITTANCE, target > 10 * mm ? 58 * mm : 5.2 * mm);
         scene.set_mass(mass);
         scene.open();
         // What the person feels of the handle is `delay` frames old.
@@ -218,7 +193,7 @@ TEST_CASE("admittance: stable with a stiff person behind 5 ms of delay, free and
 TEST_CASE("admittance: stable in the hand's torsion too, however small the part") {
   for (const double mass : {0.005, 0.1})
     for (const int delay : {0, 2, 5}) {
-      BoxOnFloor scene(H6_ADMITTANCE, 100 * mm);
+      PushedBox scene(H6_ADMITTANCE, 100 * mm);
       scene.set_mass(mass);
       scene.open();
       std::deque<double> seen(static_cast<std::size_t>(delay) + 1, 0.0);
@@ -235,7 +210,7 @@ TEST_CASE("admittance: stable in the hand's torsion too, however small the part"
 }
 
 TEST_CASE("admittance: a body of translations alone feels no twist") {
-  BoxOnFloor scene(H6_ADMITTANCE, 100 * mm);
+  PushedBox scene(H6_ADMITTANCE, 100 * mm);
   scene.bodies[1].translation_only = true;
   scene.bodies[1].pose.q = {0.8, 0, 0.6, 0};
   scene.open();
@@ -248,7 +223,7 @@ TEST_CASE("admittance: a body of translations alone feels no twist") {
 
 TEST_CASE("a device in fault pushes no more: its last wrench does not carry the body away") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE}) {
-    BoxOnFloor scene(mode, 100 * mm);
+    PushedBox scene(mode, 100 * mm);
     scene.open();
     scene.push(force(0.5, 0, 0), 50);
     CHECK(scene.body().velocity.linear.x > 0.01);
@@ -267,7 +242,7 @@ TEST_CASE("a device in fault pushes no more: its last wrench does not carry the 
 
 TEST_CASE("admittance: where the device cannot follow, the body does not run ahead") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE}) {
-    BoxOnFloor scene(mode, 100 * mm);
+    PushedBox scene(mode, 100 * mm);
     scene.hand.admittance_damping = 1;
     scene.open();
     h6DeviceCapabilities slow{};
@@ -288,7 +263,7 @@ TEST_CASE("admittance: where the device cannot follow, the body does not run ahe
 }
 
 TEST_CASE("pseudo-admittance: manipulandum and body start together, and stay when nothing pulls") {
-  BoxOnFloor scene(H6_PSEUDO_ADMITTANCE);
+  PushedBox scene(H6_PSEUDO_ADMITTANCE);
   scene.bodies[1].pose.q = {0.8, 0, 0.6, 0};
   scene.bodies[1].com = {1 * mm, 2 * mm, 3 * mm};
   scene.bodies[1].pose.p.z = 100 * mm;
@@ -343,7 +318,7 @@ TEST_CASE(
     for (const double b_dd : {0.0, 4.0, 12.0})
       for (const double m : {0.01, 0.1, 1.0})
         for (const int delay : {0, 1, 2}) {
-          BoxOnFloor scene(H6_PSEUDO_ADMITTANCE);
+          PushedBox scene(H6_PSEUDO_ADMITTANCE);
           scene.hand.manipulandum_mass = m;
           scene.hand.driver_stiffness = k_dd;
           scene.hand.driver_damping = b_dd;
@@ -378,7 +353,7 @@ TEST_CASE(
 
 TEST_CASE("pseudo-admittance: in free motion nothing drags") {
   // A device that moves at a steady speed: driver, manipulandum and body follow without a force.
-  BoxOnFloor scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
+  PushedBox scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
   scene.hand.driver_stiffness = 4e3;
   scene.hand.driver_damping = 12;
   scene.open();
@@ -399,7 +374,7 @@ TEST_CASE("pseudo-admittance: in free motion nothing drags") {
 TEST_CASE(
     "pseudo-admittance: what a push moves is body, manipulandum and a frame's coupling damping") {
   for (const double m : {0.02, 0.1, 0.5}) {
-    BoxOnFloor scene(H6_PSEUDO_ADMITTANCE, 500 * mm);
+    PushedBox scene(H6_PSEUDO_ADMITTANCE, 500 * mm);
     scene.hand.manipulandum_mass = m;
     scene.open();
     scene.push(force(0.2, 0, 0), 50);
@@ -415,7 +390,7 @@ TEST_CASE(
 
 TEST_CASE(
     "pseudo-admittance: the coupling's force on the body is bounded however far the hand goes") {
-  BoxOnFloor scene(H6_PSEUDO_ADMITTANCE);
+  PushedBox scene(H6_PSEUDO_ADMITTANCE);
   scene.hand.driver_stiffness = 1e3;
   scene.hand.driver_damping = 12;
   scene.open();
@@ -441,7 +416,7 @@ TEST_CASE(
     "pseudo-admittance: hands can turn the body, and a body of translations alone they cannot") {
   for (const bool translation_only : {false, true})
     for (const h6Gradient gradient : {H6_SYMMETRIC, H6_EXACT}) {
-      BoxOnFloor scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
+      PushedBox scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
       scene.bodies[1].translation_only = translation_only;
       scene.def.gradient = gradient;
       scene.hand.driver_stiffness = 1e3, scene.hand.driver_damping = 4;
@@ -463,7 +438,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows it") {
-  BoxOnFloor scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
+  PushedBox scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
   scene.open();
   scene.push(force(0.5, 0, 0), 30);
   const h6BodyState there{pose(20 * mm, 0, 50 * mm), {}};
@@ -474,7 +449,7 @@ TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows i
   CHECK(norm(scene.body().velocity.linear) < 1e-12);
   // One frame of two pushes: the bodies are where they were, only the manipulanda differ.
   const auto hash_after = [](double mass) {
-    BoxOnFloor pushed(H6_PSEUDO_ADMITTANCE, 100 * mm);
+    PushedBox pushed(H6_PSEUDO_ADMITTANCE, 100 * mm);
     pushed.hand.manipulandum_mass = mass;
     pushed.hand.coupling.damping_ratio = 0;
     pushed.hand.coupling.stiffness = 1e-300;
@@ -490,7 +465,7 @@ TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows i
 
 TEST_CASE("no stream of wrenches takes body or manipulandum out of the numbers") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE}) {
-    BoxOnFloor scene(mode);
+    PushedBox scene(mode);
     scene.open();
     const double values[] = {0, NAN, 1e3, -HUGE_VAL, 1e300, -1e300, 1e-310, 3};
     for (int i = 0; i < 400; ++i) {
@@ -506,8 +481,8 @@ TEST_CASE("no stream of wrenches takes body or manipulandum out of the numbers")
 }
 
 TEST_CASE("device modes that cannot be are refused with a sentence that names the value") {
-  const auto complaint_of = [](std::uint32_t mode, const std::function<void(BoxOnFloor&)>& spoil) {
-    BoxOnFloor scene(mode);
+  const auto complaint_of = [](std::uint32_t mode, const std::function<void(PushedBox&)>& spoil) {
+    PushedBox scene(mode);
     spoil(scene);
     h6Error error{};
     h6Session* session = h6CreateSession(scene.model.handle, &scene.def, &error);
@@ -516,9 +491,9 @@ TEST_CASE("device modes that cannot be are refused with a sentence that names th
     return text;
   };
   for (const std::uint32_t mode : {H6_IMPEDANCE, H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE})
-    CHECK(complaint_of(mode, [](BoxOnFloor&) {}) == "");
+    CHECK(complaint_of(mode, [](PushedBox&) {}) == "");
   for (const std::uint32_t mode : {0u, 3u, 5u, 8u, 0xffffffffu})
-    CHECK(complaint_of(mode, [](BoxOnFloor&) {}).find("device mode") != std::string::npos);
+    CHECK(complaint_of(mode, [](PushedBox&) {}).find("device mode") != std::string::npos);
   struct Value {
     const char* name;
     double h6HandDef::*value;
@@ -530,7 +505,7 @@ TEST_CASE("device modes that cannot be are refused with a sentence that names th
                          Value{"admittance_damping", &h6HandDef::admittance_damping, false}})
     for (const double wrong : {-1.0, static_cast<double>(NAN), HUGE_VAL, 0.0}) {
       const std::string text =
-          complaint_of(H6_PSEUDO_ADMITTANCE, [&](BoxOnFloor& s) { s.hand.*v.value = wrong; });
+          complaint_of(H6_PSEUDO_ADMITTANCE, [&](PushedBox& s) { s.hand.*v.value = wrong; });
       const bool named = text.find(v.name) != std::string::npos;
       CHECK_MESSAGE(named == (wrong != 0 || v.zero_is_wrong), v.name, " ", wrong, ": ", text);
     }
@@ -539,7 +514,7 @@ TEST_CASE("device modes that cannot be are refused with a sentence that names th
                                     std::pair{"force_scale", &h6HandFilterDef::force_scale}})
     for (const double wrong : {-1.0, static_cast<double>(NAN), HUGE_VAL, 0.0}) {
       const std::string text =
-          complaint_of(H6_IMPEDANCE, [&, v = value](BoxOnFloor& s) { s.hand.filter.*v = wrong; });
+          complaint_of(H6_IMPEDANCE, [&, v = value](PushedBox& s) { s.hand.filter.*v = wrong; });
       CHECK_MESSAGE(text.find(name) != std::string::npos, name, " ", wrong, ": ", text);
     }
 }
@@ -549,7 +524,7 @@ TEST_CASE("a loop refuses a device that does not work the way the hand does") {
     for (const std::uint32_t offered :
          {std::uint32_t{0}, std::uint32_t{H6_IMPEDANCE}, std::uint32_t{H6_ADMITTANCE},
           std::uint32_t{H6_IMPEDANCE | H6_PSEUDO_ADMITTANCE}}) {
-      BoxOnFloor scene(mode);
+      PushedBox scene(mode);
       scene.open();
       h6Device device{};
       device.capabilities.max_force = 10, device.capabilities.max_torque = 1;

@@ -2,7 +2,6 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -11,36 +10,18 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
-#include "tests/support/analytic.h"
+#include "tests/support/box_on_floor.h"
 
 using namespace h6::test;
 
 namespace {
 
-constexpr double mm = 1e-3;
-
 // A block held 2 mm below a floor's surface by its hand.
-struct Scene {
-  FieldArrays field = sample_analytic([](double, double, double z) { return z; },
-                                      {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
-  ShellArrays shell = bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
-  Model model{{def_of(field)}, {shell.def()}};
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
-
+struct Scene : BoxOnFloor {
   Scene() {
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0, bodies[1].pose = pose(0, 0, 5.2 * mm);
-    hand.body = 1;
     hand.coupling.max_force = 20;  // whatever the contacts' stiffness
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
-    session = h6CreateSession(model.handle, &def, nullptr);
-    REQUIRE(session);
+    open();
   }
-  ~Scene() { h6DestroySession(session); }
   static h6Device device() {
     h6Device d{};
     d.capabilities.max_force = 20, d.capabilities.max_torque = 2;
