@@ -10,7 +10,8 @@
 // and I(|x|^2) - |x|^2 = H^2 sum_a t_a (1 - t_a), hence
 //     D(x)^2 >= I(L^2) - H^2 sum_a t_a (1 - t_a).
 // Equality is possible, where the surface is a single point under a cell's middle. But a far cell
-// lies outside the band, too: call the larger of both J(x). And D changes no faster than one moves:
+// lies outside the band: the surface is no nearer to x than the cell's end and the band from there.
+// Call the larger of both J(x). And D changes no faster than one moves:
 //     D(x) >= D(c) - |x - c| >= J(c) - |x - c|   for every c of the cell.
 // What J lacks at a flat surface falls as 1 / D, so a c farther away is better, straight away from
 // the surface, where D grows as fast as one moves. The sampler takes the way of the squares'

@@ -179,13 +179,21 @@ HWY_INLINE VF interpolate_squares(const Squares& s, VF x, VF y, VF z) {
 }
 
 // J of views.h.
-HWY_INLINE VF far_bound_at(VF whole, VF x, VF y, VF z, float band) {
+HWY_INLINE VF far_bound_at(VF whole, VF x, VF y, VF z, VF floor) {
   const DF d;
   const VF one = hn::Set(d, 1.0f);
   const VF sag =
       hn::MulAdd(x, hn::Sub(one, x), hn::MulAdd(y, hn::Sub(one, y), hn::Mul(z, hn::Sub(one, z))));
-  return hn::Sqrt(hn::Max(hn::NegMulAdd(sag, hn::Set(d, 64.0f), whole),
-                          hn::Min(whole, hn::Set(d, band * band))));
+  return hn::Sqrt(
+      hn::Max(hn::NegMulAdd(sag, hn::Set(d, 64.0f), whole), hn::Min(whole, hn::Mul(floor, floor))));
+}
+
+// The band, and the way from a place in a cell to its end [voxel].
+HWY_INLINE VF band_and_end(VF x, VF y, VF z, float band) {
+  const DF d;
+  const VF one = hn::Set(d, 1.0f);
+  const VF low = hn::Min(x, hn::Min(y, z)), high = hn::Max(x, hn::Max(y, z));
+  return hn::MulAdd(hn::Min(low, hn::Sub(one, high)), hn::Set(d, 8.0f), hn::Set(d, band));
 }
 
 // How far a place can go in a direction n before its cell ends along one axis: over / under [n].
@@ -219,7 +227,7 @@ HWY_INLINE VF bound_from_farther(const Squares& s, VF x, VF y, VF z, float band)
   const VF length2 = hn::MulAdd(nx, nx, hn::MulAdd(ny, ny, hn::Mul(nz, nz)));
   x = hn::MulAdd(way, nx, x), y = hn::MulAdd(way, ny, y), z = hn::MulAdd(way, nz, z);
   return hn::NegMulAdd(hn::Mul(way, hn::Set(d, 8.0f)), hn::Sqrt(length2),
-                       far_bound_at(interpolate_squares(s, x, y, z), x, y, z, band));
+                       far_bound_at(interpolate_squares(s, x, y, z), x, y, z, hn::Set(d, band)));
 }
 
 // The bound of far cells from the values at their corners, as pairs along x [quanta], and the
@@ -234,7 +242,7 @@ HWY_INLINE VF far_bound(const VF low[4], const VF step[4], VF x, VF y, VF z, VF 
     s.step[k] = hn::Sub(hn::Mul(high, high), s.low[k]);
   }
   const VF whole = interpolate_squares(s, x, y, z);
-  VF bound = far_bound_at(whole, x, y, z, band);
+  VF bound = far_bound_at(whole, x, y, z, band_and_end(x, y, z, band));
   const auto close = hn::Lt(whole, hn::Set(d, kAskFarther * kAskFarther));
   if (!hn::AllFalse(d, close))
     bound = hn::IfThenElse(close, hn::Max(bound, bound_from_farther(s, x, y, z, band)), bound);

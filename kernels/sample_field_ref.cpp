@@ -44,10 +44,10 @@ Sample sample_near(const std::int16_t* brick, const std::int32_t cell[3], const 
 }
 
 // J of views.h, from the squares at the corners and their trilinear value.
-float far_bound(float whole, float band, const float u[3]) {
+float far_bound(float whole, float floor, const float u[3]) {
   float sag = 0;
   for (int axis = 0; axis < 3; ++axis) sag += 64 * (u[axis] * (1 - u[axis]));
-  return std::sqrt(std::max(whole - sag, std::min(whole, band * band)));
+  return std::sqrt(std::max(whole - sag, std::min(whole, floor * floor)));
 }
 
 // J where the gradient of the squares leaves the cell, less the way there [voxel].
@@ -77,7 +77,9 @@ Sample sample_far(const std::int16_t* far, float band, const std::int32_t cell[3
   Sample s = trilinear(corner, u);
   for (float& slope : s.gradient) slope /= 8;  // per voxel
   const Sample whole = trilinear(square, u);
-  float bound = far_bound(whole.value, band, u);
+  float end = 8;  // of the cell, from here
+  for (float t : u) end = std::min(end, 8 * std::min(t, 1 - t));
+  float bound = far_bound(whole.value, band + end, u);
   if (whole.value < kAskFarther * kAskFarther)
     bound = std::max(bound, bound_from_farther(square, whole, band, u));
   s.value = std::copysign(bound, s.value);

@@ -14,10 +14,10 @@ namespace h6::kernels {
 //   <  0  no samples. Row -1 - entry in `far`: bounds of |d| at the 8 corners of the cell, x
 //         fastest, int16 in 1/32 voxel, with the sign of the side; all 0 where nothing is known. At
 //         fractions t in between |d| is at least (field_layout.cpp has the proof)
-//             J(t) = sqrt(max(I - 64 sum_a t_a (1 - t_a), min(I, band^2))),   I = trilinear of
-//             squares
-//         and, where I < 32^2, J at the place where the gradient of I leaves the cell, less the way
-//         there: the farther from the surface, the tighter J.
+//             J(t) = sqrt(max(I - 64 sum_a t_a (1 - t_a), min(I, (band + e)^2)))
+//         with I = trilinear of squares, e = the way to the cell's end, and, where I < 32^2, at
+//         least J at the place where the gradient of I leaves the cell, less the way there: the
+//         farther from the surface, the tighter J.
 //
 //        table (bx*by*bz)       bricks                       far
 //        [ 0][-1][-2][ 1] ...   [729 int16, padded][...]     [8 int16][8 int16]...
