@@ -21,8 +21,7 @@ h6Quat slerp(const h6Quat& a, h6Quat b, double s) {
     wa = std::sin(wa * angle) / std::sin(angle);
     wb = std::sin(wb * angle) / std::sin(angle);
   }
-  return unit(
-      {wa * a.w + wb * b.w, wa * a.x + wb * b.x, wa * a.y + wb * b.y, wa * a.z + wb * b.z});
+  return unit({wa * a.w + wb * b.w, wa * a.x + wb * b.x, wa * a.y + wb * b.y, wa * a.z + wb * b.z});
 }
 
 }  // namespace

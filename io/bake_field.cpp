@@ -79,30 +79,30 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
                   " there twice and counted once");
   const double offset = grid.offset * grid.voxel;
   if (!surface.closed)
-    out.push_back("the mesh is not closed: " +
-                  plural(surface.odd_edges, "edge has", "edges have") +
+    out.push_back("the mesh is not closed: " + plural(surface.odd_edges, "edge has", "edges have") +
                   " an odd number of faces (" + std::to_string(surface.open_edges) +
                   " have one); it is taken as a soup");
   if (offset > 0)
-    out.push_back("the surface is moved out by " + millimetres(offset) +
-                  ": open sheets become " + millimetres(2 * offset) +
-                  " thick, wires as much thicker, and gaps below " + millimetres(2 * offset) +
-                  " close; more voxels make this smaller");
-  if (surface.closed && seal > 0)
-    out.push_back("the mesh is closed: there is no hole to seal");
+    out.push_back("the surface is moved out by " + millimetres(offset) + ": open sheets become " +
+                  millimetres(2 * offset) + " thick, wires as much thicker, and gaps below " +
+                  millimetres(2 * offset) + " close; more voxels make this smaller");
+  if (surface.closed && seal > 0) out.push_back("the mesh is closed: there is no hole to seal");
   if (report.sealed_area > 0) {
     char text[160];
     std::snprintf(text, sizeof text,
                   "holes and gaps narrower than %s that lead deeper than that were closed: "
-                  "%.4g mm2 in all", millimetres(seal).c_str(), report.sealed_area * 1e6);
+                  "%.4g mm2 in all",
+                  millimetres(seal).c_str(), report.sealed_area * 1e6);
     out.push_back(text);
   }
   if (!surface.closed && grid.offset < 0.5)
-    out.push_back("the offset is below half a voxel and the mesh is open: the outside leaks in "
-                  "through every hole");
+    out.push_back(
+        "the offset is below half a voxel and the mesh is open: the outside leaks in "
+        "through every hole");
   if (inside.inside_nodes == 0)
-    out.push_back("no node of the field lies inside: nothing can touch this obstacle; bake it with "
-                  "more voxels, or with an offset");
+    out.push_back(
+        "no node of the field lies inside: nothing can touch this obstacle; bake it with "
+        "more voxels, or with an offset");
   else if (inside.thin_edges > 0)
     out.push_back("walls thinner than a voxel (" + millimetres(grid.voxel) + ") at " +
                   plural(inside.thin_edges, "place", "places") +

@@ -18,24 +18,24 @@ enum class SignMode { automatic, flood };
 enum class Cavities { solid, hollow };
 
 struct FieldBake {
-  int voxels = 256;             // cells on the longest padded side, 16 .. 2048; not used when
-  double voxel_size = 0;        // this is > 0 [m]
-  double offset = -1;           // sigma [m]; < 0: chosen (0 when closed, else 0.9 voxel)
+  int voxels = 256;       // cells on the longest padded side, 16 .. 2048; not used when
+  double voxel_size = 0;  // this is > 0 [m]
+  double offset = -1;     // sigma [m]; < 0: chosen (0 when closed, else 0.9 voxel)
   SignMode sign = SignMode::automatic;
   Cavities cavities = Cavities::solid;
   // > 0: holes of an open mesh up to this width [m] are closed, so that a part with missing
   // triangles does not drain. Gaps narrower than this that lead to anything deeper are closed too;
   // concave corners stay open. Closed meshes have no holes: nothing changes.
   double seal = 0;
-  double band_voxels = 3;       // every cell nearer than this to the surface gets samples
-  int padding_voxels = 8;       // empty cells around the mesh
-  unsigned threads = 0;         // 0: all
+  double band_voxels = 3;  // every cell nearer than this to the surface gets samples
+  int padding_voxels = 8;  // empty cells around the mesh
+  unsigned threads = 0;    // 0: all
 };
 
 // What a bake found that a user should hear: "12 holes ...", one sentence each.
 struct FieldBakeReport {
   bool closed = false;
-  double sealed_area = 0;               // [m^2] put across holes
+  double sealed_area = 0;  // [m^2] put across holes
   std::vector<std::string> warnings;
   // Where the time went, in the order of work. Stages that run side by side with others count only
   // while nothing else is waited for.

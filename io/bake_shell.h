@@ -11,10 +11,10 @@
 
 namespace h6::io {
 
-// Where points lie. `triangles`: on them. `field`: where the body's own field is zero: in soups that
-// is the field's offset outside of the triangles, so a body is as thick when it moves as when it is
-// touched. `automatic`: on the triangles: a nut whose mesh lacks a face would jam on its bolt if it
-// were moved out, and the field it touches keeps an offset of its own.
+// Where points lie. `triangles`: on them. `field`: where the body's own field is zero: in soups
+// that is the field's offset outside of the triangles, so a body is as thick when it moves as when
+// it is touched. `automatic`: on the triangles: a nut whose mesh lacks a face would jam on its bolt
+// if it were moved out, and the field it touches keeps an offset of its own.
 enum class ShellSurface { automatic, triangles, field };
 // `field`: of the distance, so they turn evenly over edges. `automatic`: as the points.
 enum class ShellNormals { automatic, triangles, field };

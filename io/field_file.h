@@ -1,4 +1,5 @@
-// field_file.h - fields as OpenVDB files: grids `distance`, `far`, `part` and `triangle`, history as metadata.
+// field_file.h - fields as OpenVDB files: grids `distance`, `far`, `part` and `triangle`, history
+// as metadata.
 #pragma once
 #include <filesystem>
 

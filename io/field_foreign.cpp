@@ -53,8 +53,8 @@ std::vector<int> steps_to_near(const std::array<std::int32_t, 3>& size,
         bool in = true;
         for (std::size_t k = 0; k < 3; ++k) in &= to[k] >= 0 && to[k] < size[k];
         if (!in) continue;
-        const std::size_t j = (std::size_t(to[2]) * ny + std::size_t(to[1])) * nx +
-                              std::size_t(to[0]);
+        const std::size_t j =
+            (std::size_t(to[2]) * ny + std::size_t(to[1])) * nx + std::size_t(to[0]);
         if (steps[j] <= step) continue;
         steps[j] = step;
         next.push_back(j);
@@ -65,7 +65,7 @@ std::vector<int> steps_to_near(const std::array<std::int32_t, 3>& size,
 }
 
 struct Frame {
-  Coord low;                 // first voxel of brick (0,0,0)
+  Coord low;  // first voxel of brick (0,0,0)
   double voxel = 0;
   float background = 0;
 };

@@ -51,8 +51,10 @@ void check_depth(std::string_view text, const MeshSource& source) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if (quoting) {
-      if (c == '\\') ++i;
-      else if (c == '"') quoting = false;
+      if (c == '\\')
+        ++i;
+      else if (c == '"')
+        quoting = false;
     } else if (c == '"') {
       quoting = true;
     } else if (c == '{' || c == '[') {
@@ -83,12 +85,18 @@ std::string decode_base64(std::string_view text, const MeshSource& source) {
   while (!text.empty() && text.back() == '=') text.remove_suffix(1);
   for (const char c : text) {
     std::uint32_t six = 0;
-    if (c >= 'A' && c <= 'Z') six = static_cast<std::uint32_t>(c - 'A');
-    else if (c >= 'a' && c <= 'z') six = static_cast<std::uint32_t>(c - 'a' + 26);
-    else if (c >= '0' && c <= '9') six = static_cast<std::uint32_t>(c - '0' + 52);
-    else if (c == '+' || c == '-') six = 62;
-    else if (c == '/' || c == '_') six = 63;
-    else source.fail("a data URI is not base64");
+    if (c >= 'A' && c <= 'Z')
+      six = static_cast<std::uint32_t>(c - 'A');
+    else if (c >= 'a' && c <= 'z')
+      six = static_cast<std::uint32_t>(c - 'a' + 26);
+    else if (c >= '0' && c <= '9')
+      six = static_cast<std::uint32_t>(c - '0' + 52);
+    else if (c == '+' || c == '-')
+      six = 62;
+    else if (c == '/' || c == '_')
+      six = 63;
+    else
+      source.fail("a data URI is not base64");
     bits = bits << 6 | six;
     if ((have += 6) < 8) continue;
     have -= 8;
@@ -101,12 +109,14 @@ std::string decode_base64(std::string_view text, const MeshSource& source) {
 std::string decode_percent(const std::string& uri) {
   std::string out;
   const auto digit = [](char c) {
-    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10
-                                        : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
   };
   for (std::size_t i = 0; i < uri.size(); ++i) {
-    const bool coded = uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 &&
-                       digit(uri[i + 2]) >= 0;
+    const bool coded =
+        uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0;
     out.push_back(coded ? static_cast<char>(16 * digit(uri[i + 1]) + digit(uri[i + 2])) : uri[i]);
     if (coded) i += 2;
   }

@@ -39,11 +39,13 @@ Result<std::string> inflate_all(std::string_view bytes, const std::string& name,
   for (;;) {
     if (written == out.size()) {
       if (written >= limit)
-        return Failure{place(name, read, "inflates to more than " + std::to_string(limit) +
-                                              " bytes; that is refused.")};
+        return Failure{
+            place(name, read,
+                  "inflates to more than " + std::to_string(limit) + " bytes; that is refused.")};
       if (written >= kHarmless && written / kMaxRatio > read)
-        return Failure{place(name, read, "inflates to more than " + std::to_string(kMaxRatio) +
-                                              " times its size, as no mesh does; refused.")};
+        return Failure{place(name, read,
+                             "inflates to more than " + std::to_string(kMaxRatio) +
+                                 " times its size, as no mesh does; refused.")};
       // Doubling, but never past what the ratio allows: a bomb is noticed before it is stored.
       const std::size_t allowed = std::max(kHarmless, (read + 1) * kMaxRatio + kMaxRatio);
       out.resize(std::min({limit, written * 2 + 4096, std::max(allowed, written + 4096)}));
@@ -69,8 +71,9 @@ Result<std::string> inflate_all(std::string_view bytes, const std::string& name,
     } else if (state == Z_MEM_ERROR) {
       return Failure{name + ": no memory to inflate it."};
     } else if (state != Z_OK) {
-      return Failure{place(name, read, std::string("the compressed data are damaged (") +
-                                            (z.msg ? z.msg : "bad stream") + ").")};
+      return Failure{place(name, read,
+                           std::string("the compressed data are damaged (") +
+                               (z.msg ? z.msg : "bad stream") + ").")};
     }
   }
   out.resize(written);

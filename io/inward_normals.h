@@ -15,7 +15,7 @@ struct FaceTable {
   std::vector<char> sheet;   // (triangles) of a piece that does not close: it has two outer sides
   std::vector<char> bowl;    // (triangles) of such a piece that nearly closes around a volume
   std::size_t pieces = 0, sheets = 0;  // with area; those of them that do not close
-  std::vector<std::string> warnings;  // a sentence each: what was repaired or is not certain
+  std::vector<std::string> warnings;   // a sentence each: what was repaired or is not certain
 };
 
 // Indices must be in range and vertices finite. Closed pieces are oriented by their volume, hollows

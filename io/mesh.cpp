@@ -5,9 +5,9 @@
 namespace h6::io {
 
 Mesh weld(const Mesh& mesh) {
-  const Welded welded =
-      weld_points(mesh.vertices.size(), mesh.vertices.size(),
-                  [&](std::size_t i) { return without_minus_zero(mesh.vertices[i]); });
+  const Welded welded = weld_points(mesh.vertices.size(), mesh.vertices.size(), [&](std::size_t i) {
+    return without_minus_zero(mesh.vertices[i]);
+  });
 
   // Numbered anew by first use: the order is then that of the triangles, whatever the file's vertex
   // list looked like, and unused vertices fall out.

@@ -18,9 +18,9 @@ struct Vec3 {
 struct Mesh {
   std::vector<Vec3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::int32_t> part;        // (triangles) index into part_names; empty: one part
+  std::vector<std::int32_t> part;  // (triangles) index into part_names; empty: one part
   std::vector<std::string> part_names;
-  std::vector<std::string> remarks;      // sentences: what was left out or seems wrong
+  std::vector<std::string> remarks;  // sentences: what was left out or seems wrong
 };
 
 // The same triangles in the same order over welded vertices: equal coordinates (-0 is +0) are one
@@ -29,22 +29,22 @@ struct Mesh {
 Mesh weld(const Mesh& mesh);
 
 // Counts after the exact weld and after dropping duplicate triangles *ignoring winding*: what
-// decides whether the mesh is closed (METHOD.md, Sec. 5: every edge has an even number of faces). A triangle
-// with two equal vertices has no edges to count; one with three vertices in a line has, and they
-// count.
+// decides whether the mesh is closed (METHOD.md, Sec. 5: every edge has an even number of faces). A
+// triangle with two equal vertices has no edges to count; one with three vertices in a line has,
+// and they count.
 struct MeshAudit {
-  std::size_t triangles = 0;         // as read
-  std::size_t vertices = 0;          // after the weld
-  std::size_t duplicates = 0;        // same three vertices as an earlier triangle, in any order
-  std::size_t degenerate = 0;        // two equal vertices, or no area
-  std::size_t open_edges = 0;        // one face
-  std::size_t nonmanifold_edges = 0; // more than two faces
-  std::size_t odd_edges = 0;         // an odd number of faces
-  std::size_t flipped_edges = 0;     // two faces that run the same way along it
-  std::size_t components = 0;        // joined by shared vertices
-  bool closed = false;               // no odd edge, at least one triangle with area
-  Vec3 low{}, high{};                // bounding box [m]
-  double volume = 0;                 // signed [m^3]; meaningful when closed and well wound
+  std::size_t triangles = 0;          // as read
+  std::size_t vertices = 0;           // after the weld
+  std::size_t duplicates = 0;         // same three vertices as an earlier triangle, in any order
+  std::size_t degenerate = 0;         // two equal vertices, or no area
+  std::size_t open_edges = 0;         // one face
+  std::size_t nonmanifold_edges = 0;  // more than two faces
+  std::size_t odd_edges = 0;          // an odd number of faces
+  std::size_t flipped_edges = 0;      // two faces that run the same way along it
+  std::size_t components = 0;         // joined by shared vertices
+  bool closed = false;                // no odd edge, at least one triangle with area
+  Vec3 low{}, high{};                 // bounding box [m]
+  double volume = 0;                  // signed [m^3]; meaningful when closed and well wound
 };
 
 // Welds by itself. Indices must be in range.

@@ -215,10 +215,14 @@ class ColladaReader {
       if (xml_.name(p) == "ph") fail(p, "polygons with holes are not read; export triangles");
       if (xml_.name(p) != "p") return;
       const std::vector<std::uint32_t> loop = vertices_of(p, in, out);
-      if (kind == "triangles") faces += add_triangles(p, loop, out);
-      else if (kind == "polylist") faces += add_polylist(e, p, loop, out);
-      else if (strips) faces += add_strip(p, loop, kind == "trifans", out);
-      else faces += add_face(p, loop, 0, loop.size(), out);
+      if (kind == "triangles")
+        faces += add_triangles(p, loop, out);
+      else if (kind == "polylist")
+        faces += add_polylist(e, p, loop, out);
+      else if (strips)
+        faces += add_strip(p, loop, kind == "trifans", out);
+      else
+        faces += add_face(p, loop, 0, loop.size(), out);
     });
     const std::uint64_t announced = count_or(e, "count", faces);
     if (announced != faces)
@@ -357,8 +361,7 @@ class ColladaReader {
   }
 
   void place(const Visit& here, Index geometry) {
-    if (here.odd != kNone)
-      fail(here.odd, "this transform is not read; export it as a <matrix>");
+    if (here.odd != kNone) fail(here.odd, "this transform is not read; export it as a <matrix>");
     placed_.push_back({&shape(geometry), here.place, part_name(here.node, geometry)});
     if (placed_.size() > kMaxNodes) fail(here.node, "more parts than can be read");
   }
@@ -428,7 +431,8 @@ class ColladaReader {
 
 Mesh read_collada(const MeshSource& source) {
   if (source.bytes.substr(0, 4096).find('\0') != std::string_view::npos)
-    source.fail("this is not UTF-8 text, so no COLLADA that can be read; was another file renamed?");
+    source.fail(
+        "this is not UTF-8 text, so no COLLADA that can be read; was another file renamed?");
   return ColladaReader(source).read();
 }
 

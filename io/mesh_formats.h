@@ -36,10 +36,10 @@ struct MeshSource {
 
 // Points and faces as a file lists them, before the weld.
 struct Polygons {
-  std::vector<Vec3> points;             // [m]
-  std::vector<std::uint32_t> corners;   // indices into points, face by face; in range
-  std::vector<std::uint32_t> sizes;     // (faces) corners of each, at least 3
-  std::vector<std::int32_t> part;       // (faces) or empty
+  std::vector<Vec3> points;            // [m]
+  std::vector<std::uint32_t> corners;  // indices into points, face by face; in range
+  std::vector<std::uint32_t> sizes;    // (faces) corners of each, at least 3
+  std::vector<std::int32_t> part;      // (faces) or empty
   std::vector<std::string> part_names;
 };
 

@@ -74,8 +74,8 @@ class GltfReader {
   const json& item(const char* key, std::uint64_t index, const std::string& from) const {
     const json& all = list(key);
     if (index >= all.size())
-      fail(from, "it names " + std::string(key) + " " + std::to_string(index) +
-                     ", the file has " + std::to_string(all.size()));
+      fail(from, "it names " + std::string(key) + " " + std::to_string(index) + ", the file has " +
+                     std::to_string(all.size()));
     if (!all[index].is_object()) fail(at(key, index), "this must be an object");
     return all[index];
   }
@@ -111,8 +111,7 @@ class GltfReader {
       good = (*found)[i].is_number();
       if (good) out[i] = (*found)[i].template get<double>();
     }
-    if (!good)
-      fail(place, "'" + std::string(key) + "' must be " + std::to_string(N) + " numbers");
+    if (!good) fail(place, "'" + std::string(key) + "' must be " + std::to_string(N) + " numbers");
     return out;
   }
 
@@ -214,18 +213,25 @@ class GltfReader {
     if (out.count == 0) return out;
     if (offset > length || length - offset < size ||
         (length - offset - size) / out.stride < out.count - 1)
-      fail(place, "it has " + std::to_string(out.count) +
-                      " elements and reaches beyond its bufferView");
+      fail(place,
+           "it has " + std::to_string(out.count) + " elements and reaches beyond its bufferView");
     out.bytes = all.substr(begin + offset, (out.count - 1) * out.stride + size);
     return out;
   }
 
   std::uint64_t component_size(std::uint64_t type, const std::string& place) const {
     switch (type) {
-      case 5120: case 5121: return 1;
-      case 5122: case 5123: return 2;
-      case 5125: case 5126: return 4;
-      default: fail(place, "componentType " + std::to_string(type) + " does not exist");
+      case 5120:
+      case 5121:
+        return 1;
+      case 5122:
+      case 5123:
+        return 2;
+      case 5125:
+      case 5126:
+        return 4;
+      default:
+        fail(place, "componentType " + std::to_string(type) + " does not exist");
     }
   }
 
@@ -246,12 +252,18 @@ class GltfReader {
   static double real(const Column& column, std::uint64_t row, std::uint64_t axis) {
     const std::uint64_t start = row * column.stride;
     switch (column.type) {
-      case 5120: return scaled<std::int8_t>(column, start + axis);
-      case 5121: return scaled<std::uint8_t>(column, start + axis);
-      case 5122: return scaled<std::int16_t>(column, start + 2 * axis);
-      case 5123: return scaled<std::uint16_t>(column, start + 2 * axis);
-      case 5125: return scaled<std::uint32_t>(column, start + 4 * axis);
-      default: return load<float>(column, start + 4 * axis);
+      case 5120:
+        return scaled<std::int8_t>(column, start + axis);
+      case 5121:
+        return scaled<std::uint8_t>(column, start + axis);
+      case 5122:
+        return scaled<std::int16_t>(column, start + 2 * axis);
+      case 5123:
+        return scaled<std::uint16_t>(column, start + 2 * axis);
+      case 5125:
+        return scaled<std::uint32_t>(column, start + 4 * axis);
+      default:
+        return load<float>(column, start + 4 * axis);
     }
   }
 
@@ -334,9 +346,12 @@ class GltfReader {
       out.sizes.push_back(3);
     };
     for (std::size_t i = 0; i + 2 < v.size(); i += mode == 4 ? 3 : 1) {
-      if (mode == 4) add(i, i + 1, i + 2);
-      else if (mode == 6) add(0, i + 1, i + 2);
-      else add(i, i + 1 + i % 2, i + 2 - i % 2);  // every second triangle of a strip runs back
+      if (mode == 4)
+        add(i, i + 1, i + 2);
+      else if (mode == 6)
+        add(0, i + 1, i + 2);
+      else
+        add(i, i + 1 + i % 2, i + 2 - i % 2);  // every second triangle of a strip runs back
     }
   }
 

@@ -14,10 +14,10 @@ namespace {
 
 // Appearance, points and lines, and the ends of free-form blocks whose `surf` is refused.
 constexpr std::string_view kPassedOver[] = {
-    "vt",     "vn",     "vp",       "p",        "l",      "s",    "mg",   "usemtl", "mtllib",
-    "usemap", "maplib", "bevel",    "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj",
-    "cstype", "deg",    "bmat",     "step",     "curv",   "curv2", "parm", "trim",  "hole",
-    "scrv",   "sp",     "end",      "con",      "stech",  "ctech"};
+    "vt",        "vn",     "vp",     "p",     "l",        "s",        "mg",    "usemtl",
+    "mtllib",    "usemap", "maplib", "bevel", "c_interp", "d_interp", "lod",   "shadow_obj",
+    "trace_obj", "cstype", "deg",    "bmat",  "step",     "curv",     "curv2", "parm",
+    "trim",      "hole",   "scrv",   "sp",    "end",      "con",      "stech", "ctech"};
 
 bool passed_over(std::string_view statement) {
   return std::find(std::begin(kPassedOver), std::end(kPassedOver), statement) !=
@@ -32,11 +32,16 @@ class ObjReader {
     while (scan_.next_line()) {
       const std::string_view statement = scan_.word();
       if (statement.empty() || statement[0] == '#') continue;
-      if (statement == "v") vertex();
-      else if (statement == "f" || statement == "fo") face();
-      else if (statement == "o") name_object();
-      else if (statement == "g") name_group();
-      else if (statement == "surf") fail("free-form surfaces are not read; export it as polygons");
+      if (statement == "v")
+        vertex();
+      else if (statement == "f" || statement == "fo")
+        face();
+      else if (statement == "o")
+        name_object();
+      else if (statement == "g")
+        name_group();
+      else if (statement == "surf")
+        fail("free-form surfaces are not read; export it as polygons");
       else if (!passed_over(statement))
         fail(quoted(statement) + " is no statement of an OBJ file");
     }

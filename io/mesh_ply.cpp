@@ -75,12 +75,18 @@ class BinaryBody {
   }
   std::int64_t whole(PlyType type) {
     switch (type) {
-      case PlyType::int8: return static_cast<std::int8_t>(take<std::uint8_t>());
-      case PlyType::uint8: return take<std::uint8_t>();
-      case PlyType::int16: return static_cast<std::int16_t>(take<std::uint16_t>());
-      case PlyType::uint16: return take<std::uint16_t>();
-      case PlyType::int32: return static_cast<std::int32_t>(take<std::uint32_t>());
-      default: return take<std::uint32_t>();
+      case PlyType::int8:
+        return static_cast<std::int8_t>(take<std::uint8_t>());
+      case PlyType::uint8:
+        return take<std::uint8_t>();
+      case PlyType::int16:
+        return static_cast<std::int16_t>(take<std::uint16_t>());
+      case PlyType::uint16:
+        return take<std::uint16_t>();
+      case PlyType::int32:
+        return static_cast<std::int32_t>(take<std::uint32_t>());
+      default:
+        return take<std::uint32_t>();
     }
   }
   void skip(PlyType type, std::uint64_t n) {
@@ -94,9 +100,7 @@ class BinaryBody {
     return source_.bytes.find_first_not_of(std::string_view("\0\r\n ", 4), at_) ==
            std::string_view::npos;
   }
-  std::string place() const {
-    return "byte " + std::to_string(at_) + " (" + row_.name() + ")";
-  }
+  std::string place() const { return "byte " + std::to_string(at_) + " (" + row_.name() + ")"; }
 
  private:
   [[noreturn]] void ends_early() const {
@@ -129,11 +133,14 @@ class PlyReader {
     for (const PlyElement& element : header_.elements) {
       row_ = {&element, 0};
       check_room(element);
-      if (element.name == "vertex") read_vertices(element);
-      else if (element.name == "face") read_faces(element);
+      if (element.name == "vertex")
+        read_vertices(element);
+      else if (element.name == "face")
+        read_faces(element);
       else if (element.name == "tristrips" && element.count > 0)
         source_.fail("triangle strips are not read; export it as single faces");
-      else step_over(element);
+      else
+        step_over(element);
     }
     check_whole();
     return assemble(std::move(polygons_), source_);
@@ -172,9 +179,11 @@ class PlyReader {
       for (std::size_t i = 0; i < element.properties.size(); ++i) {
         const PlyProperty& property = element.properties[i];
         const auto* axis = std::find(column_of, column_of + 3, static_cast<int>(i));
-        if (axis == column_of + 3) step_over(property);
-        else xyz[axis - column_of] = coordinate(source_, body_.real(property.type),
-                                                [&] { return body_.place(); });
+        if (axis == column_of + 3)
+          step_over(property);
+        else
+          xyz[axis - column_of] =
+              coordinate(source_, body_.real(property.type), [&] { return body_.place(); });
       }
       polygons_.points.push_back({xyz[0], xyz[1], xyz[2]});
     }
@@ -185,13 +194,14 @@ class PlyReader {
         element.properties.begin(), element.properties.end(), [](const PlyProperty& p) {
           return p.list && (p.name == "vertex_indices" || p.name == "vertex_index");
         });
-    if (list == element.properties.end())
-      source_.fail("its faces have no list 'vertex_indices'");
+    if (list == element.properties.end()) source_.fail("its faces have no list 'vertex_indices'");
     if (!is_integer(list->type)) source_.fail("its 'vertex_indices' are not whole numbers");
     for (; row_.number < element.count; ++row_.number)
       for (const PlyProperty& property : element.properties)
-        if (&property == &*list) read_corners(property);
-        else step_over(property);
+        if (&property == &*list)
+          read_corners(property);
+        else
+          step_over(property);
   }
 
   void read_corners(const PlyProperty& list) {
@@ -212,9 +222,9 @@ class PlyReader {
 
   std::uint64_t length(const PlyProperty& list) {
     const std::int64_t length = body_.whole(list.count_type);
-    if (length < 0 ||
-        static_cast<std::uint64_t>(length) > body_.left() / body_.smallest(list.type))
-      fail("a list of " + std::to_string(length) + " values cannot be there: the file is "
+    if (length < 0 || static_cast<std::uint64_t>(length) > body_.left() / body_.smallest(list.type))
+      fail("a list of " + std::to_string(length) +
+           " values cannot be there: the file is "
            "truncated or damaged");
     return static_cast<std::uint64_t>(length);
   }

@@ -37,9 +37,12 @@ std::vector<Flat> flatten(const std::vector<Vec3>& points, Loop loop) {
   for (const std::uint32_t index : loop) {
     const Vec3 p = {points[index].x - base.x, points[index].y - base.y, points[index].z - base.z};
     Flat f{};
-    if (az >= ax && az >= ay) f = nz >= 0 ? Flat{p.x, p.y} : Flat{p.y, p.x};
-    else if (ax >= ay) f = nx >= 0 ? Flat{p.y, p.z} : Flat{p.z, p.y};
-    else f = ny >= 0 ? Flat{p.z, p.x} : Flat{p.x, p.z};
+    if (az >= ax && az >= ay)
+      f = nz >= 0 ? Flat{p.x, p.y} : Flat{p.y, p.x};
+    else if (ax >= ay)
+      f = nx >= 0 ? Flat{p.y, p.z} : Flat{p.z, p.y};
+    else
+      f = ny >= 0 ? Flat{p.z, p.x} : Flat{p.x, p.z};
     flat.push_back(f);
   }
   return flat;

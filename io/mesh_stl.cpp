@@ -51,18 +51,19 @@ Kind kind_of(std::string_view head, std::uint64_t size, const MeshSource& source
   if (has_count && size == expected) return Kind::binary;
   if (looks_like_text(head)) {
     if (same_word(first_word(head).substr(0, 5), "solid")) return Kind::text;
-    source.fail("this is text but no STL (it does not start with 'solid'); "
-                "was another file renamed?");
+    source.fail(
+        "this is text but no STL (it does not start with 'solid'); "
+        "was another file renamed?");
   }
   if (!has_count)
     source.fail("byte " + std::to_string(size),
                 "the file ends inside the 84-byte header of a binary STL: it is truncated");
   const std::uint64_t present = (size - kHead) / kTriangle;
   if (size < expected)
-    source.fail("byte " + std::to_string(size),
-                "the file ends early: its header announces " + std::to_string(announced) +
-                    " triangles, " + std::to_string(present) +
-                    " are there; it is truncated or no STL");
+    source.fail("byte " + std::to_string(size), "the file ends early: its header announces " +
+                                                    std::to_string(announced) + " triangles, " +
+                                                    std::to_string(present) +
+                                                    " are there; it is truncated or no STL");
   if (size >= expected + kTriangle)
     source.fail("byte " + std::to_string(expected),
                 "the file goes on behind its last triangle: its header announces " +
@@ -139,9 +140,12 @@ class TextStl {
     const std::size_t before = polygons_.sizes.size();
     for (;;) {
       const std::string_view word = need_word("endsolid");
-      if (same_word(word, "facet")) facet();
-      else if (same_word(word, "endsolid")) break;
-      else fail("'facet' or 'endsolid' should stand here, not " + quoted(word));
+      if (same_word(word, "facet"))
+        facet();
+      else if (same_word(word, "endsolid"))
+        break;
+      else
+        fail("'facet' or 'endsolid' should stand here, not " + quoted(word));
     }
     scan_.next_line();
     if (polygons_.sizes.size() == before) return;

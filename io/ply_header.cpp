@@ -12,14 +12,13 @@ std::optional<PlyType> type_from_name(std::string_view name) {
   static constexpr struct {
     std::string_view name;
     PlyType type;
-  } kNames[] = {{"char", PlyType::int8},     {"int8", PlyType::int8},
-                {"uchar", PlyType::uint8},   {"uint8", PlyType::uint8},
-                {"short", PlyType::int16},   {"int16", PlyType::int16},
-                {"ushort", PlyType::uint16}, {"uint16", PlyType::uint16},
-                {"int", PlyType::int32},     {"int32", PlyType::int32},
-                {"uint", PlyType::uint32},   {"uint32", PlyType::uint32},
-                {"float", PlyType::float32}, {"float32", PlyType::float32},
-                {"double", PlyType::float64}, {"float64", PlyType::float64}};
+  } kNames[] = {
+      {"char", PlyType::int8},      {"int8", PlyType::int8},       {"uchar", PlyType::uint8},
+      {"uint8", PlyType::uint8},    {"short", PlyType::int16},     {"int16", PlyType::int16},
+      {"ushort", PlyType::uint16},  {"uint16", PlyType::uint16},   {"int", PlyType::int32},
+      {"int32", PlyType::int32},    {"uint", PlyType::uint32},     {"uint32", PlyType::uint32},
+      {"float", PlyType::float32},  {"float32", PlyType::float32}, {"double", PlyType::float64},
+      {"float64", PlyType::float64}};
   for (const auto& known : kNames)
     if (known.name == name) return known.type;
   return std::nullopt;
@@ -37,11 +36,16 @@ class HeaderReader {
     while (scan_.next_line()) {
       const std::string_view statement = scan_.word();
       if (statement.empty() || statement == "comment" || statement == "obj_info") continue;
-      if (statement == "format") has_form = true, form();
-      else if (statement == "element") element();
-      else if (statement == "property") property();
-      else if (statement == "end_header") return finish(has_form);
-      else fail(quoted(statement) + " is no statement of a PLY header");
+      if (statement == "format")
+        has_form = true, form();
+      else if (statement == "element")
+        element();
+      else if (statement == "property")
+        property();
+      else if (statement == "end_header")
+        return finish(has_form);
+      else
+        fail(quoted(statement) + " is no statement of a PLY header");
     }
     fail("the file ends inside its header (no 'end_header'): it is truncated or no PLY");
   }
@@ -66,10 +70,14 @@ class HeaderReader {
 
   void form() {
     const std::string_view form = scan_.word(), version = scan_.word();
-    if (form == "ascii") header_.form = PlyHeader::Form::ascii;
-    else if (form == "binary_little_endian") header_.form = PlyHeader::Form::little_endian;
-    else if (form == "binary_big_endian") header_.form = PlyHeader::Form::big_endian;
-    else fail(quoted(form) + " is no format of PLY");
+    if (form == "ascii")
+      header_.form = PlyHeader::Form::ascii;
+    else if (form == "binary_little_endian")
+      header_.form = PlyHeader::Form::little_endian;
+    else if (form == "binary_big_endian")
+      header_.form = PlyHeader::Form::big_endian;
+    else
+      fail(quoted(form) + " is no format of PLY");
     if (version != "1.0") fail("PLY version " + quoted(version) + " is not known, 1.0 is");
   }
 

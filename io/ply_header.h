@@ -28,8 +28,8 @@ struct PlyElement {
 struct PlyHeader {
   enum class Form { ascii, little_endian, big_endian } form = Form::ascii;
   std::vector<PlyElement> elements;
-  std::size_t lines = 0;          // of the header
-  std::size_t body = 0;           // first byte behind it
+  std::size_t lines = 0;  // of the header
+  std::size_t body = 0;   // first byte behind it
 };
 
 // Throws BadMesh naming the line.

@@ -9,10 +9,10 @@
 // stage_us, frame_us, wakeup_us, settings} (n) or (n, width), /frames/{hand_pose, hand_velocity,
 // hand_wrench, buttons, sequence, body_pose, body_velocity, wrench, command_pose, cause, causes,
 // state, safety_asked, overdue} (n, hands) or (n, hands, width), with units and column names as
-// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit. The gravest
-// cause and all of them, the device's state, and what its safety chain was told from outside are
-// there for every frame; an event is there when one of them comes up.
-// /config and /summary keep their attributes a second time, as the text that read_recording takes.
+// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit. The
+// gravest cause and all of them, the device's state, and what its safety chain was told from
+// outside are there for every frame; an event is there when one of them comes up. /config and
+// /summary keep their attributes a second time, as the text that read_recording takes.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -28,13 +28,13 @@ namespace h6::io {
 
 // Everything but frames: kept as JSON and attributes under /config.
 struct RecordingHead {
-  std::string scene_json;                // the scene, as one JSON object; may be empty
-  std::vector<std::string> asset_hashes; // of fields and shells
-  std::string simd_target;               // kernels in use, "AVX3"
-  double rate = 1000;                    // [Hz]
+  std::string scene_json;                 // the scene, as one JSON object; may be empty
+  std::vector<std::string> asset_hashes;  // of fields and shells
+  std::string simd_target;                // kernels in use, "AVX3"
+  double rate = 1000;                     // [Hz]
   std::size_t hands = 1;
-  std::string program;                   // name and version
-  std::string run_json;                  // how it was run, recorded_run.h; may be empty
+  std::string program;   // name and version
+  std::string run_json;  // how it was run, recorded_run.h; may be empty
 };
 
 struct RecordingEvent {
@@ -72,9 +72,9 @@ struct Recording {
   RecordingHead head;
   std::vector<h6FrameRecord> frames;
   std::vector<RecordingEvent> events;
-  std::string summary_json;  // empty: the run did not end
-  bool whole = true;         // false: the run was killed; frames up to the last flush are here
-  std::string remark;        // what was repaired or is missing, one sentence; empty: nothing
+  std::string summary_json;       // empty: the run did not end
+  bool whole = true;              // false: the run was killed; frames up to the last flush are here
+  std::string remark;             // what was repaired or is missing, one sentence; empty: nothing
   std::uint64_t frame_count = 0;  // in the file; `frames` has those of the range asked for
   // Of /frames that the file has: older ones lack some, and `frames` has zeros there.
   std::vector<std::string> columns;
@@ -89,8 +89,8 @@ struct FrameRange {
 // recorder in this one waits for it. Where `file` is damaged or gone, the copy beside it is read.
 Result<Recording> read_recording(const std::filesystem::path& file, FrameRange range = {});
 
-// The first number in which two rows of one frame differ, in the order a frame makes them: contacts,
-// depths, bodies, what hands are told, the hash. Times and status are not looked at.
+// The first number in which two rows of one frame differ, in the order a frame makes them:
+// contacts, depths, bodies, what hands are told, the hash. Times and status are not looked at.
 struct RowDifference {
   std::string column, cell;  // "body_pose", "qz"
   std::size_t hand = 0;      // of columns with one row a hand
@@ -102,8 +102,8 @@ std::optional<RowDifference> first_difference(const h6FrameRecord& a, const h6Fr
 
 // Makes `file` the newest whole copy of a run that was killed and removes what else that run left
 // beside it. Changes nothing where there is nothing to do, or where a run may still be going on
-// (files younger than five seconds). A damaged file is kept as FILE.damaged. Says what it did; empty:
-// nothing.
+// (files younger than five seconds). A damaged file is kept as FILE.damaged. Says what it did;
+// empty: nothing.
 Result<std::string> repair_recording(const std::filesystem::path& file);
 
 }  // namespace h6::io

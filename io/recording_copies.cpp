@@ -47,8 +47,8 @@ int apply(int fd, const Change& change) {
   for (const auto& [number, page] : change.pages) {
     const std::uint64_t at = number * page_bytes;
     if (at >= change.size) break;
-    const auto bytes = static_cast<std::size_t>(std::min<std::uint64_t>(page_bytes,
-                                                                        change.size - at));
+    const auto bytes =
+        static_cast<std::size_t>(std::min<std::uint64_t>(page_bytes, change.size - at));
     if (const int error = write_all(fd, page.data(), bytes, at)) return error;
   }
   return ::ftruncate(fd, static_cast<off_t>(change.size)) == 0 ? 0 : errno;
@@ -124,7 +124,8 @@ Failure Copies::failed(const char* doing, int error) const {
 }
 
 bool Copies::named(const fs::path& name, const Copy& copy) const {
-  struct stat by_name{}, by_fd{};
+  struct stat by_name {
+  }, by_fd{};
   return copy.fd >= 0 && ::lstat(name.c_str(), &by_name) == 0 && ::fstat(copy.fd, &by_fd) == 0 &&
          by_name.st_dev == by_fd.st_dev && by_name.st_ino == by_fd.st_ino;
 }
@@ -197,15 +198,15 @@ Outcome Copies::publish(Change change) {
     return failed("write", error);
   }
   const fs::path part = part_of(file_);
-  struct stat ignored{};
+  struct stat ignored {};
   const bool gone = ::lstat(file_.c_str(), &ignored) != 0;
   if (!gone && !named(file_, published_)) {
     drop_spare();
     return Failure{"stopped recording to " + file_.string() +
                    ": another program put a file there; give every run its own file"};
   }
-  const bool shown = gone ? ::rename(part.c_str(), file_.c_str()) == 0
-                          : swap_names(file_, part, swap_of(file_));
+  const bool shown =
+      gone ? ::rename(part.c_str(), file_.c_str()) == 0 : swap_names(file_, part, swap_of(file_));
   if (!shown) return failed("write", errno);
   std::swap(published_, spare_);
   behind_ = std::move(change);

@@ -121,8 +121,7 @@ herr_t read_image(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t at, std::size_t bytes
   return mine(file)->image->read(at, bytes, static_cast<std::byte*>(out)) ? 0 : -1;
 }
 
-herr_t write_image(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t at, std::size_t bytes,
-                   const void* in) {
+herr_t write_image(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t at, std::size_t bytes, const void* in) {
   try {
     return mine(file)->image->write(at, bytes, static_cast<const std::byte*>(in)) ? 0 : -1;
   } catch (const std::bad_alloc&) {

@@ -188,8 +188,8 @@ Outcome read_frames(const Source& source, FrameRange range, Recording& out) {
   for (std::size_t i = 0; i < open->size(); ++i) {
     if (!(*open)[i].dataset.ok()) continue;
     out.columns.push_back(columns()[i].name);
-    if (Outcome read = read_column(source, columns()[i], (*open)[i], out.head.hands, first,
-                                   out.frames);
+    if (Outcome read =
+            read_column(source, columns()[i], (*open)[i], out.head.hands, first, out.frames);
         !read)
       return read;
   }

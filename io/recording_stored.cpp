@@ -141,8 +141,8 @@ bool read_piece(const Stored& stored, hsize_t first, hsize_t count, std::byte* o
   start[0] = first, block[0] = count;
   const Handle memory = H5Screate_simple(static_cast<int>(block.size()), block.data(), nullptr);
   const Handle disk = H5Dget_space(stored.dataset), type = H5Dget_type(stored.dataset);
-  return H5Sselect_hyperslab(disk, H5S_SELECT_SET, start.data(), nullptr, block.data(),
-                             nullptr) >= 0 &&
+  return H5Sselect_hyperslab(disk, H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) >=
+             0 &&
          H5Dread(stored.dataset, type, memory, disk, H5P_DEFAULT, out) >= 0;
 }
 
@@ -158,8 +158,8 @@ bool has(hid_t at, const char* name, H5O_type_t type) {
          object.type == type;
 }
 
-Result<Stored> open_stored(const Source& source, hid_t group, const char* folder,
-                           const char* name, hid_t type) {
+Result<Stored> open_stored(const Source& source, hid_t group, const char* folder, const char* name,
+                           hid_t type) {
   return open_any(source, group, folder, name, type);
 }
 

@@ -29,7 +29,7 @@ struct Stored {
   std::string name;
   std::vector<hsize_t> dims;  // rows first
   std::size_t row_bytes = 0, cell_bytes = 0;
-  hsize_t chunk_rows = 0;     // 0: in one piece
+  hsize_t chunk_rows = 0;  // 0: in one piece
   bool shuffled = false, deflated = false;
 };
 // With numbers of this type.

@@ -24,7 +24,7 @@ namespace {
 constexpr auto longest_wait = std::chrono::milliseconds(300);  // of a row before it is written
 constexpr double longest_span = 0.3;                           // [s] of recorded time
 constexpr std::size_t events_per_chunk = 16;
-constexpr std::size_t longest_segment = 4096;                  // rows; bounds memory
+constexpr std::size_t longest_segment = 4096;  // rows; bounds memory
 
 bool is_json_object(const std::string& text) {
   const auto parsed = nlohmann::json::parse(text, nullptr, false);
@@ -116,8 +116,8 @@ bool append(hid_t dataset, hid_t memory_type, std::vector<hsize_t> block, hsize_
   const int rank = static_cast<int>(block.size());
   const Handle memory = H5Screate_simple(rank, block.data(), nullptr);
   const Handle disk = H5Dget_space(dataset);
-  return H5Sselect_hyperslab(disk, H5S_SELECT_SET, start.data(), nullptr, block.data(),
-                             nullptr) >= 0 &&
+  return H5Sselect_hyperslab(disk, H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) >=
+             0 &&
          H5Dwrite(dataset, memory_type, memory, disk, H5P_DEFAULT, rows) >= 0;
 }
 
@@ -223,8 +223,8 @@ bool Recorder::Body::create_hdf5(const RecordingHead& head) {
   if (!h5.ok() || !put_head(h5, head)) return false;
   const Handle frames = H5Gcreate2(h5, "frames", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   for (const Column& column : columns()) {
-    datasets.push_back(make_dataset(frames, column.name, cell_type(column.cell),
-                                    shape(column, segment, hands)));
+    datasets.push_back(
+        make_dataset(frames, column.name, cell_type(column.cell), shape(column, segment, hands)));
     const hid_t made = datasets.back();
     if (made < 0 || !put_text(made, "units", column.units) ||
         !put_text(made, "columns", column.labels))
@@ -312,8 +312,7 @@ bool Recorder::Body::append_events() {
 Outcome Recorder::Body::publish() {
   if (H5Fflush(h5, H5F_SCOPE_GLOBAL) < 0)
     return stop("cannot write " + file.string() + ": " + library_reason());
-  if (Outcome published = copies.publish(image.take()); !published)
-    return stop(published.error());
+  if (Outcome published = copies.publish(image.take()); !published) return stop(published.error());
   image.rebase(copies.base());
   return Done{};
 }
@@ -330,8 +329,7 @@ Outcome Recorder::Body::stop(const std::string& sentence) {
 Outcome Recorder::Body::finish(const std::string& summary_json) {
   if (!broken.empty()) return Failure{broken};
   if (!open) return refuse(file, "this recording is finished");
-  if (!is_json_object(summary_json))
-    return refuse(file, "the summary is not one JSON object");
+  if (!is_json_object(summary_json)) return refuse(file, "the summary is not one JSON object");
   if (!append_rows(pending.size()) || !append_events())
     return stop("cannot write " + file.string() + ": " + library_reason());
   pending.clear();

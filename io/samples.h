@@ -43,7 +43,9 @@ struct SampleAllocator {
     std::construct_at(at, std::forward<Values>(values)...);
   }
   template <class U>
-  bool operator==(const SampleAllocator<U>&) const { return true; }
+  bool operator==(const SampleAllocator<U>&) const {
+    return true;
+  }
 };
 
 // Many of anything, likewise not filled.

@@ -106,7 +106,7 @@ struct Scene {
   std::string name, about;
   std::string generated;       // the name make_scene knows it by; empty: from a file
   std::filesystem::path file;  // it was read from
-  Unit unit = Unit::m;  // of files it is exported to
+  Unit unit = Unit::m;         // of files it is exported to
   std::vector<SceneBody> bodies;
   h6ContactDef contact;
   h6CouplingDef coupling;

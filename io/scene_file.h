@@ -20,11 +20,11 @@ Outcome write_path(const std::filesystem::path& file, const Path& path, Unit uni
 // from are copied. The folder is made when it is not there. Read back, it is the same scene.
 Outcome export_scene(const Scene& scene, const std::filesystem::path& folder);
 
-// The same JSON as text, without writing any file: for the head of a recording. Files keep the names
-// they were read by.
+// The same JSON as text, without writing any file: for the head of a recording. Files keep the
+// names they were read by.
 std::string scene_text(const Scene& scene);
-// And back: nothing is looked for on disk, paths of hands stay empty. A scene in metres comes back to
-// the bit. `name` is for sentences.
+// And back: nothing is looked for on disk, paths of hands stay empty. A scene in metres comes back
+// to the bit. `name` is for sentences.
 Result<Scene> read_scene_text(const std::string& text, const std::string& name);
 
 // A JSON schema of scene files, as text.

@@ -36,7 +36,9 @@ constexpr SceneKey kPose[] = {
 constexpr SceneKeys kPoseKeys = keys_of(kPose);
 
 constexpr SceneKey kField[] = {
-    {.name = "mesh", .kind = Kind::text, .about = "triangle mesh (STL, OBJ, PLY, glTF, COLLADA, .gz) to bake"},
+    {.name = "mesh",
+     .kind = Kind::text,
+     .about = "triangle mesh (STL, OBJ, PLY, glTF, COLLADA, .gz) to bake"},
     {.name = "file", .kind = Kind::text, .about = "baked field (.vdb), metres; instead of mesh"},
     {.name = "voxels",
      .kind = Kind::whole,
@@ -85,7 +87,9 @@ constexpr SceneKey kField[] = {
 constexpr SceneKeys kFieldKeys = keys_of(kField);
 
 constexpr SceneKey kShell[] = {
-    {.name = "mesh", .kind = Kind::text, .about = "triangle mesh (STL, OBJ, PLY, glTF, COLLADA, .gz) to bake"},
+    {.name = "mesh",
+     .kind = Kind::text,
+     .about = "triangle mesh (STL, OBJ, PLY, glTF, COLLADA, .gz) to bake"},
     {.name = "file", .kind = Kind::text, .about = "baked shell (.ply), metres; instead of mesh"},
     {.name = "points",
      .kind = Kind::whole,
@@ -110,8 +114,9 @@ constexpr SceneKey kShell[] = {
      .high = 9007199254740992.0},
     {.name = "surface",
      .kind = Kind::choice,
-     .about = "where points lie: triangles, field (where the mesh's own field is zero, in soups the "
-              "offset outside of the triangles) or auto (default: triangles)",
+     .about =
+         "where points lie: triangles, field (where the mesh's own field is zero, in soups the "
+         "offset outside of the triangles) or auto (default: triangles)",
      .choices = "auto|triangles|field"},
     {.name = "normals",
      .kind = Kind::choice,
@@ -176,8 +181,9 @@ constexpr SceneKeys kBodyKeys = keys_of(kBody);
 constexpr SceneKey kContact[] = {
     {.name = "method",
      .kind = Kind::method,
-     .about = "none, global, cluster, gauss3, gauss6, robust or series, and pieces of the Gauss ones: "
-              "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed; default robust"},
+     .about =
+         "none, global, cluster, gauss3, gauss6, robust or series, and pieces of the Gauss ones: "
+         "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed; default robust"},
     {.name = "stiffness",
      .kind = Kind::number,
      .about = "k, N/m; default 1e4",
@@ -333,10 +339,11 @@ constexpr SceneKey kSafety[] = {
     number("max_torque_rate", "slew limit, N m/s; default 0: the device's", 0, 1e6),
     number("max_power", "that the hand may be given, W; default 0: max_force at 1 m/s", 0, 1e5),
     number("max_speed", "admittance modes, m/s; default 0: the device's", 0, 100),
-    number("derate_speed",
-           "of the hand, m/s: from here on the force falls, to nothing at cut_speed; default 0: half "
-           "of that",
-           0, 100),
+    number(
+        "derate_speed",
+        "of the hand, m/s: from here on the force falls, to nothing at cut_speed; default 0: half "
+        "of that",
+        0, 100),
     number("cut_speed", "of the hand, m/s: zero, latched; default 0: from the device", 0, 100),
     number("soft_start", "from nothing to the whole output after arming, s; default 0.1", 0, 10),
     number("decay_time", "from the whole output to nothing in trouble, s; default 0.02", 0.001,
@@ -344,9 +351,10 @@ constexpr SceneKey kSafety[] = {
     number("pose_jump",
            "a pose farther from the last one is a jump, 1 to 50 mm, scene units; default 20 mm", 0,
            kFarthest),
-    number("freeze_time",
-           "samples that stay the same for so long mean a frozen device, s; default 0: the device's",
-           0, 1),
+    number(
+        "freeze_time",
+        "samples that stay the same for so long mean a frozen device, s; default 0: the device's",
+        0, 1),
     whole("dead_man_buttons",
           "bits: nothing is rendered unless one of these buttons is held; default 0: none", 0,
           4294967295.0)};
@@ -359,9 +367,10 @@ constexpr SceneKey kHand[] = {
      .required = true},
     {.name = "device",
      .kind = Kind::text,
-     .about = "path, simulated, arm, spacemouse, scripted:FILE, replay:FILE or bad-operator, with "
-              "options as ?key=value&key=value ('hapsix devices' explains each); a plug-in is given "
-              "with run --device; default path"},
+     .about =
+         "path, simulated, arm, spacemouse, scripted:FILE, replay:FILE or bad-operator, with "
+         "options as ?key=value&key=value ('hapsix devices' explains each); a plug-in is given "
+         "with run --device; default path"},
     {.name = "path",
      .kind = Kind::text,
      .about = "CSV t,x,y,z,qw,qx,qy,qz of the body's mesh frame"},

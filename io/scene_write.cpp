@@ -254,7 +254,7 @@ class SceneWriter {
 
   static void add_hand_def(const h6HandDef& def, Json& out) {
     const h6HandFilterDef& f = def.filter;
-    out["mode"] = def.mode == H6_ADMITTANCE           ? "admittance"
+    out["mode"] = def.mode == H6_ADMITTANCE          ? "admittance"
                   : def.mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance"
                                                      : "impedance";
     out["motion_scale"] = f.motion_scale;

@@ -7,8 +7,8 @@
 namespace h6::io {
 
 std::string too_far_for_floats(const Vec3& low, const Vec3& high) {
-  const double far = std::max({std::abs(low.x), std::abs(low.y), std::abs(low.z),
-                               std::abs(high.x), std::abs(high.y), std::abs(high.z)});
+  const double far = std::max({std::abs(low.x), std::abs(low.y), std::abs(low.z), std::abs(high.x),
+                               std::abs(high.y), std::abs(high.z)});
   const double side = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
   if (!(far > 0) || !std::isfinite(far)) return "";
   const double step = std::ldexp(1.0, std::ilogb(far) - 23);  // to the next float

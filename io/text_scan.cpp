@@ -32,8 +32,10 @@ std::string cleaned(std::string_view text, std::size_t longest) {
   while (!text.empty()) {
     const std::size_t length = printable_sequence(text);
     if (out.size() + (length ? length : 1) > longest) return out + "...";
-    if (length) out.append(text.substr(0, length));
-    else out += '?';
+    if (length)
+      out.append(text.substr(0, length));
+    else
+      out += '?';
     text.remove_prefix(length ? length : 1);
   }
   return out;

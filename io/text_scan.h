@@ -13,9 +13,9 @@ class TextScan {
   // `continued`: a backslash at a line's end joins it to the next one (OBJ).
   explicit TextScan(std::string_view text, bool continued = false);
 
-  bool next_line();         // false: there is none
-  std::string_view word();  // of this line; empty at its end
-  std::string_view next_word();  // of this line or a later one; empty at the end of the text
+  bool next_line();               // false: there is none
+  std::string_view word();        // of this line; empty at its end
+  std::string_view next_word();   // of this line or a later one; empty at the end of the text
   std::string_view rest() const;  // of this line, without blanks at either end
   std::size_t line() const { return line_; }  // 1 is the first
   std::string_view behind() const;            // everything after this line

@@ -139,8 +139,7 @@ Outcome call(const std::function<Outcome(const fs::path&)>& write, const fs::pat
 
 }  // namespace
 
-Outcome write_aside(const fs::path& file,
-                    const std::function<Outcome(const fs::path&)>& write) {
+Outcome write_aside(const fs::path& file, const std::function<Outcome(const fs::path&)>& write) {
   if (file.filename().empty() || file.filename() == "." || file.filename() == "..")
     return cannot_write(file, "this names a folder, give a file name");
   std::error_code failed;
@@ -155,9 +154,9 @@ Outcome write_aside(const fs::path& file,
   const fs::path folder = target.parent_path();
   struct stat there {};
   if (stat(folder.c_str(), &there) != 0)
-    return cannot_write(file, "the folder " + folder.string() +
-                                  (errno == ENOENT ? " does not exist, create it first"
-                                                   : ": " + reason(errno)));
+    return cannot_write(
+        file, "the folder " + folder.string() +
+                  (errno == ENOENT ? " does not exist, create it first" : ": " + reason(errno)));
   if (!S_ISDIR(there.st_mode)) return cannot_write(file, folder.string() + " is not a folder");
 
   const bool exists = stat(target.c_str(), &there) == 0;

@@ -22,9 +22,12 @@ std::size_t end_of_tag(std::string_view text, std::size_t at) {
   char quote = 0;
   for (; at < text.size(); ++at) {
     const char c = text[at];
-    if (quote) quote = c == quote ? char{0} : quote;
-    else if (c == '"' || c == '\'') quote = c;
-    else if (c == '>') return at;
+    if (quote)
+      quote = c == quote ? char{0} : quote;
+    else if (c == '"' || c == '\'')
+      quote = c;
+    else if (c == '>')
+      return at;
   }
   return std::string_view::npos;
 }
@@ -33,8 +36,10 @@ void append_utf8(std::string& out, unsigned long code) {
   const auto put = [&](unsigned long byte) { out.push_back(static_cast<char>(byte)); };
   if (code < 0x80) return put(code);
   if (code < 0x800) return put(0xc0 | code >> 6), put(0x80 | (code & 0x3f));
-  if (code < 0x10000) put(0xe0 | code >> 12);
-  else put(0xf0 | (code >> 18 & 7)), put(0x80 | (code >> 12 & 0x3f));
+  if (code < 0x10000)
+    put(0xe0 | code >> 12);
+  else
+    put(0xf0 | (code >> 18 & 7)), put(0x80 | (code >> 12 & 0x3f));
   put(0x80 | (code >> 6 & 0x3f));
   put(0x80 | (code & 0x3f));
 }
@@ -89,10 +94,14 @@ void Xml::scan() {
   };
   while ((at = text.find('<', at)) != std::string_view::npos) {
     const std::string_view rest = text.substr(at);
-    if (rest.starts_with("<?")) skip_past("?>", "a declaration");
-    else if (rest.starts_with("<!--")) skip_past("-->", "a comment");
-    else if (rest.starts_with("<![CDATA[")) skip_past("]]>", "a CDATA section");
-    else if (rest.starts_with("<!")) fail(rest.data(), "a DOCTYPE is not read; export it without");
+    if (rest.starts_with("<?"))
+      skip_past("?>", "a declaration");
+    else if (rest.starts_with("<!--"))
+      skip_past("-->", "a comment");
+    else if (rest.starts_with("<![CDATA["))
+      skip_past("]]>", "a CDATA section");
+    else if (rest.starts_with("<!"))
+      fail(rest.data(), "a DOCTYPE is not read; export it without");
     else {
       const std::size_t end = end_of_tag(text, at);
       if (end == std::string_view::npos)

@@ -32,8 +32,8 @@ HWY_INLINE VF clearance_of(VF distance, bool wide) {
   if (wide) return long_form;
   const VF short_form = hn::Mul(left, hn::Set(d, 1.0f / kSqrt3));
   const VF edge = hn::Set(d, kShortReach);
-  const VF far_form = hn::IfThenElse(hn::Gt(long_form, edge), long_form,
-                                     hn::Set(d, kShortReach - 1e-4f));
+  const VF far_form =
+      hn::IfThenElse(hn::Gt(long_form, edge), long_form, hn::Set(d, kShortReach - 1e-4f));
   return hn::IfThenElse(hn::Lt(short_form, edge), short_form, far_form);
 }
 
@@ -68,8 +68,7 @@ HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uin
   const auto keep = hn::And(live, hn::Le(distance, hn::Add(reach, hn::Set(d, c.margin))));
   const std::size_t kept = hn::CountTrue(d, keep);
   if (clearance != nullptr) {
-    const VF left = hn::Sub(
-        clearance_of(hn::Sub(distance, hn::Set(d, c.margin)), c.wide), scaled);
+    const VF left = hn::Sub(clearance_of(hn::Sub(distance, hn::Set(d, c.margin)), c.wide), scaled);
     const auto held = hn::And(keep, hn::Gt(left, hn::Zero(d)));
     store_n(hn::IfThenElse(held, hn::Zero(d), left), d, clearance, lanes.live);
   }

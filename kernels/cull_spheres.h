@@ -31,7 +31,7 @@ inline constexpr float cull_clearance(float distance, bool wide) {
   const float long_form = d - kSqrt3;
   if (wide) return long_form;
   const float short_form = d * (1.0f / kSqrt3);
-  return short_form < kShortReach ? short_form
+  return short_form < kShortReach  ? short_form
          : long_form > kShortReach ? long_form
                                    : kShortReach - 1e-4f;
 }

@@ -1,4 +1,5 @@
-// distance_facet.cpp - a triangle made ready for the float work of triangle_distance.cpp, in double.
+// distance_facet.cpp - a triangle made ready for the float work of triangle_distance.cpp, in
+// double.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -68,8 +69,8 @@ DistanceFacet make_distance_facet(const double* t) {
   const double n_length = std::sqrt(dot(n, n)), height_over = n_length / length[longest];
   // Below a height of 1e-4 voxel the longest edge alone is right to that.
   if (!(height_over > 1e-4)) {
-    const Row along = length[longest] > 1e-9 ? times(1 / length[longest], edge[longest])
-                                             : Row{1, 0, 0};
+    const Row along =
+        length[longest] > 1e-9 ? times(1 / length[longest], edge[longest]) : Row{1, 0, 0};
     set_segment(f, corner[longest], along, length[longest]);
     return f;
   }

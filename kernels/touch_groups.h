@@ -17,7 +17,8 @@ struct GroupLook {
   const std::uint16_t* rows;  // bit i: point i of the group is looked at; null: all are
   float* least;               // the smallest distance of those looked at, or infinity
   // Unless `rows` is null, of groups of which all are looked at: bit i of near_rows: point i is
-  // nearer than max(near, kNearLeast least); rest: the smallest distance of the others, or infinity.
+  // nearer than max(near, kNearLeast least); rest: the smallest distance of the others, or
+  // infinity.
   std::uint16_t* near_rows;
   float* rest;
   float near;  // [voxel]

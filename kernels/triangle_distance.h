@@ -20,8 +20,8 @@ inline constexpr int kTileBricks = 4;  // along an axis
 // wrong by whole voxels at the far end.
 struct DistanceFacet {
   float gx[8], gy[8], gz[8], c[8];
-  float half[3];       // lengths of the edges
-  float inside_from;   // a point is over the triangle when all of 3..5 are at least this
+  float half[3];      // lengths of the edges
+  float inside_from;  // a point is over the triangle when all of 3..5 are at least this
   float low[3], high[3];
 };
 
@@ -30,9 +30,9 @@ DistanceFacet make_distance_facet(const double* corners);
 // The same of many, to the same bits: `corners` is count x 3 corners x 3 coordinates.
 void make_distance_facets(const double* corners, std::size_t count, DistanceFacet* facets);
 
-// Bit (c*4 + b)*4 + a: brick (a,b,c) of the tile whose first node is at `first`, in the frame of the
-// facet's corners, may have a node within reach of the triangle.
-// Certain where it says no; where it says yes, wrong only around edges and corners.
+// Bit (c*4 + b)*4 + a: brick (a,b,c) of the tile whose first node is at `first`, in the frame of
+// the facet's corners, may have a node within reach of the triangle. Certain where it says no;
+// where it says yes, wrong only around edges and corners.
 std::uint64_t bricks_within_reach(const DistanceFacet& facet, const float first[3], float reach);
 
 // Where a triangle of a mesh may be the nearest of all: over its inside; beyond edge e (from corner
@@ -50,7 +50,7 @@ struct FacetRegion {
   float gx[16] = {}, gy[16] = {}, gz[16] = {}, c[16] = {};
   std::uint8_t edges = 0, corners = 0;  // bits: those it answers for
   std::uint8_t weighed = 3;
-  bool everywhere = true;               // nothing is known of its neighbours
+  bool everywhere = true;  // nothing is known of its neighbours
 };
 
 // Squared distances of the bricks of a tile, in an order of their own, and the name of the facet
@@ -60,8 +60,8 @@ struct TileRoom {
   alignas(64) float squared[64 * kBrickSamples];
   alignas(64) float most[64 * kBrickSamples / 16];  // by block; see triangle_distance.cpp
   std::uint32_t lowered[64], visits[64];
-  alignas(64) float middle[64];           // squared distance of the middle
-  alignas(64) std::int32_t nearest[64];   // or kNobody
+  alignas(64) float middle[64];          // squared distance of the middle
+  alignas(64) std::int32_t nearest[64];  // or kNobody
 };
 
 // The squared distances, at most reach^2, of the nodes of a tile's bricks to the nearest of `count`

@@ -391,8 +391,7 @@ void h6SetPace(h6Loop* loop, double pace) {
 
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (!may_take_over(next, *loop->session, error)) return nullptr;
-  if (const int core = loop->core; core >= 0)
-    next->team->set_realtime(loop->helper_priority, core);
+  if (const int core = loop->core; core >= 0) next->team->set_realtime(loop->helper_priority, core);
   loop->offered.store(next, std::memory_order_release);
   while (true) {
     if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire))

@@ -110,8 +110,8 @@ class OutputGuard {
   Quat q_ = Quat::Identity();
   bool moving_ = false;
 
-  std::uint32_t asked_ = 0;  // since the last frame: H6_ASKED_*, a fault's cause
-  h6SafetyInput input_{};    // of this frame
+  std::uint32_t asked_ = 0;                     // since the last frame: H6_ASKED_*, a fault's cause
+  h6SafetyInput input_{};                       // of this frame
   std::uint32_t causes_ = 0, last_causes_ = 0;  // bits 1u << h6Cause
   std::uint64_t frames_[H6_CAUSE_COUNT] = {}, times_[H6_CAUSE_COUNT] = {};
 };

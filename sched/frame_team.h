@@ -50,8 +50,8 @@ class FrameTeam {
   // Whose thread this is, for scratch of its own: 0 the caller's, 1 a helper's.
   static int here();
 
-  // How long the calling thread has waited for slices that a helper had in hand, since it began: CPU
-  // time in which it computed nothing.
+  // How long the calling thread has waited for slices that a helper had in hand, since it began:
+  // CPU time in which it computed nothing.
   static std::int64_t waited_ns();
 
   // From the helper's next nap on: SCHED_FIFO of this priority (0: as it was made), on any core but

@@ -19,9 +19,7 @@ class LatestValue {
   }
   // Writer. The slot to fill, with whatever it held; then it is the newest.
   T& next() { return slots_[back_]; }
-  void publish() {
-    back_ = middle_.exchange(back_ | kNew, std::memory_order_acq_rel) & kIndex;
-  }
+  void publish() { back_ = middle_.exchange(back_ | kNew, std::memory_order_acq_rel) & kIndex; }
   // Reader. True when there is a value newer than that of the last call; `out` is left alone if
   // not.
   bool take(T& out) {

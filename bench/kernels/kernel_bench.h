@@ -1,9 +1,9 @@
 // kernel_bench.h - registers a kernel's benchmark for its reference and for every SIMD target.
 //
-// Names end in what ran: ".../ref", ".../SCALAR", ".../AVX3". ref is the specification, compiled with
-// the same flags and vectorisation off; it counts no cycles, and where the kernel is no straight
-// loop it is another algorithm. SCALAR is the kernel itself with one lane. A run whose result is
-// wrong reports no time.
+// Names end in what ran: ".../ref", ".../SCALAR", ".../AVX3". ref is the specification, compiled
+// with the same flags and vectorisation off; it counts no cycles, and where the kernel is no
+// straight loop it is another algorithm. SCALAR is the kernel itself with one lane. A run whose
+// result is wrong reports no time.
 #pragma once
 #include <benchmark/benchmark.h>
 

@@ -40,7 +40,9 @@ struct Common {
 };
 
 void add_common(CLI::App* command, Common& c, const char* ending) {
-  command->add_option("MESH", c.mesh, "STL, OBJ, PLY, glTF or COLLADA, also .gz")->required()->option_text("FILE");
+  command->add_option("MESH", c.mesh, "STL, OBJ, PLY, glTF or COLLADA, also .gz")
+      ->required()
+      ->option_text("FILE");
   command->add_option("-o,--output", c.out, std::string("The ") + ending + " to write")
       ->required()
       ->option_text("FILE")
@@ -125,8 +127,8 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   Result<io::FieldData> field = io::bake_field(input->mesh, o.bake, &report, console.progress());
   if (!field) return bake_failed(console, o.common, *input, field.error());
   // Its samples hold wherever it lies, but the file may have lost the shape already.
-  if (const std::string name = o.common.mesh; name.ends_with("stl") || name.ends_with("STL") ||
-                                              name.ends_with("stl.gz"))
+  if (const std::string name = o.common.mesh;
+      name.ends_with("stl") || name.ends_with("STL") || name.ends_with("stl.gz"))
     add_unless_empty(report.warnings, io::too_far_for_floats(input->audit.low, input->audit.high));
   field->input_hash = io::content_hash(input->mesh, o.bake);
   const double baked = since(start);
@@ -291,13 +293,15 @@ void add_bake(CLI::App& app, Program& program) {
                    "as the points)")
       ->option_text("MODE")
       ->check(one_of({"auto", "triangles", "field"}));
-  auto* outside = shell
-                      ->add_option("--voxels", s->bake.field.voxels,
-                                   "Of the field that tells what the outside reaches, on the longest "
-                                   "padded side, 16 to 2048; default 256")
-                      ->option_text("N")
-                      ->check(whole_within(16, 2048));
-  shell->add_option("--voxel-size", s->bake.field.voxel_size, "Edge of a voxel, instead of --voxels")
+  auto* outside =
+      shell
+          ->add_option("--voxels", s->bake.field.voxels,
+                       "Of the field that tells what the outside reaches, on the longest "
+                       "padded side, 16 to 2048; default 256")
+          ->option_text("N")
+          ->check(whole_within(16, 2048));
+  shell
+      ->add_option("--voxel-size", s->bake.field.voxel_size, "Edge of a voxel, instead of --voxels")
       ->option_text("S")
       ->excludes(outside)
       ->check(number_above(0));

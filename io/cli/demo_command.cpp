@@ -85,8 +85,7 @@ int demo_command(const Console& console, DemoOptions o) {
   if (o.view.on) {
     o.view.folder = o.folder;
     o.run = {};  // a run without an end, by the scene's own settings, nothing recorded unasked
-    const Outcome viewed =
-        view_scene(**loaded, o.run, o.view, console, [](const RunSummary&) {});
+    const Outcome viewed = view_scene(**loaded, o.run, o.view, console, [](const RunSummary&) {});
     if (!viewed) return console.fail(viewed.error());
   }
   console.result(json);

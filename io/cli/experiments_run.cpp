@@ -144,11 +144,10 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
     r = {};
     r.time = static_cast<double>(i) / def.rate;
     if (Outcome done = run.step(r); !done) return out.error = done.error(), out;
-    const h6Vec3 force =
-        has_shell ? elastic_wrench(h6GetContacts(run.session.get(), first.body),
-                                   def.contact.stiffness)
-                        .force
-                  : h6Vec3{};
+    const h6Vec3 force = has_shell ? elastic_wrench(h6GetContacts(run.session.get(), first.body),
+                                                    def.contact.stiffness)
+                                         .force
+                                   : h6Vec3{};
     tally.frame(r, force);
     out.final_pose = r.body[0].pose;
     if (!recorder)

@@ -27,18 +27,18 @@ std::vector<MethodColumn> method_columns();
 
 struct RunChange {
   MethodColumn method;
-  double force = 1;                // multiple of the coupling's stiffness and bounds
-  double stiffness = 0;            // of contacts, 0: the scene's [N/m]
-  double damping = -1;             // of contacts, < 0: the scene's [s]
-  int integrator = -1;             // < 0: the scene's
-  double rate = 0;                 // 0: the scene's [Hz]
-  double max_force = -1;           // of the coupling [N]; 0: half a voxel's, < 0: the scene's
-  const io::Path* path = nullptr;  // of the first hand, null: the scene's
-  std::string device = "path";     // of every hand, as `hapsix run --device` takes it
-  std::optional<io::SceneArm> arm; // of every hand, none: the scene's
+  double force = 1;                 // multiple of the coupling's stiffness and bounds
+  double stiffness = 0;             // of contacts, 0: the scene's [N/m]
+  double damping = -1;              // of contacts, < 0: the scene's [s]
+  int integrator = -1;              // < 0: the scene's
+  double rate = 0;                  // 0: the scene's [Hz]
+  double max_force = -1;            // of the coupling [N]; 0: half a voxel's, < 0: the scene's
+  const io::Path* path = nullptr;   // of the first hand, null: the scene's
+  std::string device = "path";      // of every hand, as `hapsix run --device` takes it
+  std::optional<io::SceneArm> arm;  // of every hand, none: the scene's
   // Has the last word on the definitions, once for every hand: modes, filters, ...
   std::function<void(h6SessionDef&, h6HandDef&)> also;
-  std::string record;              // .h5 file, empty: none
+  std::string record;  // .h5 file, empty: none
 };
 
 struct RunFigures {

@@ -104,8 +104,7 @@ Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::Sc
     const auto index = static_cast<std::int32_t>(i);
     const auto body = static_cast<std::size_t>(loaded.body_index(hands[i].body));
     if (Outcome opened = open_hand(hands[i], loaded.bodies[body], h6GetCoupling(session, index),
-                                   io::metres(loaded.scene.unit), i == 0 ? steering : nullptr,
-                                   out);
+                                   io::metres(loaded.scene.unit), i == 0 ? steering : nullptr, out);
         !opened)
       return Failure{"hand of '" + hands[i].body + "': " + opened.error()};
     h6SetRating(session, index, &out.devices[i].capabilities);

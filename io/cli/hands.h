@@ -23,7 +23,6 @@ struct Hands {
 // `hands` are the scene's, changed at will; their `def` must be what the session was made of.
 // `steering` may take the first hand off its path.
 Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,
-                         h6Session* session,
-                         std::shared_ptr<device::Steering> steering = nullptr);
+                         h6Session* session, std::shared_ptr<device::Steering> steering = nullptr);
 
 }  // namespace h6::cli

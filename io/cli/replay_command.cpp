@@ -108,8 +108,9 @@ class Replay {
     head_ = recording->head;
     frames_ = recording->frame_count;
     if (!recording->remark.empty()) remarks.push_back(recording->remark);
-    Result<std::unique_ptr<RecordedSession>> opened = RecordedSession::open(
-        options_.file, *recording, {options_.method, options_.threads}, console_.progress(), remarks);
+    Result<std::unique_ptr<RecordedSession>> opened =
+        RecordedSession::open(options_.file, *recording, {options_.method, options_.threads},
+                              console_.progress(), remarks);
     if (!opened) return opened.failure();
     session_ = std::move(*opened);
     return Done{};

@@ -23,9 +23,9 @@ struct RunOptions {
   std::string method;  // empty: the scene's
   unsigned threads = 1;
   double spin_us = 0;
-  double budget_us = 0;  // anytime mode; 0: off
-  std::string record;  // empty: none
-  std::string trace;   // .json timeline of the last seconds; empty: none
+  double budget_us = 0;             // anytime mode; 0: off
+  std::string record;               // empty: none
+  std::string trace;                // .json timeline of the last seconds; empty: none
   RunObserver* observer = nullptr;  // with one the run has no end of its own
   std::size_t view_contacts = 0;    // rows of contacts kept for the observer
 };
@@ -38,7 +38,7 @@ struct RunSummary {
   std::uint32_t contacts_max = 0;
   double max_depth_voxels = 0;
   double missed_depth_voxels = 0;  // of coarse frames, the bound
-  double net_stiffness_max = 0;  // when the scene asks for it [N/m]
+  double net_stiffness_max = 0;    // when the scene asks for it [N/m]
   Histogram frame_us, wakeup_us;
   std::array<Histogram, H6_STAGE_COUNT> stage_us;
   h6Pose final_pose{}, hand_pose{};

@@ -30,7 +30,7 @@ struct RunSetup {
   std::vector<io::SceneHand> hands;  // device, path and figures; `def` is taken from hand_defs
   std::string record;                // .h5 file, empty: none
   std::shared_ptr<device::Steering> steering;  // who may take the first hand off its path
-  bool virtual_time = true;          // what the recording says; whoever steps knows
+  bool virtual_time = true;                    // what the recording says; whoever steps knows
 
   SessionPtr session;
   Hands devices;

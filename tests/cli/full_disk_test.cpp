@@ -30,10 +30,10 @@ bool cache_is_empty(const Sandbox& box) { return fs::is_empty(box.cache()); }
 TEST_CASE("a bake onto a full disk says so and leaves no file, and the older one as it was") {
   Sandbox box;
   spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 10)));
-  for (const Args& bake : {Args{"bake", "field", "ball.stl", "--voxels", "64", "-o", "ball.vdb"},
-                           Args{"bake", "field", "ball.stl", "--voxels", "64", "--no-compression",
-                                "-o", "ball.vdb"},
-                           Args{"bake", "shell", "ball.stl", "--points", "5000", "-o", "ball.ply"}}) {
+  for (const Args& bake :
+       {Args{"bake", "field", "ball.stl", "--voxels", "64", "-o", "ball.vdb"},
+        Args{"bake", "field", "ball.stl", "--voxels", "64", "--no-compression", "-o", "ball.vdb"},
+        Args{"bake", "shell", "ball.stl", "--points", "5000", "-o", "ball.ply"}}) {
     const std::string out = bake.back();
     CAPTURE(out);
     for (const bool there_before : {false, true}) {
@@ -65,9 +65,9 @@ TEST_CASE("a run whose assets do not fit into the cache runs, warned, and leaves
 
 TEST_CASE("a recording that outgrows the disk ends the run with a sentence, and still opens") {
   Sandbox box;
-  const Ended ended = Process(box, {"run", "box-on-wall", "--virtual-time", "--record", "run.h5"},
-                              "", -1, 200'000)
-                          .wait();
+  const Ended ended =
+      Process(box, {"run", "box-on-wall", "--virtual-time", "--record", "run.h5"}, "", -1, 200'000)
+          .wait();
   CAPTURE(ended.err);
   CHECK(ended.code == 1);
   CHECK(lines(ended.err, "hapsix: ") == 1);

@@ -22,7 +22,8 @@ void is_a_run(const Json& run) {
             "events"});
   has(run.value("contacts", Json()), {"mean", "max"});
   has(run.value("frame_us", Json()), {"p50", "p99", "p999", "max"});
-  has(run.value("deadline", Json()), {"missed_compute", "missed_wakeup", "missed_stolen", "late_us"});
+  has(run.value("deadline", Json()),
+      {"missed_compute", "missed_wakeup", "missed_stolen", "late_us"});
   for (const char* pose : {"final_pose", "hand_pose"}) {
     has(run.value(pose, Json()), {"p", "q"});
     CHECK(run[pose]["p"].size() == 3);

@@ -149,8 +149,8 @@ TEST_CASE("a mesh of nothing, of too much or of the same again is a result or a 
     spill_scene(sandbox, odd.file);
     const std::set<std::string> before = sandbox.files();
     Process field(sandbox, {"bake", "field", odd.file, "-o", "out.vdb", "--voxels", "32"});
-    Process shell(sandbox, {"bake", "shell", odd.file, "-o", "out.ply", "--points", "100",
-                            "--voxels", "32"});
+    Process shell(
+        sandbox, {"bake", "shell", odd.file, "-o", "out.ply", "--points", "100", "--voxels", "32"});
     Process info(sandbox, {"info", odd.file});
     Process scene(sandbox, {"run", "scene.json", "--virtual-time"});
     std::set<std::string> expected = before;
@@ -176,8 +176,8 @@ TEST_CASE("a mesh far from its origin, in a file of doubles, has the field it ha
   Sandbox sandbox;
   const auto bake = [&](const std::string& name, Point at) {
     spill(sandbox.file(name + ".obj"), as_obj(box(1e-3, at)));
-    return result_of(sandbox, {"bake", "field", name + ".obj", "-o", name + ".vdb", "--voxels",
-                               "64"});
+    return result_of(sandbox,
+                     {"bake", "field", name + ".obj", "-o", name + ".vdb", "--voxels", "64"});
   };
   const Json near = bake("near", {0, 0, 0}), far = bake("far", {999e3, -999e3, 999e3});
   for (const char* key : {"dims", "bricks", "closed", "offset", "warnings"}) {

@@ -161,8 +161,7 @@ TEST_CASE("a nut pulled along its bolt goes as far as the play of the thread, an
 TEST_CASE("a nut in the right screw motion follows its hand and is not held") {
   const auto data = test_data();
   if (!data) return;
-  const fs::path scene =
-      nut::write(*data, workplace() / "nut-screwed", nut::turn(2, nut::pitch));
+  const fs::path scene = nut::write(*data, workplace() / "nut-screwed", nut::turn(2, nut::pitch));
   const json result = run(scene, "robust");
   report(result);
   check_sound(result);
@@ -205,7 +204,7 @@ TEST_CASE("a gear sits on its post, is held by it sideways, and comes off freely
     const json pushed = run(scene, method, gear::pushed);
     CHECK(near(hand(pushed).p[0], 3e-3, 1e-6));
     CHECK(std::abs(body(pushed).p[2]) < 0.25 * gear::voxel);
-    CHECK(body(pushed).p[0] > 0.005e-3);  // it used the play it has ...
+    CHECK(body(pushed).p[0] > 0.005e-3);                            // it used the play it has ...
     CHECK(sideways(body(pushed)) < 0.0125e-3 + 0.5 * gear::voxel);  // ... and no more
 
     const json lifting = run(scene, method, gear::lifting);  // still around the post

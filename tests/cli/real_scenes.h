@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 struct Keyframe {
-  double t;                          // [s]
-  std::array<double, 3> p;           // [m]
+  double t;                 // [s]
+  std::array<double, 3> p;  // [m]
   std::array<double, 4> q{1, 0, 0, 0};
 };
 using HandPath = std::vector<Keyframe>;
@@ -33,8 +33,8 @@ inline std::array<double, 4> turn_about_z(double angle) {
 }
 
 struct Grip {
-  double contact_stiffness;   // k [N/m]
-  double half_size;           // of the part held [m]
+  double contact_stiffness;  // k [N/m]
+  double half_size;          // of the part held [m]
   double stiffness() const { return contact_stiffness / 10; }
   double rotational_stiffness() const { return stiffness() * half_size * half_size; }
 };
@@ -57,17 +57,17 @@ inline fs::path write_scene(const fs::path& folder, const json& bodies, const Gr
   csv.precision(17);
   csv << "t,x,y,z,qw,qx,qy,qz\n";
   for (const Keyframe& k : path)
-    csv << k.t << ',' << k.p[0] << ',' << k.p[1] << ',' << k.p[2] << ',' << k.q[0] << ','
-        << k.q[1] << ',' << k.q[2] << ',' << k.q[3] << '\n';
-  const json scene = {{"hapsix", 1},
-                      {"name", folder.filename().string()},
-                      {"units", "m"},
-                      {"bodies", bodies},
-                      {"contact", {{"stiffness", grip.contact_stiffness}}},
-                      {"coupling",
-                       {{"stiffness", grip.stiffness()},
-                        {"rotational_stiffness", grip.rotational_stiffness()}}},
-                      {"hands", {{{"body", bodies.back()["name"]}, {"path", "hand.csv"}}}}};
+    csv << k.t << ',' << k.p[0] << ',' << k.p[1] << ',' << k.p[2] << ',' << k.q[0] << ',' << k.q[1]
+        << ',' << k.q[2] << ',' << k.q[3] << '\n';
+  const json scene = {
+      {"hapsix", 1},
+      {"name", folder.filename().string()},
+      {"units", "m"},
+      {"bodies", bodies},
+      {"contact", {{"stiffness", grip.contact_stiffness}}},
+      {"coupling",
+       {{"stiffness", grip.stiffness()}, {"rotational_stiffness", grip.rotational_stiffness()}}},
+      {"hands", {{{"body", bodies.back()["name"]}, {"path", "hand.csv"}}}}};
   std::ofstream(folder / "scene.json") << scene.dump(1);
   return folder / "scene.json";
 }
@@ -92,8 +92,8 @@ inline fs::path write(const fs::path& data, const fs::path& folder, const HandPa
 }
 // 10 mm up in a second, a rest, and back.
 inline HandPath pull() {
-  return {{0, {0, 0, start}},          {0.2, {0, 0, start}},        {1.2, {0, 0, start + 0.01}},
-          {1.7, {0, 0, start + 0.01}}, {2.7, {0, 0, start}},        {3.2, {0, 0, start}}};
+  return {{0, {0, 0, start}},          {0.2, {0, 0, start}}, {1.2, {0, 0, start + 0.01}},
+          {1.7, {0, 0, start + 0.01}}, {2.7, {0, 0, start}}, {3.2, {0, 0, start}}};
 }
 // `turns` > 0 unscrews, in a second each; `lead` metres up per turn.
 inline HandPath turn(double turns, double lead) {
@@ -101,8 +101,8 @@ inline HandPath turn(double turns, double lead) {
   const double steps = std::ceil(std::abs(turns)) * 100;
   for (double i = 0; i <= steps; ++i) {
     const double done = turns * i / steps;
-    path.push_back({0.01 * i, {0, 0, start + lead * done},
-                    turn_about_z(2 * std::numbers::pi * done)});
+    path.push_back(
+        {0.01 * i, {0, 0, start + lead * done}, turn_about_z(2 * std::numbers::pi * done)});
   }
   path.push_back({path.back().t + 0.5, path.back().p, path.back().q});
   return path;
@@ -122,11 +122,10 @@ constexpr double max_force = grip.contact_stiffness * voxel / 2;  // 2 N
 constexpr double seated = 1.49, pushed = 2.19, lifting = 3.0;
 
 inline fs::path write(const fs::path& data, const fs::path& folder) {
-  const HandPath path = {{0, {0, 0, start}},       {0.1, {0, 0, start}},
-                         {1.1, {0, 0, -2e-3}},     {1.5, {0, 0, -2e-3}},
-                         {1.8, {3e-3, 0, -2e-3}},  {2.2, {3e-3, 0, -2e-3}},
-                         {2.5, {0, 0, -2e-3}},     {2.6, {0, 0, 0}},
-                         {3.6, {0, 0, start}},     {4.0, {0, 0, start}}};
+  const HandPath path = {{0, {0, 0, start}},   {0.1, {0, 0, start}},    {1.1, {0, 0, -2e-3}},
+                         {1.5, {0, 0, -2e-3}}, {1.8, {3e-3, 0, -2e-3}}, {2.2, {3e-3, 0, -2e-3}},
+                         {2.5, {0, 0, -2e-3}}, {2.6, {0, 0, 0}},        {3.6, {0, 0, start}},
+                         {4.0, {0, 0, start}}};
   return write_scene(
       folder,
       {field_of("base", data / "gears/factory_gear_base_loose_space_5e-4_subdiv_4x.obj",
@@ -157,21 +156,19 @@ inline void write_floor(const fs::path& file) {
 }
 
 inline fs::path write(const fs::path& data, const fs::path& folder) {
-  const HandPath path = {{0, {0, 0, start}},       {0.1, {0, 0, start}},
-                         {0.8, {0, 0, -2e-3}},     {1.2, {0, 0, -2e-3}},
-                         {1.5, {3e-3, 0, -2e-3}},  {2.0, {3e-3, 0, -2e-3}},
-                         {2.3, {0, 0, -2e-3}},     {2.4, {0, 0, 0}},
-                         {3.2, {0, 0, start}},     {3.6, {0, 0, start}}};
+  const HandPath path = {{0, {0, 0, start}},   {0.1, {0, 0, start}},    {0.8, {0, 0, -2e-3}},
+                         {1.2, {0, 0, -2e-3}}, {1.5, {3e-3, 0, -2e-3}}, {2.0, {3e-3, 0, -2e-3}},
+                         {2.3, {0, 0, -2e-3}}, {2.4, {0, 0, 0}},        {3.2, {0, 0, start}},
+                         {3.6, {0, 0, start}}};
   fs::create_directories(folder);
   write_floor(folder / "floor.obj");
-  return write_scene(
-      folder,
-      {field_of("hole", data / "peg-hole/factory_round_hole_16mm_subdiv_3x.obj",
-                {{"voxel_size", voxel}}),
-       field_of("floor", "floor.obj", {{"voxel_size", voxel}}),
-       shell_of("peg", data / "peg-hole/factory_round_peg_16mm_tight.obj", {{"spacing", 4e-4}},
-                path.front())},
-      grip, path);
+  return write_scene(folder,
+                     {field_of("hole", data / "peg-hole/factory_round_hole_16mm_subdiv_3x.obj",
+                               {{"voxel_size", voxel}}),
+                      field_of("floor", "floor.obj", {{"voxel_size", voxel}}),
+                      shell_of("peg", data / "peg-hole/factory_round_peg_16mm_tight.obj",
+                               {{"spacing", 4e-4}}, path.front())},
+                     grip, path);
 }
 }  // namespace peg
 

@@ -4,11 +4,11 @@
 int main(void) { /* a floor at z = 4 mm in one brick of 1 mm cells; a part of one point */
   float d[512], far_grid[8], zero = 0, up = 1;
   int32_t brick = 0;
-  uint32_t rows[2] = {0, 1};
+  uint32_t row[2] = {0, 1};
   for (int i = 0; i < 512; ++i) d[i] = 1e-3f * (float)(i / 64 - 4);
   for (int i = 0; i < 8; ++i) far_grid[i] = d[i < 4 ? 0 : 511];
   h6FieldDef floor = {{0, 0, 0}, 1e-3, {1, 1, 1}, &brick, d, 1, far_grid, 1e-3, NULL, NULL};
-  h6ShellDef tip = {1, &zero, &zero, &zero, &zero, &zero, &up, NULL, 1, rows, rows, &zero, rows, rows};
+  h6ShellDef tip = {1, &zero, &zero, &zero, &zero, &zero, &up, NULL, 1, row, row, &zero, row, row};
   h6ModelDef parts = {.fields = &floor, .field_count = 1, .shells = &tip, .shell_count = 1};
   h6Model* model = h6CreateModel(&parts, NULL);
   h6BodyDef body[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};

@@ -27,8 +27,9 @@ FieldData must_bake(const Mesh& mesh, const FieldBake& options) {
 
 }  // namespace
 
-TEST_CASE("bake_field: at a million random points the far bound is safe, and at its own nodes within "
-          "a third of a voxel of the truth on average") {
+TEST_CASE(
+    "bake_field: at a million random points the far bound is safe, and at its own nodes within "
+    "a third of a voxel of the truth on average") {
   // |far| is 1-Lipschitz-safe from each corner of a cell: the best corner less the way to it. On
   // average over the corners themselves it must not be loose.
   const auto check = [](const Mesh& mesh, const FieldBake& options, int points) {
@@ -72,6 +73,9 @@ TEST_CASE("bake_field: at a million random points the far bound is safe, and at 
   check(turned(l_shape(1.0), 0.4, 0.3), small_bake(128), 200000);
   check(torus(1.0, 0.3), small_bake(128), 200000);
   check(soup, small_bake(128), 400000);
-  check(patch(6, 6, [](double s, double t) { return Vec3{s, t, 0.2 * s * t}; }), small_bake(96),
-        200000);
+  check(patch(6, 6,
+              [](double s, double t) {
+                return Vec3{s, t, 0.2 * s * t};
+              }),
+        small_bake(96), 200000);
 }

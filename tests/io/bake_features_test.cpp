@@ -95,8 +95,8 @@ TEST_CASE("bake_field: distances are exact beside slivers and where corners lie 
   }
   CHECK(worst_outside(strip, 64) < 1e-3);
   Mesh junction;
-  junction.vertices = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0.3}, {0, 0, 0}, {0.3, -1, 0.2},
-                       {-0.7, -0.9, 0}};
+  junction.vertices = {{-1, 0, 0}, {1, 0, 0},      {0, 1, 0.3},
+                       {0, 0, 0},  {0.3, -1, 0.2}, {-0.7, -0.9, 0}};
   junction.triangles = {{0, 1, 2}, {3, 1, 4}, {0, 3, 5}, {3, 4, 5}};
   CHECK(worst_outside(junction, 64) < 1e-3);
 }

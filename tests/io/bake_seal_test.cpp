@@ -49,10 +49,13 @@ Mesh box_without(int n, Drop&& drop, Vec3 size = {1, 1, 1}) {
 // A square hole of `cells` x `cells` of 24, an even number, in the middle of the top.
 Mesh holed_box(int cells, Vec3 size = {1, 1, 1}) {
   const double half = 0.5 * cells / 24;
-  return box_without(24, [&](Vec3 m) {
-    return m.z > size.z - 1e-9 && std::fabs(m.x / size.x - 0.5) < half &&
-           std::fabs(m.y / size.y - 0.5) < half;
-  }, size);
+  return box_without(
+      24,
+      [&](Vec3 m) {
+        return m.z > size.z - 1e-9 && std::fabs(m.x / size.x - 0.5) < half &&
+               std::fabs(m.y / size.y - 0.5) < half;
+      },
+      size);
 }
 
 bool within(Vec3 p, Vec3 low, Vec3 high) {
@@ -62,12 +65,13 @@ bool within(Vec3 p, Vec3 low, Vec3 high) {
 // Which side, wherever the field has a brick or a node of the far grid.
 bool inside(const FieldData& f, Vec3 p) {
   const Vec3 g = (1 / f.voxel_size) * (p - f.origin);
-  if (const float* d = node_sample(f, {int(std::lround(g.x)), int(std::lround(g.y)),
-                                       int(std::lround(g.z))}))
+  if (const float* d =
+          node_sample(f, {int(std::lround(g.x)), int(std::lround(g.y)), int(std::lround(g.z))}))
     return *d < 0;
   const auto at = [](double v) { return std::size_t(std::lround(v / 8)); };
   return f.far_grid[(at(g.z) * std::size_t(f.bricks[1] + 1) + at(g.y)) *
-                        std::size_t(f.bricks[0] + 1) + at(g.x)] < 0;
+                        std::size_t(f.bricks[0] + 1) +
+                    at(g.x)] < 0;
 }
 
 // Nodes on the wrong side of a solid box, away from `hole` and beyond the offset.
@@ -140,12 +144,11 @@ TEST_CASE("seal: a mesh without holes is unchanged, bit for bit, concave corners
   plain.sign = sealed.sign = h6::io::SignMode::flood;  // or a closed mesh would not be looked at
   Mesh room = box({0, 0, 0}, {1, 1, 1}, 4);            // a pit: five concave corners and edges
   std::erase_if(room.triangles, [&](const auto& t) {
-    return std::all_of(t.begin(), t.end(), [&](std::uint32_t v) {
-      return room.vertices[v].z > 1 - 1e-9;
-    });
+    return std::all_of(t.begin(), t.end(),
+                       [&](std::uint32_t v) { return room.vertices[v].z > 1 - 1e-9; });
   });
-  for (const Mesh& mesh : {l_shape(1.0), turned(l_shape(1.0), 0.4, 0.3), turned(room, 0.3, 0.2),
-                           torus(1.0, 0.4)}) {
+  for (const Mesh& mesh :
+       {l_shape(1.0), turned(l_shape(1.0), 0.4, 0.3), turned(room, 0.3, 0.2), torus(1.0, 0.4)}) {
     FieldBakeReport report;
     const FieldData a = must_bake(mesh, plain), b = must_bake(mesh, sealed, &report);
     CHECK(report.sealed_area == 0);

@@ -65,12 +65,12 @@ inline Mesh box(Vec3 low, Vec3 high, int n = 2) {
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side)
       add(mesh, patch(n, n, [&](double s, double t) {
-        double c[3] = {};
-        c[axis] = side;
-        c[(axis + 1) % 3] = side ? s : t;
-        c[(axis + 2) % 3] = side ? t : s;
-        return low + Vec3{c[0] * size.x, c[1] * size.y, c[2] * size.z};
-      }));
+            double c[3] = {};
+            c[axis] = side;
+            c[(axis + 1) % 3] = side ? s : t;
+            c[(axis + 2) % 3] = side ? t : s;
+            return low + Vec3{c[0] * size.x, c[1] * size.y, c[2] * size.z};
+          }));
   return h6::io::weld(mesh);
 }
 
@@ -157,8 +157,8 @@ class Judge {
   explicit Judge(const Mesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
     std::iota(order_.begin(), order_.end(), 0u);
     for (const auto& t : mesh.triangles)
-      middle_.push_back((1.0 / 3) * (mesh.vertices[t[0]] + mesh.vertices[t[1]] +
-                                     mesh.vertices[t[2]]));
+      middle_.push_back((1.0 / 3) *
+                        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]));
     if (!order_.empty()) build(0, order_.size());
   }
 

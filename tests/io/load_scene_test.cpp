@@ -1,8 +1,8 @@
 // From a scene to what the engine runs: mass properties, shared assets, sentences that name the
 // body.
 #include <doctest/doctest.h>
-#include "tests/support/near.h"
 #include <unistd.h>
+#include "tests/support/near.h"
 
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
-// mesh_nodes_test.cpp - glTF and COLLADA: every node where its transforms put it, the right way out,
-// under its name; and nothing a hostile file can say does harm.
+// mesh_nodes_test.cpp - glTF and COLLADA: every node where its transforms put it, the right way
+// out, under its name; and nothing a hostile file can say does harm.
 #include <doctest/doctest.h>
 #include <unistd.h>
 
@@ -81,9 +81,8 @@ struct Folder {
 
 TEST_CASE("JSON with its data inside, one binary file and XML give the same mesh, packed or not") {
   const Mesh expected = weld(kBox);
-  const std::vector<File> files = {as_gltf(kPlain),
-                                   {"a.glb", glb(gltf(kBox, kPlain, ""), buffer(kBox))},
-                                   as_dae(kPlainDae)};
+  const std::vector<File> files = {
+      as_gltf(kPlain), {"a.glb", glb(gltf(kBox, kPlain, ""), buffer(kBox))}, as_dae(kPlainDae)};
   for (const File& file : files) {
     CAPTURE(file.name);
     CHECK(samples::same_bits(good(file), expected));
@@ -92,7 +91,8 @@ TEST_CASE("JSON with its data inside, one binary file and XML give the same mesh
   }
 }
 
-TEST_CASE("nested nodes apply the inner transform first: scale, turn, shift, each by the parent's") {
+TEST_CASE(
+    "nested nodes apply the inner transform first: scale, turn, shift, each by the parent's") {
   // Box 2 x 1 x 0.25, scaled to 4 x 3 x 1, turned by 90 deg about z, shifted by (0, 0, 1); then
   // scaled by (10, 1, 1), which does not commute with the turn, and shifted by (100, 0, 0).
   const Vec3 low = {100 - 15, -2, 1}, high = {100 + 15, 2, 2};
@@ -176,7 +176,8 @@ TEST_CASE("glTF is in metres whatever unit is given, and says so") {
   CHECK(mesh.remarks[0].find("metres") != std::string::npos);
 }
 
-TEST_CASE("a buffer beside the file or below it is read; nothing above, elsewhere or in a network") {
+TEST_CASE(
+    "a buffer beside the file or below it is read; nothing above, elsewhere or in a network") {
   const Folder folder;
   const std::string bytes = buffer(kBox);
   folder.put("a b.bin", bytes);
@@ -187,9 +188,10 @@ TEST_CASE("a buffer beside the file or below it is read; nothing above, elsewher
     REQUIRE_MESSAGE(mesh, mesh.error());
     CHECK(samples::same_bits(*mesh, weld(kBox)));
   }
-  const std::vector<std::string> outside = {
-      "../a b.bin",    "%2e%2e/a b.bin",                    "sub/../../a b.bin", "http://a.b/c.bin",
-      "file:///c.bin", (folder.path / "a b.bin").string(), "..\\\\a b.bin",    "a%00"};
+  const std::vector<std::string> outside = {"../a b.bin",        "%2e%2e/a b.bin",
+                                            "sub/../../a b.bin", "http://a.b/c.bin",
+                                            "file:///c.bin",     (folder.path / "a b.bin").string(),
+                                            "..\\\\a b.bin",     "a%00"};
   for (const std::string& uri : outside) {
     CAPTURE(uri);
     const auto mesh = read_mesh(folder.put("sub/m.gltf", gltf(kBox, kPlain, uri)));
@@ -226,8 +228,9 @@ TEST_CASE("strips, fans and polygons are cut with the winding they have; lines a
   up(good({"a.dae", with(with(with(loop, "<triangles", "<polylist"), "</triangles", "</polylist"),
                          "<p>", "<vcount>4</vcount><p>")}));
 
-  const Mesh both = good({"a.gltf", with(file, R"([{"attributes")",
-                                         R"([{"mode":1,"attributes":{"POSITION":0}},{"attributes")")});
+  const Mesh both =
+      good({"a.gltf", with(file, R"([{"attributes")",
+                           R"([{"mode":1,"attributes":{"POSITION":0}},{"attributes")")});
   CHECK(both.triangles.size() == 1);
   REQUIRE(both.remarks.size() == 1);
   CHECK(both.remarks[0].find("lines are left out") != std::string::npos);
@@ -236,7 +239,8 @@ TEST_CASE("strips, fans and polygons are cut with the winding they have; lines a
 
 TEST_CASE("what moves is read where it rests, with a remark") {
   const std::string more = R"(,"animations":[{}],"skins":[{"joints":[0]}])";
-  const Mesh a = good({"a.gltf", gltf(kBox, R"([{"mesh":0,"skin":0}])", data_uri(buffer(kBox)), more)});
+  const Mesh a =
+      good({"a.gltf", gltf(kBox, R"([{"mesh":0,"skin":0}])", data_uri(buffer(kBox)), more)});
   CHECK(a.triangles.size() == 12);
   CHECK(a.remarks.size() == 2);
   const std::string skinned =
@@ -260,7 +264,8 @@ TEST_CASE("a file that is wrong is refused with a sentence that names the place"
   refuses({"a.gltf", with(file, R"("mesh":0)", R"("mesh":0,"scale":[1e300,1,1])")}, "1e6 m");
   refuses({"a.gltf", with(file, R"("mesh":0)", R"("mesh":0,"scale":[1e999,1,1])")}, "number");
   refuses({"a.gltf", with(file, R"("mesh":0)", R"("mesh":0,"rotation":[0,0,0,0])")}, "quaternion");
-  refuses({"a.gltf", with(file, R"("scene":0)", R"("scene":0,"extensionsRequired":["KHR_draco_mesh_compression"])")},
+  refuses({"a.gltf", with(file, R"("scene":0)",
+                          R"("scene":0,"extensionsRequired":["KHR_draco_mesh_compression"])")},
           "KHR_draco");
   refuses({"a.gltf", "{}"}, "asset");
   refuses({"a.gltf", "[1, 2]"}, "no glTF");
@@ -276,7 +281,8 @@ TEST_CASE("a file that is wrong is refused with a sentence that names the place"
   refuses({"a.dae", with(xml, "-1 -0.5 0", "nan -0.5 0")}, "line 5 (float_array)");
   refuses({"a.dae", with(xml, "count=\"8\"", "count=\"9\"")}, "reaches beyond");
   refuses({"a.dae", with(xml, "count=\"8\"", "count=\"7\"")}, "names vertex 7");
-  refuses({"a.dae", with(xml, "<triangles count=\"12\"", "<triangles count=\"13\"")}, "announces 13");
+  refuses({"a.dae", with(xml, "<triangles count=\"12\"", "<triangles count=\"13\"")},
+          "announces 13");
   refuses({"a.dae", with(xml, "url=\"#g\"", "url=\"#h\"")}, "not there");
   refuses({"a.dae", with(xml, "url=\"#g\"", "url=\"http://a/b.dae#g\"")}, "same file");
   refuses({"a.dae", with(xml, "<!-- a comment -->", "<!DOCTYPE x>")}, "DOCTYPE");
@@ -313,17 +319,19 @@ TEST_CASE("nodes in a ring, and repetitions without bound, end with a sentence a
 
 TEST_CASE("2,000 damaged files of each kind are refused or a mesh") {
   std::mt19937_64 random(20);
-  const std::string nodes = R"([{"children":[1,2]},{"mesh":0,"name":"a"},{"mesh":0,"scale":[1,-1,2]}])";
+  const std::string nodes =
+      R"([{"children":[1,2]},{"mesh":0,"name":"a"},{"mesh":0,"scale":[1,-1,2]}])";
   const std::string xml = R"(<node name="n"><translate>1 2 3</translate><rotate>0 0 1 30</rotate>
       <instance_geometry url="#g"/><instance_node url="#k"/></node>)";
   const std::vector<File> files = {
-      as_gltf(nodes), {"a.glb", glb(gltf(kBox, nodes, ""), buffer(kBox))},
+      as_gltf(nodes),
+      {"a.glb", glb(gltf(kBox, nodes, ""), buffer(kBox))},
       as_dae(xml, R"(<unit meter="0.01"/>)",
              R"(<node id="k"><scale>1 -1 1</scale><instance_geometry url="#g"/></node>)")};
-  static const std::string kEvil[] = {"-1",   "0",    "4294967295", "18446744073709551615",
-                                      "1e999", "null", "99",        "[",
-                                      "{}",   "<",    "\"",         "#k",
-                                      "<a>",  "/>",   "nan",        "\xff\xff\xff\xff"};
+  static const std::string kEvil[] = {"-1",    "0",    "4294967295", "18446744073709551615",
+                                      "1e999", "null", "99",         "[",
+                                      "{}",    "<",    "\"",         "#k",
+                                      "<a>",   "/>",   "nan",        "\xff\xff\xff\xff"};
   int accepted = 0, refused = 0;
   for (const File& file : files) {
     CAPTURE(file.name);
@@ -333,13 +341,24 @@ TEST_CASE("2,000 damaged files of each kind are refused or a mesh") {
       for (unsigned changes = 1 + random() % 3; changes > 0; --changes) {
         const std::size_t at = random() % bytes.size(), length = 1 + random() % 8;
         switch (random() % 6) {
-          case 0: bytes[at] = static_cast<char>(random()); break;
-          case 1: bytes[at] = static_cast<char>(bytes[at] ^ (1u << random() % 8)); break;
-          case 2: bytes.erase(at, length); break;
-          case 3: bytes.insert(at, bytes.substr(random() % bytes.size(), 8 * length)); break;
-          case 4: bytes.replace(at, random() % 3, kEvil[random() % std::size(kEvil)]); break;
+          case 0:
+            bytes[at] = static_cast<char>(random());
+            break;
+          case 1:
+            bytes[at] = static_cast<char>(bytes[at] ^ (1u << random() % 8));
+            break;
+          case 2:
+            bytes.erase(at, length);
+            break;
+          case 3:
+            bytes.insert(at, bytes.substr(random() % bytes.size(), 8 * length));
+            break;
+          case 4:
+            bytes.replace(at, random() % 3, kEvil[random() % std::size(kEvil)]);
+            break;
           default:
-            if (random() % 8 == 0) bytes.resize(at + 1);
+            if (random() % 8 == 0)
+              bytes.resize(at + 1);
             else if (bytes[at] >= '0' && bytes[at] <= '9')
               bytes[at] = static_cast<char>('0' + random() % 10);
         }

@@ -97,8 +97,8 @@ inline std::string ply(const Mesh& mesh, const std::string& form) {
     out += "2 0.5 0.25 -7\n";
     for (const auto& p : mesh.vertices) out += "255 " + text(p) + "\n";
     for (const auto& t : mesh.triangles)
-      out += "3 " + std::to_string(t[0]) + " " + std::to_string(t[1]) + " " +
-             std::to_string(t[2]) + " 9\n";
+      out += "3 " + std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) +
+             " 9\n";
     return out;
   }
   const bool big = form == "binary_big_endian";

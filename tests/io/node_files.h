@@ -36,9 +36,10 @@ inline std::string data_uri(const std::string& bytes) {
   return "data:application/octet-stream;base64," + base64(bytes);
 }
 
-// One mesh "drawn". `nodes` is the JSON list; the scene shows node 0. `uri` empty: the .glb's chunk.
-inline std::string gltf(const samples::Mesh& mesh, const std::string& nodes,
-                        const std::string& uri, const std::string& more = "") {
+// One mesh "drawn". `nodes` is the JSON list; the scene shows node 0. `uri` empty: the .glb's
+// chunk.
+inline std::string gltf(const samples::Mesh& mesh, const std::string& nodes, const std::string& uri,
+                        const std::string& more = "") {
   const std::size_t points = 12 * mesh.vertices.size(), corners = 3 * mesh.triangles.size();
   const auto number = [](std::size_t n) { return std::to_string(n); };
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":)" + nodes +
@@ -72,19 +73,23 @@ inline std::string dae(const samples::Mesh& mesh, const std::string& asset,
   for (const auto& t : mesh.triangles)
     for (const auto v : t) corners += std::to_string(v) + " 0 ";  // and one normal for all
   const std::string n = std::to_string(mesh.vertices.size());
-  return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<!-- a comment -->\n<COLLADA version=\"1.4.1\">"
-         "<asset>" + asset + "</asset>\n<library_geometries><geometry id=\"g\" name=\"drawn\"><mesh>\n"
+  return "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<!-- a comment -->\n<COLLADA "
+         "version=\"1.4.1\">"
+         "<asset>" +
+         asset +
+         "</asset>\n<library_geometries><geometry id=\"g\" name=\"drawn\"><mesh>\n"
          "<source id=\"p\"><float_array id=\"a\" count=\"" +
          std::to_string(3 * mesh.vertices.size()) + "\">" + points +
          "</float_array>\n<technique_common><accessor source=\"#a\" count=\"" + n +
          "\" stride=\"3\"><param name=\"X\"/><param name=\"Y\"/><param name=\"Z\"/></accessor>"
          "</technique_common></source>\n"
          "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>\n"
-         "<triangles count=\"" + std::to_string(mesh.triangles.size()) +
+         "<triangles count=\"" +
+         std::to_string(mesh.triangles.size()) +
          "\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>"
-         "<input semantic=\"NORMAL\" source=\"#n\" offset=\"1\"/><p>" + corners +
-         "</p></triangles>\n</mesh></geometry></library_geometries>\n<library_nodes>" + library +
-         "</library_nodes>\n<library_visual_scenes><visual_scene id=\"s\">" + nodes +
+         "<input semantic=\"NORMAL\" source=\"#n\" offset=\"1\"/><p>" +
+         corners + "</p></triangles>\n</mesh></geometry></library_geometries>\n<library_nodes>" +
+         library + "</library_nodes>\n<library_visual_scenes><visual_scene id=\"s\">" + nodes +
          "</visual_scene></library_visual_scenes>\n"
          "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>\n";
 }

@@ -97,28 +97,25 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
 
 inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
   const auto equal = [](const auto& x, const auto& y) { return !std::memcmp(&x, &y, sizeof x); };
-  bool all = equal(a.time, b.time) && equal(a.wakeup_us, b.wakeup_us) && a.late == b.late &&
-             equal(a.late_us, b.late_us) && equal(a.cpu_us, b.cpu_us) &&
-             a.report.coarse_pairs == b.report.coarse_pairs &&
-             a.report.coarse_points == b.report.coarse_points && a.settings == b.settings &&
-             equal(a.report.missed_depth_voxels, b.report.missed_depth_voxels) &&
-             a.report.frame == b.report.frame && a.report.status == b.report.status &&
-             a.report.contacts == b.report.contacts &&
-             equal(a.report.max_depth, b.report.max_depth) &&
-             equal(a.report.max_depth_voxels, b.report.max_depth_voxels) &&
-             equal(a.report.net_stiffness_min, b.report.net_stiffness_min) &&
-             equal(a.report.net_stiffness_max, b.report.net_stiffness_max) &&
-             equal(a.report.stage_us, b.report.stage_us) &&
-             equal(a.report.frame_us, b.report.frame_us) &&
-             a.report.state_hash == b.report.state_hash;
+  bool all =
+      equal(a.time, b.time) && equal(a.wakeup_us, b.wakeup_us) && a.late == b.late &&
+      equal(a.late_us, b.late_us) && equal(a.cpu_us, b.cpu_us) &&
+      a.report.coarse_pairs == b.report.coarse_pairs &&
+      a.report.coarse_points == b.report.coarse_points && a.settings == b.settings &&
+      equal(a.report.missed_depth_voxels, b.report.missed_depth_voxels) &&
+      a.report.frame == b.report.frame && a.report.status == b.report.status &&
+      a.report.contacts == b.report.contacts && equal(a.report.max_depth, b.report.max_depth) &&
+      equal(a.report.max_depth_voxels, b.report.max_depth_voxels) &&
+      equal(a.report.net_stiffness_min, b.report.net_stiffness_min) &&
+      equal(a.report.net_stiffness_max, b.report.net_stiffness_max) &&
+      equal(a.report.stage_us, b.report.stage_us) && equal(a.report.frame_us, b.report.frame_us) &&
+      a.report.state_hash == b.report.state_hash;
   for (std::size_t h = 0; h < H6_MAX_HANDS; ++h)
     all = all && equal(a.hand[h].pose, b.hand[h].pose) &&
           equal(a.hand[h].velocity, b.hand[h].velocity) &&
-          equal(a.hand[h].wrench, b.hand[h].wrench) &&
-          a.hand[h].buttons == b.hand[h].buttons && equal(a.body[h], b.body[h]) &&
-          equal(a.command[h].wrench, b.command[h].wrench) &&
-          equal(a.command[h].pose, b.command[h].pose) &&
-          a.command[h].cause == b.command[h].cause &&
+          equal(a.hand[h].wrench, b.hand[h].wrench) && a.hand[h].buttons == b.hand[h].buttons &&
+          equal(a.body[h], b.body[h]) && equal(a.command[h].wrench, b.command[h].wrench) &&
+          equal(a.command[h].pose, b.command[h].pose) && a.command[h].cause == b.command[h].cause &&
           a.command[h].causes == b.command[h].causes && a.state[h] == b.state[h] &&
           a.hand[h].sequence == b.hand[h].sequence &&
           a.safety_input[h].asked == b.safety_input[h].asked &&

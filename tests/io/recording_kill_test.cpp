@@ -101,7 +101,8 @@ TEST_CASE("what was handed over is on disk soon, at any rate of frames") {
   CHECK(read(file).frames.back().report.frame == 20900);
 }
 
-TEST_CASE("50 runs killed at random instants leave files that open and lack at most half a second") {
+TEST_CASE(
+    "50 runs killed at random instants leave files that open and lack at most half a second") {
   const Folder folder;
   std::mt19937_64 random(20);
   std::size_t kills = 0;

@@ -107,16 +107,15 @@ TEST_CASE("a recording from before a column was added opens, with zeros in its p
   const std::vector<std::string> all = read(file).columns;
   CHECK(std::count(all.begin(), all.end(), "hand_wrench") == 1);
   const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-  const char* later[] = {"hand_wrench", "command_pose", "net_stiffness", "causes", "state",
-                         "sequence", "safety_asked", "overdue", "settings"};
+  const char* later[] = {"hand_wrench", "command_pose", "net_stiffness", "causes",  "state",
+                         "sequence",    "safety_asked", "overdue",       "settings"};
   for (const char* name : later)
     REQUIRE(H5Ldelete(h5, (std::string("/frames/") + name).c_str(), H5P_DEFAULT) >= 0);
   H5Fclose(h5);
   const Recording r = read(file);
   REQUIRE(r.frames.size() == 300);
   CHECK(r.columns.size() + std::size(later) == all.size());
-  for (const char* name : later)
-    CHECK(std::count(r.columns.begin(), r.columns.end(), name) == 0);
+  for (const char* name : later) CHECK(std::count(r.columns.begin(), r.columns.end(), name) == 0);
   for (std::size_t i = 0; i < 300; ++i) {
     h6FrameRecord expected = frame(i);
     expected.hand[0].wrench = {};

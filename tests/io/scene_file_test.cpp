@@ -187,7 +187,8 @@ TEST_CASE("switches that are off and an arm that is not described are not writte
   CHECK(!text.contains("net_stiffness"));
   CHECK(!text["contact"].contains("passivity"));
   CHECK(!text["bodies"][1].contains("translation_only"));
-  for (const char* key : {"relative", "passivity", "safety", "arm"}) CHECK(!text["hands"][0].contains(key));
+  for (const char* key : {"relative", "passivity", "safety", "arm"})
+    CHECK(!text["hands"][0].contains(key));
 }
 
 TEST_CASE("units scale every length and nothing else") {

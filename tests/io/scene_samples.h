@@ -2,8 +2,8 @@
 // same.
 #pragma once
 #include <doctest/doctest.h>
-#include "tests/support/near.h"
 #include <unistd.h>
+#include "tests/support/near.h"
 
 #include <cmath>
 #include <filesystem>
@@ -140,25 +140,21 @@ inline void check_same(const h6Pose& a, const h6Pose& b) {
 inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
   CHECK(a.method == b.method);
   if (a.method != H6_METHOD_ROBUST) CHECK(a.pieces == b.pieces);
-  const double xs[] = {a.stiffness,      a.damping,        a.global_n0,    a.epsilon,
-                       a.epsilon_normal, a.epsilon_torque, a.torque_length,
-                       a.series_c,       a.margin_voxels,  a.cluster_voxels};
+  const double xs[] = {a.stiffness,      a.damping,        a.global_n0,     a.epsilon,
+                       a.epsilon_normal, a.epsilon_torque, a.torque_length, a.series_c,
+                       a.margin_voxels,  a.cluster_voxels};
   CHECK(a.passivity == b.passivity);
-  const double ys[] = {b.stiffness,      b.damping,        b.global_n0,    b.epsilon,
-                       b.epsilon_normal, b.epsilon_torque, b.torque_length,
-                       b.series_c,       b.margin_voxels,  b.cluster_voxels};
+  const double ys[] = {b.stiffness,      b.damping,        b.global_n0,     b.epsilon,
+                       b.epsilon_normal, b.epsilon_torque, b.torque_length, b.series_c,
+                       b.margin_voxels,  b.cluster_voxels};
   for (int i = 0; i < 10; ++i) check_close(xs[i], ys[i]);
 }
 
 inline void check_same(const h6CouplingDef& a, const h6CouplingDef& b) {
-  const double xs[] = {a.stiffness,     a.rotational_stiffness,
-                       a.damping_ratio, a.max_depth_voxels,
-                       a.max_force,     a.max_torque,
-                       a.max_step_voxels};
-  const double ys[] = {b.stiffness,     b.rotational_stiffness,
-                       b.damping_ratio, b.max_depth_voxels,
-                       b.max_force,     b.max_torque,
-                       b.max_step_voxels};
+  const double xs[] = {a.stiffness, a.rotational_stiffness, a.damping_ratio,  a.max_depth_voxels,
+                       a.max_force, a.max_torque,           a.max_step_voxels};
+  const double ys[] = {b.stiffness, b.rotational_stiffness, b.damping_ratio,  b.max_depth_voxels,
+                       b.max_force, b.max_torque,           b.max_step_voxels};
   CHECK(a.mode == b.mode);
   for (int i = 0; i < 7; ++i) check_close(xs[i], ys[i]);
 }
@@ -188,9 +184,18 @@ inline void check_same(const h6HandDef& a, const h6HandDef& b) {
   check_close(a.driver_damping, b.driver_damping);
   check_close(a.admittance_damping, b.admittance_damping);
   const auto limits = [](const h6SafetyDef& d) {
-    return std::vector<double>{d.max_force,  d.max_torque,   d.max_force_rate, d.max_torque_rate,
-                               d.max_power,  d.max_speed,    d.derate_speed,   d.cut_speed,
-                               d.soft_start, d.decay_time,   d.pose_jump,      d.freeze_time,
+    return std::vector<double>{d.max_force,
+                               d.max_torque,
+                               d.max_force_rate,
+                               d.max_torque_rate,
+                               d.max_power,
+                               d.max_speed,
+                               d.derate_speed,
+                               d.cut_speed,
+                               d.soft_start,
+                               d.decay_time,
+                               d.pose_jump,
+                               d.freeze_time,
                                static_cast<double>(d.dead_man_buttons)};
   };
   const std::vector<double> la = limits(a.safety), lb = limits(b.safety);

@@ -137,7 +137,8 @@ TEST_CASE("every listed scene can be made under its kebab-case name, and no othe
     CHECK(entry.about.find('\n') == std::string::npos);
   }
   for (const SceneName& entry : small_scenes()) CHECK(scene_of(entry.name).name == entry.name);
-  for (const char* needed : {"box-on-wall", "peg-in-hole", "alpha-shortcut", "engine-bay", "landing-gear"})
+  for (const char* needed :
+       {"box-on-wall", "peg-in-hole", "alpha-shortcut", "engine-bay", "landing-gear"})
     CHECK(names.count(needed) == 1);
   const Result<Scene> unknown = make_scene("no-such-scene");
   REQUIRE(!unknown);

@@ -103,7 +103,8 @@ inline Mesh inside_out(Mesh mesh) {
 }
 
 // Least and mean distance to the nearest other point among the first `count`; `one_side`: of those
-// whose normals are less than 134 degrees apart, as the sides of a sheet are sampled each for itself.
+// whose normals are less than 134 degrees apart, as the sides of a sheet are sampled each for
+// itself.
 struct Spacing {
   double least = INFINITY, mean = 0;
 };

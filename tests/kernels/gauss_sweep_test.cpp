@@ -2,9 +2,6 @@
 // contacts.
 #include "kernels/gauss_sweep.h"
 
-#include "tests/kernels/gauss_cases.h"
-#include "tests/kernels/gauss_sets.h"
-#include "tests/support/near.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +9,9 @@
 #include <string>
 #include <thread>
 #include <vector>
+#include "tests/kernels/gauss_cases.h"
+#include "tests/kernels/gauss_sets.h"
+#include "tests/support/near.h"
 
 using namespace h6::kernels;
 using namespace h6::kernels::test;

@@ -1,9 +1,6 @@
 // gauss_tree_test.cpp - the tree gives the weights of the specification, at any number of contacts.
 #include "kernels/gauss_tree.h"
 
-#include "tests/kernels/gauss_cases.h"
-#include "tests/kernels/gauss_sets.h"
-#include "tests/support/near.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +8,9 @@
 #include <string>
 #include <thread>
 #include <vector>
+#include "tests/kernels/gauss_cases.h"
+#include "tests/kernels/gauss_sets.h"
+#include "tests/support/near.h"
 
 using namespace h6::kernels;
 using namespace h6::kernels::test;

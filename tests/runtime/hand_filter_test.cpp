@@ -334,7 +334,8 @@ TEST_CASE("under the clutch the hand feels nothing, the part stays pressed, and 
   scene.hand.filter.clutch_buttons = 2;
   scene.open();
   h6DeviceCapabilities slow{};
-  slow.max_force = 10, slow.max_torque = 1, slow.max_force_rate = 500, slow.frame_time = true;  // half a newton a frame
+  slow.max_force = 10, slow.max_torque = 1, slow.max_force_rate = 500,
+  slow.frame_time = true;  // half a newton a frame
   h6SetRating(scene.session, 0, &slow);
   scene.step(3000);
   const double pressed = scene.told.wrench.force.z, height = h6GetBody(scene.session, 1).pose.p.z;

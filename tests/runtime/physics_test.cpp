@@ -194,8 +194,9 @@ TEST_CASE("several fields act as one: two half floors hold like a whole one") {
     h6DestroySession(s);
     return z;
   };
-  // Depths, not heights. Interpolation rounds the edge where the halves meet: the twelve points next to
-  // it are shallower by a sixth, which is 1.4 % of the mean depth; sums then differ by about twice that.
+  // Depths, not heights. Interpolation rounds the edge where the halves meet: the twelve points
+  // next to it are shallower by a sixth, which is 1.4 % of the mean depth; sums then differ by
+  // about twice that.
   const double split = 5 * mm - rest_height({1, 2}), whole_depth = 5 * mm - rest_height({0});
   CHECK(split == h6::test::near(whole_depth).epsilon(0.04));
 }
