@@ -265,12 +265,7 @@ void bake_scaling(benchmark::State& state, const Lazy& make, int voxels) {
 
 void level_set(benchmark::State& state, const Lazy& make, int voxels, unsigned threads) {
   const InputPtr input = make();
-  io::Vec3 low = input->mesh.vertices[0], high = low;
-  for (const io::Vec3& v : input->mesh.vertices) {
-    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
-    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
-  }
-  const double side = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  const double side = io::bounds_of(input->mesh).longest();
   std::size_t bricks = 0;
   forget_peak();
   const std::int64_t begin = sched::now_ns();

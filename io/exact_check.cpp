@@ -221,7 +221,8 @@ class Check {
   // Of a node, as far as bake_field.h says what it is.
   void distance(double d, const RayScene::Near& near, Dice& dice, Tally& t) const {
     const double u = near.distance / h_;
-    // Of a sheet moved out by the offset, or of a solid at least.
+    // A plug is nearer than the mesh. What the mesh alone would allow: for a node in front of the
+    // surface its distance, for one in a solid the least depth that the offset leaves it.
     const bool solid = d <= -offset_;
     const double to_surface = solid ? -d : d + offset_,
                  to_mesh = solid ? std::fabs(offset_ - u) : u;
@@ -316,7 +317,8 @@ Result<ExactCheck> check_exactly(const Mesh& mesh, const FieldData& field,
   out.nodes = sum.node.count, out.worst_node = sum.node.most, out.mean_node = sum.node.mean();
   out.between = sum.between.count;
   out.worst_between = sum.between.most, out.mean_between = sum.between.mean();
-  out.far_excess = sum.excess, out.far_gap = sum.gap.mean();
+  out.far_excess = sum.excess;
+  out.outside = sum.gap.count, out.far_gap = sum.gap.mean();
   out.inside = sum.inside_gap.count, out.inside_gap = sum.inside_gap.mean();
   out.deep = sum.deep.count, out.worst_deep = sum.deep.most;
   out.corner_gap = sum.corner.mean();

@@ -41,11 +41,11 @@ struct ExactCheck {
   std::size_t enclosed = 0;  // inside, but rays say outside; no way out was found: cavities
   // In places without samples: the engine's lower bound of the distance [voxel].
   std::size_t far = 0, far_wrong = 0;
-  double far_excess = 0, far_gap = 0;  // most above the distance, mean below it where outside
-  double corner_gap = 0;               // likewise of the far grid itself, at its own nodes
-  // A tenth of those inside, where what is nearest has outside beyond it.
-  std::size_t inside = 0;
-  double inside_gap = 0;
+  double far_excess = 0;  // most above the distance
+  // Mean below the distance: outside, likewise of the far grid itself at its own nodes, and inside,
+  // of a tenth of the places, where what is nearest has outside beyond it. Of how many places.
+  std::size_t outside = 0, inside = 0;
+  double far_gap = 0, corner_gap = 0, inside_gap = 0;
 
   std::size_t wrong_sides() const { return drained + filled; }
   // A closed mesh, and nothing wrong with its field; of a soup the sides are a matter of opinion.

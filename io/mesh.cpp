@@ -34,4 +34,13 @@ Mesh weld(const Mesh& mesh) {
   return out;
 }
 
+MeshBounds bounds_of(const Mesh& mesh) {
+  MeshBounds b{mesh.vertices.front(), mesh.vertices.front()};
+  for (const Vec3& p : mesh.vertices) {
+    b.low = {std::min(b.low.x, p.x), std::min(b.low.y, p.y), std::min(b.low.z, p.z)};
+    b.high = {std::max(b.high.x, p.x), std::max(b.high.y, p.y), std::max(b.high.z, p.z)};
+  }
+  return b;
+}
+
 }  // namespace h6::io

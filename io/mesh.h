@@ -1,5 +1,6 @@
 // mesh.h - a triangle mesh in memory, and what is wrong with it.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -22,6 +23,13 @@ struct Mesh {
   std::vector<std::string> part_names;
   std::vector<std::string> remarks;  // sentences: what was left out or seems wrong
 };
+
+// The box around all vertices, of which there is one at least [m].
+struct MeshBounds {
+  Vec3 low, high;
+  double longest() const { return std::max({high.x - low.x, high.y - low.y, high.z - low.z}); }
+};
+MeshBounds bounds_of(const Mesh& mesh);
 
 // The same triangles in the same order over welded vertices: equal coordinates (-0 is +0) are one
 // vertex, vertices no triangle uses are gone, the rest stand in the order in which the triangles

@@ -92,12 +92,7 @@ void check_start(std::string_view bytes, const MeshSource& source) {
 // Nobody holds what is larger in the hand; millimetres taken for metres are.
 constexpr double kLargest = 20;  // [m]
 void remark_size(const MeshSource& source, Mesh& mesh) {
-  Vec3 low = mesh.vertices.front(), high = low;
-  for (const Vec3& p : mesh.vertices) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const double across = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  const double across = bounds_of(mesh).longest();
   if (across <= kLargest) return;
   char text[128];
   std::snprintf(text, sizeof text,

@@ -23,12 +23,8 @@ std::string too_far_for_floats(const Vec3& low, const Vec3& high) {
 
 std::string too_far_for_floats(const Mesh& mesh) {
   if (mesh.vertices.empty()) return "";
-  Vec3 low = mesh.vertices.front(), high = low;
-  for (const Vec3& p : mesh.vertices) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  return too_far_for_floats(low, high);
+  const MeshBounds box = bounds_of(mesh);
+  return too_far_for_floats(box.low, box.high);
 }
 
 }  // namespace h6::io

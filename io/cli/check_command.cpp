@@ -80,6 +80,7 @@ ordered_json exact_json(const io::ExactCheck& c) {
           {"far_excess_max", c.far_excess},
           {"far_gap_mean", c.far_gap},
           {"far_grid_gap_mean", c.corner_gap},
+          {"far_outside", c.outside},
           {"far_inside", c.inside},
           {"far_inside_gap_mean", c.inside_gap}};
 }
@@ -120,17 +121,33 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls, cons
                 m["holding_force_N"].get<double>());
 }
 
+// How far bounds are below the distance, where there is somewhere to ask.
+std::string looseness(const io::ExactCheck& c) {
+  char text[128];
+  std::string all;
+  if (c.outside > 0) {
+    std::snprintf(text, sizeof text,
+                  ", on average %.2g voxel below it outside (%.2g at the far grid)", c.far_gap,
+                  c.corner_gap);
+    all += text;
+  }
+  if (c.inside > 0) {
+    std::snprintf(text, sizeof text, ", on average %.2g voxel below it inside", c.inside_gap);
+    all += text;
+  }
+  return all;
+}
+
 void print(const io::ExactCheck& c) {
   std::printf(
       "  field   %s\n"
       "    distance  %zu nodes: %.2g voxel wrong at most; interpolated %.2g, %.2g on average\n"
       "    sides     %zu votes: %zu outside that should be inside, %zu inside that should be "
       "outside; %zu cavities, %zu doubtful\n"
-      "    far       %zu places: %zu bounds above the distance, %.2g voxel below it on average "
-      "outside (%.2g where the far grid is given), %.2g inside\n",
+      "    far       %zu places: %zu bounds above the distance%s\n",
       c.agrees() ? "agrees with the mesh" : "DISAGREES with the mesh", c.nodes, c.worst_node,
       c.worst_between, c.mean_between, c.voted, c.drained, c.filled, c.enclosed, c.doubtful, c.far,
-      c.far_wrong, c.far_gap, c.corner_gap, c.inside_gap);
+      c.far_wrong, looseness(c).c_str());
 }
 
 // What is worth a sentence of its own.

@@ -18,15 +18,6 @@ double distance_to_segment(const h6Vec3& p, const h6Vec3& a, const h6Vec3& b) {
   return length(p - a - s * ab);
 }
 
-double longest_side(const Mesh& mesh) {
-  Vec3 low = mesh.vertices.front(), high = low;
-  for (const Vec3& v : mesh.vertices) {
-    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
-    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
-  }
-  return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
-}
-
 // Longest edge first; equal ones in the order of their vertices.
 struct Edge {
   double squared;
@@ -245,7 +236,7 @@ IndustrialInput Assembly::broken(const Defects& defects, std::size_t probes) con
 
   IndustrialTruth& truth = out.truth;
   truth.duplicates = mesh.triangles.size() - single;
-  truth.voxel = longest_side(mesh) / (1024 - 2 * 8);  // less the padding
+  truth.voxel = bounds_of(mesh).longest() / (1024 - 2 * 8);  // less the padding
   truth.wires = wires_;
   for (const Hole& hole : holes_) {
     h6Vec3 centre{0, 0, 0}, normal{0, 0, 0};

@@ -43,22 +43,18 @@ struct Drawn {
 
 Drawn quantise(const Mesh& mesh) {
   Drawn out;
-  Vec3 low = mesh.vertices.front(), high = low;
-  for (const Vec3& v : mesh.vertices) {
-    low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
-    high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
-  }
-  const double side = std::max({high.x - low.x, high.y - low.y, high.z - low.z, 1e-9});
-  out.origin = low;
+  const MeshBounds box = bounds_of(mesh);
+  const double side = std::max(box.longest(), 1e-9);
+  out.origin = box.low;
   out.step = side / 65535;
   const auto cell = [&](double x, double from) {
     return static_cast<std::int16_t>(std::lround((x - from) / out.step) - 32768);
   };
   out.position.reserve(3 * mesh.vertices.size());
   for (const Vec3& v : mesh.vertices) {
-    out.position.push_back(cell(v.x, low.x));
-    out.position.push_back(cell(v.y, low.y));
-    out.position.push_back(cell(v.z, low.z));
+    out.position.push_back(cell(v.x, box.low.x));
+    out.position.push_back(cell(v.y, box.low.y));
+    out.position.push_back(cell(v.z, box.low.z));
   }
   out.index.reserve(3 * mesh.triangles.size());
   for (const auto& t : mesh.triangles) out.index.insert(out.index.end(), t.begin(), t.end());

@@ -194,7 +194,9 @@ async function start() {
   let view: View3D | null = null;
   try {
     view = new View3D($('space'));
-  } catch { /* It has said so in its place; the rest of the report does without. */ }
+  } catch (error) {
+    console.error(error);  // It has said so in its place; the rest of the report does without.
+  }
   if (view) {
     replay = new Replay(packet, view, strips);
     replay.go(0.6 * head.duration);
