@@ -32,12 +32,12 @@
 #include <string>
 #include <vector>
 
-#include "io/bake_field.h"
-#include "io/bake_shell.h"
-#include "io/mesh_file.h"
-#include "io/scenes/industrial.h"
+#include "io/bake/bake_field.h"
+#include "io/mesh/mesh_file.h"
+#include "io/scenes/industrial/industrial.h"
 #include "io/scenes/scenes.h"
-#include "kernels/triangle_distance.h"
+#include "io/shell/bake_shell.h"
+#include "kernels/bake/triangle_distance.h"
 #include "level_set_peer.h"
 #include "sched/clock.h"
 

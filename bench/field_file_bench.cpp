@@ -20,9 +20,9 @@
 #include <string>
 #include <vector>
 
-#include "io/bake_field.h"
-#include "io/field_file.h"
-#include "io/scenes/industrial.h"
+#include "io/bake/bake_field.h"
+#include "io/field/field_file.h"
+#include "io/scenes/industrial/industrial.h"
 #include "io/scenes/scenes.h"
 
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "io/load_scene.h"
+#include "io/scene/load_scene.h"
 #include "io/scenes/scenes.h"
 
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 #include <cstddef>
 
-#include "io/mesh.h"
+#include "io/mesh/mesh.h"
 
 namespace h6::bench {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "io/load_scene.h"
+#include "io/scene/load_scene.h"
 #include "io/scenes/scenes.h"
 #include "tests/support/frame_scenes.h"
 

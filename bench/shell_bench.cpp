@@ -18,11 +18,11 @@
 #include <memory>
 #include <string>
 
-#include "io/bake_plan.h"
-#include "io/bake_shell.h"
-#include "io/nearest_triangle.h"
-#include "io/scenes/industrial.h"
-#include "tests/io/shell_test_meshes.h"
+#include "io/bake/plan.h"
+#include "io/mesh/nearest_triangle.h"
+#include "io/scenes/industrial/industrial.h"
+#include "io/shell/bake_shell.h"
+#include "tests/io/shell/shell_test_meshes.h"
 
 namespace {
 

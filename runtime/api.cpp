@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "runtime/stages.h"
+#include "runtime/frame/stages.h"
 
 namespace h6 {
 

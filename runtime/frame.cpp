@@ -8,9 +8,9 @@
 // helper of `team`, joined in index order: any number of threads gives the same bits.
 #include <algorithm>
 
-#include "kernels/contact_columns.h"
-#include "runtime/net_stiffness.h"
-#include "runtime/stages.h"
+#include "kernels/contact/contact_columns.h"
+#include "runtime/frame/net_stiffness.h"
+#include "runtime/frame/stages.h"
 #include "sched/clock.h"
 #include "sched/realtime.h"
 

@@ -1,12 +1,12 @@
 // contact_columns_bench.cpp - what is done once a contact: sampling groups, making contacts of what
 // touches, torque directions.
-#include "kernels/contact_columns.h"
+#include "kernels/contact/contact_columns.h"
 
 #include <memory>
 #include <vector>
 
 #include "bench/kernels/field_bench.h"
-#include "kernels/touch_groups.h"
+#include "kernels/contact/touch_groups.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // contact_wrench_bench.cpp - wrench, stiffness and damping of n contacts.
-#include "kernels/contact_wrench.h"
+#include "kernels/contact/contact_wrench.h"
 
 #include <memory>
 #include <vector>

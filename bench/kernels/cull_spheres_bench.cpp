@@ -1,5 +1,5 @@
 // cull_spheres_bench.cpp - spheres of up to 6 voxels radius, within 20 voxels of the surface.
-#include "kernels/cull_spheres.h"
+#include "kernels/contact/cull_spheres.h"
 
 #include <memory>
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/kernels/kernel_bench.h"
-#include "tests/kernels/analytic_field.h"
+#include "tests/kernels/field/analytic_field.h"
 
 namespace h6::kernels::bench {
 

@@ -3,15 +3,15 @@
 //
 // Sets: spread (directions everywhere), clump (as wide as the hats), walls (six, rough, wall by
 // wall, torque directions of arms on them), one-normal (a flat wall), equal.
-#include "kernels/gauss_tree.h"
+#include "kernels/weights/gauss_tree.h"
 
 #include <algorithm>
 #include <memory>
 #include <vector>
 
 #include "bench/kernels/kernel_bench.h"
-#include "kernels/gauss_few.h"
-#include "kernels/gauss_sweep.h"
+#include "kernels/weights/gauss_few.h"
+#include "kernels/weights/gauss_sweep.h"
 
 namespace {
 

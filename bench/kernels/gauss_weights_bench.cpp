@@ -1,5 +1,5 @@
 // gauss_weights_bench.cpp - density on the Gauss map, n contacts against n.
-#include "kernels/gauss_weights.h"
+#include "kernels/weights/gauss_weights.h"
 
 #include <memory>
 #include <vector>

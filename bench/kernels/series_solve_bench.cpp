@@ -1,5 +1,5 @@
 // series_solve_bench.cpp - loads of n contacts, from nothing and from the last frame's extension.
-#include "kernels/series_solve.h"
+#include "kernels/weights/series_solve.h"
 
 #include <algorithm>
 #include <memory>

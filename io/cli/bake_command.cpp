@@ -7,15 +7,15 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "io/bake_field.h"
-#include "io/bake_shell.h"
-#include "io/cache.h"
-#include "io/cli/checks.h"
+#include "io/bake/bake_field.h"
 #include "io/cli/commands.h"
-#include "io/field_file.h"
-#include "io/mesh_file.h"
-#include "io/shell_file.h"
-#include "io/single_precision.h"
+#include "io/console/checks.h"
+#include "io/field/field_file.h"
+#include "io/mesh/mesh_file.h"
+#include "io/mesh/single_precision.h"
+#include "io/scene/cache.h"
+#include "io/shell/bake_shell.h"
+#include "io/shell/shell_file.h"
 
 namespace h6::cli {
 namespace {

@@ -7,17 +7,17 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "io/bake_plan.h"
-#include "io/clearance.h"
-#include "io/cli/checks.h"
+#include "io/bake/plan.h"
+#include "io/check/clearance.h"
+#include "io/check/exact_check.h"
+#include "io/check/wall_thickness.h"
 #include "io/cli/commands.h"
-#include "io/exact_check.h"
-#include "io/field_file.h"
-#include "io/load_scene.h"
-#include "io/mesh_file.h"
-#include "io/scene_file.h"
-#include "io/single_precision.h"
-#include "io/wall_thickness.h"
+#include "io/console/checks.h"
+#include "io/field/field_file.h"
+#include "io/mesh/mesh_file.h"
+#include "io/mesh/single_precision.h"
+#include "io/scene/load_scene.h"
+#include "io/scene/scene_file.h"
 
 namespace h6::cli {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 #include <functional>
 
-#include "io/cli/console.h"
+#include "io/console/console.h"
 
 namespace CLI {
 class App;

@@ -4,12 +4,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
 #include "io/cli/report_files.h"
-#include "io/cli/run_scene.h"
 #include "io/cli/tables.h"
 #include "io/cli/view_run.h"
+#include "io/console/checks.h"
+#include "io/run/run_scene.h"
 #include "io/scenes/scenes.h"
 #include "io/view/page.h"
 

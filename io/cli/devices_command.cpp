@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "device/spacemouse.h"
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
 #include "io/cli/device_check.h"
-#include "io/cli/open_device.h"
+#include "io/console/checks.h"
+#include "io/run/open_device.h"
 
 namespace h6::cli {
 namespace {

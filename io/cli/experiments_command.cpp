@@ -7,11 +7,11 @@
 #include <fstream>
 #include <memory>
 
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
-#include "io/cli/experiments_studies.h"
-#include "io/cli/experiments_weighing.h"
-#include "io/write_aside.h"
+#include "io/console/checks.h"
+#include "io/experiments/studies.h"
+#include "io/experiments/weighing.h"
+#include "io/file/write_aside.h"
 
 namespace h6::cli {
 namespace {

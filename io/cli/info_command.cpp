@@ -6,15 +6,15 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
-#include "io/field_file.h"
-#include "io/mesh_file.h"
-#include "io/recorded_run.h"
-#include "io/recording.h"
-#include "io/scene_file.h"
-#include "io/shell_file.h"
-#include "io/single_precision.h"
+#include "io/console/checks.h"
+#include "io/field/field_file.h"
+#include "io/mesh/mesh_file.h"
+#include "io/mesh/single_precision.h"
+#include "io/record/recording.h"
+#include "io/run/recorded_run.h"
+#include "io/scene/scene_file.h"
+#include "io/shell/shell_file.h"
 
 namespace h6::cli {
 namespace {

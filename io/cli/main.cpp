@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "hapsix/base.h"
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
+#include "io/console/checks.h"
 
 using namespace h6::cli;
 

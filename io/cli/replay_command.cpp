@@ -11,12 +11,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
-#include "io/cli/histogram.h"
-#include "io/cli/recorded_session.h"
-#include "io/cli/run_scene.h"
-#include "io/recording.h"
+#include "io/console/checks.h"
+#include "io/record/recording.h"
+#include "io/run/histogram.h"
+#include "io/run/recorded_session.h"
+#include "io/run/run_scene.h"
 #include "kernels/targets.h"
 
 namespace h6::cli {

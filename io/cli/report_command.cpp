@@ -8,13 +8,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
-#include "io/cli/recorded_session.h"
 #include "io/cli/report_files.h"
+#include "io/console/checks.h"
+#include "io/file/write_aside.h"
+#include "io/run/recorded_session.h"
 #include "io/view/page.h"
 #include "io/view/report.h"
-#include "io/write_aside.h"
 
 namespace h6::cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "hapsix/result.h"
-#include "io/cli/console.h"
+#include "io/console/console.h"
 
 namespace h6::cli {
 

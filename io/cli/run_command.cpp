@@ -5,13 +5,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "io/cli/checks.h"
 #include "io/cli/commands.h"
-#include "io/cli/hands.h"
-#include "io/cli/run_scene.h"
 #include "io/cli/tables.h"
 #include "io/cli/view_run.h"
-#include "io/scene_file.h"
+#include "io/console/checks.h"
+#include "io/run/hands.h"
+#include "io/run/run_scene.h"
+#include "io/scene/scene_file.h"
 #include "io/scenes/scenes.h"
 
 namespace h6::cli {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/cli/commands.h"
-#include "io/scene_file.h"
+#include "io/scene/scene_file.h"
 #include "io/scenes/scenes.h"
 
 namespace h6::cli {

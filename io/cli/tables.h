@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "io/cli/run_scene.h"
+#include "io/run/run_scene.h"
 
 namespace h6::cli {
 

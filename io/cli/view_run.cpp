@@ -15,9 +15,9 @@
 #include <variant>
 
 #include "device/steering.h"
-#include "io/cli/checks.h"
-#include "io/cli/run_observer.h"
-#include "io/recorded_run.h"
+#include "io/console/checks.h"
+#include "io/run/recorded_run.h"
+#include "io/run/run_observer.h"
 #include "io/view/live_state.h"
 #include "io/view/page.h"
 #include "io/view/view_request.h"

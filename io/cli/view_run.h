@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "io/cli/run_scene.h"
+#include "io/run/run_scene.h"
 
 namespace CLI {
 class App;

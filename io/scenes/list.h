@@ -1,6 +1,6 @@
 // list.h - the generated scenes, one function each; scenes.cpp has them by name.
 #pragma once
-#include "io/scene.h"
+#include "io/scene/scene.h"
 
 namespace h6::io {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "hapsix/result.h"
-#include "io/scene.h"
+#include "io/scene/scene.h"
 
 namespace h6::io {
 

@@ -125,15 +125,6 @@ Mesh block_with_hole(double half_side, double height, double radius, double dept
   return mesh;
 }
 
-Mesh moved(const Mesh& mesh, const h6Pose& pose) {
-  Mesh out = mesh;
-  for (Vec3& v : out.vertices) {
-    const h6Vec3 p = pose.p + rotate(pose.q, {v.x, v.y, v.z});
-    v = {p.x, p.y, p.z};
-  }
-  return out;
-}
-
 void add_face(PointCloud& cloud, const h6Vec3& centre, const h6Vec3& u, const h6Vec3& v, int nu,
               int nv, const h6Vec3& inward) {
   for (int i = 0; i < nu; ++i)

@@ -1,6 +1,6 @@
 // shapes.h - what generated scenes are made of: primitive meshes, point grids, hand paths. Metres.
 #pragma once
-#include "io/scene.h"
+#include "io/scene/scene.h"
 
 namespace h6::io {
 
@@ -31,7 +31,6 @@ Mesh block_with_hole(double half_side, double height, double radius, double dept
 // Smallest distance between the surfaces of two meshes, 0 when they cross; all triangle pairs whose
 // spheres are not too far. For checking a scene's clearances, not for the frame.
 double mesh_distance(const Mesh& a, const Mesh& b);
-Mesh moved(const Mesh& mesh, const h6Pose& pose);
 
 // ---- explicit shells: grids of cell centres ----------------------------------------------------
 

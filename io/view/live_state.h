@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
-#include "io/load_scene.h"
+#include "io/scene/load_scene.h"
 #include "io/view/envelope.h"
 #include "io/view/view_request.h"
 

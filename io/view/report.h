@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "hapsix/result.h"
-#include "io/load_scene.h"
-#include "io/recording.h"
+#include "io/record/recording.h"
+#include "io/scene/load_scene.h"
 
 namespace h6::io::view {
 

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "io/mesh_file.h"
-#include "io/shell_file.h"
+#include "io/mesh/mesh_file.h"
+#include "io/shell/shell_file.h"
 
 namespace h6::io::view {
 namespace {

@@ -6,7 +6,7 @@
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 
-#include "io/load_scene.h"
+#include "io/scene/load_scene.h"
 #include "io/view/envelope.h"
 
 namespace h6::io::view {

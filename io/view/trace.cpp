@@ -5,7 +5,7 @@
 #include <fstream>
 #include <string>
 
-#include "io/write_aside.h"
+#include "io/file/write_aside.h"
 
 namespace h6::io::view {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/gauss_weights.h"
+#include "kernels/weights/gauss_weights.h"
 #include "tests/kernels/kernel_test.h"
 
 using namespace h6::kernels;

@@ -1,4 +1,39 @@
-// main.cpp - of every test that has none of its own.
+// main.cpp - of every test program that has none of its own.
 #include <doctest/doctest.h>
 
-int main(int argc, char** argv) { return doctest::Context(argc, argv).run(); }
+#include <cstdio>
+
+namespace {
+
+// A filter that matches nothing must not pass: the file it names may have been renamed.
+unsigned matching = 0;
+struct CountMatches : doctest::IReporter {
+  explicit CountMatches(const doctest::ContextOptions&) {}
+  void report_query(const doctest::QueryData&) override { matching = 1; }
+  void test_run_start() override {}
+  void test_run_end(const doctest::TestRunStats& stats) override {
+    matching = stats.numTestCasesPassingFilters;
+  }
+  void test_case_start(const doctest::TestCaseData&) override {}
+  void test_case_reenter(const doctest::TestCaseData&) override {}
+  void test_case_end(const doctest::CurrentTestCaseStats&) override {}
+  void test_case_exception(const doctest::TestCaseException&) override {}
+  void subcase_start(const doctest::SubcaseSignature&) override {}
+  void subcase_end() override {}
+  void log_assert(const doctest::AssertData&) override {}
+  void log_message(const doctest::MessageData&) override {}
+  void test_case_skipped(const doctest::TestCaseData&) override {}
+};
+
+}  // namespace
+
+REGISTER_LISTENER("matches", 1, CountMatches);
+
+int main(int argc, char** argv) {
+  const int failed = doctest::Context(argc, argv).run();
+  if (failed == 0 && matching == 0) {
+    std::fprintf(stderr, "No test matches this filter.\n");
+    return 1;
+  }
+  return failed;
+}

@@ -1,0 +1,209 @@
+// bake_field.cpp - a field from a mesh, step by step (see bake_grid.h).
+//
+// Meaning of the sign: H. Xu, J. Barbic, "Signed distance fields for polygon soup meshes", 2014.
+// What the outside cannot reach is inside: winding is never looked at, so inside-out, mixed or
+// doubled meshes give the same field.
+#include "io/bake/bake_field.h"
+
+#include <algorithm>
+#include <new>
+
+#include "io/bake/grid.h"
+#include "sched/clock.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io {
+namespace bake {
+
+bool Steps::run(const std::string& what, double from, double to, std::size_t count,
+                unsigned threads, const std::function<void(std::size_t)>& body) const {
+  constexpr std::size_t kSlices = 16;
+  const std::size_t grain = count < 4096 ? 1 : 16;
+  const std::size_t blocks = (count + grain - 1) / grain;
+  const std::size_t slices =
+      progress_ ? std::min(kSlices, blocks) : std::min<std::size_t>(1, blocks);
+  for (std::size_t s = 0; s < slices; ++s) {
+    if (!tell(what, from + (to - from) * double(s) / double(slices))) return false;
+    const std::size_t begin = blocks * s / slices, end = blocks * (s + 1) / slices;
+    sched::parallel_for(end - begin, threads, [&](std::size_t i) {
+      const std::size_t first = (begin + i) * grain, last = std::min(count, first + grain);
+      for (std::size_t k = first; k < last; ++k) body(k);
+    });
+  }
+  return tell(what, to);
+}
+
+void Steps::clock(const std::string& what) const {
+  if (!stages_.empty() && stages_.back().name == what) return;
+  const std::int64_t now = sched::now_ns();
+  if (!stages_.empty()) stages_.back().seconds += 1e-9 * double(now - since_ns_);
+  since_ns_ = now;
+  stages_.push_back({what, 0});
+}
+
+std::vector<FieldBakeReport::Stage> Steps::stages() const {
+  clock("");
+  std::vector<FieldBakeReport::Stage> sum;  // a stage that was left and entered again is one
+  for (const FieldBakeReport::Stage& s : stages_) {
+    if (s.name.empty()) continue;
+    const auto same = std::find_if(sum.begin(), sum.end(),
+                                   [&](const auto& other) { return other.name == s.name; });
+    if (same == sum.end())
+      sum.push_back(s);
+    else
+      same->seconds += s.seconds;
+  }
+  return sum;
+}
+
+}  // namespace bake
+
+namespace {
+
+std::string plural(std::size_t n, const std::string& one, const std::string& many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+std::string millimetres(double metres) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.4g mm", metres * 1e3);
+  return text;
+}
+
+void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Inside& inside,
+          double seal, FieldBakeReport& report) {
+  auto& out = report.warnings;
+  if (surface.duplicates > 0)
+    out.push_back(plural(surface.duplicates, "triangle is", "triangles are") +
+                  " there twice and counted once");
+  const double offset = grid.offset * grid.voxel;
+  if (!surface.closed)
+    out.push_back("the mesh is not closed: " + plural(surface.odd_edges, "edge has", "edges have") +
+                  " an odd number of faces (" + std::to_string(surface.open_edges) +
+                  " have one); it is taken as a soup");
+  if (offset > 0)
+    out.push_back("the surface is moved out by " + millimetres(offset) + ": open sheets become " +
+                  millimetres(2 * offset) + " thick, wires as much thicker, and gaps below " +
+                  millimetres(2 * offset) + " close; more voxels make this smaller");
+  if (surface.closed && seal > 0) out.push_back("the mesh is closed: there is no hole to seal");
+  if (report.sealed_area > 0) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "holes and gaps narrower than %s that lead deeper than that were closed: "
+                  "%.4g mm2 in all",
+                  millimetres(seal).c_str(), report.sealed_area * 1e6);
+    out.push_back(text);
+  }
+  if (!surface.closed && grid.offset < 0.5)
+    out.push_back(
+        "the offset is below half a voxel and the mesh is open: the outside leaks in "
+        "through every hole");
+  if (inside.inside_nodes == 0)
+    out.push_back(
+        "no node of the field lies inside: nothing can touch this obstacle; bake it with "
+        "more voxels, or with an offset");
+  else if (inside.thin_edges > 0)
+    out.push_back("walls thinner than a voxel (" + millimetres(grid.voxel) + ") at " +
+                  plural(inside.thin_edges, "place", "places") +
+                  " are no obstacles there; bake with more voxels, or with an offset");
+}
+
+// Distances of all bricks near the surface.
+Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned threads,
+                const bake::Steps& steps, double from, double to, bake::NarrowBand& band) {
+  using namespace bake;
+  band = {};
+  if (!steps.tell("bricks", from)) return Failure{"cancelled"};
+  if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
+  find_features(surface, threads, band.features);
+  band.u.resize(band.rows() * kBrickSamples);
+  band.free.resize(band.rows());
+  band.first_node.resize(band.rows());
+  band.towards.resize(band.rows());
+  if (grid.offset < 0.5) band.crossing.resize(band.rows());
+  if (!surface.part.empty()) band.part.resize(band.rows());
+  band.triangle.resize(band.rows(), -1);
+  if (!steps.run("distance", from + 0.05, to, band.tiles.count(), threads, [&](std::size_t tile) {
+        const auto triangles = measure_tile(surface, grid, tile, band);
+        if (!band.crossing.empty()) cross_tile(surface, grid, tile, triangles, band);
+      }))
+    return Failure{"cancelled"};
+  band.features = {};
+  return Done{};
+}
+
+Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
+                               const Progress& progress) {
+  using namespace bake;
+  const Steps steps(progress);
+  const Failure cancelled{"cancelled"};
+  if (!steps.tell("surface", 0)) return cancelled;
+  Result<Surface> prepared = prepare_surface(mesh, options.threads);
+  if (!prepared) return prepared.failure();
+  Surface& surface = *prepared;
+  const bool sealed = surface.closed && options.sign == SignMode::automatic;
+  Result<Grid> grid = choose_grid(surface, options, sealed);
+  if (!grid) return grid.failure();
+  const unsigned threads = options.threads;
+  to_grid(surface, *grid, threads);
+
+  NarrowBand band;
+  const bool parts = !surface.part.empty() && mesh.part_names.size() > 1;
+  if (!parts) surface.part.clear();
+  const double measured = grid->seal > 0 ? 0.3 : 0.6;
+  if (const Outcome done = measure(surface, *grid, threads, steps, 0.05, measured, band); !done)
+    return done.failure();
+  std::size_t plugs = 0;
+  if (grid->seal > 0) {
+    plugs = plug_holes(*grid, band, threads, surface);
+    const double reach = grid->reach();
+    grid->seal = 0;
+    if (plugs > 0 || grid->reach() < reach)
+      if (const Outcome done = measure(surface, *grid, threads, steps, 0.35, 0.6, band); !done)
+        return done.failure();
+  }
+
+  if (!steps.tell("flood", 0.6)) return cancelled;
+  const Reached reached = flood(surface, *grid, band, options.cavities, threads);
+  Large<std::uint32_t>().swap(band.tiles.triangle);
+  Large<std::uint64_t>().swap(band.tiles.near);
+  Inside inside;
+  if (!look_inside(*grid, band, reached, threads, steps, inside)) return cancelled;
+
+  FieldData field;
+  field.origin = grid->origin();
+  field.voxel_size = grid->voxel;
+  field.bricks = grid->bricks;
+  field.band = grid->band * grid->voxel;
+  field.offset = grid->offset * grid->voxel;
+  field.sign_mode = sealed ? "closed" : "flood";
+  field.triangles = mesh.triangles.size();
+  if (!band.part.empty()) field.part_names = mesh.part_names;
+  if (!steps.tell("samples", 0.8)) return cancelled;
+  write_samples(*grid, band, reached, inside, threads, field);
+  inside.chains.reset();
+  if (const Outcome far =
+          far_distances(surface, *grid, band, reached, threads, steps, field.far_grid);
+      !far)
+    return far.failure();
+  if (report) {
+    report->stages = steps.stages();
+    report->closed = surface.closed;
+    report->sealed_area = double(plugs) * grid->voxel * grid->voxel;
+    warn(surface, *grid, inside, options.seal, *report);
+  }
+  return field;
+}
+
+}  // namespace
+
+Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
+                             const Progress& progress) {
+  try {
+    return bake_checked(mesh, options, report, progress);
+  } catch (const std::bad_alloc&) {
+    return Failure{"not enough memory to bake this field: choose larger voxels"};
+  }
+}
+
+}  // namespace h6::io

@@ -1,0 +1,363 @@
+// bake_inside.cpp - from unsigned distances u and the reached set R to signed distances.
+//
+// Nodes of R get u - offset: exact. For the others the distance to R is wanted.
+// - No part of R is nearer than offset - u (u is 1-Lipschitz and is `offset` on the border of R).
+// - A straight line from p to a point r of R that is shorter than u(p) + u(r) meets no surface: the
+//   two empty balls overlap. So if every such line is longer, p lies behind a sheet, and R begins
+//   at u + offset: exactly there if the sheet that p is nearest to borders R.
+// - Chains of nodes give an upper bound D >= distance to R: D(r) = offset - u(r) on R, and
+//   D(p) = min over the 26 neighbours of D(q) + |p - q|. They are at most 13 % too long.
+// Hence, for p not in R:
+//   D <  u + offset: R is in sight: max(offset - u, (D - slack)/1.13), which is offset - u along
+//     smooth sheets and the depth of the dent below a crack.
+//   D >= u + offset: behind a sheet: u + offset. Sheets buried in the solid (two parts run into
+//     each other) do not border R, and u + offset is too short there:
+//     max(u + offset, (D - corner slack)/1.13), a lower bound of the way to the nodes of R.
+// What is outside without a node of R, a groove between nodes say, begins no chain, and D goes the
+// long way round: on one mesh all 22 nodes that were too deep lie behind a gap narrower than a
+// voxel, 20 of them with no node of R within a voxel of the nearest point. Chains pass through
+// bricks that have no buried sheet in or beside them by u + offset; where they did not, nodes at
+// the edge of the others came out up to 1.4 voxel too deep.
+#include <algorithm>
+#include <atomic>
+#include <optional>
+
+#include "io/bake/chains.h"
+#include "io/bake/grid.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io::bake {
+namespace {
+
+constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
+
+// A brick is kept when a cell of its own, or one that shares its nodes, has a point within band of
+// the zero set. Only where R is near.
+bool near_zero_set(const NarrowBand& band, const Around& around) {
+  bool near = false;
+  for (std::size_t i = 0; i < 27; ++i) {
+    const std::int32_t row = around.row[i];
+    near |= row >= 0 && (band.towards[std::size_t(row)] >> (26 - i) & 1);
+  }
+  return near;
+}
+bool near_outside(const Reached& reached, const Around& around) {
+  for (std::size_t i = 0; i < 27; ++i)
+    if (around.row[i] < 0 ? around.outside[i] : reached.node[std::size_t(around.row[i])].any())
+      return true;
+  return false;
+}
+
+constexpr NodeMask kNoNodes{};
+
+std::size_t count(const NodeMask& nodes) {
+  std::size_t n = 0;
+  for (std::uint64_t z : nodes.z) n += std::size_t(std::popcount(z));
+  return n;
+}
+
+// Nodes with a reached node among the 27 around them, themselves included; `nodes` tells those of a
+// row. With kOthers: with one that is not reached.
+template <bool kOthers = false>
+NodeMask beside_any(const Around& around, const Masks& nodes) {
+  std::array<const NodeMask*, 27> at;
+  for (std::size_t i = 0; i < 27; ++i)
+    at[i] = around.row[i] >= 0  ? &nodes[std::size_t(around.row[i])]
+            : around.outside[i] ? &kAllNodes
+                                : &kNoNodes;
+  return spread<kOthers>(at);
+}
+
+// The same as far as the brick alone tells: mostly enough. `flip`: of the others.
+NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
+  constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
+  std::uint64_t layer[10] = {};
+  for (std::size_t z = 0; z < 8; ++z) {
+    const std::uint64_t own = nodes.z[z] ^ flip,
+                        along = own | (own & kNotX7) << 1 | (own & kNotX0) >> 1;
+    layer[z + 1] = along | along << 8 | along >> 8;
+  }
+  NodeMask out;
+  for (std::size_t z = 0; z < 8; ++z) out.z[z] = layer[z] | layer[z + 1] | layer[z + 2];
+  return out;
+}
+
+// Whether u at a node's neighbour (entry 13 + dx + 3*dy + 9*dz) is more than at the one across.
+bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& around, int node,
+                   int neighbour) {
+  const int by[3] = {neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1};
+  const int x = node % 8, y = node / 8 % 8, z = node / 64;
+  const auto u = [&](int i, int j, int k) {
+    const std::int32_t row = around.row[Around::entry(i, j, k)];
+    return row < 0 ? float(grid.reach())
+                   : band.nodes(std::size_t(row))[((k & 7) * 8 + (j & 7)) * 8 + (i & 7)];
+  };
+  return u(x + by[0], y + by[1], z + by[2]) > u(x - by[0], y - by[1], z - by[2]);
+}
+
+// The steps of look_inside, with what they share.
+class Look {
+ public:
+  Look(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
+       const Steps& steps, Inside& inside)
+      : grid_(grid),
+        band_(band),
+        reached_(reached),
+        threads_(threads),
+        steps_(steps),
+        inside_(inside),
+        offset_(float(grid.offset)),
+        buried_(band.rows(), 0),
+        live_(band.rows(), 0),
+        corrected_(band.rows(), 0) {}
+
+  bool run() {
+    if (!steps_.tell("sign", 0.65)) return false;
+    inside_.needed.resize(band_.rows());
+    inside_.depths.resize(band_.rows());
+    inspect_rows();
+    find_corrected();
+    inside_.in_sight = std::move(band_.free);  // not needed any more, but the room is
+    constexpr std::size_t kSlice = 4096;
+    sched::parallel_for((band_.rows() + kSlice - 1) / kSlice, threads_, [&](std::size_t slice) {
+      const std::size_t first = slice * kSlice, end = std::min(band_.rows(), first + kSlice);
+      std::fill_n(inside_.in_sight.begin() + std::ptrdiff_t(first), end - first, NodeMask{});
+    });
+    if (!lay_chains()) return false;
+    if (offset_ > 0 && !steps_.run("sign", 0.7, 0.8, band_.tiles.count(), threads_,
+                                   [&](std::size_t tile) { look(tile); }))
+      return false;
+    inside_.chains = std::move(chains_);
+    inside_.corrected = std::move(corrected_);
+    return true;
+  }
+
+ private:
+  // How many nodes a chain takes from R to a node on the near side of a sheet, at most: one step
+  // can gain a voxel in any direction.
+  int hops_in_sight() const { return offset_ > 0 ? int(std::ceil(offset_ + 0.05f)) : 0; }
+  int hops_across() const { return offset_ > 0 ? int(std::ceil(2 * offset_ + 0.2f)) : 0; }
+
+  // Calls f(rows) for the tiles that have rows.
+  template <class F>
+  void each_tile(F&& f) {
+    sched::parallel_for(band_.tiles.count(), threads_, [&](std::size_t tile) {
+      if (band_.tiles.first[tile] != band_.tiles.first[tile + 1])
+        f(TileRows(grid_, band_, reached_, tile));
+    });
+  }
+
+  // Which rows are needed, and have nodes inside, sheets buried there, thin walls.
+  void inspect_rows() {
+    beside_.resize(offset_ > 0 ? band_.rows() : 0);
+    std::atomic<std::size_t> thin{0}, dry{0};
+    each_tile([&](const TileRows& rows) {
+      std::size_t thin_here = 0, dry_here = 0;
+      rows.each([&](std::size_t place, std::size_t r) {
+        const NodeMask& nodes = reached_.node[r];
+        std::uint64_t some = 0, all = ~std::uint64_t{0};
+        for (std::uint64_t w : nodes.z) {
+          some |= w;
+          all &= w;
+        }
+        const bool whole = all == ~std::uint64_t{0};
+        // A row alone mostly tells enough; what is around it lies in 27 places.
+        const bool near = band_.towards[r] >> 13 & 1;
+        std::optional<Around> around;
+        if (some == 0 || !near) around.emplace(rows, place);
+        const bool outside = some != 0 || near_outside(reached_, *around);
+        inside_.needed[r] = outside && (near || near_zero_set(band_, *around));
+        if (!whole) dry_here += some == 0 ? kBrickSamples : kBrickSamples - count(nodes);
+        live_[r] = inside_.needed[r] && !whole;
+        if (!beside_.empty())
+          beside_[r] = whole     ? kAllNodes
+                       : outside ? beside_any(Around(rows, place), reached_.node)
+                                 : kNoNodes;
+        if (!band_.crossing.empty()) inspect_crossings(rows, place, r, thin_here);
+      });
+      thin.fetch_add(thin_here, std::memory_order_relaxed);
+      dry.fetch_add(dry_here, std::memory_order_relaxed);
+    });
+    inside_.thin_edges = thin;
+    inside_.inside_nodes = dry;
+  }
+
+  // - Whether the surface crosses an edge, or meets a node, with nothing reached around: a sheet
+  //   buried in the solid. (Next to reached nodes it may be a groove narrower than a voxel.)
+  // - Crossed edges between reached nodes without a node inside anywhere around: a wall thinner
+  //   than the spacing. A sharp rim has nodes inside close by and does not count.
+  void inspect_crossings(const TileRows& rows, std::size_t place, std::size_t r,
+                         std::size_t& thin) {
+    const Crossing& c = band_.crossing[r];
+    NodeMask met;
+    for (std::size_t z = 0; z < 8; ++z)
+      met.z[z] = c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z];
+    if (!met.any()) return;
+    const auto outside_of = [&](const NodeMask& nodes) {
+      std::uint64_t left = 0;
+      for (std::size_t z = 0; z < 8; ++z) left |= met.z[z] & ~nodes.z[z];
+      return left != 0;
+    };
+    const Masks& reached = reached_.node;
+    if (!beside_.empty())
+      buried_[r] = outside_of(beside_[r]);
+    else
+      buried_[r] = outside_of(beside_here(reached[r])) &&
+                   outside_of(beside_any(Around(rows, place), reached));
+    if (offset_ > 0 || !outside_of(beside_here(reached[r], ~std::uint64_t{0}))) return;
+    NodeMask deep = beside_any<true>(Around(rows, place), reached);
+    for (std::uint64_t& z : deep.z) z = ~z;
+    for (const NodeMask& edge : c.edge)
+      for (std::size_t z = 0; z < 8; ++z)
+        if (const std::uint64_t bits = edge.z[z] & deep.z[z]; bits != 0)
+          thin += std::size_t(std::popcount(bits));
+  }
+
+  // With an offset, what lies within it of a sheet and farther from R than the far side of a sheet
+  // that borders R is buried. Depths are corrected there and one brick around.
+  void find_corrected() {
+    if (beside_.empty() && std::find(buried_.begin(), buried_.end(), 1) == buried_.end()) return;
+    Masks wide, last;
+    for (int hop = 1; hop + 1 < hops_across() && !beside_.empty(); ++hop) {
+      last = hop == 1 ? beside_ : wide;
+      wide.resize(band_.rows());
+      each_tile([&](const TileRows& rows) {
+        rows.each([&](std::size_t place, std::size_t r) {
+          wide[r] = beside_any(Around(rows, place), last);
+        });
+      });
+    }
+    const Masks& before = wide.empty() ? beside_ : wide;
+    const bool one_more = hops_across() > 1;
+    each_tile([&](const TileRows& rows) {
+      rows.each([&](std::size_t place, std::size_t r) {
+        bool buried = buried_[r] != 0;
+        if (!buried && live_[r] && !before.empty()) {
+          NodeMask deep;
+          for (std::size_t z = 0; z < 8; ++z) deep.z[z] = ~band_.free[r].z[z] & ~before[r].z[z];
+          if (deep.any() && one_more) {
+            const NodeMask near = beside_any(Around(rows, place), before);
+            for (std::size_t z = 0; z < 8; ++z) deep.z[z] &= ~near.z[z];
+          }
+          buried = deep.any();
+        }
+        if (!buried) return;
+        for (const std::int32_t next : Around(rows, place).row)
+          if (next >= 0)
+            std::atomic_ref(corrected_[std::size_t(next)]).store(1, std::memory_order_relaxed);
+      });
+    });
+  }
+
+  bool lay_chains() {
+    std::vector<std::uint8_t> deep(band_.rows());
+    bool any = false;
+    for (std::size_t r = 0; r < deep.size(); ++r) {
+      deep[r] = live_[r] && (corrected_[r] || hops_in_sight() > 1);
+      any |= deep[r];
+    }
+    if (!any) return true;
+    chains_ = std::make_shared<Chains>(grid_, band_, reached_, deep, threads_, &corrected_);
+    const int steps = std::max(kDeepPasses + int(offset_), hops_across());
+    const int passes = (steps + kStepsAPass - 1) / kStepsAPass;
+    for (int pass = 0; pass < passes; ++pass) {
+      chains_->pass();
+      if (!steps_.tell("sign", 0.65 + 0.05 * pass / passes)) return false;
+    }
+    return true;
+  }
+
+  // A row to look at, its nodes in question and what is known of them.
+  struct Asked {
+    std::size_t place, row;
+    bool held;
+    NodeMask todo;
+    kernels::ChainSides sides;
+  };
+
+  // Which side of its sheet a node is on, where u alone does not tell. Chains that are held tell it
+  // by themselves; the nodes around a brick are needed for the others, and where a sheet is close.
+  void look(std::size_t tile) {
+    if (band_.tiles.first[tile] == band_.tiles.first[tile + 1]) return;
+    thread_local const auto room = std::make_unique<ChainRoom>();
+    thread_local std::array<Asked, 64> asked;
+    thread_local std::vector<ChainRoom::Wanted> bricks;
+    const TileRows rows(grid_, band_, reached_, tile);
+    bricks.clear();
+    std::size_t count = 0;
+    rows.each([&](std::size_t place, std::size_t r) {
+      if (!live_[r]) return;
+      Asked& row = asked[count];
+      row.place = place;
+      row.row = r;
+      row.held = chains_ && chains_->holds(r);
+      for (std::size_t z = 0; z < 8; ++z)
+        row.todo.z[z] = ~reached_.node[r].z[z] & (row.held ? ~std::uint64_t{0} : beside_[r].z[z]);
+      if (!row.todo.any()) return;
+      NodeMask unsure = row.todo;
+      if (row.held) {
+        kernels::chain_sides(chains_->nodes(r), band_.nodes(r), limits(), row.sides);
+        for (std::size_t z = 0; z < 8; ++z) unsure.z[z] &= row.sides.close[z];
+      }
+      if (unsure.any()) bricks.push_back({place, neighbours_of(unsure)});
+      ++count;
+    });
+    room->fill(grid_, band_, reached_, chains_.get(), rows, bricks, nullptr);
+    for (std::size_t i = 0; i < count; ++i) look(rows, *room, asked[i]);
+  }
+  kernels::ChainLimits limits() const {
+    return {offset_, kSlack, kCrooked, 0.5f * (kSlack + (kCrooked - 1) * offset_)};
+  }
+  void look(const TileRows& rows, ChainRoom& room, Asked& row) {
+    const std::size_t r = row.row;
+    const Chain* first = room.first(row.place);
+    Chain stepped[kBrickSamples];
+    if (!row.held) {
+      kernels::chain_step(first, ChainRoom::kLine, ChainRoom::kLayer, stepped, 8, 64);
+      kernels::chain_sides(stepped, band_.nodes(r), limits(), row.sides);
+    }
+    NodeMask& in_sight = inside_.in_sight[r];
+    for (std::size_t z = 0; z < 8; ++z) {
+      in_sight.z[z] |= row.todo.z[z] & row.sides.in_sight[z];
+      for (std::uint64_t bits = row.held ? 0 : row.todo.z[z] & row.sides.dented[z]; bits != 0;
+           bits &= bits - 1) {
+        const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
+        const float dent = (float(stepped[n]) * kChainUnit - kSlack) / kCrooked;
+        inside_.depths[r].push_back({std::uint32_t(n), dent});
+      }
+    }
+    // So close to a sheet chains cannot tell the side: the nearest way to R goes through q; R's
+    // side is where u grows, so q is farther from the sheet than its mirror image.
+    NodeMask close;
+    for (std::size_t z = 0; z < 8; ++z) close.z[z] = row.todo.z[z] & row.sides.close[z];
+    if (!close.any()) return;
+    std::uint8_t nearest[kBrickSamples];
+    kernels::chain_nearest(first, ChainRoom::kLine, ChainRoom::kLayer, close.z.data(), nearest);
+    const Around around(rows, row.place);
+    for (std::size_t z = 0; z < 8; ++z)
+      for (std::uint64_t bits = close.z[z]; bits != 0; bits &= bits - 1) {
+        const int n = int(64 * z) + std::countr_zero(bits);
+        if (rises_towards(grid_, band_, around, n, nearest[n])) in_sight.set(std::size_t(n));
+      }
+  }
+
+  const Grid& grid_;
+  NarrowBand& band_;
+  const Reached& reached_;
+  unsigned threads_;
+  const Steps& steps_;
+  Inside& inside_;
+  float offset_;
+  std::vector<std::uint8_t> buried_, live_, corrected_;  // (rows)
+  Masks beside_;                                         // (rows) one step from R
+  std::shared_ptr<Chains> chains_;
+};
+
+}  // namespace
+
+bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
+                 const Steps& steps, Inside& inside) {
+  return Look(grid, band, reached, threads, steps, inside).run();
+}
+
+}  // namespace h6::io::bake

@@ -1,0 +1,108 @@
+// bake_sign.cpp - what is outside: a flood over nodes, 64 at a time.
+//
+// A node is passable when u > offset and it is not on the surface; it is left through edges that no
+// triangle crosses. Bricks without a row are all passable, so the flood takes them whole. The
+// result is a set: the order of work does not show in it.
+#include <algorithm>
+
+#include "io/bake/flood.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io::bake {
+namespace {
+
+using namespace flooding;
+
+// Regions by nesting: 0 outside, 1 behind one wall, 2 behind two, ... A wall is what the flood
+// cannot pass: crossed edges and the nodes that are not passable. Even regions are empty.
+Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& free, unsigned threads,
+                      Flood& flood) {
+  Reached empty{flood.wet(), {}};
+  Masks last = flood.wet(), wall(band.rows());
+  for (std::size_t r = 0; r < band.rows(); ++r) wall[r] = ~free[r];
+  Flood walls(grid, band, wall, Flood::Edges::open, threads, Flood::Over::rows);
+  for (std::uint8_t depth = 1; depth < 250; ++depth) {
+    Masks seeds = neighbours(grid, band, last, threads);
+    const Masks before_wall = walls.wet();
+    walls.from_nodes(seeds, 1);
+    Masks crossed = walls.wet();
+    for (std::size_t r = 0; r < crossed.size(); ++r) crossed[r] = crossed[r] & ~before_wall[r];
+    const Masks behind = neighbours(grid, band, crossed, threads);
+    for (std::size_t r = 0; r < seeds.size(); ++r) seeds[r] = seeds[r] | behind[r];
+    last = flood.wet();
+    if (!flood.from_nodes(seeds, std::uint8_t(depth + 1))) break;
+    for (std::size_t r = 0; r < last.size(); ++r) {
+      last[r] = flood.wet()[r] & ~last[r];
+      if (depth % 2 == 0) empty.node[r] = empty.node[r] | last[r];
+    }
+  }
+  for (std::uint8_t& tag : flood.cells()) tag &= 1;  // depth + 1 is odd where it is empty
+  empty.cell = std::move(flood.cells());
+  return empty;
+}
+
+// Dry nodes that hang together with no roomy place, a node with six free edges to dry nodes:
+// bottoms of grooves, and tips of solids.
+std::vector<RowNodes> cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry,
+                                    unsigned threads) {
+  Masks roomy(dry.size());
+  sched::parallel_for(dry.size(), threads, [&](std::size_t r) {
+    roomy[r] = dry[r];
+    if (!dry[r].any()) return;
+    const std::array<int, 3> at = grid.place(band.cell[r]);
+    const Crossing& own = band.crossing[r];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (int step : {-1, 1}) {
+        // Dry nodes of this brick and its neighbour, moved to the node they are the neighbour of.
+        NodeMask linked = step > 0 ? before(dry[r], axis) & ~own.edge[axis]
+                                   : after(dry[r] & ~own.edge[axis], axis);
+        std::array<int, 3> to = at;
+        to[axis] += step;
+        const bool in = to[axis] >= 0 && to[axis] < grid.bricks[axis];
+        const std::int32_t next = in ? band.row[grid.cell(to[0], to[1], to[2])] : -1;
+        const NodeMask& there = next >= 0 ? dry[std::size_t(next)] : kAllNodes;
+        const Crossing& theirs = next >= 0 ? band.crossing[std::size_t(next)] : kOpenEdges;
+        const NodeMask across = through(there, step > 0 ? kOpenEdges : theirs, axis, -step);
+        linked = linked | (step > 0 ? across & ~own.edge[axis] : across);
+        roomy[r] = roomy[r] & linked;
+      }
+  });
+  Flood solid(grid, band, dry, Flood::Edges::cut, threads, Flood::Over::rows);
+  solid.from_nodes(roomy, 1);
+  std::vector<RowNodes> cramped;
+  for (std::size_t r = 0; r < dry.size(); ++r)
+    if (const NodeMask left = dry[r] & ~solid.wet()[r]; left.any())
+      cramped.push_back({std::uint32_t(r), left});
+  return cramped;
+}
+
+void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                   const Masks& free, unsigned threads, Flood& outside) {
+  Masks dry(band.rows());
+  sched::parallel_for(dry.size(), threads,
+                      [&](std::size_t r) { dry[r] = free[r] & ~outside.wet()[r]; });
+  std::vector<RowNodes> left = cramped_nodes(grid, band, dry, threads);
+  constexpr int kRounds = 8;  // down a groove, a few voxels at a time
+  for (int i = 0; i < kRounds; ++i) {
+    for (RowNodes& row : left) row.nodes = row.nodes & ~outside.wet()[row.row];
+    std::erase_if(left, [](const RowNodes& row) { return !row.nodes.any(); });
+    if (!outside.from_nodes(reachable(surface, grid, band, left, outside.wet(), threads), 1))
+      return;
+  }
+}
+
+}  // namespace
+
+Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
+              unsigned threads) {
+  const Masks& free = band.free;
+  Flood outside(grid, band, free, Flood::Edges::cut, threads);
+  outside.from_border();
+  // In a soup every crack is a pocket, and parity tells nothing: there they stay inside.
+  if (!band.crossing.empty() && surface.closed)
+    reach_pockets(surface, grid, band, free, threads, outside);
+  if (cavities == Cavities::hollow) return open_cavities(grid, band, free, threads, outside);
+  return {outside.take_wet(), std::move(outside.cells())};
+}
+
+}  // namespace h6::io::bake

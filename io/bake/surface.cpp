@@ -1,0 +1,317 @@
+// bake_surface.cpp - which triangles of a mesh count, whether they close, and the grid around them.
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include "io/bake/grid.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io::bake {
+namespace {
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+Triangle sorted(Triangle t) {
+  std::sort(t.begin(), t.end());
+  return t;
+}
+
+double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vec3 sub(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+// Height over the longest side below 1e-12 of it: rounding, not area.
+bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 u = sub(b, a), v = sub(c, a), w = sub(c, b);
+  const Vec3 n = {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
+  const double longest2 = std::max({dot(u, u), dot(v, v), dot(w, w)});
+  return dot(n, n) > 1e-24 * longest2 * longest2;
+}
+
+constexpr std::size_t kSlice = 16384;  // triangles
+std::size_t slices_of(std::size_t count) { return (count + kSlice - 1) / kSlice; }
+
+// Calls body(slice, i) for every triangle, slices side by side.
+template <class F>
+void each_triangle(std::size_t count, unsigned threads, F&& body) {
+  sched::parallel_for(slices_of(count), threads, [&](std::size_t s) {
+    for (std::size_t i = s * kSlice; i < std::min(count, (s + 1) * kSlice); ++i) body(s, i);
+  });
+}
+
+// Something about a vertex.
+struct Item {
+  std::uint32_t vertex, what;
+};
+
+// Calls `each(range, begin, end)` for the items of every vertex that has some, in order of making,
+// ranges of vertices side by side: so many fit the cache. `make(i, add)` calls add(item) for
+// triangle i, the same whenever it is asked.
+constexpr std::size_t kRanges = 128;
+template <class Make, class Each>
+void by_vertex(std::size_t vertices, std::size_t triangles, unsigned threads, Make&& make,
+               Each&& each) {
+  const std::size_t wide = std::max<std::size_t>(1, (vertices + kRanges - 1) / kRanges);
+  const auto shift = std::uint32_t(std::bit_width(wide - 1));  // ranges of a power of two
+  const std::size_t slices = slices_of(triangles);
+  std::vector<std::array<std::size_t, kRanges>> place(slices);
+  sched::parallel_for(slices, threads, [&](std::size_t s) {
+    place[s].fill(0);
+    for (std::size_t i = s * kSlice; i < std::min(triangles, (s + 1) * kSlice); ++i)
+      make(i, [&](const Item& item) { ++place[s][item.vertex >> shift]; });
+  });
+  std::array<std::size_t, kRanges + 1> first{};
+  std::size_t total = 0;
+  for (std::size_t k = 0; k < kRanges; ++k) {
+    first[k] = total;
+    for (auto& of_slice : place) total += std::exchange(of_slice[k], total);
+  }
+  first[kRanges] = total;
+  Large<Item> items(total);
+  sched::parallel_for(slices, threads, [&](std::size_t s) {
+    for (std::size_t i = s * kSlice; i < std::min(triangles, (s + 1) * kSlice); ++i)
+      make(i, [&](const Item& item) { items[place[s][item.vertex >> shift]++] = item; });
+  });
+  sched::parallel_for(kRanges, threads, [&](std::size_t k) {
+    std::vector<std::uint32_t> next((std::size_t{1} << shift) + 1, 0),
+        sorted(first[k + 1] - first[k]);
+    const std::uint32_t low = std::uint32_t(k << shift);
+    for (std::size_t i = first[k]; i < first[k + 1]; ++i) ++next[items[i].vertex - low + 1];
+    for (std::size_t v = 1; v < next.size(); ++v) next[v] += next[v - 1];
+    for (std::size_t i = first[k]; i < first[k + 1]; ++i)
+      sorted[next[items[i].vertex - low]++] = items[i].what;
+    std::uint32_t begin = 0;
+    for (std::size_t v = 0; v + 1 < next.size(); ++v) {
+      if (next[v] != begin) each(k, sorted.data() + begin, sorted.data() + next[v]);
+      begin = next[v];
+    }
+  });
+}
+
+// Marks every later copy of a triangle with the same three vertices, in any order.
+std::vector<std::uint8_t> find_duplicates(const Mesh& mesh, unsigned threads) {
+  const std::size_t count = mesh.triangles.size();
+  std::vector<std::uint8_t> duplicate(count, 0);
+  const auto lowest = [&](std::size_t i, auto&& add) {
+    const Triangle& t = mesh.triangles[i];
+    add(Item{std::min({t[0], t[1], t[2]}), std::uint32_t(i)});
+  };
+  by_vertex(mesh.vertices.size(), count, threads, lowest,
+            [&](std::size_t, const std::uint32_t* begin, const std::uint32_t* end) {
+              if (end - begin < 2) return;
+              thread_local std::vector<std::pair<Triangle, std::uint32_t>> fan;
+              fan.clear();
+              for (; begin != end; ++begin) fan.push_back({sorted(mesh.triangles[*begin]), *begin});
+              std::sort(fan.begin(), fan.end());
+              for (std::size_t i = 1; i < fan.size(); ++i)
+                if (fan[i].first == fan[i - 1].first) duplicate[fan[i].second] = 1;
+            });
+  return duplicate;
+}
+
+// Flat triangles carry edges too: a T-junction closed by one is closed. Those with two equal
+// vertices carry one edge twice, which changes nothing.
+void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, unsigned threads,
+                 Surface& surface) {
+  struct alignas(64) Count {
+    std::size_t open = 0, odd = 0;
+  };
+  std::array<Count, kRanges> found;
+  const auto edges = [&](std::size_t i, auto&& add) {
+    const Triangle& t = mesh.triangles[i];
+    if (duplicate[i] || t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return;
+    for (std::size_t k = 0; k < 3; ++k)
+      add(Item{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+  };
+  by_vertex(mesh.vertices.size(), mesh.triangles.size(), threads, edges,
+            [&](std::size_t range, std::uint32_t* begin, std::uint32_t* end) {
+              std::sort(begin, end);
+              for (std::uint32_t* next; begin != end; begin = next) {
+                next = std::find_if(begin, end, [&](std::uint32_t v) { return v != *begin; });
+                found[range].open += next - begin == 1;
+                found[range].odd += std::size_t(next - begin) % 2;
+              }
+            });
+  for (const Count& c : found) {
+    surface.open_edges += c.open;
+    surface.odd_edges += c.odd;
+  }
+  surface.closed = surface.odd_edges == 0;
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+}  // namespace
+
+Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
+  const std::size_t count = mesh.triangles.size(), slices = slices_of(count);
+  constexpr std::size_t kNone = ~std::size_t{0};
+  // What is found slice by slice, put together in their order.
+  struct Found {
+    std::size_t no_vertex = kNone, not_finite = kNone;  // first such triangle
+    std::size_t duplicates = 0, flat = 0, kept = 0;
+    double low[3], high[3];
+  };
+  constexpr double kHuge = std::numeric_limits<double>::max();
+  std::vector<Found> found(slices);
+  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
+    for (std::uint32_t v : mesh.triangles[i])
+      if (v >= mesh.vertices.size()) found[s].no_vertex = std::min(found[s].no_vertex, i);
+  });
+  for (const Found& f : found) {
+    if (f.no_vertex == kNone) continue;
+    for (std::uint32_t v : mesh.triangles[f.no_vertex])
+      if (v >= mesh.vertices.size())
+        return Failure{"triangle " + std::to_string(f.no_vertex) + " names vertex " +
+                       std::to_string(v) + ", but the mesh has " +
+                       std::to_string(mesh.vertices.size())};
+  }
+  Surface surface;
+  const std::vector<std::uint8_t> duplicate = find_duplicates(mesh, threads);
+  count_edges(mesh, duplicate, threads, surface);
+
+  std::vector<std::uint8_t> keep(count, 0);
+  for (Found& f : found) {
+    std::fill_n(f.low, 3, kHuge);
+    std::fill_n(f.high, 3, -kHuge);
+  }
+  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
+    Found& f = found[s];
+    if (duplicate[i]) {
+      ++f.duplicates;
+      return;
+    }
+    const Triangle& t = mesh.triangles[i];
+    const Vec3 corner[3] = {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+    for (const Vec3& p : corner)
+      if (!std::isfinite(p.x + p.y + p.z)) f.not_finite = std::min(f.not_finite, i);
+    if (!has_area(corner[0], corner[1], corner[2])) {
+      ++f.flat;
+      return;
+    }
+    for (const Vec3& p : corner) {
+      const double at[3] = {p.x, p.y, p.z};
+      for (std::size_t k = 0; k < 3; ++k) {
+        f.low[k] = std::min(f.low[k], at[k]);
+        f.high[k] = std::max(f.high[k], at[k]);
+      }
+    }
+    keep[i] = 1;
+    ++f.kept;
+  });
+  double low[3] = {kHuge, kHuge, kHuge}, high[3] = {-kHuge, -kHuge, -kHuge};
+  std::size_t kept = 0;
+  for (Found& f : found) {
+    if (f.not_finite != kNone)
+      return Failure{"triangle " + std::to_string(f.not_finite) +
+                     " has a coordinate that is not finite"};
+    surface.duplicates += f.duplicates;
+    surface.flat += f.flat;
+    kept += std::exchange(f.kept, kept);  // from here on: where the slice's go
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], f.low[k]);
+      high[k] = std::max(high[k], f.high[k]);
+    }
+  }
+  if (kept == 0)
+    return Failure{"the mesh has no triangle with area: there is nothing to make a field of"};
+  surface.low = {low[0], low[1], low[2]};
+  surface.high = {high[0], high[1], high[2]};
+  const bool parts = mesh.part.size() == count;
+  surface.triangles.resize(kept);
+  surface.source.resize(kept);
+  if (parts) surface.part.resize(kept);
+  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
+    if (!keep[i]) return;
+    const std::size_t to = found[s].kept++;
+    surface.triangles[to] = mesh.triangles[i];
+    surface.source[to] = std::int32_t(i);
+    if (parts) surface.part[to] = mesh.part[i];
+  });
+  surface.vertices.resize(mesh.vertices.size());
+  sched::parallel_for(slices_of(mesh.vertices.size()), threads, [&](std::size_t s) {
+    const std::size_t begin = s * kSlice, end = std::min(mesh.vertices.size(), begin + kSlice);
+    std::copy(mesh.vertices.begin() + std::ptrdiff_t(begin),
+              mesh.vertices.begin() + std::ptrdiff_t(end),
+              surface.vertices.begin() + std::ptrdiff_t(begin));
+  });
+  return surface;
+}
+
+// The longest side gets `voxels` nodes. Around the mesh stay the wanted padding and never less than
+// the band, the offset and two voxels: the border of the grid is outside for certain.
+Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed) {
+  if (options.voxel_size <= 0 && (options.voxels < 16 || options.voxels > 2048))
+    return Failure{"a field takes 16 to 2048 voxels on its longest side, not " +
+                   std::to_string(options.voxels)};
+  if (!(options.voxel_size >= 0) || !std::isfinite(options.voxel_size))
+    return Failure{"the voxel size must be a positive length"};
+  if (!(options.band_voxels >= 1) || options.band_voxels > 8)
+    return Failure{"the band must be 1 to 8 voxels wide, not " + number(options.band_voxels)};
+  if (options.padding_voxels < 0 || options.padding_voxels > 512)
+    return Failure{"the padding must be 0 to 512 voxels, not " +
+                   std::to_string(options.padding_voxels)};
+  if (!(options.seal >= 0) || !std::isfinite(options.seal))
+    return Failure{"the width of holes to seal must be a length, or 0 for none"};
+  if (!std::isfinite(options.offset)) return Failure{"the offset must be a length, or -1 for auto"};
+
+  Grid grid;
+  grid.band = options.band_voxels;
+  grid.centre = {0.5 * surface.low.x + 0.5 * surface.high.x,
+                 0.5 * surface.low.y + 0.5 * surface.high.y,
+                 0.5 * surface.low.z + 0.5 * surface.high.z};
+  const double side[3] = {surface.high.x - surface.low.x, surface.high.y - surface.low.y,
+                          surface.high.z - surface.low.z};
+  const double longest = std::max({side[0], side[1], side[2]});
+  const bool automatic = options.offset < 0;
+  const double auto_offset = sealed ? 0.0 : 0.9;  // [voxel]
+  const double margin = grid.band + 2 + (automatic ? auto_offset : 0.0);
+  const double extra = automatic ? 0.0 : options.offset;  // [m], on each side
+  const double seal = sealed ? 0.0 : options.seal;        // [m]; a ball of it passes all around
+  double padding = options.padding_voxels;
+  if (options.voxel_size > 0) {
+    grid.voxel = options.voxel_size;
+    padding = std::max({padding, margin + extra / grid.voxel, 0.5 * seal / grid.voxel + 2});
+  } else {
+    const double n = options.voxels;
+    padding = std::max(std::min(padding, n / 4), margin);
+    grid.voxel = std::max({longest / (n - 2 * padding), (longest + 2 * extra) / (n - 2 * margin),
+                           (longest + seal) / (n - 4)});
+    padding = std::max({padding, margin + extra / grid.voxel, 0.5 * seal / grid.voxel + 2});
+  }
+  grid.offset = automatic ? auto_offset : options.offset / grid.voxel;
+  if (grid.offset > 64)
+    return Failure{"the offset of " + number(options.offset) + " m is " + number(grid.offset) +
+                   " voxels; at most 64 are possible: choose larger voxels"};
+  grid.seal = seal / grid.voxel;
+  if (grid.seal > 0 && grid.offset < 0.6)
+    return Failure{"sealing holes needs an offset of at least 0.6 voxel (" +
+                   number(0.6 * grid.voxel) + " m)"};
+  if (grid.seal > 32)
+    return Failure{"holes of " + number(options.seal) + " m are " + number(grid.seal) +
+                   " voxels wide; at most 32 can be sealed: choose larger voxels"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double nodes = side[k] / grid.voxel + 2 * padding;
+    if (!(nodes <= 2048 + 1e-6)) {
+      const double room = 2048 - 2 * std::max(double(options.padding_voxels), margin);
+      return Failure{"voxels of " + number(grid.voxel) + " m make " + number(nodes) +
+                     " nodes on a side, 2048 are possible: choose at least " +
+                     number(1.001 * (longest + 2 * extra) / room) + " m"};
+    }
+    grid.bricks[k] = std::max(1, int(std::ceil(nodes / 8 - 1e-9)));
+  }
+  return grid;
+}
+
+void to_grid(Surface& surface, const Grid& grid, unsigned threads) {
+  sched::parallel_for((surface.vertices.size() + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
+    const std::size_t end = std::min(surface.vertices.size(), (s + 1) * kSlice);
+    for (std::size_t i = s * kSlice; i < end; ++i)
+      surface.vertices[i] = grid.from_metres(surface.vertices[i]);
+  });
+}
+
+}  // namespace h6::io::bake

@@ -1,0 +1,328 @@
+#include "io/check/exact_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/check/ray_votes.h"
+#include "io/field/view.h"
+#include "kernels/field/field_layout.h"
+#include "kernels/field/sample_field.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io {
+namespace {
+
+constexpr double kJitter = 2.5;      // voxels about the mesh
+constexpr double kNodeSlack = 1e-3;  // [voxel] what counts as exact
+constexpr double kFarSlack = 1e-4;   // [voxel] what the sampler's floats may add
+constexpr std::size_t kBlock = 128;  // places a task: sums are joined in the order of blocks
+constexpr int kRuns = 200;           // of a search for a way out
+
+struct Worst {
+  double most = 0, sum = 0;
+  std::size_t count = 0;
+  void add(double error) { most = std::max(most, error), sum += error, ++count; }
+  void add(const Worst& o) { most = std::max(most, o.most), sum += o.sum, count += o.count; }
+  double mean() const { return count > 0 ? sum / double(count) : 0; }
+};
+
+struct Tally {
+  Worst node, between, gap, inside_gap, corner, deep;
+  ExactCheck sum;  // its counts
+  double excess = 0;
+  std::size_t lost = 0;  // places near the mesh where the field has no samples
+
+  void add(const Tally& o) {
+    node.add(o.node), between.add(o.between), gap.add(o.gap), inside_gap.add(o.inside_gap),
+        corner.add(o.corner), deep.add(o.deep);
+    excess = std::max(excess, o.excess), lost += o.lost;
+    for (const auto count : {&ExactCheck::buried, &ExactCheck::nearer, &ExactCheck::voted,
+                             &ExactCheck::doubtful, &ExactCheck::drained, &ExactCheck::filled,
+                             &ExactCheck::enclosed, &ExactCheck::far, &ExactCheck::far_wrong})
+      sum.*count += o.sum.*count;
+  }
+};
+
+// The engine's bounds: its own layout, without the bricks.
+class FarBounds {
+ public:
+  FarBounds(const FieldData& field, unsigned threads) : def_(field.def()) {
+    const std::size_t cells = field.brick_index.size();
+    table_.resize(cells);
+    kernels::layout_table(def_, table_.data());
+    far_.resize(8 * kernels::field_layout_size(def_).far_cells);
+    sched::parallel_for((cells + 4095) / 4096, threads, [&](std::size_t block) {
+      for (std::size_t c = 4096 * block; c < std::min(cells, 4096 * (block + 1)); ++c)
+        if (table_[c] < 0) kernels::layout_cell(def_, table_.data(), c, nullptr, far_.data());
+    });
+  }
+  bool any() const { return !far_.empty(); }
+  // At a place in voxels; false where there are samples, or where the side is not known.
+  bool operator()(const Vec3& g, double& bound, bool& inside) const {
+    const std::size_t nx = std::size_t(def_.bricks[0]), ny = std::size_t(def_.bricks[1]);
+    const std::size_t x = std::size_t(g.x / 8), y = std::size_t(g.y / 8), z = std::size_t(g.z / 8);
+    if (table_[(z * ny + y) * nx + x] >= 0) return false;
+    int below = 0;
+    for (std::size_t k = 0; k < 8; ++k)
+      below +=
+          def_.far_grid[((z + (k >> 2)) * (ny + 1) + y + (k >> 1 & 1)) * (nx + 1) + x + (k & 1)] <
+          0;
+    if (below != 0 && below != 8) return false;
+    inside = below == 8;
+    const kernels::FieldView view{{def_.bricks[0], def_.bricks[1], def_.bricks[2]},
+                                  table_.data(),
+                                  nullptr,
+                                  far_.data(),
+                                  kernels::layout_band(def_)};
+    const kernels::Affine same{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    const float p[3] = {float(g.x), float(g.y), float(g.z)};
+    float d = 0;
+    kernels::sample_field_ref(view, same, {&p[0], &p[1], &p[2], 1}, nullptr, 1, &d, nullptr,
+                              nullptr, nullptr);
+    bound = std::fabs(double(d));
+    return true;
+  }
+
+ private:
+  h6FieldDef def_;
+  std::vector<std::int32_t> table_;
+  std::vector<std::int16_t> far_;
+};
+
+class Check {
+ public:
+  Check(const Mesh& mesh, const FieldData& field, const ExactCheckOptions& options,
+        const RayScene& rays, const FaceTable& faces)
+      : field_(field),
+        view_(field),
+        options_(options),
+        rays_(rays),
+        faces_(faces),
+        votes_(rays, faces),
+        places_(mesh),
+        far_(field, options.threads),
+        h_(field.voxel_size),
+        offset_(field.offset / field.voxel_size) {}
+
+  bool has_area() const { return places_.area() > 0; }
+
+  Tally near(std::size_t i) const {
+    Tally t;
+    Dice dice(options_.seed, i);
+    Vec3 g{}, p{};
+    const float* sample = nullptr;
+    for (int tries = 0; sample == nullptr && tries < 4; ++tries) {
+      p = places_(dice).p;
+      for (double* c : {&p.x, &p.y, &p.z}) *c += h_ * dice.within(-kJitter, kJitter);
+      g = view_.from_metres(p);
+      sample = node({std::round(g.x), std::round(g.y), std::round(g.z)});
+    }
+    if (sample == nullptr) {
+      t.lost = 1;
+      return t;
+    }
+    const Vec3 at = view_.to_metres({std::round(g.x), std::round(g.y), std::round(g.z)});
+    const RayScene::Near near = rays_.nearest(at);
+    const double d = double(*sample) / h_, u = near.distance / h_;
+    if (u < field_.band / h_) distance(d, near, dice, t);
+    if (u > std::max(2 * offset_, kNodeSlack)) side(at, d < 0, u, dice, t);
+    double value = 0;
+    if (view_.distance(g, value) && value >= 0) {
+      const double error = value + offset_ - rays_.distance(p) / h_;
+      if (!options_.sealed || error > 0) t.between.add(std::fabs(error));
+    }
+    return t;
+  }
+
+  Tally far(std::size_t i) const {
+    Tally t;
+    if (!far_.any()) return t;
+    Dice dice(options_.seed + 1, i);
+    Vec3 g{};
+    double bound = 0;
+    bool inside = false;
+    for (int tries = 0;; ++tries) {
+      if (tries == 64) return t;  // hardly a place without samples
+      // The engine's last cell ends at the last node.
+      g = {dice.within(0, 8 * field_.bricks[0] - 1), dice.within(0, 8 * field_.bricks[1] - 1),
+           dice.within(0, 8 * field_.bricks[2] - 1)};
+      g = {double(float(g.x)), double(float(g.y)), double(float(g.z))};
+      if (far_(g, bound, inside)) break;
+    }
+    const Vec3 p = view_.to_metres(g);
+    t.sum.far = 1;
+    const Kept kept = promise(p, bound, inside, dice, t);
+    if (!inside) t.gap.add(kept.gap);
+    corner(g, dice, t);
+    // A tenth of them is asked by rays too, which cost more than distances.
+    if (i % 10 != 0) return t;
+    if (kept.near.distance / h_ > std::max(2 * offset_, kNodeSlack))
+      side(p, inside, kept.near.distance / h_, dice, t);
+    if (inside && outer(kept.near, dice)) t.inside_gap.add(kept.gap);
+    return t;
+  }
+
+ private:
+  // What a bound promised, and by how much it was below the distance [voxel].
+  struct Kept {
+    RayScene::Near near;
+    double gap;
+  };
+  Kept promise(const Vec3& p, double bound, bool inside, Dice& dice, Tally& t) const {
+    const RayScene::Near near = rays_.nearest(p);
+    const double u = near.distance / h_, most = inside ? u + offset_ : u - offset_;
+    if (bound > most + kFarSlack && (!inside || outer(near, dice)))
+      t.sum.far_wrong = 1, t.excess = std::max(t.excess, bound - most);
+    return {near, most - bound};
+  }
+  // The far grid where it is given, at a corner of the place's cell.
+  void corner(const Vec3& g, Dice& dice, Tally& t) const {
+    const std::size_t c[3] = {std::size_t(g.x / 8), std::size_t(g.y / 8), std::size_t(g.z / 8)};
+    const std::size_t nx = std::size_t(field_.bricks[0]) + 1,
+                      ny = std::size_t(field_.bricks[1]) + 1;
+    const double far = double(field_.far_grid[(c[2] * ny + c[1]) * nx + c[0]]) / h_;
+    const Kept kept =
+        promise(view_.to_metres({8.0 * double(c[0]), 8.0 * double(c[1]), 8.0 * double(c[2])}),
+                std::fabs(far), far < 0, dice, t);
+    if (far >= 0) t.corner.add(kept.gap);
+  }
+  // Whether there is outside on either side of the mesh there: else it is buried in the solid, and
+  // the way out is longer than to the mesh.
+  bool outer(const RayScene::Near& near, Dice& dice) const {
+    const Vec3& n = faces_.inward[near.triangle];
+    for (const double step : {-1.05, 1.05}) {
+      const double s = step * h_ * std::max(room(), 0.1);
+      const Vec3 beside{near.point.x + s * n.x, near.point.y + s * n.y, near.point.z + s * n.z};
+      if (votes_.side(beside, dice) == RayVotes::Side::outside && leads_out(beside, dice))
+        return true;
+    }
+    return false;
+  }
+  // Where a ball of sigma and the diagonal of half a voxel passes, so does a flood from node to
+  // node; without an offset no way is too narrow. [voxel]
+  double room() const { return offset_ > 0 ? offset_ + 0.9 : 0; }
+  bool leads_out(const Vec3& p, Dice& dice) const {
+    return votes_.way_out(p, room() * h_, kRuns, dice);
+  }
+
+  const float* node(const Vec3& n) const {
+    const double c[3] = {n.x, n.y, n.z};
+    std::size_t at[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!(c[k] >= 0 && c[k] < 8.0 * field_.bricks[k])) return nullptr;
+      at[k] = std::size_t(c[k]);
+    }
+    const std::size_t nx = std::size_t(field_.bricks[0]), ny = std::size_t(field_.bricks[1]);
+    const std::int32_t row = field_.brick_index[(at[2] / 8 * ny + at[1] / 8) * nx + at[0] / 8];
+    if (row < 0) return nullptr;
+    return &field_.samples[std::size_t(row) * 512 + (at[2] % 8 * 8 + at[1] % 8) * 8 + at[0] % 8];
+  }
+
+  // Of a node, as far as bake_field.h says what it is.
+  void distance(double d, const RayScene::Near& near, Dice& dice, Tally& t) const {
+    const double u = near.distance / h_;
+    // A plug is nearer than the mesh. What the mesh alone would allow: for a node in front of the
+    // surface its distance, for one in a solid the least depth that the offset leaves it.
+    const bool solid = d <= -offset_;
+    const double to_surface = solid ? -d : d + offset_,
+                 to_mesh = solid ? std::fabs(offset_ - u) : u;
+    if (options_.sealed && to_surface < to_mesh - kNodeSlack) {
+      ++t.sum.nearer;
+    } else if (d >= 0) {
+      t.node.add(std::fabs(d + offset_ - u));
+    } else if (-d > u + offset_ + kNodeSlack) {
+      if (outer(near, dice))
+        t.deep.add(-d - u - offset_);
+      else
+        ++t.sum.buried;
+    } else if (offset_ == 0) {
+      t.node.add(std::fabs(-d - u));
+    } else {
+      t.node.add(std::max(0.0, std::fabs(offset_ - u) + d));
+    }
+  }
+
+  void side(const Vec3& p, bool inside, double u, Dice& dice, Tally& t) const {
+    const RayVotes::Side says = votes_.side(p, dice);
+    if (says == RayVotes::Side::doubtful) {
+      ++t.sum.doubtful;
+      return;
+    }
+    ++t.sum.voted;
+    if (inside == (says == RayVotes::Side::inside)) return;
+    if (!inside) {
+      ++t.sum.drained;
+      return;
+    }
+    const bool out = u > room() && leads_out(p, dice);
+    ++(out ? t.sum.filled : t.sum.enclosed);
+  }
+
+  const FieldData& field_;
+  const FieldView view_;
+  const ExactCheckOptions& options_;
+  const RayScene& rays_;
+  const FaceTable& faces_;
+  const RayVotes votes_;
+  const SurfacePlaces places_;
+  const FarBounds far_;
+  const double h_, offset_;  // [m], [voxel]
+};
+
+// False: cancelled.
+template <class Ask>
+bool ask_all(std::size_t count, unsigned threads, const Progress& progress, const char* what,
+             double from, double to, Tally& sum, const Ask& ask) {
+  const std::size_t blocks = (count + kBlock - 1) / kBlock;
+  constexpr std::size_t kSlices = 20;
+  for (std::size_t s = 0; s < kSlices; ++s) {
+    if (progress && !progress(what, from + (to - from) * double(s) / kSlices)) return false;
+    const std::size_t first = blocks * s / kSlices, last = blocks * (s + 1) / kSlices;
+    std::vector<Tally> part(last - first);
+    sched::parallel_for(part.size(), threads, [&](std::size_t b) {
+      const std::size_t begin = (first + b) * kBlock;
+      for (std::size_t i = begin; i < std::min(count, begin + kBlock); ++i) part[b].add(ask(i));
+    });
+    for (const Tally& t : part) sum.add(t);
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<ExactCheck> check_exactly(const Mesh& mesh, const FieldData& field,
+                                 const ExactCheckOptions& options, const Progress& progress) {
+  const Failure cancelled{"cancelled"};
+  if (progress && !progress("rays", 0)) return cancelled;
+  const Result<std::unique_ptr<RayScene>> rays = RayScene::make(mesh);
+  if (!rays) return rays.failure();
+  const FaceTable faces = face_table(mesh);
+  const Check check(mesh, field, options, **rays, faces);
+  if (!check.has_area())
+    return Failure{"the mesh has no area: there is nothing to check a field with"};
+  Tally sum;
+  if (!ask_all(options.points, options.threads, progress, "near the mesh", 0.1, 0.6, sum,
+               [&](std::size_t i) { return check.near(i); }))
+    return cancelled;
+  if (sum.lost > options.points * 9 / 10)
+    return Failure{
+        "hardly any place near the mesh has samples in the field: it was baked from "
+        "another mesh, or in another unit"};
+  if (!ask_all(options.far_points, options.threads, progress, "far from it", 0.6, 1, sum,
+               [&](std::size_t i) { return check.far(i); }))
+    return cancelled;
+
+  ExactCheck out = sum.sum;
+  out.closed = audit(mesh).closed;
+  out.nodes = sum.node.count, out.worst_node = sum.node.most, out.mean_node = sum.node.mean();
+  out.between = sum.between.count;
+  out.worst_between = sum.between.most, out.mean_between = sum.between.mean();
+  out.far_excess = sum.excess;
+  out.outside = sum.gap.count, out.far_gap = sum.gap.mean();
+  out.inside = sum.inside_gap.count, out.inside_gap = sum.inside_gap.mean();
+  out.deep = sum.deep.count, out.worst_deep = sum.deep.most;
+  out.corner_gap = sum.corner.mean();
+  return out;
+}
+
+}  // namespace h6::io

@@ -1,0 +1,284 @@
+#include "io/check/ray_scene.h"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/bake/triangle_distance.h"
+
+namespace h6::io {
+namespace {
+
+Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+Vec3 on_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 e = minus(b, a);
+  const double t = std::clamp(dot(minus(p, a), e) / dot(e, e), 0.0, 1.0);
+  return {a.x + t * e.x, a.y + t * e.y, a.z + t * e.z};
+}
+// Of a triangle with area: straight below, or on the nearest edge.
+Vec3 point_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 n = cross(minus(b, a), minus(c, a)), w = minus(p, a);
+  const auto left_of = [&](const Vec3& q, const Vec3& r) {
+    return dot(cross(minus(r, q), minus(p, q)), n) >= 0;
+  };
+  if (left_of(a, b) && left_of(b, c) && left_of(c, a)) {
+    const double h = dot(w, n) / dot(n, n);
+    return {p.x - h * n.x, p.y - h * n.y, p.z - h * n.z};
+  }
+  Vec3 best = on_edge(p, a, b);
+  for (const Vec3& q : {on_edge(p, b, c), on_edge(p, c, a)})
+    if (dot(minus(p, q), minus(p, q)) < dot(minus(p, best), minus(p, best))) best = q;
+  return best;
+}
+
+// Triangles with area, the first of each three corners.
+std::vector<std::uint32_t> that_count(const Mesh& mesh) {
+  struct Key {
+    std::array<std::uint32_t, 3> corners;
+    std::uint32_t triangle;
+    bool operator<(const Key& o) const {
+      return corners != o.corners ? corners < o.corners : triangle < o.triangle;
+    }
+  };
+  std::vector<Key> keys;
+  keys.reserve(mesh.triangles.size());
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& f = mesh.triangles[t];
+    const Vec3& a = mesh.vertices[f[0]];
+    const Vec3 u = minus(mesh.vertices[f[1]], a), v = minus(mesh.vertices[f[2]], a);
+    const Vec3 n = cross(u, v);
+    const double longest2 = std::max({dot(u, u), dot(v, v), dot(minus(v, u), minus(v, u))});
+    if (!(dot(n, n) > 1e-24 * longest2 * longest2)) continue;  // a line
+    keys.push_back({f, t});
+    std::sort(keys.back().corners.begin(), keys.back().corners.end());
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> kept;
+  kept.reserve(keys.size());
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    if (i == 0 || keys[i].corners != keys[i - 1].corners) kept.push_back(keys[i].triangle);
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+constexpr double kSlack = 1e-6;  // of the cube's half side
+
+}  // namespace
+
+struct RayScene::Embree {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  std::vector<std::uint32_t> triangle;  // (primitives) of the mesh
+  Vec3 middle{};
+  double half = 1;  // [m] is 1 for Embree
+
+  ~Embree() {
+    if (scene) rtcReleaseScene(scene);
+    if (device) rtcReleaseDevice(device);
+  }
+  Vec3 inside(const Vec3& p) const {
+    return {(p.x - middle.x) / half, (p.y - middle.y) / half, (p.z - middle.z) / half};
+  }
+  RTCRayHit ray(const Vec3& from, const Vec3& along) const {
+    const Vec3 o = inside(from);
+    RTCRayHit ray{};
+    ray.ray.org_x = float(o.x), ray.ray.org_y = float(o.y), ray.ray.org_z = float(o.z);
+    ray.ray.dir_x = float(along.x), ray.ray.dir_y = float(along.y), ray.ray.dir_z = float(along.z);
+    ray.ray.tnear = 0;
+    ray.ray.tfar = std::numeric_limits<float>::infinity();
+    ray.ray.mask = ~0u;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    return ray;
+  }
+};
+
+RayScene::RayScene(const Mesh& mesh, std::unique_ptr<Embree> embree)
+    : mesh_(mesh), embree_(std::move(embree)) {}
+RayScene::~RayScene() = default;
+
+Result<std::unique_ptr<RayScene>> RayScene::make(const Mesh& mesh) {
+  const Failure no_memory{"not enough memory to shoot rays at this mesh: simplify it first"};
+  auto e = std::make_unique<Embree>();
+  e->device = rtcNewDevice(nullptr);
+  if (!e->device) return no_memory;
+  e->scene = rtcNewScene(e->device);
+  rtcSetSceneFlags(e->scene,
+                   RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  e->triangle = that_count(mesh);
+  Vec3 low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
+  for (const std::uint32_t t : e->triangle)
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      const Vec3& p = mesh.vertices[v];
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+  if (!e->triangle.empty()) {
+    e->middle = {(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};
+    e->half = std::max({high.x - low.x, high.y - low.y, high.z - low.z}) / 2;
+    RTCGeometry geometry = rtcNewGeometry(e->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    const std::size_t vertices = mesh.vertices.size(), triangles = e->triangle.size();
+    auto* place = static_cast<float*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
+    auto* corner = static_cast<std::uint32_t*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(std::uint32_t), triangles));
+    if (place && corner) {
+      for (std::size_t v = 0; v < vertices; ++v) {
+        const Vec3 p = e->inside(mesh.vertices[v]);
+        place[3 * v] = float(p.x), place[3 * v + 1] = float(p.y), place[3 * v + 2] = float(p.z);
+      }
+      for (std::size_t i = 0; i < triangles; ++i)
+        std::copy_n(mesh.triangles[e->triangle[i]].data(), 3, corner + 3 * i);
+      rtcCommitGeometry(geometry);
+      rtcAttachGeometry(e->scene, geometry);
+    }
+    rtcReleaseGeometry(geometry);
+    if (!place || !corner) return no_memory;
+  }
+  rtcCommitScene(e->scene);
+  if (rtcGetDeviceError(e->device) != RTC_ERROR_NONE) return no_memory;
+  return std::unique_ptr<RayScene>(new RayScene(mesh, std::move(e)));
+}
+
+RayScene::Near RayScene::nearest(const Vec3& place) const {
+  struct Search {
+    const RayScene* self;
+    double p[3];
+    double best2 = std::numeric_limits<double>::infinity();
+    double slack = 0;  // in Embree's unit
+    std::uint32_t triangle = kNoTriangle;
+  } search{this, {place.x, place.y, place.z}};
+  const Vec3 at = embree_->inside(place);
+  search.slack = kSlack * std::max({1.0, std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
+  RTCPointQuery query{};
+  query.x = float(at.x), query.y = float(at.y), query.z = float(at.z);
+  query.radius = std::numeric_limits<float>::infinity();
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  const auto look = [](RTCPointQueryFunctionArguments* args) {
+    auto& s = *static_cast<Search*>(args->userPtr);
+    const Mesh& mesh = s.self->mesh_;
+    const auto& f = mesh.triangles[s.self->embree_->triangle[args->primID]];
+    double c[3][3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& v = mesh.vertices[f[k]];
+      c[k][0] = v.x, c[k][1] = v.y, c[k][2] = v.z;
+    }
+    const double d2 = kernels::point_triangle_squared(s.p, c[0], c[1], c[2]);
+    if (d2 >= s.best2) return false;
+    s.best2 = d2, s.triangle = s.self->embree_->triangle[args->primID];
+    args->query->radius = float(std::sqrt(d2) / s.self->embree_->half * (1 + kSlack) + s.slack);
+    return true;
+  };
+  if (!embree_->triangle.empty()) rtcPointQuery(embree_->scene, &query, &context, look, &search);
+  if (search.triangle == kNoTriangle) return {};
+  const auto& f = mesh_.triangles[search.triangle];
+  return {std::sqrt(search.best2), search.triangle,
+          point_nearest(place, mesh_.vertices[f[0]], mesh_.vertices[f[1]], mesh_.vertices[f[2]])};
+}
+
+void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all) const {
+  struct Collect : RTCIntersectContext {
+    std::vector<std::uint32_t> found;
+  } context;
+  rtcInitIntersectContext(&context);
+  context.filter = [](const RTCFilterFunctionNArguments* args) {
+    for (unsigned i = 0; i < args->N; ++i) {
+      if (args->valid[i] == 0) continue;
+      auto* collect = static_cast<Collect*>(args->context);
+      collect->found.push_back(RTCHitN_primID(args->hit, args->N, i));
+      args->valid[i] = 0;  // and on
+    }
+  };
+  RTCRayHit ray = embree_->ray(from, along);
+  rtcIntersect1(embree_->scene, &context, &ray);
+  std::sort(context.found.begin(), context.found.end());
+  context.found.erase(std::unique(context.found.begin(), context.found.end()), context.found.end());
+  all.clear();
+  for (const std::uint32_t i : context.found) {
+    const std::uint32_t t = embree_->triangle[i];
+    const auto& f = mesh_.triangles[t];
+    const Vec3& a = mesh_.vertices[f[0]];
+    const Vec3 n = cross(minus(mesh_.vertices[f[1]], a), minus(mesh_.vertices[f[2]], a));
+    const double fall = dot(n, along);
+    all.push_back({t, fall != 0 ? std::max(0.0, dot(n, minus(a, from)) / fall) : 0});
+  }
+  std::sort(all.begin(), all.end(), [](const Crossing& a, const Crossing& b) {
+    return a.t != b.t ? a.t < b.t : a.triangle < b.triangle;
+  });
+}
+
+bool RayScene::meets(const Vec3& from, const Vec3& along) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit ray = embree_->ray(from, along);
+  rtcOccluded1(embree_->scene, &context, &ray.ray);
+  return ray.ray.tfar < 0;
+}
+
+double RayScene::free_way(const Vec3& from, const Vec3& along) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit ray = embree_->ray(from, along);
+  rtcIntersect1(embree_->scene, &context, &ray);
+  const bool met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  return met ? double(ray.ray.tfar) * embree_->half : std::numeric_limits<double>::infinity();
+}
+
+double RayScene::reach() const { return 5 * embree_->half; }
+
+std::uint64_t Dice::next() {
+  std::uint64_t z = state_ += 0x9E3779B97F4A7C15u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return z ^ (z >> 31);
+}
+double Dice::within(double low, double high) {
+  return low + (high - low) * double(next() >> 11) * 0x1p-53;
+}
+Vec3 Dice::direction() {
+  for (;;) {
+    const Vec3 d{within(-1, 1), within(-1, 1), within(-1, 1)};
+    const double length2 = dot(d, d);
+    if (length2 > 1 || length2 < 0.01) continue;
+    const double length = std::sqrt(length2);
+    return {d.x / length, d.y / length, d.z / length};
+  }
+}
+
+SurfacePlaces::SurfacePlaces(const Mesh& mesh) : mesh_(mesh) {
+  sum_.reserve(mesh.triangles.size());
+  double sum = 0;
+  for (const auto& f : mesh.triangles) {
+    const Vec3& a = mesh.vertices[f[0]];
+    const Vec3 n = cross(minus(mesh.vertices[f[1]], a), minus(mesh.vertices[f[2]], a));
+    sum_.push_back(sum += std::sqrt(dot(n, n)) / 2);
+  }
+}
+
+SurfacePlaces::SurfacePlaces(const Mesh& mesh, const std::vector<double>& area) : mesh_(mesh) {
+  sum_.reserve(area.size());
+  double sum = 0;
+  for (const double a : area) sum_.push_back(sum += a);
+}
+
+SurfacePlaces::Place SurfacePlaces::operator()(Dice& dice) const {
+  const auto found = std::upper_bound(sum_.begin(), sum_.end(), dice.within(0, sum_.back()));
+  const auto t = std::min(std::size_t(found - sum_.begin()), sum_.size() - 1);
+  double u = dice.within(0, 1), v = dice.within(0, 1);
+  if (u + v > 1) u = 1 - u, v = 1 - v;
+  const auto& f = mesh_.triangles[t];
+  const Vec3& a = mesh_.vertices[f[0]];
+  const Vec3 b = minus(mesh_.vertices[f[1]], a), c = minus(mesh_.vertices[f[2]], a);
+  return {std::uint32_t(t),
+          {a.x + u * b.x + v * c.x, a.y + u * b.y + v * c.y, a.z + u * b.z + v * c.z}};
+}
+
+}  // namespace h6::io

@@ -1,0 +1,194 @@
+#include "io/console/console.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "hapsix/hapsix.h"
+#include "io/file/write_aside.h"
+
+namespace h6::cli {
+
+std::atomic<bool> interrupted{false};
+
+namespace {
+
+std::atomic<void (*)(void*)> signal_hook{nullptr};
+std::atomic<void*> signal_context{nullptr};
+
+// The first signal asks; a second one ends the program at once, tidily.
+void on_signal(int number) {
+  if (auto hook = signal_hook.load()) hook(signal_context.load());
+  if (interrupted.exchange(true)) {
+    io::remove_unfinished();
+    _exit(128 + number);
+  }
+}
+
+// A crash stops the devices first and is then what it would have been.
+constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGQUIT};
+struct sigaction before_crash[std::size(kCrashes)];
+void on_crash(int number) {
+  for (std::size_t i = 0; i < std::size(kCrashes); ++i)
+    if (kCrashes[i] == number) sigaction(number, &before_crash[i], nullptr);
+  h6HaltAll();
+  raise(number);
+}
+
+}  // namespace
+
+void install_signal_handlers() {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  struct sigaction hang_up {};
+  sigaction(SIGHUP, nullptr, &hang_up);
+  if (hang_up.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);  // not under nohup
+  action.sa_handler = on_crash;
+  for (std::size_t i = 0; i < std::size(kCrashes); ++i)
+    sigaction(kCrashes[i], &action, &before_crash[i]);
+  signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a file over the limit is a failed write, with a sentence
+}
+
+void set_signal_hook(void (*hook)(void*), void* context) {
+  signal_hook.store(nullptr);
+  signal_context.store(context);
+  signal_hook.store(hook);
+}
+
+namespace {
+
+// In a handler: what cannot be written is lost.
+void write_all(int to, const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t some = write(to, text.data() + done, text.size() - done);
+    if (some <= 0) return;
+    done += static_cast<std::size_t>(some);
+  }
+}
+
+}  // namespace
+
+EndsAtOnce::EndsAtOnce(const Console& console, const std::string& sentence) {
+  static std::string error, result;  // the handler may not allocate, nor find them gone
+  error = (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("hapsix: " + sentence) + "\n";
+  result = console.json ? Console::text({{"error", sentence}}, 2) + "\n" : "";
+  set_signal_hook(
+      [](void*) {
+        io::remove_unfinished();
+        write_all(STDERR_FILENO, error);
+        write_all(STDOUT_FILENO, result);
+        _exit(kFailed);
+      },
+      nullptr);
+}
+
+EndsAtOnce::~EndsAtOnce() { set_signal_hook(nullptr, nullptr); }
+
+void Console::log(const std::string& text) const { std::fprintf(stderr, "%s\n", text.c_str()); }
+
+void Console::warn(const std::vector<std::string>& sentences) const {
+  for (const std::string& s : sentences) log("warning: " + s);
+}
+
+int Console::fail(std::string sentence, int code) const {
+  // Sentences come from many places: here they all end alike.
+  if (!sentence.empty() && sentence.back() == '.') sentence.pop_back();
+  log("hapsix: " + sentence);
+  if (json) result({{"error", sentence}});
+  return code;
+}
+
+std::string Console::text(const nlohmann::ordered_json& object, int indent) {
+  return object.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+void Console::result(const nlohmann::ordered_json& object) const {
+  if (json) std::printf("%s\n", text(object, 2).c_str());
+}
+
+int Console::finish(int code) const {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
+  const int why = errno;
+  if (why != EPIPE) log(std::string("hapsix: the result cannot be written: ") + std::strerror(why));
+  return code == kOk ? kFailed : code;
+}
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// "about 3 s left", as if the rest went like what is done; empty while that says little.
+std::string time_left(double seconds, double share) {
+  if (seconds < 1 || share < 0.02 || share >= 1) return "";
+  const double left = seconds * (1 - share) / share;
+  const double minutes = left / 60, hours = minutes / 60;
+  char text[32];
+  if (left < 99.5)
+    std::snprintf(text, sizeof text, " about %.0f s left", std::max(left, 1.0));
+  else if (minutes < 99.5)
+    std::snprintf(text, sizeof text, " about %.0f min left", minutes);
+  else
+    std::snprintf(text, sizeof text, " about %.0f h left", std::min(hours, 999.0));
+  return text;
+}
+
+struct Bar {
+  Clock::time_point start = Clock::now(), shown = start, began = start;
+  double share = 0;
+  bool drawn = false;
+  ~Bar() { clear(); }
+  void clear() {
+    if (drawn) std::fprintf(stderr, "\r\033[K");
+    drawn = false;
+  }
+  // A line of at most 80 columns: a longer one would wrap and could not be wiped.
+  void draw(const std::string& what, Clock::time_point now) {
+    constexpr int width = 20;
+    const int full = static_cast<int>(width * share);
+    const double worked = std::chrono::duration<double>(now - began).count();
+    std::fprintf(stderr, "\r\033[K%-28.28s [%s%s] %3.0f %%%s", what.c_str(),
+                 std::string(full, '#').c_str(), std::string(width - full, ' ').c_str(),
+                 100 * share, time_left(worked, share).c_str());
+    std::fflush(stderr);
+    drawn = true;
+    shown = now;
+  }
+};
+
+}  // namespace
+
+io::Progress Console::progress() const {
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  return [terminal, bar = std::make_shared<Bar>()](const std::string& what, double done) {
+    const auto now = Clock::now();
+    const double share = done > 0 ? std::min(done, 1.0) : 0;  // NaN is 0
+    if (share < bar->share) bar->began = now;                 // the next work
+    bar->share = share;
+    if (terminal && now - bar->start > std::chrono::milliseconds(500) &&
+        now - bar->shown > std::chrono::milliseconds(80))
+      bar->draw(what, now);
+    if (done >= 1) bar->clear();
+    return !interrupted.load();
+  };
+}
+
+std::string number(double value, int digits) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", digits, value);
+  return text;
+}
+
+}  // namespace h6::cli

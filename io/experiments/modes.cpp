@@ -1,0 +1,161 @@
+// experiments_modes.cpp - the peg in the hand of a simulated arm, in every device mode and with
+// delay (Fig. 13).
+#include <algorithm>
+#include <cmath>
+
+#include "io/experiments/grid.h"
+#include "io/scenes/scenes.h"
+
+namespace h6::cli {
+namespace {
+
+constexpr int kDelays = 3;  // 0, 1 and 2 frames
+constexpr int kSteps = 20;  // of a gain, by a factor of sqrt(2) each
+constexpr double kStep = 1.4142135623730951;
+
+enum class Gain { coupling, hand };
+
+struct Mode {
+  const char* name;
+  std::uint32_t mode;
+  Gain gain;
+};
+const Mode kModes[] = {{"impedance", H6_IMPEDANCE, Gain::coupling},
+                       {"admittance", H6_ADMITTANCE, Gain::hand},
+                       {"pseudo-admittance", H6_PSEUDO_ADMITTANCE, Gain::coupling}};
+
+const char* gain_name(Gain gain) {
+  return gain == Gain::coupling ? "largest k_VC [N/m]" : "stiffest grip [N/m]";
+}
+
+bool stable(const RunFigures& run) {
+  return run.error.empty() && run.verdict != io::Verdict::unstable &&
+         run.verdict != io::Verdict::chatters && run.late_speed < 2e-3 &&
+         run.late_depth_swing < 0.1;
+}
+
+// One run; `factor` on the mode's gain, 1 for the defaults.
+RunFigures run_mode(const io::LoadedScene& loaded, const MethodColumn& method, const Mode& mode,
+                    int delay, double factor) {
+  RunChange change;
+  change.method = method;
+  change.device = "arm";
+  change.arm.emplace();
+  change.arm->delay_frames = delay;
+  if (mode.gain == Gain::hand) {  // stiffer, in the same ratio of damping
+    change.arm->grip_stiffness *= factor, change.arm->grip_rotational_stiffness *= factor;
+    change.arm->grip_damping *= std::sqrt(factor);
+    change.arm->grip_rotational_damping *= std::sqrt(factor);
+  }
+  change.also = [&](h6SessionDef&, h6HandDef& hand) {
+    hand.mode = mode.mode;
+    if (mode.gain == Gain::coupling)
+      hand.coupling.stiffness *= factor, hand.coupling.rotational_stiffness *= factor;
+  };
+  return run_experiment(loaded, change);
+}
+
+// In steps from the default, -kSteps .. kSteps; below that: not even so.
+int largest_gain(const std::function<bool(int)>& holds) {
+  if (holds(kSteps)) return kSteps;
+  int low = -kSteps - 1, high = kSteps;
+  if (holds(0))
+    low = 0;
+  else
+    high = 0;
+  while (high - low > 1) {
+    const int middle = low + (high - low) / 2;
+    (holds(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+// The gain's own figure after so many steps.
+double gain_value(Gain gain, const io::LoadedScene& loaded, int steps) {
+  const double first =
+      gain == Gain::coupling ? loaded.hands[0].coupling.stiffness : io::SceneArm{}.grip_stiffness;
+  return steps < -kSteps ? 0 : first * std::pow(kStep, steps);
+}
+
+std::string gain_text(Gain gain, const io::LoadedScene& loaded, int steps) {
+  if (steps < -kSteps) return "none";
+  return (steps < kSteps ? "" : "≥ ") + number(gain_value(gain, loaded, steps), 0);
+}
+
+struct Row {
+  const Mode* mode;
+  std::size_t method;
+  RunFigures defaults[kDelays];
+  int limits[kDelays];  // in steps
+};
+
+}  // namespace
+
+Study study_modes(const std::vector<MethodColumn>& columns, const Console& console) {
+  Study out;
+  out.title = "Fig. 13: device modes and delay";
+  out.about =
+      "The peg of Fig. 10 in the hand of a person who holds a simulated arm (mass, friction, "
+      "encoder steps, filtered velocity, 1 kHz sample and hold, drive at 10 kHz), whose commands "
+      "come 0, 1 or 2 frames late. First with the default gains: verdict, deepest contact in "
+      "voxels, RMS speed of the peg in the last 0.2 s. Then how far a gain can rise, to a factor "
+      "of "
+      "√2, before the peg moves by more than 2 mm/s where the hand rests, its depth swings by more "
+      "than 0.1 voxel, or the run is unstable (smaller gains assumed no worse): in the modes with "
+      "a "
+      "virtual coupling its k_VC (default 1000 N/m), in admittance mode the stiffness of the grip "
+      "(default 1500 N/m), which is what closes the loop through the force sensor.";
+  Result<io::Scene> scene = io::make_scene("peg-in-hole");
+  if (!scene) return out;
+  auto loaded = io::load_scene(std::move(*scene));
+  if (!loaded) return out;
+  std::vector<Row> rows;
+  for (const Mode& mode : kModes)
+    for (std::size_t m = 0; m < columns.size(); ++m)
+      if (columns[m].name == "robust" || columns[m].name == "series")
+        rows.push_back({&mode, m, {}, {}});
+  std::vector<std::function<void()>> jobs;
+  for (Row& row : rows)
+    for (int delay = 0; delay < kDelays; ++delay) {
+      jobs.push_back([&, delay] {
+        const MethodColumn& method = columns[row.method];
+        row.defaults[delay] = run_mode(**loaded, method, *row.mode, delay, 1);
+        row.limits[delay] = largest_gain([&](int steps) {
+          return stable(run_mode(**loaded, method, *row.mode, delay, std::pow(kStep, steps)));
+        });
+      });
+    }
+  run_jobs(jobs, console, "device modes");
+
+  out.table = {{"mode, method", "what", "0 frames", "1 frame", "2 frames"}};
+  bool all = true;
+  for (const Row& row : rows) {
+    const std::string& method = columns[row.method].name;
+    const std::string name = std::string(row.mode->name) + ", " + method;
+    auto& json = out.json[row.mode->name][method];
+    out.table.push_back({name, "defaults"});
+    for (int delay = 0; delay < kDelays; ++delay) {
+      const RunFigures& run = row.defaults[delay];
+      all = all && stable(run);
+      out.table.back().push_back(cell(run) + ", " + number(1e3 * run.late_speed, 2) + " mm/s" +
+                                 (stable(run) ? "" : " (not at rest)"));
+      json["defaults"].push_back({{"verdict", io::verdict_name(run.verdict)},
+                                  {"stable", stable(run)},
+                                  {"max_depth_voxels", run.max_depth_voxels},
+                                  {"late_speed", run.late_speed},
+                                  {"late_depth_swing_voxels", run.late_depth_swing}});
+      if (!run.error.empty()) json["defaults"].back()["error"] = run.error;
+    }
+    const Gain gain = row.mode->gain;
+    out.table.push_back({name, gain_name(gain)});
+    for (const int steps : row.limits) {
+      out.table.back().push_back(gain_text(gain, **loaded, steps));
+      json[gain_name(gain)].push_back(gain_value(gain, **loaded, steps));
+    }
+  }
+  out.after = all ? "With the default gains all three modes are at rest at every delay."
+                  : "With the default gains some of these do not come to rest.";
+  return out;
+}
+
+}  // namespace h6::cli

@@ -1,0 +1,49 @@
+#include "io/experiments/probe.h"
+
+namespace h6::cli {
+
+io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points,
+                      const h6Pose& obstacle_pose) {
+  io::Scene scene = io::common_scene(name, name);
+  scene.bodies.push_back(io::obstacle("obstacle", std::move(obstacle), kProbeVoxel));
+  scene.bodies.back().pose = obstacle_pose;
+  io::SceneBody body;
+  body.name = "body";
+  body.com = h6Vec3{0, 0, 0};
+  body.inertia = io::box_inertia(body.mass, {10 * kMm, 10 * kMm, 5 * kMm});
+  body.pose = {{0, 0, 0}, {1, 0, 0, 0}};
+  body.shell.emplace();
+  body.shell->points = std::move(points);
+  body.shell->bake.levels = 3;
+  scene.bodies.push_back(std::move(body));
+  return scene;
+}
+
+io::Mesh plate(double from_x, double to_x) {
+  return io::box_mesh({from_x, -40 * kMm, -12 * kMm}, {to_x, 40 * kMm, 0});
+}
+
+io::PointCloud bottom(int nu, int nv) {
+  io::PointCloud cloud;
+  io::add_face(cloud, {0, 0, -5 * kMm}, {10 * kMm, 0, 0}, {0, 10 * kMm, 0}, nu, nv, {0, 0, 1});
+  return cloud;
+}
+
+Probe::Probe(const io::LoadedScene& loaded, const MethodColumn& method) {
+  h6SessionDef def = loaded.session_def();
+  method.apply(def.contact);
+  def.contact.damping = 0;
+  def.max_contacts = 200000;
+  session_.reset(h6CreateSession(loaded.model.get(), &def, nullptr));
+}
+
+h6Contacts Probe::at(const h6Pose& pose) {
+  const h6BodyState state{pose, {}};
+  h6SetBody(session_.get(), 1, &state);
+  h6DeviceSample sample{};
+  h6DeviceCommand command{};
+  h6Step(session_.get(), &sample, &command);
+  return h6GetContacts(session_.get(), 1);
+}
+
+}  // namespace h6::cli

@@ -1,0 +1,31 @@
+// experiments_probe.h - studies of contacts at given poses: a free body that nothing holds is put
+// somewhere, and what touches there is read.
+#pragma once
+#include "io/experiments/grid.h"
+
+namespace h6::cli {
+
+inline constexpr double kMm = io::kMm, kProbeStiffness = 1e4, kProbeVoxel = 1e-3;
+inline constexpr double kProbeDepth = 0.2 * kMm;  // how deep the points of a patch are
+
+// A free body with these points against one obstacle, in a field of kProbeVoxel, at
+// `obstacle_pose`.
+io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points,
+                      const h6Pose& obstacle_pose = {{0, 0, 0}, {1, 0, 0, 0}});
+
+// A plate of 12 mm under z = 0, and the bottom of a box of 20 x 20 x 10 mm around its centre.
+io::Mesh plate(double from_x, double to_x);
+io::PointCloud bottom(int nu, int nv);
+
+class Probe {
+ public:
+  Probe(const io::LoadedScene& loaded, const MethodColumn& method);
+  explicit operator bool() const { return session_ != nullptr; }
+  h6Contacts at(const h6Pose& pose);
+  h6FrameReport report() const { return h6GetFrame(session_.get()); }
+
+ private:
+  SessionPtr session_;
+};
+
+}  // namespace h6::cli

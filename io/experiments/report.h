@@ -1,0 +1,28 @@
+// experiments_report.h - the experiments' tables as text for a terminal, as Markdown and as JSON.
+#pragma once
+#include <nlohmann/json.hpp>
+
+#include "io/experiments/scenes.h"
+
+namespace h6::cli {
+
+// Rows of cells, the first is the head; columns as wide as they need.
+using TextTable = std::vector<std::vector<std::string>>;
+std::string plain(const TextTable& table);
+std::string markdown(const TextTable& table);
+
+// One study beside the scenes' table: what it measures and how, its table, the same as JSON.
+struct Study {
+  std::string name, title, about;
+  TextTable table;
+  std::string after;  // what follows from the table; may be empty
+  nlohmann::ordered_json json;
+};
+
+TextTable scene_table(const std::vector<SceneRow>& rows, const std::vector<MethodColumn>& columns);
+nlohmann::ordered_json to_json(const SceneRow& row, const std::vector<MethodColumn>& columns);
+std::string markdown_report(const std::vector<SceneRow>& rows,
+                            const std::vector<MethodColumn>& columns,
+                            const std::vector<Study>& studies, double seconds);
+
+}  // namespace h6::cli

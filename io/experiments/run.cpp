@@ -1,0 +1,205 @@
+#include "io/experiments/run.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "io/record/recording.h"
+
+namespace h6::cli {
+namespace {
+
+constexpr double kLate = 0.2;  // the verdict's own window [s]
+
+double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
+h6Vec3 minus(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+// Sums a run up, row by row.
+class Tally {
+ public:
+  Tally(const io::LoadedScene& loaded, double rate, double duration, RunFigures& out)
+      : out_(out),
+        late_from_(duration - kLate),
+        verdict_(loaded.scene.verdict, loaded.watched_points,
+                 loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com, rate) {}
+
+  void frame(const h6FrameRecord& r, const h6Vec3& force) {
+    const h6FrameReport& f = r.report;
+    out_.status |= f.status;
+    out_.contacts_max = std::max(out_.contacts_max, f.contacts);
+    if (f.contacts) contacts_ += f.contacts, ++touching_;
+    out_.max_depth_voxels = std::max(out_.max_depth_voxels, f.max_depth_voxels);
+    out_.final_depth_voxels = f.max_depth_voxels;
+    out_.force_jump = std::max(out_.force_jump, norm(minus(force, force_)));
+    force_ = force;
+    if (r.time >= late_from_) {
+      const double v = norm(r.body[0].velocity.linear);
+      speed2_ += v * v, ++late_;
+      low_ = std::min(low_, f.max_depth_voxels), high_ = std::max(high_, f.max_depth_voxels);
+    }
+    frame_us_.add(f.frame_us);
+    verdict_.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
+                   (f.status & H6_STATE_NOT_FINITE) == 0);
+  }
+
+  void finish() {
+    out_.verdict = verdict_.verdict();
+    if (touching_) out_.contacts_mean = contacts_ / static_cast<double>(touching_);
+    if (late_) {
+      out_.late_speed = std::sqrt(speed2_ / static_cast<double>(late_));
+      out_.late_depth_swing = high_ - low_;
+    }
+    out_.frame_us_p50 = frame_us_.percentile(50);
+    out_.frame_us_p99 = frame_us_.percentile(99);
+  }
+
+ private:
+  RunFigures& out_;
+  double late_from_;
+  io::VerdictWatch verdict_;
+  Histogram frame_us_;
+  h6Vec3 force_{};
+  double contacts_ = 0, speed2_ = 0, low_ = 1e9, high_ = 0;
+  std::size_t touching_ = 0, late_ = 0;
+};
+
+// The definitions of a run: the scene's, with what is to be different.
+Outcome open(const RunChange& change, RunSetup& run) {
+  for (h6HandDef& hand : run.hand_defs) {
+    h6CouplingDef& c = hand.coupling;
+    c.stiffness *= change.force, c.rotational_stiffness *= change.force;
+    c.max_depth_voxels *= change.force;  // the bound that a max_force of 0 derives
+    if (change.max_force >= 0) c.max_force = change.max_force;
+    c.max_force *= change.force, c.max_torque *= change.force;
+  }
+  change.method.apply(run.def.contact);
+  if (change.stiffness > 0) run.def.contact.stiffness = change.stiffness;
+  if (change.damping >= 0) run.def.contact.damping = change.damping;
+  if (change.integrator >= 0) run.def.integrator = static_cast<h6Integrator>(change.integrator);
+  if (change.rate > 0) run.def.rate = change.rate;
+  if (change.also)
+    for (h6HandDef& hand : run.hand_defs) change.also(run.def, hand);
+  for (io::SceneHand& hand : run.hands) {
+    hand.device = change.device;
+    if (change.arm) hand.arm = change.arm;
+  }
+  if (change.path) run.hands[0].path = *change.path;
+  run.record = change.record;
+  return run.open();
+}
+
+}  // namespace
+
+void MethodColumn::apply(h6ContactDef& contact) const {
+  h6MethodFromName(method.c_str(), &contact.method, &contact.pieces);
+  if (global_n0 > 0) contact.global_n0 = global_n0;
+}
+
+std::vector<MethodColumn> method_columns() {
+  std::vector<MethodColumn> out;
+  for (int i = 0; i < H6_METHOD_COUNT; ++i) {
+    const std::string name = h6MethodName(static_cast<h6Method>(i));
+    out.push_back({name, name, 0});
+    if (name == "global") out.push_back({"global/1", name, 1});
+    if (name == "gauss3" || name == "gauss6")
+      out.push_back({name + "+facing", name + "+facing", 0});
+  }
+  return out;
+}
+
+h6Wrench elastic_wrench(const h6Contacts& c, double stiffness) {
+  h6Wrench out{};
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const double s = stiffness * c.load[i];
+    const h6Vec3 f = {s * c.nx[i], s * c.ny[i], s * c.nz[i]};
+    out.force.x += f.x, out.force.y += f.y, out.force.z += f.z;
+    out.torque.x += c.ry[i] * f.z - c.rz[i] * f.y;
+    out.torque.y += c.rz[i] * f.x - c.rx[i] * f.z;
+    out.torque.z += c.rx[i] * f.y - c.ry[i] * f.x;
+  }
+  return out;
+}
+
+RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change) {
+  RunFigures out;
+  RunSetup run(loaded);
+  if (Outcome opened = open(change, run); !opened) return out.error = opened.error(), out;
+  const h6SessionDef& def = run.def;
+  io::Recorder* recorder = run.recorder.get();
+  const h6HandDef& first = run.hand_defs[0];
+  const bool has_shell = loaded.bodies[static_cast<std::size_t>(first.body)].shell >= 0;
+
+  const double duration = change.path ? change.path->back().t : loaded.duration();
+  Tally tally(loaded, def.rate, duration, out);
+  const auto frames = static_cast<std::uint64_t>(duration * def.rate + 0.5);
+  std::vector<h6FrameRecord> rows;
+  for (std::uint64_t i = 0; i < frames && !interrupted.load(); ++i) {
+    h6FrameRecord& r = rows.emplace_back();
+    r = {};
+    r.time = static_cast<double>(i) / def.rate;
+    if (Outcome done = run.step(r); !done) return out.error = done.error(), out;
+    const h6Vec3 force = has_shell ? elastic_wrench(h6GetContacts(run.session.get(), first.body),
+                                                    def.contact.stiffness)
+                                         .force
+                                   : h6Vec3{};
+    tally.frame(r, force);
+    out.final_pose = r.body[0].pose;
+    if (!recorder)
+      rows.clear();
+    else if (rows.size() == 100) {
+      if (Outcome done = recorder->frames(rows.data(), rows.size()); !done)
+        return out.error = done.error(), out;
+      rows.clear();
+    }
+  }
+  tally.finish();
+  if (recorder) {
+    Outcome done = recorder->frames(rows.data(), rows.size());
+    const nlohmann::ordered_json summary{{"method", change.method.name},
+                                         {"verdict", io::verdict_name(out.verdict)},
+                                         {"max_depth_voxels", out.max_depth_voxels}};
+    if (done) done = recorder->finish(summary.dump());
+    if (!done) out.error = done.error();
+  }
+  return out;
+}
+
+void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
+              const std::string& label) {
+  std::atomic<std::size_t> next{0}, done{0};
+  std::exception_ptr thrown;  // out of memory, say: for the caller's thread
+  std::mutex lock;
+  const auto work = [&] {
+    for (std::size_t i; !interrupted.load() && (i = next.fetch_add(1)) < jobs.size();) {
+      try {
+        jobs[i]();
+      } catch (...) {
+        const std::lock_guard<std::mutex> hold(lock);
+        if (!thrown) thrown = std::current_exception();
+        next.store(jobs.size());
+        done.store(jobs.size());
+      }
+      done.fetch_add(1);
+    }
+  };
+  std::thread other(work);
+  std::thread one(work);
+  const io::Progress progress = console.progress();
+  const double count = static_cast<double>(std::max<std::size_t>(1, jobs.size()));
+  while (done.load() < jobs.size() && !interrupted.load()) {
+    progress(label, 0.999 * static_cast<double>(done.load()) / count);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  one.join();
+  other.join();
+  progress(label, 1);
+  if (thrown) std::rethrow_exception(thrown);
+}
+
+}  // namespace h6::cli

@@ -1,0 +1,56 @@
+// experiments_scenes.h - the scenes of the experiments' table: the paper's claim about each, what a
+// prototype with analytic distances measured, and the runs.
+#pragma once
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "io/experiments/run.h"
+#include "io/scenes/paper/experiments.h"
+
+namespace h6::cli {
+
+struct TableScene {
+  const char* name;
+  const char* figure;
+  const char* claim;       // the paper's, in one sentence
+  const char* difference;  // why the engine's row differs from the prototype's; may be empty
+  // Makes it with a shell sampled like that; null: only as it is.
+  io::Scene (*sampled)(const io::Sampling&);
+  bool thin;  // its shell is explicit and small: part of re-sampling and of "push harder"
+  std::map<std::string, const char*> prototype;  // column -> its verdict and depth [voxel]
+};
+const std::vector<TableScene>& table_scenes();
+
+// A scene's assets, made once, whichever of its runs comes first.
+class SharedScene {
+ public:
+  explicit SharedScene(std::function<Result<io::Scene>()> make) : make_(std::move(make)) {}
+  // Null when it cannot be made: error() says why.
+  const io::LoadedScene* get();
+  const std::string& error() const { return error_; }
+
+ private:
+  std::function<Result<io::Scene>()> make_;
+  std::mutex lock_;
+  std::unique_ptr<io::LoadedScene> loaded_;
+  std::string error_;
+};
+
+struct SceneRow {
+  const TableScene* scene;
+  std::vector<RunFigures> runs;  // as columns
+  std::vector<std::string> recordings;
+};
+
+// All scenes against all columns; recordings go to `folder` unless it is empty.
+std::vector<SceneRow> run_scene_table(const std::vector<const TableScene*>& scenes,
+                                      const std::vector<MethodColumn>& columns,
+                                      const std::string& folder, const Console& console);
+
+// "held .21": the words of the verdict, and the deepest contact [voxel].
+std::string cell(const RunFigures& run);
+
+}  // namespace h6::cli

@@ -1,0 +1,40 @@
+// experiments_studies.h - what the paper's experiments ask beside single scenes: how stable, how
+// smooth, how dependent on the sampling each method is.
+#pragma once
+#include "io/experiments/report.h"
+
+namespace h6::cli {
+
+struct StudyKind {
+  const char* name;
+  const char* about;
+  Study (*run)(const std::vector<MethodColumn>& columns, const Console& console);
+};
+const std::vector<StudyKind>& studies();
+
+// experiments_stability.cpp
+Study study_stability(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_variations.cpp: the scenes with one thing changed.
+Study study_sampling(const std::vector<MethodColumn>& columns, const Console& console);
+Study study_force(const std::vector<MethodColumn>& columns, const Console& console);
+Study study_voxel(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_share.cpp
+Study study_share(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_global.cpp
+Study study_global(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_alpha.cpp
+Study study_pushes(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_smoothness.cpp
+Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console);
+Study study_ripple(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_stiffness.cpp
+Study study_net_stiffness(const std::vector<MethodColumn>& columns, const Console& console);
+Study study_two_planes(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_modes.cpp
+Study study_modes(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_energy.cpp
+Study study_energy(const std::vector<MethodColumn>& columns, const Console& console);
+// experiments_time.cpp
+Study study_time(const std::vector<MethodColumn>& columns, const Console& console);
+
+}  // namespace h6::cli

@@ -1,0 +1,38 @@
+// field_view.h - a baked field as a function of place. Everything here is in GRID coordinates:
+// voxels, node (i, j, k) of the field at (i, j, k).
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "io/field/field_data.h"
+
+namespace h6::io {
+
+class FieldView {
+ public:
+  explicit FieldView(const FieldData& field) : field_(field) {}
+
+  Vec3 from_metres(const Vec3& p) const {
+    const Vec3& o = field_.origin;
+    const double h = field_.voxel_size;
+    return {(p.x - o.x) / h, (p.y - o.y) / h, (p.z - o.z) / h};
+  }
+  Vec3 to_metres(const Vec3& g) const {
+    const Vec3& o = field_.origin;
+    const double h = field_.voxel_size;
+    return {o.x + h * g.x, o.y + h * g.y, o.z + h * g.z};
+  }
+
+  // Trilinear [voxel]. False where a corner has no sample: far from the surface.
+  bool distance(const Vec3& g, double& d, Vec3* gradient = nullptr) const;
+  // The eight corners of a cell [m], x fastest; false where one has no sample.
+  bool corners(const std::array<std::int32_t, 3>& cell, float out[8]) const;
+
+ private:
+  const FieldData& field_;
+};
+
+// The same of eight corners: value and gradient at fractions of the cell, in the corners' unit.
+double trilinear(const float corner[8], const double at[3], Vec3* gradient);
+
+}  // namespace h6::io

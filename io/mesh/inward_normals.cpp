@@ -1,0 +1,378 @@
+// inward_normals.cpp - weld, pair up edges, spread one winding over each piece, then settle each
+// piece's sign by its volume.
+#include "io/mesh/inward_normals.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "io/file/mix.h"
+#include "io/file/radix_sort.h"
+
+namespace h6::io {
+namespace {
+
+using Triangle = std::array<std::uint32_t, 3>;
+constexpr std::uint32_t none = UINT32_MAX;
+
+Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+// For each vertex the first one with the same place.
+std::vector<std::uint32_t> weld(const std::vector<Vec3>& vertices, Pulse* pulse) {
+  KeyedIndices order(vertices.size()), spare;
+  const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v + 0.0); };  // -0 is 0
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const Vec3& v = vertices[i];
+    order[i] = {mix(mix(bits(v.x), bits(v.y)), bits(v.z)), std::uint32_t(i)};
+  }
+  radix_sort(order, spare, 0, pulse);
+  std::vector<std::uint32_t> same(vertices.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i % 65536 == 0 && !alive(pulse)) return same;
+    same[order[i].index] = order[i].index;
+    // Equal keys are almost always equal places; another place with the same key is stepped over.
+    for (std::size_t k = i; k-- > 0 && order[k].key == order[i].key;) {
+      const Vec3 &a = vertices[order[k].index], &b = vertices[order[i].index];
+      if (a.x == b.x && a.y == b.y && a.z == b.z) {
+        same[order[i].index] = same[order[k].index];
+        break;
+      }
+    }
+  }
+  return same;
+}
+
+struct Piece {  // triangles joined by edges that exactly two of them share
+  std::vector<std::uint32_t> triangles;
+  bool closed = true;
+  bool turned = false;             // its winding as read is not one winding
+  bool twisted = false;            // it has no two sides
+  double volume = 0;               // with one winding [m^3]
+  double area = 0, area_kept = 0;  // [m^2]; the part whose winding is as read
+  Vec3 low{}, high{};
+  bool flip = false;  // of its one winding, so that normals point out
+  double lid = 0;     // open: area of a flat lid over it [m^2]
+  bool bowl = false;  // open, but it holds a volume
+};
+
+class Orientation {
+ public:
+  Orientation(const Mesh& mesh, Pulse* pulse) : mesh_(mesh), pulse_(pulse) {}
+  FaceTable run();
+
+ private:
+  void measure();
+  void drop_duplicates();
+  void pair_edges();
+  void spread(std::uint32_t start);
+  void find_open_pieces();
+  void settle_signs();
+  bool hollow(std::size_t piece) const;
+  int crossings(const Piece& piece, const Vec3& from, const Vec3& along) const;
+  void warn();
+  const Vec3& corner(std::uint32_t t, int k) const { return mesh_.vertices[faces_[t][k]]; }
+
+  const Mesh& mesh_;
+  Pulse* pulse_;
+  FaceTable table_;
+  std::vector<Triangle> faces_;        // welded
+  std::vector<std::uint32_t> across_;  // (3 x triangles) half edge 3t+k's other half, or none
+  KeyedIndices edges_;                 // half edges by edge
+  std::vector<char> reversed_;         // against the piece's one winding
+  std::vector<std::uint32_t> piece_of_;
+  std::vector<Piece> pieces_;
+  std::size_t duplicates_ = 0, inside_out_ = 0, hollows_ = 0;
+};
+
+void Orientation::measure() {
+  const std::vector<std::uint32_t> same = weld(mesh_.vertices, pulse_);
+  faces_.resize(mesh_.triangles.size());
+  table_.area.assign(faces_.size(), 0);
+  table_.inward.assign(faces_.size(), Vec3{0, 0, 0});
+  for (std::uint32_t t = 0; t < faces_.size(); ++t) {
+    for (int k = 0; k < 3; ++k) faces_[t][k] = same[mesh_.triangles[t][k]];
+    const Vec3 n = cross(minus(corner(t, 1), corner(t, 0)), minus(corner(t, 2), corner(t, 0)));
+    const double length = std::sqrt(dot(n, n));
+    if (!(length > 0)) continue;
+    table_.area[t] = length / 2;
+    table_.inward[t] = {-n.x / length, -n.y / length, -n.z / length};
+  }
+}
+
+// The same three corners in any order: one surface, sampled once. Degenerate triangles stay in the
+// edge table: they may carry the edge between two others.
+void Orientation::drop_duplicates() {
+  KeyedIndices order, spare;
+  order.reserve(faces_.size());
+  const auto sorted = [&](std::uint32_t t) {
+    Triangle f = faces_[t];
+    std::sort(f.begin(), f.end());
+    return f;
+  };
+  for (std::uint32_t t = 0; t < faces_.size(); ++t) {
+    const Triangle f = sorted(t);
+    order.push_back({mix(mix(f[0], f[1]), f[2]), t});
+  }
+  radix_sort(order, spare, 0, pulse_);
+  if (!alive(pulse_)) return;
+  std::vector<std::uint32_t> again;
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    for (std::size_t k = i; k-- > 0 && order[k].key == order[i].key;) {
+      if (sorted(order[k].index) != sorted(order[i].index)) continue;
+      again.push_back(order[i].index);
+      break;
+    }
+  }
+  for (const std::uint32_t t : again) {
+    if (table_.area[t] > 0) ++duplicates_;
+    table_.area[t] = 0;
+    faces_[t] = {none, none, none};
+  }
+}
+
+void Orientation::pair_edges() {
+  KeyedIndices spare;
+  edges_.reserve(3 * faces_.size());
+  for (std::uint32_t t = 0; t < faces_.size(); ++t) {
+    if (t % 65536 == 0 && !alive(pulse_)) return;
+    const Triangle& f = faces_[t];
+    if (f[0] == f[1] || f[1] == f[2] || f[2] == f[0]) continue;  // a line, or dropped
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = f[k], b = f[(k + 1) % 3];
+      const std::uint64_t key = (std::uint64_t(std::min(a, b)) << 32) | std::max(a, b);
+      edges_.push_back({key, 3 * t + k});
+    }
+  }
+  radix_sort(edges_, spare, 0, pulse_);
+  across_.assign(3 * faces_.size(), none);
+  for (std::size_t i = 0; i + 1 < edges_.size(); ++i) {
+    const bool pair = edges_[i].key == edges_[i + 1].key &&
+                      (i == 0 || edges_[i - 1].key != edges_[i].key) &&
+                      (i + 2 == edges_.size() || edges_[i + 2].key != edges_[i].key);
+    if (!pair) continue;
+    across_[edges_[i].index] = edges_[i + 1].index;
+    across_[edges_[i + 1].index] = edges_[i].index;
+  }
+}
+
+// One piece, from one of its triangles over all edges of exactly two faces.
+void Orientation::spread(std::uint32_t start) {
+  const auto id = std::uint32_t(pieces_.size());
+  Piece piece;
+  piece.low = piece.high = corner(start, 0);
+  piece_of_[start] = id;
+  piece.triangles.push_back(start);
+  for (std::size_t i = 0; i < piece.triangles.size(); ++i) {
+    if (i % 65536 == 65535 && !alive(pulse_)) break;
+    const std::uint32_t t = piece.triangles[i];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t other = across_[3 * t + k];
+      if (other == none) continue;
+      const std::uint32_t u = other / 3;
+      // Neighbours of one winding run opposite ways along their edge.
+      const bool opposed = faces_[t][k] != faces_[u][other % 3];
+      const char reversed = char(opposed ? reversed_[t] : !reversed_[t]);
+      if (piece_of_[u] == none) {
+        piece_of_[u] = id;
+        reversed_[u] = reversed;
+        piece.triangles.push_back(u);
+      } else if (reversed_[u] != reversed) {
+        piece.twisted = true;
+      }
+    }
+  }
+  const Vec3 origin = corner(start, 0);  // near: volumes of small pieces far out stay exact
+  for (const std::uint32_t t : piece.triangles) {
+    const double six = dot(minus(corner(t, 0), origin),
+                           cross(minus(corner(t, 1), origin), minus(corner(t, 2), origin)));
+    piece.volume += (reversed_[t] ? -six : six) / 6;
+    piece.area += table_.area[t];
+    if (!reversed_[t]) piece.area_kept += table_.area[t];
+    piece.turned = piece.turned || reversed_[t];
+    for (int k = 0; k < 3; ++k) {
+      const Vec3& v = corner(t, k);
+      piece.low = {std::min(piece.low.x, v.x), std::min(piece.low.y, v.y),
+                   std::min(piece.low.z, v.z)};
+      piece.high = {std::max(piece.high.x, v.x), std::max(piece.high.y, v.y),
+                    std::max(piece.high.z, v.z)};
+    }
+  }
+  pieces_.push_back(std::move(piece));
+}
+
+// A piece is open when one of its edges has an odd number of its faces.
+void Orientation::find_open_pieces() {
+  for (std::size_t i = 0; i < edges_.size();) {
+    std::size_t end = i;
+    while (end < edges_.size() && edges_[end].key == edges_[i].key) ++end;
+    if (end - i == 1) {
+      pieces_[piece_of_[edges_[i].index / 3]].closed = false;
+    } else if (end - i > 2) {
+      std::vector<std::uint32_t> here;
+      for (std::size_t k = i; k < end; ++k) here.push_back(piece_of_[edges_[k].index / 3]);
+      std::sort(here.begin(), here.end());
+      for (std::size_t k = 0; k < here.size();) {
+        const std::size_t first = k;
+        while (k < here.size() && here[k] == here[first]) ++k;
+        if ((k - first) % 2 == 1) pieces_[here[first]].closed = false;
+      }
+    }
+    i = end;
+  }
+  for (Piece& piece : pieces_) {  // volume about the origin of its own middle means something only
+    if (piece.closed) continue;   // when the surface nearly closes; take the middle of its box
+    const Vec3 middle{(piece.low.x + piece.high.x) / 2, (piece.low.y + piece.high.y) / 2,
+                      (piece.low.z + piece.high.z) / 2};
+    piece.volume = 0;
+    Vec3 across{};  // of all vector areas, twice: that of the lids that are missing
+    for (const std::uint32_t t : piece.triangles) {
+      const double six = dot(minus(corner(t, 0), middle),
+                             cross(minus(corner(t, 1), middle), minus(corner(t, 2), middle)));
+      piece.volume += (reversed_[t] ? -six : six) / 6;
+      const Vec3 n = cross(minus(corner(t, 1), corner(t, 0)), minus(corner(t, 2), corner(t, 0)));
+      const double sign = reversed_[t] ? -1 : 1;
+      across = {across.x + sign * n.x, across.y + sign * n.y, across.z + sign * n.z};
+    }
+    piece.lid = std::sqrt(dot(across, across)) / 2;
+  }
+}
+
+// Crossings of a ray with a piece (Moller & Trumbore 1997).
+int Orientation::crossings(const Piece& piece, const Vec3& from, const Vec3& along) const {
+  int count = 0;
+  for (const std::uint32_t t : piece.triangles) {
+    const Vec3 e1 = minus(corner(t, 1), corner(t, 0)), e2 = minus(corner(t, 2), corner(t, 0));
+    const Vec3 p = cross(along, e2);
+    const double det = dot(e1, p);
+    if (det == 0) continue;
+    const Vec3 s = minus(from, corner(t, 0)), q = cross(s, e1);
+    const double u = dot(s, p) / det, v = dot(along, q) / det;
+    count += u >= 0 && v >= 0 && u + v <= 1 && dot(e2, q) / det > 0;
+  }
+  return count;
+}
+
+// Whether there is a body around the piece and none in it. Windings of closed pieces tell where
+// bodies are: where as many are entered as left there is none. A piece wound like the one around it
+// is a part inside a part, not a hollow; one more within the hollow is a body again. Where a
+// winding was mixed it tells nothing: hollow is then what an odd number of pieces is around.
+bool Orientation::hollow(std::size_t c) const {
+  const Piece& piece = pieces_[c];
+  std::vector<std::size_t> maybe;
+  bool unlike = false, mixed = piece.turned;
+  for (std::size_t o = 0; o < pieces_.size(); ++o) {
+    const Piece& outer = pieces_[o];
+    const bool holds = outer.low.x < piece.low.x && outer.high.x > piece.high.x &&
+                       outer.low.y < piece.low.y && outer.high.y > piece.high.y &&
+                       outer.low.z < piece.low.z && outer.high.z > piece.high.z;
+    if (o == c || !outer.closed || !holds) continue;
+    maybe.push_back(o);
+    mixed |= outer.turned;
+    unlike |= outer.turned || (outer.volume < 0) != (piece.volume < 0);
+  }
+  if (!unlike && !piece.turned) return false;
+  const std::uint32_t t = piece.triangles[0];
+  const Vec3 &a = corner(t, 0), &b = corner(t, 1), &d = corner(t, 2);
+  const Vec3 from{(a.x + b.x + d.x) / 3, (a.y + b.y + d.y) / 3, (a.z + b.z + d.z) / 3};
+  constexpr Vec3 rays[3] = {
+      {0.8017, 0.5323, 0.2719}, {-0.3571, 0.8929, 0.2741}, {0.1873, -0.4561, 0.87}};
+  int around = 0, bodies = 0;
+  for (const std::size_t o : maybe) {
+    int votes = 0;
+    for (const Vec3& ray : rays) votes += crossings(pieces_[o], from, ray) % 2;
+    if (votes < 2) continue;
+    ++around;
+    bodies += pieces_[o].volume < 0 ? -1 : 1;
+  }
+  if (mixed) return around % 2 == 1;
+  return bodies != 0 && bodies + (piece.volume < 0 ? -1 : 1) == 0;
+}
+
+void Orientation::settle_signs() {
+  for (std::size_t c = 0; c < pieces_.size(); ++c) {
+    if (!alive(pulse_)) return;
+    Piece& piece = pieces_[c];
+    if (piece.closed) {
+      const bool inside = hollow(c);
+      piece.flip = (piece.volume < 0) != inside;
+      hollows_ += inside;
+      inside_out_ += !piece.turned && !inside && piece.volume < 0;
+      continue;
+    }
+    // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; with a twentieth of it
+    // the volume tells the sides, with less it is a sheet.
+    const bool holds = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
+    piece.flip = holds ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
+    piece.bowl = holds && piece.lid < 0.35 * piece.area;  // a box without a lid: 0.2
+  }
+}
+
+void Orientation::warn() {
+  std::size_t open = 0, mixed = 0, twisted = 0;
+  for (const Piece& piece : pieces_) {
+    if (piece.area == 0) continue;
+    ++table_.pieces;
+    open += !piece.closed;
+    mixed += piece.turned;
+    twisted += piece.twisted;
+  }
+  table_.sheets = open;
+  const auto pieces = [](std::size_t n) {
+    return std::to_string(n) + (n == 1 ? " piece" : " pieces");
+  };
+  auto& out = table_.warnings;
+  if (duplicates_ > 0) {
+    out.push_back(std::to_string(duplicates_) +
+                  " triangles are stored more than once; each surface was sampled once.");
+  }
+  if (inside_out_ > 0) {
+    out.push_back(pieces(inside_out_) +
+                  " of the mesh wound inside out; normals were turned to point into the body.");
+  }
+  if (mixed > 0) {
+    out.push_back(pieces(mixed) + " of the mesh with mixed winding; one winding was made of it.");
+  }
+  if (twisted > 0) {
+    out.push_back(
+        pieces(twisted) +
+        " of the mesh with one side only (like a Moebius strip); the normals there jump.");
+  }
+}
+
+FaceTable Orientation::run() {
+  measure();
+  drop_duplicates();
+  pair_edges();
+  if (!alive(pulse_)) return {};
+  reversed_.assign(faces_.size(), 0);
+  piece_of_.assign(faces_.size(), none);
+  for (std::uint32_t t = 0; t < faces_.size(); ++t) {
+    if (piece_of_[t] == none && faces_[t][0] != none) spread(t);
+  }
+  if (!alive(pulse_)) return {};
+  find_open_pieces();
+  settle_signs();
+  table_.sheet.assign(faces_.size(), 0);
+  table_.bowl.assign(faces_.size(), 0);
+  for (std::uint32_t t = 0; t < faces_.size(); ++t) {
+    if (piece_of_[t] == none) continue;
+    table_.sheet[t] = !pieces_[piece_of_[t]].closed;
+    table_.bowl[t] = pieces_[piece_of_[t]].bowl;
+    if (bool(reversed_[t]) == pieces_[piece_of_[t]].flip) continue;
+    Vec3& n = table_.inward[t];
+    n = {-n.x, -n.y, -n.z};
+  }
+  warn();
+  return std::move(table_);
+}
+
+}  // namespace
+
+FaceTable face_table(const Mesh& mesh, Pulse* pulse) { return Orientation(mesh, pulse).run(); }
+
+}  // namespace h6::io

@@ -1,0 +1,102 @@
+// recording_layout.h - what stands where in a recording, and HDF5 made safe to use. Private.
+//
+//   /config    attributes: version, json, asset_hashes, simd_target, program, run, rate, hands,
+//              stage_names, cause_names, state_names, units
+//   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns
+//   /events    t, what, detail
+//   /summary   attribute json; the group is there once the run has ended
+//
+// Attributes are for people and their tools, in text of variable length. read_recording takes the
+// same from the datasets /config/whole and /summary/whole, see recording_stored.cpp.
+#pragma once
+#include <hdf5.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "io/record/recording.h"
+
+namespace h6::io::recording {
+
+constexpr std::uint32_t format_version = 1;
+constexpr std::size_t event_what_bytes = 64, event_detail_bytes = 512;
+
+enum class Cell { real, natural32, natural64 };
+
+// A dataset of /frames, and where its numbers stand in h6FrameRecord: `width` cells at `offset`,
+// for each hand `stride` bytes further; stride 0: once a frame.
+struct Column {
+  const char* name;
+  Cell cell;
+  std::size_t width, offset, stride;
+  const char* units;
+  const char* labels;  // of the cells in a row, separated by blanks
+  bool later = false;  // older recordings do without: zeros then
+  bool per_hand() const { return stride != 0; }
+};
+
+const std::vector<Column>& columns();
+const std::vector<std::string>& stage_names();
+const std::vector<std::string>& cause_names();
+const std::vector<std::string>& state_names();
+
+std::size_t cell_bytes(Cell cell);
+hid_t cell_type(Cell cell);  // as on disk; not to be closed
+// Dimensions of a dataset with `rows` frames: (n), (n, width), (n, hands) or (n, hands, width).
+std::vector<hsize_t> shape(const Column& column, hsize_t rows, std::size_t hands);
+std::size_t row_bytes(const Column& column, std::size_t hands);
+
+// To and from the packed rows of a dataset.
+void pack(const Column& column, std::size_t hands, const h6FrameRecord* from, std::size_t count,
+          std::vector<std::byte>& out);
+void unpack(const Column& column, std::size_t hands, const std::byte* from, std::size_t count,
+            h6FrameRecord* out);
+
+// Any HDF5 object, released at the end of the scope.
+class Handle {
+ public:
+  Handle(hid_t id = -1) : id_(id) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(id_, other.id_);
+    return *this;
+  }
+  ~Handle() { close(); }
+  void close() {
+    if (id_ >= 0) H5Idec_ref(id_);
+    id_ = -1;
+  }
+  operator hid_t() const { return id_; }
+  bool ok() const { return id_ >= 0; }
+
+ private:
+  hid_t id_;
+};
+
+// Hold one around every use of the library: Debian's build is not for several threads at once, and
+// it prints its errors unless told not to.
+class LibraryLock {
+ public:
+  LibraryLock();
+
+ private:
+  std::lock_guard<std::mutex> lock_;
+};
+
+// The innermost reason for the library's last failure, as it says it.
+std::string library_reason();
+
+// Variable-length UTF-8 text in memory and on disk.
+Handle text_type();
+// Texts of `bytes` bytes (0: 1), filled with NULs.
+Handle fixed_text_type(std::size_t bytes);
+
+// read_recording without the lock and without looking at copies beside the file.
+Result<Recording> read_one(const std::filesystem::path& file, FrameRange range);
+
+}  // namespace h6::io::recording

@@ -1,0 +1,46 @@
+// recording_stored.h - rows of a dataset from a file that may lie about itself. Private.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hapsix/result.h"
+#include "io/record/layout.h"
+
+namespace h6::io::recording {
+
+// The file being read: its name for sentences, its size against lies.
+struct Source {
+  std::filesystem::path file;
+  std::uint64_t bytes;
+  Handle h5;
+
+  Failure wrong(const std::string& what) const {
+    return {file.string() + " is not a recording that can be read: " + what};
+  }
+};
+
+// A group or dataset that stands in the file itself; links to elsewhere are not followed.
+bool has(hid_t at, const char* name, H5O_type_t type);
+
+// A dataset whose rows are all in the file.
+struct Stored {
+  Handle dataset;
+  std::string name;
+  std::vector<hsize_t> dims;  // rows first
+  std::size_t row_bytes = 0, cell_bytes = 0;
+  hsize_t chunk_rows = 0;  // 0: in one piece
+  bool shuffled = false, deflated = false;
+};
+// With numbers of this type.
+Result<Stored> open_stored(const Source& source, hid_t group, const char* folder, const char* name,
+                           hid_t type);
+// Texts of one length, which is in cell_bytes.
+Result<Stored> open_stored_texts(const Source& source, hid_t group, const char* folder,
+                                 const char* name);
+
+// Rows first .. first + count - 1, as on disk (little-endian). They must be in the dataset.
+Outcome read_rows(const Source& source, const Stored& stored, hsize_t first, hsize_t count,
+                  std::vector<std::byte>& out);
+
+}  // namespace h6::io::recording

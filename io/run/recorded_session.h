@@ -1,0 +1,65 @@
+// recorded_session.h - a recording's run again: its scene, settings and SIMD target, its hand's
+// samples in, the same frames out.
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "hapsix/result.h"
+#include "io/record/recording.h"
+#include "io/run/recorded_run.h"
+#include "io/run/run_setup.h"
+#include "io/scene/load_scene.h"
+
+namespace h6::cli {
+
+class RecordedSession {
+ public:
+  // Changes of what was recorded; empty or 0: none.
+  struct Changes {
+    std::string method;
+    unsigned threads = 0;
+  };
+  // `recording`: its head, events and columns are read, not its frames. A sentence where it does
+  // not say how it was run, or its parts are gone or changed. `remarks` gets what a person should
+  // know all the same.
+  static Result<std::unique_ptr<RecordedSession>> open(const std::filesystem::path& file,
+                                                       const io::Recording& recording,
+                                                       const Changes& changes,
+                                                       const io::Progress& progress,
+                                                       std::vector<std::string>& remarks);
+  // The recorded frame once more; rows in order, from the first on. The new row stays until the
+  // next call. A sentence where settings were changed and the recording does not say how or when.
+  Result<const h6FrameRecord*> step(const h6FrameRecord& recorded);
+
+  const io::LoadedScene& loaded() const { return *loaded_; }
+  const io::RecordedRun& run() const { return run_; }
+  const h6Session* session() const { return session_.get(); }
+  unsigned threads() const { return threads_; }
+  const std::string& method() const { return method_; }
+  const std::string& recorded_method() const { return recorded_method_; }
+
+ private:
+  RecordedSession() = default;
+  void set_faults(const h6FrameRecord& recorded);
+  Outcome follow_settings(const h6FrameRecord& recorded);
+  Outcome change_settings(const std::string& detail);
+  io::RecordedRun run_;
+  std::unique_ptr<io::LoadedScene> loaded_;
+  h6SessionDef def_{};
+  std::vector<h6HandDef> hand_defs_;
+  std::vector<io::RecordingEvent> settings_;  // events, in order
+  std::uint32_t changed_ = 0;                 // so many of them are behind us
+  bool own_method_ = false;                   // another than was recorded
+  bool has_inputs_ = false, says_when_ = false;
+  SessionPtr session_;
+  std::size_t hands_ = 0;
+  unsigned threads_ = 1;
+  std::string method_, recorded_method_;
+  bool latched_ = false;
+  h6FrameRecord now_{};
+};
+
+}  // namespace h6::cli

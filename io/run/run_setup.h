@@ -1,0 +1,46 @@
+// run_setup.h - what every run of a loaded scene begins with, in real time or not: a session, the
+// devices of its hands, a recording.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "device/steering.h"
+#include "hapsix/result.h"
+#include "io/record/recording.h"
+#include "io/run/hands.h"
+#include "io/scene/load_scene.h"
+
+namespace h6::cli {
+
+struct SessionRelease {
+  void operator()(h6Session* session) const { h6DestroySession(session); }
+};
+using SessionPtr = std::unique_ptr<h6Session, SessionRelease>;
+
+// A run in the making: change `def`, `hand_defs` and `hands` at will, then open.
+struct RunSetup {
+  explicit RunSetup(const io::LoadedScene& scene);
+  RunSetup(const RunSetup&) = delete;  // def points at hand_defs
+  RunSetup& operator=(const RunSetup&) = delete;
+
+  const io::LoadedScene& loaded;
+  h6SessionDef def;
+  std::vector<h6HandDef> hand_defs;
+  std::vector<io::SceneHand> hands;  // device, path and figures; `def` is taken from hand_defs
+  std::string record;                // .h5 file, empty: none
+  std::shared_ptr<device::Steering> steering;  // who may take the first hand off its path
+  bool virtual_time = true;                    // what the recording says; whoever steps knows
+
+  SessionPtr session;
+  Hands devices;
+  std::unique_ptr<io::Recorder> recorder;
+  Outcome open();
+  // One frame at r.time, on this thread, as the haptic loop does it; fills the rest of the row.
+  Outcome step(h6FrameRecord& r);
+
+ private:
+  Outcome open_recording();
+};
+
+}  // namespace h6::cli

@@ -1,0 +1,50 @@
+#include "io/scene/asset_hash.h"
+
+#include "io/file/content_hash.h"
+
+namespace h6::io {
+namespace {
+
+// Hash of a list of hashes, one a column, so that no two columns run together.
+class Columns {
+ public:
+  template <class Column>
+  Columns& add(const Column& values) {
+    return add(values.data(), values.size() * sizeof *values.data());
+  }
+  Columns& add(const void* bytes, std::size_t size) {
+    const Hash128 hash = hash_bytes(bytes, size);
+    list_.insert(list_.end(), {std::uint64_t{size}, hash.low, hash.high});
+    return *this;
+  }
+  std::string text() const { return hex(hash_bytes(list_.data(), list_.size() * 8)); }
+
+ private:
+  std::vector<std::uint64_t> list_;
+};
+
+}  // namespace
+
+std::string asset_hash(const FieldData& f) {
+  const double numbers[] = {f.origin.x, f.origin.y, f.origin.z, f.voxel_size, f.band};
+  return Columns()
+      .add(numbers, sizeof numbers)
+      .add(f.bricks)
+      .add(f.brick_index)
+      .add(f.samples)
+      .add(f.far_grid)
+      .add(f.part)
+      .text();
+}
+
+std::string asset_hash(const ShellData& s) {
+  Columns columns;
+  for (const std::vector<float>* column : {&s.x, &s.y, &s.z, &s.nx, &s.ny, &s.nz, &s.node_radius})
+    columns.add(*column);
+  for (const std::vector<std::uint32_t>* column :
+       {&s.source, &s.level_first, &s.node_point, &s.node_first_child, &s.node_child_count})
+    columns.add(*column);
+  return columns.text();
+}
+
+}  // namespace h6::io

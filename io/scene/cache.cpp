@@ -1,0 +1,117 @@
+// cache.cpp - see the header. The key is in the file's name and again inside the file: what a file
+// holds is believed only when both agree. Files are written aside and renamed, so two programs that
+// bake the same asset at once both succeed, and the last one's file (the same) stays.
+#include "io/scene/cache.h"
+
+#include <cstdlib>
+#include <system_error>
+
+#include "io/field/field_file.h"
+#include "io/mesh/single_precision.h"
+#include "io/shell/shell_file.h"
+
+namespace h6::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+// The file of a key; empty when there is no place for a cache.
+fs::path cached_file(const std::string& key, const char* ending, Cached& cached) {
+  const fs::path folder = cache_folder();
+  if (folder.empty()) {
+    cached.warnings.push_back(
+        "There is no folder for baked assets, so this one is not kept: set "
+        "HAPSIX_CACHE to a folder.");
+    return {};
+  }
+  return folder / (key + ending);
+}
+
+template <class Data>
+bool is_it(const Result<Data>& read, const std::string& key, const fs::path& file, Cached& cached) {
+  if (read && read->input_hash == key) return true;
+  const std::string why =
+      read ? file.string() + ": it was baked from something else." : read.error();
+  cached.warnings.push_back("A file of the cache is of no use and is baked again. " + why);
+  return false;
+}
+
+template <class Write>
+void keep(const fs::path& file, Cached& cached, const Write& write) {
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);  // if it fails, writing says so
+  if (const Outcome kept = write(file); !kept) {
+    cached.warnings.push_back("The baked asset is not kept in the cache. " + kept.error());
+  }
+}
+
+// The one way through the cache; read, bake and write are the asset's own.
+template <class Data, class Read, class Bake, class Write>
+Result<Data> through_cache(const std::string& key, const char* ending, Cached* report,
+                           const Read& read, const Bake& bake, const Write& write) {
+  Cached unheard;
+  Cached& cached = report ? *report : unheard;
+  cached.hit = cached.rebuilt = false;
+  cached.file = cached_file(key, ending, cached);
+  std::error_code error;
+  if (!cached.file.empty() && fs::exists(cached.file, error)) {
+    Result<Data> found = read(cached.file);
+    if (is_it(found, key, cached.file, cached)) {
+      cached.hit = true;
+      return found;
+    }
+    cached.rebuilt = true;
+  }
+  Result<Data> baked = bake(cached);
+  if (!baked) return baked;
+  baked->input_hash = key;
+  if (!cached.file.empty()) {
+    keep(cached.file, cached, [&](const fs::path& file) { return write(file, *baked); });
+  }
+  return baked;
+}
+
+}  // namespace
+
+std::filesystem::path cache_folder() {
+  if (const std::string own = environment("HAPSIX_CACHE"); !own.empty()) return own;
+  const fs::path xdg = environment("XDG_CACHE_HOME");
+  if (xdg.is_absolute()) return xdg / "hapsix";  // the XDG rule: relative ones do not count
+  const std::string home = environment("HOME");
+  return home.empty() ? fs::path{} : fs::path(home) / ".cache" / "hapsix";
+}
+
+Result<FieldData> cached_field(const Mesh& mesh, const FieldBake& options, Cached* cached,
+                               const Progress& progress) {
+  return through_cache<FieldData>(
+      content_hash(mesh, options), ".vdb", cached,
+      [](const fs::path& file) { return read_field(file); },
+      [&](Cached& told) {
+        FieldBakeReport report;
+        Result<FieldData> field = bake_field(mesh, options, &report, progress);
+        told.warnings.insert(told.warnings.end(), report.warnings.begin(), report.warnings.end());
+        return field;
+      },
+      [](const fs::path& file, const FieldData& field) {
+        return write_field(file, field, Compression::none);
+      });
+}
+
+Result<ShellData> cached_shell(const Mesh& mesh, const ShellBake& options, Cached* cached,
+                               const Progress& progress) {
+  return through_cache<ShellData>(
+      content_hash(mesh, options), ".ply", cached,
+      [](const fs::path& file) { return read_shell(file); },
+      [&](Cached& told) {
+        if (std::string far = too_far_for_floats(mesh); !far.empty()) told.warnings.push_back(far);
+        return bake_shell(mesh, options, &told.warnings, progress);
+      },
+      [](const fs::path& file, const ShellData& shell) { return write_shell(file, shell); });
+}
+
+}  // namespace h6::io

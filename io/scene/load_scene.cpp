@@ -1,0 +1,252 @@
+#include "io/scene/load_scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+
+#include "io/field/field_file.h"
+#include "io/mesh/mesh_file.h"
+#include "io/scene/asset_hash.h"
+#include "io/scene/cache.h"
+#include "io/scene/mass.h"
+#include "io/shell/shell_file.h"
+
+namespace h6::io {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+class Loader {
+ public:
+  Loader(LoadedScene& out, const Progress& progress) : out_(out), progress_(progress) {}
+
+  Outcome run() {
+    for (const SceneBody& body : out_.scene.bodies)
+      if (Outcome done = add(body); !done)
+        return Failure{"body '" + body.name + "': " + done.error()};
+    for (const SceneHand& hand : out_.scene.hands) {
+      h6HandDef def = hand.def;
+      def.body = out_.body_index(hand.body);
+      def.coupling = out_.scene.coupling;
+      out_.hands.push_back(def);
+    }
+    watch_first_hand();
+    return make_model();
+  }
+
+ private:
+  Outcome add(const SceneBody& body) {
+    h6BodyDef def = h6DefaultBodyDef();
+    def.pose = body.pose;
+    def.fixed = body.fixed;
+    def.mass = body.mass;
+    def.translation_only = body.translation_only;
+    if (body.field) {
+      Result<int> index = field(body);
+      if (!index) return index.failure();
+      def.field = *index;
+    }
+    if (body.shell) {
+      Result<int> index = shell(body);
+      if (!index) return index.failure();
+      def.shell = *index;
+    }
+    if (Outcome done = mass(body, def); !done) return done;
+    out_.bodies.push_back(def);
+    return Done{};
+  }
+
+  // Meshes are read once, however many bodies and bakes use them.
+  template <class Source>
+  Result<const Mesh*> mesh_of(const Source& source) {
+    if (source.mesh_data) return &*source.mesh_data;
+    const Unit unit = source.unit.value_or(out_.scene.unit);
+    const std::string key = source.mesh.string() + '\0' + std::to_string(static_cast<int>(unit));
+    auto found = meshes_.find(key);
+    if (found == meshes_.end()) {
+      Result<Mesh> mesh = read_mesh(source.mesh, unit);
+      if (!mesh) return mesh.failure();
+      out_.warnings.insert(out_.warnings.end(), mesh->remarks.begin(), mesh->remarks.end());
+      found = meshes_.emplace(key, std::make_unique<Mesh>(std::move(*mesh))).first;
+    }
+    return static_cast<const Mesh*>(found->second.get());
+  }
+
+  // All fields, or all shells: what is there, found by its content.
+  template <class Data>
+  struct Kept {
+    std::map<std::string, int> index;
+    std::vector<Data> all;
+  };
+
+  // Read from a baked file, or baked from a mesh through the cache; content that another body has
+  // loaded already is shared.
+  template <class Data, class Source, class Read, class Bake, class Describe>
+  Result<int> obtain(const SceneBody& body, const Source& source, Kept<Data>& kept, Read read,
+                     Bake bake, Describe describe) {
+    const auto start = Clock::now();
+    LoadedAsset asset;
+    asset.body = body.name;
+    const Mesh* mesh = nullptr;
+    std::string key = "file " + source.file.string();
+    if (source.file.empty()) {
+      Result<const Mesh*> found = mesh_of(source);
+      if (!found) return found.failure();
+      mesh = *found;
+      key = content_hash(*mesh, source.bake);
+    }
+    if (const auto known = kept.index.find(key); known != kept.index.end()) return known->second;
+    Cached cached;
+    Result<Data> data = mesh ? bake(*mesh, source.bake, &cached, progress_) : read(source.file);
+    if (!data) return data.failure();
+    for (const std::string& w : cached.warnings)
+      out_.warnings.push_back("body '" + body.name + "': " + w);
+    asset.hash = mesh ? key : asset_hash(*data);
+    asset.from_cache = cached.hit;
+    asset.rebuilt = cached.rebuilt;
+    asset.seconds = since(start);
+    describe(*data, asset);
+    out_.assets.push_back(asset);
+    return keep(kept, key, std::move(*data));
+  }
+
+  template <class Data>
+  static int keep(Kept<Data>& kept, const std::string& key, Data data) {
+    kept.all.push_back(std::move(data));
+    return kept.index[key] = static_cast<int>(kept.all.size()) - 1;
+  }
+
+  Result<int> field(const SceneBody& body) {
+    return obtain(body, *body.field, fields_, read_field, cached_field,
+                  [](const FieldData& data, LoadedAsset& asset) {
+                    asset.is_field = true;
+                    asset.voxel_size = data.voxel_size;
+                    asset.origin = {data.origin.x, data.origin.y, data.origin.z};
+                    for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
+                    asset.bricks = data.brick_count();
+                  });
+  }
+
+  Result<int> shell(const SceneBody& body) {
+    const auto describe = [](const ShellData& data, LoadedAsset& asset) {
+      asset.points = data.size();
+      asset.levels = static_cast<int>(data.level_points.size());
+    };
+    if (!body.shell->points)
+      return obtain(body, *body.shell, shells_, read_shell, cached_shell, describe);
+    const auto start = Clock::now();
+    Result<ShellData> built = build_shell(*body.shell->points, body.shell->bake.levels);
+    if (!built) return built.failure();
+    LoadedAsset asset;
+    asset.body = body.name;
+    asset.hash = asset_hash(*built);
+    asset.seconds = since(start);
+    describe(*built, asset);
+    out_.assets.push_back(asset);
+    return keep(shells_, "points of " + body.name, std::move(*built));
+  }
+
+  // What the scene states; else a uniform solid where there is one, else the shell's points.
+  Outcome mass(const SceneBody& body, h6BodyDef& def) {
+    if (body.fixed) return Done{};
+    std::optional<MassProperties> found;
+    if (!body.com || !body.inertia) {
+      if (body.shell && (body.shell->mesh_data || !body.shell->mesh.empty())) {
+        Result<const Mesh*> mesh = mesh_of(*body.shell);
+        if (!mesh) return mesh.failure();
+        found = solid_mass(**mesh, body.mass);
+      }
+      if (!found && body.field && (body.field->mesh_data || !body.field->mesh.empty())) {
+        Result<const Mesh*> mesh = mesh_of(*body.field);
+        if (!mesh) return mesh.failure();
+        found = solid_mass(**mesh, body.mass);
+      }
+      if (!found && def.shell >= 0)
+        found = shell_mass(shells_.all[static_cast<std::size_t>(def.shell)], body.mass);
+      if (!found)
+        return Failure{
+            "its mass properties cannot be derived (no shell, no closed mesh): state 'com' and "
+            "'inertia'"};
+    }
+    def.com = body.com ? *body.com : h6Vec3{found->com.x, found->com.y, found->com.z};
+    std::array<double, 6> inertia = body.inertia ? *body.inertia : found->inertia;
+    if (body.com && !body.inertia) {  // derived about its own centre: move it to the stated one
+      const double x = def.com.x - found->com.x, y = def.com.y - found->com.y,
+                   z = def.com.z - found->com.z, m = body.mass;
+      const double more[6] = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y),
+                              -m * x * y,          -m * x * z,          -m * y * z};
+      for (int i = 0; i < 6; ++i) inertia[i] += more[i];
+    }
+    std::copy(inertia.begin(), inertia.end(), def.inertia);
+    return Done{};
+  }
+
+  void watch_first_hand() {
+    if (out_.hands.empty()) return;
+    const int shell = out_.bodies[static_cast<std::size_t>(out_.hands[0].body)].shell;
+    if (shell < 0) return;
+    const ShellData& data = shells_.all[static_cast<std::size_t>(shell)];
+    for (std::size_t i = 0; i < data.size(); ++i)
+      out_.watched_points.push_back({data.x[i], data.y[i], data.z[i]});
+  }
+
+  Outcome make_model() {
+    std::vector<h6FieldDef> fields;
+    std::vector<h6ShellDef> shells;
+    for (const FieldData& f : fields_.all) fields.push_back(f.def());
+    for (const ShellData& s : shells_.all) shells.push_back(s.def());
+    h6ModelDef def = h6DefaultModelDef();
+    def.fields = fields.data(), def.field_count = fields.size();
+    def.shells = shells.data(), def.shell_count = shells.size();
+    h6Error error{};
+    out_.model.reset(h6CreateModel(&def, &error));
+    if (!out_.model) return Failure{error.message};
+    return Done{};
+  }
+
+  LoadedScene& out_;
+  const Progress& progress_;
+  std::map<std::string, std::unique_ptr<Mesh>> meshes_;
+  Kept<FieldData> fields_;
+  Kept<ShellData> shells_;
+};
+
+}  // namespace
+
+int LoadedScene::body_index(const std::string& name) const {
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == name) return static_cast<int>(i);
+  return -1;
+}
+
+double LoadedScene::duration() const {
+  if (scene.duration > 0) return scene.duration;
+  double longest = 0;
+  for (const SceneHand& hand : scene.hands)
+    if (!hand.path.empty()) longest = std::max(longest, hand.path.back().t);
+  return longest > 0 ? longest : 1;
+}
+
+h6SessionDef LoadedScene::session_def() const {
+  h6SessionDef def = h6DefaultSessionDef();
+  def.bodies = bodies.data(), def.body_count = bodies.size();
+  def.hands = hands.data(), def.hand_count = hands.size();
+  def.contact = scene.contact;
+  def.integrator = scene.integrator;
+  def.gradient = scene.gradient;
+  def.rate = scene.rate;
+  def.net_stiffness = scene.net_stiffness;
+  return def;
+}
+
+Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress) {
+  auto out = std::make_unique<LoadedScene>();
+  out->scene = std::move(scene);
+  if (Outcome done = Loader(*out, progress).run(); !done) return done.failure();
+  return out;
+}
+
+}  // namespace h6::io

@@ -1,0 +1,23 @@
+// mass.h - mass properties of parts whose scene does not state them.
+#pragma once
+#include <array>
+#include <optional>
+
+#include "io/mesh/mesh.h"
+#include "io/shell/shell_data.h"
+
+namespace h6::io {
+
+struct MassProperties {
+  Vec3 com;                       // mesh frame [m]
+  std::array<double, 6> inertia;  // xx yy zz xy xz yz about com, mesh axes [kg m^2]
+};
+
+// A uniform solid of this mass, when the mesh encloses a volume: closed, consistently wound (either
+// way). Nothing otherwise.
+std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass);
+
+// Each point an equal share of the mass. For soups, and shells without a mesh.
+MassProperties shell_mass(const ShellData& shell, double mass);
+
+}  // namespace h6::io

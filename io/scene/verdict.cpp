@@ -1,0 +1,261 @@
+// verdict.cpp - what happened in a run. The rules stand in the header.
+#include "io/scene/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace h6::io {
+namespace {
+
+constexpr double kWindow = 0.2;            // judged, at the end of a still phase [s]
+constexpr double kStillMotion = 0.02e-3;   // [m]
+constexpr double kChatterSpeed = 2e-3;     // RMS over points and window [m/s]
+constexpr double kChatterDepth = 0.1;      // peak to peak [voxels]
+constexpr double kUnstableFactor = 100;    // of the hand's peak speed
+constexpr double kLeastPeakSpeed = 10e-3;  // [m/s]
+constexpr std::size_t kClusterSize = 48;
+
+h6Vec3 add(const h6Vec3& a, const h6Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+h6Vec3 sub(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+double dot(const h6Vec3& a, const h6Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+h6Vec3 cross(const h6Vec3& a, const h6Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+h6Quat conjugate(const h6Quat& q) { return {q.w, -q.x, -q.y, -q.z}; }
+
+struct Rotation {
+  double m[3][3];
+  explicit Rotation(const h6Quat& q)
+      : m{{1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y - q.w * q.z),
+           2 * (q.x * q.z + q.w * q.y)},
+          {2 * (q.x * q.y + q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z),
+           2 * (q.y * q.z - q.w * q.x)},
+          {2 * (q.x * q.z - q.w * q.y), 2 * (q.y * q.z + q.w * q.x),
+           1 - 2 * (q.x * q.x + q.y * q.y)}} {}
+  h6Vec3 operator*(const h6Vec3& v) const {
+    return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z,
+            m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+            m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+  }
+};
+
+bool finite(const h6Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+bool finite(const h6Pose& pose) {
+  const h6Quat& q = pose.q;
+  return finite(pose.p) && std::isfinite(q.w) && std::isfinite(q.x) && std::isfinite(q.y) &&
+         std::isfinite(q.z);
+}
+
+bool contains(const Box& box, const h6Vec3& p) {
+  return p.x >= box.low.x && p.x <= box.high.x && p.y >= box.low.y && p.y <= box.high.y &&
+         p.z >= box.low.z && p.z <= box.high.z;
+}
+
+bool touches(const Box& box, const h6Vec3& centre, double radius) {
+  const auto outside = [](double x, double low, double high) {
+    return x < low ? low - x : x > high ? x - high : 0.0;
+  };
+  const double dx = outside(centre.x, box.low.x, box.high.x);
+  const double dy = outside(centre.y, box.low.y, box.high.y);
+  const double dz = outside(centre.z, box.low.z, box.high.z);
+  return dx * dx + dy * dy + dz * dz <= radius * radius;
+}
+
+double angle_between(const h6Quat& a, const h6Quat& b) {
+  const double cosine = std::abs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z);
+  return 2 * std::acos(std::min(1.0, cosine));
+}
+
+}  // namespace
+
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::unstable:
+      return "unstable";
+    case Verdict::through:
+      return "through";
+    case Verdict::chatters:
+      return "chatters";
+    case Verdict::held:
+      return "held";
+    case Verdict::arrived:
+      return "arrived";
+    case Verdict::stuck:
+      return "stuck";
+  }
+  return "unknown";
+}
+
+VerdictWatch::VerdictWatch(const SceneVerdict& rules, std::vector<h6Vec3> points, h6Vec3 com,
+                           double rate)
+    : rules_(rules), points_(std::move(points)), com_(com), rate_(rate > 0 ? rate : 1000) {
+  // The centre of mass is watched and moves like a point.
+  points_.push_back(com_);
+  const double share = 1 / static_cast<double>(points_.size());
+  for (const h6Vec3& p : points_) {
+    mean_ = add(mean_, {share * p.x, share * p.y, share * p.z});
+    const double products[6] = {p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z};
+    for (int i = 0; i < 6; ++i) second_[i] += share * products[i];
+  }
+  if (!rules_.forbidden.empty()) cluster_points(0, points_.size());
+  const auto frames = static_cast<std::size_t>(std::lround(kWindow * rate_));
+  window_.speed2.resize(std::max<std::size_t>(frames, 2));
+  window_.depth.resize(window_.speed2.size());
+}
+
+// Halves the points along the longest side of their box until few are left.
+void VerdictWatch::cluster_points(std::size_t first, std::size_t count) {
+  const auto begin = points_.begin() + static_cast<std::ptrdiff_t>(first);
+  const auto end = begin + static_cast<std::ptrdiff_t>(count);
+  h6Vec3 low = *begin, high = *begin;
+  for (auto p = begin; p != end; ++p) {
+    low = {std::min(low.x, p->x), std::min(low.y, p->y), std::min(low.z, p->z)};
+    high = {std::max(high.x, p->x), std::max(high.y, p->y), std::max(high.z, p->z)};
+  }
+  const h6Vec3 size = sub(high, low);
+  if (count > kClusterSize) {
+    const auto along = size.x >= size.y && size.x >= size.z ? &h6Vec3::x
+                       : size.y >= size.z                   ? &h6Vec3::y
+                                                            : &h6Vec3::z;
+    std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(count / 2), end,
+                     [along](const h6Vec3& a, const h6Vec3& b) { return a.*along < b.*along; });
+    cluster_points(first, count / 2);
+    cluster_points(first + count / 2, count - count / 2);
+    return;
+  }
+  Cluster cluster = {{low.x + size.x / 2, low.y + size.y / 2, low.z + size.z / 2},
+                     0,
+                     static_cast<std::uint32_t>(first),
+                     static_cast<std::uint32_t>(count)};
+  for (auto p = begin; p != end; ++p) {
+    const h6Vec3 arm = sub(*p, cluster.centre);
+    cluster.radius = std::max(cluster.radius, std::sqrt(dot(arm, arm)));
+  }
+  cluster.radius *= 1 + 1e-9;  // rounding of the transform
+  clusters_.push_back(cluster);
+}
+
+// Mean of |v + w x R p|^2 over the points p, in O(1): with a = RT w, u = RT v,
+//   |u|^2 + 2 u.(a x mean) + |a|^2 tr S - aT S a,   S = mean of p pT.
+double VerdictWatch::mean_speed2(const h6Vec3& origin_velocity, const h6Vec3& angular,
+                                 const h6Quat& q) const {
+  const Rotation to_mesh(conjugate(q));
+  const h6Vec3 u = to_mesh * origin_velocity, a = to_mesh * angular;
+  const double* s = second_;
+  const h6Vec3 sa = {s[0] * a.x + s[3] * a.y + s[4] * a.z, s[3] * a.x + s[1] * a.y + s[5] * a.z,
+                     s[4] * a.x + s[5] * a.y + s[2] * a.z};
+  const double mean =
+      dot(u, u) + 2 * dot(u, cross(a, mean_)) + dot(a, a) * (s[0] + s[1] + s[2]) - dot(a, sa);
+  return std::max(0.0, mean);
+}
+
+// Mean square distance that the points travel from one pose to another. A turn D by the angle t
+// about n carries A to B = D A; with the middle orientation M = D^(1/2) A,
+//   B - A = (D^(1/2) - D^(-1/2)) M = 2 sin(t/2) [n]x M,
+// so the exact chord is the velocity of the "angular velocity" 2 sin(t/2) n at the orientation M.
+double VerdictWatch::mean_motion2(const h6Pose& from, const h6Pose& to) const {
+  const h6Quat &a = from.q, &b = to.q;
+  h6Quat middle = {a.w + b.w, a.x + b.x, a.y + b.y, a.z + b.z};
+  double sign = 1;
+  if (a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0) {
+    middle = {a.w - b.w, a.x - b.x, a.y - b.y, a.z - b.z};
+    sign = -1;
+  }
+  const double norm2 =
+      middle.w * middle.w + middle.x * middle.x + middle.y * middle.y + middle.z * middle.z;
+  // b a* = (cos t/2, n sin t/2)
+  const h6Vec3 turn = {2 * sign * (-b.w * a.x + b.x * a.w - b.y * a.z + b.z * a.y),
+                       2 * sign * (-b.w * a.y + b.x * a.z + b.y * a.w - b.z * a.x),
+                       2 * sign * (-b.w * a.z - b.x * a.y + b.y * a.x + b.z * a.w)};
+  const double scale = 1 / std::sqrt(norm2);
+  return mean_speed2(sub(to.p, from.p), turn,
+                     {middle.w * scale, middle.x * scale, middle.y * scale, middle.z * scale});
+}
+
+bool VerdictWatch::entered(const h6Pose& body) const {
+  if (clusters_.empty()) return false;
+  const Rotation r(body.q);
+  for (const Cluster& cluster : clusters_) {
+    const h6Vec3 centre = add(body.p, r * cluster.centre);
+    for (const Box& box : rules_.forbidden) {
+      if (!touches(box, centre, cluster.radius)) continue;
+      for (std::uint32_t i = cluster.first; i < cluster.first + cluster.count; ++i)
+        if (contains(box, add(body.p, r * points_[i]))) return true;
+    }
+  }
+  return false;
+}
+
+bool VerdictWatch::chatters_now(double time) const {
+  // Half a frame of slack: times are sums of periods.
+  const bool still_long_enough = time - still_since_ >= kWindow - 0.5 / rate_;
+  if (!still_long_enough || window_.filled < window_.speed2.size()) return false;
+  double sum = 0;
+  for (const double speed2 : window_.speed2) sum += speed2;
+  const auto [low, high] = std::minmax_element(window_.depth.begin(), window_.depth.end());
+  return std::sqrt(sum / static_cast<double>(window_.speed2.size())) > kChatterSpeed ||
+         *high - *low > kChatterDepth;
+}
+
+// Called before this frame enters the window: a phase that ends is judged by what it held.
+void VerdictWatch::watch_stillness(double time, const h6Pose& hand) {
+  if (!first_ && mean_motion2(still_hand_, hand) <= kStillMotion * kStillMotion) return;
+  if (!first_ && chatters_now(last_time_)) chattered_ = true;
+  still_hand_ = hand;
+  still_since_ = time;
+  window_.filled = window_.next = 0;
+}
+
+void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand_velocity,
+                         const h6BodyState& body, double max_depth_voxels, bool state_finite) {
+  const bool all_finite = state_finite && finite(body.pose) && finite(body.velocity.linear) &&
+                          finite(body.velocity.angular) && std::isfinite(max_depth_voxels);
+  finite_ = finite_ && all_finite;
+  if (!finite_) return;
+  // A hand that sends nonsense is the device's fault, not the body's: this frame says nothing of
+  // it.
+  if (!finite(hand) || !finite(hand_velocity.linear) || !finite(hand_velocity.angular)) return;
+
+  const h6Velocity& v = body.velocity;
+  const h6Vec3 com_arm = Rotation(body.pose.q) * com_;
+  const h6Vec3 origin_velocity = sub(v.linear, cross(v.angular, com_arm));
+  peak_speed2_ = std::max(peak_speed2_, mean_speed2(origin_velocity, v.angular, body.pose.q));
+  peak_hand_speed2_ =
+      std::max(peak_hand_speed2_, mean_speed2(hand_velocity.linear, hand_velocity.angular, hand.q));
+
+  through_ = through_ || entered(body.pose);
+
+  watch_stillness(time, hand);
+  // Speed from the motion itself: it is there whatever the body's integrator calls its velocity.
+  const double dt = first_ || time <= last_time_ ? 1 / rate_ : time - last_time_;
+  const double speed2 = first_ ? 0 : mean_motion2(last_body_.pose, body.pose) / (dt * dt);
+  window_.speed2[window_.next] = speed2;
+  window_.depth[window_.next] = max_depth_voxels;
+  window_.next = (window_.next + 1) % window_.speed2.size();
+  window_.filled = std::min(window_.filled + 1, window_.speed2.size());
+
+  last_body_ = body;
+  last_time_ = time;
+  first_ = false;
+}
+
+bool VerdictWatch::arrived() const {
+  if (first_) return false;
+  const h6Vec3 off = sub(last_body_.pose.p, rules_.target->p);
+  const bool turned = rules_.tolerance_angle > 0 &&
+                      angle_between(last_body_.pose.q, rules_.target->q) > rules_.tolerance_angle;
+  return std::sqrt(dot(off, off)) <= rules_.tolerance && !turned;
+}
+
+Verdict VerdictWatch::verdict() const {
+  const double limit = kUnstableFactor * std::max(kLeastPeakSpeed, std::sqrt(peak_hand_speed2_));
+  if (!finite_ || peak_speed2_ > limit * limit) return Verdict::unstable;
+  if (through_) return Verdict::through;
+  if (chattered_ || (!first_ && chatters_now(last_time_))) return Verdict::chatters;
+  if (!rules_.target) return Verdict::held;
+  return arrived() ? Verdict::arrived : Verdict::stuck;
+}
+
+}  // namespace h6::io

@@ -1,0 +1,73 @@
+// verdict.h - what happened in a run, from its motion alone: no method name is seen here.
+//
+// In this order:
+//   unstable  a state that is not finite, or a body faster than 100x the hand's peak speed (a peak
+//             below 10 mm/s counts as 10 mm/s: a hand at rest does not make any motion unstable)
+//   through   a shell point or the centre of mass was in a forbidden box
+//   chatters  over the last 0.2 s of a phase in which the hand was still for at least 0.2 s: RMS
+//   point
+//             speed above 2 mm/s, or peak-to-peak depth above 0.1 voxel. The end of each phase is
+//             judged, so that the body has all of it to settle; a limit cycle does not go away.
+//   arrived, stuck   at the end, in a scene with a target
+//   held      else
+//
+// Speeds are root mean squares over all shell points, so that turning counts like moving. Still:
+// the hand's shell points have moved less than 0.02 mm since the phase began.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/scene/scene.h"
+
+namespace h6::io {
+
+enum class Verdict { unstable, through, chatters, held, arrived, stuck };
+const char* verdict_name(Verdict verdict);
+
+// Watches a run frame by frame; memory does not grow with its length.
+class VerdictWatch {
+ public:
+  // `points` (n x 3) are the shell of the first hand's body, mesh frame [m]; com likewise.
+  VerdictWatch(const SceneVerdict& rules, std::vector<h6Vec3> points, h6Vec3 com, double rate);
+  // Times increase. The body's velocity is that of its centre of mass, the hand's that of the mesh
+  // frame's origin.
+  void frame(double time, const h6Pose& hand, const h6Velocity& hand_velocity,
+             const h6BodyState& body, double max_depth_voxels, bool state_finite);
+  Verdict verdict() const;
+
+ private:
+  // Points that lie together, mesh frame: one sphere test spares most of them.
+  struct Cluster {
+    h6Vec3 centre;
+    double radius;
+    std::uint32_t first, count;
+  };
+  struct Window {  // the last 0.2 s, a ring
+    std::vector<double> speed2, depth;
+    std::size_t next = 0, filled = 0;
+  };
+
+  void cluster_points(std::size_t first, std::size_t count);
+  double mean_speed2(const h6Vec3& origin_velocity, const h6Vec3& angular, const h6Quat& q) const;
+  double mean_motion2(const h6Pose& from, const h6Pose& to) const;
+  bool entered(const h6Pose& body) const;
+  void watch_stillness(double time, const h6Pose& hand);
+  bool chatters_now(double time) const;
+  bool arrived() const;
+
+  SceneVerdict rules_;
+  std::vector<h6Vec3> points_;
+  std::vector<Cluster> clusters_;
+  h6Vec3 com_, mean_{};    // mean_: of the points, mesh frame [m]
+  double second_[6] = {};  // mean of p pT over the points, xx yy zz xy xz yz [m^2]
+  double rate_;
+  double peak_hand_speed2_ = 0, peak_speed2_ = 0;
+  bool finite_ = true, through_ = false, chattered_ = false, first_ = true;
+  double still_since_ = 0, last_time_ = 0;
+  h6Pose still_hand_{};  // where the hand's still phase began
+  h6BodyState last_body_{};
+  Window window_;
+};
+
+}  // namespace h6::io

@@ -1,0 +1,313 @@
+// bake_shell.cpp - points on the surface, then levels and tree.
+//
+// Many candidates, spread evenly over the area that can be reached from outside, are thinned out to
+// the number asked for (see blue_noise.h); build_tree makes the levels of those. What is reached is
+// what a field says, baked here for that: of a mesh that is one closed piece all is, without
+// asking.
+#include "io/shell/bake_shell.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <new>
+#include <optional>
+
+#include "io/shell/candidates.h"
+#include "io/shell/tree.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io {
+namespace {
+
+Outcome check_mesh(const Mesh& mesh) {
+  if (mesh.triangles.empty())
+    return Failure{"The mesh has no triangles: there is no surface to sample."};
+  if (mesh.triangles.size() > UINT32_MAX / 3) {
+    return Failure{"The mesh has more than 1.4 billion triangles: simplify it first."};
+  }
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    for (const double v : {mesh.vertices[i].x, mesh.vertices[i].y, mesh.vertices[i].z}) {
+      if (!(std::abs(v) <= 1e6)) {
+        return Failure{"Vertex " + std::to_string(i) +
+                       " of the mesh lies nowhere: a coordinate is "
+                       "not a number or beyond 1,000,000 m. Check the file and its units."};
+      }
+    }
+  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const auto index : mesh.triangles[t]) {
+      if (index < mesh.vertices.size()) continue;
+      return Failure{"Triangle " + std::to_string(t) + " of the mesh names vertex " +
+                     std::to_string(index) + ", but there are only " +
+                     std::to_string(mesh.vertices.size()) + "."};
+    }
+  }
+  return Done{};
+}
+
+constexpr const char* too_many = ", more than the 20 million a shell can have: ask for ";
+
+Outcome check_options(const ShellBake& options) {
+  if (Outcome fine = check_levels(options.levels); !fine) return fine;
+  if (!std::isfinite(options.spacing)) {
+    return Failure{"The spacing of a shell must be a length in metres."};
+  }
+  if (options.spacing > 0) return Done{};
+  if (options.spacing < 0) {
+    return Failure{
+        "The spacing of a shell must be more than 0 m (or 0, to give a number of points)."};
+  }
+  if (options.points == 0) return Failure{"A shell needs at least one point: ask for 1 or more."};
+  if (options.points > max_shell_points) {
+    return Failure{std::to_string(options.points) + " points" + too_many + "fewer."};
+  }
+  return Done{};
+}
+
+std::string millimetres(double metres) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3g mm", metres * 1e3);
+  return text;
+}
+
+// The field's complaints stand after the name of a file; these here stand alone.
+std::string sentence(std::string text) {
+  if (text == "cancelled" || text.empty()) return text;
+  text[0] = char(std::toupper(static_cast<unsigned char>(text[0])));
+  return text.back() == '.' ? text : text + ".";
+}
+
+using Warnings = std::vector<std::string>;
+
+// Points to be thinned out, and what makes a point of the shell out of each.
+class Bake {
+ public:
+  Bake(const Mesh& mesh, const ShellBake& options, Warnings& warnings, Pulse& pulse)
+      : mesh_(mesh), options_(options), warnings_(warnings), pulse_(pulse) {}
+
+  Result<ShellData> run() {
+    if (!pulse_.step("reading the surface", 0, 0.05)) return cancelled_;
+    surface_ = options_.surface;
+    if (surface_ == ShellSurface::automatic) surface_ = ShellSurface::triangles;
+    if (!pulse_.alive()) return cancelled_;
+    Result<Candidates> samples = surface_ == ShellSurface::triangles ? on_triangles() : on_field();
+    if (!samples) return samples.failure();
+    return thin_and_build(*samples);
+  }
+
+ private:
+  // Candidates of a field count in its voxels.
+  double unit() const { return surface_ == ShellSurface::field ? field_->voxel_size : 1; }
+  Demand demand() const {
+    return {options_.points, options_.spacing / unit(), options_.seed, options_.threads};
+  }
+
+  // Of a sound mesh only what the outside reaches is asked for. Half a voxel of offset is the least
+  // that no step from node to node can cross, and spares the field its search for gaps narrower
+  // than a voxel: seconds, where many parts lie on one another.
+  static void step_off(const Mesh& mesh, FieldBake& options) {
+    if (options.offset >= 0) return;
+    Vec3 low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
+    for (const auto& triangle : mesh.triangles) {
+      for (const std::uint32_t v : triangle) {
+        const Vec3& p = mesh.vertices[v];
+        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+      }
+    }
+    const double longest = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    const double padding = std::min(double(options.padding_voxels), options.voxels / 4.0);
+    if (options.voxel_size <= 0) options.voxel_size = longest / (options.voxels - 2 * padding);
+    options.offset = 0.5001 * options.voxel_size;
+  }
+
+  Outcome bake_the_field(bool sound) {
+    FieldBake options = options_.field;
+    if (sound) step_off(mesh_, options);
+    options.threads = options_.threads;
+    options.cavities = Cavities::solid;  // a shell is touched from outside
+    pulse_.step("finding the outside", 0.05, 0.4);
+    Result<FieldData> field = bake_field(mesh_, options, &report_, pulse_.part());
+    if (!field) return Failure{sentence(field.error())};
+    field_ = std::move(*field);
+    return Done{};
+  }
+
+  Result<Candidates> on_triangles() {
+    const FaceTable faces = face_table(mesh_, &pulse_);
+    if (!pulse_.alive()) return cancelled_;
+    double area = 0;
+    for (const double a : faces.area) area += a;
+    if (!(area > 0)) {
+      return Failure{"The mesh has no area: all its triangles are lines or points."};
+    }
+    const bool all_outside = faces.pieces == 1 && faces.sheets == 0;
+    Reach reach;
+    reach.hide = !all_outside;
+    reach.field_normals = options_.normals == ShellNormals::field;
+    std::optional<FieldView> view;
+    if (reach.hide || reach.field_normals) {
+      if (Outcome baked = bake_the_field(faces.sheets == 0); !baked) return baked.failure();
+      reach.field = &view.emplace(*field_);
+      reach.offset = field_->offset / field_->voxel_size;
+    }
+    pulse_.step("spreading points", 0.4, 0.8);
+    Result<Candidates> samples = sample_triangles(mesh_, faces, reach, demand(), pulse_);
+    if (!samples) return samples;
+    warnings_.insert(warnings_.end(), faces.warnings.begin(), faces.warnings.end());
+    if (faces.sheets > 0) {
+      warnings_.push_back(std::to_string(faces.sheets) +
+                          (faces.sheets == 1 ? " piece" : " pieces") +
+                          " of the mesh not closed: both sides have points wherever the outside "
+                          "reaches both.");
+    }
+    if (samples->hidden > 0.005) {
+      warnings_.push_back(
+          std::to_string(std::lround(100 * samples->hidden)) +
+          " % of the mesh's area cannot be reached from outside and has no points; gaps below " +
+          millimetres(2 * std::max(field_->offset, 0.5 * field_->voxel_size)) +
+          " count as closed, more voxels look into narrower ones.");
+    }
+    return samples;
+  }
+
+  Result<Candidates> on_field() {
+    if (Outcome baked = bake_the_field(false); !baked) return baked.failure();
+    pulse_.step("spreading points", 0.4, 0.8);
+    Result<Candidates> samples = sample_zero_set(*field_, demand(), pulse_);
+    if (!samples) return samples;
+    // Half as many again as are wanted, where the grid has them; then exactly there.
+    const Thinned some = thinned(*samples, demand().spacing * 0.8, options_.points * 3 / 2);
+    if (some.cancelled) return cancelled_;
+    for (std::size_t i = 0; i < some.chosen.size(); ++i) {
+      samples->points[i] = samples->points[some.chosen[i]];
+    }
+    samples->points.resize(some.chosen.size());
+    const NearestTriangle nearest(mesh_, options_.threads, &pulse_);
+    if (!pulse_.alive()) return cancelled_;
+    settle({&mesh_, &*field_, &nearest, options_.normals == ShellNormals::triangles},
+           options_.threads, pulse_, *samples);
+    if (!pulse_.alive()) return cancelled_;
+    if (field_->offset > 0) {
+      warnings_.push_back(
+          std::string(report_.closed ? "" : "The mesh is not closed. ") +
+          "Its points lie where its field has its surface, " + millimetres(field_->offset) +
+          " outside of the triangles; more voxels or a smaller offset bring them nearer, and "
+          "\"triangles\" as surface puts them on the triangles.");
+    }
+    return samples;
+  }
+
+  // By spacing when there is one, else the number.
+  Thinned thinned(const Candidates& samples, double spacing, std::size_t number) {
+    Thinning thinning;
+    thinning.fixed_radius = spacing > 0;
+    thinning.target = thinning.fixed_radius ? max_shell_points : number;
+    thinning.first_radius =
+        thinning.fixed_radius ? spacing : 0.93 * std::sqrt(samples.area / double(number));
+    thinning.both_sides = true;
+    thinning.seed = options_.seed;
+    thinning.threads = options_.threads;
+    thinning.pulse = &pulse_;
+    return thin_out(samples.points, thinning);
+  }
+
+  Result<ShellData> thin_and_build(const Candidates& samples) {
+    const Thinned thinned = this->thinned(samples, demand().spacing, options_.points);
+    if (thinned.cancelled) return cancelled_;
+    if (thinned.chosen.size() > max_shell_points) {
+      return Failure{"This spacing gives " + std::to_string(thinned.chosen.size()) + " points" +
+                     too_many + "a wider spacing."};
+    }
+    std::vector<OrientedPoint> points(thinned.chosen.size());
+    std::vector<std::uint32_t> source(thinned.chosen.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (i % 65536 == 0 && !pulse_.alive()) return cancelled_;
+      points[i] = in_metres(samples.points[thinned.chosen[i]]);
+      source[i] = samples.source[thinned.chosen[i]];
+    }
+    if (!pulse_.step("building levels", 0.8, 1)) return cancelled_;
+    TreeOptions tree;
+    tree.levels = options_.levels;
+    tree.spacing = thinned.spacing * unit();
+    tree.seed = options_.seed;
+    tree.threads = options_.threads;
+    tree.pulse = &pulse_;
+    Result<ShellData> shell = build_tree(points, source, tree);
+    return shell;
+  }
+
+  OrientedPoint in_metres(OrientedPoint q) const {
+    if (surface_ == ShellSurface::triangles) return q;
+    const Vec3 p = FieldView(*field_).to_metres({q.p[0], q.p[1], q.p[2]});
+    q.p[0] = float(p.x), q.p[1] = float(p.y), q.p[2] = float(p.z);
+    return q;
+  }
+
+  const Mesh& mesh_;
+  const ShellBake& options_;
+  Warnings& warnings_;
+  Pulse& pulse_;
+  const Failure cancelled_{"cancelled"};
+  ShellSurface surface_ = ShellSurface::automatic;
+  std::optional<FieldData> field_;
+  FieldBakeReport report_;
+};
+
+constexpr const char* mode_names[] = {"auto", "triangles", "field"};  // of both enums, in order
+
+template <class Mode>
+std::optional<Mode> mode_from_name(const std::string& name) {
+  for (int i = 0; i < 3; ++i) {
+    if (name == mode_names[i]) return Mode(i);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<ShellSurface> surface_from_name(const std::string& name) {
+  return mode_from_name<ShellSurface>(name);
+}
+std::optional<ShellNormals> normals_from_name(const std::string& name) {
+  return mode_from_name<ShellNormals>(name);
+}
+const char* name_of(ShellSurface surface) { return mode_names[int(surface)]; }
+const char* name_of(ShellNormals normals) { return mode_names[int(normals)]; }
+
+double candidates_for(double points, bool by_spacing) {
+  // A fixed spacing has no second round to fill its gaps and needs more. Very large shells get
+  // fewer: theirs alone fill gigabytes.
+  const double each = points > 2e6 ? 4 : by_spacing ? 24 : 12;
+  return std::max(4096.0, each * points);
+}
+
+Result<double> Demand::wanted(double area) const {
+  if (!by_spacing()) return double(points);
+  // Random darts that keep a distance r from one another cover 0.547 of a plane with discs of
+  // radius r/2 when no more fit: r = 0.83 sqrt(area / points).
+  const double count = std::max(1.0, 0.70 * area / (spacing * spacing));
+  if (count <= double(max_shell_points)) return count;
+  return Failure{"This spacing gives about " + std::to_string(std::llround(count / 1e6)) +
+                 " million points" + too_many + "a wider spacing."};
+}
+
+double Demand::guess(double area, double count) const {
+  return by_spacing() ? spacing : std::sqrt(area / count);
+}
+
+Result<ShellData> bake_shell(const Mesh& mesh, const ShellBake& options,
+                             std::vector<std::string>* warnings, const Progress& progress) {
+  if (Outcome fine = check_options(options); !fine) return fine.failure();
+  if (Outcome fine = check_mesh(mesh); !fine) return fine.failure();
+  try {
+    Warnings unheard;
+    Pulse pulse(progress);
+    return Bake(mesh, options, warnings ? *warnings : unheard, pulse).run();
+  } catch (const std::bad_alloc&) {
+    return Failure{"Not enough memory for this shell: ask for fewer points or a wider spacing."};
+  }
+}
+
+}  // namespace h6::io

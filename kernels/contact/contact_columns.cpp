@@ -1,0 +1,153 @@
+// contact_columns.cpp - the SIMD twin of contact_columns_ref.cpp.
+//
+// Floats where a direction or a share results, doubles where depths differ by little. Agrees to a
+// few 2^-24, of |r| over the length that a torque is divided by.
+#include "kernels/contact/contact_columns.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/contact/contact_columns.cpp"
+#include "kernels/simd.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/tail-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+using DF = hn::ScalableTag<float>;
+using DD = hn::ScalableTag<double>;
+
+// D: of the lanes; columns are floats.
+template <class D>
+HWY_INLINE hn::Vec<D> column_at(D, const float* column, std::size_t i, std::size_t live) {
+  if constexpr (sizeof(hn::TFromD<D>) == sizeof(float)) {
+    return load_n(D(), column + i, live);
+  } else {
+    return hn::PromoteTo(D(), load_n(hn::Rebind<float, D>(), column + i, live));
+  }
+}
+
+// N and r x N.
+template <class D>
+struct Axis {
+  hn::Vec<D> v[6];
+};
+template <class D>
+HWY_INLINE Axis<D> axis_at(D d, const ContactColumns& c, std::size_t i) {
+  const std::size_t live = c.count - i;
+  const auto nx = column_at(d, c.nx, i, live), ny = column_at(d, c.ny, i, live);
+  const auto nz = column_at(d, c.nz, i, live), rx = column_at(d, c.rx, i, live);
+  const auto ry = column_at(d, c.ry, i, live), rz = column_at(d, c.rz, i, live);
+  return {{nx, ny, nz, hn::NegMulAdd(rz, ny, hn::Mul(ry, nz)),
+           hn::NegMulAdd(rx, nz, hn::Mul(rz, nx)), hn::NegMulAdd(ry, nx, hn::Mul(rx, ny))}};
+}
+
+void facing_simd(const ContactColumns& c, float edge, float* facing) {
+  const DF d;
+  const auto per_edge = hn::Set(d, 1 / edge), one = hn::Set(d, 1.0f);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    auto dot = hn::Mul(load_n(d, c.nx + i, live), load_n(d, c.gx + i, live));
+    dot = hn::MulAdd(load_n(d, c.ny + i, live), load_n(d, c.gy + i, live), dot);
+    dot = hn::MulAdd(load_n(d, c.nz + i, live), load_n(d, c.gz + i, live), dot);
+    const auto share = hn::Min(hn::Max(hn::Mul(dot, per_edge), hn::Zero(d)), one);
+    store_n(share, d, facing + i, live);
+  }
+}
+
+void torque_simd(const ContactColumns& c, float l0, float lever, float* tx, float* ty, float* tz) {
+  const DF d;
+  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), l2 = hn::Set(d, l0 * l0);
+  const auto fixed = hn::Set(d, lever > 0 ? 1 / lever : 0.0f);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    const Axis<DF> a = axis_at(d, c, i);
+    auto scale = fixed;
+    if (!(lever > 0)) {
+      auto length2 = hn::MulAdd(a.v[3], a.v[3], l2);
+      length2 = hn::MulAdd(a.v[4], a.v[4], length2);
+      length2 = hn::MulAdd(a.v[5], a.v[5], length2);
+      scale = hn::IfThenElseZero(hn::Gt(length2, zero), hn::Div(one, hn::Sqrt(length2)));
+    }
+    store_n(hn::Mul(a.v[3], scale), d, tx + i, live);
+    store_n(hn::Mul(a.v[4], scale), d, ty + i, live);
+    store_n(hn::Mul(a.v[5], scale), d, tz + i, live);
+  }
+}
+
+void depths_simd(const float* depth, std::size_t count, Depths& out) {
+  const DF d;
+  const auto zero = hn::Zero(d);
+  auto deepest = zero;
+  std::size_t inside = 0;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto deep = load_n(d, depth + i, count - i);
+    inside += hn::CountTrue(d, hn::Gt(deep, zero));
+    deepest = hn::Max(deepest, deep);
+  }
+  out = {inside, hn::GetLane(hn::MaxOfLanes(d, deepest))};
+}
+
+void gap_simd(const ContactColumns& c, const float* depth, double beta, const double* u, float* e) {
+  const DD d;
+  const hn::Rebind<float, DD> df;
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    const Axis<DD> a = axis_at(d, c, i);
+    auto approach = hn::Mul(a.v[0], hn::Set(d, u[0]));
+    for (int k = 1; k < 6; ++k) approach = hn::MulAdd(a.v[k], hn::Set(d, u[k]), approach);
+    const auto gap = hn::NegMulAdd(hn::Set(d, beta), approach, column_at(d, depth, i, live));
+    store_n(hn::DemoteTo(df, gap), df, e + i, live);
+  }
+}
+
+void loads_simd(const float* kappa, const float* slack, const float* depth, std::size_t count,
+                float* load, float* weight) {
+  const DF d;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const std::size_t live = count - i;
+    const auto force = hn::Mul(load_n(d, kappa + i, live), load_n(d, slack + i, live));
+    const auto deep = load_n(d, depth + i, live);
+    const auto share = hn::IfThenElseZero(hn::Gt(deep, hn::Zero(d)), hn::Div(force, deep));
+    store_n(force, d, load + i, live);
+    store_n(share, d, weight + i, live);
+  }
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(facing_simd);
+HWY_EXPORT(torque_simd);
+HWY_EXPORT(depths_simd);
+HWY_EXPORT(gap_simd);
+HWY_EXPORT(loads_simd);
+
+void contact_facing(const ContactColumns& c, float edge, float* facing) {
+  HWY_DYNAMIC_DISPATCH(facing_simd)(c, edge, facing);
+}
+void torque_directions(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
+                       float* tz) {
+  HWY_DYNAMIC_DISPATCH(torque_simd)(c, l0, lever, tx, ty, tz);
+}
+Depths look_at_depths(const float* depth, std::size_t count) {
+  Depths out;
+  HWY_DYNAMIC_DISPATCH(depths_simd)(depth, count, out);
+  return out;
+}
+void series_gap(const ContactColumns& c, const float* depth, double beta, const double u[6],
+                float* e) {
+  HWY_DYNAMIC_DISPATCH(gap_simd)(c, depth, beta, u, e);
+}
+void series_loads(const float* kappa, const float* slack, const float* depth, std::size_t count,
+                  float* load, float* weight) {
+  HWY_DYNAMIC_DISPATCH(loads_simd)(kappa, slack, depth, count, load, weight);
+}
+
+}  // namespace h6::kernels
+#endif

@@ -1,0 +1,335 @@
+// touch_groups.cpp - the SIMD twin of touch_groups_ref.cpp.
+#include "kernels/contact/touch_groups.h"
+
+#include <hwy/cache_control.h>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/contact/touch_groups.cpp"
+#include "kernels/simd.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/compress-inl.h"
+#include "kernels/field/sample_field-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+// What is looked at is staged, the points of one group behind those of another, some groups at a
+// time. Sixteen points, a batch, then go through three steps, some batches apart, so that none
+// waits for the one before: where they are in the table; where in the bricks; their samples. After
+// a pause each step asks for the memory of the next one too.
+//
+//     batch  k + ahead: locate   k + ahead / 2: look_up   k: sample
+constexpr std::size_t kStaged = 32;  // groups
+constexpr std::size_t kRing = 16;
+constexpr std::size_t kAhead = 4;  // with what is read in the caches; kRing where it is not
+
+struct Stage {
+  static constexpr std::size_t kRoom = (kStaged + 1) * kGroup;
+  HWY_ALIGN float x[kRoom], y[kRoom], z[kRoom], distance[kRoom];
+  HWY_ALIGN std::int32_t row[kRoom];
+  std::size_t first[kStaged + 1];  // of each group; then their number
+};
+
+struct Ring {
+  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // of the table, then bytes among the bricks
+  HWY_ALIGN std::int32_t node[kRing][kGroup];
+  HWY_ALIGN float fraction[3][kRing][kGroup];
+  bool plain[kRing];  // all in bricks: other batches are sampled anew
+};
+
+// Batches are whole: the last one is filled up with the first point.
+HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* groups,
+                             const std::uint16_t* rows, std::size_t count, Stage& stage) {
+  const DF d;
+  const DI di;
+  const VI iota = hn::Iota(di, 0), bit = hn::Shl(hn::Set(di, 1), iota);
+  std::size_t n = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    stage.first[k] = n;
+    const std::size_t first = kGroup * groups[k];
+    std::uint32_t looked = rows[k];
+    if (HWY_UNLIKELY(first + kGroup > points.count))
+      looked &= first < points.count ? (1u << (points.count - first)) - 1 : 0u;
+    for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
+      const auto here = hn::TestBit(hn::Set(di, static_cast<std::int32_t>(looked >> i)), bit);
+      const auto put = [&](const float* from, float* to) HWY_ATTR {
+        const VF v = hn::LoadU(d, from + first + i);
+        hn::StoreU(compress(d, v, hn::RebindMask(d, here)), d, to + n);
+      };
+      put(points.x, stage.x);
+      put(points.y, stage.y);
+      put(points.z, stage.z);
+      const VI row = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(first + i)));
+      hn::StoreU(compress(di, row, here), di, stage.row + n);
+      n += hn::CountTrue(di, here);
+    }
+  }
+  stage.first[count] = n;
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d))
+    for (float* column : {stage.x, stage.y, stage.z})
+      hn::StoreU(hn::Set(d, column[0]), d, column + n + i);
+}
+
+// What batches are made of: a group each, or what is staged.
+struct WholeGroups {
+  const PointsView& points;
+  const std::uint32_t* groups;
+  float* least;
+
+  std::size_t first(std::size_t batch) const { return kGroup * groups[batch]; }
+  VF x(std::size_t at) const { return hn::LoadU(DF(), points.x + at); }
+  VF y(std::size_t at) const { return hn::LoadU(DF(), points.y + at); }
+  VF z(std::size_t at) const { return hn::LoadU(DF(), points.z + at); }
+  VI row(std::size_t at) const {
+    return hn::Add(hn::Iota(DI(), 0), hn::Set(DI(), static_cast<std::int32_t>(at)));
+  }
+  std::size_t count() const { return points.count; }
+  void keep(std::size_t, VF) const {}
+  void end(std::size_t batch, VF smallest) const {
+    least[batch] = hn::GetLane(hn::MinOfLanes(DF(), smallest));
+  }
+};
+struct StagedPoints {
+  Stage& stage;
+  std::size_t number;
+
+  std::size_t first(std::size_t batch) const { return kGroup * batch; }
+  VF x(std::size_t at) const { return hn::Load(DF(), stage.x + at); }
+  VF y(std::size_t at) const { return hn::Load(DF(), stage.y + at); }
+  VF z(std::size_t at) const { return hn::Load(DF(), stage.z + at); }
+  VI row(std::size_t at) const { return hn::Load(DI(), stage.row + at); }
+  std::size_t count() const { return number; }
+  void keep(std::size_t at, VF distance) const { hn::Store(distance, DF(), stage.distance + at); }
+  void end(std::size_t, VF) const {}
+};
+
+template <class Points>
+HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Points& points,
+                       std::size_t batch, std::size_t k, bool cold, Ring& ring) {
+  const DF d;
+  const DI di;
+  const VF zero = hn::Zero(d);
+  bool plain = true;
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
+    const std::size_t at = points.first(batch) + i;
+    const VF px = points.x(at), py = points.y(at), pz = points.z(at);
+    VF q[3];
+    auto inside = hn::FirstN(d, hn::Lanes(d));
+    HWY_UNROLL(3)
+    for (int a = 0; a < 3; ++a) {
+      q[a] = affine_row(to_field.m[a], px, py, pz);
+      const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
+      inside = hn::And(inside, hn::And(hn::Ge(q[a], zero), hn::Le(q[a], last)));
+    }
+    plain = plain && hn::AllTrue(d, inside);
+    Axis axis[3];
+    HWY_UNROLL(3)
+    for (int a = 0; a < 3; ++a) {
+      axis[a] = split_axis(hn::IfThenElseZero(inside, q[a]), field.size[a]);
+      hn::Store(axis[a].fraction, d, ring.fraction[a][k] + i);
+    }
+    const Cell cell = cell_of(field, axis[0], axis[1], axis[2]);
+    hn::Store(cell.slot, di, ring.slot[k] + i);
+    hn::Store(cell.node, di, ring.node[k] + i);
+  }
+  ring.plain[k] = plain;
+  if (cold)
+    for (const std::int32_t slot : ring.slot[k]) hwy::Prefetch(field.table + slot);
+}
+
+HWY_INLINE void look_up(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
+  const DI di;
+  if (cold)
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      const std::int32_t entry = field.table[ring.slot[k][i]];
+      if (entry < 0) {
+        hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
+        continue;
+      }
+      const std::int16_t* const node =
+          field.bricks + std::ptrdiff_t{entry} * kBrickStride + ring.node[k][i];
+      hwy::Prefetch(node + 5);
+      hwy::Prefetch(node + 86);
+    }
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di)) {
+    const VI entry = gather_entries(field.table, ring.slot[k] + i);
+    ring.plain[k] = ring.plain[k] && hn::AllFalse(di, hn::Lt(entry, hn::Zero(di)));
+    hn::Store(near_offset(entry, hn::Load(di, ring.node[k] + i)), di, ring.slot[k] + i);
+  }
+}
+
+struct Samples {
+  VF distance, gx, gy, gz;
+};
+
+HWY_INLINE Samples sample_plain(const FieldView& field, const Ring& ring, std::size_t k,
+                                std::size_t i) {
+  const DF d;
+  const VF quantum = hn::Set(d, kNearQuantum);
+  VI pair[4];
+  gather_pairs(field.bricks, ring.slot[k] + i, kNearCorners, pair);
+  Samples s;
+  interpolate<true>(corners_of(pair), hn::Load(d, ring.fraction[0][k] + i),
+                    hn::Load(d, ring.fraction[1][k] + i), hn::Load(d, ring.fraction[2][k] + i),
+                    quantum, quantum, s.distance, s.gx, s.gy, s.gz);
+  return s;
+}
+
+template <class Points>
+Samples sample_anew(const FieldView& field, const Affine& to_field, const Points& points,
+                    std::size_t at) {
+  const VF px = points.x(at), py = points.y(at), pz = points.z(at);
+  Samples s;
+  sample_points<true>(field, affine_row(to_field.m[0], px, py, pz),
+                      affine_row(to_field.m[1], px, py, pz), affine_row(to_field.m[2], px, py, pz),
+                      s.distance, s.gx, s.gy, s.gz);
+  return s;
+}
+
+// Which distances are samples: of points in the grid, and there in a brick.
+template <class Points>
+hn::Mask<DF> in_bricks(const FieldView& field, const Affine& to_field, const Points& points,
+                       std::size_t at) {
+  const DF d;
+  const DI di;
+  const VF px = points.x(at), py = points.y(at), pz = points.z(at), zero = hn::Zero(d);
+  VF q[3];
+  auto inside = hn::FirstN(d, hn::Lanes(d));
+  for (int a = 0; a < 3; ++a) {
+    q[a] = affine_row(to_field.m[a], px, py, pz);
+    const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
+    inside = hn::And(inside, hn::And(hn::Ge(q[a], zero), hn::Le(q[a], last)));
+  }
+  const Cell cell = cell_of(field, split_axis(hn::IfThenElseZero(inside, q[0]), field.size[0]),
+                            split_axis(hn::IfThenElseZero(inside, q[1]), field.size[1]),
+                            split_axis(hn::IfThenElseZero(inside, q[2]), field.size[2]));
+  HWY_ALIGN std::int32_t slot[hn::MaxLanes(di)];
+  hn::Store(cell.slot, di, slot);
+  const VI entry = gather_entries(field.table, slot);
+  return hn::AndNot(hn::RebindMask(d, hn::Lt(entry, hn::Zero(di))), inside);
+}
+
+// Writes what touches of so many batches behind what is written, and returns where that ends.
+template <class Points>
+HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_field,
+                                      const Points& points, std::size_t batches, float limit,
+                                      bool cold, const Touching& out, std::size_t written) {
+  const DF d;
+  const DI di;
+  static_assert(hn::MaxLanes(DF()) <= kGroup, "a vector is part of a batch");
+  const VF none = hn::Set(d, __builtin_huge_valf());
+  const std::size_t ahead = cold ? kRing : kAhead, half = ahead / 2;
+  Ring ring;
+  const auto locate_at = [&](std::size_t k) HWY_ATTR {
+    if (k < batches) locate(field, to_field, points, k, k % kRing, cold, ring);
+  };
+  const auto look_up_at = [&](std::size_t k) HWY_ATTR {
+    if (k < batches) look_up(field, k % kRing, cold, ring);
+  };
+  for (std::size_t k = 0; k < ahead; ++k) locate_at(k);
+  for (std::size_t k = 0; k < half; ++k) look_up_at(k);
+  for (std::size_t k = 0; k < batches; ++k) {
+    look_up_at(k + half);
+    VF smallest = none;
+    for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
+      const std::size_t at = points.first(k) + i;
+      Samples s = HWY_LIKELY(ring.plain[k % kRing]) ? sample_plain(field, ring, k % kRing, i)
+                                                    : sample_anew(field, to_field, points, at);
+      const auto real = hn::FirstN(d, at < points.count() ? points.count() - at : 0);
+      s.distance = hn::IfThenElse(real, s.distance, none);
+      points.keep(at, s.distance);
+      smallest = hn::Min(smallest, s.distance);
+      // Whole vectors are written, whatever touches: a branch would be guessed wrong too often.
+      auto touching = hn::Lt(s.distance, hn::Set(d, limit));
+      if (HWY_UNLIKELY(!ring.plain[k % kRing]) && limit > 0 && !hn::AllFalse(d, touching))
+        touching = hn::Or(hn::Lt(s.distance, hn::Zero(d)),
+                          hn::And(touching, in_bricks(field, to_field, points, at)));
+      hn::StoreU(compress(di, points.row(at), hn::RebindMask(di, touching)), di,
+                 reinterpret_cast<std::int32_t*>(out.row + written));
+      hn::StoreU(compress(d, s.distance, touching), d, out.distance + written);
+      hn::StoreU(compress(d, s.gx, touching), d, out.gx + written);
+      hn::StoreU(compress(d, s.gy, touching), d, out.gy + written);
+      hn::StoreU(compress(d, s.gz, touching), d, out.gz + written);
+      written += hn::CountTrue(d, touching);
+    }
+    points.end(k, smallest);
+    locate_at(k + ahead);
+  }
+  return written;
+}
+
+template <class M>
+HWY_INLINE std::uint32_t bits_of(M mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(DF(), mask, bytes);
+  return bytes[0] | bytes[1] << 8;
+}
+
+// What is learnt of a group whose points are staged from `first` to `end`.
+HWY_INLINE void learn_group(const Stage& stage, std::size_t first, std::size_t end, bool all,
+                            const GroupLook& look, std::size_t k) {
+  const DF d;
+  const VF none = hn::Set(d, __builtin_huge_valf());
+  const auto at = [&](std::size_t i) HWY_ATTR {
+    return hn::IfThenElse(hn::FirstN(d, end - i), hn::LoadU(d, stage.distance + i), none);
+  };
+  VF least = none;
+  for (std::size_t i = first; i < end; i += hn::Lanes(d)) least = hn::Min(least, at(i));
+  least = hn::MinOfLanes(d, least);
+  look.least[k] = hn::GetLane(least);
+  if (!all) return;
+  const VF edge = hn::Max(hn::Set(d, look.near), hn::Mul(hn::Set(d, kNearLeast), least));
+  VF rest = none;
+  std::uint32_t near_rows = 0;
+  for (std::size_t i = first; i < end; i += hn::Lanes(d)) {
+    const VF v = at(i);
+    const auto near = hn::Lt(v, edge);
+    near_rows |= bits_of(near) << (i - first);
+    rest = hn::Min(rest, hn::IfThenElse(near, none, v));
+  }
+  look.near_rows[k] = static_cast<std::uint16_t>(near_rows);
+  look.rest[k] = hn::GetLane(hn::MinOfLanes(d, rest));
+}
+
+std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
+                              const PointsView& points, const std::uint32_t* groups,
+                              std::size_t count, float limit, bool cold, const GroupLook& look,
+                              const Touching& out) {
+  if (look.rows == nullptr)
+    return sample_batches(field, to_field, WholeGroups{points, groups, look.least}, count, limit,
+                          cold, out, 0);
+  std::size_t written = 0;
+  Stage stage;
+  for (std::size_t done = 0; done < count; done += kStaged) {
+    const std::size_t some = HWY_MIN(kStaged, count - done);
+    stage_points(points, groups + done, look.rows + done, some, stage);
+    const std::size_t staged = stage.first[some];
+    written = sample_batches(field, to_field, StagedPoints{stage, staged},
+                             (staged + kGroup - 1) / kGroup, limit, cold, out, written);
+    for (std::size_t k = 0; k < some; ++k)
+      learn_group(stage, stage.first[k], stage.first[k + 1], look.rows[done + k] == kAllRows, look,
+                  done + k);
+  }
+  return written;
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(touch_groups_simd);
+
+std::size_t touch_groups(const FieldView& field, const Affine& to_field, const PointsView& points,
+                         const std::uint32_t* groups, std::size_t count, float limit, bool cold,
+                         const GroupLook& look, const Touching& out) {
+  return HWY_DYNAMIC_DISPATCH(touch_groups_simd)(field, to_field, points, groups, count, limit,
+                                                 cold, look, out);
+}
+
+}  // namespace h6::kernels
+#endif

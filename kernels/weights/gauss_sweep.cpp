@@ -1,0 +1,319 @@
+// gauss_sweep.cpp - stages, pairs and weights of gauss_sweep.h.
+#include "kernels/weights/gauss_sweep.h"
+
+#include <algorithm>
+
+#include "kernels/weights/gauss_tree_stages.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/weights/gauss_sweep.cpp"
+#include "kernels/simd.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/fold-inl.h"
+#include "kernels/tail-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+using DF = hn::CappedTag<float, kBandBlock>;
+using DI = hn::RebindToSigned<DF>;
+using VF = hn::Vec<DF>;
+constexpr std::size_t kLanes = hn::MaxLanes(DF());
+constexpr std::size_t kRows = 4;  // a group: rows that share loads of columns
+
+// Rows whose hats a column sums before they join the total: rounding grows with the number of
+// sums, not of contacts.
+constexpr std::size_t kFresh = 128;
+constexpr std::uint32_t kRun = 64 * kLanes;  // columns whose hats a row sums before, likewise
+
+// Farther than any hat reaches; its square is still a float.
+constexpr float kNowhere = 1e15f;
+
+// Columns in the order of the bands, with their padding.
+void gather_rows(const GaussSweep& sweep) {
+  const DF d;
+  const DI di;
+  const DirectionsView& c = sweep.contacts;
+  const GaussPairs& pairs = *sweep.product;
+  const std::size_t rows = band_blocks(c.count) * kBandBlock;
+  for (std::size_t i = 0; i < rows; i += kLanes) {
+    const auto row = hn::Load(di, reinterpret_cast<const std::int32_t*>(sweep.bands[0].source) + i);
+    const auto real = hn::FirstN(d, c.count > i ? c.count - i : 0);
+    for (int k = 0; k < 6; ++k) {
+      const VF v = hn::GatherIndex(d, pairs.column[k], row);
+      hn::Store(hn::IfThenElse(real, v, hn::Set(d, kNowhere)), d, pairs.at[k] + i);
+    }
+    VF share = hn::Set(d, *sweep.per_share);
+    if (c.depth != nullptr) share = hn::Mul(share, hn::GatherIndex(d, c.depth, row));
+    if (c.facing != nullptr) share = hn::Mul(share, hn::GatherIndex(d, c.facing, row));
+    hn::Store(hn::IfThenElseZero(real, share), d, pairs.share + i);
+  }
+}
+
+// ---- pairs
+
+// Rows i .. i + kRows - 1.
+struct Group {
+  VF at[kRows][3], share[kRows], sum[kRows];
+};
+
+template <bool kMasked>
+HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
+                         float* column, Group& rows) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  VF x[6], hat[kRows];
+  for (int k = 0; k < 3; ++k) x[k] = hn::Load(d, g.at[k] + j);
+  const auto gap_to_edge = [&](std::size_t r, int s) HWY_ATTR {
+    VF v = width2[s];
+    HWY_UNROLL(3)
+    for (int k = 3 * s; k < 3 * s + 3; ++k) {
+      // Registers hold one sphere's; the other's come with the subtraction.
+      const VF at = s == 0 ? rows.at[r][k] : hn::Set(d, g.at[k][i + r]);
+      const VF gap = hn::Sub(x[k], at);
+      v = hn::NegMulAdd(gap, gap, v);
+    }
+    return hn::Max(v, zero);
+  };
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) {
+    hat[r] = gap_to_edge(r, 0);
+    if (kMasked) {
+      // Only columns behind the row.
+      const std::size_t out = i + r + 1 > j ? i + r + 1 - j : 0;
+      hat[r] = hn::IfThenZeroElse(hn::FirstN(d, out), hat[r]);
+    }
+  }
+  const VF any = hn::Max(hn::Max(hat[0], hat[1]), hn::Max(hat[2], hat[3]));
+  if (hn::AllTrue(d, hn::Eq(any, zero))) return;
+  for (int k = 3; k < 6; ++k) x[k] = hn::Load(d, g.at[k] + j);
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) hat[r] = hn::Mul(hat[r], gap_to_edge(r, 1));
+  const VF share = hn::Load(d, g.share + j);
+  VF sum = hn::Load(d, column + j);
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) {
+    rows.sum[r] = hn::MulAdd(share, hat[r], rows.sum[r]);
+    sum = hn::MulAdd(rows.share[r], hat[r], sum);
+  }
+  hn::Store(sum, d, column + j);
+}
+
+// A group's rows from `i` on, with columns from `j` to `end`.
+HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
+                          std::size_t end, float* fresh, float* total) {
+  const DF d;
+  Group rows;
+  HWY_UNROLL(4)
+  for (std::size_t r = 0; r < kRows; ++r) {
+    for (int k = 0; k < 3; ++k) rows.at[r][k] = hn::Set(d, g.at[k][i + r]);
+    rows.share[r] = hn::Set(d, g.share[i + r]);
+    rows.sum[r] = hn::Zero(d);
+  }
+  for (; j < HWY_MIN(i + kRows, end); j += kLanes) add_tile<true>(g, width2, i, j, fresh, rows);
+  for (; j < end; j += kLanes) add_tile<false>(g, width2, i, j, fresh, rows);
+  add_four_sums(d, rows.sum, total + i);
+}
+
+void sum_pairs(const GaussSweep& sweep, std::size_t part) {
+  const DF d;
+  const GaussBands& g = sweep.bands[0];
+  const GaussPairs& pairs = *sweep.product;
+  const std::size_t count = g.grid->count, padded = band_blocks(count) * kBandBlock;
+  float *const fresh = pairs.fresh[part], *const total = pairs.sum[part];
+  std::fill_n(fresh, padded, 0.0f);
+  std::fill_n(total, padded, 0.0f);
+  VF width2[2];
+  for (int s = 0; s < 2; ++s) width2[s] = hn::Set(d, pairs.width[s] * pairs.width[s]);
+  const std::size_t end = pairs.split[part + 1];
+  for (std::size_t first = pairs.split[part]; first < end; first += kFresh / kBandBlock) {
+    std::size_t farthest = 0;
+    for (std::size_t b = first; b < HWY_MIN(first + kFresh / kBandBlock, end); ++b) {
+      const BandRuns& runs = g.runs[b];
+      const std::size_t rows = HWY_MIN((b + 1) * kBandBlock, count);
+      for (std::uint32_t r = 0; r < runs.count; ++r) {
+        for (std::uint32_t from = runs.first[r]; from < runs.end[r]; from += kRun) {
+          const std::uint32_t to = HWY_MIN(from + kRun, runs.end[r]);
+          for (std::size_t i = b * kBandBlock; i < rows; i += kRows)
+            add_group(pairs, width2, i, HWY_MAX(std::size_t{from}, i / kLanes * kLanes), to, fresh,
+                      total);
+        }
+      }
+      if (runs.count > 0) farthest = HWY_MAX(farthest, std::size_t{runs.end[runs.count - 1]});
+    }
+    for (std::size_t j = first * kBandBlock; j < farthest; j += kLanes) {
+      hn::Store(hn::Add(hn::Load(d, total + j), hn::Load(d, fresh + j)), d, total + j);
+      hn::Store(hn::Zero(d), d, fresh + j);
+    }
+  }
+}
+
+// Adds up what the parts summed.
+void join_parts(const GaussSweep& sweep) {
+  const DF d;
+  const GaussBands& g = sweep.bands[0];
+  const GaussPairs& pairs = *sweep.product;
+  const VF unit =
+      hn::Set(d, 1 / (pairs.width[0] * pairs.width[0] * pairs.width[1] * pairs.width[1]));
+  for (std::size_t j = 0; j < g.grid->count; j += kLanes) {
+    VF phi = hn::Load(d, pairs.sum[0] + j);
+    for (std::size_t part = 1; part < kGaussSweepParts; ++part)
+      phi = hn::Add(phi, hn::Load(d, pairs.sum[part] + j));
+    hn::Store(hn::MulAdd(phi, unit, hn::Load(d, pairs.share + j)), d, pairs.sum[0] + j);
+  }
+}
+
+// ---- weights
+
+void weigh_rows(const GaussSweep& sweep, std::size_t begin, std::size_t end) {
+  const DF d;
+  const DirectionsView& c = sweep.contacts;
+  const DI di;
+  const VF zero = hn::Zero(d), self = hn::Set(d, sweep.densities == 2 ? 2.0f : 1.0f);
+  for (std::size_t i = begin; i < end; i += kLanes) {
+    const std::size_t live = end - i;
+    VF phi = zero;
+    for (int p = 0; p < sweep.densities; ++p) {
+      const GaussBands& g = sweep.bands[p];
+      const auto place = load_n(di, reinterpret_cast<const std::int32_t*>(g.place) + i, live);
+      phi = hn::Add(phi, hn::GatherIndex(d, g.order_only ? sweep.product->sum[0] : g.phi, place));
+    }
+    const VF facing = c.facing ? load_n(d, c.facing + i, live) : hn::Set(d, 1.0f);
+    VF share = hn::Set(d, *sweep.per_share);
+    if (c.depth != nullptr) share = hn::Mul(share, load_n(d, c.depth + i, live));
+    if (c.facing != nullptr) share = hn::Mul(share, facing);
+    // A contact's own share is in its density, whatever rounding takes from a light one.
+    const VF own = hn::Mul(share, self);
+    const VF weight = hn::Div(hn::Mul(facing, own), hn::Max(phi, own));
+    store_n(hn::IfThenElseZero(hn::Gt(own, zero), weight), d, sweep.weight + i, live);
+  }
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(gather_rows);
+HWY_EXPORT(sum_pairs);
+HWY_EXPORT(join_parts);
+HWY_EXPORT(weigh_rows);
+
+namespace {
+
+constexpr std::size_t kBlocksASlice = 16;  // summed, of 16 contacts each
+constexpr std::size_t kRowsASlice = 2048;  // weighed
+
+GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& widths,
+                        GaussColumns& columns) {
+  GaussSweep sweep{};
+  sweep.contacts = c;
+  sweep.hat = hat;
+  sweep.densities = hat == Hat::sum ? 2 : 1;
+  columns.take(sweep.per_share, 2);  // one for each density that sorts
+  columns.take(sweep.pairs, 2);
+  const float* const normals[6] = {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz};
+  const float width[2] = {std::max(widths.normal, kMinWidth), std::max(widths.torque, kMinWidth)};
+  for (int p = 0; p < sweep.densities; ++p) {
+    GaussBands& g = sweep.bands[p];
+    g.order_only = hat == Hat::product;
+    std::copy_n(normals + 3 * p, 3, g.column);
+    g.width = width[p];
+    lay_out_bands(g, c.count, columns);
+  }
+  if (hat != Hat::product) return sweep;
+  columns.take(sweep.product, 1);
+  GaussPairs pairs{};
+  std::copy_n(normals, 6, pairs.column);
+  std::copy_n(width, 2, pairs.width);
+  const std::size_t rows = band_blocks(c.count) * kBandBlock;
+  for (float*& at : pairs.at) columns.take(at, rows);
+  columns.take(pairs.share, rows);
+  for (std::size_t part = 0; part < kGaussSweepParts; ++part) {
+    columns.take(pairs.fresh[part], rows);
+    columns.take(pairs.sum[part], rows);
+  }
+  if (sweep.product != nullptr) *sweep.product = pairs;
+  return sweep;
+}
+
+std::size_t slices_of(std::size_t rows, std::size_t size) { return (rows + size - 1) / size; }
+
+// Half of the pairs to each part.
+void split_pairs(const GaussSweep& sweep) {
+  const GaussBands& g = sweep.bands[0];
+  const std::size_t blocks = band_blocks(g.grid->count);
+  std::size_t* const split = sweep.product->split;
+  split[0] = 0, split[2] = blocks;
+  std::uint64_t seen = 0;
+  std::size_t b = 0;
+  for (; 2 * seen < *sweep.pairs && b < blocks; ++b)
+    for (std::uint32_t r = 0; r < g.runs[b].count; ++r)
+      seen += kBandBlock * (g.runs[b].end[r] - g.runs[b].first[r]);
+  split[1] = b;
+}
+
+void sort(const GaussSweep& sweep, std::size_t density) {
+  const DirectionsView& c = sweep.contacts;
+  const bool weighted = c.facing != nullptr || c.depth != nullptr;
+  sweep.per_share[density] = weighted ? gauss_per_share(c) : 1.0f;
+  sweep.pairs[density] = sort_bands(sweep.bands[density], c, sweep.per_share[density]);
+  if (sweep.product == nullptr) return;
+  HWY_DYNAMIC_DISPATCH(gather_rows)(sweep);
+  split_pairs(sweep);
+}
+
+void sum(const GaussSweep& sweep, std::size_t slice) {
+  if (sweep.hat == Hat::product) return HWY_DYNAMIC_DISPATCH(sum_pairs)(sweep, slice);
+  const std::size_t blocks = band_blocks(sweep.contacts.count);
+  const std::size_t each = slices_of(blocks, kBlocksASlice);
+  const std::size_t first = slice % each * kBlocksASlice;
+  sum_bands(sweep.bands[slice / each], first, first + kBlocksASlice);
+}
+
+}  // namespace
+
+std::size_t gauss_sweep_bytes(std::size_t count, Hat hat) {
+  GaussColumns counting{nullptr};
+  DirectionsView c{};
+  c.count = count;
+  with_columns(c, hat, {1, 1}, counting);
+  return counting.block_bytes();
+}
+
+GaussSweep gauss_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
+                       float* weight) {
+  GaussColumns columns = GaussColumns::in(memory);
+  GaussSweep sweep = with_columns(c, hat, widths, columns);
+  sweep.weight = weight;
+  return sweep;
+}
+
+std::size_t gauss_sweep_slices(const GaussSweep& sweep, int stage) {
+  const std::size_t count = sweep.contacts.count;
+  if (count == 0) return 0;
+  const auto densities = static_cast<std::size_t>(sweep.densities);
+  if (stage == 0) return densities;
+  if (sweep.hat == Hat::product) return stage == 1 ? kGaussSweepParts : 1;
+  return stage == 1 ? densities * slices_of(band_blocks(count), kBlocksASlice)
+                    : slices_of(count, kRowsASlice);
+}
+
+void gauss_sweep_run(const GaussSweep& sweep, int stage, std::size_t slice) {
+  if (stage == 0) return sort(sweep, slice);
+  if (stage == 1) return sum(sweep, slice);
+  const std::size_t count = sweep.contacts.count;
+  if (sweep.hat == Hat::product) {
+    HWY_DYNAMIC_DISPATCH(join_parts)(sweep);
+    return HWY_DYNAMIC_DISPATCH(weigh_rows)(sweep, 0, count);
+  }
+  const std::size_t first = slice * kRowsASlice;
+  HWY_DYNAMIC_DISPATCH(weigh_rows)(sweep, first, std::min(first + kRowsASlice, count));
+}
+
+}  // namespace h6::kernels
+#endif

@@ -1,0 +1,67 @@
+// gauss_sweep.h - the weights of gauss_weights.h for some thousand contacts: sorted, so that each
+// meets only those of a window.
+//
+// gauss_bands.h sorts them, and sums hats over one sphere. Of a product of two, which costs more, a
+// pair is evaluated once: by a sum over lanes for one contact and a sum over rows for the others.
+//
+//     columns -> bands, runs -> sums of rows and of columns, part by part -> weights
+//
+// Stages and slices are those of gauss_tree.h. Parts have their own sums, which are added in
+// order, so which thread runs what changes no bit.
+#pragma once
+#include "kernels/weights/gauss_bands.h"
+
+namespace h6::kernels {
+
+inline constexpr int kGaussSweepStages = 3;
+inline constexpr std::size_t kGaussSweepParts = 2;     // slices of a product's pairs
+inline constexpr std::size_t kGaussSweepMost = 32768;  // contacts; from there on gauss_tree
+inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536;  // a contact
+
+// The pairs of a product of two hats.
+struct GaussPairs {
+  const float* column[6];  // as they came
+  float width[2];
+  float *at[6], *share;                                    // in order of the bands
+  float *fresh[kGaussSweepParts], *sum[kGaussSweepParts];  // part by part
+  std::size_t split[kGaussSweepParts + 1];                 // first block of each
+};
+
+struct GaussSweep {
+  DirectionsView contacts;
+  Hat hat;
+  int densities;  // 2 for Hat::sum
+  GaussBands bands[2];
+  GaussPairs* product;   // of Hat::product
+  float* per_share;      // 1 / the largest s
+  std::uint64_t* pairs;  // (densities) that runs hold
+  float* weight;
+};
+
+// Bytes of `memory`, any alignment.
+std::size_t gauss_sweep_bytes(std::size_t count, Hat hat);
+
+// Arguments as of gauss_weights, geodesic excepted. weight (count).
+GaussSweep gauss_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
+                       float* weight);
+std::size_t gauss_sweep_slices(const GaussSweep& sweep, int stage);
+void gauss_sweep_run(const GaussSweep& sweep, int stage, std::size_t slice);
+
+// After stage 0: whether its pairs cost less than gauss_tree does.
+inline bool gauss_sweep_pays(const GaussSweep& sweep) {
+  const std::uint64_t each = sweep.hat == Hat::product ? kGaussSweepPairs6 : kGaussSweepPairs3;
+  std::uint64_t pairs = 0;
+  for (int p = 0; p < sweep.densities; ++p) pairs += sweep.pairs[p];
+  return pairs <= each * static_cast<std::uint64_t>(sweep.densities) * sweep.contacts.count;
+}
+
+// All of it, on the caller. The specification is gauss_weights_ref.
+inline void gauss_weights_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths,
+                                void* memory, float* weight) {
+  const GaussSweep sweep = gauss_sweep(c, hat, widths, memory, weight);
+  for (int stage = 0; stage < kGaussSweepStages; ++stage)
+    for (std::size_t i = 0; i < gauss_sweep_slices(sweep, stage); ++i)
+      gauss_sweep_run(sweep, stage, i);
+}
+
+}  // namespace h6::kernels

@@ -1,0 +1,226 @@
+// gauss_targets-inl.h - targets of gauss_tree_sum.cpp: what is listed pair by pair, and the
+// polynomial of what lies inside all supports.
+//
+// Included once for each SIMD target.
+#include <cstring>
+
+#include "kernels/weights/gauss_tree_stages.h"
+
+// Per-target include guard.
+#if defined(H6_KERNELS_GAUSS_TARGETS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef H6_KERNELS_GAUSS_TARGETS_INL_H_
+#undef H6_KERNELS_GAUSS_TARGETS_INL_H_
+#else
+#define H6_KERNELS_GAUSS_TARGETS_INL_H_
+#endif
+
+#include "hwy/highway.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using DF = hn::CappedTag<float, kGaussLeaf>;
+using VF = hn::Vec<DF>;
+using MF = hn::Mask<DF>;
+constexpr std::size_t kLanes = hn::MaxLanes(DF());
+constexpr std::size_t kListed = 512;    // contacts before a list is worked off
+constexpr std::size_t kMostLeaves = 2;  // of targets
+constexpr float kTogether = 0.1f;       // of a width: leaves that share a walk, and how far apart
+constexpr std::size_t kOpened = 256;    // leaves before they are opened
+
+// Pairs in the form c + 2 t.x, with x and t from the targets' centre: exact enough while targets
+// are no farther from it than a width. Else by differences.
+enum class Form { products, differences };
+
+// Columns of listed contacts. Over each sphere, form products: 2 x and e^2 - |x|^2, the first
+// sphere's times the share; form differences: x, the share first. Where all shares are 1, form
+// products has no share, and x in the place of 2 x.
+template <int kAxes>
+struct List {
+  static constexpr int kShare = 0, kFirst = 1;  // then 4 a sphere: x y z, rest
+  HWY_ALIGN float column[1 + 4 * kAxes / 3][kListed + 2 * kGaussLeaf];
+  std::size_t count = 0;
+};
+
+// Targets of a leaf, or of two in a row.
+template <int kAxes>
+struct Targets {
+  static constexpr int kSpheres = kAxes / 3;
+  static constexpr int kTerms = kAxes == 3 ? 5 : 25;
+  const GaussDensity& g;
+  std::size_t leaf, leaves;
+  // What is large stays uninitialised.
+  Targets(const GaussDensity& density, std::size_t first, std::size_t count)
+      : g(density), leaf(first), leaves(count) {
+    for (VF& v : term) v = hn::Zero(DF());
+    std::memset(sum, 0, count * kGaussLeaf * sizeof *sum);
+  }
+  // Target r of all, in column k.
+  const float* at(int k, std::size_t r) const {
+    return leaf_column(g, leaf + r / kGaussLeaf, k) + r % kGaussLeaf;
+  }
+  Form form = Form::products;
+  float centre[kAxes];
+  float radius[kSpheres], width2[kSpheres];
+  // Coefficients of 1, x, y, z, |x|^2 about the centre (products: of N's times T's), one sum a
+  // lane.
+  VF term[kTerms];
+  HWY_ALIGN float sum[kMostLeaves * kGaussLeaf][kGaussLeaf];  // of pairs, one sum a lane
+  std::uint32_t cut[kOpened + kGaussLeaf];                    // leaves to open
+  std::size_t cuts = 0;
+  List<kAxes> list;
+};
+
+HWY_INLINE unsigned bits_of(MF mask) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(DF(), mask, bytes);
+  std::uint32_t bits;
+  std::memcpy(&bits, bytes, sizeof bits);
+  return bits & ((1u << kLanes) - 1);
+}
+
+HWY_INLINE VF norm2_of(const VF* v) {
+  return hn::MulAdd(v[2], v[2], hn::MulAdd(v[1], v[1], hn::Mul(v[0], v[0])));
+}
+HWY_INLINE VF twice(VF v) { return hn::Add(v, v); }
+
+// ---- pairs
+
+template <int kAxes, Form kForm, std::size_t kCount, bool kUnit = false>
+HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
+  constexpr int kSpheres = kAxes / 3;
+  const DF d;
+  const auto& column = t.list.column;
+  VF at[kCount][kAxes], at2[kCount][kSpheres], sum[kCount];
+  VF width2[kSpheres];
+  for (int s = 0; s < kSpheres; ++s) width2[s] = hn::Set(d, t.width2[s]);
+  HWY_UNROLL(8)
+  for (std::size_t r = 0; r < kCount; ++r) {
+    for (int k = 0; k < kAxes; ++k) {
+      const float origin = kForm == Form::products ? t.centre[k] : 0.0f;
+      at[r][k] = hn::Set(d, t.at(k, first)[r] - origin);
+    }
+    for (int s = 0; s < kSpheres; ++s) at2[r][s] = norm2_of(at[r] + 3 * s);
+    for (int k = 0; k < (kUnit ? kAxes : 0); ++k) at[r][k] = twice(at[r][k]);
+    sum[r] = hn::Zero(d);
+  }
+  for (std::size_t k = 0; k < t.list.count; k += kLanes) {
+    const VF share = kUnit ? hn::Zero(d) : hn::Load(d, column[0] + k);
+    VF x[kSpheres][4];
+    for (int s = 0; s < kSpheres; ++s)
+      for (int a = 0; a < (kForm == Form::products ? 4 : 3); ++a)
+        x[s][a] = hn::Load(d, column[1 + 4 * s + a] + k);
+    HWY_UNROLL(8)
+    for (std::size_t r = 0; r < kCount; ++r) {
+      VF hat[kSpheres];
+      for (int s = 0; s < kSpheres; ++s) {
+        const VF* a = at[r] + 3 * s;
+        VF v;
+        if constexpr (kForm == Form::products) {
+          v = s == 0 && !kUnit ? hn::NegMulAdd(share, at2[r][0], x[0][3])
+                               : hn::Sub(x[s][3], at2[r][s]);
+          for (int i = 0; i < 3; ++i) v = hn::MulAdd(x[s][i], a[i], v);
+        } else {
+          v = width2[s];
+          for (int i = 0; i < 3; ++i) {
+            const VF gap = hn::Sub(x[s][i], a[i]);
+            v = hn::NegMulAdd(gap, gap, v);
+          }
+        }
+        hat[s] = hn::Max(v, hn::Zero(d));
+      }
+      if constexpr (kForm == Form::products) {
+        sum[r] =
+            kAxes == 3 ? hn::Add(sum[r], hat[0]) : hn::MulAdd(hat[0], hat[kSpheres - 1], sum[r]);
+      } else {
+        const VF both = kAxes == 3 ? hat[0] : hn::Mul(hat[0], hat[kSpheres - 1]);
+        sum[r] = hn::MulAdd(share, both, sum[r]);
+      }
+    }
+  }
+  HWY_UNROLL(8)
+  for (std::size_t r = 0; r < kCount; ++r) {
+    float* const out = t.sum[first + r];
+    hn::Store(hn::Add(hn::Load(d, out), sum[r]), d, out);
+  }
+}
+
+template <int kAxes>
+HWY_NOINLINE void work_off(Targets<kAxes>& t) {
+  // Targets that share loads, as many as registers hold.
+  constexpr std::size_t kCount = kLanes == 16 && kAxes == 3 ? 4 : 2;
+  const DF d;
+  if (t.list.count == 0) return;
+  for (auto& column : t.list.column) hn::StoreU(hn::Zero(d), d, column + t.list.count);
+  for (std::size_t r = 0; r < t.leaves * kGaussLeaf; r += kCount) {
+    if (t.form == Form::products && kAxes == 3 && t.g.unit) {
+      add_pairs<kAxes, Form::products, kCount, true>(t, r);
+    } else if (t.form == Form::products) {
+      add_pairs<kAxes, Form::products, kCount>(t, r);
+    } else {
+      add_pairs<kAxes, Form::differences, kCount>(t, r);
+    }
+  }
+  t.list.count = 0;
+}
+
+// ---- what lies inside all supports
+
+// Adds nodes with first coefficients about their own centroids to the polynomial: `away` from the
+// targets' centre, gap = e^2 - |away|^2. Coefficients of x, y, z are left halved.
+HWY_INLINE void join(VF* term, VF mass, VF a2, const VF* away, VF gap) {
+  term[0] = hn::Add(term[0], hn::MulSub(mass, gap, a2));
+  for (int k = 0; k < 3; ++k) term[1 + k] = hn::MulAdd(mass, away[k], term[1 + k]);
+  term[4] = hn::Sub(term[4], mass);
+}
+
+// One row of the product's polynomial from its first and second moments over T.
+HWY_INLINE void join_row(VF* row, VF mass, const VF* b, VF b2, const VF* away, VF gap) {
+  VF constant = hn::MulSub(mass, gap, b2);
+  for (int l = 0; l < 3; ++l) {
+    constant = hn::NegMulAdd(twice(away[l]), b[l], constant);
+    row[1 + l] = hn::Add(row[1 + l], twice(hn::MulAdd(away[l], mass, b[l])));
+  }
+  row[0] = hn::Add(row[0], constant);
+  row[4] = hn::Sub(row[4], mass);
+}
+
+HWY_NOINLINE void join_nodes(const GaussLevel& level, std::size_t first, MF inside, const VF* away,
+                             const VF* gap, VF* term) {
+  const DF d;
+  const auto m = [&](int k) HWY_ATTR {
+    return hn::IfThenElseZero(inside, hn::Load(d, level.moment[k] + first));
+  };
+  const VF mass = m(kMass), a2 = m(kA2), b2 = m(kB2), zero = hn::Zero(d);
+  VF ab[9], ab2[3];
+  for (int k = 0; k < 9; ++k) ab[k] = m(kAB + k);
+  for (int k = 0; k < 3; ++k) ab2[k] = m(kAB2 + k);
+  VF b[3], square = hn::MulSub(gap[0], b2, m(kA2B2));
+  for (int l = 0; l < 3; ++l) {
+    b[l] = hn::Neg(m(kBA2 + l));
+    for (int k = 0; k < 3; ++k) b[l] = hn::NegMulAdd(twice(away[k]), ab[3 * k + l], b[l]);
+    square = hn::NegMulAdd(twice(away[l]), ab2[l], square);
+  }
+  join_row(term, hn::MulSub(gap[0], mass, a2), b, square, away + 3, gap[1]);
+  for (int k = 0; k < 3; ++k) {
+    for (int l = 0; l < 3; ++l) b[l] = twice(ab[3 * k + l]);
+    join_row(term + 5 + 5 * k, twice(hn::Mul(away[k], mass)), b,
+             twice(hn::MulAdd(away[k], b2, ab2[k])), away + 3, gap[1]);
+  }
+  for (VF& v : b) v = zero;
+  join_row(term + 20, hn::Neg(mass), b, hn::Neg(b2), away + 3, gap[1]);
+}
+
+HWY_NOINLINE void join_contacts(VF share, const VF* away, const VF* gap, VF* term) {
+  const VF zero = hn::Zero(DF()), none[3] = {zero, zero, zero};
+  const auto row = [&](int r, VF factor)
+                       HWY_ATTR { join_row(term + 5 * r, factor, none, zero, away + 3, gap[1]); };
+  row(0, hn::Mul(gap[0], share));
+  for (int k = 0; k < 3; ++k) row(1 + k, twice(hn::Mul(away[k], share)));
+  row(4, hn::Neg(share));
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,229 @@
+// series_solve.cpp - the SIMD twin of series_solve_ref.cpp.
+//
+// Lanes are doubles: what a dense patch carries is a small difference of e and J.y in every
+// contact. The first pass divides kappa out. A pass reads eight columns and adds to 28 sums, or to
+// 7 where the solution is likely reached: then it leaves the slack as well, and is the last. Most
+// contacts within the margin carry nothing: floats tell so first, with room for their rounding,
+// which changes no bit. Without a start, many contacts are first solved for some of them.
+#include "kernels/weights/series_solve.h"
+
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/weights/series_solve.cpp"
+#include "kernels/simd.h"
+#include "kernels/weights/series_newton.h"
+// After simd.h.
+#include "hwy/foreach_target.h"
+// After foreach_target.h.
+#include "hwy/highway.h"
+#include "kernels/tail-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace h6::kernels::HWY_NAMESPACE {
+
+using DD = hn::ScalableTag<double>;
+using DF = hn::Rebind<float, DD>;
+using VD = hn::Vec<DD>;
+
+constexpr float kDoubt = 1e-5f;  // of a sum of some ten floats: a hundred times their rounding
+constexpr std::size_t kManyToStart = 256;  // contacts from which a start is worth its time
+
+HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
+  return hn::PromoteTo(DD(), load_n(DF(), column + first, live));
+}
+
+// Scaled axes of the contacts from `i` on; zero past the end.
+struct Axes {
+  VD v[6];
+};
+HWY_INLINE Axes axes_at(const SeriesColumns& c, VD per_lever, std::size_t i) {
+  const std::size_t live = c.count - i;
+  const VD nx = load_column(c.nx, i, live), ny = load_column(c.ny, i, live);
+  const VD nz = load_column(c.nz, i, live);
+  const VD rx = hn::Mul(load_column(c.rx, i, live), per_lever);
+  const VD ry = hn::Mul(load_column(c.ry, i, live), per_lever);
+  const VD rz = hn::Mul(load_column(c.rz, i, live), per_lever);
+  return {{nx, ny, nz, hn::NegMulAdd(rz, ny, hn::Mul(ry, nz)),
+           hn::NegMulAdd(rx, nz, hn::Mul(rz, nx)), hn::NegMulAdd(ry, nx, hn::Mul(rx, ny))}};
+}
+
+HWY_INLINE VD slack_at(const SeriesColumns& c, const Axes& J, std::size_t i, const double* y) {
+  const DD d;
+  VD u = load_column(c.e, i, c.count - i);
+  for (int k = 0; k < 6; ++k) u = hn::NegMulAdd(J.v[k], hn::Set(d, y[k]), u);
+  return u;
+}
+
+// What slack_at is in floats, for a quick look.
+struct Glance {
+  float y[6];  // those of the torque over the lever
+  float doubt;
+  Glance(const double* at, double lever) {
+    double size = 0;
+    for (int k = 0; k < 6; ++k) {
+      y[k] = static_cast<float>(k < 3 ? at[k] : at[k] / lever);
+      size += std::fabs(at[k]);
+    }
+    doubt = static_cast<float>(kDoubt * 2 * size);
+  }
+};
+
+// False: no contact from `i` on has slack, by more than what floats round off. An axis is at most
+// (1, |r| / L) long and |r| at most L: the sum of what is rounded is below 2 |y|.
+HWY_INLINE bool may_carry(const SeriesColumns& c, const Glance& g, std::size_t i) {
+  const DF d;
+  const std::size_t live = c.count - i;
+  const auto load = [&](const float* column) HWY_ATTR { return load_n(d, column + i, live); };
+  const auto e = load(c.e), nx = load(c.nx), ny = load(c.ny), nz = load(c.nz);
+  const auto rx = load(c.rx), ry = load(c.ry), rz = load(c.rz);
+  const auto y = [&](int k) HWY_ATTR { return hn::Set(d, g.y[k]); };
+  // (r x N).y = N.(y x r)
+  const auto sx = hn::NegMulAdd(y(5), ry, hn::MulAdd(y(4), rz, y(0)));
+  const auto sy = hn::NegMulAdd(y(3), rz, hn::MulAdd(y(5), rx, y(1)));
+  const auto sz = hn::NegMulAdd(y(4), rx, hn::MulAdd(y(3), ry, y(2)));
+  auto u = hn::NegMulAdd(nx, sx, hn::MulAdd(hn::Abs(e), hn::Set(d, kDoubt), e));
+  u = hn::NegMulAdd(nz, sz, hn::NegMulAdd(ny, sy, u));
+  // Whatever is not a number stays in.
+  return !hn::AllTrue(d, hn::Lt(u, hn::Set(d, -g.doubt)));
+}
+
+// kappa_i of contacts whose axes are J.
+HWY_INLINE hn::Vec<DF> stiffness_at(const SeriesColumns& c, VD per_c, const Axes& J,
+                                    std::size_t i) {
+  const DD d;
+  VD a = hn::Mul(J.v[0], J.v[0]);
+  for (int k = 1; k < 6; ++k) a = hn::MulAdd(J.v[k], J.v[k], a);
+  const VD soft = hn::NegMulAdd(hn::Min(a, hn::Set(d, 2.0)), per_c, hn::Set(d, 1.0));
+  const VD facing = c.facing != nullptr ? load_column(c.facing, i, c.count - i) : hn::Set(d, 1.0);
+  return hn::DemoteTo(DF(), hn::Div(facing, soft));
+}
+
+// What a pass over the contacts does besides pull and energy.
+enum Pass : int {
+  kStiffen = 1,  // fills kappa, and finds the largest e of a contact that can carry load, or 0
+  kSystem = 2,
+  kSlack = 4,  // fills slack
+};
+
+// Of the contacts one vector in `stride`.
+template <int kPass>
+HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const double* y,
+                       float* kappa, float* slack, SeriesSums& out, std::size_t stride = 1) {
+  const DD d;
+  const VD zero = hn::Zero(d), per_lever = hn::Set(d, 1 / p.lever), per_c = hn::Set(d, 1 / p.c);
+  VD system[kUpper6], pull[6], energy = zero, max_e = zero;
+  for (int k = 0; k < kUpper6; ++k) system[k] = zero;
+  for (int k = 0; k < 6; ++k) pull[k] = zero;
+  const Glance glance(y, p.lever);
+  for (std::size_t i = 0; i < c.count; i += stride * hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    if constexpr (!(kPass & kStiffen)) {
+      if (!may_carry(c, glance, i)) {
+        if constexpr (kPass & kSlack) store_n(hn::Zero(DF()), DF(), slack + i, live);
+        continue;
+      }
+    }
+    const Axes J = axes_at(c, per_lever, i);
+    const VD u = slack_at(c, J, i, y);
+    hn::Vec<DF> k;
+    if constexpr (kPass & kStiffen) {
+      k = stiffness_at(c, per_c, J, i);
+      store_n(k, DF(), kappa + i, live);
+      const auto carries = hn::Gt(k, hn::Zero(DF()));
+      const auto e = hn::IfThenElseZero(carries, load_n(DF(), c.e + i, live));
+      max_e = hn::Max(max_e, hn::PromoteTo(d, e));
+    }
+    if constexpr (kPass & kSlack)
+      store_n(hn::DemoteTo(DF(), hn::Max(u, zero)), DF(), slack + i, live);
+    const auto active = hn::Gt(u, zero);
+    if (hn::AllFalse(d, active)) continue;
+    if constexpr (!(kPass & kStiffen)) k = load_n(DF(), kappa + i, live);
+    const VD w = hn::IfThenElseZero(active, hn::PromoteTo(d, k));
+    const VD wu = hn::Mul(w, u);
+    energy = hn::MulAdd(wu, u, energy);
+    int entry = 0;
+    HWY_UNROLL(8)
+    for (int row = 0; row < 6; ++row) {
+      pull[row] = hn::MulAdd(wu, J.v[row], pull[row]);
+      if constexpr (kPass & kSystem) {
+        const VD wJ = hn::Mul(w, J.v[row]);
+        for (int col = row; col < 6; ++col, ++entry)
+          system[entry] = hn::MulAdd(wJ, J.v[col], system[entry]);
+      }
+    }
+  }
+  if constexpr (kPass & kSystem)
+    for (int k = 0; k < kUpper6; ++k) out.system[k] = hn::GetLane(hn::SumOfLanes(d, system[k]));
+  for (int k = 0; k < 6; ++k) out.pull[k] = hn::GetLane(hn::SumOfLanes(d, pull[k]));
+  out.energy = hn::GetLane(hn::SumOfLanes(d, energy));
+  return hn::GetLane(hn::MaxOfLanes(d, max_e));
+}
+
+// A start from a part of the contacts, each for as many as it stands for: instead of heavier
+// contacts a softer spring.
+HWY_NOINLINE void start_from_some(const SeriesColumns& c, const SeriesParameters& p, double* y,
+                                  float* kappa, std::size_t stride) {
+  SeriesParameters softer = p;
+  softer.c = p.c / static_cast<double>(stride);
+  softer.tolerance = 1e-2;
+  SeriesSums first;
+  const double max_e = pass<kStiffen | kSystem>(c, p, y, kappa, nullptr, first, stride);
+  if (!(max_e > 0)) return;
+  newton(softer, max_e, y, first, [&](const double* at, bool) HWY_ATTR {
+    SeriesSums sums;
+    pass<kSystem>(c, p, at, kappa, nullptr, sums, stride);
+    return sums;
+  });
+  check_start(y);
+}
+
+void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double* y, float* kappa,
+                       float* slack, SeriesResult& result) {
+  result = {0, 0};
+  check_start(y);
+  if (c.count >= kManyToStart && norm2(y) == 0) {
+    for (const std::size_t stride : {16, 4}) start_from_some(c, p, y, kappa, stride);
+  }
+  SeriesSums first;
+  const double max_e = pass<kStiffen | kSystem>(c, p, y, kappa, slack, first);
+  bool filled = false;  // slack, at y
+  if (max_e > 0) {
+    const bool apart = slack != c.e;
+    result = newton(p, max_e, y, first, [&](const double* at, bool system) HWY_ATTR {
+      SeriesSums sums;
+      filled = !system && apart;
+      if (system) {
+        pass<kSystem>(c, p, at, kappa, slack, sums);
+      } else if (apart) {
+        pass<kSlack>(c, p, at, kappa, slack, sums);
+      } else {
+        pass<0>(c, p, at, kappa, slack, sums);
+      }
+      return sums;
+    });
+  } else {
+    for (int k = 0; k < 6; ++k) y[k] = 0;  // nothing to hold
+  }
+  if (filled) return;
+  SeriesSums unused;
+  pass<kSlack>(c, p, y, kappa, slack, unused);
+}
+
+}  // namespace h6::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace h6::kernels {
+
+HWY_EXPORT(series_solve_simd);
+
+SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
+                          double y[6], float* kappa, float* slack) {
+  SeriesResult result;
+  HWY_DYNAMIC_DISPATCH(series_solve_simd)(contacts, parameters, y, kappa, slack, result);
+  return result;
+}
+
+}  // namespace h6::kernels
+#endif

@@ -1,0 +1,42 @@
+// contacts.h - the contacts of one shell body: structure of arrays, one row a touching point.
+#pragma once
+#include <cstdint>
+
+#include "runtime/base/arena.h"
+
+namespace h6 {
+
+struct Contacts {
+  float* depth;          // penetration depth, > 0; `series`: also about to touch [m]
+  float *nx, *ny, *nz;   // inward unit normal, world frame
+  float *gx, *gy, *gz;   // unit gradient of the field, world frame, outward
+  float *rx, *ry, *rz;   // arm from the centre of mass, world frame           [m]
+  float *tx, *ty, *tz;   // torque direction T, world frame
+  float* facing;         // c = clamp(N.g / 0.25, 0, 1), or 1
+  float* weight;         // share of the stiffness
+  float* load;           // elastic force over k: weight * depth, or lambda (series) [m]
+  float *slack, *kappa;  // `series`: kernels/weights/series_solve.h               [m], [1]
+  std::uint32_t* point;  // index into the shell's points
+  std::int32_t* field_body;
+  std::size_t count, capacity;
+};
+
+// One list of columns serves allocation and checks.
+template <class F>
+void each_column(Contacts& c, F&& f) {
+  for (float** column : {&c.depth, &c.nx, &c.ny, &c.nz, &c.gx, &c.gy, &c.gz, &c.rx, &c.ry, &c.rz,
+                         &c.tx, &c.ty, &c.tz, &c.facing, &c.weight, &c.load, &c.slack, &c.kappa})
+    f(*column);
+  f(c.point);
+  f(c.field_body);
+}
+
+inline void take_columns(Contacts& c, Arena& arena, std::size_t capacity) {
+  each_column(c, [&](auto*& column) {
+    column = arena.take<std::remove_reference_t<decltype(*column)>>(capacity);
+  });
+  c.count = 0;
+  c.capacity = capacity;
+}
+
+}  // namespace h6

@@ -1,0 +1,49 @@
+// name_contacts.cpp - the part and the triangle that each contact is with, for those who ask.
+//
+// Fields keep them by brick. A contact's brick is found again from its arm, at the place that the
+// last traversal saw: so the frame itself pays one matrix a pair, and nothing a contact.
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/frame/session.h"
+
+namespace h6 {
+namespace {
+
+// The row of the brick that a point [voxel] is in; -1: in none.
+std::int32_t brick_of(const kernels::FieldView& field, const float (&at)[3]) {
+  std::int32_t brick[3];
+  for (int k = 0; k < 3; ++k) {
+    if (!(at[k] >= 0 && at[k] <= static_cast<float>(8 * field.size[k]))) return -1;
+    brick[k] = std::min(static_cast<std::int32_t>(at[k]) / 8, field.size[k] - 1);
+  }
+  return std::max(-1,
+                  field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]]);
+}
+
+void name_rows(const h6Session& s, const Pair& pair, std::int32_t* part, std::int32_t* triangle) {
+  const Contacts& c = s.contacts[pair.a];
+  const Field& field = s.model->fields[s.bodies[pair.b].field];
+  for (std::size_t i = pair.begin; i < pair.end; ++i) {
+    float at[3];
+    for (int k = 0; k < 3; ++k) {
+      const float* m = pair.arms.m[k];
+      at[k] = m[0] * c.rx[i] + (m[1] * c.ry[i] + (m[2] * c.rz[i] + m[3]));
+    }
+    const std::int32_t row = brick_of(field.view, at);
+    if (part) part[i] = row < 0 || field.part.count == 0 ? -1 : field.part[row];
+    if (triangle) triangle[i] = row < 0 || field.triangle.count == 0 ? -1 : field.triangle[row];
+  }
+}
+
+}  // namespace
+}  // namespace h6
+
+using namespace h6;
+
+extern "C" void h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
+                               int32_t* triangle) {
+  H6_ASSERT(shell_body >= 0 && static_cast<std::size_t>(shell_body) < session->body_count);
+  for (std::size_t p = 0; p < session->pair_count; ++p)
+    if (session->pairs[p].a == shell_body) name_rows(*session, session->pairs[p], part, triangle);
+}

@@ -1,0 +1,439 @@
+// haptic_loop.cpp - devices, session and clock joined: what runs on the haptic thread.
+//
+//   deadline -> what was asked meanwhile -> read every device -> frame -> write every device,
+//   unless they were stopped -> sign of life to the watchdog -> record into the ring
+//
+// Between two frames the loop hands poses and contacts to a viewer, and takes another session when
+// one is offered: runtime/loop/loop_view.h.
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <memory>
+
+#include "runtime/frame/session.h"
+#include "runtime/frame/stages.h"
+#include "runtime/loop/device_gate.h"
+#include "runtime/loop/loop_view.h"
+#include "sched/clock.h"
+#include "sched/halt_list.h"
+#include "sched/periodic_thread.h"
+#include "sched/spsc_ring.h"
+#include "sched/watchdog.h"
+
+namespace {
+enum Request { kNothing, kArm, kDisarm };
+}
+
+struct h6Loop {
+  h6Session* session = nullptr;
+  h6LoopDef def{};
+  h6Device devices[H6_MAX_HANDS] = {};
+  h6DeviceSample samples[H6_MAX_HANDS] = {};
+  h6DeviceCommand commands[H6_MAX_HANDS] = {};
+  std::uint64_t frames = 0;  // to run; 0: no end
+  std::uint64_t begun = 0;   // frames so far
+  double due = 1;            // of the next frame; it runs when this reaches 1
+  std::unique_ptr<h6::sched::SpscRing<h6FrameRecord>> ring;
+  h6FrameRecord record{};
+  h6LoopReport report{};  // the haptic thread's until it has ended
+  std::atomic<bool> stop{false};
+  std::atomic<int> request{kNothing};
+  h6::DeviceGate gate;
+  std::int64_t sent_at = 0;                       // the last commands, 0: none yet [ns]
+  std::uint64_t trips = 0;                        // of the watchdog, that are known here
+  bool stepped = false;                           // this tick was a frame
+  std::unique_ptr<h6::sched::Watchdog> watchdog;  // stops devices: goes before the gate
+  std::atomic<double> pace{1};
+  std::unique_ptr<h6::LoopView> view;
+  std::uint64_t view_step = 1;  // the viewer sees every so-many-th frame
+  // Another session on its way in, and the one before on its way out.
+  std::atomic<h6Session*> offered{nullptr}, given_back{nullptr};
+  // The haptic thread's core, which a helper keeps off, and the helper's priority (0: none).
+  std::atomic<int> core{-1}, helper_priority{0};
+  std::unique_ptr<h6::sched::PeriodicThread> thread;
+};
+
+namespace h6 {
+namespace {
+
+constexpr double kViewRate = 125;  // of what a viewer is given, at most [Hz]
+
+// The device first: what it still refuses must not pile up behind it.
+void arm_hands(h6Loop& loop) {
+  h6Session& s = *loop.session;
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    const h6Device& device = loop.devices[h];
+    OutputGuard& guard = s.hands[h].guard;
+    if (guard.can_arm() && (!device.arm || device.arm(device.self) == 0)) guard.arm();
+  }
+}
+
+// A session begins armed, and so do its devices; what is latched stays so.
+void begin_output(h6Loop& loop) {
+  h6Session& s = *loop.session;
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    const h6Device& device = loop.devices[h];
+    OutputGuard& guard = s.hands[h].guard;
+    guard.restart();
+    if (loop.def.disarmed || guard.fault() != H6_CAUSE_NONE) continue;
+    if (!device.arm || device.arm(device.self) == 0) guard.arm();
+  }
+  if (loop.watchdog) loop.watchdog->beat(sched::now_ns());
+}
+
+void end_output(h6Loop& loop) {
+  loop.gate.stop_all();
+  if (loop.watchdog) loop.watchdog->rest();
+}
+
+// What other threads did or want since the last frame. A fault comes after a wish to arm: nobody
+// who asked could know of it.
+void take_requests(h6Loop& loop) {
+  const int request = loop.request.exchange(kNothing);
+  if (request == kArm) arm_hands(loop);
+  if (request == kDisarm) h6Disarm(loop.session);
+  if (loop.watchdog && loop.watchdog->trips() != loop.trips) {
+    loop.trips = loop.watchdog->trips();
+    h6Fault(loop.session, H6_CAUSE_WATCHDOG);
+  }
+  if (loop.gate.halted()) h6Fault(loop.session, H6_CAUSE_STOPPED);
+}
+
+// A device that cannot be read or written is lost: all outputs go to zero and stay there.
+void lose(h6Loop& loop, std::size_t hand) {
+  loop.session->report.status |= H6_DEVICE_LOST;
+  h6LoseDevice(loop.session, static_cast<std::int32_t>(hand));
+}
+
+void read_devices(h6Loop& loop, double time) {
+  h6Session& s = *loop.session;
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    if (loop.devices[h].read(loop.devices[h].self, time, &loop.samples[h]) != 0) lose(loop, h);
+  if (loop.def.virtual_time || loop.sent_at == 0) return;
+  // To a device that lives on the frames' time no command comes late.
+  const double since = 1e-9 * static_cast<double>(sched::now_ns() - loop.sent_at);
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    if (!loop.devices[h].capabilities.frame_time) note_interval(s.hands[h], s.dt, since);
+}
+
+// In place of commands that were made before the devices were stopped.
+void hold_back(h6Loop& loop, const h6DeviceCommand* before, h6Cause why) {
+  for (std::size_t h = 0; h < loop.session->hand_count; ++h) {
+    h6DeviceCommand& command = loop.commands[h];
+    command.wrench = {};
+    command.velocity = {};
+    // A motion stays where it was last sent; before that, where the device is.
+    const bool moves = loop.session->hands[h].mode != H6_IMPEDANCE;
+    if (moves && loop.sent_at != 0) command.pose = before[h].pose;
+    command.cause = why;
+    command.causes |= 1u << why;
+  }
+}
+
+bool tripped(const h6Loop& loop) { return loop.watchdog && loop.watchdog->trips() != loop.trips; }
+
+// false: nothing is sent any more.
+bool write_devices(h6Loop& loop, double time, const h6DeviceCommand* before) {
+  if (!loop.gate.enter()) {
+    hold_back(loop, before, H6_CAUSE_STOPPED);
+    return false;
+  }
+  if (tripped(loop)) hold_back(loop, before, H6_CAUSE_WATCHDOG);
+  for (std::size_t h = 0; h < loop.session->hand_count; ++h)
+    if (loop.devices[h].write(loop.devices[h].self, time, &loop.commands[h]) != 0) lose(loop, h);
+  if (tripped(loop)) loop.gate.stop_real();  // while we wrote: once more
+  loop.sent_at = sched::now_ns();
+  if (loop.watchdog) loop.watchdog->beat(loop.sent_at);
+  return loop.gate.leave();
+}
+
+void change_session(h6Loop& loop) {
+  if (!loop.offered.load(std::memory_order_relaxed)) return;
+  h6Session* next = loop.offered.exchange(nullptr, std::memory_order_acquire);
+  if (!next) return;  // it was withdrawn
+  take_over(*next, *loop.session);
+  loop.given_back.store(loop.session, std::memory_order_release);
+  loop.session = next;
+  ++loop.record.settings;
+}
+
+// Slow motion: a frame every so many periods. Whoever lives on the frames' time sees no difference.
+bool frame_due(h6Loop& loop) {
+  loop.due += loop.pace.load(std::memory_order_relaxed);
+  if (loop.due < 1) return false;
+  loop.due -= 1;
+  if (loop.due >= 1) loop.due = 0;
+  return true;
+}
+
+bool tick(h6Loop& loop, const sched::TickTiming& before, double wakeup_us) {
+  change_session(loop);
+  loop.stepped = frame_due(loop);
+  if (!loop.stepped) return true;
+  const std::uint64_t number = loop.begun++;
+  h6Session& s = *loop.session;
+  const double time = static_cast<double>(number) * s.dt;
+  h6DeviceCommand last[H6_MAX_HANDS];
+  for (std::size_t h = 0; h < s.hand_count; ++h) last[h] = loop.commands[h];
+  take_requests(loop);
+  read_devices(loop, time);
+  frame(s, loop.samples, loop.commands);
+  const bool sent = write_devices(loop, time, last);
+  if (before.late != sched::Late::no) s.report.status |= H6_LATE;
+  loop.report.status |= s.report.status;
+  loop.record.time = time;
+  loop.record.wakeup_us = wakeup_us;
+  return sent && (loop.frames == 0 || number + 1 < loop.frames);
+}
+
+std::uint32_t late_bit(sched::Late late) {
+  switch (late) {
+    case sched::Late::compute:
+      return H6_LATE_COMPUTE;
+    case sched::Late::stolen:
+      return H6_LATE_STOLEN;
+    case sched::Late::wakeup:
+      return H6_LATE_WAKEUP;
+    default:
+      return 0;
+  }
+}
+
+void count_late(h6LoopReport& report, const sched::TickTiming& timing) {
+  h6LateHistogram* const by_cause[] = {nullptr, &report.late_us_compute, &report.late_us_stolen,
+                                       &report.late_us_wakeup};
+  h6LateHistogram* histogram = by_cause[static_cast<int>(timing.late)];
+  if (!histogram) return;
+  std::size_t bin = 0;
+  for (double most = 10; bin + 1 < H6_LATE_BINS && timing.late_us >= most; most *= 10) ++bin;
+  ++histogram->frames[bin];
+}
+
+// After the frame, before the next deadline: nothing here is timed as the frame's.
+void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
+  if (!loop.stepped) return;
+  h6Session& s = *loop.session;
+  h6LoopReport& r = loop.report;
+  ++r.frames;
+  r.late_compute += timing.late == sched::Late::compute;
+  r.late_stolen += timing.late == sched::Late::stolen;
+  r.late_wakeup += timing.late == sched::Late::wakeup;
+  count_late(r, timing);
+  r.coarse_frames += (s.report.status & H6_COARSE) != 0;
+  if (timing.wakeup_us > r.wakeup_us_max) r.wakeup_us_max = timing.wakeup_us;
+  if (loop.view && s.report.frame % loop.view_step == 0) loop.view->write(s, loop.record.time);
+  if (!loop.ring) return;
+  h6FrameRecord& row = loop.record;
+  row.report = s.report;
+  row.late = late_bit(timing.late);
+  row.late_us = timing.late_us;
+  row.cpu_us = timing.cpu_us;
+  for (std::size_t h = 0; h < s.hand_count; ++h) {
+    row.hand[h] = loop.samples[h];
+    row.command[h] = loop.commands[h];
+    row.state[h] = s.hands[h].guard.state();
+    row.safety_input[h] = s.hands[h].guard.input();
+    const Body& body = s.bodies[s.hands[h].body];
+    row.body[h] = {mesh_pose(body), {to(body.v), to(body.w)}};
+  }
+  // Virtual time has no deadline: it waits for its reader instead of losing rows.
+  if (loop.def.virtual_time)
+    while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed) && !loop.gate.halted())
+      sched::sleep_until_ns(sched::now_ns() + 200000);
+  loop.ring->push(row);
+}
+
+constexpr int kHelperPriority = 79;  // below the haptic thread's
+
+void note_grant(h6LoopReport& report, const sched::RealtimeGrant& grant) {
+  std::snprintf(report.granted, sizeof report.granted, "%s", grant.text);
+  h6Granted& g = report.grant;
+  g.core = grant.core;
+  g.fifo = grant.fifo;
+  g.locked = grant.locked;
+  g.isolated = grant.isolated;
+  std::snprintf(g.governor, sizeof g.governor, "%s", grant.governor);
+}
+
+const char* mode_name(std::uint32_t mode) {
+  if (mode == H6_ADMITTANCE) return "admittance";
+  return mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance" : "impedance";
+}
+
+// As long as a full output may take to nothing.
+double shortest_decay(const h6Session& s) {
+  double shortest = SafetyLimits{}.decay_time;
+  for (std::size_t h = 0; h < s.hand_count; ++h)
+    shortest = std::min(shortest, s.hands[h].guard.limits().decay_time);
+  return shortest;
+}
+
+// A device that does not say is an impedance device.
+bool speaks(const h6Device& device, std::uint32_t mode) {
+  const std::uint32_t modes = device.capabilities.modes;
+  return ((modes ? modes : std::uint32_t{H6_IMPEDANCE}) & mode) != 0;
+}
+
+bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& def,
+           h6Error* error) {
+  if (!session) return fail(error, "a loop needs a session");
+  if (session->hand_count && !devices)
+    return fail(error, "a loop needs one device for each of %zu hands", session->hand_count);
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    if (!devices[h].read || !devices[h].write)
+      return fail(error, "device %zu has no read or no write", h);
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    if (!speaks(devices[h], session->hands[h].mode))
+      return fail(error,
+                  "hand %zu works in %s mode, which device %zu does not offer: choose another mode "
+                  "for the hand or another device",
+                  h, mode_name(session->hands[h].mode), h);
+  for (std::size_t h = 0; h < session->hand_count; ++h)
+    if (const AboveRating above = above_rating(devices[h].capabilities, session->hands[h].safety);
+        above.key)
+      return fail(error,
+                  "hand %zu: safety %s, %g %s, is above what device %zu is rated for, %g %s: leave "
+                  "it out or choose less",
+                  h, above.key, above.asked, above.unit, h, above.rating, above.unit);
+  if (!(def.duration >= 0) || def.duration > 1e9)
+    return fail(error, "duration must be 0 (no end) to 1e9 s, it is %g", def.duration);
+  if (!(def.spin_us >= 0 && def.spin_us <= 1e4))
+    return fail(error, "spin_us must be in 0..10000, it is %g", def.spin_us);
+  if (def.ring_frames > 10000000)
+    return fail(error, "ring_frames must be at most 10000000, it is %zu", def.ring_frames);
+  if (def.view_contacts > 1000000)
+    return fail(error, "view_contacts must be at most 1000000, it is %zu", def.view_contacts);
+  return true;
+}
+
+}  // namespace
+}  // namespace h6
+
+using namespace h6;
+
+extern "C" {
+
+h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
+                    h6Error* error) {
+  const h6LoopDef used = def ? *def : h6DefaultLoopDef();
+  if (!check(session, devices, used, error)) return nullptr;
+  try {
+    auto loop = std::make_unique<h6Loop>();
+    loop->session = session;
+    loop->def = used;
+    for (std::size_t h = 0; h < session->hand_count; ++h) {
+      loop->devices[h] = devices[h];
+      loop->samples[h].pose.q.w = 1;
+      h6SetRating(session, static_cast<std::int32_t>(h), &devices[h].capabilities);
+    }
+    session->anytime.no_clock = used.virtual_time;
+    loop->report.grant.core = -1;
+    loop->frames = static_cast<std::uint64_t>(used.duration / session->dt + 0.5);
+    if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
+    if (used.ring_frames)
+      loop->ring = std::make_unique<sched::SpscRing<h6FrameRecord>>(used.ring_frames);
+    if (used.view_contacts) {
+      loop->view = std::make_unique<LoopView>(session->body_count, used.view_contacts);
+      loop->view_step = static_cast<std::uint64_t>(std::max(1.0, 1 / (kViewRate * session->dt)));
+    }
+    sched::PeriodicThreadOptions options;
+    options.rate = 1 / session->dt;
+    options.spin_us = used.spin_us;
+    options.virtual_time = used.virtual_time;
+    options.realtime = used.realtime;
+    options.request.core = used.core;
+    bool real = false;
+    for (std::size_t h = 0; h < session->hand_count; ++h)
+      real = real || !devices[h].capabilities.frame_time;
+    if (!loop->gate.open(loop->devices, session->hand_count)) {
+      fail(error, "more than %zu loops at a time: end one first", sched::kMostToHalt);
+      return nullptr;
+    }
+    h6Loop* raw = loop.get();
+    if (real && !used.virtual_time)
+      loop->watchdog = std::make_unique<sched::Watchdog>(
+          static_cast<std::int64_t>(1e9 * (session->dt + shortest_decay(*session))),
+          used.realtime ? options.request.priority + 1 : 0, [raw] { raw->gate.stop_real(); });
+    loop->thread = std::make_unique<sched::PeriodicThread>(
+        options,
+        sched::PeriodicThread::Work{
+            [raw](const sched::RealtimeGrant& grant) {
+              note_grant(raw->report, grant);
+              raw->helper_priority = grant.fifo ? kHelperPriority : 0;
+              raw->core = grant.core;
+              raw->session->team->set_realtime(raw->helper_priority, grant.core);
+              begin_output(*raw);
+            },
+            [raw](std::uint64_t, const sched::TickTiming& before, double wakeup) {
+              raw->stepped = false;
+              const bool more =
+                  !raw->stop.load(std::memory_order_relaxed) && tick(*raw, before, wakeup);
+              if (!more) end_output(*raw);
+              return more;
+            },
+            [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
+    return loop.release();
+  } catch (const std::exception& e) {
+    fail(error, "the haptic thread could not be started: %s", e.what());
+    return nullptr;
+  }
+}
+
+size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity) {
+  return loop->ring ? loop->ring->pop(out, capacity) : 0;
+}
+bool h6ReadView(h6Loop* loop, h6LoopView* out) { return loop->view && loop->view->read(out); }
+
+void h6SetPace(h6Loop* loop, double pace) {
+  loop->pace.store(pace >= 0 && pace <= 1 ? pace : 1, std::memory_order_relaxed);
+}
+
+h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
+  if (!may_take_over(next, *loop->session, error)) return nullptr;
+  if (const int core = loop->core; core >= 0) next->team->set_realtime(loop->helper_priority, core);
+  loop->offered.store(next, std::memory_order_release);
+  while (true) {
+    if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire))
+      return before;
+    if (!loop->thread->running() && loop->offered.exchange(nullptr))
+      return fail(error, "the loop has ended"), nullptr;
+    sched::sleep_until_ns(sched::now_ns() + 100000);
+  }
+}
+
+bool h6LoopRunning(const h6Loop* loop) { return loop->thread->running(); }
+void h6RequestStop(h6Loop* loop) { loop->stop.store(true, std::memory_order_relaxed); }
+void h6ArmLoop(h6Loop* loop) { loop->request.store(kArm); }
+void h6DisarmLoop(h6Loop* loop) { loop->request.store(kDisarm); }
+void h6HaltLoop(h6Loop* loop) {
+  loop->gate.halt();
+  h6RequestStop(loop);
+}
+void h6HaltAll(void) { sched::halt_all(); }
+
+h6LoopReport h6JoinLoop(h6Loop* loop) {
+  loop->thread->join();
+  loop->gate.stop_all();
+  loop->session->team->set_realtime(0, -1);
+  h6LoopReport report = loop->report;
+  report.fault = H6_CAUSE_NONE;
+  for (std::size_t h = 0; h < loop->session->hand_count; ++h) {
+    OutputGuard& guard = loop->session->hands[h].guard;
+    if (loop->gate.halted()) guard.fault(H6_CAUSE_STOPPED);
+    report.hand[h] = guard.report();
+    if (report.fault == H6_CAUSE_NONE) report.fault = guard.fault();
+  }
+  report.ring_overruns = loop->ring ? loop->ring->dropped() : 0;
+  report.watchdog_trips = loop->watchdog ? loop->watchdog->trips() : 0;
+  return report;
+}
+
+void h6DestroyLoop(h6Loop* loop) {
+  if (!loop) return;
+  h6RequestStop(loop);
+  h6JoinLoop(loop);
+  delete loop;
+}
+
+}  // extern "C"

@@ -1,0 +1,103 @@
+#include "runtime/loop/loop_view.h"
+
+#include "runtime/frame/session.h"
+#include "runtime/frame/stages.h"
+
+namespace h6 {
+
+LoopView::LoopView(std::size_t bodies, std::size_t contacts) {
+  slots_.prepare([&](Slot& slot) {
+    slot.body.resize(bodies);
+    slot.contact.resize(contacts);
+  });
+}
+
+namespace {
+
+h6ViewContact row_of(const Contacts& c, std::size_t i, const Vec3& centre, std::int32_t body) {
+  h6ViewContact row;
+  const Vec3 p = centre + Vec3(c.rx[i], c.ry[i], c.rz[i]);
+  for (int a = 0; a < 3; ++a) row.position[a] = p[a];
+  row.normal[0] = c.nx[i], row.normal[1] = c.ny[i], row.normal[2] = c.nz[i];
+  row.torque_direction[0] = c.tx[i], row.torque_direction[1] = c.ty[i];
+  row.torque_direction[2] = c.tz[i];
+  row.weight = c.weight[i];
+  row.depth = c.depth[i];
+  row.shell_body = body;
+  row.field_body = c.field_body[i];
+  return row;
+}
+
+}  // namespace
+
+void LoopView::write(const h6Session& s, double time) {
+  Slot& slot = slots_.next();
+  slot.frame = s.report.frame;
+  slot.time = time;
+  slot.contacts = 0;
+  for (std::size_t b = 0; b < s.body_count; ++b) {
+    slot.body[b] = mesh_pose(s.bodies[b]);
+    slot.contacts += s.contacts[b].count;
+  }
+  // Where there are more than the viewer has room for: every n-th, so that all regions are there.
+  const std::size_t room = slot.contact.size();
+  const std::size_t step = room ? (slot.contacts + room - 1) / room : 0;
+  slot.rows = 0;
+  std::size_t skip = 0;
+  for (std::size_t b = 0; b < s.body_count && step; ++b) {
+    const Contacts& c = s.contacts[b];
+    std::size_t i = skip;
+    for (; i < c.count; i += step)
+      slot.contact[slot.rows++] = row_of(c, i, s.bodies[b].x, static_cast<std::int32_t>(b));
+    skip = i - c.count;
+  }
+  slots_.publish();
+}
+
+bool LoopView::read(h6LoopView* out) {
+  const Slot* slot = slots_.newest();
+  if (!slot) return false;
+  *out = {slot->frame,    slot->time, slot->body.size(),   slot->body.data(),
+          slot->contacts, slot->rows, slot->contact.data()};
+  return true;
+}
+
+void take_over(h6Session& next, const h6Session& before) {
+  H6_ASSERT(next.body_count == before.body_count && next.hand_count == before.hand_count);
+  for (std::size_t i = 0; i < next.body_count; ++i)
+    static_cast<RigidState&>(next.bodies[i]) = before.bodies[i];
+  for (std::size_t i = 0; i < next.hand_count; ++i) {
+    Hand hand = before.hands[i];
+    const Hand& set = next.hands[i];
+    hand.coupling = set.coupling;
+    hand.manipulandum_mass = set.manipulandum_mass;
+    hand.driver_stiffness = set.driver_stiffness;
+    hand.driver_damping = set.driver_damping;
+    hand.passivity = set.passivity;
+    if (!set.passivity) hand.port.forget();
+    next.hands[i] = hand;
+  }
+  next.anytime.no_clock = before.anytime.no_clock;
+  next.report = before.report;
+  next.frame = before.frame;
+}
+
+bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error) {
+  if (!next || next->model != before.model || next->body_count != before.body_count ||
+      next->hand_count != before.hand_count || next->dt != before.dt)
+    return fail(error, "a loop goes on with a session of the same model, bodies, hands and rate");
+  for (std::size_t h = 0; h < next->hand_count; ++h)
+    if (next->hands[h].body != before.hands[h].body || next->hands[h].mode != before.hands[h].mode)
+      return fail(error, "a loop goes on with hands on the same bodies, in the same modes");
+  return true;
+}
+
+}  // namespace h6
+
+extern "C" bool h6TakeOver(h6Session* next, const h6Session* before, h6Error* error) {
+  if (!before || next == before)
+    return h6::fail(error, "a session goes on where another one stands");
+  if (!h6::may_take_over(next, *before, error)) return false;
+  h6::take_over(*next, *before);
+  return true;
+}

@@ -1,0 +1,127 @@
+#include "runtime/model/model.h"
+
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include "kernels/field/sample_field.h"
+
+namespace h6 {
+
+bool fail(h6Error* error, const char* format, ...) {
+  if (error) {
+    va_list arguments;
+    va_start(arguments, format);
+    std::vsnprintf(error->message, sizeof error->message, format, arguments);
+    va_end(arguments);
+  }
+  return false;
+}
+
+namespace {
+
+template <class T>
+T* make_array(const h6Allocator& allocator, std::size_t count) {
+  T* array = static_cast<T*>(allocate(allocator, count * sizeof(T)));
+  if (array)
+    for (std::size_t i = 0; i < count; ++i) new (&array[i]) T();
+  return array;
+}
+template <class T>
+void drop_array(const h6Allocator& allocator, T* array, std::size_t count) {
+  if (!array) return;
+  for (std::size_t i = 0; i < count; ++i) array[i].~T();
+  release(allocator, array, count * sizeof(T));
+}
+
+bool fill(h6Model& model, const h6ModelDef& def, h6Error* error) {
+  if ((def.field_count && !def.fields) || (def.shell_count && !def.shells))
+    return fail(error, "the model definition counts fields or shells but points at none");
+  model.fields = make_array<Field>(def.allocator, def.field_count);
+  if (def.field_count && !model.fields)
+    return fail(error, "no memory for %zu fields", def.field_count);
+  model.field_count = def.field_count;
+  model.shells = make_array<Shell>(def.allocator, def.shell_count);
+  if (def.shell_count && !model.shells)
+    return fail(error, "no memory for %zu shells", def.shell_count);
+  model.shell_count = def.shell_count;
+  h6Error why;
+  for (std::size_t i = 0; i < def.field_count; ++i)
+    if (!convert_field(def.fields[i], def, &model.fields[i], &why))
+      return fail(error, "field %zu: %s", i, why.message);
+  for (std::size_t i = 0; i < def.shell_count; ++i)
+    if (!convert_shell(def.shells[i], def.allocator, &model.shells[i], &why))
+      return fail(error, "shell %zu: %s", i, why.message);
+  return true;
+}
+
+}  // namespace
+}  // namespace h6
+
+using namespace h6;
+
+extern "C" {
+
+h6Model* h6CreateModel(const h6ModelDef* def, h6Error* error) {
+  if (!def) return fail(error, "no model definition was given"), nullptr;
+  h6Model* model = create<h6Model>(def->allocator);
+  if (!model) return fail(error, "no memory for a model"), nullptr;
+  model->allocator = def->allocator;
+  if (fill(*model, *def, error)) return model;
+  h6DestroyModel(model);
+  return nullptr;
+}
+
+void h6DestroyModel(h6Model* model) {
+  if (!model) return;
+  const h6Allocator allocator = model->allocator;
+  drop_array(allocator, model->fields, model->field_count);
+  drop_array(allocator, model->shells, model->shell_count);
+  destroy(allocator, model);
+}
+
+size_t h6ModelBytes(const h6Model* model) {
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < model->field_count; ++i) bytes += model->fields[i].bytes();
+  for (std::size_t i = 0; i < model->shell_count; ++i) bytes += model->shells[i].bytes();
+  return bytes;
+}
+
+int h6SampleField(const h6Model* model, int32_t index, const double* points, size_t count,
+                  double* distance, double* gradient, uint8_t* exact) {
+  if (!model || index < 0 || static_cast<std::size_t>(index) >= model->field_count) return -1;
+  const Field& field = model->fields[index];
+  const float scale = static_cast<float>(1.0 / field.voxel);
+  // Points relative to the field's first node, in double: float then loses nothing that matters.
+  const kernels::Affine to_field{{{scale, 0, 0, 0}, {0, scale, 0, 0}, {0, 0, scale, 0}}};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 p(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+    const Eigen::Vector3f q = (p - field.origin).cast<float>();
+    float d, gx, gy, gz;
+    kernels::sample_field(field.view, to_field, {&q[0], &q[1], &q[2], 1}, nullptr, 1, &d, &gx, &gy,
+                          &gz);
+    distance[i] = d * field.voxel;
+    if (gradient) {
+      Vec3 g(gx, gy, gz);
+      const double n = g.norm();
+      if (n > 0) g /= n;
+      for (int k = 0; k < 3; ++k) gradient[3 * i + k] = g[k];
+    }
+    if (exact) {
+      const Vec3 cell = ((p - field.origin) / (8 * field.voxel)).array().floor();
+      bool inside = cell.allFinite();
+      for (int k = 0; k < 3; ++k) inside = inside && cell[k] >= 0 && cell[k] < field.view.size[k];
+      exact[i] = 0;
+      if (inside) {
+        const auto* n = field.view.size;
+        const std::size_t at =
+            (static_cast<std::size_t>(cell[2]) * n[1] + static_cast<std::size_t>(cell[1])) * n[0] +
+            static_cast<std::size_t>(cell[0]);
+        exact[i] = field.view.table[at] >= 0;
+      }
+    }
+  }
+  return 0;
+}
+
+}  // extern "C"

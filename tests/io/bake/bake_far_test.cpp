@@ -1,0 +1,81 @@
+// The far grid at a million random points: safe everywhere, and tight.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "io/bake/bake_field.h"
+#include "tests/io/bake/field_check.h"
+
+using namespace field_check;
+using h6::io::bake_field;
+using h6::io::FieldBake;
+
+namespace {
+
+FieldBake small_bake(int voxels) {
+  FieldBake options;
+  options.voxels = voxels;
+  options.threads = 2;
+  return options;
+}
+
+FieldData must_bake(const Mesh& mesh, const FieldBake& options) {
+  auto field = bake_field(mesh, options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  return *field;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "bake_field: at a million random points the far bound is safe, and at its own nodes within "
+    "a third of a voxel of the truth on average") {
+  // |far| is 1-Lipschitz-safe from each corner of a cell: the best corner less the way to it. On
+  // average over the corners themselves it must not be loose.
+  const auto check = [](const Mesh& mesh, const FieldBake& options, int points) {
+    const FieldData field = must_bake(mesh, options);
+    const Judge judge(mesh);
+    Random random(17);
+    const double h = field.voxel_size;
+    const std::size_t nx = std::size_t(field.bricks[0]) + 1, ny = std::size_t(field.bricks[1]) + 1;
+    std::size_t unsafe = 0, corners = 0;
+    double gap = 0;
+    for (int i = 0; i < points; ++i) {
+      const double g[3] = {random(0, field.bricks[0]), random(0, field.bricks[1]),
+                           random(0, field.bricks[2])};  // in cells of 8 voxels
+      const Vec3 p = field.origin + (8 * h) * Vec3{g[0], g[1], g[2]};
+      const double u = judge.distance(p);
+      double best = -1e9, side = 1;
+      for (int c = 0; c < 8; ++c) {
+        const std::size_t n[3] = {std::size_t(g[0]) + (c & 1), std::size_t(g[1]) + (c >> 1 & 1),
+                                  std::size_t(g[2]) + std::size_t(c >> 2)};
+        const double far = field.far_grid[(n[2] * ny + n[1]) * nx + n[0]];
+        const Vec3 corner = field.origin + (8 * h) * Vec3{double(n[0]), double(n[1]), double(n[2])};
+        if (std::fabs(far) - norm(corner - p) > best) {
+          best = std::fabs(far) - norm(corner - p);
+          side = far < 0 ? -1 : 1;
+        }
+        if (i % 20 == 0 && c == 0 && far > 0) {
+          gap += (judge.distance(corner) - field.offset - far) / h;
+          ++corners;
+        }
+      }
+      unsafe += best > 0 && best > (side < 0 ? u + field.offset : u - field.offset) + 1e-9;
+    }
+    CHECK(unsafe == 0);
+    CHECK(corners > 1000);
+    CHECK(gap / double(corners) < 0.3);
+    CHECK(gap >= 0);
+    MESSAGE("loose by ", gap / double(corners), " voxel on average");
+  };
+  Mesh soup = turned(l_shape(1.0), 0.4, 0.3);
+  soup.triangles.resize(soup.triangles.size() - 3);
+  check(turned(l_shape(1.0), 0.4, 0.3), small_bake(128), 200000);
+  check(torus(1.0, 0.3), small_bake(128), 200000);
+  check(soup, small_bake(128), 400000);
+  check(patch(6, 6,
+              [](double s, double t) {
+                return Vec3{s, t, 0.2 * s * t};
+              }),
+        small_bake(96), 200000);
+}

@@ -1,0 +1,323 @@
+// Embree's answers against a judge that uses none of it, and the exact check against fields that
+// are right and fields that were spoilt by hand.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/check/exact_check.h"
+
+#include "io/bake/bake_field.h"
+#include "io/bake/plan.h"
+#include "io/check/ray_votes.h"
+#include "tests/io/bake/field_check.h"
+#include "tests/support/sanitized.h"
+
+using namespace field_check;
+using namespace h6::io;
+
+namespace {
+
+// Sheets and slivers of all sizes, anywhere.
+Mesh shards(int count) {
+  Mesh mesh;
+  Random random(3);
+  for (int i = 0; i < count; ++i) {
+    const Vec3 at{random(-1, 1), random(-1, 1), random(-1, 1)};
+    const double size = std::pow(10, random(-3, 0));
+    for (int k = 0; k < 3; ++k)
+      mesh.vertices.push_back(
+          at + size * Vec3{random(-1, 1), random(-1, 1), (i % 3 ? 1 : 1e-3) * random(-1, 1)});
+    const auto first = std::uint32_t(3 * i);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
+std::unique_ptr<RayScene> rays_at(const Mesh& mesh) {
+  auto made = RayScene::make(mesh);
+  REQUIRE(made);
+  return std::move(*made);
+}
+
+FieldData bake(const Mesh& mesh, int voxels = 96) {
+  FieldBake options;
+  options.voxels = voxels;
+  auto field = bake_field(mesh, options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  return *field;
+}
+
+ExactCheck check(const Mesh& mesh, const FieldData& field, unsigned threads = 2) {
+  ExactCheckOptions options;
+  options.points = 4000, options.far_points = 4000, options.threads = threads;
+  auto found = check_exactly(mesh, field, options);
+  REQUIRE_MESSAGE(found, found.error());
+  return *found;
+}
+
+// A ball within a ball, both wound outward as far as winding goes.
+Mesh hollow_ball() {
+  Mesh mesh = sphere({0, 0, 0}, 1.0);
+  add(mesh, sphere({0, 0, 0}, 0.5));
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("distances by Embree are exact in double: near, far, far from the origin, of slivers") {
+  for (const Vec3 by : {Vec3{0, 0, 0}, Vec3{1e4, -2e4, 3e3}}) {
+    const Mesh mesh = moved(shards(500), by);
+    const auto rays = rays_at(mesh);
+    const Judge judge(mesh);
+    Random random(5);
+    for (int i = 0; i < h6::test::repeated(3000, 300); ++i) {
+      const double reach = i % 3 == 0 ? 30 : 1.2;
+      const Vec3 p = by + reach * Vec3{random(-1, 1), random(-1, 1), random(-1, 1)};
+      const double truth = judge.distance(p), found = rays->distance(p);
+      CHECK(std::fabs(found - truth) < 1e-12 * (1 + norm(by)));
+    }
+  }
+}
+
+TEST_CASE("a ray meets every triangle of its way, in order, and the first one at its free way") {
+  const Mesh mesh = hollow_ball();
+  const auto rays = rays_at(mesh);
+  Random random(7);
+  std::vector<Crossing> way;
+  for (int i = 0; i < h6::test::repeated(500, 100); ++i) {
+    Dice dice(1, std::uint64_t(i));
+    const Vec3 along = dice.direction();
+    CHECK(norm(along) > 0.999999);
+    CHECK(norm(along) < 1.000001);
+    rays->crossings({0.01, 0.02, -0.03}, along, way);
+    REQUIRE(way.size() == 2);  // out of the small ball, out of the big one
+    CHECK(way[0].t < way[1].t);
+    CHECK(way[0].t > 0.45);
+    CHECK(way[0].t < 0.55);
+    CHECK(way[1].t > 0.9);
+    CHECK(way[1].t < 1.05);
+    CHECK(std::fabs(rays->free_way({0.01, 0.02, -0.03}, along) - way[0].t) < 1e-5);
+    CHECK(rays->meets({0.01, 0.02, -0.03}, along));
+    rays->crossings({0, 0, 4}, {0, 0, 1}, way);
+    CHECK(way.empty());
+    CHECK(!rays->meets({0, 0, 4}, {0, 0, 1}));
+    CHECK(std::isinf(rays->free_way({0, 0, 4}, {0, 0, 1})));
+  }
+}
+
+TEST_CASE("votes: parts that overlap are one solid, a hollow is not, a bowl can be left") {
+  Mesh mesh = box({0, 0, 0}, {2, 1, 1});
+  add(mesh, box({1, 0.25, 0.25}, {3, 0.75, 0.75}));  // runs into the first
+  Mesh turned_in = sphere({1.5, 5, 0}, 0.5);         // a hollow in a ball
+  for (auto& t : turned_in.triangles) std::swap(t[0], t[1]);
+  add(mesh, sphere({1.5, 5, 0}, 1.0));
+  add(mesh, turned_in);
+  const auto rays = rays_at(mesh);
+  const FaceTable faces = face_table(mesh);
+  const RayVotes votes(*rays, faces);
+  using Side = RayVotes::Side;
+  const auto side = [&](Vec3 p) {
+    Dice dice(11, 1);
+    return votes.side(p, dice);
+  };
+  CHECK(side({0.5, 0.5, 0.5}) == Side::inside);
+  CHECK(side({1.5, 0.5, 0.5}) == Side::inside);  // in both: an even number of crossings
+  CHECK(side({2.5, 0.5, 0.5}) == Side::inside);
+  CHECK(side({2.5, 0.1, 0.5}) == Side::outside);
+  CHECK(side({1.5, 5.75, 0}) == Side::inside);
+  CHECK(side({1.5, 5.1, 0}) == Side::outside);  // in the hollow
+  Dice dice(13, 1);
+  CHECK(votes.way_out({2.5, 0.1, 0.5}, 0.05, 100, dice));
+  CHECK(!votes.way_out({1.5, 5.1, 0}, 0, 300, dice));
+  CHECK(!votes.way_out({0.5, 0.5, 0.5}, 0, 300, dice));
+
+  // A box whose lid is off: a small ball comes out of it, one as wide as it does not.
+  Mesh open = box({0, 0, 0}, {1, 1, 1});
+  std::erase_if(open.triangles, [&](const auto& t) {
+    return open.vertices[t[0]].z + open.vertices[t[1]].z + open.vertices[t[2]].z > 2.99;
+  });
+  const auto open_rays = rays_at(open);
+  const FaceTable open_faces = face_table(open);
+  const RayVotes open_votes(*open_rays, open_faces);
+  CHECK(open_votes.way_out({0.5, 0.5, 0.5}, 0.2, 300, dice));
+  CHECK(!open_votes.way_out({0.5, 0.5, 0.45}, 0.48, 300, dice));
+}
+
+TEST_CASE("bake_field's fields agree with their meshes: closed, overlapping, open, of one sheet") {
+  Mesh overlapping = turned(l_shape(1.0), 0.4, 0.3);
+  add(overlapping, sphere({0.7, 0.7, 0.5}, 0.6));
+  for (const Mesh& mesh :
+       {torus(1.0, 0.4), overlapping, hollow_ball(), patch(6, 6, [](double s, double t) {
+          return Vec3{s, t, s * t};
+        })}) {
+    const ExactCheck c = check(mesh, bake(mesh));
+    CAPTURE(mesh.triangles.size());
+    CAPTURE(c.far_excess);
+    CHECK(c.agrees());
+    CHECK(c.nodes > 3000);
+    CHECK(c.worst_node < 1e-3);
+    CHECK(c.wrong_sides() == 0);
+    CHECK(c.far > 3000);
+    CHECK(c.far_wrong == 0);
+    CHECK(c.worst_deep < 2.5);
+    CHECK(c.corner_gap < 0.3);
+  }
+  // Its bounds are tight on either side.
+  const Mesh ball = sphere({0, 0, 0}, 1.0);
+  const ExactCheck both = check(ball, bake(ball));
+  CHECK(both.agrees());
+  CHECK(both.far_gap < 1);
+  CHECK(both.inside > 30);
+  CHECK(both.inside_gap > 0);
+  CHECK(both.inside_gap < 1);
+  // With a hole it drains: every distance is right, and the votes tell the side that was lost.
+  Mesh open = torus(1.0, 0.4);
+  open.triangles.resize(open.triangles.size() - 40);
+  const ExactCheck c = check(open, bake(open));
+  CHECK(c.agrees());  // a soup: sides are a matter of opinion
+  CHECK(c.drained > 100);
+  CHECK(c.filled == 0);
+  CHECK(c.far_wrong == 0);
+}
+
+TEST_CASE(
+    "a sealed hole is nearer than the mesh, from outside and from within, and that is right") {
+  Mesh holed = box({0, 0, 0}, {1, 1, 1}, 24);
+  std::erase_if(holed.triangles, [&](const auto& t) {
+    const Vec3 m = (1.0 / 3) * (holed.vertices[t[0]] + holed.vertices[t[1]] + holed.vertices[t[2]]);
+    return m.z > 1 - 1e-9 && std::fabs(m.x - 0.5) < 0.2 && std::fabs(m.y - 0.5) < 0.2;
+  });
+  FieldBake options;
+  options.voxels = 64, options.seal = 0.6;
+  auto field = bake_field(holed, options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  ExactCheckOptions asked;
+  asked.sealed = true;
+  auto c = check_exactly(holed, *field, asked);
+  REQUIRE_MESSAGE(c, c.error());
+  CHECK(c->nearer > 30);
+  CHECK(c->agrees());
+  asked.sealed = false;  // what was done is not what was said
+  c = check_exactly(holed, *field, asked);
+  REQUIRE_MESSAGE(c, c.error());
+  CHECK(!c->agrees());
+}
+
+TEST_CASE("whatever is wrong with a field shows, and where") {
+  const Mesh mesh = torus(1.0, 0.4);
+  const FieldData good = bake(mesh);
+  REQUIRE(check(mesh, good).agrees());
+
+  FieldData wider = good;  // samples a hundredth of a voxel off
+  for (float& s : wider.samples) s += float(0.01 * good.voxel_size);
+  ExactCheck c = check(mesh, wider);
+  CHECK(!c.agrees());
+  CHECK(c.worst_node > 0.009);
+  CHECK(c.worst_node < 0.011);
+
+  FieldData drained = good;  // outside everywhere
+  for (float& s : drained.samples) s = std::fabs(s);
+  for (float& s : drained.far_grid) s = std::fabs(s);
+  c = check(mesh, drained);
+  CHECK(!c.agrees());
+  CHECK(c.drained > 1000);
+  CHECK(c.filled == 0);
+  CHECK(c.worst_node < 1e-3);
+
+  FieldData filled = good;  // one brick in four is inside, whatever the mesh says
+  for (std::size_t i = 0; i < filled.samples.size(); ++i)
+    if (i / 512 % 4 == 0) filled.samples[i] = -std::fabs(filled.samples[i]);
+  c = check(mesh, filled);
+  CHECK(!c.agrees());
+  CHECK(c.filled > 300);
+  CHECK(c.drained == 0);
+
+  FieldData deeper = good;  // the inside two voxels further down than it is
+  for (float& s : deeper.samples)
+    if (s < 0) s -= float(2 * good.voxel_size);
+  c = check(mesh, deeper);
+  CHECK(c.deep > 1000);
+  CHECK(c.worst_deep > 1.9);
+  CHECK(!c.agrees());
+
+  FieldData promises = good;  // a bound one voxel too good
+  for (float& f : promises.far_grid) f += std::copysign(float(good.voxel_size), f);
+  c = check(mesh, promises);
+  CHECK(!c.agrees());
+  CHECK(c.far_wrong > 100);
+  CHECK(c.far_excess > 0.9);
+
+  FieldData careful = good;  // three voxels too careful: safe, and said to be loose
+  for (float& f : careful.far_grid)
+    f = std::copysign(std::max(0.f, std::fabs(f) - float(3 * good.voxel_size)), f);
+  c = check(mesh, careful);
+  CHECK(c.agrees());
+  CHECK(c.corner_gap > 2.5);
+  CHECK(c.far_gap > check(mesh, good).far_gap + 1);
+}
+
+TEST_CASE("a field of another mesh, or of nothing, is refused with a sentence") {
+  const FieldData field = bake(torus(1.0, 0.4));
+  const auto other = check_exactly(moved(torus(1.0, 0.4), {40, 0, 0}), field, {});
+  REQUIRE(!other);
+  CHECK(other.error().find("another mesh") != std::string::npos);
+  Mesh line;
+  line.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  line.triangles = {{0, 1, 2}};
+  CHECK(!check_exactly(line, field, {}));
+  const auto cancelled =
+      check_exactly(torus(1.0, 0.4), field, {}, [](const std::string&, double) { return false; });
+  REQUIRE(!cancelled);
+  CHECK(cancelled.error() == "cancelled");
+}
+
+TEST_CASE("one thread or four: the same counts and the same digits") {
+  Mesh mesh = turned(l_shape(1.0), 0.4, 0.3);
+  mesh.triangles.pop_back();
+  const FieldData field = bake(mesh);
+  const ExactCheck one = check(mesh, field, 1), four = check(mesh, field, 4);
+  CHECK(one.worst_node == four.worst_node);
+  CHECK(one.mean_node == four.mean_node);
+  CHECK(one.mean_between == four.mean_between);
+  CHECK(one.far_gap == four.far_gap);
+  CHECK(one.voted == four.voted);
+  CHECK(one.doubtful == four.doubtful);
+}
+
+TEST_CASE("a plan is the bake's own voxel, offset and size, and its bricks to a tenth") {
+  Mesh open = torus(1.0, 0.4);
+  open.triangles.resize(open.triangles.size() - 40);
+  for (const Mesh& mesh : {torus(1.0, 0.4), open, box({0, 0, 0}, {3, 1, 0.5}, 1), shards(50)}) {
+    FieldBake options;
+    options.voxels = 160;
+    const auto plan = plan_field(mesh, audit(mesh), options);
+    REQUIRE(plan);
+    const FieldData field = bake(mesh, 160);
+    CHECK(plan->voxel_size == field.voxel_size);
+    CHECK(plan->offset == field.offset);
+    CHECK(plan->bricks == field.bricks);
+    const double ratio = double(plan->brick_count) / double(field.brick_count());
+    CAPTURE(ratio);
+    CHECK(ratio > 0.85);
+    CHECK(ratio < 1.15);
+    CHECK(plan->seconds > 0);
+  }
+  FieldBake tiny;
+  tiny.voxel_size = 1e-6;
+  CHECK(!plan_field(open, audit(open), tiny));  // the bake's own sentence
+  // So much surface that not every triangle can be looked at: still a figure, and soon.
+  Mesh heap;
+  for (int i = 0; i < 40; ++i)
+    add(heap, turned(box({-1, -1, -1}, {1, 1, 1}, 1), 0.1 * i, 0.07 * i));
+  FieldBake fine;
+  fine.voxels = 2048;
+  const auto plan = plan_field(heap, audit(heap), fine);
+  REQUIRE(plan);
+  CHECK(plan->brick_count > 1000000);
+}

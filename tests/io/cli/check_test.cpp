@@ -1,0 +1,154 @@
+// hapsix check from outside: what it says of meshes, scenes and fields, and how it exits.
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+bool near(double a, double b, double tolerance) { return std::fabs(a - b) <= tolerance; }
+
+std::vector<Facet> scaled(std::vector<Facet> facets, float x, float y, float z) {
+  for (Facet& f : facets)
+    for (Corner& c : f) c = {x * c[0], y * c[1], z * c[2]};
+  return facets;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "a plate's thickness comes in voxels, with the force it withstands and what a bake takes") {
+  Sandbox box;
+  spill(box.file("plate.stl"), stl(scaled(box_facets(1), 100, 100, 2)));
+  const Json all = result_of(
+      box, {"check", "plate.stl", "--units", "mm", "--voxel-size", "0.5", "--stiffness", "1e5"});
+  CHECK(all["agrees"].is_null());  // nothing was compared
+  const Json plate = all["meshes"][0];
+  CHECK(plate["closed"] == true);
+  CHECK(near(plate["voxel_size"].get<double>(), 5e-4, 1e-12));
+  CHECK(near(plate["walls_voxels"]["p5"].get<double>(), 4, 1e-4));
+  CHECK(near(plate["walls_voxels"]["median"].get<double>(), 4, 1e-4));
+  CHECK(plate["gaps_voxels"].is_null());
+  CHECK(near(plate["holding_force_N"].get<double>(), 1e5 * 1e-3, 1e-3));  // to its middle
+  CHECK(plate["bricks_estimate"].get<int>() > 100);
+  CHECK(plate["field_bytes_estimate"].get<double>() > 1e5);
+  CHECK(plate["bake_seconds_estimate"].get<double>() > 0);
+  CHECK(plate["warnings"].empty());
+  // With voxels as large as the plate is thick, it is said.
+  const Json coarse = result_of(box, {"check", "plate.stl", "--units", "mm", "--voxel-size", "2"});
+  REQUIRE(coarse["meshes"][0]["warnings"].size() == 1);
+  CHECK(coarse["meshes"][0]["warnings"][0].get<std::string>().find("thinner than two voxels") !=
+        std::string::npos);
+  // The same as text, one block a mesh.
+  const Ended text = run(box, {"check", "plate.stl", "plate.stl", "--units", "mm"});
+  CHECK(text.code == 0);
+  CHECK(text.out.find("plate.stl: 12 triangles, closed") != std::string::npos);
+  CHECK(text.out.find("walls") != std::string::npos);
+  CHECK(box.files() == std::set<std::string>{"plate.stl"});
+}
+
+TEST_CASE("a baked field is compared with its mesh: 0 when it agrees, 1 when it is another's") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(50, 20)));
+  spill(box.file("other.stl"), stl(sphere_facets(52, 20)));
+  const Json baked = result_of(
+      box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--units", "mm", "--voxels", "96"});
+  const Args compare{"--units",  "mm",   "--field",      "ball.vdb",
+                     "--points", "2000", "--far-points", "2000"};
+  const auto with = [&](Args args) {
+    args.insert(args.end(), compare.begin(), compare.end());
+    return args;
+  };
+  const Json good = result_of(box, with({"check", "ball.stl"}));
+  CHECK(good["agrees"] == true);
+  const Json field = good["meshes"][0]["field"];
+  CHECK(field["agrees"] == true);
+  CHECK(good["meshes"][0]["voxel_size"] == baked["voxel_size"]);
+  CHECK(field["nodes"].get<int>() > 1500);
+  CHECK(field["node_error_max"].get<double>() < 1e-3);
+  CHECK(field["sides_drained"] == 0);
+  CHECK(field["far_above"] == 0);
+
+  Args json = with({"check", "other.stl"});
+  json.push_back("--json");
+  const Ended bad = run(box, json);
+  CHECK(bad.code == 1);
+  const Json said = one_object(bad);
+  CHECK(said["agrees"] == false);
+  CHECK(said["meshes"][0]["field"]["node_error_max"].get<double>() > 1);
+  CHECK(run(box, with({"check", "other.stl"})).out.find("DISAGREES") != std::string::npos);
+
+  // And a field that is made for the purpose.
+  const Json fresh = result_of(box, {"check", "other.stl", "--units", "mm", "--voxels", "64",
+                                     "--verify", "--points", "1000", "--far-points", "1000"});
+  CHECK(fresh["agrees"] == true);
+}
+
+TEST_CASE(
+    "of a scene every body that is touched as a field is checked, with the scene's stiffness") {
+  Sandbox box;
+  result_of(box, {"scene", "export", "peg-in-hole", "."});
+  const Json scene = Json::parse(slurp(box.file("scene.json")));
+  std::size_t fields = 0;
+  for (const Json& body : scene["bodies"]) fields += body.contains("field");
+  const Json all = result_of(box, {"check", "scene.json"});
+  CHECK(all["meshes"].size() == fields);
+  CHECK(fields > 0);
+  for (const Json& m : all["meshes"]) CHECK(m["triangles"].get<int>() > 0);
+}
+
+TEST_CASE("how far a scene's shells are from its fields at the start is told in voxels") {
+  Sandbox box;
+  spill(box.file("cube.stl"), stl(box_facets(10)));
+  const Json body{{"mesh", "cube.stl"}};
+  Json field = body;
+  field["voxel_size"] = 0.5;
+  const Json scene{{"hapsix", 1},
+                   {"units", "mm"},
+                   {"bodies",
+                    {{{"name", "floor"}, {"fixed", true}, {"field", field}},
+                     {{"name", "part"},
+                      {"shell", {{"mesh", "cube.stl"}, {"points", 500}}},
+                      {"pose", {{"p", {2, 1, 12}}, {"q", {1, 0, 0, 0}}}}}}}};
+  spill(box.file("scene.json"), scene.dump());
+  const Json all = result_of(box, {"check", "scene.json"});
+  const Json start = all["meshes"][0]["clearances"];
+  REQUIRE(start.size() == 1);
+  CHECK(start[0]["shell"] == "part");
+  CHECK(near(start[0]["distance_m"].get<double>(), 2e-3, 1e-8));
+  CHECK(near(start[0]["voxels"].get<double>(), 4, 1e-4));
+}
+
+TEST_CASE("wrong input gets one sentence and the right code") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(50, 10)));
+  spill(box.file("empty.stl"), "");
+  spill(box.file("no.vdb"), "this is no field");
+  struct Case {
+    Args args;
+    int code;
+  };
+  const std::vector<Case> cases = {
+      {{"check"}, 2},
+      {{"check", "gone.stl"}, 1},
+      {{"check", "empty.stl"}, 1},
+      {{"check", "ball.stl", "--field", "gone.vdb"}, 1},
+      {{"check", "ball.stl", "--field", "no.vdb"}, 1},
+      {{"check", "ball.stl", "ball.stl", "--field", "no.vdb"}, 2},
+      {{"check", "ball.stl", "--field", "no.vdb", "--verify"}, 2},
+      {{"check", "ball.stl", "--voxels", "7"}, 2},
+      {{"check", "ball.stl", "--voxel-size", "1e-9"}, 1},
+      {{"check", "ball.stl", "--points", "0"}, 2},
+  };
+  for (const Case& c : cases) {
+    const Ended ended = run(box, c.args);
+    CAPTURE(ended.err);
+    CHECK(ended.code == c.code);
+    CHECK(!ended.err.empty());
+    CHECK(ended.out.empty());
+  }
+}

@@ -1,0 +1,71 @@
+// A run of the program that is killed at any instant has left a recording: it opens, `info` puts
+// the folder in order and says what it did, and what is there replays to the bit.
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <algorithm>
+#include <memory>
+#include <random>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+// Copies that a run left and nobody has touched for long enough to be sure that it is over.
+bool age(const fs::path& file) {
+  bool any = false;
+  for (const char* ending : {".part", ".swap"}) {
+    const fs::path other = file.string() + ending;
+    if (!fs::exists(other)) continue;
+    any = true;
+    fs::last_write_time(other, fs::file_time_type::clock::now() - std::chrono::seconds(60));
+  }
+  return any;
+}
+
+}  // namespace
+
+TEST_CASE("runs killed at random instants: the recording opens, is put in order, and replays") {
+  Sandbox box;
+  result_of(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.01"});  // bakes
+  std::mt19937_64 random(22);
+  struct Victim {
+    std::string file;
+    std::unique_ptr<Process> process;
+    std::chrono::milliseconds life;
+  };
+  std::vector<Victim> victims;
+  for (int i = 0; i < 10; ++i) {
+    const std::string file = "run" + std::to_string(i) + ".h5";
+    const Args args{"run", "peg-in-hole", "--duration", "60", "--record", file};
+    victims.push_back(
+        {file, std::make_unique<Process>(box, args), std::chrono::milliseconds(random() % 900)});
+  }
+  for (const Victim& v : victims) REQUIRE(soon([&] { return fs::exists(box.file(v.file)); }, 60));
+  std::sort(victims.begin(), victims.end(),
+            [](const Victim& a, const Victim& b) { return a.life < b.life; });
+  const auto began = std::chrono::steady_clock::now();
+  for (Victim& v : victims) {
+    std::this_thread::sleep_until(began + v.life);
+    v.process.reset();  // SIGKILL
+  }
+  std::uint64_t most = 0;
+  for (const Victim& v : victims) {
+    CAPTURE(v.file);
+    const bool left = age(box.file(v.file));
+    const Json info = result_of(box, {"info", v.file});
+    CHECK(info["whole"] == false);
+    CHECK((info["repaired"] != "") == left);
+    if (left) CHECK(std::string(info["repaired"]).find(v.file + ".part") != std::string::npos);
+    CHECK_FALSE(age(box.file(v.file)));
+    CHECK(result_of(box, {"info", v.file})["repaired"] == "");  // nothing is left to do
+    most = std::max(most, info["frames"].get<std::uint64_t>());
+    if (info["frames"] == 0) continue;
+    CHECK(info["event_counts"].is_object());
+    const Json replay = result_of(box, {"replay", v.file, "--verify"});
+    CHECK(replay["same"] == true);
+    CHECK(replay["frames"] == info["frames"]);
+  }
+  CHECK(most > 100);
+  MESSAGE("10 kills, up to " << most << " frames");
+}

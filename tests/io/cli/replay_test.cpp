@@ -1,0 +1,265 @@
+// A recording runs again to the bit, and says where it does not.
+#include <hdf5.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+// Flips the last bit of one number of a column of 64-bit cells, in place.
+void flip_bit(const fs::path& file, const std::string& column, hsize_t frame, hsize_t cell) {
+  const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  REQUIRE(h5 >= 0);
+  const hid_t data = H5Dopen2(h5, ("/frames/" + column).c_str(), H5P_DEFAULT);
+  const hid_t space = H5Dget_space(data);
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::array<hsize_t, 3> start{frame, 0, 0}, one{1, 1, 1};
+  start[static_cast<std::size_t>(rank - 1)] = rank > 1 ? cell : frame;
+  H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, one.data(), nullptr);
+  const hid_t memory = H5Screate_simple(rank, one.data(), nullptr);
+  double value = 0;
+  REQUIRE(H5Dread(data, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, &value) >= 0);
+  std::uint64_t bits;
+  std::memcpy(&bits, &value, sizeof bits);
+  bits ^= 1;
+  std::memcpy(&value, &bits, sizeof bits);
+  REQUIRE(H5Dwrite(data, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, &value) >= 0);
+  H5Sclose(memory), H5Sclose(space), H5Dclose(data), H5Fclose(h5);
+}
+
+// Changes the head of a recording: `from` becomes `to`, which is as long.
+void change_head(const fs::path& file, const std::string& from, const std::string& to) {
+  REQUIRE(from.size() == to.size());
+  const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hid_t data = H5Dopen2(h5, "/config/whole", H5P_DEFAULT), type = H5Dget_type(data);
+  std::string text(H5Tget_size(type), '\0');
+  REQUIRE(H5Dread(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) >= 0);
+  const std::size_t at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  text.replace(at, from.size(), to);
+  REQUIRE(H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) >= 0);
+  H5Tclose(type), H5Dclose(data), H5Fclose(h5);
+}
+
+// A ball goes 5 mm deep into the top of a block.
+Json ball_and_block(Sandbox& box) {
+  spill(box.file("ball.stl"), stl(sphere_facets(20, 16)));
+  spill(box.file("block.stl"), stl(box_facets(60)));
+  spill(box.file("hand.csv"),
+        "t,x,y,z,qw,qx,qy,qz\n0,30,30,85,1,0,0,0\n0.5,30,30,75,1,0,0,0\n0.8,33,30,75,1,0,0,0\n");
+  return Json::parse(R"({"hapsix": 1, "units": "mm",
+    "bodies": [{"name": "block", "fixed": true, "pose": {"p": [50.5, -6.5, 0], "q": [0.8, 0, 0, 0.6]},
+                "field": {"mesh": "block.stl", "voxel_size": 1.3}},
+               {"name": "ball", "mass": 0.1, "pose": {"p": [30,30,85]},
+                "shell": {"mesh": "ball.stl", "points": 800}}],
+    "contact": {"torque_length": 0.7},
+    "hands": [{"body": "ball", "path": "hand.csv"}]})");
+}
+
+}  // namespace
+
+TEST_CASE("a recording has the same bits on one thread and on two, each time") {
+  Sandbox box;
+  result_of(box,
+            {"run", "alpha-shortcut", "--virtual-time", "--duration", "3", "--record", "a.h5"});
+  std::set<std::string> hashes;
+  for (const char* threads : {"1", "2", "1", "2"}) {
+    const Json json = result_of(box, {"replay", "a.h5", "--verify", "--threads", threads});
+    CHECK(json["same"] == true);
+    CHECK(json["divergence"].is_null());
+    CHECK(json["frames"] == 3000);
+    CHECK(json["replayed"]["contacts"]["max"] > 10);
+    hashes.insert(json["replayed"]["hash"]);
+    hashes.insert(json["recorded"]["hash"]);
+  }
+  CHECK(hashes.size() == 1);
+}
+
+TEST_CASE("real time and virtual time, people and arms: every run replays") {
+  Sandbox box;
+  const Args runs[] = {
+      {"run", "peg-in-hole", "--duration", "0.4"},
+      {"run", "peg-in-hole", "--duration", "0.4", "--threads", "2"},
+      {"run", "box-on-wall", "--duration", "0.4", "--budget", "0.001"},
+      {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--device", "simulated"},
+      {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--device", "arm"},
+      {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--method", "series"},
+      {"run", "box-on-wall", "--duration", "0.4", "--virtual-time", "--method", "gauss6+facing"}};
+  for (Args args : runs) {
+    args.insert(args.end(), {"--record", "run.h5"});
+    const Json recorded = result_of(box, args);
+    if (recorded["records_lost"] > 0) continue;  // a machine that stood still: nothing to compare
+    const Json json = result_of(box, {"replay", "run.h5", "--verify"});
+    CHECK(json["same"] == true);
+    CHECK(json["frames"] == recorded["frames"]);
+    // Every late frame has an event with its cause, and a place in its histogram.
+    const Json& deadline = recorded["deadline"];
+    for (const char* cause : {"compute", "wakeup", "stolen"}) {
+      const std::string said = std::string(cause) == "compute"  ? "late: own computation"
+                               : std::string(cause) == "wakeup" ? "late: wake-up"
+                                                                : "late: stolen";
+      long events = 0, in_bins = 0;
+      for (const Json& event : recorded["events"]) events += event["what"] == said;
+      for (const Json& frames : deadline["late_us"][cause]) in_bins += frames.get<long>();
+      CHECK(in_bins == deadline[std::string("missed_") + cause]);
+      if (recorded["events_dropped"] == 0) CHECK(events == in_bins);
+    }
+    const bool coarse = std::find(args.begin(), args.end(), "--budget") != args.end();
+    CHECK((recorded["coarse"]["frames"] > 0) == coarse);
+    CHECK(json["replayed"]["verdict"] == recorded["verdict"]);
+    CHECK(json["replayed"]["max_depth_voxels"] == recorded["max_depth_voxels"]);
+  }
+}
+
+TEST_CASE("a flipped bit is found at its frame, with its column") {
+  Sandbox box;
+  result_of(box, {"run", "peg-in-hole", "--virtual-time", "--record", "good.h5"});
+  struct Flip {
+    const char* column;
+    hsize_t frame, cell;
+  };
+  for (const Flip& flip :
+       {Flip{"hand_pose", 731, 2}, Flip{"hand_pose", 5000, 4}, Flip{"hand_velocity", 12, 1},
+        Flip{"body_pose", 401, 5}, Flip{"max_depth", 1200, 0}, Flip{"hash", 0, 0}}) {
+    CAPTURE(std::string(flip.column));
+    const hsize_t frame = flip.frame % 1400;
+    fs::copy_file(box.file("good.h5"), box.file("bad.h5"), fs::copy_options::overwrite_existing);
+    flip_bit(box.file("bad.h5"), flip.column, frame, flip.cell);
+    const Ended ended = run(box, {"replay", "bad.h5", "--verify", "--json"});
+    CHECK(ended.code == 1);
+    const Json json = Json::parse(ended.out);
+    CHECK(json["same"] == false);
+    CHECK(json["divergence"]["frame"] == frame);
+    const std::string said = json["error"];
+    CHECK(said.find("frame " + std::to_string(frame)) != std::string::npos);
+    // What an input does comes first; a number of the results is named itself.
+    if (std::string(flip.column).rfind("hand_", 0) != 0)
+      CHECK(json["divergence"]["column"] == flip.column);
+    if (std::string(flip.column) == "body_pose") CHECK(json["divergence"]["cell"] == "qy");
+  }
+}
+
+TEST_CASE("files come back to the bit, from where they were or from beside the recording") {
+  Sandbox box;
+  spill(box.file("scene.json"), ball_and_block(box).dump());
+  const Json recorded =
+      result_of(box, {"run", "scene.json", "--virtual-time", "--record", "run.h5"});
+  REQUIRE(recorded["contacts"]["max"] > 0);
+  const auto verified = [&](const std::string& file) {
+    return result_of(box, {"replay", file, "--verify"})["same"] == true;
+  };
+  CHECK(verified("run.h5"));
+  // Not needed for it: where the hand was and what was asked for is in the recording.
+  fs::remove(box.file("hand.csv")), fs::remove(box.file("scene.json"));
+  CHECK(verified("run.h5"));
+  fs::create_directory(box.file("else"));
+  for (const char* name : {"ball.stl", "block.stl", "run.h5"})
+    fs::rename(box.file(name), box.file("else") / name);
+  CHECK(verified("else/run.h5"));
+
+  // A part that is not what it was, and one that is gone.
+  spill(box.file("else") / "block.stl", stl(box_facets(61)));
+  const Ended other = run(box, {"replay", "else/run.h5", "--verify"});
+  CHECK(other.code == 1);
+  CHECK(other.err.find("the field of body 'block' is not the one") != std::string::npos);
+  fs::remove(box.file("else") / "ball.stl");
+  const Ended gone = run(box, {"replay", "else/run.h5"});
+  CHECK(gone.code == 1);
+  CHECK(gone.err.find("ball.stl is not there any more") != std::string::npos);
+}
+
+TEST_CASE("a baked file that was changed since is told from the one that was recorded") {
+  Sandbox box;
+  Json scene = ball_and_block(box);
+  const Args bake{"bake", "shell", "ball.stl", "-o", "ball.ply", "--units", "mm"};
+  const auto with_points = [&](const char* points) {
+    Args args = bake;
+    args.insert(args.end(), {"--points", points});
+    return run(box, args).code;
+  };
+  REQUIRE(with_points("800") == 0);
+  scene["bodies"][1]["shell"] = {{"file", "ball.ply"}};
+  spill(box.file("scene.json"), scene.dump());
+  result_of(box, {"run", "scene.json", "--virtual-time", "--record", "run.h5"});
+  CHECK(result_of(box, {"replay", "run.h5", "--verify"})["same"] == true);
+  REQUIRE(with_points("801") == 0);
+  const Ended other = run(box, {"replay", "run.h5"});
+  CHECK(other.code == 1);
+  CHECK(other.err.find("the shell of body 'ball' is not the one") != std::string::npos);
+}
+
+TEST_CASE("the same hand runs with another method, and nothing is compared") {
+  Sandbox box;
+  result_of(box, {"run", "peg-in-hole", "--virtual-time", "--record", "run.h5"});
+  const Json json = result_of(box, {"replay", "run.h5", "--method", "none"});
+  CHECK(json["method"] == "none");
+  CHECK(json["recorded_method"] == "robust");
+  CHECK_FALSE(json.contains("same"));
+  CHECK(json["replayed"]["hash"] != json["recorded"]["hash"]);
+  CHECK(json["replayed"]["max_depth_voxels"] < json["recorded"]["max_depth_voxels"]);
+  CHECK(run(box, {"replay", "run.h5", "--method", "none", "--verify"}).code == 2);
+  CHECK(run(box, {"replay", "run.h5", "--method", "nose"}).code == 2);
+  CHECK(run(box, {"replay", "run.h5", "--threads", "3"}).code == 2);
+  CHECK(run(box, {"replay", "gone.h5"}).code == 1);
+  spill(box.file("text.h5"), "no recording");
+  CHECK(run(box, {"replay", "text.h5"}).code == 1);
+}
+
+TEST_CASE("a recording of another instruction set is replayed on that, or says that it cannot be") {
+  Sandbox box;
+  const Json recorded =
+      result_of(box, {"run", "peg-in-hole", "--virtual-time", "--record", "run.h5"});
+  const std::string target = recorded["simd_target"];
+  const auto as_if = [&](std::string other) {
+    other.resize(target.size(), ' ');
+    fs::copy_file(box.file("run.h5"), box.file("other.h5"), fs::copy_options::overwrite_existing);
+    change_head(box.file("other.h5"), "\"simd_target\":\"" + target, "\"simd_target\":\"" + other);
+    return run(box, {"replay", "other.h5", "--verify", "--json"});
+  };
+  const Ended unknown = as_if("M");
+  CHECK(unknown.err.find("does not have") != std::string::npos);
+  CHECK(unknown.code == 0);  // what it says is wrong, its bits are right
+  if (target != "AVX3") return;
+  const Ended old = as_if("SSE4");
+  CHECK(old.code == 1);
+  const Json json = Json::parse(old.out);
+  CHECK(json["simd_target"] == "SSE4");
+  CHECK(json["same"] == false);
+  CHECK(std::string(json["error"]).find("recorded on SSE4") == std::string::npos);
+}
+
+TEST_CASE("what a killed run left is replayed as far as it goes") {
+  Sandbox box;
+  {
+    Process victim(box, {"run", "peg-in-hole", "--record", "run.h5"});
+    for (int i = 0; i < 400 && !fs::exists(box.file("run.h5")); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    std::this_thread::sleep_for(std::chrono::milliseconds(900));
+  }  // killed
+  const Json json = result_of(box, {"replay", "run.h5", "--verify"});
+  CHECK(json["same"] == true);
+  CHECK(json["frames"] > 100);
+  CHECK(json["remarks"].size() == 1);
+  // A look at it puts in order what the run left, and says so.
+  const bool left = fs::exists(box.file("run.h5.part"));
+  if (left)
+    fs::last_write_time(box.file("run.h5.part"),
+                        fs::file_time_type::clock::now() - std::chrono::seconds(60));
+  const Json info = result_of(box, {"info", "run.h5"});
+  CHECK((info["repaired"] != "") == left);
+  CHECK(info["whole"] == false);
+  CHECK(info["run"]["scene"] == "peg-in-hole");
+  CHECK(info["run"]["virtual_time"] == false);
+  CHECK_FALSE(fs::exists(box.file("run.h5.part")));
+  CHECK(result_of(box, {"replay", "run.h5", "--verify"})["same"] == true);
+}

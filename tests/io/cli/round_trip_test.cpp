@@ -1,0 +1,118 @@
+// What the program writes it reads back to the same physics, and the same input gives the same
+// bits.
+#include <set>
+#include <string>
+
+#include "tests/io/cli/program.h"
+#include "tests/support/sanitized.h"
+
+using namespace h6::test;
+
+TEST_CASE("an exported scene runs like the scene it came from") {
+  Sandbox box;
+  const Json list = result_of(box, {"scene", "list"});
+  for (const Json& scene : list["scenes"]) {
+    const std::string name = scene["name"];
+    CAPTURE(name);
+    // Minutes each, and their bakes' threads are seen at work on smaller meshes.
+    if (kSanitized && (name == "engine-bay" || name == "landing-gear")) continue;
+    const auto run_of = [&](const std::string& what) {
+      Args args{"run", what, "--virtual-time"};
+      if (kThreadSanitized) args.insert(args.end(), {"--duration", "0.2"});
+      return result_of(box, args);
+    };
+    const Json named = run_of(name);
+    REQUIRE(run(box, {"scene", "export", name, name}).code == 0);
+    const Json exported = run_of(name + "/scene.json");
+    CHECK(exported["verdict"] == named["verdict"]);
+    CHECK(exported["frames"] == named["frames"]);
+    // Meshes go through single precision: the last digits may move, and with them a contact.
+    CHECK(exported["max_depth_voxels"].get<double>() ==
+          doctest::Approx(named["max_depth_voxels"].get<double>()).epsilon(0.01));
+    CHECK(exported["max_force"].get<double>() ==
+          doctest::Approx(named["max_force"].get<double>()).epsilon(0.02));
+  }
+}
+
+TEST_CASE("baked files in a scene give the very run of the meshes they came from") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(20, 16)));
+  spill(box.file("block.stl"), stl(box_facets(60)));
+  // The ball goes 5 mm deep into the top of the block.
+  spill(box.file("hand.csv"),
+        "t,x,y,z,qw,qx,qy,qz\n0,30,30,85,1,0,0,0\n0.5,30,30,75,1,0,0,0\n0.8,30,30,75,1,0,0,0\n");
+  Json scene = Json::parse(R"({"hapsix": 1, "units": "mm",
+    "bodies": [{"name": "block", "fixed": true, "field": {"mesh": "block.stl", "voxels": 48}},
+               {"name": "ball", "mass": 0.1, "com": [0,0,0], "inertia": [1e-5,1e-5,1e-5,0,0,0],
+                "pose": {"p": [30,30,85]}, "shell": {"mesh": "ball.stl", "points": 800}}],
+    "hands": [{"body": "ball", "path": "hand.csv"}]})");
+  spill(box.file("mesh.json"), scene.dump());
+  const Json from_mesh = result_of(box, {"run", "mesh.json", "--virtual-time"});
+  REQUIRE(from_mesh["contacts"]["max"] > 0);
+  CHECK(from_mesh["verdict"] == "held");
+
+  const Json field = result_of(box, {"bake", "field", "block.stl", "-o", "block.vdb", "--units",
+                                     "mm", "--voxels", "48", "--threads", "1"});
+  const Json shell = result_of(box, {"bake", "shell", "ball.stl", "-o", "ball.ply", "--units", "mm",
+                                     "--points", "800", "--threads", "1"});
+  scene["bodies"][0]["field"] = {{"file", "block.vdb"}};
+  scene["bodies"][1]["shell"] = {{"file", "ball.ply"}};
+  spill(box.file("baked.json"), scene.dump());
+  const Json from_files = result_of(box, {"run", "baked.json", "--virtual-time"});
+  // Also from one thread to all of them, which baked the first.
+  CHECK(from_files["state_hash"] == from_mesh["state_hash"]);
+  CHECK(from_files["max_depth_voxels"] == from_mesh["max_depth_voxels"]);
+
+  const Json field_info = result_of(box, {"info", "block.vdb"});
+  CHECK(field_info["dims"] == field["dims"]);
+  CHECK(field_info["bricks"] == field["bricks"]);
+  CHECK(field_info["triangles"] == field["triangles"]);
+  CHECK(field_info["sign_mode"] == field["sign_mode"]);
+  CHECK(field_info["offset_m"] == field["offset"]);
+  CHECK(field_info["voxel_size_m"] == field["voxel_size"]);
+  const Json shell_info = result_of(box, {"info", "ball.ply"});
+  CHECK(shell_info["points"] == shell["points"]);
+  CHECK(shell_info["level_points"] == shell["level_points"]);
+
+  // Units of the mesh are those said: the same numbers in metres are a thousand times as large.
+  const Json large =
+      result_of(box, {"bake", "field", "block.stl", "-o", "large.vdb", "--voxels", "48"});
+  CHECK(large["voxel_size"].get<double>() ==
+        doctest::Approx(1000 * field["voxel_size"].get<double>()));
+}
+
+TEST_CASE(
+    "the same run gives the same bits, by one thread or two, from fresh assets or the cache") {
+  Sandbox box;
+  const Args args{"run", "alpha-shortcut", "--virtual-time", "--duration", "4"};
+  const auto with_threads = [&](const char* n) {
+    Args more = args;
+    more.push_back("--threads"), more.push_back(n);
+    return result_of(box, more);
+  };
+  const Json first = result_of(box, args);
+  REQUIRE(first["contacts"]["max"] > 0);
+  CHECK(result_of(box, args)["state_hash"] == first["state_hash"]);
+  CHECK(with_threads("1")["state_hash"] == first["state_hash"]);
+  CHECK(with_threads("2")["state_hash"] == first["state_hash"]);
+  Args other = args;
+  other.push_back("--method"), other.push_back("global");
+  CHECK(result_of(box, other)["state_hash"] != first["state_hash"]);  // the hash sees the motion
+}
+
+TEST_CASE("a recording holds every frame and the result of its run") {
+  Sandbox box;
+  const Json run_result =
+      result_of(box, {"run", "peg-in-hole", "--virtual-time", "--record", "run.h5"});
+  const Json info = result_of(box, {"info", "run.h5"});
+  CHECK(info["frames"] == run_result["frames"]);
+  CHECK(info["whole"] == true);
+  CHECK(info["summary"]["state_hash"] == run_result["state_hash"]);
+  CHECK(info["summary"]["verdict"] == run_result["verdict"]);
+  CHECK(box.files() == std::set<std::string>{"run.h5"});  // nothing beside it
+  // A second run replaces it.
+  result_of(box,
+            {"run", "peg-in-hole", "--virtual-time", "--duration", "0.1", "--record", "run.h5"});
+  CHECK(result_of(box, {"info", "run.h5"})["frames"] == 100);
+  CHECK(box.files() == std::set<std::string>{"run.h5"});
+}

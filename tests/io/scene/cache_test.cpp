@@ -1,0 +1,278 @@
+// The cache of baked assets: found again, never believed blindly, never in the way.
+#include <doctest/doctest.h>
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "io/file/content_hash.h"
+#include "io/scene/cache.h"
+#include "io/shell/shell_file.h"
+#include "tests/io/shell/shell_test_meshes.h"
+
+using namespace shells;
+namespace fs = std::filesystem;
+using namespace h6::io;
+
+namespace {
+
+// HAPSIX_CACHE names a folder that is not there yet, for one test.
+struct CacheFolder {
+  fs::path root = fs::temp_directory_path() / ("hapsix-cache-test-" + std::to_string(getpid()));
+  fs::path path = root / "not" / "yet";
+  CacheFolder() {
+    fs::create_directories(root);
+    setenv("HAPSIX_CACHE", path.c_str(), 1);
+  }
+  ~CacheFolder() {
+    unsetenv("HAPSIX_CACHE");
+    fs::remove_all(root);
+  }
+};
+
+ShellBake shell_options() {
+  ShellBake options;
+  options.points = 200;
+  return options;
+}
+
+FieldBake field_options() {
+  FieldBake options;
+  options.voxels = 16;
+  return options;
+}
+
+const Mesh mesh = box({0, 0, 0}, {0.03, 0.02, 0.01});
+
+// One run; REQUIREs success.
+Cached shell_run(ShellData* out = nullptr, const ShellBake& options = shell_options()) {
+  Cached cached;
+  const auto shell = cached_shell(mesh, options, &cached);
+  REQUIRE_MESSAGE(shell, shell.error());
+  CHECK(shell->input_hash == content_hash(mesh, options));
+  CHECK(shell->size() == options.points);
+  if (out) *out = *shell;
+  return cached;
+}
+
+Cached field_run(FieldData* out = nullptr) {
+  Cached cached;
+  const auto field = cached_field(mesh, field_options(), &cached);
+  REQUIRE_MESSAGE(field, field.error());
+  CHECK(field->input_hash == content_hash(mesh, field_options()));
+  if (out) *out = *field;
+  return cached;
+}
+
+void overwrite(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary | std::ios::trunc) << bytes;
+}
+
+void restore(const char* name, const char* value) {
+  if (value)
+    setenv(name, value, 1);
+  else
+    unsetenv(name);
+}
+
+}  // namespace
+
+TEST_CASE("the folder is HAPSIX_CACHE, else that of XDG, else the home's") {
+  const char* xdg = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  const std::string old_xdg = xdg ? xdg : "", old_home = home ? home : "";
+  unsetenv("HAPSIX_CACHE");
+  setenv("HOME", "/h", 1);
+  setenv("XDG_CACHE_HOME", "/x", 1);
+  CHECK(cache_folder() == "/x/hapsix");
+  setenv("XDG_CACHE_HOME", "relative", 1);  // such a value does not count, says XDG
+  CHECK(cache_folder() == "/h/.cache/hapsix");
+  unsetenv("XDG_CACHE_HOME");
+  CHECK(cache_folder() == "/h/.cache/hapsix");
+  setenv("HAPSIX_CACHE", "/own", 1);
+  CHECK(cache_folder() == "/own");
+  unsetenv("HAPSIX_CACHE");
+  unsetenv("HOME");
+  CHECK(cache_folder().empty());
+  Cached cached;
+  CHECK(cached_shell(mesh, shell_options(), &cached));  // baked all the same
+  CHECK(cached.warnings.size() == 1);
+  restore("XDG_CACHE_HOME", xdg ? old_xdg.c_str() : nullptr);
+  restore("HOME", home ? old_home.c_str() : nullptr);
+}
+
+TEST_CASE("the fingerprint is the published one and sees every byte") {
+  const std::string fox = "The quick brown fox jumps over the lazy dog";
+  CHECK(hex(hash_bytes(fox.data(), fox.size())) == "e34bbc7bbc071b6c7a433ca9c49a9347");
+  CHECK(hex(hash_bytes("", 0)) == std::string(32, '0'));
+  std::set<std::string> seen;
+  std::string bytes(67, '\0');
+  for (std::size_t size = 0; size <= bytes.size(); ++size)
+    seen.insert(hex(hash_bytes(bytes.data(), size)));
+  for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    bytes[bit / 8] ^= char(1u << bit % 8);
+    seen.insert(hex(hash_bytes(bytes.data(), bytes.size())));
+    bytes[bit / 8] ^= char(1u << bit % 8);
+  }
+  CHECK(seen.size() == 68 + 8 * 67);
+}
+
+TEST_CASE("every parameter and every part of the mesh makes another key, threads do not") {
+  std::set<std::string> keys{content_hash(mesh, ShellBake{}), content_hash(mesh, FieldBake{})};
+  std::size_t expected = 2;
+  const auto shell = [&](auto change) {
+    ShellBake options;
+    change(options);
+    keys.insert(content_hash(mesh, options));
+    CHECK(keys.size() == ++expected);
+  };
+  shell([](ShellBake& o) { o.points = 9999; });
+  shell([](ShellBake& o) { o.spacing = 1e-3; });
+  shell([](ShellBake& o) { o.levels = 6; });
+  shell([](ShellBake& o) { o.seed = 2; });
+  shell([](ShellBake& o) { o.surface = ShellSurface::field; });
+  shell([](ShellBake& o) { o.normals = ShellNormals::field; });
+  shell([](ShellBake& o) { o.field.voxels = 128; });
+  shell([](ShellBake& o) { o.field.voxel_size = 1e-3; });
+  shell([](ShellBake& o) { o.field.offset = 0; });
+  shell([](ShellBake& o) { o.field.seal = 1e-3; });
+  const auto field = [&](auto change) {
+    FieldBake options;
+    change(options);
+    keys.insert(content_hash(mesh, options));
+    CHECK(keys.size() == ++expected);
+  };
+  field([](FieldBake& o) { o.voxels = 255; });
+  field([](FieldBake& o) { o.voxel_size = 1e-3; });
+  field([](FieldBake& o) { o.offset = 1e-4; });
+  field([](FieldBake& o) { o.sign = SignMode::flood; });
+  field([](FieldBake& o) { o.cavities = Cavities::hollow; });
+  field([](FieldBake& o) { o.seal = 1e-3; });
+  field([](FieldBake& o) { o.band_voxels = 4; });
+  field([](FieldBake& o) { o.padding_voxels = 9; });
+  const auto other_mesh = [&](auto change) {
+    Mesh changed = mesh;
+    change(changed);
+    keys.insert(content_hash(changed, ShellBake{}));
+    keys.insert(content_hash(changed, FieldBake{}));
+    CHECK(keys.size() == (expected += 2));
+  };
+  other_mesh([](Mesh& m) { m.vertices[3].y = std::nextafter(m.vertices[3].y, 1.0); });
+  other_mesh([](Mesh& m) { std::swap(m.triangles[0][1], m.triangles[0][2]); });
+  other_mesh([](Mesh& m) { m.vertices.push_back({0, 0, 0}); });
+  other_mesh([](Mesh& m) { m.triangles.pop_back(); });
+  other_mesh([](Mesh& m) { m.part.assign(m.triangles.size(), 0); });
+  other_mesh([](Mesh& m) { m.part_names = {"ab", "c"}; });
+  other_mesh([](Mesh& m) { m.part_names = {"a", "bc"}; });
+  ShellBake threaded;
+  threaded.threads = 3;
+  CHECK(content_hash(mesh, threaded) == content_hash(mesh, ShellBake{}));
+}
+
+TEST_CASE("what was baked once is found again, to the bit") {
+  const CacheFolder folder;
+  ShellData first, second;
+  const Cached miss = shell_run(&first), hit = shell_run(&second);
+  CHECK_FALSE(miss.hit);
+  CHECK(hit.hit);
+  CHECK(hit.warnings.empty());
+  CHECK(hit.file == folder.path / (content_hash(mesh, shell_options()) + ".ply"));
+  CHECK(same_bits(first, second));
+  ShellBake more = shell_options();
+  more.points = 201;
+  CHECK_FALSE(shell_run(nullptr, more).hit);
+
+  FieldData field, again;
+  CHECK_FALSE(field_run(&field).hit);
+  const Cached found = field_run(&again);
+  CHECK(found.hit);
+  CHECK(found.file.extension() == ".vdb");
+  CHECK(field.samples == again.samples);
+  CHECK(field.brick_index == again.brick_index);
+  CHECK(field.far_grid == again.far_grid);
+}
+
+TEST_CASE("a damaged or foreign file is baked again, says so, and is then good") {
+  const CacheFolder folder;
+  const fs::path file = shell_run().file;
+  std::ifstream in(file, std::ios::binary);
+  const std::string good((std::istreambuf_iterator<char>(in)), {});
+  std::string flipped = good;
+  flipped[good.size() / 2] ^= 4;
+  for (const std::string& bad : {std::string(), good.substr(0, good.size() / 2), flipped,
+                                 std::string("hello"), good + "x"}) {
+    overwrite(file, bad);
+    const Cached cached = shell_run();
+    CHECK_FALSE(cached.hit);
+    CHECK(cached.warnings.size() == 1);
+    CHECK(shell_run().hit);
+  }
+  // A sound shell of something else under this name.
+  ShellBake other = shell_options();
+  other.seed = 77;
+  const auto foreign = bake_shell(mesh, other, nullptr);
+  REQUIRE(foreign);
+  REQUIRE(write_shell(file, *foreign));
+  const Cached cached = shell_run();
+  CHECK_FALSE(cached.hit);
+  CHECK(cached.warnings.size() == 1);
+  CHECK(shell_run().hit);
+
+  const fs::path field = field_run().file;
+  overwrite(field, "no field");
+  CHECK_FALSE(field_run().hit);
+  CHECK(field_run().hit);
+}
+
+TEST_CASE("a cache that cannot be written is a warning, not an error") {
+  const CacheFolder folder;
+  overwrite(folder.root / "file", "in the way");
+  setenv("HAPSIX_CACHE", (folder.root / "file" / "cache").c_str(), 1);
+  const Cached cached = shell_run();
+  CHECK_FALSE(cached.hit);
+  CHECK(cached.warnings.size() == 1);
+  CHECK(field_run().warnings.size() == 1);
+  // And a folder where the file should be.
+  setenv("HAPSIX_CACHE", folder.root.c_str(), 1);
+  fs::create_directories(folder.root / (content_hash(mesh, shell_options()) + ".ply"));
+  CHECK(shell_run().warnings.size() == 2);  // not read, not written
+}
+
+TEST_CASE("a bake that fails or is cancelled leaves nothing in the cache") {
+  const CacheFolder folder;
+  Cached cached;
+  const auto cancelled = cached_shell(mesh, shell_options(), &cached,
+                                      [](const std::string&, double) { return false; });
+  CHECK_FALSE(cancelled);
+  CHECK(cancelled.error() == "cancelled");
+  CHECK_FALSE(cached_shell(Mesh{}, shell_options(), nullptr));
+  CHECK((!fs::exists(folder.path) || fs::is_empty(folder.path)));
+}
+
+TEST_CASE("many who bake the same asset at once all succeed and leave one file") {
+  const CacheFolder folder;
+  std::vector<ShellData> shells(4);
+  std::vector<std::thread> bakers;
+  for (ShellData& out : shells) {
+    bakers.emplace_back([&out] {
+      for (int turn = 0; turn < 5; ++turn) {
+        Cached cached;
+        const auto shell = cached_shell(mesh, shell_options(), &cached);
+        if (shell && cached.warnings.empty()) out = *shell;
+      }
+    });
+  }
+  for (auto& baker : bakers) baker.join();
+  for (const ShellData& shell : shells) {
+    CHECK(shell.size() == 200);
+    CHECK(same_bits(shell, shells[0]));
+  }
+  CHECK(std::distance(fs::directory_iterator(folder.path), {}) == 1);
+}

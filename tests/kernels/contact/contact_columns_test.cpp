@@ -1,0 +1,128 @@
+// contact_columns_test.cpp - facing, torque directions, gaps and loads of every contact.
+#include "kernels/contact/contact_columns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/kernels/kernel_test.h"
+
+using namespace h6::kernels;
+using namespace h6::kernels::test;
+
+namespace {
+
+constexpr int kOut = 6;  // facing, tx ty tz, e, load
+
+struct Contacts {
+  std::vector<Column> column;  // N g r depth slack
+  std::size_t count;
+  Contacts(std::size_t n, std::size_t shift) : count(n) {
+    Random random(40 + n);
+    for (std::size_t k = 0; k < 11; ++k) column.emplace_back(n, shift + k % 3);
+    for (std::size_t i = 0; i < n; ++i) {
+      double v[3];
+      for (std::size_t k = 0; k < 9; ++k) {
+        if (k % 3 == 0) random.direction(v);
+        column[k][i] = float(v[k % 3] * (k < 6 ? 1 : random.uniform(0.001, 0.2)));
+      }
+      // Now and then an arm along the normal.
+      if (i % 9 == 4)
+        for (std::size_t k = 0; k < 3; ++k) column[6 + k][i] = column[k][i];
+      column[9][i] = float(random.uniform(-2e-4, 1e-3));
+      column[10][i] = float(std::max(0.0, random.uniform(-5e-4, 1e-3)));
+    }
+  }
+  ContactColumns view() {
+    const auto p = [&](std::size_t k) { return column[k].begin(); };
+    return {p(0), p(1), p(2), p(3), p(4), p(5), p(6), p(7), p(8), count};
+  }
+};
+
+double worst(Column& got, Column& want, std::size_t count, double tolerance) {
+  double most = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double error = std::fabs(double{got[i]} - want[i]);
+    most = std::max(most, std::isfinite(got[i]) ? error / tolerance : HUGE_VAL);
+  }
+  CHECK(got.padding_untouched());
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("contact_columns: depths are counted and the largest found on every target and count") {
+  on_every_target([](const std::string&) {
+    Random random(12);
+    for (std::size_t n = 0; n <= 67; ++n) {
+      Column depth(n, n % 5);  // followed by NaN
+      for (std::size_t i = 0; i < n; ++i)
+        depth[i] = i % 4 == 1 ? 0.0f : float(random.uniform(-1e-3, n % 3 == 0 ? 0 : 1e-3));
+      const Depths got = look_at_depths(depth.begin(), n);
+      const Depths want = look_at_depths_ref(depth.begin(), n);
+      CHECK(got.inside == want.inside);
+      CHECK(got.deepest == want.deepest);
+      CHECK((got.deepest > 0) == (got.inside > 0));
+    }
+  });
+}
+
+TEST_CASE("contact_columns: SIMD agrees with the reference on every target, count and alignment") {
+  const double u[6] = {0.3, -0.2, 0.1, 2, -3, 1};
+  on_every_target([&](const std::string&) {
+    for (std::size_t n = 0; n <= 67; ++n) {
+      Contacts c(n, n % 4);
+      const ContactColumns view = c.view();
+      std::vector<Column> got, want;
+      for (std::size_t k = 0; k < kOut + 1; ++k) got.emplace_back(n, k), want.emplace_back(n, 0);
+
+      contact_facing(view, 0.25f, got[0].begin());
+      contact_facing_ref(view, 0.25f, want[0].begin());
+      CHECK(worst(got[0], want[0], n, 2e-6) <= 1);
+
+      // Rounding of r x N is 2^-24 |r|, and |r| up to 1 is divided by l0 at least.
+      for (const float l0 : {1e-3f, 0.1f}) {
+        for (const float lever : {0.0f, 0.2f}) {
+          torque_directions(view, l0, lever, got[1].begin(), got[2].begin(), got[3].begin());
+          torque_directions_ref(view, l0, lever, want[1].begin(), want[2].begin(), want[3].begin());
+          for (std::size_t k = 1; k <= 3; ++k) CHECK(worst(got[k], want[k], n, 3e-7 / l0) <= 1);
+        }
+      }
+      const float* const depth = c.column[9].begin();
+      series_gap(view, depth, 1e-3, u, got[4].begin());
+      series_gap_ref(view, depth, 1e-3, u, want[4].begin());
+      CHECK(worst(got[4], want[4], n, 1e-9) <= 1);
+
+      const float *const kappa = got[0].begin(), *const slack = c.column[10].begin();
+      series_loads(kappa, slack, depth, n, got[5].begin(), got[6].begin());
+      series_loads_ref(kappa, slack, depth, n, want[5].begin(), want[6].begin());
+      CHECK(same_bits(got[5].begin(), want[5].begin(), n));
+      CHECK(same_bits(got[6].begin(), want[6].begin(), n));
+      CHECK(got[5].padding_untouched());
+      CHECK(got[6].padding_untouched());
+    }
+  });
+}
+
+TEST_CASE("contact_columns: a torque direction is square to its normal, of length 1 without l0") {
+  Contacts c(500, 1);
+  const ContactColumns view = c.view();
+  Column t[3] = {Column(500, 0), Column(500, 1), Column(500, 2)};
+  on_every_target([&](const std::string&) {
+    torque_directions(view, 0, 0, t[0].begin(), t[1].begin(), t[2].begin());
+    for (std::size_t i = 0; i < c.count; ++i) {
+      if (i % 9 == 4) continue;  // no direction: the arm is along the normal
+      double dot = 0, length2 = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        dot += double{t[k][i]} * c.column[k][i], length2 += double{t[k][i]} * t[k][i];
+      CHECK(std::fabs(dot) < 1e-4);
+      CHECK(std::fabs(length2 - 1) < 1e-6);
+    }
+    // No arm, no direction.
+    const float zero[3] = {0, 0, 0}, n[3] = {1, 0, 0};
+    const ContactColumns one{n, n + 1, n + 2, n, n + 1, n + 2, zero, zero, zero, 1};
+    torque_directions(one, 0, 0, t[0].begin(), t[1].begin(), t[2].begin());
+    for (Column& column : t) CHECK(column[0] == 0.0f);
+  });
+}

@@ -1,0 +1,70 @@
+// gauss_tree_test.cpp - the tree gives the weights of the specification, at any number of contacts.
+#include "kernels/weights/gauss_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <thread>
+#include <vector>
+#include "tests/kernels/weights/gauss_cases.h"
+#include "tests/kernels/weights/gauss_sets.h"
+#include "tests/support/near.h"
+
+using namespace h6::kernels;
+using namespace h6::kernels::test;
+
+namespace {
+
+struct Tree {
+  static constexpr int kStages = kGaussStages;
+  static constexpr std::size_t kMany = 9001, kMost = 70000;
+  static constexpr auto bytes = gauss_tree_bytes;
+  static constexpr auto all = gauss_weights_tree;
+  static constexpr auto make = gauss_tree;
+  static constexpr auto slices = gauss_tree_slices;
+  static constexpr auto run = gauss_tree_run;
+};
+
+}  // namespace
+
+TEST_CASE("gauss_tree: weights are those of the reference on every target, count and alignment") {
+  check_counts<Tree>();
+}
+
+TEST_CASE("gauss_tree: weights are right however thousands of contacts lie") {
+  check_thousands<Tree>();
+}
+
+TEST_CASE("gauss_tree: any order of slices, and any threads, give the same bits") {
+  check_same_bits_on_any_thread<Tree>();
+}
+
+TEST_CASE("gauss_tree: coincident contacts share one contact's stiffness, whatever their number") {
+  check_coincident<Tree>();
+}
+
+TEST_CASE("gauss_tree: weights stay within 0 and 1 at any depth and width") {
+  check_bounds<Tree>();
+}
+
+TEST_CASE("gauss_tree: contacts that face away weigh nothing, were they all to") {
+  check_facing_away<Tree>();
+}
+
+TEST_CASE("gauss_tree: columns that are not numbers do no harm outside the weights") {
+  check_not_numbers<Tree>();
+}
+
+TEST_CASE("gauss_tree: weights are right where contacts lie so dense that leaves share a walk") {
+  for (const bool weighted : {false, true}) {
+    Contacts c = contacts_of(Set::clump, 30011, kPaper);
+    const DirectionsView view = c.view(weighted);
+    const std::vector<float> want = reference_of(view, Hat::normal, kPaper, 750);
+    on_every_target([&](const std::string& target) {
+      if (target == "SCALAR") return;  // what the others do, slowly
+      CHECK(worst_of(weights_of<Tree>(view, Hat::normal, kPaper), want, 750) <= kTolerance);
+    });
+  }
+}
