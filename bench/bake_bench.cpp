@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bake_bench.cpp - mesh in memory to asset in memory: bake/MESH/voxels:N/threads:T and
 // bake/MESH/points:N/threads:T; bake/openvdb/... is OpenVDB's meshToLevelSet on the same mesh and
 // voxel, in the same run. Meshes are made here; the files of $HAPSIX_BENCH_MESHES (a list separated

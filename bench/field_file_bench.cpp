@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_file_bench.cpp - baked fields to files and back: bake/file/MESH/voxels:N/WHAT, where WHAT
 // is
 //   write       as the cache writes it: uncompressed, to the disk (fsync), renamed

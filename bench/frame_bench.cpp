@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // frame_bench.cpp - whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold.
 //
 // The tool is pushed into the gap until it has the contacts asked for, then held there. Before a

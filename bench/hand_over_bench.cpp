@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hand_over_bench.cpp - what it costs to share a frame's work with the resident helper:
 //     sched/hand_over               the way of an empty slice there and of the news back
 //     sched/sums/us:N               arithmetic in registers, in slices of 1 us

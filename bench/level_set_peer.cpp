@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // level_set_peer.cpp - compiled with the flags of everything else, so that times compare.
 #include "level_set_peer.h"
 

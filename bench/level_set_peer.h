@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // level_set_peer.h - the same job done by OpenVDB's meshToLevelSet, for comparison.
 #pragma once
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // many_fields_bench.cpp - whole frames with many pairs, and with several hands:
 // frame/many_fields/fields:N/threads:T/slow|fast
 // frame/two_hands/contacts:N/threads:T/slow|fast

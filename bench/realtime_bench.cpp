@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // realtime_bench.cpp - the haptic thread beside a plain sleeping thread, idle and under load:
 //     realtime/alpha|socket/RATEHz/idle|loaded/threads:T/spin:US
 //     realtime/arithmetic/RATEHz/idle|loaded

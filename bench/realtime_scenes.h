@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // realtime_scenes.h - what runs in real time: sessions of one scene, and a hand for it.
 #pragma once
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_frame_bench.cpp - whole frames on seeded scenes of 1024^3 voxels and 56,823 points:
 //     frame/clutter|conforming/METHOD/contacts:N/threads:T/warm|cold/slow|fast
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_bench.cpp - mesh in memory to shell in memory: bake/shell/points:56823/threads:T of the
 // starter motor (18,580 triangles), and bake/shell/MESH/points:N/threads:T of other inputs: the
 // actuator (25,191), a torus of one closed piece, a soup of slit tori with points where its field

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // target.cpp - all benchmarks on a lesser instruction set: HAPSIX_BENCH_TARGET=AVX2 hapsix_bench.
 #include <benchmark/benchmark.h>
 

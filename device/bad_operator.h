@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bad_operator.h - a hand, and what goes wrong with hands: for soak tests of whatever is behind it.
 //
 //     a device --sample--> shake | jerk | freeze | NaN | jump | unplug --sample--> engine

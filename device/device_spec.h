@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device_spec.h - the name of a device on a command line or in a scene, taken apart:
 //
 //   NAME[:TARGET][?KEY=VALUE[&KEY=VALUE...]]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // forward_arm.h - of a device that stands before another: it arms what is behind it.
 #pragma once
 #include "hapsix/device.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hand_path.h - where a hand should be at a time: keyframes in memory.
 //
 // Devices receive arrays; files are read elsewhere.

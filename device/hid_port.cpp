@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hidapi, and nothing else of it anywhere.
 #include "device/hid_port.h"
 

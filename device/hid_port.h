@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hid_port.h - the little of HID that a SpaceMouse needs. hidapi stands behind it, or a test.
 //
 // Not for the haptic thread: these calls enter the system and may wait.

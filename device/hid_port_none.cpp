@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // For builds without hidapi: there are no HID devices.
 #include "device/hid_port.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // path_device.h - a hand that follows its path whatever it feels: an ideal, infinitely strong
 // person.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // plugin.h - a device out of a shared library (hapsix/device_plugin.h).
 //
 //   probe  in a child process: load, open, read once, close. A crash or a hang ends the child, and

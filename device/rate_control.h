@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // rate_control.h - deflection of a sprung cap in, hand pose out: the cap's deflection is the hand's
 // velocity, which is integrated here, once a frame.
 //

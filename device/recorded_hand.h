@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recorded_hand.h - a hand that gives the samples of an earlier run again, bit by bit, whatever is
 // felt; at rest where the last one was.
 #pragma once

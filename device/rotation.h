@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // rotation.h - vectors and quaternions of the devices; private to this folder.
 #pragma once
 #include <cmath>

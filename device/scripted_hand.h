@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scripted_hand.h - a hand that does what a text says, line by line:
 //
 //   move DX DY DZ in SECONDS      straight, world frame, in the text's unit of length

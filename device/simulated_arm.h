@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // simulated_arm.h - a 6-DoF force-feedback arm without hardware, with what makes real ones hard,
 // and a person who holds it.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // simulated_hand.h - a person without hardware: an arm of mass, spring and damper that wants to be
 // where its path says, and yields to the force it feels.
 //

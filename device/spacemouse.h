@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // spacemouse.h - a 3Dconnexion cap as a hand: six axes of velocity in, one light out.
 //
 //   HID thread    opens, reads all that is queued, keeps the newest, lights the LED; looks for the

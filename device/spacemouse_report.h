@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // spacemouse_report.h - what a 3Dconnexion cap says: bytes in, axes, buttons and battery out. Pure
 // functions: nothing is opened here, and no bytes can do harm.
 //

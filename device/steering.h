@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // steering.h - somebody takes the hand away from its path, moves it, and gives it back.
 //
 // While it is held the path's own time stands still; given back, the hand glides to where the path

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // compress-inl.h - lanes that a mask names, moved to the front, in order.
 //
 // Highway 1.0 keeps the tables for that in the function that needs them, and compilers copy them to

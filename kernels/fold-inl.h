@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // fold-inl.h - sums over the lanes of four vectors at once: a quarter of the shuffles that one
 // after the other takes, and in a fixed order.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // simd.h - which Highway targets are built; include before hwy/foreach_target.h.
 //
 // Kernels keep vectors in small structs and arrays, which targets of unknown vector length cannot:

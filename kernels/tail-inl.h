@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tail-inl.h - loads and stores of the first n lanes that touch no memory past them.
 //
 // Included once for each SIMD target. Highway's masked forms read or write a whole vector where the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // targets.cpp - names and forces the SIMD target; see targets.h.
 #include "kernels/targets.h"
 

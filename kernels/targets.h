@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // targets.h - which SIMD instruction set the kernels run on, and how a test picks another.
 //
 // Every kernel is compiled once for each target and chooses at run time; results agree bit for bit

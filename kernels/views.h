@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // views.h - what kernels read: plain pointers and counts, no ownership.
 //
 // Kernels work in float, in voxels of one field: session state stays in double above them. All

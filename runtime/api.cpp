@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // api.cpp - a session seen through the contract.
 #include <algorithm>
 #include <bit>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // assert.cpp - what a failed assertion does; the one piece of the contract that is code, so that
 // the leaves can assert without knowing the engine.
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // defaults.cpp - start values of every definition (METHOD.md, Sec. 4) and names of every
 // enumeration.
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // frame.cpp - one frame, on one page.
 //
 //   samples -> [traverse -> contacts -> weights -> wrench, K, D] -> coupling -> step -> output

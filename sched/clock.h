@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // clock.h - the two clocks of a haptic thread.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // frame_team.h - a resident helper that takes slices of a frame's work from the haptic thread.
 //
 // Entering a TBB arena every millisecond costs a futex call a frame. So the helper is one task that

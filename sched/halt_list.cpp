@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sched/halt_list.h"
 
 #include <sched.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // halt_list.h - what a process must halt before it ends, however it ends: by exit, from a signal
 // handler, from any thread.
 #pragma once

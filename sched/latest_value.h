@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // latest_value.h - hands the newest value from one writer to one reader; neither ever waits.
 //
 // Three slots: the writer owns one, the reader owns one, the third is the exchange. `middle_` holds

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // parallel_for.h - one loop over independent pieces, oneTBB behind it. For baking and loading, not
 // for the frame (see frame_team.h).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sched/periodic_thread.h"
 
 #include "sched/clock.h"

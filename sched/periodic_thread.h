@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // periodic_thread.h - a thread that does one thing at absolute deadlines, and accounts for time.
 //
 //   deadline n          deadline n+1

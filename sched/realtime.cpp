@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sched/realtime.h"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // realtime.h - asks the machine for real-time treatment of the calling thread, and says what it
 // got.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // spsc_ring.h - one writer, one reader, fixed capacity; neither ever waits.
 //
 // The two cursors only grow; a slot is cursor % capacity. Each side keeps a copy of the other's

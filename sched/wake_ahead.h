@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // wake_ahead.h - where deadlines lie, and when to end the sleep before one, so that the spin is as
 // long as it was asked to be.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // watchdog.h - a thread that does nothing as long as another one says that it lives.
 //
 // It sleeps from one possible expiry to the next, so that a beat costs one store and no wake-up.

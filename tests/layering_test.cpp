@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The house stands: includes point down, packages enter through one folder, link lines agree.
 #include <doctest/doctest.h>
 
@@ -250,6 +251,15 @@ TEST_CASE("link lines agree with the house") {
     }
   }
   CHECK(seen >= 7);
+}
+
+TEST_CASE("every source file names its licence in its first line") {
+  for (const fs::path& file : sources()) {
+    std::ifstream in(file);
+    std::string first;
+    std::getline(in, first);
+    CHECK_MESSAGE(first == "// SPDX-License-Identifier: Apache-2.0", file);
+  }
 }
 
 TEST_CASE("no file names an instruction set or loosens floating point for the compiler") {

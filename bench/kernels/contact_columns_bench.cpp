@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_columns_bench.cpp - what is done once a contact: sampling groups, making contacts of what
 // touches, torque directions.
 #include "kernels/contact/contact_columns.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_wrench_bench.cpp - wrench, stiffness and damping of n contacts.
 #include "kernels/contact/contact_wrench.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cull_spheres_bench.cpp - spheres of up to 6 voxels radius, within 20 voxels of the surface.
 #include "kernels/contact/cull_spheres.h"
 

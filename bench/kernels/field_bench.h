@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_bench.h - a field and points for the sampling and culling benchmarks.
 #pragma once
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree_bench.cpp - density on the Gauss map by the tree, by the sweep and, of few contacts,
 // by every pair once, where the flat kernel is quadratic.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_weights_bench.cpp - density on the Gauss map, n contacts against n.
 #include "kernels/weights/gauss_weights.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // kernel_bench.h - registers a kernel's benchmark for its reference and for every SIMD target.
 //
 // Names end in what ran: ".../ref", ".../SCALAR", ".../AVX3". ref is the specification, compiled

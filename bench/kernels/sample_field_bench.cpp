@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_field_bench.cpp - distance and gradient at n points: "near" all in bricks, "mixed" within
 // 20 voxels of the surface. The set stays in cache between runs when it fits.
 #include "kernels/field/sample_field.h"

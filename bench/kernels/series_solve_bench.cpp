@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series_solve_bench.cpp - loads of n contacts, from nothing and from the last frame's extension.
 #include "kernels/weights/series_solve.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* template_device.c - a plug-in to start from: a handle of 0.3 kg that a spring holds where it
  * began. Put your driver's calls where the spring is. Build and try it:
  *

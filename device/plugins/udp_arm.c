@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* udp_arm.c - a plug-in for an arm that is reached through a network (udp_arm_protocol.h).
  *
  *   build/release/hapsix_udp_arm --port 47806 &

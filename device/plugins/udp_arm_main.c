@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* udp_arm_main.c - the other side of udp_arm.c: a simulated arm as a process of its own.
  *
  *   hapsix_udp_arm [--port N] [--press METRES] [--period SECONDS]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* udp_arm_protocol.h - two datagrams between udp_arm.c (the plug-in) and udp_arm_main.c (the arm).
  *
  *   plug-in --command, numbered--> arm --one sample for each, with the command's number--> plug-in

@@ -1,4 +1,5 @@
-// bake_field.cpp - a field from a mesh, step by step (see bake_grid.h).
+// SPDX-License-Identifier: Apache-2.0
+// bake_field.cpp - a field from a mesh, step by step (see grid.h).
 //
 // Meaning of the sign: H. Xu, J. Barbic, "Signed distance fields for polygon soup meshes", 2014.
 // What the outside cannot reach is inside: winding is never looked at, so inside-out, mixed or

@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 // bake_field.h - from a triangle mesh or soup to a sparse signed distance field.
 //
 // H. Xu, J. Barbic, "Signed distance fields for polygon soup meshes", 2014, for the meaning of the
-// sign; bake_inside.cpp says what inside samples are.
+// sign; inside.cpp says what inside samples are.
 #pragma once
 #include "hapsix/result.h"
 #include "io/field/field_data.h"
@@ -51,7 +52,7 @@ struct FieldBakeReport {
 // likewise. Inside a soup: minus (distance + offset), the way out through the nearest sheet, or
 // distance - offset between that sheet and the zero set. Where sheets lie buried in the solid
 // (parts that run into each other) the way out is up to 0.74 voxel + 13 % too short; in a few
-// places too long (bake_inside.cpp).
+// places too long (inside.cpp).
 // far_grid: a lower bound of the distance, outside by a voxel at most.
 Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                              const Progress& progress = {});

@@ -1,4 +1,5 @@
-// bake_bins.cpp - which triangles come within reach of which bricks.
+// SPDX-License-Identifier: Apache-2.0
+// bins.cpp - which triangles come within reach of which bricks.
 //
 // A triangle visits the tiles of its box, and in each all 64 bricks at once. Where tiles are many,
 // the range is halved and each half is kept only if no plane of the triangle separates it (face

@@ -1,4 +1,5 @@
-// bake_chains.cpp - chains of neighbouring nodes from the reached set (see bake_chains.h).
+// SPDX-License-Identifier: Apache-2.0
+// chains.cpp - chains of neighbouring nodes from the reached set (see chains.h).
 #include "io/bake/chains.h"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
-// bake_chains.h - how far nodes are from the reached set along chains of neighbours. Private to
-// bake_*.cpp; bake_inside.cpp says what for.
+// SPDX-License-Identifier: Apache-2.0
+// chains.h - how far nodes are from the reached set along chains of neighbours. Private to
+// bake_*.cpp; inside.cpp says what for.
 #pragma once
 #include "io/bake/grid.h"
 #include "kernels/bake/chain_step.h"

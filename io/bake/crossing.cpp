@@ -1,4 +1,5 @@
-// bake_crossing.cpp - which edges between neighbouring nodes the surface crosses, exactly.
+// SPDX-License-Identifier: Apache-2.0
+// crossing.cpp - which edges between neighbouring nodes the surface crosses, exactly.
 //
 // Vertices are rounded once to 2^-18 voxel: a closed mesh stays closed, and from then on everything
 // is integer arithmetic without error. Each triangle is drawn, once along each axis, onto the

@@ -1,4 +1,5 @@
-// bake_distance.cpp - the unsigned distance of a tile's nodes to the triangles near them, and what
+// SPDX-License-Identifier: Apache-2.0
+// distance.cpp - the unsigned distance of a tile's nodes to the triangles near them, and what
 // the later steps ask about it, while it is in the cache.
 #include <algorithm>
 

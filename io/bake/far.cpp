@@ -1,4 +1,5 @@
-// bake_far.cpp - how far every eighth node is from the surface at least.
+// SPDX-License-Identifier: Apache-2.0
+// far.cpp - how far every eighth node is from the surface at least.
 //
 // Nodes near the surface are known already. Of the others every second one each way is searched,
 // with the triangles around those that were nearest to the nodes before as a start, which nearly

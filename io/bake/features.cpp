@@ -1,4 +1,5 @@
-// bake_features.cpp - which triangle answers for an edge or corner, and what the others that share
+// SPDX-License-Identifier: Apache-2.0
+// features.cpp - which triangle answers for an edge or corner, and what the others that share
 // it say about where it may be nearest (see kernels::FacetRegion).
 #include <algorithm>
 

@@ -1,4 +1,5 @@
-// bake_flood.cpp - the flood of bake_flood.h.
+// SPDX-License-Identifier: Apache-2.0
+// flood.cpp - the flood of flood.h.
 #include "io/bake/flood.h"
 
 #include <algorithm>

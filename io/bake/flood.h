@@ -1,4 +1,5 @@
-// bake_flood.h - what water reaches over nodes, 64 at a time. Private to bake_*.cpp.
+// SPDX-License-Identifier: Apache-2.0
+// flood.h - what water reaches over nodes, 64 at a time. Private to bake_*.cpp.
 //
 // A node is passable when its mask says so; it is left through edges that no triangle crosses.
 // Bricks without a row are all passable, so the flood takes them whole. The result is a set: the

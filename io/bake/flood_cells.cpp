@@ -1,4 +1,5 @@
-// bake_flood_cells.cpp - which open cells of a flood (bake_flood.h) hang together with the border.
+// SPDX-License-Identifier: Apache-2.0
+// flood_cells.cpp - which open cells of a flood (flood.h) hang together with the border.
 #include <algorithm>
 
 #include "io/bake/flood.h"

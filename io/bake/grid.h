@@ -1,4 +1,5 @@
-// bake_grid.h - what the steps of a field bake hand to each other. Private to bake_*.cpp.
+// SPDX-License-Identifier: Apache-2.0
+// grid.h - what the steps of a field bake hand to each other. Private to bake_*.cpp.
 //
 // All steps work in GRID coordinates: voxels, node (i,j,k) of the field at (i,j,k). Metres come
 // back only when the result is written.
@@ -148,7 +149,7 @@ struct Features {
   Large<Gradient> across;                 // (3 triangles) into another triangle of an owned edge
   Large<Gradient> from;                   // (4 vertices) along edges that leave it
 };
-// bake_features.cpp
+// features.cpp
 void find_features(const Surface& surface, unsigned threads, Features& out);
 
 // Bricks that a triangle comes near to, and what is known of their nodes. Rows are candidates, in
@@ -191,10 +192,10 @@ class Steps {
   mutable std::int64_t since_ns_ = 0;
 };
 
-// bake_bins.cpp: tiles, cells and rows. A sentence when there are too many.
+// bins.cpp: tiles, cells and rows. A sentence when there are too many.
 Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
                         NarrowBand& band);
-// bake_distance.cpp, bake_crossing.cpp: what is known of the rows of one tile.
+// distance.cpp, crossing.cpp: what is known of the rows of one tile.
 // The first returns the triangles that may meet the tile itself, which the second needs; they are
 // there until the thread measures another.
 std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& grid,
@@ -202,25 +203,25 @@ std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& 
 void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile,
                 std::span<const std::uint32_t> triangles, NarrowBand& band);
 
-// bake_seal.cpp: facets across holes up to grid.seal wide; returns how many, a square voxel each.
+// seal.cpp: facets across holes up to grid.seal wide; returns how many, a square voxel each.
 std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads,
                        Surface& surface);
 
-// bake_sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
+// sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
 struct Reached {
   Masks node;                      // (rows)
   std::vector<std::uint8_t> cell;  // (cells) all of it, where it has no row
 };
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads);
-// bake_pockets.cpp: those of the candidates from which a reached node can be reached after all.
+// pockets.cpp: those of the candidates from which a reached node can be reached after all.
 std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
                                 const std::vector<RowNodes>& candidates, const Masks& wet,
                                 unsigned threads);
 
-class Chains;  // bake_chains.h
+class Chains;  // chains.h
 
-// bake_inside.cpp: what the signed distances need besides u, and which rows are needed at all.
+// inside.cpp: what the signed distances need besides u, and which rows are needed at all.
 struct Inside {
   std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within band of the zero set
   Masks in_sight;                    // (rows) not reached, yet R is on this side of the sheet
@@ -238,11 +239,11 @@ struct Inside {
 };
 bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
                  const Steps& steps, Inside& inside);
-// bake_samples.cpp: the needed rows' signed distances [m], in place of u, and where they are.
+// samples.cpp: the needed rows' signed distances [m], in place of u, and where they are.
 void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, const Inside& inside,
                    unsigned threads, FieldData& field);
 
-// bake_far.cpp: lower bounds [m] with sign at every eighth node.
+// far.cpp: lower bounds [m] with sign at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
                       const Reached& reached, unsigned threads, const Steps& steps,
                       std::vector<float>& far);

@@ -1,4 +1,5 @@
-// bake_inside.cpp - from unsigned distances u and the reached set R to signed distances.
+// SPDX-License-Identifier: Apache-2.0
+// inside.cpp - from unsigned distances u and the reached set R to signed distances.
 //
 // Nodes of R get u - offset: exact. For the others the distance to R is wanted.
 // - No part of R is nearer than offset - u (u is 1-Lipschitz and is `offset` on the border of R).

@@ -1,4 +1,5 @@
-// bake_leaves.cpp - the order of triangles in the tree (see bake_leaves.h).
+// SPDX-License-Identifier: Apache-2.0
+// leaves.cpp - the order of triangles in the tree (see leaves.h).
 //
 // Triangles in the order of Hilbert's curve lie together, but eights of them that follow each other
 // on it lie anyhow: around edges, across faces. So every 512 of them are halved until eights are

@@ -1,4 +1,5 @@
-// bake_leaves.h - which triangles share a leaf of the tree (see bake_tree.h). Private to
+// SPDX-License-Identifier: Apache-2.0
+// leaves.h - which triangles share a leaf of the tree (see tree.h). Private to
 // bake_*.cpp.
 #pragma once
 #include "io/bake/grid.h"

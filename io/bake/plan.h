@@ -1,4 +1,5 @@
-// bake_plan.h - what a field bake will give and ask for, before it is made.
+// SPDX-License-Identifier: Apache-2.0
+// plan.h - what a field bake will give and ask for, before it is made.
 #pragma once
 #include <array>
 #include <cstdint>

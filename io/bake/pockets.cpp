@@ -1,4 +1,5 @@
-// bake_pockets.cpp - nodes at the bottom of grooves narrower than a voxel.
+// SPDX-License-Identifier: Apache-2.0
+// pockets.cpp - nodes at the bottom of grooves narrower than a voxel.
 //
 // Such a node is outside, yet all edges to its neighbours are crossed: the flood cannot step down
 // to it. Each candidate is judged alone: first by the parity of crossings towards reached nodes

@@ -1,4 +1,5 @@
-// bake_samples.cpp - from unsigned distances to the samples of the field, in place.
+// SPDX-License-Identifier: Apache-2.0
+// samples.cpp - from unsigned distances to the samples of the field, in place.
 //
 // Rows become bricks in the same order, and no brick lies behind its row. Chunks are signed side by
 // side, each in order, right into the room of their bricks. Where that is room of rows that a chunk

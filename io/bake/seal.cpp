@@ -1,4 +1,5 @@
-// bake_seal.cpp - plugs for holes up to a width, so that a part with missing triangles does not
+// SPDX-License-Identifier: Apache-2.0
+// seal.cpp - plugs for holes up to a width, so that a part with missing triangles does not
 // drain.
 //
 // 1. The wide outside W: where the middle of a ball of that width can come from outside.

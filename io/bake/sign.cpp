@@ -1,4 +1,5 @@
-// bake_sign.cpp - what is outside: a flood over nodes, 64 at a time.
+// SPDX-License-Identifier: Apache-2.0
+// sign.cpp - what is outside: a flood over nodes, 64 at a time.
 //
 // A node is passable when u > offset and it is not on the surface; it is left through edges that no
 // triangle crosses. Bricks without a row are all passable, so the flood takes them whole. The

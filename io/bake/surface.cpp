@@ -1,4 +1,5 @@
-// bake_surface.cpp - which triangles of a mesh count, whether they close, and the grid around them.
+// SPDX-License-Identifier: Apache-2.0
+// surface.cpp - which triangles of a mesh count, whether they close, and the grid around them.
 #include <algorithm>
 #include <cstdio>
 #include <utility>

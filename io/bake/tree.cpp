@@ -1,4 +1,5 @@
-// bake_tree.cpp - closest-point search over triangles (see bake_tree.h).
+// SPDX-License-Identifier: Apache-2.0
+// tree.cpp - closest-point search over triangles (see tree.h).
 //
 // Boxes and triangles are weighed eight at a time in float, by bounds that are never more than the
 // truth (rounding to float included). The least of the triangles' bounds is one of the distance;

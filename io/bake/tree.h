@@ -1,4 +1,5 @@
-// bake_tree.h - the distance of any point to the surface. Private to bake_*.cpp.
+// SPDX-License-Identifier: Apache-2.0
+// tree.h - the distance of any point to the surface. Private to bake_*.cpp.
 #pragma once
 #include <span>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // clearance.h - how far one mesh is from another, where they stand.
 #pragma once
 #include "hapsix/result.h"

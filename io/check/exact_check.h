@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // exact_check.h - a baked field against the mesh it is of: distances that are exact, sides by votes
 // of rays, the bound far from the surface as the engine reads it. Nothing of the bake is used.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ray_scene.h - rays through a mesh and the point of it nearest to a place, by Embree: the tool for
 // a question at a few thousand places, where a field is a grid of answers.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ray_votes.h - on which side of a mesh a place is, as rays see it, and whether it can be left.
 #pragma once
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // wall_thickness.h - how thick the walls of a mesh are and how wide its gaps, by rays from its
 // surface against the normals of its triangles.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bake_command.cpp - hapsix bake field|shell: a mesh becomes an asset that opens in other programs.
 #include <sys/resource.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // check_command.cpp - hapsix check: whether meshes are fit for fields, before an hour is spent on
 // them, and whether a baked field is what its mesh says.
 #include <CLI/CLI.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // commands.h - one function a subcommand: adds it to the program; its work runs after parsing.
 #pragma once
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // demo_command.cpp - hapsix demo: the alpha puzzle forced through its gap, global scaling against
 // the adaptive weights, in real time.
 #include <CLI/CLI.hpp>

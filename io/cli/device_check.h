@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device_check.h - a device by itself, without a scene: its samples, and a tenth of its force.
 #pragma once
 #include <functional>

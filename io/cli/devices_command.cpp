@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // devices_command.cpp - hapsix devices: which there are, why one cannot be used, what one says.
 #include <unistd.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // experiments_command.cpp - hapsix experiments [NAME...]: the paper's experiments, every method, as
 // tables anyone can re-run.
 #include <CLI/CLI.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // info_command.cpp - hapsix info FILE: what a file is, and what is wrong with it.
 #include <CLI/CLI.hpp>
 #include <algorithm>

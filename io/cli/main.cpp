@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // main.cpp - hapsix, the program: parses, dispatches, exits 0 (done), 1 (failed) or 2 (wrong
 // usage).
 #include <CLI/CLI.hpp>

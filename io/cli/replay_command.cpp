@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // replay_command.cpp - hapsix replay REC.h5: the recorded hand once more, in virtual time.
 //
 //   recording --head--> scene, settings, SIMD target --> session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // report_command.cpp - hapsix report REC.h5... -o OUT.html: recordings as one file to look at.
 //
 // Recordings hold what devices and bodies did; contacts are made again by running each recorded

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // report_files.h - recordings in, one HTML file out.
 #pragma once
 #include <string>

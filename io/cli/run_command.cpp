@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // run_command.cpp - hapsix run SCENE.json: forces and a verdict out.
 #include <CLI/CLI.hpp>
 #include <algorithm>

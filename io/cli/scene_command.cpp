@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_command.cpp - hapsix scene list | export NAME DIR: generated scenes as plain files.
 #include <CLI/CLI.hpp>
 #include <memory>

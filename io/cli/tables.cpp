@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/cli/tables.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tables.h - runs as a person reads them.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/cli/view_run.h"
 
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // view_run.h - a run that is looked at: `hapsix run SCENE --view`.
 //
 // The page's server is on a thread of its own, the run on the haptic thread; between them this,

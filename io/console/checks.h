@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // checks.h - what can be said about an argument before any work is done: mistakes are told within
 // milliseconds, not after a long bake.
 #pragma once

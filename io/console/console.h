@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // console.h - what the program says and where: results on stdout, everything else on stderr.
 #pragma once
 #include <atomic>

@@ -1,4 +1,5 @@
-// experiments_alpha.cpp - the alpha pushed at its shortcut in many directions (Fig. 8).
+// SPDX-License-Identifier: Apache-2.0
+// alpha.cpp - the alpha pushed at its shortcut in many directions (Fig. 8).
 #include <algorithm>
 
 #include "io/experiments/grid.h"

@@ -1,4 +1,5 @@
-// experiments_energy.cpp - what a closed cycle costs or gives, and whether a bounce grows.
+// SPDX-License-Identifier: Apache-2.0
+// energy.cpp - what a closed cycle costs or gives, and whether a bounce grows.
 #include <algorithm>
 #include <cmath>
 

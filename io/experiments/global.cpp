@@ -1,4 +1,5 @@
-// experiments_global.cpp - global scaling in the scenes in which the paper says that it fails.
+// SPDX-License-Identifier: Apache-2.0
+// global.cpp - global scaling in the scenes in which the paper says that it fails.
 #include "io/experiments/grid.h"
 #include "io/scenes/scenes.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/experiments/grid.h"
 
 namespace h6::cli {

@@ -1,4 +1,5 @@
-// experiments_grid.h - what studies that run scenes share: every scene with every column.
+// SPDX-License-Identifier: Apache-2.0
+// grid.h - what studies that run scenes share: every scene with every column.
 #pragma once
 #include "io/experiments/studies.h"
 

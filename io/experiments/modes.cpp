@@ -1,4 +1,5 @@
-// experiments_modes.cpp - the peg in the hand of a simulated arm, in every device mode and with
+// SPDX-License-Identifier: Apache-2.0
+// modes.cpp - the peg in the hand of a simulated arm, in every device mode and with
 // delay (Fig. 13).
 #include <algorithm>
 #include <cmath>

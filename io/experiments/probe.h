@@ -1,4 +1,5 @@
-// experiments_probe.h - studies of contacts at given poses: a free body that nothing holds is put
+// SPDX-License-Identifier: Apache-2.0
+// probe.h - studies of contacts at given poses: a free body that nothing holds is put
 // somewhere, and what touches there is read.
 #pragma once
 #include "io/experiments/grid.h"

@@ -1,4 +1,5 @@
-// experiments_report.h - the experiments' tables as text for a terminal, as Markdown and as JSON.
+// SPDX-License-Identifier: Apache-2.0
+// report.h - the experiments' tables as text for a terminal, as Markdown and as JSON.
 #pragma once
 #include <nlohmann/json.hpp>
 

@@ -1,4 +1,5 @@
-// experiments_run.h - one run of a scene in virtual time on the calling thread, and what the tables
+// SPDX-License-Identifier: Apache-2.0
+// run.h - one run of a scene in virtual time on the calling thread, and what the tables
 // say about it; many of them side by side.
 #pragma once
 #include <functional>

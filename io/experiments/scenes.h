@@ -1,4 +1,5 @@
-// experiments_scenes.h - the scenes of the experiments' table: the paper's claim about each, what a
+// SPDX-License-Identifier: Apache-2.0
+// scenes.h - the scenes of the experiments' table: the paper's claim about each, what a
 // prototype with analytic distances measured, and the runs.
 #pragma once
 #include <functional>

@@ -1,4 +1,5 @@
-// experiments_share.cpp - Fig. 7 with ever fewer contacts on one of two plates.
+// SPDX-License-Identifier: Apache-2.0
+// share.cpp - Fig. 7 with ever fewer contacts on one of two plates.
 #include "io/experiments/grid.h"
 
 namespace h6::cli {

@@ -1,4 +1,5 @@
-// experiments_smoothness.cpp - how smooth the force is on given paths.
+// SPDX-License-Identifier: Apache-2.0
+// smoothness.cpp - how smooth the force is on given paths.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

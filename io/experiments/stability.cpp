@@ -1,4 +1,5 @@
-// experiments_stability.cpp - the largest contact stiffness that a run stands, per method, sampling
+// SPDX-License-Identifier: Apache-2.0
+// stability.cpp - the largest contact stiffness that a run stands, per method, sampling
 // and integrator.
 #include <cmath>
 

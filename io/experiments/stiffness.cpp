@@ -1,4 +1,5 @@
-// experiments_stiffness.cpp - how stiff the weighted contacts are together: against the sampling of
+// SPDX-License-Identifier: Apache-2.0
+// stiffness.cpp - how stiff the weighted contacts are together: against the sampling of
 // flat and curved patches, and against the angle between two planes.
 #include <algorithm>
 #include <cmath>

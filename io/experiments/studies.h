@@ -1,4 +1,5 @@
-// experiments_studies.h - what the paper's experiments ask beside single scenes: how stable, how
+// SPDX-License-Identifier: Apache-2.0
+// studies.h - what the paper's experiments ask beside single scenes: how stable, how
 // smooth, how dependent on the sampling each method is.
 #pragma once
 #include "io/experiments/report.h"
@@ -12,29 +13,29 @@ struct StudyKind {
 };
 const std::vector<StudyKind>& studies();
 
-// experiments_stability.cpp
+// stability.cpp
 Study study_stability(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_variations.cpp: the scenes with one thing changed.
+// variations.cpp: the scenes with one thing changed.
 Study study_sampling(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_force(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_voxel(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_share.cpp
+// share.cpp
 Study study_share(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_global.cpp
+// global.cpp
 Study study_global(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_alpha.cpp
+// alpha.cpp
 Study study_pushes(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_smoothness.cpp
+// smoothness.cpp
 Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_ripple(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_stiffness.cpp
+// stiffness.cpp
 Study study_net_stiffness(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_two_planes(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_modes.cpp
+// modes.cpp
 Study study_modes(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_energy.cpp
+// energy.cpp
 Study study_energy(const std::vector<MethodColumn>& columns, const Console& console);
-// experiments_time.cpp
+// time.cpp
 Study study_time(const std::vector<MethodColumn>& columns, const Console& console);
 
 }  // namespace h6::cli

@@ -1,4 +1,5 @@
-// experiments_time.cpp - what a frame costs against the number of contacts (Fig. 6).
+// SPDX-License-Identifier: Apache-2.0
+// time.cpp - what a frame costs against the number of contacts (Fig. 6).
 #include <algorithm>
 
 #include "io/experiments/probe.h"

@@ -1,4 +1,5 @@
-// experiments_variations.cpp - the scenes again with one thing changed: the sampling of the shell,
+// SPDX-License-Identifier: Apache-2.0
+// variations.cpp - the scenes again with one thing changed: the sampling of the shell,
 // the force of the hand, the voxels of the fields.
 #include <algorithm>
 

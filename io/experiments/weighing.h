@@ -1,4 +1,5 @@
-// experiments_weighing.h - `series` beside `robust`, criterion by criterion, from what was
+// SPDX-License-Identifier: Apache-2.0
+// weighing.h - `series` beside `robust`, criterion by criterion, from what was
 // measured.
 #pragma once
 #include "io/experiments/report.h"

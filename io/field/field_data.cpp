@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_data.cpp - the view of a baked field that the engine takes.
 #include "io/field/field_data.h"
 

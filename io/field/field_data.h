@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_data.h - a baked field in memory: what h6FieldDef points at, with its history.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_file.cpp - fields to and from OpenVDB files.
 //
 //   distance  FloatGrid, level set [m]; a leaf of 8^3 voxels is a brick, all of it active
@@ -5,7 +6,7 @@
 //   part      Int32Grid, one voxel a brick; only where the mesh has parts
 //   triangle  Int32Grid, one voxel a brick; -1 where a sealed hole is nearest
 // The rest of FieldData is metadata of `distance`, named hapsix_*. Leaves run z fastest, bricks x.
-// Uncompressed files of ours are laid out and read by field_stored.cpp, all others by OpenVDB here.
+// Uncompressed files of ours are laid out and read by stored.cpp, all others by OpenVDB here.
 //
 // OpenVDB trusts its input: an exception while it reads a tree frees what was never made, and an
 // uncompressed file does not notice a flipped bit. So our files carry a seal over all bytes that is

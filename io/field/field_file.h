@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_file.h - fields as OpenVDB files: grids `distance`, `far`, `part` and `triangle`, history
 // as metadata.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // file_seal.h - a checksum of a whole file inside that file.
 //
 // The file holds seal_text() once, near its start, where its format keeps text; its digits are a

@@ -1,4 +1,5 @@
-// field_foreign.cpp - a narrow-band level set made by another program, as a field.
+// SPDX-License-Identifier: Apache-2.0
+// foreign.cpp - a narrow-band level set made by another program, as a field.
 //
 // Trusted are values nearer than the background (the half width of the band). A cell nearer than
 // background - sqrt(3) voxels to the surface has trusted values at all its nodes: that is our band.

@@ -1,4 +1,5 @@
-// field_grids.cpp - fields to and from grids: all but the samples.
+// SPDX-License-Identifier: Apache-2.0
+// grids.cpp - fields to and from grids: all but the samples.
 #include "io/field/grids.h"
 
 #include <cmath>

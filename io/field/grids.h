@@ -1,4 +1,5 @@
-// field_grids.h - what the ways to read and write .vdb files share. Private to field_*.cpp.
+// SPDX-License-Identifier: Apache-2.0
+// grids.h - what the ways to read and write .vdb files share. Private to field_*.cpp.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -35,7 +36,7 @@ struct Place {
   }
 };
 
-// ---- field_grids.cpp: all of a field but its samples --------------------------------------------
+// ---- grids.cpp: all of a field but its samples --------------------------------------------
 
 // `distance` without a leaf: its name, place and metadata.
 openvdb::FloatGrid::Ptr bare_distance_grid(const FieldData& field);
@@ -49,7 +50,7 @@ bool take_small(const openvdb::GridPtrVec& grids, FieldData& field);
 // The distance grid of a file of ours, whatever its format; else null.
 openvdb::FloatGrid::Ptr own_distance(const openvdb::GridPtrVec& grids);
 
-// ---- field_scan.cpp: a look at a file before OpenVDB allocates by what it says ------------------
+// ---- scan.cpp: a look at a file before OpenVDB allocates by what it says ------------------
 
 struct VdbGrid {
   std::string name, type;
@@ -78,11 +79,11 @@ inline Failure broken_seal(const std::string& name) {
   return {name + " is a damaged field (its checksum differs): bake it again"};
 }
 
-// ---- field_foreign.cpp: a level set somebody else made ------------------------------------------
+// ---- foreign.cpp: a level set somebody else made ------------------------------------------
 
 Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::string& name);
 
-// ---- field_stored.cpp: uncompressed fields, at the speed of the disk ----------------------------
+// ---- stored.cpp: uncompressed fields, at the speed of the disk ----------------------------
 
 Outcome write_stored(const std::filesystem::path& file, const FieldData& field);
 // True for files that write_stored made, as far as the head tells.

@@ -1,4 +1,5 @@
-// field_scan.cpp - a look at a .vdb file before OpenVDB allocates by what it says.
+// SPDX-License-Identifier: Apache-2.0
+// scan.cpp - a look at a .vdb file before OpenVDB allocates by what it says.
 //
 // What it walks (format of OpenVDB 4 and later, little endian; strings are a 32-bit length and
 // bytes):

@@ -1,4 +1,5 @@
-// field_stored.cpp - uncompressed fields, laid out in OpenVDB's format by many threads.
+// SPDX-License-Identifier: Apache-2.0
+// stored.cpp - uncompressed fields, laid out in OpenVDB's format by many threads.
 //
 //   head     what OpenVDB writes before the buffers of `distance`: header, metadata, topology
 //   records  one a brick, all of a size (vdb_tree.h)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // vdb_tree.h - the tree of an uncompressed float grid as it stands in an OpenVDB file (versions 222
 // and later), so that its leaves can be written and read by many threads, each where it belongs.
 //

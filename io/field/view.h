@@ -1,4 +1,5 @@
-// field_view.h - a baked field as a function of place. Everything here is in GRID coordinates:
+// SPDX-License-Identifier: Apache-2.0
+// view.h - a baked field as a function of place. Everything here is in GRID coordinates:
 // voxels, node (i, j, k) of the field at (i, j, k).
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // content_hash.h - a 128-bit fingerprint of bytes.
 //
 // MurmurHash3, x64, 128 bits (A. Appleby), from its description: no package of ours has a fast

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // direct_file.h - large files in blocks by several threads, past the page cache where the file
 // system lets us: a field of a gigabyte then costs what the disk costs, and neither a copy in
 // memory nor what was in the cache.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gunzip.h - inflates a .gz held in memory.
 #pragma once
 #include <cstddef>

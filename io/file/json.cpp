@@ -1,4 +1,5 @@
-// scene_json.cpp - one pass over the text without building anything, so that a hostile file costs
+// SPDX-License-Identifier: Apache-2.0
+// json.cpp - one pass over the text without building anything, so that a hostile file costs
 // neither stack nor memory.
 #include "io/file/json.h"
 

@@ -1,4 +1,5 @@
-// scene_json.h - is this text JSON that is worth building a tree of?
+// SPDX-License-Identifier: Apache-2.0
+// json.h - is this text JSON that is worth building a tree of?
 #pragma once
 #include <string>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mix.h - numbers that look random and need no state.
 #pragma once
 #include <cstdint>

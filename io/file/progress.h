@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // progress.h - how long work tells somebody that it goes on, and hears that it should stop.
 #pragma once
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // pulse.h - whether work shall go on: cheap enough to ask anywhere in it, from any thread.
 #pragma once
 #include <atomic>

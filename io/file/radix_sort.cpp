@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // radix_sort.cpp - least significant digit first, 11 bits a round; digits that are the same in all
 // keys cost nothing. Blocks count and move their items side by side; each knows where its items of
 // a digit go from the counts of all blocks before it, so order does not depend on who moves first.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // radix_sort.h - the order of many 64-bit keys, in linear time: equal keys keep their order, so a
 // sort never depends on the machine or on the number of threads.
 #pragma once

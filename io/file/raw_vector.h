@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // raw_vector.h - a vector whose new elements are not cleared: they are written next, by many
 // threads. Clearing gigabytes on one thread first takes a second in which nobody can cancel.
 #pragma once

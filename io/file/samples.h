@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // samples.h - room for the samples of a field: a vector that is not filled when it grows, since all
 // of it is written once anyway, and that asks for large pages: a field of a gigabyte in pages of 4
 // KiB is a quarter of a million page faults.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // text_scan.h - lines, words and numbers of a text mesh. Works on the bytes in place, does not
 // depend on the locale, and knows the line it stands on.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // write_aside.h - a file is whole or not there: written beside its place, then renamed.
 #pragma once
 #include <filesystem>

@@ -1,4 +1,5 @@
-// mesh_assembly.h - formats that are trees of nodes: shapes, where each is placed, and the mesh of
+// SPDX-License-Identifier: Apache-2.0
+// assembly.h - formats that are trees of nodes: shapes, where each is placed, and the mesh of
 // all of them. Inside io only; glTF and COLLADA share it.
 #pragma once
 #include <array>

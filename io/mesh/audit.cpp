@@ -1,4 +1,5 @@
-// mesh_audit.cpp - counts what is wrong with a mesh. Sorting instead of maps: half a second for
+// SPDX-License-Identifier: Apache-2.0
+// audit.cpp - counts what is wrong with a mesh. Sorting instead of maps: half a second for
 // millions of triangles, and the same answer whatever the order of the input.
 #include <algorithm>
 #include <cmath>

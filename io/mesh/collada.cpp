@@ -1,4 +1,5 @@
-// mesh_collada.cpp - COLLADA 1.4 and 1.5 (.dae): the polygons of the scene with the transforms of
+// SPDX-License-Identifier: Apache-2.0
+// collada.cpp - COLLADA 1.4 and 1.5 (.dae): the polygons of the scene with the transforms of
 // their nodes. Axes stay the file's own, whatever <up_axis> says: a part then lies as it was drawn
 // and as its STL or OBJ has it.
 #include <algorithm>

@@ -1,4 +1,5 @@
-// mesh_formats.h - what the readers of the mesh formats share. Inside io only.
+// SPDX-License-Identifier: Apache-2.0
+// formats.h - what the readers of the mesh formats share. Inside io only.
 //
 // STL, OBJ and PLY are read here and not by a package: assimp 5.2 takes ten to twenty times as long
 // (1.8 M triangles, welded: 3.8, 3.2, 1.4 s against 0.2, 0.35, 0.15), reads 1e400, NaN and PLY

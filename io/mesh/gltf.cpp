@@ -1,4 +1,5 @@
-// mesh_gltf.cpp - glTF 2.0, as JSON (.gltf; buffers inside it or in files beside it) and as one
+// SPDX-License-Identifier: Apache-2.0
+// gltf.cpp - glTF 2.0, as JSON (.gltf; buffers inside it or in files beside it) and as one
 // binary file (.glb): the triangles of the default scene with the transforms of their nodes.
 //
 // Own code over a JSON parser, and no package for the whole: what must be right here is that every

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gltf_container.h - what a glTF is packed in: a .glb's chunks, base64 and percent signs.
 #pragma once
 #include <optional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // inward_normals.cpp - weld, pair up edges, spread one winding over each piece, then settle each
 // piece's sign by its volume.
 #include "io/mesh/inward_normals.h"

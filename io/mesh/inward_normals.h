@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // inward_normals.h - for every triangle of a mesh the unit normal that points into the body,
 // however the mesh is wound.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/mesh/mesh.h"
 
 #include "io/mesh/weld.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh.h - a triangle mesh in memory, and what is wrong with it.
 #pragma once
 #include <algorithm>

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_file.cpp - from a file or from bytes to a mesh, and back to a binary STL. The formats are in
-// mesh_stl.cpp, mesh_obj.cpp, mesh_ply.cpp, mesh_gltf.cpp and mesh_collada.cpp.
+// stl.cpp, obj.cpp, ply.cpp, gltf.cpp and collada.cpp.
 #include "io/mesh/mesh_file.h"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_file.h - reads STL (ascii, binary), OBJ, PLY, glTF (.gltf, .glb) and COLLADA (.dae), each
 // also as .gz.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_triangle.cpp - boxes split at the median of the triangles' middles, by rank: a balanced
 // tree for any mesh. Distances in double; boxes in float, rounded outwards.
 #include "io/mesh/nearest_triangle.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_triangle.h - the point of a mesh nearest to a place, exactly: a tree of boxes.
 #pragma once
 #include <cstdint>

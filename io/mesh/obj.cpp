@@ -1,4 +1,5 @@
-// mesh_obj.cpp - Wavefront OBJ: `v` and `f`, polygons cut into triangles, negative indices, lines
+// SPDX-License-Identifier: Apache-2.0
+// obj.cpp - Wavefront OBJ: `v` and `f`, polygons cut into triangles, negative indices, lines
 // continued by a backslash; `o` and `g` are parts. Texture, normals, materials, points and lines
 // are passed over. A statement nobody knows is an error: a damaged `f` would otherwise be a hole.
 #include <algorithm>

@@ -1,4 +1,5 @@
-// mesh_ply.cpp - PLY, text and binary in either byte order: x y z of the element `vertex` and the
+// SPDX-License-Identifier: Apache-2.0
+// ply.cpp - PLY, text and binary in either byte order: x y z of the element `vertex` and the
 // corner list of `face`; every other element and property is stepped over.
 #include <algorithm>
 #include <bit>

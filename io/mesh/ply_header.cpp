@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/mesh/ply_header.h"
 
 #include <algorithm>

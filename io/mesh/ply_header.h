@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ply_header.h - what a PLY file says it holds.
 #pragma once
 #include <cstdint>

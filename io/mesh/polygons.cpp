@@ -1,4 +1,5 @@
-// mesh_polygons.cpp - cuts the faces of all formats but STL into triangles, and welds.
+// SPDX-License-Identifier: Apache-2.0
+// polygons.cpp - cuts the faces of all formats but STL into triangles, and welds.
 #include <cmath>
 #include <span>
 

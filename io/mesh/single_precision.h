@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // single_precision.h - whether a mesh lies too far from its origin for numbers of 24 bits.
 #pragma once
 #include <string>

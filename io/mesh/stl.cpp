@@ -1,4 +1,5 @@
-// mesh_stl.cpp - STL, text and binary.
+// SPDX-License-Identifier: Apache-2.0
+// stl.cpp - STL, text and binary.
 //
 // Binary: 80 bytes of anything, the number of triangles n (uint32), n times 50 bytes: normal and
 // three vertices (12 floats), two bytes of anything; little endian. So its size is 84 + 50 n, and

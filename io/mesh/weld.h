@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // weld.h - equal points become one vertex. Exact: no tolerance, so no two features of a part ever
 // merge and the result does not depend on the order of floating-point work.
 //

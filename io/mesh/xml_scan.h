@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // xml_scan.h - an XML file as a flat list of elements, in place: what COLLADA needs of XML.
 //
 // Elements, attributes, comments, CDATA, the five named entities and character numbers in

@@ -1,4 +1,5 @@
-// recording_compare.cpp - where two rows of a recording part.
+// SPDX-License-Identifier: Apache-2.0
+// compare.cpp - where two rows of a recording part.
 #include <cstring>
 #include <sstream>
 

@@ -1,4 +1,5 @@
-// recording_copies.cpp - see recording_copies.h.
+// SPDX-License-Identifier: Apache-2.0
+// copies.cpp - see copies.h.
 #include "io/record/copies.h"
 
 #include <fcntl.h>

@@ -1,4 +1,5 @@
-// recording_copies.h - one file that is whole at every instant while it grows. Private.
+// SPDX-License-Identifier: Apache-2.0
+// copies.h - one file that is whole at every instant while it grows. Private.
 //
 //   OUT        the published copy: complete, closed, never written to
 //   OUT.part   the spare copy: gets the last change and the new one, then the two swap names

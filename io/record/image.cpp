@@ -1,4 +1,5 @@
-// recording_image.cpp - see recording_image.h; the HDF5 file driver is below the image.
+// SPDX-License-Identifier: Apache-2.0
+// image.cpp - see image.h; the HDF5 file driver is below the image.
 #include "io/record/image.h"
 
 #include <H5FDpublic.h>

@@ -1,4 +1,5 @@
-// recording_image.h - an HDF5 file as the library sees it: a file on disk that is only read, and
+// SPDX-License-Identifier: Apache-2.0
+// image.h - an HDF5 file as the library sees it: a file on disk that is only read, and
 // the pages changed since. Private to the recordings.
 //
 //   HDF5 library -> driver -> Image = base (published file, read only) + changed pages (memory)

@@ -1,4 +1,5 @@
-// recording_layout.h - what stands where in a recording, and HDF5 made safe to use. Private.
+// SPDX-License-Identifier: Apache-2.0
+// layout.h - what stands where in a recording, and HDF5 made safe to use. Private.
 //
 //   /config    attributes: version, json, asset_hashes, simd_target, program, run, rate, hands,
 //              stage_names, cause_names, state_names, units
@@ -7,7 +8,7 @@
 //   /summary   attribute json; the group is there once the run has ended
 //
 // Attributes are for people and their tools, in text of variable length. read_recording takes the
-// same from the datasets /config/whole and /summary/whole, see recording_stored.cpp.
+// same from the datasets /config/whole and /summary/whole, see stored.cpp.
 #pragma once
 #include <hdf5.h>
 

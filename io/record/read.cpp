@@ -1,4 +1,5 @@
-// recording_read.cpp - recordings from disk; nothing that a file says about itself is believed.
+// SPDX-License-Identifier: Apache-2.0
+// read.cpp - recordings from disk; nothing that a file says about itself is believed.
 #include <unistd.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recording.cpp - the columns of a recording, the edge to HDF5, and repair after a kill.
 #include "io/record/recording.h"
 

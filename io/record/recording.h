@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recording.h - runs as HDF5, for h5py and MATLAB; a killed run loses at most its last half second.
 //
 // OUT.h5 is a complete, closed HDF5 file at every instant of the run: what is new goes to a second

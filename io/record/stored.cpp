@@ -1,4 +1,5 @@
-// recording_stored.cpp - see recording_stored.h.
+// SPDX-License-Identifier: Apache-2.0
+// stored.cpp - see stored.h.
 //
 // The library takes the size of a chunk and what its filters made of it on trust and reads past its
 // buffers where a damaged file lies. So it only finds the bytes here; they are inflated and put in

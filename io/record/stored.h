@@ -1,4 +1,5 @@
-// recording_stored.h - rows of a dataset from a file that may lie about itself. Private.
+// SPDX-License-Identifier: Apache-2.0
+// stored.h - rows of a dataset from a file that may lie about itself. Private.
 #pragma once
 #include <filesystem>
 #include <string>

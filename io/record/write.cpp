@@ -1,4 +1,5 @@
-// recording_write.cpp - the recorder: rows to HDF5 in memory, then published as one change.
+// SPDX-License-Identifier: Apache-2.0
+// write.cpp - the recorder: rows to HDF5 in memory, then published as one change.
 //
 //   frames() -> pending rows --- a quarter second ---> HDF5 (Image) -> flush -> Copies::publish
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hands.h - the devices of a scene's hands, by name.
 #pragma once
 #include <memory>

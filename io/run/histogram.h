@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // histogram.h - percentiles of any number of durations in fixed memory.
 #pragma once
 #include <algorithm>

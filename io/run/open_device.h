@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // open_device.h - every device that the program knows, by name: NAME[:TARGET][?KEY=VALUE&...].
 #pragma once
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recorded_run.h - what a recording says of its run beside the scene, so that it can be run again
 // to the bit.
 //

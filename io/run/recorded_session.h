@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recorded_session.h - a recording's run again: its scene, settings and SIMD target, its hand's
 // samples in, the same frames out.
 #pragma once

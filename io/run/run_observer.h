@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // run_observer.h - somebody who looks at a run while it goes, and may change it.
 #pragma once
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // run_scene.h - runs a loaded scene with its hands, watches it, records it, sums it up.
 #pragma once
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/run/run_setup.h"
 
 #include "io/run/recorded_run.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // run_setup.h - what every run of a loaded scene begins with, in real time or not: a session, the
 // devices of its hands, a recording.
 #pragma once

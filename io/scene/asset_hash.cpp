@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/scene/asset_hash.h"
 
 #include "io/file/content_hash.h"

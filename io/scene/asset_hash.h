@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // asset_hash.h - a fingerprint of a field or shell as the engine gets it, whatever it came from.
 //
 // What a baked file says it was baked from proves nothing about what is in it now. 128 bits as 32

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // asset_key.cpp - the key of a cached asset: a hash of the mesh and of everything that shapes the
 // bake.
 #include <cstdint>

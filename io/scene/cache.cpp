@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cache.cpp - see the header. The key is in the file's name and again inside the file: what a file
 // holds is believed only when both agree. Files are written aside and renamed, so two programs that
 // bake the same asset at once both succeed, and the last one's file (the same) stays.

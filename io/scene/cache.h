@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cache.h - baked assets by content: the same mesh and parameters are never baked twice.
 #pragma once
 #include <filesystem>

@@ -1,4 +1,5 @@
-// scene_check.cpp - a scene file's JSON against the table of keys.
+// SPDX-License-Identifier: Apache-2.0
+// check.cpp - a scene file's JSON against the table of keys.
 #include "io/scene/check.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// scene_check.h - a scene file's JSON against the table of keys. Private to the reader.
+// SPDX-License-Identifier: Apache-2.0
+// check.h - a scene file's JSON against the table of keys. Private to the reader.
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 #include <string>

@@ -1,4 +1,5 @@
-// scene_keys.cpp - the one table of keys of a scene file.
+// SPDX-License-Identifier: Apache-2.0
+// keys.cpp - the one table of keys of a scene file.
 #include "io/scene/keys.h"
 
 namespace h6::io {

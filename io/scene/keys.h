@@ -1,4 +1,5 @@
-// scene_keys.h - every key of a scene file, once: the reader checks by this table and the schema is
+// SPDX-License-Identifier: Apache-2.0
+// keys.h - every key of a scene file, once: the reader checks by this table and the schema is
 // printed from it, so neither can know a key that the other does not.
 #pragma once
 #include <cstddef>

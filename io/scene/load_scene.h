@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // load_scene.h - from a scene to what the engine runs: assets baked or taken from the cache, one
 // model, definitions of bodies and hands.
 #pragma once

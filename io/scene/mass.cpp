@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mass.cpp - volume integrals of a triangle mesh, tetrahedron by tetrahedron.
 //
 // Each triangle and a reference point span a signed tetrahedron; the integral of x_i x_j over one

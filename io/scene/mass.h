@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mass.h - mass properties of parts whose scene does not state them.
 #pragma once
 #include <array>

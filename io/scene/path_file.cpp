@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // path_file.cpp - hand paths: CSV in and out, and where a path is at a time.
 #include <algorithm>
 #include <charconv>

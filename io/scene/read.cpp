@@ -1,7 +1,8 @@
-// scene_read.cpp - scene files: text -> checked JSON -> Scene.
+// SPDX-License-Identifier: Apache-2.0
+// read.cpp - scene files: text -> checked JSON -> Scene.
 //
-//   check_json_text   is it JSON, and of a sane size                 (scene_json.cpp)
-//   check             every key known, of its kind, in its range     (scene_check.cpp)
+//   check_json_text   is it JSON, and of a sane size                 (json.cpp)
+//   check             every key known, of its kind, in its range     (check.cpp)
 //   SceneReader       numbers to metres, names to bodies, files to paths; what the table cannot say
 #include <cmath>
 #include <fstream>

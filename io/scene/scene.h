@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene.h - a scene as data: what a scene file says, and what a generated scene is.
 //
 // Lengths are in metres here; files carry their own units.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_file.h - scene files (JSON, version 1) and hand paths (CSV).
 #pragma once
 #include "io/scene/scene.h"

@@ -1,4 +1,5 @@
-// scene_schema.cpp - the JSON schema of scene files, printed from the one table of keys.
+// SPDX-License-Identifier: Apache-2.0
+// schema.cpp - the JSON schema of scene files, printed from the one table of keys.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 

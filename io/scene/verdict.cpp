@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // verdict.cpp - what happened in a run. The rules stand in the header.
 #include "io/scene/verdict.h"
 

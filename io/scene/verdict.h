@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // verdict.h - what happened in a run, from its motion alone: no method name is seen here.
 //
 // In this order:

@@ -1,4 +1,5 @@
-// scene_write.cpp - a scene as plain files: scene.json, STL meshes, PLY shells, CSV paths.
+// SPDX-License-Identifier: Apache-2.0
+// write.cpp - a scene as plain files: scene.json, STL meshes, PLY shells, CSV paths.
 //
 // Every setting is written, defaults too: the file says all that the run depends on.
 #include <algorithm>

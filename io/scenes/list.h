@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // list.h - the generated scenes, one function each; scenes.cpp has them by name.
 #pragma once
 #include "io/scene/scene.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_distance.cpp - exact distance between two triangle meshes, for the clearances of scenes.
 #include <algorithm>
 #include <cmath>

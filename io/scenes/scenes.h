@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scenes.h - scenes that the program makes itself: no file is needed.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shapes.h - what generated scenes are made of: primitive meshes, point grids, hand paths. Metres.
 #pragma once
 #include "io/scene/scene.h"

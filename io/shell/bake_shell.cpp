@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bake_shell.cpp - points on the surface, then levels and tree.
 //
 // Many candidates, spread evenly over the area that can be reached from outside, are thinned out to

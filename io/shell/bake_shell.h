@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bake_shell.h - from a triangle mesh to a shell: nested blue-noise levels and their sphere tree.
 #pragma once
 #include <optional>

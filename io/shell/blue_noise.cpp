@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // blue_noise.cpp - see the header. The rounds run in parallel without depending on it: points live
 // in grid cells at least one radius wide, cells get one of 27 colours by their place modulo 3, and
 // cells of one colour cannot see each other's points (phase groups, L.-Y. Wei, "Parallel Poisson

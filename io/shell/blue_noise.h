@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // blue_noise.h - out of many points, a given number that keep their distance from one another.
 //
 // Greedy ("dart throwing") selection with a shrinking radius: a round at radius r accepts every

@@ -1,4 +1,5 @@
-// shell_candidates.h - private to the bake of shells: candidates for points, spread over a surface.
+// SPDX-License-Identifier: Apache-2.0
+// candidates.h - private to the bake of shells: candidates for points, spread over a surface.
 #pragma once
 #include <cstdint>
 
@@ -36,7 +37,7 @@ struct Candidates {
 // Many for each point: few leave gaps, many take time.
 double candidates_for(double points, bool by_spacing);
 
-// shell_triangles.cpp. On the triangles, in metres. Without `reach` everywhere, on the outer side;
+// triangles.cpp. On the triangles, in metres. Without `reach` everywhere, on the outer side;
 // with it where the outside comes near: pieces that do not close on both sides.
 struct Reach {
   const FieldView* field = nullptr;
@@ -47,7 +48,7 @@ struct Reach {
 Result<Candidates> sample_triangles(const Mesh& mesh, const FaceTable& faces, const Reach& reach,
                                     const Demand& demand, Pulse& pulse);
 
-// shell_zero_set.cpp. Near the zero set of a field, where the outside reaches it, in voxels of the
+// zero_set.cpp. Near the zero set of a field, where the outside reaches it, in voxels of the
 // field's grid (demand too); no sources yet.
 Result<Candidates> sample_zero_set(const FieldData& field, const Demand& demand, Pulse& pulse);
 // To where the distance to the mesh is exactly the field's offset, with sources.

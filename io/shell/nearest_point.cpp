@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_point.cpp - split at the median along the widest axis, by rank and not by place, so that
 // coinciding points make no deep tree; leaves of eight.
 #include "io/shell/nearest_point.h"

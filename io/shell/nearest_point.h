@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_point.h - the nearest of many points, for any arrangement of them: a balanced kd-tree.
 #pragma once
 #include <cstddef>

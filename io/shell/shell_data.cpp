@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_data.cpp - see the header.
 #include "io/shell/shell_data.h"
 

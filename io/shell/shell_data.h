@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_data.h - a baked shell in memory: what h6ShellDef points at.
 #pragma once
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_file.cpp - the reader of shell_file.h. Nothing in a file is believed: counts are held
 // against its size before anything is reserved, and the whole shell is checked before it is given
 // out.

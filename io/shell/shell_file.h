@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_file.h - shells as binary PLY: `vertex` with nx ny nz radius level first_child child_count
 // triangle, and `node` with the whole sphere tree. Other programs show the vertices.
 //

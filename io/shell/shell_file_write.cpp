@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_file_write.cpp - the writer of shell_file.h.
 #include <bit>
 #include <cstring>

@@ -1,4 +1,5 @@
-// shell_tree.cpp - levels and sphere tree of given points.
+// SPDX-License-Identifier: Apache-2.0
+// tree.cpp - levels and sphere tree of given points.
 //
 // Levels are chosen from fine to coarse: each is a blue-noise subset of the one below it, so
 // S1 c S2 c ... holds by construction and each has its exact size. The coarse levels only steer

@@ -1,4 +1,5 @@
-// shell_tree.h - private to this box: the tree of points that are already laid out and checked.
+// SPDX-License-Identifier: Apache-2.0
+// tree.h - private to this box: the tree of points that are already laid out and checked.
 #pragma once
 #include <span>
 

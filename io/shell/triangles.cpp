@@ -1,4 +1,5 @@
-// shell_triangles.cpp - candidates on the triangles of a mesh, evenly by area, and which of them
+// SPDX-License-Identifier: Apache-2.0
+// triangles.cpp - candidates on the triangles of a mesh, evenly by area, and which of them
 // the outside reaches.
 #include <algorithm>
 #include <cmath>

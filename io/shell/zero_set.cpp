@@ -1,4 +1,5 @@
-// shell_zero_set.cpp - candidates on the zero set of a field.
+// SPDX-License-Identifier: Apache-2.0
+// zero_set.cpp - candidates on the zero set of a field.
 //
 // Darts fall evenly into the volume; those that end in a layer half a voxel thick just outside the
 // surface count. |grad d| = 1 there, so a layer of one thickness holds equally many above every

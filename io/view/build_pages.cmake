@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Builds live.html and report.html into OUT from the page's sources in SOURCE; without node and npm,
 # or without the network the first time, both are left empty and the program says so when it is
 # asked for a view. Nothing else fails for it.

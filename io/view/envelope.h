@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // envelope.h - one message to the page: what it is as JSON, and its numbers as they are in memory.
 //
 //   u32 bytes of JSON | JSON, padded with blanks to 4 | arrays, each padded with zeros to 4

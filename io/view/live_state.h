@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // live_state.h - a run as the page shows it: one message for each picture, made from the rows and
 // the newest contacts of a loop.
 #pragma once

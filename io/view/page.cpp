@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // page.cpp - HAPSIX_PAGES is the folder with live.html and report.html. The assembler copies the
 // files: as a C++ array they would take seconds to compile.
 #include "io/view/page.h"

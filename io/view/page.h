@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // page.h - the pages that io/view/page builds, as they lie in the program; empty where it was built
 // without node and npm.
 #pragma once

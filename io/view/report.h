@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // report.h - recordings as one HTML file that opens from disk: strips as in Fig. 10 of Xu & Barbic
 // 2016, a replay in space with the Gauss sphere, the time of a frame by stage, late frames, events,
 // configuration, hashes, verdict. Several recordings are laid over one another.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/view/scene_drawing.h"
 
 #include <meshoptimizer.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_drawing.h - the bodies of a scene as the page draws them.
 //
 // A body with a mesh is drawn by it, 16 bits a coordinate on a cube around it (for a part of 1 m:

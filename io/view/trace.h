@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // trace.h - the last seconds of a run as a timeline that chrome://tracing and ui.perfetto.dev open:
 // each frame with its stages and, on a thread of its own, what the helper took of it; wake-up, late
 // frames and their cause, contacts and depth.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // view_request.h - what the page may ask for, read from a text that anyone could have sent.
 #pragma once
 #include <array>

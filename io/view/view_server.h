@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // view_server.h - a web server for one page and its live data, for the person at this machine only.
 //
 //   GET /?token=T             the page

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // beside-inl.h - how far points are from a triangle, in its frame.
 //
 // Included once for each SIMD target.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_halves.cpp - the fast twin of box_halves_ref.cpp.
 #include "kernels/bake/box_halves.h"
 

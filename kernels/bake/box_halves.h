@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_halves.h - which way to halve boxes so that the boxes around the halves are small: the inner
 // loop of making a tree of them.
 #pragma once

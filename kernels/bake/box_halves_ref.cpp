@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_halves_ref.cpp - the specification of box_halves.cpp.
 #include <algorithm>
 

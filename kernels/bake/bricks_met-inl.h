@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bricks_met-inl.h - where a triangle may be the nearest: boxes of nodes against its FacetRegion.
 //
 // Included once for each SIMD target.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // chain_step.cpp - the fast twin of chain_step_ref.
 //
 // A step goes along x, then y, then z. What a line of nodes gives to itself, to the lines beside it

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // chain_step.h - lengths of chains of neighbouring nodes, one step at a time, in 16-bit numbers.
 //
 // Lengths are in 1/256 voxel, and steps of 1, sqrt 2 and sqrt 3 voxels are rounded up: a chain is

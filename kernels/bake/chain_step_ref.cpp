@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // chain_step_ref.cpp - the specification of chain_step, chain_seeds, chain_sides,
 // chain_nearest.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // distance_facet.cpp - a triangle made ready for the float work of triangle_distance.cpp, in
 // double.
 #include <algorithm>

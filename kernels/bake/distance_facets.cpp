@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // distance_facets.cpp - the fast twin of make_distance_facet: as many triangles at once as a vector
 // has doubles, by the same steps in the same order, so to the same bits. The rare ones without
 // area are left to it.

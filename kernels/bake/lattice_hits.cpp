@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // lattice_hits.cpp - the fast twin of lattice_hits_ref: a row of lines at once. The shares of the
 // area are integers that doubles hold exactly, so they may be added up from line to line.
 #include "kernels/bake/lattice_hits.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // lattice_hits.h - where the lines of a tile's lattice meet a triangle.
 #pragma once
 #include <cstddef>

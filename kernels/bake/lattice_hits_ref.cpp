@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // lattice_hits_ref.cpp - the specification: every line on its own, in integers.
 #include "kernels/bake/lattice_hits.h"
 

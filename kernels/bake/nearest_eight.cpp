@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_eight.cpp - the fast twins of nearest_eight_ref.cpp.
 #include "kernels/bake/nearest_eight.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_eight.h - one point against eight boxes or eight triangles: the inner loops of a
 // closest-point search. Float, and never more than the truth: what passes is looked at in double.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_eight_ref.cpp - the specification of nearest_eight.cpp: the distances
 // themselves, in double.
 #include <algorithm>

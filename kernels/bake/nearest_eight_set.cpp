@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_eight_set.cpp - the fast twin of nearest_eight_set_ref.cpp: triangles in double, since on
 // a long sliver a float cross product points anywhere; boxes in float.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // nearest_eight_set_ref.cpp - triangles made ready for nearest_eight.cpp, and the boxes around
 // eight: the specification, in double.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sign_brick.h - from unsigned distances to the samples of a brick of 8 x 8 x 8 nodes.
 //
 // io/bake/inside.cpp says what the samples are. Masks are bit 8*y + x of word z.

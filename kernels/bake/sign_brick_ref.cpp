@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sign_brick_ref.cpp - the specification of sign_brick.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // triangle_bricks.cpp - bricks of a tile: which a triangle comes near, and what is asked of their
 // nodes.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // triangle_distance.cpp - the fast twin of triangle_distance_ref.
 //
 // A brick is 32 blocks of 4 x 2 x 2 nodes. A triangle is weighed at the nodes of a block only where

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // triangle_distance.h - how far the nodes of a brick are from triangles.
 //
 // A brick is 8 x 8 x 8 nodes at unit spacing, node (i,j,k) at (i,j,k), x fastest in arrays; a tile

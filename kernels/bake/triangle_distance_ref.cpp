@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // triangle_distance_ref.cpp - the specification of triangle_distance: all pairs, in double.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // triangle_tables.h - where blocks of nodes and bricks lie, and what float work is trusted with:
 // what the fast kernels of triangle_distance.h share.
 #pragma once

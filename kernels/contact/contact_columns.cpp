@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_columns.cpp - the SIMD twin of contact_columns_ref.cpp.
 //
 // Floats where a direction or a share results, doubles where depths differ by little. Agrees to a

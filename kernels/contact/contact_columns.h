@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_columns.h - what the weighing rules need of every contact before they look at all of
 // them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_columns_ref.cpp - the specification of contact_columns.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_wrench.cpp - the SIMD twin of contact_wrench_ref.cpp.
 //
 // Lanes are doubles: sums of many contacts nearly cancel, and products of floats are then exact. It

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_wrench.h - the wrench of weighted contacts and its derivatives, in one pass.
 //
 // With J = [N; r x N], J_g = [g; r x g] and relative velocity u = (v, omega) of shell against field

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_wrench_ref.cpp - the specification of contact_wrench, in double.
 #include "kernels/contact/contact_wrench.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cull_spheres.cpp - the SIMD twin of cull_spheres_ref.cpp.
 #include "kernels/contact/cull_spheres.h"
 

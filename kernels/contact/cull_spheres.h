@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cull_spheres.h - which spheres of a shell level may hold a contact.
 //
 // Xu & Barbic 2016, Sec. 3: a node is dropped when its signed distance exceeds its radius. Here

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cull_spheres_ref.cpp - the specification of cull_spheres, one sphere at a time.
 #include "kernels/contact/cull_spheres.h"
 #include "kernels/field/sample_field.h"

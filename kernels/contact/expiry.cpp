@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // expiry.cpp - the SIMD twin of expiry_ref.cpp.
 #include "kernels/contact/expiry.h"
 

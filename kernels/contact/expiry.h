@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // expiry.h - blocks of 16 values that are each good until something has passed them.
 //
 // Traversal keeps, for every group of points, how far the shell may travel before that group can

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // expiry_ref.cpp - the specification of expiry.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // keep_nearest.cpp - the fast twin of keep_nearest_ref.
 //
 // The limit is found by halving: how many lie below a value is counted sixteen at a time, which for

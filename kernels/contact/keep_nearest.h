@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // keep_nearest.h - of many points those with the least distances, in the order in which they came.
 #pragma once
 #include "kernels/contact/touch_groups.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // make_contacts.cpp - the SIMD twin of make_contacts_ref, a vector of contacts at a time.
 #include "kernels/contact/touch_groups.h"
 

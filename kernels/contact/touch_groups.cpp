@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // touch_groups.cpp - the SIMD twin of touch_groups_ref.cpp.
 #include "kernels/contact/touch_groups.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // touch_groups.h - which points of groups of 16 touch a field, and their contacts.
 #pragma once
 #include "kernels/views.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // touch_groups_ref.cpp - the specification of touch_groups and make_contacts.
 #include <algorithm>
 #include <cmath>

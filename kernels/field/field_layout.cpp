@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_layout.cpp - from samples in metres to int16 nodes and far bounds in voxels.
 //
 // The bound of a far cell. Let D be the true unsigned distance, L_c <= D the far grid's magnitude

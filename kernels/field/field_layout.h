@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_layout.h - from the plain arrays of h6FieldDef to the hot layout of FieldView.
 //
 // Kept beside the kernels so that the layout is known in one place: change it here and in

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_field-inl.h - one vector of field samples; shared by sample_field and cull_spheres.
 //
 // Included once for each SIMD target. Two neighbours along x are 4 adjacent bytes, in a brick and

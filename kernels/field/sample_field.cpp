@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_field.cpp - the SIMD twin of sample_field_ref.cpp.
 #include "kernels/field/sample_field.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_field.h - signed distance and its gradient at many points.
 #pragma once
 #include "kernels/views.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_field_ref.cpp - the specification of sample_field, one point at a time.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_bands.cpp - sorting and runs of gauss_bands.h.
 #include "kernels/weights/gauss_bands.h"
 

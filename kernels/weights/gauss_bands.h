@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_bands.h - contacts in bands over one sphere, for gauss_sweep.h: who meets whom, and the
 // density of one hat over it.
 //

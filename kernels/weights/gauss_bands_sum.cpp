@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_bands_sum.cpp - sums of gauss_bands.h: hats over one sphere, contact by contact.
 #include "kernels/weights/gauss_bands.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_few.cpp - lanes over columns j, four rows i > j a pass: the hat of a pair joins the sum of
 // its row, over lanes, and that of its column.
 #include "kernels/weights/gauss_few.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_few.h - the weights of gauss_weights.h for few contacts: every pair once, without sorting.
 #pragma once
 #include "kernels/weights/gauss_weights.h"

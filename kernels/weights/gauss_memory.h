@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_memory.h - columns of gauss_tree.h and gauss_sweep.h in one block of the caller's.
 #pragma once
 #include <cstddef>

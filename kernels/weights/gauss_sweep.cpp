@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_sweep.cpp - stages, pairs and weights of gauss_sweep.h.
 #include "kernels/weights/gauss_sweep.h"
 

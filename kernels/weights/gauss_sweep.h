@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_sweep.h - the weights of gauss_weights.h for some thousand contacts: sorted, so that each
 // meets only those of a window.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_targets-inl.h - targets of gauss_tree_sum.cpp: what is listed pair by pair, and the
 // polynomial of what lies inside all supports.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree.cpp - memory and stages of gauss_tree.h; the work is in gauss_tree_sort.cpp and
 // gauss_tree_sum.cpp.
 #include "kernels/weights/gauss_tree.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree.h - the weights of gauss_weights.h for many contacts, in nearly linear time.
 //
 // Contacts in the order of a space-filling curve over the Gauss map, 16 to a leaf, 16 leaves to a

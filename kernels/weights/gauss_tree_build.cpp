@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree_build.cpp - leaves and nodes of the tree: centroids, radii and moments about them.
 //
 // Everything is a difference from a row nearby before it is squared or summed, and a centroid is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree_sort.cpp - contacts in the order of a space-filling curve over the Gauss map.
 //
 // A vector is laid flat by the octahedron's map: one face of it a quadrant, so that near directions

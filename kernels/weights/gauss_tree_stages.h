@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree_stages.h - what the files of gauss_tree.h call of each other.
 #pragma once
 #include "kernels/weights/gauss_tree.h"

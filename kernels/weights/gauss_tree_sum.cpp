@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree_sum.cpp - densities at the contacts of a leaf, from the nodes of the tree.
 //
 // For the 16 targets of a leaf, or of two that are near, the tree is walked once, 16 sibling nodes

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_weights.cpp - the SIMD twin of gauss_weights_ref.cpp: lanes over j, a few rows i a pass.
 //
 // A hat is summed as max(0, epsilon^2 - |dV|^2): the scale 1/epsilon^2 is the same for all pairs

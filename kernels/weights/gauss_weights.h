@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_weights.h - each contact's share of stiffness, from the density of contacts around it on
 // the Gauss map. Xu & Barbic 2016, Eq. (6)-(12), and our product form.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_weights_ref.cpp - the specification of gauss_weights, in double.
 //
 // Xu & Barbic 2016, Eq. (6)-(12), with the weight read as phi_self/phi_i: contacts of equal

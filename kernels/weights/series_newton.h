@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series_newton.h - Newton's method of series_solve, above whatever sums over the contacts.
 #pragma once
 #include <cmath>

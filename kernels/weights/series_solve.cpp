@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series_solve.cpp - the SIMD twin of series_solve_ref.cpp.
 //
 // Lanes are doubles: what a dense patch carries is a small difference of e and J.y in every

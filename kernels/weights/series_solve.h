@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series_solve.h - the load of every contact when the whole penalty stands in series with one
 // 6-D spring of stiffness c k: net stiffness never exceeds c k, however dense the sampling.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series_solve_ref.cpp - the specification of series_solve, in double.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // arena.h - storage that is sized once.
 //
 // A layout function takes its columns from an Arena twice: first from an empty one, which only

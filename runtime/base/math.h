@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // math.h - Eigen inside the engine: fixed sizes only, so that nothing here allocates.
 #pragma once
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // anytime.h - what of a frame's traversal to leave out so that the frame ends in time.
 //
 //   elapsed + groups to sample + contacts to weigh + the rest  <=  budget

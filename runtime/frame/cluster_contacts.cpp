@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cluster_contacts.cpp - near contacts become one. Kim et al. 2003; METHOD.md, Sec. 3.
 //
 // A grid whose cells have a diagonal of the threshold: contacts of one cell hang together without

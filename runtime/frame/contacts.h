@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contacts.h - the contacts of one shell body: structure of arrays, one row a touching point.
 #pragma once
 #include <cstdint>

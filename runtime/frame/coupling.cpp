@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // coupling.cpp - what stands between the hand and its body.
 //
 // Virtual coupling: McNeely 1999, Wan & McNeely 2003. Saturation: Barbic & James 2008. METHOD.md,

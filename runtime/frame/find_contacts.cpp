@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // find_contacts.cpp - the points of a shell body that are inside fields, pair by pair, and what
 // their contacts are.
 #include <algorithm>

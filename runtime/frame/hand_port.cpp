@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hand_port.cpp - what comes from a device and what goes to it, each frame. METHOD.md, Sec. 4.
 //
 //   sample -> watch -> finite? -> filter -> the frame's hand ... wrench or motion -> filter ->

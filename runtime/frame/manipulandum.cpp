@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // manipulandum.cpp - pseudo-admittance: what the hand holds has mass (Xu & Barbic 2016, Fig. 13).
 //
 //   device --[driver's coupling]-- manipulandum --[virtual coupling]-- body --[contacts]-- world

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // name_contacts.cpp - the part and the triangle that each contact is with, for those who ask.
 //
 // Fields keep them by brick. A contact's brick is found again from its arm, at the place that the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // net_stiffness.h - how stiff a shell body's contacts are together, whatever their number.
 // METHOD.md, Sec. 3.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // passivity.h - energy that nobody put in is not given out: a time-domain passivity observer and
 // controller (Hannaford & Ryu 2002) in six dimensions. METHOD.md, Sec. 4.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // rigid_step.cpp - one time step of the moving bodies.
 //
 // Implicit (METHOD.md, Sec. 2; Barbic & James 2008):

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series.cpp - the rule `series` in a frame: loads of all contacts of a shell body from one solve,
 // then wrenches and derivatives pair by pair. METHOD.md, Sec. 3.
 //

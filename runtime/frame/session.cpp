@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // session.cpp - from a definition to a session: everything is derived, sized and reserved here, so
 // that a frame has nothing left to decide.
 #include "runtime/frame/session.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // session.h - everything that changes from frame to frame, in storage sized once.
 #pragma once
 #include "hapsix/hapsix.h"

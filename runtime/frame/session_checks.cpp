@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "runtime/frame/session_checks.h"
 
 #include <Eigen/Cholesky>

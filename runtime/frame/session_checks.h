@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // session_checks.h - is a session definition one that can be run?
 #pragma once
 #include "hapsix/hapsix.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // share_gate.h - whether the helper is to be asked: both ways are timed now and then.
 //
 // What a second thread writes, or reads, has to come over from its core's cache, and what that

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_lanes.h - shell bodies side by side on the two threads: two hands, each with its own part.
 //
 // Traversal, contacts and weights of one shell body are nobody else's business until the wrenches

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solve.cpp - Eigen's factorisations are here, and nowhere else in a step: they compile slowly.
 #include "runtime/frame/solve.h"
 

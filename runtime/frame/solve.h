@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solve.h - the dense system of a step: symmetric positive by LDL^T, anything else by pivoted LU.
 #pragma once
 #include "runtime/base/math.h"

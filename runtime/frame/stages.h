@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // stages.h - the stages of a frame, each in a file of its own; frame.cpp puts them in order.
 #pragma once
 #include "runtime/frame/session.h"

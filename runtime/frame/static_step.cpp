@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // static_step.cpp - a body without mass goes straight to where all that acts on it balances.
 //
 // Wan & McNeely 2003: dq = -(K_c + K_VC)^-1 (f_c + f_VC), one solve a frame. METHOD.md, Sec. 4.

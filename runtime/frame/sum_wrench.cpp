@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sum_wrench.cpp - a pair's wrench on both of its bodies, and how it changes as they move.
 //
 // The kernel sums over the shell body's arms. The field body's Jacobian is J_b = -[N; r_b x N] with

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // traverse_pair.h - the points of one shell that touch one field; find_contacts.cpp makes contacts
 // of them.
 #pragma once

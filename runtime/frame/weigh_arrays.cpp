@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // weigh_arrays.cpp - h6WeighContacts: the rules for contacts of any simulator.
 #include <Eigen/LU>
 #include <algorithm>

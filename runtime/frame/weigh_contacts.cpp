@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // weigh_contacts.cpp - how the contact stiffness is shared among a shell body's contacts.
 //
 // Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // weighing.h - the rules of METHOD.md, Sec. 3, on columns of contacts: shared by a session's frame
 // and by h6WeighContacts.
 #pragma once

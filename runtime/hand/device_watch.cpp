@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "runtime/hand/device_watch.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device_watch.h - what a hand's samples say about its device: is it there, does it hang, did it
 // jump, how fast is it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "runtime/hand/hand_filter.h"
 
 #include <cmath>

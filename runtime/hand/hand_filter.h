@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hand_filter.h - indexing and scaling between a device and the scene. METHOD.md, Sec. 4.
 //
 // The centre of mass is what is scaled about: with x the body's centre of mass where the hand holds

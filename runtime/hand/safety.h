@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // safety.h - the last thing before a device, for every hand, always on.
 //
 // Whatever comes in, what goes out is finite, inside the rating, changes no faster than the slew

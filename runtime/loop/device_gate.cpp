@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "runtime/loop/device_gate.h"
 
 #include "sched/clock.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // device_gate.h - between a loop's devices, the haptic thread that writes to them and whoever stops
 // them: the watchdog, a signal handler, another thread, the process's end.
 //

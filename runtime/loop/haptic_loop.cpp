@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // haptic_loop.cpp - devices, session and clock joined: what runs on the haptic thread.
 //
 //   deadline -> what was asked meanwhile -> read every device -> frame -> write every device,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "runtime/loop/loop_view.h"
 
 #include "runtime/frame/session.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // loop_view.h - what a viewer sees of a running loop: the newest poses and contacts, handed over in
 // place. Neither side ever waits; what the viewer does not fetch in time is replaced.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field.cpp - from the plain arrays of a definition to the hot layout, checked and in parallel.
 #include <atomic>
 #include <cmath>

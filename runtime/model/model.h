@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // model.h - what never changes: fields and shells in their hot layout.
 #pragma once
 #include "hapsix/hapsix.h"

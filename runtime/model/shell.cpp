@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell.cpp - checks a shell and its tree, and lays its points out for traversal. METHOD.md,
 // Sec. 6.
 #include <algorithm>

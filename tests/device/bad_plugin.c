@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* bad_plugin.c - plug-ins that go wrong, one for each value of WRONG. */
 #define _GNU_SOURCE
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Hands that need no hardware: a path followed exactly, and a person who yields.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The real path through hidapi, with devices that umockdev makes: found, opened, read, lit,
 // unplugged and plugged in again.
 #include <doctest/doctest.h>

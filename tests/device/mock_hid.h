@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mock_hid.h - SpaceMouse caps that the system believes in: umockdev puts a /sys and a /dev of the
 // test's own before this process and its children, so hidapi and the program run as they are.
 //

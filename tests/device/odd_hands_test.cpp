@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Hands that go wrong on purpose, hands that do what a text says, hands of an earlier run.
 #include <doctest/doctest.h>
 

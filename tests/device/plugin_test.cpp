@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Devices out of shared libraries: the template, and every way to be wrong.
 #include <doctest/doctest.h>
 

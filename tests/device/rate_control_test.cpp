@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A cap's deflection as velocity: dead zone, curve, scales, dominant axis, buttons, yielding.
 #include <doctest/doctest.h>
 

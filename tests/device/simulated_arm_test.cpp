@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A simulated arm and the person who holds it, by physics: what springs, delays, encoders and
 // motors must do whatever the figures are.
 #include "device/simulated_arm.h"

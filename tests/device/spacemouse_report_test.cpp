@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a SpaceMouse sends: both layouts, buttons, battery, and bytes that mean nothing.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // spacemouse_samples.h - report descriptors of 3Dconnexion caps, item by item, and reports as such
 // caps send them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The SpaceMouse's two threads, with a HID port of the test's own: newest wins, stale is released,
 // unplug and replug, light, battery, permission.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A hand that somebody takes off its path and gives back: no jump, bounded speed, the path's own
 // time stands still meanwhile.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The worked example: an arm in a process of its own, reached through UDP, in the hand of a session
 // at 1 kHz; killed, started again.
 #include <dlfcn.h>

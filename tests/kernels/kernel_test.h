@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // kernel_test.h - what the kernel tests share: seeded numbers, every SIMD target, hostile columns.
 #pragma once
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // targets_test.cpp - a forced target is the one that runs.
 #include <map>
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // clock_test.cpp - how long a tick is, whatever happens to the counter or the clock.
 #include "sched/clock.h"
 #include <doctest/doctest.h>

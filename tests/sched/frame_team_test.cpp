@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The resident helper takes slices, each once, and never holds the haptic thread up.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Values cross from a thread that must not wait to one that may be slow.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Deadlines are absolute, late frames have one cause, denormals are flushed only in scope.
 #include <doctest/doctest.h>
 

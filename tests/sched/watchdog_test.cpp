@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A watchdog speaks when, and only when, nothing is heard of whom it watches.
 #include <doctest/doctest.h>
 

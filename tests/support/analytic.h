@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // analytic.h - fields and shells with known answers, for tests and benchmarks.
 #pragma once
 #include <algorithm>

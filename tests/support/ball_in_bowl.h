@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ball_in_bowl.h - many contacts in all directions: a frame with work for every stage.
 #pragma once
 #include <doctest/doctest.h>

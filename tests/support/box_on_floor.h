@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_on_floor.h - a box on a floor, a hand that holds it, and the little geometry tests need.
 #pragma once
 #include <doctest/doctest.h>

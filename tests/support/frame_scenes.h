@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // frame_scenes.h - seeded scenes for whole frames: a part of 56,823 points in clutter and in a
 // socket that fits it, both in fields of 1024^3 voxels sampled from signed distance functions.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // main.cpp - of every test program that has none of its own.
 #include <doctest/doctest.h>
 

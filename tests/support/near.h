@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // near.h - equal up to a relative error, whatever the unit.
 #pragma once
 #include <doctest/doctest.h>

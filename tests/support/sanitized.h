@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sanitized.h - what a test does less of where everything is instrumented: AddressSanitizer makes
 // it two to five times slower, ThreadSanitizer ten to a hundred times.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // actuator.cpp - a landing gear's retraction actuator, 25,191 triangles.
 //
 // The pin of its fixed end is the x axis; it pushes along +z, where the rod end's pin is 580 mm

@@ -1,4 +1,5 @@
-// industrial_assembly.cpp - pieces to one mesh: refined to an exact count, or spoilt.
+// SPDX-License-Identifier: Apache-2.0
+// assembly.cpp - pieces to one mesh: refined to an exact count, or spoilt.
 #include "io/scenes/industrial/assembly.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// industrial_assembly.h - many pieces put together to one mesh, sound or as bad as exports are, and
+// SPDX-License-Identifier: Apache-2.0
+// assembly.h - many pieces put together to one mesh, sound or as bad as exports are, and
 // what is known about it by construction.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay.cpp - a car's engine bay as a soup of 505,276 triangles.
 #include "io/scenes/industrial/engine_bay.h"
 

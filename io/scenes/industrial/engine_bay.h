@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay.h - the engine bay's groups of parts. x: to the car's left, y: to its rear, z: up
 // [mm].
 #pragma once

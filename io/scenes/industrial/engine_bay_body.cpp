@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay_body.cpp - what the engine stands in: sheets without thickness, rails, tanks, battery.
 #include <cmath>
 #include <numbers>

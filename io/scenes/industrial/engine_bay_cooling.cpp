@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay_cooling.cpp - radiator with its fins, fans, and the hoses.
 #include <cmath>
 #include <numbers>

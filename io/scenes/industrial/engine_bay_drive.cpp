@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay_drive.cpp - what the engine drives: belt and accessories, clutch, gearbox, shafts.
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay_engine.cpp - a four-cylinder engine across the bay: block, pan, head, manifolds.
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // engine_bay_lines.cpp - bundles of wires two voxels thick, brake and fuel lines.
 #include "io/scenes/industrial/engine_bay.h"
 

@@ -1,4 +1,5 @@
-// industrial_fasteners.cpp - bolts, nuts, washers, rivets, springs, hose clamps.
+// SPDX-License-Identifier: Apache-2.0
+// fasteners.cpp - bolts, nuts, washers, rivets, springs, hose clamps.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,5 @@
-// industrial_groups.cpp - bolts in rows, wires in bundles.
+// SPDX-License-Identifier: Apache-2.0
+// groups.cpp - bolts in rows, wires in bundles.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // industrial.h - generated industrial inputs: polygon soups as CAD systems export them, the sound
 // parts that are to be fitted into them, and what is known about the soups by construction.
 #pragma once

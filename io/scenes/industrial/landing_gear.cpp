@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // landing_gear.cpp - an airliner's landing gear in its bay as a soup of 1,789,551 triangles.
 #include "io/scenes/industrial/landing_gear.h"
 

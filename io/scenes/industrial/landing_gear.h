@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // landing_gear.h - the landing gear's groups of parts. x: inboard, y: aft, z: up [mm].
 #pragma once
 #include "io/scenes/industrial/assembly.h"

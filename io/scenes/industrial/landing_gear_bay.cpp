@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // landing_gear_bay.cpp - the bay the gear folds into: skins and ribs without thickness, rivets,
 // brackets, doors.
 #include <cmath>

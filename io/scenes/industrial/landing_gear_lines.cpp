@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // landing_gear_lines.cpp - hydraulic lines and hoses, valves, wire bundles two voxels a wire.
 #include <cmath>
 #include <numbers>

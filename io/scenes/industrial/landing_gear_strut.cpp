@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // landing_gear_strut.cpp - the shock strut, its torque links, braces and brackets.
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // landing_gear_wheels.cpp - two wheels: tyres with tread, rims, stacks of brake discs.
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,5 @@
-// industrial_outlines.cpp - outlines with holes, cut into triangles, and plates made of them.
+// SPDX-License-Identifier: Apache-2.0
+// outlines.cpp - outlines with holes, cut into triangles, and plates made of them.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

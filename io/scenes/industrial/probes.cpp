@@ -1,4 +1,5 @@
-// industrial_probes.cpp - probes by construction: no field is asked.
+// SPDX-License-Identifier: Apache-2.0
+// probes.cpp - probes by construction: no field is asked.
 //
 // Inside: a piece is closed and well wound before it is spoilt, so its own winding number says on
 // which side a point is. Outside: cells of a coarse grid that no triangle's box comes near, and

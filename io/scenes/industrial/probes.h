@@ -1,4 +1,5 @@
-// industrial_probes.h - points of an assembly that are known to be inside, outside or on a sheet.
+// SPDX-License-Identifier: Apache-2.0
+// probes.h - points of an assembly that are known to be inside, outside or on a sheet.
 #pragma once
 #include "io/scenes/industrial/assembly.h"
 

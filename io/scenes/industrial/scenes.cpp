@@ -1,4 +1,5 @@
-// industrial_scenes.cpp - the industrial inputs as scenes: a part led to its place and away again.
+// SPDX-License-Identifier: Apache-2.0
+// scenes.cpp - the industrial inputs as scenes: a part led to its place and away again.
 #include "io/scenes/industrial/engine_bay.h"
 #include "io/scenes/industrial/landing_gear.h"
 #include "io/scenes/list.h"

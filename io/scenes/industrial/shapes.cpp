@@ -1,4 +1,5 @@
-// industrial_shapes.cpp - lofts, turned and swept parts, sheets, and the lines they follow.
+// SPDX-License-Identifier: Apache-2.0
+// shapes.cpp - lofts, turned and swept parts, sheets, and the lines they follow.
 #include "io/scenes/industrial/shapes.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// industrial_shapes.h - what generated machines are made of: lofts, turned and swept parts, plates
+// SPDX-License-Identifier: Apache-2.0
+// shapes.h - what generated machines are made of: lofts, turned and swept parts, plates
 // with holes, sheets, fasteners. Millimetres throughout; an Assembly turns them into metres.
 #pragma once
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // starter_motor.cpp - a car's starter motor with its solenoid, 18,580 triangles.
 //
 // The shaft is the z axis. The flange's face, which meets the bell housing, is z = 0; spigot and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha.cpp - the alpha puzzle: two equal tubes, each swept along an alpha curve, hooked together.
 //
 //        tail \   / tail          seen along z. At X the strands cross, 14 mm apart in z between

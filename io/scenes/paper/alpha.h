@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha.h - what the scenes with two alphas have in common.
 #pragma once
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha_shortcut.cpp - one alpha forced through the gap of the other, and pushed at it in many
 // ways.
 //

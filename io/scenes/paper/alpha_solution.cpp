@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha_solution.cpp - the alpha puzzle solved: a way without contact that takes the alphas apart.
 //
 // The alphas are hooked so that each one's crossing lies within the other's loop; the tool is

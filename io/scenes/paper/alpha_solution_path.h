@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha_solution_path.h - the way that takes one alpha off the other, as keyframes.
 #pragma once
 

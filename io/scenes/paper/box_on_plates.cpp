@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_on_plates.cpp - a box pressed on two plates of very different size (Fig. 7): the few contacts
 // on the small one must carry their side.
 #include <cmath>

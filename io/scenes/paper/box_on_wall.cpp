@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_on_wall.cpp - the simplest contact: many parallel points on a flat wall (cf. Fig. 2).
 #include <cmath>
 #include <numbers>

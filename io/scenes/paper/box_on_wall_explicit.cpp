@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_on_wall_explicit.cpp - the flat contact of Fig. 2 under explicit integration and without
 // contact damping, where the net stiffness alone decides what is stable.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // box_over_wire.cpp - a box dragged over a plate against something thin (Fig. 12): a low wire, or a
 // post.
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cone_in_gap.cpp - a cone pulled into a gap that is lower than the cone is high (Fig. 3): hundreds
 // of contacts on the floor against a handful at the ceiling.
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "io/scenes/paper/experiment_shapes.h"
 
 #include <algorithm>

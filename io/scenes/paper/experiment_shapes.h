@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // experiment_shapes.h - what the scenes of the paper's experiments share: shells that can be
 // sampled more or less densely and unevenly, and a few more closed meshes. Metres.
 #pragma once

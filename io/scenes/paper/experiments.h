@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // experiments.h - the paper's experiments as scenes, each with the values that studies vary.
 //
 // Without arguments they are the figures' own. Where a figure's start is not its hand's, the hand

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // peg_in_hole.cpp - a tight conforming fit with contacts all around (Fig. 10).
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // rod_between_tubes.cpp - a rod forced with 20 N at a gap narrower than itself (Fig. 8, in its
 // simplest form).
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // build.mjs OUT: live.html and report.html, each one file with everything in it.
 import { build } from 'esbuild';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';

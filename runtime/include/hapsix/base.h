@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* base.h - version, visibility, status bits, hooks for memory and messages.
  *
  * Everything in this folder is plain C99 (and C++), needs only the standard headers and is the

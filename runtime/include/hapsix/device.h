@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* device.h - what the engine asks of a haptic device, and what it promises in return.
  *
  * Thread rules: read and write are called by the haptic thread alone, once a frame, and must return

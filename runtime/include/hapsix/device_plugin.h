@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* device_plugin.h - a device of your own as a shared library, loaded while the program runs:
  *
  *     hapsix run SCENE --device 'plugin:./arm.so?host=10.0.0.7'

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* hapsix.h - the engine: models, sessions, the haptic loop. The header is the manual.
  *
  *   h6ModelDef -> h6CreateModel -> h6Model       fields and shells, immutable, shared by threads

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // result.h - a value, or one sentence for a person. C++ only; for files, users and machines.
 //
 // The sentence says what is wrong, where, and what to do: it is printed as it stands.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* types.h - what a model and a session are made of.
  *
  * Units are SI (m, kg, s, N, rad). Every pose is that of the MESH FRAME: it carries a point of the

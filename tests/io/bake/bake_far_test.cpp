@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The far grid at a million random points: safe everywhere, and tight.
 #include <doctest/doctest.h>
 

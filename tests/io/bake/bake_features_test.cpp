@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distances where triangles share edges and corners in every way: each node is weighed only with
 // triangles that answer for the feature it is nearest to.
 #include <doctest/doctest.h>

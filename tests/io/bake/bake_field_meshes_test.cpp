@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields of real meshes: distances against a tree in double, sides against parity and winding.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields of meshes made here: distances, sides, bounds and bad input.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

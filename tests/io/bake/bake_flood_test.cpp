@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The flood against one that walks from node to node.
 #include <doctest/doctest.h>
 

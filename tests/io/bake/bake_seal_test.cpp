@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Holes of known width: without --seal a part drains through them, with it the part holds, and
 // nothing else moves.
 #include <doctest/doctest.h>

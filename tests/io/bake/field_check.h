@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_check.h - meshes made here, and an independent judge of distance and side for field tests.
 #pragma once
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The triangle and the part that each brick is named after: the nearest of the mesh as it was
 // given.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Embree's answers against a judge that uses none of it, and the exact check against fields that
 // are right and fields that were spoilt by hand.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Walls and gaps of bodies whose thickness is known.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Baked assets are kept: a second run starts from them, and no state of the cache stops a run.
 #include <functional>
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hapsix check from outside: what it says of meshes, scenes and fields, and how it exits.
 #include <cmath>
 #include <set>

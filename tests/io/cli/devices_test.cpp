@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hapsix devices, and runs with devices that are not simulated, from outside.
 #include <chrono>
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // hapsix experiments: the schema that other programs read, the report and recordings, mistakes.
 #include <cmath>
 #include <string>

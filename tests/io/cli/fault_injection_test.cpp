@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Faults of devices, threads and processes, seen from the other end of the wire: this process plays
 // the device and hears every command and every stop, also the last ones of an engine that dies.
 //

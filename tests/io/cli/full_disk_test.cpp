@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A disk that is full: one sentence that names the file, exit 1, and no half file.
 #include <cstdlib>
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // --json: one object on stdout with the keys that other programs rely on; people's words on stderr.
 #include <string>
 #include <utility>

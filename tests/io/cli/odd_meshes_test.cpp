@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Meshes that nobody means to make and everybody has: bakes, info and runs end with a clear result
 // or with one sentence, never otherwise.
 #include <array>

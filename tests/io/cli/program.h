@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // program.h - the program from outside: runs it as a user would, in a folder and with a cache of
 // its own, and tells what came out. Nothing of hapsix is linked.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Real meshes end to end: files in, `hapsix run` as a user starts it, and what physics says about
 // threads, fits and soups. Scenes, sizes and clearances: real_scenes.h.
 //

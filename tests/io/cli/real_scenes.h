@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // real_scenes.h - scenes made of real meshes, as files for the program: scene.json and hand.csv.
 //
 // The meshes come from $HAPSIX_TEST_DATA and are in metres, each pair in one assembled frame,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A recording runs again to the bit, and says where it does not.
 #include <hdf5.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the program writes it reads back to the same physics, and the same input gives the same
 // bits.
 #include <set>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a user sees of the safety chain: keys of a scene, events and counters of a run, and what a
 // signal does to a run.
 #include <string>

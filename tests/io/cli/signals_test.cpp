@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ctrl-C, a kill, a terminal: the program ends soon, leaves nothing half made, keeps what it
 // recorded.
 #include <algorithm>

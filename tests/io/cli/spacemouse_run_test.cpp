@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole program with a SpaceMouse that umockdev makes: listed, checked, and in the hand of a
 // run at 1 kHz. HAPSIX_SOAK_SECONDS=30 runs the alpha for so long instead of a box for two seconds.
 #include <chrono>

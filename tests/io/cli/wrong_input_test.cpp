@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every mistake of a user: one sentence that says what and where, the right exit code, soon, and
 // nothing left behind.
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields as files: to the bit and back, for other programs, and through every kind of damage.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // write_aside_test.cpp - a file is whole or not there, whatever happens to its writer.
 #include <doctest/doctest.h>
 #include <signal.h>

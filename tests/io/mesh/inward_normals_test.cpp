@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which way normals point: into the body, whatever its winding, and away from its hollows.
 #include <doctest/doctest.h>
 

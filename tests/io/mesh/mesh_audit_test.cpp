@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_audit_test.cpp - what the audit counts, on shapes whose answer is known and on real meshes.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

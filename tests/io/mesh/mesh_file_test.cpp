@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_file_test.cpp - meshes out of files: the right ones whole, the wrong ones with a sentence.
 #include <doctest/doctest.h>
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_fuzz_test.cpp - damaged mesh files never crash the readers, and what they accept is a mesh.
 #include <doctest/doctest.h>
 

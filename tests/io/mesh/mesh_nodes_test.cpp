@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_nodes_test.cpp - glTF and COLLADA: every node where its transforms put it, the right way
 // out, under its name; and nothing a hostile file can say does harm.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // mesh_samples.h - small meshes, and every format they can be written in, for the tests of reading.
 #pragma once
 #include <zlib.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // node_files.h - small glTF and COLLADA files, put together by the tests that read them.
 #pragma once
 #include <cstdint>

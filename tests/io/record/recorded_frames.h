@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recorded_frames.h - frames with arbitrary bits, a folder, short ways to record and to read.
 #pragma once
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recording_kill_test.cpp - recordings survive kills at random instants, full disks and readers,
 // and cost no older file.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // recording_test.cpp - recordings come back to the bit, open in any HDF5 tool, and damaged, foreign
 // or lying files are refused with a sentence.
 #include "io/record/recording.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes in the hand of a simulated arm: every way that a device and the engine can talk, with and
 // without delay.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The cache of baked assets: found again, never believed blindly, never in the way.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From a scene to what the engine runs: mass properties, shared assets, sentences that name the
 // body.
 #include <doctest/doctest.h>

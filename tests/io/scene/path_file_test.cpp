@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // path_file_test.cpp - hand paths: CSV there and back, what is refused, and what is between rows.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_export_test.cpp - scenes written as files, and the schema of what is in them.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_file_test.cpp - scene files: what is read, what is refused and how that is said.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scene_samples.h - scenes as JSON for tests, the files they name, and when two scenes are the
 // same.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // verdict_test.cpp - runs made up as motions, and what is said of them.
 #include <doctest/doctest.h>
 

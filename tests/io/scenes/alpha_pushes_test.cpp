@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha_pushes_test.cpp - the alpha pushed at its shortcut: that the pushes are what they are said
 // to be, that "through" means unlinked whatever the direction, and that the default method holds.
 #include <doctest/doctest.h>

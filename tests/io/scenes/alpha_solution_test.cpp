@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // alpha_solution_test.cpp - the puzzle has a solution: proved on the geometry, then run.
 #include <doctest/doctest.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // experiment_scenes_test.cpp - the paper's experiments as scenes: sizes, samplings, and that each
 // run begins clear of everything.
 #include <doctest/doctest.h>

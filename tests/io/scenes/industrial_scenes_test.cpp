@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // industrial_scenes_test.cpp - the generated industrial inputs: sizes, defects, and whether what
 // they claim to know of themselves is true.
 #include <doctest/doctest.h>

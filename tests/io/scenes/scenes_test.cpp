@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // scenes_test.cpp - generated scenes: are they what they claim, before anything is simulated?
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

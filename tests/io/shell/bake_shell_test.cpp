@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Shells: exact numbers, blue noise, inward normals, nested levels and spheres that lose nothing.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Shell files: back to the bit, readable by others, and no file can do harm.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which surface a shell lies on: what the outside reaches, of sound meshes and of soups.
 #include <doctest/doctest.h>
 

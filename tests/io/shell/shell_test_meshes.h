@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // shell_test_meshes.h - closed bodies whose surface and inside are known, and what a sphere tree
 // has to be, told without the code under test.
 #pragma once

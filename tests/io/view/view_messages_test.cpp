@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the page asks, and what it is sent: requests that anyone could have written, envelopes,
 // timelines.
 #include <doctest/doctest.h>

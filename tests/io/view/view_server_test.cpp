@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The view's server seen from the network: who gets in, who is thrown out, who waits for whom.
 #include <doctest/doctest.h>
 

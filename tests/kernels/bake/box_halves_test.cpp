@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Halving boxes: the axis of the specification, whatever the count.
 #include "kernels/bake/box_halves.h"
 

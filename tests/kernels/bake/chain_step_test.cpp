@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Chains of nodes: SIMD against the reference, and against the straight line.
 #include <doctest/doctest.h>
 

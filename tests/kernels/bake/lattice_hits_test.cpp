@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lines of a lattice through a triangle: SIMD against the reference, and against geometry.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One point against eight boxes and triangles: never more than the truth, and hardly less.
 #include <doctest/doctest.h>
 

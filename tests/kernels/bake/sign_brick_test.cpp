@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples of a brick: SIMD against the reference, and what they promise.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exact distances of a brick's nodes to triangles: SIMD against the reference, and against
 // geometry.
 #include <doctest/doctest.h>

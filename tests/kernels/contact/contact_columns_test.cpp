@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_columns_test.cpp - facing, torque directions, gaps and loads of every contact.
 #include "kernels/contact/contact_columns.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contact_wrench_test.cpp - the wrench of contacts and its derivatives.
 #include <algorithm>
 #include <array>

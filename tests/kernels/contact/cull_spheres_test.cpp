@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // cull_spheres_test.cpp - culling loses no contact.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The nearest of many points: SIMD against the reference, and what is promised of ties and order.
 #include <doctest/doctest.h>
 

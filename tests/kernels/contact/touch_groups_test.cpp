@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // touch_groups_test.cpp - traversal's kernels say what their specifications say, on every target.
 #include <algorithm>
 #include <cmath>

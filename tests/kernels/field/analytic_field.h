@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // analytic_field.h - an h6FieldDef sampled from a formula, and its hot layout. In voxels
 // throughout.
 #pragma once

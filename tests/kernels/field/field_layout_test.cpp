@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // field_layout_test.cpp - far bounds are bounds, aprons meet their neighbours.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_field_test.cpp - samples, gradients and bounds of a field in its hot layout.
 #include <algorithm>
 #include <cmath>

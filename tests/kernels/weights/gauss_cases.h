@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_cases.h - what any way of summing densities must keep to, for tests of each.
 //
 // A Way has bytes and all of its kernel, and kMost, the contacts that it is tried with at most; one

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_few_test.cpp - every pair once gives the weights of the specification.
 #include "kernels/weights/gauss_few.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_sets.h - contacts in the ways that they lie on the Gauss map, for tests of the density.
 #pragma once
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_sweep_test.cpp - the sweep gives the weights of the specification, at any number of
 // contacts.
 #include "kernels/weights/gauss_sweep.h"

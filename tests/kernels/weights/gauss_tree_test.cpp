@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_tree_test.cpp - the tree gives the weights of the specification, at any number of contacts.
 #include "kernels/weights/gauss_tree.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // gauss_weights_test.cpp - shares of stiffness on the Gauss map.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // series_solve_test.cpp - what the rule `series` promises, at any sampling of any shape.
 #include "kernels/weights/series_solve.h"
 

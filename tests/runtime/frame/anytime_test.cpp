@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Anytime mode: what a frame leaves out when time is short, what it says of it, and that a run can
 // be repeated.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Clusters of contacts, and the options of the Gauss methods.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // contacts_test.cpp - contacts are those of a test of every point, whatever moved before.
 //
 // Traversal remembers from frame to frame what cannot touch yet. Here sessions walk, slowly and

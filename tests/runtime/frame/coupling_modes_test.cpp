@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What stands between hand and body: dynamic, quasi-static or nothing.
 #include <doctest/doctest.h>
 

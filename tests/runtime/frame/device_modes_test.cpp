@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Devices that say how hard they are pushed and are told where to be: admittance and
 // pseudo-admittance, alone and in a closed loop with a person and a delay.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A frame never allocates, locks or calls the system, and says the same with any number of threads.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The derivatives that the implicit step relies on, against central differences of the forces, in
 // double: one shell body against analytic fields on three bodies, all of them moving and turned.
 //

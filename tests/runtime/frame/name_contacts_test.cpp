@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a contact is with: the names that its field has for the brick the contact is in.
 #include <doctest/doctest.h>
 

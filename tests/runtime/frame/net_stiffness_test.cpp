@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The certificate of a frame: how stiff its contacts are together.
 #include "runtime/frame/net_stiffness.h"
 

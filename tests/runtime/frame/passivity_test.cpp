@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Energy that nobody put in is not given out.
 #include "runtime/frame/passivity.h"
 

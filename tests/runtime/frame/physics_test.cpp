@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a body pushed against a field must do, whatever the code looks like.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What holds in every frame, whatever is pushed against whatever: nothing pulls, nothing jumps,
 // nothing breaks a bound, and nonsense from a hand does no harm.
 #include <doctest/doctest.h>

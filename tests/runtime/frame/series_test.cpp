@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `series` in whole frames: bounds, derivatives with several moving fields, the margin.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Work goes the way that takes less time, on whatever machine.
 #include <doctest/doctest.h>
 

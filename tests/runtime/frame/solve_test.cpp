@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // solve_test.cpp - the step's system: answers satisfy it, and what is not positive is refused.
 #include <doctest/doctest.h>
 

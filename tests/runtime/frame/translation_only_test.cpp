@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies of three degrees of freedom: they never turn and feel no torque.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Several hands, each with a part of its own: traversed and weighed side by side, with the same
 // bits.
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN

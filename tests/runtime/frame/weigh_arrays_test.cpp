@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // h6WeighContacts: the weights as a filter for any simulator.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What each rule promises about shared stiffness, seen through whole frames. METHOD.md, Sec. 3.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

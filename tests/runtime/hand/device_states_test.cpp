@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a hand's samples, lateness and buttons do to its output: states, trouble, decay, latching.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

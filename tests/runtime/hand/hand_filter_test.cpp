@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Indexing and scaling: nothing is lost, nothing jumps, nothing winds up.
 #include "runtime/hand/hand_filter.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whatever is asked for, what reaches a device is finite, inside the rating, slow enough,
 // explained.
 #include <doctest/doctest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A thousand random scripts of everything that can go wrong with a device, in virtual time:
 // whatever happens in whatever order, no frame breaks a limit, and trouble ends at zero and stays
 // there.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The loop joins devices, session and clock: what it runs, counts and hands over.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a viewer sees of a running loop, and what it may change: settings, pace.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Definitions that cannot be run are refused with a sentence; those that can are kept exactly.
 #include <doctest/doctest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Colours of the whole page. The map from weight to colour runs from dark blue (shares its
 // stiffness with many) to yellow (has all of it), and stays readable without colour vision.
 const stops = [

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Taking the part in hand: a drag that begins on the part or its ghost moves the hand in the plane
 // of the screen, with the right button or Shift it turns it about the part's centre of mass, the
 // wheel moves it along the line of sight. Everywhere else the mouse turns the camera.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One message of the program: JSON head and typed arrays (io/view/envelope.h).
 export type Numbers = Float32Array | Uint32Array | Int16Array | Uint8Array;
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The Gauss sphere: normals N (red) and torque directions T (blue) of all contacts, seen from where
 // the camera of the scene stands. Dots behind the sphere are faint.
 import { Quaternion, Vector3 } from 'three';

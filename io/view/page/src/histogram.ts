@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How long frames took: bins of a quarter octave, from 1/4 us; the counts are drawn on a log scale.
 export const binLow = (bin: number) => 0.25 * 2 ** (bin / 4);
 

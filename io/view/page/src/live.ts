@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page of `hapsix run --view`: shows what comes, sends what the person does.
 import * as THREE from 'three';
 import { floats, unpack, type Packet } from './envelope';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page of `hapsix report`: recordings side by side, from the data inside the page.
 import { floats, unpack, type Packet } from './envelope';
 import { series as colours } from './colours';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Principal axes of a symmetric 3 x 3 matrix (Jacobi rotations): the net stiffness of all contacts.
 import { Matrix4 } from 'three';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Strips over time, as in the paper's Fig. 10: contacts, force, torque, penetration depth.
 import uPlot from 'uplot';
 import { series as colours } from './colours';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The scene in space: environment, part, the hand's ghost, contacts as arrows, the deepest point,
 // the net-stiffness ellipsoid, a slice of the field. World frame in metres, shrunk to the scene's
 // size so that the camera's depth range fits any part.

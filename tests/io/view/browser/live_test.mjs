@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The live view, used as a person uses it: node --test with HAPSIX_PROGRAM, HAPSIX_CHROMIUM and
 // HAPSIX_PICTURES (a folder for screenshots) set. `./dev test-view` does that.
 import assert from 'node:assert/strict';

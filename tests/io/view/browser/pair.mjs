@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What being looked at costs: the same run with and without three clients, turn about. One client
 // reads, one never reads, one is killed on the way. `./dev bench view` runs it.
 import { execFileSync, spawn } from 'node:child_process';

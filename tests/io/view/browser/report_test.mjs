@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A report, opened from disk as a person opens it: no server, nothing fetched.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
