@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 
+#include "io/file/mix.h"
 #include "io/file/radix_sort.h"
 #include "sched/parallel_for.h"
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/file/mix.h"
 #include "io/shell/candidates.h"
 #include "sched/parallel_for.h"
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/file/mix.h"
 #include "io/shell/bake_shell.h"
 #include "io/shell/blue_noise.h"
 #include "kernels/bake/triangle_distance.h"
