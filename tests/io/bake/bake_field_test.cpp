@@ -281,8 +281,8 @@ TEST_CASE(
     const Mesh flat = patch(3, 3, [&](double s, double t) {
       return Vec3{size * (s - 0.5), size * (t - 0.5), bend * s * t};
     });
-    add(mesh, moved(turned(flat, random(0, 6), random(0, 6)),
-                    {random(-1, 1), random(-1, 1), random(-1, 1)}));
+    add(mesh, shifted(turned(flat, random(0, 6), random(0, 6)),
+                      {random(-1, 1), random(-1, 1), random(-1, 1)}));
   }
   FieldBake options = small_bake(160);
   options.offset = 0;
@@ -496,7 +496,7 @@ TEST_CASE(
 TEST_CASE("bake_field: far from the origin nothing is lost") {
   const Mesh here = turned(l_shape(0.01), 0.4, 0.3);
   const Vec3 there{1e5, -1e5, 1e5};
-  const FieldData near = must_bake(here), far = must_bake(moved(here, there));
+  const FieldData near = must_bake(here), far = must_bake(shifted(here, there));
   CHECK(near.brick_index == far.brick_index);
   REQUIRE(near.samples.size() == far.samples.size());
   double worst = 0;

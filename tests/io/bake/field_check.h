@@ -128,7 +128,7 @@ inline Mesh turned(Mesh mesh, double a, double b) {
   return mesh;
 }
 
-inline Mesh moved(Mesh mesh, Vec3 by) {
+inline Mesh shifted(Mesh mesh, Vec3 by) {
   for (Vec3& v : mesh.vertices) v = v + by;
   return mesh;
 }

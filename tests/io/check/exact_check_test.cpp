@@ -73,7 +73,7 @@ Mesh hollow_ball() {
 
 TEST_CASE("distances by Embree are exact in double: near, far, far from the origin, of slivers") {
   for (const Vec3 by : {Vec3{0, 0, 0}, Vec3{1e4, -2e4, 3e3}}) {
-    const Mesh mesh = moved(shards(500), by);
+    const Mesh mesh = shifted(shards(500), by);
     const auto rays = rays_at(mesh);
     const Judge judge(mesh);
     Random random(5);
@@ -265,7 +265,7 @@ TEST_CASE("whatever is wrong with a field shows, and where") {
 
 TEST_CASE("a field of another mesh, or of nothing, is refused with a sentence") {
   const FieldData field = bake(torus(1.0, 0.4));
-  const auto other = check_exactly(moved(torus(1.0, 0.4), {40, 0, 0}), field, {});
+  const auto other = check_exactly(shifted(torus(1.0, 0.4), {40, 0, 0}), field, {});
   REQUIRE(!other);
   CHECK(other.error().find("another mesh") != std::string::npos);
   Mesh line;

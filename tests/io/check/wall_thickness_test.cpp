@@ -35,7 +35,7 @@ Mesh reversed(Mesh mesh) {
 TEST_CASE("a slab is as thick as it is, however it lies and is wound, far from the origin or not") {
   const Mesh slab = box({0, 0, 0}, {10, 10, 0.25});
   for (const Mesh& mesh : {slab, reversed(slab), turned(slab, 0.5, 1.1),
-                           moved(turned(slab, 0.5, 1.1), {1000, 2000, 0})}) {
+                           shifted(turned(slab, 0.5, 1.1), {1000, 2000, 0})}) {
     const Walls w = measure(mesh);
     REQUIRE(w.thickness.size() == 4000);  // its narrow sides are 10 apart
     CHECK(near(w.thickness.front(), 0.25, 1e-6));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A run of the program that is killed at any instant has left a recording: it opens, `info` puts
 // the folder in order and says what it did, and what is there replays to the bit.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
 #include <memory>
 #include <random>

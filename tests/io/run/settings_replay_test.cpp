@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Settings that a person changes in the live view are part of a recording: replay changes them
 // before the same frame, and says so where a recording cannot.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include <hdf5.h>
 #include <unistd.h>

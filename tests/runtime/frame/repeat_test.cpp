@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a loop did is stepped again to the bit from its rows: deadlines that were missed, faults,
 // requests and changed settings included, also where the safety chain's output moves the body.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <atomic>

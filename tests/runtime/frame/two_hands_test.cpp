@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Several hands, each with a part of its own: traversed and weighed side by side, with the same
 // bits.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <array>
