@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// clock.cpp - reads the clocks.
 #include "sched/clock.h"
 
 #include <cerrno>
@@ -38,7 +39,7 @@ std::int64_t ticks() {
 void TickLength::see(std::int64_t now_ns, std::int64_t ticks) {
   const std::int64_t ns = now_ns - since_ns_, counted = ticks - since_ticks_;
   const bool begun = since_ns_ != 0, whole = ns > kSecond;
-  // Until a second has passed the best that can be said.
+  // During the first second this is a first estimate.
   if (begun && ns > 0 && counted > 0 && (whole || !known_)) {
     ns_ = static_cast<double>(ns) / static_cast<double>(counted);
     known_ = whole;

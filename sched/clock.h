@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// clock.h - the two clocks of a haptic thread.
+// clock.h - the clocks of a haptic thread: wall time, fast ticks, CPU time.
 #pragma once
 #include <cstdint>
 
 namespace h6::sched {
 
-// Nanoseconds of the monotonic clock. Read through the vDSO: no system call, allowed in a frame.
+// Nanoseconds of the monotonic clock. The vDSO reads it without a system call, so a frame may.
 std::int64_t now_ns();
 
-// A reading for spans of one thread within a frame. Where the processor has a counter of constant
-// rate that is it (10 ns a reading where the clock takes 26), else the clock.
+// A reading for time spans within one frame on one thread: the processor's counter where its rate
+// is constant (10 ns a reading), else the clock (26 ns).
 std::int64_t ticks();
 
-// How long a tick is, from both read together now and then. After a second it starts anew: what a
-// pause of the machine did to either is forgotten.
+// The length of a tick, from pairs of readings of both clocks. It is measured anew every second, so
+// that a pause of the machine does not spoil it for ever.
 class TickLength {
  public:
   void see(std::int64_t now_ns, std::int64_t ticks);
@@ -25,10 +25,10 @@ class TickLength {
   double ns_ = 1;
 };
 
-// Nanoseconds of CPU time that the calling thread has used. A system call: outside the frame only.
+// CPU time of the calling thread [ns]. A system call, so only outside the frame.
 std::int64_t thread_cpu_ns();
 
-// Sleeps until the monotonic clock shows `deadline_ns`; returns at once when that has passed.
+// Sleeps until the monotonic clock shows `deadline_ns`; returns at once if that has passed.
 void sleep_until_ns(std::int64_t deadline_ns);
 
 }  // namespace h6::sched

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// frame_team.cpp - the ticket that both threads claim slices from, and the helper's life.
 #include "sched/frame_team.h"
 
 #include <oneapi/tbb/task_arena.h>
@@ -31,7 +32,7 @@ constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
 thread_local int this_is_helper = 0;
 thread_local std::int64_t this_waited = 0;
 
-// The thread belongs to TBB: it gets back what it came with.
+// Core and priority of the helper's thread. The thread belongs to TBB, so both are given back.
 class Treatment {
  public:
   Treatment() { pthread_getaffinity_np(pthread_self(), sizeof came_with_, &came_with_); }
@@ -39,7 +40,7 @@ class Treatment {
   void set(int priority, int haptic_core) {
     cpu_set_t cores = came_with_;
     if (haptic_core >= 0) CPU_CLR(haptic_core, &cores);
-    // With no other core it would only stand in the way.
+    // Without another core the helper must not compete with the haptic thread.
     const bool alone = CPU_COUNT(&cores) == 0;
     pthread_setaffinity_np(pthread_self(), sizeof cores, alone ? &came_with_ : &cores);
     sched_param parameters{};
@@ -52,38 +53,36 @@ class Treatment {
   cpu_set_t came_with_{};
 };
 
-// What sharing costs, with the helper polling (slices of 2 us, 8,000 jobs, p50): a job of 4 us
-// takes 2.7 us on both threads, 8: 5.0, 16: 9.4, 32: 18.3; of two slices of 1 us 1.7 instead
-// of 2.2. So some 0.7 us: less work than 4 us is not worth it.
-constexpr int kInHaste = 2;           // frames that came too early in a row: so will the next
-constexpr std::int64_t kNap = 50000;  // ns; how late the helper may notice an early frame
+// Sharing costs some 0.7 us while the helper polls: a job of 4 us takes 2.7 on both threads. Less
+// work than that does not pay.
+constexpr int kInHaste = 2;           // after so many early frames the next one is expected early
+constexpr std::int64_t kNap = 50000;  // how late the helper may notice an early frame [ns]
 }  // namespace
 
-// One job at a time. The ticket is the whole job in one word: its number (32 bits), the end of its
-// free slices (16) and the first of them (16). A claim is one compare-and-swap of that word, so a
-// helper that wakes late can never take a slice of a job that is over, nor read a job that is being
-// set up. The haptic thread takes the first one, the helper the last: so each has the same ones in
-// frame after frame, and what they left in its cache.
+// There is one job at a time, and the ticket is the whole job in one word: its number (32 bits),
+// the end of its free slices (16) and the first of them (16). A claim is one compare-and-swap of
+// that word, so a helper that wakes late can neither take a slice of a finished job nor read a job
+// that is being set up. The haptic thread takes the first free slice, the helper the last: from
+// frame to frame each gets the same slices, whose data are still in its cache.
 struct FrameTeam::Helper {
-  oneapi::tbb::task_arena arena{1, 0};  // alive for as long as its task waits
-  // A task that TBB has no thread for (every helper stays in one) may wait for ever: who is done
-  // with it then leaves it behind.
+  oneapi::tbb::task_arena arena{1, 0};  // lives as long as its task waits
+  // Where TBB has no thread left the task may never start. The destructor then abandons it.
   enum State { kWaiting, kHelping, kEnded, kAbandoned };
   std::atomic<int> state{kWaiting};
   std::atomic<bool> stop{false};
-  std::atomic<bool> polling{false};         // a frame is on
+  std::atomic<bool> polling{false};         // a frame is running
   std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
   std::atomic<int> treatment{0};            // priority + 256 * (the haptic thread's core + 1)
-  std::atomic<int> frame_core{-1};          // where the last frame began
+  std::atomic<int> frame_core{-1};          // the core on which the last frame began
   alignas(64) std::atomic<std::uint64_t> ticket{0};
   alignas(64) std::atomic<std::uint32_t> done{0};  // slices of this job that are finished
   // Written before the ticket is published, read after a claim.
   Slice work = nullptr;
   void* context = nullptr;
   std::uint32_t job = 0;
-  std::int64_t announced = 0;  // when the next frame was said to be due
+  std::int64_t announced = 0;  // when the next frame is due, as end_frame was told
   int early = 0;               // frames in a row that came long before they were due
-  // Written by the helper before it counts a slice as done, read and cleared when all are.
+  // The helper writes it before it counts a slice as done; it is read and cleared between jobs.
   HelperWork helped;
 
   static std::uint64_t ticket_of(std::uint32_t job, std::size_t slices) {
@@ -124,7 +123,7 @@ struct FrameTeam::Helper {
     while (!stop.load(std::memory_order_relaxed)) {
       if (!polling.load(std::memory_order_acquire)) {
         int asked = treatment.load(std::memory_order_relaxed);
-        // Nobody said which core is the haptic thread's: not this one, it seems.
+        // Without set_realtime the helper still leaves the core on which frames begin.
         if (const int core = frame_core.load(std::memory_order_relaxed);
             asked == 0 && core >= 0 && core == sched_getcpu())
           asked = 256 * (core + 1);
@@ -135,7 +134,7 @@ struct FrameTeam::Helper {
         const std::int64_t now = now_ns();
         if (now < due)
           sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
-        else if (now > due + 2 * kPollBefore)  // nobody steps: the longer, the lazier
+        else if (now > due + 2 * kPollBefore)  // no frames come: nap, and longer after a while
           sleep_until_ns(now + (now - due > 2000 * kNap ? 20 * kNap : kNap));
         else
           relax();
@@ -154,8 +153,8 @@ FrameTeam::FrameTeam(unsigned threads) {
   // Polling is off until the first frame; the store also orders construction before the helper's
   // work.
   helper_->polling.store(false, std::memory_order_release);
-  // The sanitizer cannot see TBB hand the closure over: read by nothing but the body, which it
-  // leaves alone (not by a function of shared_ptr); what it calls is watched as ever.
+  // A thread sanitizer cannot see how TBB hands the closure over, so it must ignore this body. The
+  // body reads the raw pointer, not the shared one, because functions that it calls are watched.
   helper_->arena.enqueue([ kept = helper_, helper = helper_.get() ]()
                              __attribute__((no_sanitize("thread"))) { helper->help(); });
 }
@@ -198,7 +197,7 @@ FrameTeam::HelperWork FrameTeam::helper_work() const {
 void FrameTeam::end_frame(std::int64_t next_frame_ns) {
   if (!helper_) return;
   helper_->announced = next_frame_ns;
-  // Whoever steps as fast as they can is not waited for asleep.
+  // Where the caller steps as fast as it can, the helper does not fall asleep.
   const bool haste = helper_->early >= kInHaste;
   helper_->next_frame.store(haste ? now_ns() + kPollBefore : next_frame_ns,
                             std::memory_order_relaxed);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// halt_list.cpp - a fixed table of atomic entries.
 #include "sched/halt_list.h"
 
 #include <sched.h>
@@ -10,7 +11,7 @@
 namespace h6::sched {
 namespace {
 
-// No lock: a signal handler may have interrupted whoever holds it.
+// Without a lock, because a signal handler may interrupt the thread that would hold it.
 struct Entry {
   std::atomic<void*> self{nullptr};  // null: free
   std::atomic<void (*)(void*)> halt{nullptr};
@@ -27,7 +28,7 @@ bool add_to_halt_list(void (*halt)(void*), void* self) {
   if (!at_exit) return false;
   for (Entry& entry : list) {
     void* none = nullptr;
-    // Nobody halts it before `halt` is there.
+    // halt_all skips the entry until `halt` is stored.
     if (!entry.self.compare_exchange_strong(none, self)) continue;
     entry.process.store(getpid());
     entry.halt.store(halt);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // latest_value.h - hands the newest value from one writer to one reader; neither ever waits.
 //
-// Three slots: the writer owns one, the reader owns one, the third is the exchange. `middle_` holds
-// the index of the exchange slot and whether it is newer than what the reader has. Large values are
-// written and read where they lie: next() and publish(), newest().
+// There are three slots: the writer owns one, the reader owns one, the third is the exchange.
+// `middle_` holds the index of the exchange slot and whether that is newer than the reader's value.
+// Large values can be written and read in place: next() and publish(), newest().
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -18,23 +18,23 @@ class LatestValue {
     slots_[back_] = value;
     publish();
   }
-  // Writer. The slot to fill, with whatever it held; then it is the newest.
+  // Writer. Fill the slot that next() gives, which holds an old value; publish() makes it the
+  // newest.
   T& next() { return slots_[back_]; }
   void publish() { back_ = middle_.exchange(back_ | kNew, std::memory_order_acq_rel) & kIndex; }
-  // Reader. True when there is a value newer than that of the last call; `out` is left alone if
-  // not.
+  // Reader. True when there is a newer value than in the last call; otherwise `out` is unchanged.
   bool take(T& out) {
     const T* value = newest();
     if (value) out = *value;
     return value != nullptr;
   }
-  // Reader. A value newer than that of the last call, or nullptr; it stays until the next call.
+  // Reader. A newer value than in the last call, or nullptr. It is valid until the next call.
   const T* newest() {
     if (!(middle_.load(std::memory_order_relaxed) & kNew)) return nullptr;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;
     return &slots_[front_];
   }
-  // Before anyone writes or reads.
+  // Prepares all slots, before the first write or read.
   template <class F>
   void prepare(F&& each) {
     for (T& slot : slots_) each(slot);

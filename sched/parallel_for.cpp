@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// parallel_for.cpp - the loop in an arena of its own.
 #include "sched/parallel_for.h"
 
 #include <oneapi/tbb/blocked_range.h>
@@ -13,8 +14,8 @@
 namespace h6::sched {
 namespace {
 
-// An arena of our own: the host's TBB work can neither enter it nor be held up by it. The calling
-// thread keeps it, since making one and getting workers into it takes longer than many a loop.
+// Our own arena, so that the host program's TBB work neither enters it nor waits for it. The
+// calling thread keeps it, because a new arena with workers takes longer than many a loop.
 oneapi::tbb::task_arena& own_arena(unsigned threads) {
   thread_local std::vector<std::unique_ptr<oneapi::tbb::task_arena>> arenas;
   if (arenas.size() <= threads) arenas.resize(threads + 1);
@@ -31,15 +32,15 @@ unsigned machine_threads() {
 
 void parallel_for(std::size_t count, unsigned threads,
                   const std::function<void(std::size_t)>& body) {
-  // More than the machine has would only make TBB complain.
+  // TBB warns when asked for more threads than the machine has.
   const unsigned most = machine_threads();
   if (threads == 0 || threads > most) threads = most;
   if (threads == 1 || count < 2) {
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;
   }
-  // TBB orders all this already; said once more in atomics for a thread sanitizer, which cannot see
-  // into a TBB that was built without it.
+  // TBB orders these accesses already. The atomics repeat it for a thread sanitizer, which cannot
+  // see into a TBB that was built without it.
   std::atomic<std::size_t> order{0};
   order.store(1, std::memory_order_release);
   own_arena(threads).execute([&] {

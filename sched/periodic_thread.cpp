@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// periodic_thread.cpp - the loop over deadlines.
 #include "sched/periodic_thread.h"
 
 #include "sched/clock.h"
@@ -21,7 +22,7 @@ void wait_for(std::int64_t deadline, WakeAhead& ahead) {
 Late cause_of(std::int64_t wakeup, std::int64_t wall, std::int64_t cpu, std::int64_t period) {
   if (wakeup + wall <= period) return Late::no;
   if (cpu > period) return Late::compute;
-  // The larger of the two delays that were not our work.
+  // Two delays were not our work; the larger one is the cause.
   return wall - cpu >= wakeup ? Late::stolen : Late::wakeup;
 }
 
@@ -60,7 +61,7 @@ void PeriodicThread::run() {
       more = work_.tick(frame, timing, wakeup_us);
       const std::int64_t end = now_ns();
       const std::int64_t cpu = thread_cpu_ns() - cpu_before;
-      // Where the machine has taken the helper's core, this one spins for its slice.
+      // Waiting for a helper whose core the machine took is not this thread's work.
       const std::int64_t own = cpu - (FrameTeam::waited_ns() - waited_before);
       const Late late = cause_of(start - deadline, end - start, own, period);
       timing = {wakeup_us, late,

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// periodic_thread.h - a thread that does one thing at absolute deadlines, and accounts for time.
+// periodic_thread.h - a thread that runs a tick at absolute deadlines and measures its timing.
 //
 //   deadline n          deadline n+1
 //   |--wakeup--[=== tick ===]---sleep---[spin]|--
 //
-// Deadlines are n periods apart, so that a late frame does not delay the next ones. After more than
-// a whole period is lost the schedule moves by whole ones: a burst of catch-up frames would be a
-// jolt.
+// Deadlines are whole periods apart, so that a late frame does not delay the next ones. When more
+// than a period is lost the schedule moves on: a burst of catch-up frames would be felt as a jolt.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -17,34 +16,35 @@
 
 namespace h6::sched {
 
-// Why a frame ended after its deadline: exactly one cause a late frame.
+// Why a frame ended after its deadline. Every late frame has exactly one cause.
 enum class Late {
   no,
-  compute,  // the thread's own CPU time, without waiting for a helper, was over the period
-  stolen,   // it was not, but the clock was: the machine ran something else
-  wakeup,   // the frame was short enough, but began too late
+  compute,  // the thread's own CPU time, without waiting for a helper, exceeded the period
+  stolen,   // only the wall time did: the machine ran something else
+  wakeup,   // the frame was short enough but began too late
 };
 
-// What the thread knows of the frame before, given to the next one and to `done`.
+// The timing of one frame, given to the next tick and to `done`.
 struct TickTiming {
   double wakeup_us = 0;  // start after the deadline
   Late late = Late::no;
-  double late_us = 0;  // end after the next deadline, of a late one
-  double cpu_us = 0;   // the thread's own CPU time
+  double late_us = 0;  // a late frame's end after the next deadline
+  double cpu_us = 0;   // CPU time of the thread
 };
 
 struct PeriodicThreadOptions {
   double rate = 1000;         // [Hz]
-  double spin_us = 0;         // poll the clock this long before a deadline
-  bool virtual_time = false;  // no clock, no sleep: frame after frame
-  bool realtime = true;       // ask for real-time treatment
+  double spin_us = 0;         // how long to poll the clock before a deadline
+  bool virtual_time = false;  // frame after frame, without clock or sleep
+  bool realtime = true;       // request real-time treatment
   RealtimeRequest request;
 };
 
 class PeriodicThread {
  public:
-  // `tick` runs every period with its frame number and returns false to end. `done` runs after each
-  // tick, outside the measured frame. `begin` runs first on the thread, with what was granted.
+  // `begin` runs first on the thread, with what the system granted. `tick` runs every period with
+  // its frame number and returns false to end. `done` runs after each tick, outside the measured
+  // frame.
   struct Work {
     std::function<void(const RealtimeGrant&)> begin;
     std::function<bool(std::uint64_t frame, const TickTiming& before, double wakeup_us)> tick;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// realtime.cpp - core, priority and memory of the haptic thread.
 #include "sched/realtime.h"
 
 #include <fcntl.h>
@@ -29,7 +30,7 @@ void append(RealtimeGrant& grant, const char* format, ...) {
   va_end(arguments);
 }
 
-// The first line of a small file that the kernel makes; empty when it does not.
+// The first line of a small kernel file; empty where there is no such file.
 void read_line(const char* file, char* out, std::size_t size) {
   out[0] = 0;
   const int fd = open(file, O_RDONLY | O_CLOEXEC);
@@ -53,7 +54,7 @@ bool in_list(const char* list, int core) {
   return false;
 }
 
-// Whether the clock stays up and the core stays ours: the machine's settings, not the thread's.
+// Reports settings of the machine: whether the core is isolated, and what governs its clock.
 void look_at_core(RealtimeGrant& grant, int core) {
   char list[256], file[96];
   read_line("/sys/devices/system/cpu/isolated", list, sizeof list);
@@ -74,7 +75,7 @@ void look_at_core(RealtimeGrant& grant, int core) {
            grant.governor);
 }
 
-// The kernel grows a stack page by page, each a page fault: take them now.
+// The kernel grows a stack page by page with a page fault each. Take them now.
 void touch_stack() {
   volatile char page[128 * 1024];
   for (std::size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
@@ -85,7 +86,7 @@ void touch_stack() {
 RealtimeGrant request_realtime(const RealtimeRequest& request) {
   RealtimeGrant grant;
   const int cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
-  // The last core: the first one serves most interrupts.
+  // The last core, because the first one serves most interrupts.
   const int core = request.core >= 0 ? request.core : cores - 1;
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -111,7 +112,7 @@ RealtimeGrant request_realtime(const RealtimeRequest& request) {
            "and log in again. ",
            std::strerror(refused));
 
-  // Only what exists now: with MCL_FUTURE a host program's next malloc could fail.
+  // Only present memory: with MCL_FUTURE the host program's next malloc could fail.
   grant.locked = mlockall(MCL_CURRENT) == 0;
   if (grant.locked)
     append(grant, "memory locked.");

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // spsc_ring.h - one writer, one reader, fixed capacity; neither ever waits.
 //
-// The two cursors only grow; a slot is cursor % capacity. Each side keeps a copy of the other's
-// cursor on its own cache line, so that a half-full ring costs no shared line a push.
+// The two cursors only grow; a slot is cursor % capacity. The writer keeps a copy of the reader's
+// cursor on its own cache line, so that a push into a half-full ring touches no shared line.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -16,7 +16,7 @@ class SpscRing {
   explicit SpscRing(std::size_t capacity)
       : slots_(std::make_unique<T[]>(capacity)), capacity_(capacity) {}
 
-  // Writer. False when the ring is full: the value is dropped and counted.
+  // Writer. False when the ring is full; the value is then dropped and counted.
   bool push(const T& value) {
     const std::size_t at = written_.load(std::memory_order_relaxed);
     if (at - seen_read_ == capacity_) {
@@ -30,14 +30,14 @@ class SpscRing {
     written_.store(at + 1, std::memory_order_release);
     return true;
   }
-  // Writer. Whether a push would be dropped now.
+  // Writer. Would a push be dropped now?
   bool full() {
     const std::size_t at = written_.load(std::memory_order_relaxed);
     seen_read_ = read_.load(std::memory_order_acquire);
     return at - seen_read_ == capacity_;
   }
 
-  // Reader. Moves up to `room` values, oldest first, and returns how many.
+  // Reader. Moves up to `room` values out, the oldest first, and returns how many.
   std::size_t pop(T* out, std::size_t room) {
     const std::size_t at = read_.load(std::memory_order_relaxed);
     const std::size_t there = written_.load(std::memory_order_acquire) - at;
@@ -47,14 +47,14 @@ class SpscRing {
     return count;
   }
 
-  // Either side.
+  // Either side. Values that were dropped so far.
   std::size_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
 
  private:
   std::unique_ptr<T[]> slots_;
   std::size_t capacity_;
   alignas(64) std::atomic<std::size_t> written_{0};
-  std::size_t seen_read_ = 0;  // the writer's
+  std::size_t seen_read_ = 0;  // the writer's copy of read_
   std::atomic<std::size_t> dropped_{0};
   alignas(64) std::atomic<std::size_t> read_{0};
 };

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// watchdog.cpp - the watchdog's thread.
 #include "sched/watchdog.h"
 
 #include <pthread.h>
@@ -29,7 +30,7 @@ void Watchdog::sleep_ns(std::int64_t duration) {
 
 void Watchdog::run(int priority) {
   if (priority > 0) {
-    // Above the thread it watches: that may spin for ever on a core that both would need.
+    // Above the watched thread, which may spin for ever on a core that both need.
     sched_param parameters{};
     parameters.sched_priority = priority;
     (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
@@ -38,7 +39,7 @@ void Watchdog::run(int priority) {
     const std::lock_guard lock(mutex_);
     return end_;
   };
-  std::int64_t expired_beat = 0;  // the beat that none has followed
+  std::int64_t expired_beat = 0;  // the last beat before the stall that was counted last
   while (!ends()) {
     const std::int64_t beat = beat_.load(std::memory_order_relaxed), now = now_ns();
     if (beat == 0 || now < beat + timeout_) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// watchdog.h - a thread that does nothing as long as another one says that it lives.
+// watchdog.h - a thread that acts when another thread stops giving signs of life.
 //
-// It sleeps from one possible expiry to the next, so that a beat costs one store and no wake-up.
+// The watchdog sleeps from one possible expiry to the next, so that a beat costs one store and no
+// wake-up.
 #pragma once
 #include <atomic>
 #include <condition_variable>
@@ -14,19 +15,19 @@ namespace h6::sched {
 
 class Watchdog {
  public:
-  // `expired` is called on the watchdog's thread once no beat has come for `timeout_ns`, and again
-  // every `timeout_ns` until one does. The thread asks for SCHED_FIFO of this priority, 0: not; it
-  // goes on without.
+  // Calls `expired` on the watchdog's thread when no beat has come for `timeout_ns`, and again
+  // every `timeout_ns` until one comes. The thread requests SCHED_FIFO of this priority (0: none)
+  // and works without it too.
   Watchdog(std::int64_t timeout_ns, int priority, std::function<void()> expired);
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  // The watched thread. Nothing expires before the first beat and after a rest.
+  // For the watched thread. Nothing expires before the first beat or after a rest.
   void beat(std::int64_t now_ns) { beat_.store(now_ns, std::memory_order_relaxed); }
   void rest() { beat_.store(0, std::memory_order_relaxed); }
 
-  // How often it stood still. Grows before `expired` is called.
+  // How many times the watched thread was found stalled. Grows before `expired` is called.
   std::uint64_t trips() const { return trips_.load(); }
 
  private:
@@ -37,7 +38,7 @@ class Watchdog {
   const std::function<void()> expired_;
   std::atomic<std::int64_t> beat_{0};
   std::atomic<std::uint64_t> trips_{0};
-  std::mutex mutex_;  // of the end alone: the watched thread never takes it
+  std::mutex mutex_;  // guards end_ only; the watched thread never takes it
   std::condition_variable ended_;
   bool end_ = false;
   std::thread thread_;
