@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// assert.cpp - what a failed assertion does; the one piece of the contract that is code, so that
-// the leaves can assert without knowing the engine.
+// assert.cpp - handles a failed assertion. It is part of the contract, so that kernels and sched
+// can assert without the engine.
 #include <cstdio>
 
 #include "hapsix/base.h"

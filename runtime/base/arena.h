@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // arena.h - storage that is sized once.
 //
-// A layout function takes its columns from an Arena twice: first from an empty one, which only
-// counts, then from one over memory of that size. So capacity and use can never disagree.
+// A layout function takes its columns from an Arena twice: first from an empty arena, which only
+// counts, then from one over memory of the counted size. So capacity and use always agree.
 #pragma once
 #include <sys/mman.h>
 
@@ -22,11 +22,12 @@ inline void* allocate(const h6Allocator& a, std::size_t bytes) {
   bytes = (bytes + kAlignment - 1) & ~(kAlignment - 1);
   if (a.allocate && a.release) return a.allocate(a.user, bytes, kAlignment);
   if (bytes < kHugePage) return std::aligned_alloc(kAlignment, bytes ? bytes : kAlignment);
-  // Fields are read all over: on pages of 4 kB finding them is a good part of a cold frame.
+  // A frame reads fields all over. With 4 kB pages the page table costs a good part of a cold
+  // frame.
   const std::size_t whole = (bytes + kHugePage - 1) & ~(kHugePage - 1);
   void* memory = std::aligned_alloc(kHugePage, whole);
 #ifdef MADV_HUGEPAGE
-  if (memory) madvise(memory, whole, MADV_HUGEPAGE);  // a wish: without it all is as it was
+  if (memory) madvise(memory, whole, MADV_HUGEPAGE);  // may be refused
 #endif
   return memory;
 }
@@ -51,7 +52,7 @@ void destroy(const h6Allocator& a, T* object) {
   release(a, object, sizeof(T));
 }
 
-// A column or a block: `count` values of a type that needs no constructor.
+// `count` values of a type that needs no constructor.
 template <class T>
 struct Buffer {
   h6Allocator allocator{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// math.h - Eigen inside the engine: fixed sizes only, so that nothing here allocates.
+// math.h - Eigen inside the engine, with fixed sizes only, so that nothing allocates.
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -19,8 +19,8 @@ inline Quat from(const h6Quat& q) { return {q.w, q.x, q.y, q.z}; }
 inline h6Vec3 to(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 inline h6Quat to(const Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
-// Zeros. By halves: the fill of a whole matrix becomes a string instruction, which takes some 40
-// cycles to begin.
+// Sets m to zero, half by half: GCC fills a whole matrix with a string instruction, which takes
+// some 40 cycles to begin.
 inline void clear(Mat6& m) {
   m.topRows<3>().setZero();
   m.bottomRows<3>().setZero();
@@ -36,7 +36,7 @@ inline Mat3 cross_matrix(const Vec3& v) {
 // Rotation vector -> rotation.
 inline Quat exp_rotation(const Vec3& w) {
   const double angle = w.norm();
-  // sin(a/2)/a by its series where the quotient would lose digits.
+  // sin(a/2)/a by its series, where the quotient would lose digits.
   const double s = angle < 1e-4 ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
   return Quat(std::cos(0.5 * angle), s * w.x(), s * w.y(), s * w.z());
 }
@@ -68,7 +68,7 @@ inline bool finite(const h6Velocity& u) {
 inline bool finite(const h6Wrench& f) {
   return from(f.force).allFinite() && from(f.torque).allFinite();
 }
-// Numbers, and a quaternion that can be made unit.
+// Both are finite, and the quaternion can be normalised.
 inline bool usable(const h6Pose& pose, const h6Velocity& u) {
   const double n = from(pose.q).norm();
   return finite(pose) && finite(u) && n > 0.5 && n < 2.0;

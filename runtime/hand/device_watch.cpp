@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// device_watch.cpp - freezes, jumps and speeds.
 #include "runtime/hand/device_watch.h"
 
 #include <algorithm>
@@ -9,9 +10,9 @@ namespace h6 {
 namespace {
 
 constexpr double kJumpAngle = 0.5;       // [rad]
-constexpr double kSmoothing = 0.01;      // of the poses' own velocity [s]
-constexpr double kCountedFreeze = 0.05;  // of a device that counts its samples [s]
-constexpr double kSlowest = 0.02;        // devices give a sample more often than that [s]
+constexpr double kSmoothing = 0.01;      // time constant for the velocity of the poses [s]
+constexpr double kCountedFreeze = 0.05;  // freeze time of a device that counts its samples [s]
+constexpr double kSlowest = 0.02;        // every device gives samples more often than that [s]
 
 bool same_bits(const h6DeviceSample& a, const h6DeviceSample& b) {
   return std::memcmp(&a.pose, &b.pose, sizeof a.pose) == 0 &&
@@ -33,8 +34,9 @@ void DeviceWatch::set(const h6SafetyDef& def, const h6DeviceCapabilities& device
   dead_man_ = def.dead_man_buttons;
 }
 
-// Devices may rest, and encoders with them: the same pose alone proves nothing. A count that stands
-// still does, a rating that says so, or a velocity that would have taken the pose elsewhere.
+// A device may rest, and its encoders with it, so the same pose alone proves nothing. Three things
+// do: a sample count that stands still, a freeze time in the rating, or a velocity that would have
+// changed the pose.
 bool DeviceWatch::hangs(const h6DeviceSample& sample, double dt) {
   const bool counts = sample.sequence != 0 || last_.sequence != 0;
   const bool same =
@@ -44,7 +46,7 @@ bool DeviceWatch::hangs(const h6DeviceSample& sample, double dt) {
   const double limit = freeze_time_ > 0 ? freeze_time_ : counts ? kCountedFreeze : 0;
   const double slack = 0.5 * dt;  // sums of dt round
   if (limit > 0 && same_for_ >= limit - slack) return true;
-  if (simulated_) return false;  // or a program's own samples
+  if (simulated_) return false;  // a simulated device, or a program's own samples
   const double speed = speed_of(from(sample.velocity.linear), from(sample.velocity.angular));
   return same_for_ > kSlowest + slack && speed * same_for_ > jump_;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// device_watch.h - what a hand's samples say about its device: is it there, does it hang, did it
-// jump, how fast is it.
+// device_watch.h - watches a device's samples: is it there, does it hang, did it jump, how fast is
+// it?
 #pragma once
 #include "hapsix/device.h"
 #include "runtime/base/math.h"
@@ -16,15 +16,15 @@ class DeviceWatch {
  public:
   void set(const h6SafetyDef& def, const h6DeviceCapabilities& device);
 
-  // Every frame of `dt` seconds, as the device gave it; `usable`: it is numbers.
+  // Once a frame of `dt` seconds, with the device's own sample. `usable`: it is finite.
   void see(const h6DeviceSample& sample, bool usable, double dt);
 
-  bool seen() const { return seen_; }      // a usable sample has come, in some frame
-  bool usable() const { return usable_; }  // in this one
-  bool jumped() const { return jumped_; }  // farther than a hand can have moved
-  bool frozen() const { return frozen_; }  // the same sample for too long
-  bool held() const { return held_; }      // the dead-man button, where there is one
-  // The larger of what the device says and what its poses say over some 10 ms [m/s].
+  bool seen() const { return seen_; }      // a usable sample has come in some frame
+  bool usable() const { return usable_; }  // this frame's sample is usable
+  bool jumped() const { return jumped_; }  // it is farther away than a hand can move
+  bool frozen() const { return frozen_; }  // the sample has been the same for too long
+  bool held() const { return held_; }      // the dead-man button is held, or there is none
+  // The larger of the device's velocity and the velocity of its poses over some 10 ms [m/s].
   double speed() const { return speed_; }
 
  private:
@@ -34,7 +34,7 @@ class DeviceWatch {
   std::uint32_t dead_man_ = 0;
   bool seen_ = false, usable_ = false, jumped_ = false, frozen_ = false, held_ = true;
   h6DeviceSample last_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};  // the last usable one
-  double since_ = 0;                                              // then [s]
+  double since_ = 0;                                              // time since last_ [s]
   double same_for_ = 0;                                           // [s]
   Vec3 drift_ = Vec3::Zero(), spin_ = Vec3::Zero();  // velocities of the poses, smoothed
   double speed_ = 0;

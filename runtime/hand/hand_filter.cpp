@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// hand_filter.cpp - the scaled maps and the clutch.
 #include "runtime/hand/hand_filter.h"
 
 #include <cmath>
@@ -7,8 +8,8 @@
 namespace h6 {
 namespace {
 
-// A rotation farther than this from its anchor takes the anchor along [rad]. Samples may then be
-// nearly half a turn apart before a logarithm is in doubt.
+// A rotation farther than this from its anchor moves the anchor [rad]. Two samples may then be
+// nearly half a turn apart before the logarithm is ambiguous.
 constexpr double kLeash = 2.0;
 
 bool same(const h6Pose& a, const h6Pose& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
@@ -52,7 +53,7 @@ h6BodyState ScaledMotion::map(const h6BodyState& in) {
   const Quat q = from(in.pose.q);
   Vec3 theta = log_rotation(q * q_in_.conjugate());
   if (theta.norm() > kLeash) {
-    // From the last sample on: what it was mapped to stays, so nothing jumps.
+    // The last sample becomes the anchor; its image stays, so nothing jumps.
     q_in_ = from(last_in_.q);
     q_out_ = from(last_out_.q);
     theta = log_rotation(q * q_in_.conjugate());
@@ -94,8 +95,8 @@ h6DeviceSample HandFilter::to_scene(const h6DeviceSample& device, const h6Pose& 
   *clutched = clutched_;
   device_ = device;
   if (clutched_ || was || !started_) {
-    // The manipulandum of an impedance hand was held; what follows in the other modes may have
-    // moved.
+    // Under the clutch an impedance hand's manipulandum rested; in the other modes the follower may
+    // have moved.
     if (started_ && admittance_) held_ = scene;
     anchor(device.pose, held_);
   }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// safety.cpp - limits from ratings, and the chain for wrenches and for motions.
 #include "runtime/hand/safety.h"
 
 #include <algorithm>
@@ -13,11 +14,11 @@ constexpr unsigned kCauseShift = 8;  // of h6SafetyInput.asked
 
 // v shortened to at most `most`; true when it was longer.
 bool clamp_norm(Vec3& v, double most) {
-  // stableNorm: a finite vector whose square overflows must still come out at `most`.
+  // stableNorm, because a finite vector whose square overflows must also come out at `most`.
   const double n = v.stableNorm();
   if (n <= most) return false;
   v *= most / n;
-  // The product rounds: the limit is kept to the last bit.
+  // The product rounds, but the limit holds to the last bit.
   while (v.norm() > most) v *= 1 - 1e-15;
   return true;
 }
@@ -29,12 +30,12 @@ bool slew(Vec3& v, const Vec3& last, double most) {
   return true;
 }
 
-// An axis limits when its numbers do: min < max.
+// An axis has a limit where min < max.
 bool clamp_to_box(Vec3& x, Vec3& v, const Vec3& least, const Vec3& most) {
   bool cut = false;
   for (int i = 0; i < 3; ++i) {
     if (!(least[i] < most[i]) || (x[i] >= least[i] && x[i] <= most[i])) continue;
-    // A device that follows the velocity must not be sent on through the wall.
+    // A device that follows the velocity must not pass through the wall.
     v[i] = x[i] < least[i] ? std::max(v[i], 0.0) : std::min(v[i], 0.0);
     x[i] = std::clamp(x[i], least[i], most[i]);
     cut = true;
@@ -47,7 +48,7 @@ bool sane(const h6Pose& pose) {
   return finite(pose) && n > 0.5 && n < 2;
 }
 
-// From the lightest to the gravest: what a command is said to be for.
+// From the lightest cause to the gravest, which the command names.
 constexpr h6Cause kGravity[] = {H6_CAUSE_PASSIVITY, H6_CAUSE_CLAMPED,    H6_CAUSE_SLEWED,
                                 H6_CAUSE_CLUTCHED,  H6_CAUSE_SPEED,      H6_CAUSE_POWER,
                                 H6_CAUSE_DERATED,   H6_CAUSE_SOFT_START, H6_CAUSE_DEAD_MAN,
@@ -61,7 +62,7 @@ h6Cause gravest(std::uint32_t causes) {
   return found;
 }
 
-// A setting may only be tighter than what there is; 0 leaves it alone.
+// A setting only makes a limit tighter; 0 leaves it alone.
 void tighten(double& limit, double asked) {
   if (asked > 0) limit = std::min(limit, asked);
 }
@@ -87,7 +88,7 @@ SafetyLimits limits_of(const h6DeviceCapabilities& c) {
 SafetyLimits limits_of(const h6DeviceCapabilities& c, const h6SafetyDef& def) {
   const SafetyLimits ceiling;
   SafetyLimits limits;
-  // A rating that is not a number or negative is no rating: nothing is rendered.
+  // A negative rating or NaN is no rating: nothing is rendered.
   const auto rating = [](double value, double most) {
     return value > 0 ? std::min(value, most) : 0.0;
   };
@@ -161,7 +162,7 @@ void OutputGuard::arm() {
   asked_ = H6_ASKED_ARM;
   if (fault_ != H6_CAUSE_NONE) asked_ |= H6_ASKED_FROM_FAULT;
   if (!armed_) asked_ |= H6_ASKED_FROM_DISARMED;
-  // A motion that was latched starts where the device is by now.
+  // A latched motion starts again where the device is now.
   if (fault_ != H6_CAUSE_NONE) moving_ = false;
   if (!armed()) gain_ = 0;
   fault_ = H6_CAUSE_NONE;
@@ -187,8 +188,8 @@ void OutputGuard::fall(double seconds) {
   if (gain_ < 1e-9) gain_ = 0;  // sums of dt round
 }
 
-// Trouble of `seconds` more: the first frame of it is held, then the gain falls, and when the whole
-// decay has passed it is for good.
+// Adds `seconds` of trouble. During the first frame the output is held; then the gain falls, and
+// after the whole decay time the trouble becomes a fault.
 void OutputGuard::suffer(h6Cause cause, double seconds) {
   note_cause(cause);
   falling_ = cause;
@@ -209,14 +210,14 @@ void OutputGuard::note(const DeviceWatch& watch, bool lost, double overdue, doub
   if (lost) asked_ |= H6_ASKED_LOST;
   input_ = {asked_, overdue};
   if (lost) fault(H6_CAUSE_DEVICE_LOST);
-  if (overdue > 0) note_cause(H6_CAUSE_LATE);  // also when something else was first
+  if (overdue > 0) note_cause(H6_CAUSE_LATE);  // also after a fault of another cause
   const bool trouble = overdue > 0 || hangs || !watch.usable();
   if (!trouble) {
     grace_ = dt;
     trouble_ = 0;
   } else if (armed()) {
-    if (!watch.held()) grace_ = 0;  // it decays already
-    // The frame after the last command is no delay, but only once.
+    if (!watch.held()) grace_ = 0;  // the gain falls already
+    // The frame after the last command counts as no delay, once.
     if (overdue > 0) suffer(H6_CAUSE_LATE, grace_ > 0 ? overdue : overdue + dt);
     if (hangs) suffer(H6_CAUSE_FROZEN, dt);
     if (!watch.usable()) suffer(H6_CAUSE_BAD_SAMPLE, dt);
@@ -274,7 +275,7 @@ h6DeviceCommand OutputGuard::finished(h6DeviceCommand command, h6Status* status)
     times_[cause] += (last_causes_ >> cause & 1u) == 0;
   }
   last_causes_ = causes_;
-  asked_ = 0;  // a fault of this frame's own comes again by itself
+  asked_ = 0;  // a fault of this frame will occur again when the frame is repeated
   return command;
 }
 
@@ -339,7 +340,7 @@ h6DeviceCommand OutputGuard::pass_motion(const h6Pose& device, const h6BodyState
   Vec3 v = from(wanted.velocity.linear), w = from(wanted.velocity.angular);
   Vec3 x = from(wanted.pose.p);
   h6DeviceCommand out{};
-  // Without a place to start from there is no safe pose; a step so large that it overflows is none.
+  // No pose is safe without one to start from, or after a step so large that it overflows.
   if (!moving_ || !sane(wanted.pose) || !v.allFinite() || !w.allFinite() || !(x - x_).allFinite())
     fault(H6_CAUSE_NOT_FINITE);
   if (fault_ != H6_CAUSE_NONE) {
@@ -360,7 +361,7 @@ h6DeviceCommand OutputGuard::pass_motion(const h6Pose& device, const h6BodyState
     if (gain_ < 1 && falling_ == H6_CAUSE_NONE) note_cause(H6_CAUSE_SOFT_START);
   }
   x_ = x;
-  // What is not limited goes out to the bit.
+  // A rotation within the limit goes out bit for bit.
   if (far_turned)
     q_ = (exp_rotation(turn) * q_).normalized();
   else

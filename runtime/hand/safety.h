@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// safety.h - the last thing before a device, for every hand, always on.
+// safety.h - the last stage before a device, for every hand, always on.
 //
-// Whatever comes in, what goes out is finite, inside the rating, changes no faster than the slew
-// limit (towards zero it may), and carries every cause of a difference. In order, each frame:
+// Whatever comes in, the output is finite and inside the rating, changes no faster than the slew
+// limit (it may fall to zero faster), and carries every cause of a difference. In order, each
+// frame:
 //
 //   watch    absent, lost, unusable, frozen, late, dead-man   -> state; trouble and its clock
 //   gain     up in soft_start, down in decay_time; a jump: 0  -> SOFT_START, the trouble's cause
-//   latch    what is not finite, lost, too fast, too long in trouble -> zero until h6Arm
+//   latch    not finite, lost, too fast, too long in trouble  -> zero until h6Arm
 //   clamp    norms of force and torque to the rating          -> CLAMPED
 //   scale    by the gain, and by the hand's speed             -> DERATED
-//   slew     of what was sent last                            -> SLEWED
-//   ceiling  gain times the rating: a slow slew cannot hold a decay up
+//   slew     against the last output                          -> SLEWED
+//   ceiling  gain times the rating: a slow slew must not delay a decay
 //   power    given to the hand                                -> POWER
 //
-// In the admittance modes clamp and slew are those of the pose and its velocity (SPEED), the gain
-// is one on the speed that is allowed, and a latched output stays where it was last sent.
-// METHOD.md, "The safety chain", has the whole table, with what stands behind it.
+// In the admittance modes clamp and slew act on the pose and its velocity (SPEED), the gain scales
+// the allowed speed, and a latched output stays where it was last sent. METHOD.md, "The safety
+// chain", has the whole table and its reasons.
 #pragma once
 #include <cstdint>
 
@@ -31,17 +32,17 @@ struct SafetyLimits {
   double power = 100;                             // given to the hand [W]
   double derate_speed = 2.5, cut_speed = 5;       // of the hand [m/s]
   double soft_start = 0.1, decay_time = 0.02;     // [s]
-  // Admittance modes. The two belong together by the lever of a hand.
+  // Admittance modes. kHandLever relates the two speeds.
   double speed = 2, angular_speed = 10;                             // norms [m/s], [rad/s]
   Vec3 workspace_min = Vec3::Zero(), workspace_max = Vec3::Zero();  // equal: no box [m]
 };
 
-// Limits that a device's ratings ask for: never above the defaults, which are our own ceiling. And
-// tighter ones that a definition asks for.
+// The limits from a device's ratings, never above the defaults, which are our own ceiling. A
+// definition can only make them tighter.
 SafetyLimits limits_of(const h6DeviceCapabilities& capabilities);
 SafetyLimits limits_of(const h6DeviceCapabilities& capabilities, const h6SafetyDef& def);
 
-// The part of a definition that is above what the device allows; NULL: none.
+// A setting of a definition that is above the device's rating. key is null where there is none.
 struct AboveRating {
   const char* key = nullptr;
   const char* unit = "";
@@ -54,39 +55,39 @@ class OutputGuard {
   void set_limits(const SafetyLimits& limits) { limits_ = limits; }
   const SafetyLimits& limits() const { return limits_; }
 
-  // Begins a frame. `lost`: its device could not be read or written. `overdue`: so much later than
-  // a frame after the last command does the next one come, 0 for one in time [s].
+  // Begins a frame. `lost`: the device could not be read or written. `overdue`: how much later than
+  // one frame after the last command the next one comes; 0: it is in time [s].
   void note(const DeviceWatch& watch, bool lost, double overdue, double dt);
-  // More causes of this frame, of what comes before the chain.
+  // Adds a cause of this frame, from a stage before the chain.
   void note_cause(h6Cause cause) { causes_ |= 1u << cause; }
 
   void fault(h6Cause cause);
-  // Clears a fault and starts from zero, softly; a motion from the device's own pose. Not while the
-  // device is absent, lost, frozen or sends no numbers.
+  // Clears a fault and starts softly from zero; a motion starts from the device's own pose. It does
+  // nothing while the device is absent, lost, frozen or sends no finite samples.
   void arm();
   void disarm();
-  // What of these four came since the last frame, for a record of it, and once more from that.
+  // Which of these calls came since the last frame, for a recording; repeat() calls them again.
   const h6SafetyInput& input() const { return input_; }
   void repeat(std::uint32_t asked);
-  // Another device: not armed, nothing has been sent. A fault stays.
+  // For another device: not armed, and nothing has been sent. A fault stays.
   void restart();
 
   h6Cause fault() const { return fault_; }
   h6DeviceState state() const { return state_; }
   bool can_arm() const { return may_arm_; }
   bool armed() const { return armed_ && fault_ == H6_CAUSE_NONE; }
-  // Nothing can go out in this frame.
+  // Neither force nor motion may go out in this frame.
   bool holds() const { return fault_ != H6_CAUSE_NONE || gain_ == 0; }
   double gain() const { return gain_; }
   h6HandSafety report() const;
 
-  // The wrench that may be sent in a frame of `dt` seconds to a hand that moves so (at the point
-  // that torques are about), why it differs, and status bits.
+  // The wrench that may be sent in a frame of `dt` seconds, with the causes of a difference; sets
+  // status bits. `hand`: its velocity at the point that torques are about.
   h6DeviceCommand pass(const h6Wrench& wanted, const h6Velocity& hand, double dt, h6Status* status);
 
-  // The pose and velocity that may be sent, for the admittance modes. Both are limited in speed;
-  // the origin of the mesh frame goes towards what is wanted but never farther out of the workspace
-  // than it is. `device` is where the device says it is: the first frame starts there.
+  // The pose and velocity that may be sent in the admittance modes. Both are limited in speed; the
+  // origin of the mesh frame never goes farther out of the workspace than it is. `device`: the
+  // device's own pose, from which the first frame starts.
   h6DeviceCommand pass_motion(const h6Pose& device, const h6BodyState& wanted, double dt,
                               h6Status* status);
 
@@ -102,10 +103,10 @@ class OutputGuard {
   h6DeviceState state_ = H6_ABSENT;
   bool may_arm_ = true;
   double gain_ = 0;
-  double speed_ = 0;                 // of the hand [m/s]
-  double grace_ = 0;                 // what is left of the one frame that is held in trouble [s]
-  double trouble_ = 0;               // without a pause, beyond that [s]
-  h6Cause falling_ = H6_CAUSE_NONE;  // why the gain falls in this frame
+  double speed_ = 0;    // of the hand [m/s]
+  double grace_ = 0;    // rest of the first frame of trouble, which changes nothing [s]
+  double trouble_ = 0;  // length of the present trouble after that frame [s]
+  h6Cause falling_ = H6_CAUSE_NONE;                    // why the gain falls in this frame
   Vec3 force_ = Vec3::Zero(), torque_ = Vec3::Zero();  // sent in the last frame
   Vec3 x_ = Vec3::Zero();                              // pose sent in the last frame, once moving_
   Quat q_ = Quat::Identity();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// device_gate.cpp - the order of marks and stops.
 #include "runtime/loop/device_gate.h"
 
 #include "sched/clock.h"

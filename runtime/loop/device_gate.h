@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// device_gate.h - between a loop's devices, the haptic thread that writes to them and whoever stops
-// them: the watchdog, a signal handler, another thread, the process's end.
+// device_gate.h - keeps the haptic thread's writes to devices apart from a stop by the watchdog, a
+// signal handler, another thread or the end of the process.
 //
-// A stop and a write can cross. So the writer says that it writes, whoever halts waits a little for
-// it, and a writer that was crossed stops the devices once more: the last word is always the
-// stop's.
+// A stop and a write can cross. So the writer marks its writes, a halt waits a little for a write,
+// and a writer that was crossed stops the devices once more. The last call is always the stop.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -21,19 +20,20 @@ class DeviceGate {
   DeviceGate(const DeviceGate&) = delete;
   DeviceGate& operator=(const DeviceGate&) = delete;
 
-  // `devices` outlive the gate. From now on the process's end halts them. false: too many gates.
+  // `devices` must outlive the gate. From now on the end of the process halts them. False when
+  // there are too many gates.
   bool open(const h6Device* devices, std::size_t count);
 
-  // The haptic thread, around its writes; false: nothing may be sent.
+  // For the haptic thread, before its writes. False: nothing may be sent.
   bool enter();
-  // false: the devices were halted meanwhile, and have been stopped once more.
+  // After its writes. False: the devices were halted meanwhile and have been stopped once more.
   bool leave();
 
-  // For ever. Waits 2 ms at most for a write on its way. Any thread, a signal handler, many times.
+  // Halts for ever; waits at most 2 ms for a write. From any thread or signal handler, many times.
   void halt();
   bool halted() const { return halted_.load(); }
 
-  // The devices' own stop, of those whose time is the clock's, or of all.
+  // Calls the stop of all devices, or of those that live in real time.
   void stop_all() const { stop(false); }
   void stop_real() const { stop(true); }
 

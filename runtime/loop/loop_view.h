@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// loop_view.h - what a viewer sees of a running loop: the newest poses and contacts, handed over in
-// place. Neither side ever waits; what the viewer does not fetch in time is replaced.
+// loop_view.h - hands the newest poses and contacts of a running loop to a viewer, in place.
+// Neither side ever waits; a value that the viewer does not fetch in time is replaced.
 #pragma once
 #include <vector>
 
@@ -11,11 +11,12 @@ namespace h6 {
 
 class LoopView {
  public:
-  // `contacts`: rows at most.
+  // `contacts`: the most rows that a viewer gets.
   LoopView(std::size_t bodies, std::size_t contacts);
-  // On the haptic thread, between two frames.
+  // For the haptic thread, between two frames.
   void write(const h6Session& session, double time);
-  // The viewer's thread. False when nothing is newer; what `out` points at stays until then.
+  // For the viewer's thread. False when nothing is newer. `out` points into a slot that stays valid
+  // until a later call returns true.
   bool read(h6LoopView* out);
 
  private:
@@ -29,8 +30,8 @@ class LoopView {
   sched::LatestValue<Slot> slots_;
 };
 
-// `next` goes on where `before` is: poses, velocities, hands, and what their safety chains hold.
-// Settings stay those of `next`. Both are of the same bodies and hands.
+// Lets `next` go on where `before` is: poses, velocities, hands and their safety chains. Settings
+// stay those of `next`. Both sessions have the same bodies and hands.
 void take_over(h6Session& next, const h6Session& before);
 bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error);
 

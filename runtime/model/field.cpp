@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// field.cpp - from the plain arrays of a definition to the hot layout, checked and in parallel.
+// field.cpp - checks a field's definition and lays it out for the kernels, in parallel.
 #include <atomic>
 #include <cmath>
 
@@ -54,7 +54,7 @@ bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
   return true;
 }
 
-// Names by brick, in the order of the hot layout. Without any: nothing is kept.
+// Names by brick, in the order of the kernels' layout. Nothing is kept where there are none.
 bool convert_names(const h6FieldDef& def, const std::int32_t* names, std::size_t bricks,
                    const Field& field, const h6Allocator& allocator, Buffer<std::int32_t>* out) {
   if (!names || bricks == 0) return true;
@@ -84,7 +84,8 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
       !field->far.reserve(model.allocator, (size.far_cells + 1) * 8))
     return fail(error, "no memory for %zu bricks (%zu MB)", size.bricks,
                 size.bricks * kernels::kBrickStride * 2 / 1000000);
-  // One row more than is used: a gather may read past its node, and an empty pool stays readable.
+  // One row more than used, because a gather may read past its node, and an empty pool must be
+  // readable.
   for (int i = 0; i < kernels::kBrickStride; ++i)
     field->bricks[size.bricks * kernels::kBrickStride + i] = 0;
   for (int i = 0; i < 8; ++i) field->far[size.far_cells * 8 + i] = 0;

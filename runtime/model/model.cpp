@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// model.cpp - makes and destroys a model, and answers questions about it.
 #include "runtime/model/model.h"
 
 #include <cmath>

@@ -27,8 +27,8 @@ bool check_points(const h6ShellDef& def, h6Error* error) {
   return true;
 }
 
-// Every level's nodes are the children of the level before, each once, and the last level holds
-// every point once: then traversal reaches each point exactly once.
+// Each level's nodes are the children of the level before, each once, and the last level holds
+// every point once. So traversal reaches each point exactly once.
 bool check_tree(const h6ShellDef& def, h6Error* error) {
   if (def.level_count < 1 || def.level_count > 32 || !def.level_first || !def.node_point ||
       !def.node_radius || !def.node_first_child || !def.node_child_count)
@@ -64,9 +64,9 @@ bool check_tree(const h6ShellDef& def, h6Error* error) {
   return true;
 }
 
-// A sphere that does not hold its descendants would lose contacts silently.
+// A sphere that does not enclose its descendants would silently lose contacts.
 bool check_spheres(const h6ShellDef& def, h6Error* error) {
-  // Each node of the last level walks up; parents are found by a sweep, level by level.
+  // Parents are found in one sweep; then each node of the last level walks up.
   const std::uint32_t nodes = def.level_first[def.level_count];
   Buffer<std::uint32_t> parent;
   if (!parent.reserve({}, nodes)) return fail(error, "no memory to check %u nodes", nodes);
@@ -88,8 +88,8 @@ bool check_spheres(const h6ShellDef& def, h6Error* error) {
   return true;
 }
 
-// Splits rows [begin, end) at medians of the longest axis until they fit in `unit`; parts before
-// the last are whole multiples of it.
+// Splits rows [begin, end) at medians of the longest axis into parts of `unit` rows; only the last
+// part may be smaller.
 void split_at_medians(std::uint32_t* rows, std::size_t begin, std::size_t end, std::size_t unit,
                       const float* const axes[3]) {
   if (end - begin <= unit) return;
@@ -106,7 +106,7 @@ void split_at_medians(std::uint32_t* rows, std::size_t begin, std::size_t end, s
   const std::size_t units = (end - begin + unit - 1) / unit;
   const std::size_t middle = begin + units / 2 * unit;
   const float* column = axes[axis];
-  // Ties by number: the order does not depend on the library.
+  // Ties go by number, so that the order does not depend on the library.
   std::nth_element(rows + begin, rows + middle, rows + end,
                    [column](std::uint32_t a, std::uint32_t b) {
                      return column[a] != column[b] ? column[a] < column[b] : a < b;
@@ -115,8 +115,8 @@ void split_at_medians(std::uint32_t* rows, std::size_t begin, std::size_t end, s
   split_at_medians(rows, middle, end, unit, axes);
 }
 
-// Nearly the smallest sphere of rows [begin, end): steps towards the farthest point, ever shorter
-// (Badoiu & Clarkson 2003). Whatever the centre, the radius holds them all.
+// Nearly the smallest sphere of rows [begin, end): ever shorter steps towards the farthest point
+// (Badoiu & Clarkson 2003). The radius encloses all rows, wherever the centre ends.
 void enclose(const Shell& shell, std::size_t begin, std::size_t end, Tier& tier, std::size_t at) {
   Vec3 c = Vec3::Zero();
   for (std::size_t i = begin; i < end; ++i) c += Vec3(shell.x[i], shell.y[i], shell.z[i]);
@@ -153,7 +153,7 @@ void take_samples(const Shell& shell, Samples& samples) {
     const std::size_t group = std::min(g, shell.groups.count - 1), first = group * kGroupRows;
     const std::size_t rows = std::min(kGroupRows, shell.points - first), block = g / kGroupRows;
     const Vec3 centre(shell.groups.x[group], shell.groups.y[group], shell.groups.z[group]);
-    double gap[kGroupRows];  // of each point to the nearest sample
+    double gap[kGroupRows];  // distance of each point to the nearest sample
     std::size_t next = first;
     for (std::size_t i = 0; i < rows; ++i) {
       gap[i] = HUGE_VAL;
@@ -178,7 +178,8 @@ void take_samples(const Shell& shell, Samples& samples) {
   }
 }
 
-// Called twice: with an empty arena to count, then to take. What traversal reads stands first.
+// Called twice: with an empty arena to count, then to take. The columns that traversal reads come
+// first.
 void lay_out(Shell& shell, Arena& arena) {
   const std::size_t padded = (shell.points + kBlockRows - 1) / kBlockRows * kBlockRows;
   for (auto [tier, rows] : {std::pair{&shell.blocks, kBlockRows}, {&shell.groups, kGroupRows}}) {
