@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// compress-inl.h - lanes that a mask names, moved to the front, in order.
+// compress-inl.h - moves the lanes that a mask selects to the front, in order.
 //
-// Highway 1.0 keeps the tables for that in the function that needs them, and compilers copy them to
-// the stack at every call: hundreds of bytes for eight lanes. These stand still.
+// Highway 1.0 keeps the tables for this inside the function, and compilers copy them to the stack
+// at every call: hundreds of bytes for eight lanes. The tables here are static.
 //
 // Included once for each SIMD target.
 #include <cstddef>
@@ -12,7 +12,7 @@
 #define H6_KERNELS_COMPRESS_TABLES
 namespace h6::kernels {
 
-// By the bits of the mask: which lanes of eight come first; which bytes of four lanes.
+// Indexed by the bits of the mask: the order of eight lanes; the order of the bytes of four lanes.
 struct CompressTables {
   alignas(64) std::uint8_t lane[256][8];
   alignas(64) std::uint8_t byte[16][16];
@@ -48,8 +48,8 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Of vectors of up to eight lanes of 32 bits: bit i of `bits` is lane i. What follows the lanes
-// that are kept means nothing.
+// For vectors of up to eight lanes of 32 bits: bit i of `bits` keeps lane i. The lanes after the
+// kept ones are unspecified.
 template <class D>
 HWY_INLINE hn::Vec<D> compress_by_bits(D d, hn::Vec<D> v, std::uint32_t bits) {
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET > HWY_AVX3
@@ -78,7 +78,7 @@ HWY_INLINE std::uint32_t bits_of(D d, hn::Mask<D> mask) {
   return bytes[0];
 }
 
-// The same by a mask.
+// The same with a mask.
 template <class D>
 HWY_INLINE hn::Vec<D> compress([[maybe_unused]] D d, hn::Vec<D> v, hn::Mask<D> mask) {
 #if HWY_TARGET != HWY_SCALAR && HWY_TARGET > HWY_AVX3

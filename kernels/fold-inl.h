@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// fold-inl.h - sums over the lanes of four vectors at once: a quarter of the shuffles that one
-// after the other takes, and in a fixed order.
+// fold-inl.h - sums over the lanes of four vectors at once, in a fixed order, with a quarter of the
+// shuffles that four separate sums take.
 //
 // Included once for each SIMD target.
 #include <cstddef>
@@ -28,7 +28,7 @@ HWY_INLINE void add_four_sums(D d, const hn::Vec<D>* sum, float* to) {
   const auto fold = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR {
     return hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b));
   };
-  // In every block of four lanes: the four in order.
+  // Every block of four lanes now holds the four partial sums in order.
   const auto rows = fold(fold(sum[0], sum[2]), fold(sum[1], sum[3]));
   const hn::CappedTag<float, 4> d4;
   HWY_ALIGN float blocks[hn::MaxLanes(d)];

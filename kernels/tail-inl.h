@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tail-inl.h - loads and stores of the first n lanes that touch no memory past them.
 //
-// Included once for each SIMD target. Highway's masked forms read or write a whole vector where the
-// instruction set has none (SSE), which can fault at the end of a page: those go through a buffer.
+// Included once for each SIMD target. Where the instruction set has no masked access (SSE), Highway
+// reads or writes a whole vector, which can fault at the end of a page. A buffer is used there.
 #include <cstddef>
 #include <cstring>
 
@@ -20,7 +20,7 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Lanes n and up are 0. 0 <= n; n at or above the width loads a whole vector.
+// Lanes n and up are 0. With n at or above the width a whole vector is loaded.
 template <class D, class T = hn::TFromD<D>>
 HWY_INLINE hn::Vec<D> load_n(D d, const T* p, std::size_t n) {
   if (HWY_LIKELY(n >= hn::Lanes(d))) return hn::LoadU(d, p);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// beside-inl.h - how far points are from a triangle, in its frame.
+// beside-inl.h - distance of points to a triangle within its plane.
 //
 // Included once for each SIMD target.
 #include "kernels/bake/triangle_tables.h"
@@ -20,7 +20,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, kBlock>;
 using VF = hn::Vec<D>;
 
-// The part of |p - triangle|^2 that is not h^2, for the triangle's inside and first edges.
+// |p - triangle|^2 without the part h^2 across the plane, over the triangle's inside and its first
+// edges.
 template <int kEdges>
 HWY_INLINE VF beside_squared(const DistanceFacet& f, const VF (&s)[3], const VF (&w)[3]) {
   const D d;

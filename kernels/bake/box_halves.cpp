@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// At most 3 x 16,000^2: two of them fit.
+// At most 3 x 16,000^2, so the sum of two fits.
 HWY_INLINE std::int32_t squared_diagonal(const ShortBox* boxes, const std::uint16_t* some,
                                          std::size_t count) {
   const hn::CappedTag<std::int16_t, 8> d;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bricks_met-inl.h - where a triangle may be the nearest: boxes of nodes against its FacetRegion.
+// bricks_met-inl.h - tests boxes of nodes against a triangle's FacetRegion, where the triangle may
+// be the nearest.
 //
 // Included once for each SIMD target.
 #include "kernels/bake/triangle_tables.h"
@@ -20,7 +21,7 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// What functions gain over half a box at most, and the leeway.
+// The most that the functions change over half a box, plus the leeway.
 HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::size_t count,
                       const float (&half)[3], float* out) {
   const hn::CappedTag<float, 8> d;
@@ -32,7 +33,7 @@ HWY_INLINE void gains(const float* gx, const float* gy, const float* gz, std::si
               d, out + k);
 }
 
-// Boxes of one size, as a triangle's functions and the planes of its region see them.
+// Boxes of one size in terms of a triangle's functions and the planes of its region.
 struct Gains {
   alignas(64) float function[8], plane[kPlanes];
 };
@@ -42,8 +43,8 @@ HWY_INLINE void set_gains(const DistanceFacet& f, const FacetRegion& r, const fl
   if ((r.edges | r.corners) != 0) gains(r.gx, r.gy, r.gz, kPlanes, half, gain.plane);
 }
 
-// Whether boxes may meet the region: their middles are at (x, y, z), where the functions are s and
-// w; `plane` is what the planes are at (0, 0, 0).
+// Whether boxes may meet the region. Their middles are at (x, y, z), where the functions are s and
+// w; `plane` has the values of the planes at (0, 0, 0).
 HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains& gain,
                       const float* plane, VF x, VF y, VF z, const VF (&s)[3], const VF (&w)[3]) {
   const D d;
@@ -75,15 +76,15 @@ HWY_INLINE auto meets(const DistanceFacet& f, const FacetRegion& r, const Gains&
   return there;
 }
 
-// Those of the bricks that may meet the region. On the way the triangle is weighed at the middles
-// of the bricks, and of some beside them, which does no harm.
+// The bricks that may meet the region. This also updates the nearest triangle at the middles of the
+// bricks, and at some beside them, which does no harm.
 template <int kEdges>
 HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r,
                                     std::uint64_t bricks, std::int32_t name, TileRoom& room) {
   constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
   const D d;
   const hn::RebindToSigned<D> d32;
-  // One brick is as soon weighed as tested.
+  // For one brick the test costs as much as the work it saves.
   const bool all = r.everywhere || (bricks & (bricks - 1)) == 0;
   Gains gain = {};
   if (!all) set_gains(f, r, kBrickHalf, gain);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // chain_step.cpp - the fast twin of chain_step_ref.
 //
-// A step goes along x, then y, then z. What a line of nodes gives to itself, to the lines beside it
-// and to those across is made of the line and its neighbours along x, once; layers are done one
-// after the other, and one is written as soon as the next has been read: nothing needs a copy.
+// A step goes along x, then y, then z. From a line of nodes and its neighbours along x, the lengths
+// that it offers to itself, to the lines beside it and to those diagonally across are made once.
+// Layers are done in order, and each is written as soon as the next has been read, so no copy is
+// needed.
 #include "kernels/bake/chain_step.h"
 
 #include <algorithm>
@@ -20,12 +21,12 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Three layers of a brick, with what they give to themselves and along z.
+// Three layers of a brick: the lengths that they offer within the layer and along z.
 struct Layers {
   alignas(64) Chain own[3][64], along[3][64];
 };
 
-// Calls f(y, of the line, of the line along z) for the lines of a layer.
+// Calls f(y, lengths offered within the layer, lengths offered along z) for each line of a layer.
 template <class D, class F>
 HWY_INLINE void EachLine(D d, const Chain* from, std::ptrdiff_t line, F&& f) {
   using V = hn::Vec<D>;
@@ -57,7 +58,7 @@ bool ChainStepOf(const Chain* from, std::size_t line, std::size_t layer, Chain* 
   Layers of;
   const auto far = hn::Set(d, kChainFar);
   auto changed = hn::Zero(d);
-  for (std::size_t z = 0; z < 10; ++z) {  // the layers around the brick are the first and the last
+  for (std::size_t z = 0; z < 10; ++z) {  // layers 0 and 9 lie around the brick
     const Chain* in = from + z * layer - layer;
     Chain *own = of.own[z % 3], *along = of.along[z % 3];
     for (std::size_t x = 0; x < 8; x += lanes)

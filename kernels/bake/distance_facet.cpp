@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// distance_facet.cpp - a triangle made ready for the float work of triangle_distance.cpp, in
-// double.
+// distance_facet.cpp - prepares a triangle, in double, for the float work of triangle_distance.cpp.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,7 +34,8 @@ Row any_normal(const Row& a) {
   return times(1 / std::sqrt(dot(n, n)), n);
 }
 
-// Three times the segment from `from` along the unit vector `along`; nothing lies over it.
+// The segment from `from` along the unit vector `along`, as all three edges of a triangle without
+// an inside.
 void set_segment(DistanceFacet& f, const Row& from, const Row& along, double length) {
   const Row n = any_normal(along), in = cross(n, along);
   const Row middle = {from[0] + length / 2 * along[0], from[1] + length / 2 * along[1],
@@ -68,7 +68,7 @@ DistanceFacet make_distance_facet(const double* t) {
   }
   const Row n = cross(edge[2], edge[0]);
   const double n_length = std::sqrt(dot(n, n)), height_over = n_length / length[longest];
-  // Below a height of 1e-4 voxel the longest edge alone is right to that.
+  // A triangle lower than 1e-4 voxel is its longest edge to within that height.
   if (!(height_over > 1e-4)) {
     const Row along =
         length[longest] > 1e-9 ? times(1 / length[longest], edge[longest]) : Row{1, 0, 0};
@@ -84,8 +84,8 @@ DistanceFacet make_distance_facet(const double* t) {
     f.half[e] = float(length[e] / 2);
   }
   set_function(f, 6, normal, corner[0]);
-  // Points on an edge are over the triangle whatever float says, but on a sliver that must not
-  // reach past its tips.
+  // Points on an edge must count as over the triangle in spite of rounding. On a sliver the
+  // tolerance must not reach past its tips.
   f.inside_from = -float(std::min(2e-6, 1e-5 * height_over / length[longest]));
   return f;
 }

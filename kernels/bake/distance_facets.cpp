@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// distance_facets.cpp - the fast twin of make_distance_facet: as many triangles at once as a vector
-// has doubles, by the same steps in the same order, so to the same bits. The rare ones without
-// area are left to it.
+// distance_facets.cpp - the fast twin of make_distance_facet: a triangle per lane of doubles, with
+// the same operations in the same order, so with the same bits. The rare triangles without area go
+// to make_distance_facet itself.
 #include <algorithm>
 #include <cstddef>
 
@@ -42,7 +42,7 @@ HWY_INLINE Row minus(const Row& a, const Row& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
-// The floats of facets, number by number: row k is what lies k floats into a DistanceFacet.
+// Facets as columns: row k holds float k of each DistanceFacet.
 constexpr std::size_t kRows = sizeof(DistanceFacet) / sizeof(float);
 struct Staged {
   alignas(32) float row[kRows][kLanes];
@@ -56,7 +56,7 @@ struct Staged {
     put(16 + k, g.z);
     put(24 + k, hn::Neg(dot(g, zero_at)));
   }
-  // Four numbers of four facets at a time, where vectors hold so many.
+  // Transposes four floats of four facets at a time, where vectors have four lanes or more.
   HWY_INLINE void take(std::size_t count, DistanceFacet* facets) const {
     const auto number = [&](std::size_t i) { return reinterpret_cast<float*>(facets + i); };
     std::size_t taken = 0;
@@ -95,7 +95,7 @@ void MakeFacets(const double* corners, std::size_t count, DistanceFacet* facets)
   for (std::size_t k = 7; k < 32; k += 8) staged.put(k, hn::Zero(d));
   const auto nine = hn::Mul(hn::Iota(di, 0), hn::Set(di, 9));
   for (std::size_t first = 0; first < count; first += kLanes) {
-    // The last ones may not fill a vector: then the last triangle fills it.
+    // The last triangle fills up the last vector.
     const std::size_t some = std::min(kLanes, count - first);
     const auto from = hn::Min(nine, hn::Set(di, std::int64_t(9 * (some - 1))));
     const auto coordinate = [&](std::size_t k) HWY_ATTR {

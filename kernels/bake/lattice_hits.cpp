@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// lattice_hits.cpp - the fast twin of lattice_hits_ref: a row of lines at once. The shares of the
-// area are integers that doubles hold exactly, so they may be added up from line to line.
+// lattice_hits.cpp - the fast twin of lattice_hits_ref: a row of lines at once. Barycentric areas
+// are integers that doubles hold exactly, so they can be stepped from line to line.
 #include "kernels/bake/lattice_hits.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -18,14 +18,14 @@ namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_HAVE_FLOAT64 && HWY_TARGET != HWY_SCALAR
-// Along axis a: the shares of the area that the line of slot 0 has, what a line further on adds to
-// them, and where lines meet the triangle: start + share 1 * second + share 2 * third.
+// Along axis a: the barycentric areas of the line of slot 0, their steps from line to line, and the
+// coordinate of a hit: start + area 1 * second + area 2 * third.
 struct Setup {
   alignas(32) double whole[4], share[3][4], per_column[3][4], per_row[3][4];
   alignas(32) double start[4], second[4], third[4];
 };
 
-// All three axes side by side: axis a of a vector's lane a.
+// All three axes side by side: lane a has axis a.
 HWY_INLINE void set_up(const std::int32_t (*corner)[3], const std::int32_t* first, Setup& s) {
   const hn::CappedTag<double, 4> d;
   alignas(32) double along[3][4], across[3][4], up[3][4], first_across[4], first_up[4];
@@ -77,7 +77,7 @@ void Hits(const std::int32_t (*corner)[3], const std::int32_t* first, const std:
   using V = hn::Vec<decltype(d)>;
   const std::int32_t lanes = std::int32_t(hn::Lanes(d));
   const V lane = hn::Iota(d, 0.0), zero = hn::Zero(d);
-  const auto number = hn::Iota(du, 0);  // of others the compiler writes them lane by lane
+  const auto number = hn::Iota(du, 0);  // unsigned: GCC builds a signed one lane by lane
   Setup setup;
   set_up(corner, first, setup);
   for (std::size_t axis = 0; axis < 3; ++axis) {

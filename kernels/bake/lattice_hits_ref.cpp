@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// lattice_hits_ref.cpp - the specification: every line on its own, in integers.
+// lattice_hits_ref.cpp - the specification of lattice_hits: every line on its own, in integers.
 #include "kernels/bake/lattice_hits.h"
 
 namespace h6::kernels {
@@ -11,7 +11,7 @@ void lattice_hits_ref(const std::int32_t corner[3][3], const std::int32_t first[
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     hits.count[axis] = 0;
     hits.shift[axis] = lattice_shift(last[u] - first[u] + 1);
-    // Twice the area of the triangle that a line through (j, k) makes with corners a and b.
+    // Twice the area of the triangle between the line through (j, k) and corners a and b.
     const auto twice_area = [&](int a, int b, std::int64_t j, std::int64_t k) {
       return std::int64_t(corner[b][u] - corner[a][u]) * (k - corner[a][v]) -
              std::int64_t(corner[b][v] - corner[a][v]) * (j - corner[a][u]);

@@ -32,7 +32,7 @@ HWY_INLINE VF dot(const V3& a, const V3& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
-// Stores lanes i ... and tells which are below `most`.
+// Stores lanes i and up, and returns which are below `most`.
 HWY_INLINE std::uint32_t keep(VF found, float most, std::size_t i, float* squared) {
   const D d;
   hn::StoreU(found, d, squared + i);
@@ -41,12 +41,12 @@ HWY_INLINE std::uint32_t keep(VF found, float most, std::size_t i, float* square
   return std::uint32_t{bits[0]} << i;
 }
 
-// The squared distances of triangles i ... from below. In the frame of a triangle that is h^2 over
-// its inside, else h^2 + min over edges (off^2 + beyond^2), where beyond is how far the point lies
-// past the ends of the edge. A point that may be over the inside is taken to be: h is never more
-// than the distance. On a sliver, whose inside cannot be told like that, a foot in it is nowhere
-// farther from an edge than the radius of the circle inside.
-// `slack`: what rounding can have done to either side.
+// Lower bounds of the squared distances of triangles i and up. In the frame of a triangle the
+// square is h^2 over its inside, else h^2 + min over edges (off^2 + beyond^2), where beyond is the
+// distance past the ends of the edge. A point that may be over the inside is taken to be: h is
+// never more than the distance. Rounding hides the inside of a sliver; there the foot of a point
+// over it is at most the inradius away from an edge. `slack`: the most that rounding changes the
+// square.
 HWY_INLINE VF triangles_from(const EightTriangles& t, const V3& at, std::size_t i, VF& slack) {
   constexpr float kDigits = 4e-6f;
   const D d;
@@ -71,7 +71,7 @@ HWY_INLINE VF triangles_from(const EightTriangles& t, const V3& at, std::size_t 
               edge(from2, half2, off2));
   const VF inner = hn::Min(hn::Min(y, off1), off2);
   const VF longest2 = hn::Load(d, t.longest2 + i);
-  // Not less than |q| and the longest edge together; no root.
+  // At least |q| plus the longest edge, without a root.
   const VF size =
       hn::Add(hn::Add(hn::Abs(x), hn::Abs(y)), hn::Add(hn::Abs(h), hn::Add(half0, half0)));
   const VF least = hn::Mul(hn::Neg(hn::Load(d, t.inside + i)), size);
@@ -146,7 +146,7 @@ HWY_INLINE void weigh(const NearestTree& tree, std::uint32_t leaf, const V3& at,
     const VF squared = triangles_from(tree.leaf[leaf], at, i, slack);
     const auto nearer = hn::Lt(squared, hn::Set(d, found.squared));
     if (hn::AllFalse(d, nearer)) continue;
-    // What was taken off is put back, and as much again; a square of 0 was off by less still.
+    // An upper bound: the slack that was subtracted is added twice. A square of 0 had less slack.
     const VF twice = hn::Add(slack, slack), width2 = hn::Load(d, tree.leaf[leaf].width2 + i);
     alignas(32) float near[8], above[8];
     hn::Store(squared, d, near);
@@ -158,22 +158,22 @@ HWY_INLINE void weigh(const NearestTree& tree, std::uint32_t leaf, const V3& at,
   }
 }
 
-// Those of the lanes that are alive, one after the other: first + lane, and what it holds. Returns
-// how many; whole vectors are stored. (Some processors compress slowly into memory.)
+// Appends the live lanes: first + lane, and its value. Returns their number. Whole vectors are
+// stored, since some processors compress slowly into memory.
 template <class Mask>
 HWY_INLINE std::size_t keep_live(std::uint32_t first, VF squared, Mask live, std::uint32_t* what,
                                  float* bound) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  // Not lanes from `first` on, compressed: a compiler writes those one by one and reads them as a
-  // vector, which has to wait for all of them.
+  // Compresses lane numbers and then adds `first`: GCC builds an Iota from a variable lane by lane
+  // in memory, and the load that follows has to wait for all of the stores.
   const auto lanes = compress(du, hn::Iota(du, 0), hn::RebindMask(du, live));
   hn::StoreU(hn::Add(lanes, hn::Set(du, first)), du, what);
   hn::StoreU(compress(d, squared, live), d, bound);
   return hn::CountTrue(d, live);
 }
 
-// Depth first: the room does not depend on how many nodes are near.
+// Depth first: the stack has a bound that does not depend on how many nodes are near.
 void search_deep(const NearestTree& tree, const V3& at, NearestFound& found) {
   constexpr std::uint32_t kLevel = 28, kNode = (1u << kLevel) - 1;
   constexpr std::size_t kRoom = 8 * NearestTree::kMostLevels + 8;
@@ -208,9 +208,9 @@ void search_deep(const NearestTree& tree, const V3& at, NearestFound& found) {
   }
 }
 
-// Level by level: the start is nearly always the nearest, so what is near is known before, and a
-// processor works on many nodes at once where going deep would make it wait for each. False: there
-// is no room for so many.
+// Level by level: the start is nearly always the nearest, so the bound is tight from the beginning,
+// and a processor works on many nodes at once where a depth-first search would make it wait for
+// each. Returns false when there is no room for the nodes of a level.
 constexpr std::size_t kWide = 504;
 bool search_wide(const NearestTree& tree, const V3& at, NearestFound& found) {
   const D d;

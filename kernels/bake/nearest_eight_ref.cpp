@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_eight_ref.cpp - the specification of nearest_eight.cpp: the distances
-// themselves, in double.
+// nearest_eight_ref.cpp - the specification of nearest_eight.cpp: exact distances in double.
 #include <algorithm>
 #include <cmath>
 

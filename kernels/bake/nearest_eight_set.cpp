@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_eight_set.cpp - the fast twin of nearest_eight_set_ref.cpp: triangles in double, since on
-// a long sliver a float cross product points anywhere; boxes in float.
+// nearest_eight_set.cpp - the fast twin of nearest_eight_set_ref.cpp. Triangles are prepared in
+// double, since the cross product of a long sliver has no correct digit in float; boxes in float.
 #include <cmath>
 
 #include "kernels/bake/nearest_eight.h"
@@ -75,18 +75,18 @@ RowD any_normal(const RowD& a) {
   return times(hn::Div(hn::Set(d, 1.0), length(n)), n);
 }
 
-// Triangles i ...; `normal`: as long as twice the area.
+// Triangles i and up; `normal` is twice as long as the area.
 HWY_INLINE void set_triangles(const LeafCorners& corners, std::size_t i, EightTriangles& t,
                               float (&normal)[3][8]) {
   constexpr double kFlat = 1e-6, kSliver = 1e-2;
-  constexpr double kDigits = 4e-6;  // a float's, thirty times over
+  constexpr double kDigits = 4e-6;  // thirty times the rounding of a float
   const Wide d;
   const VD zero = hn::Zero(d), one = hn::Set(d, 1.0), half = hn::Set(d, 0.5);
   const RowD a = load(d, corners.at[0], i), b = load(d, corners.at[1], i),
              c = load(d, corners.at[2], i);
   const RowD ab = minus(b, a), bc = minus(c, b), ca = minus(a, c);
   const VD size_ab = length(ab), size_bc = length(bc), size_ca = length(ca);
-  // The longest edge is the first: its direction is the surest.
+  // The longest edge comes first: its direction is the most precise.
   const auto second_longest = hn::Gt(size_bc, size_ab);
   const auto third_longest = hn::Gt(size_ca, hn::Max(size_ab, size_bc));
   const auto of_longest = [&](const auto& x, const auto& y, const auto& z) HWY_ATTR {
@@ -112,7 +112,7 @@ HWY_INLINE void set_triangles(const LeafCorners& corners, std::size_t i, EightTr
   put(t.frame[0], i, x);
   put(t.frame[1], i, cross(z, x));
   put(t.frame[2], i, z);
-  // A flat one is three times the longest edge; nothing lies over it.
+  // A flat triangle becomes its longest edge, three times, without an inside.
   const VD by_second = hn::Div(one, second), by_third = hn::Div(one, third);
   const VD x1 = hn::Mul(dot(next, x), by_second), y1 = hn::Mul(height, by_second);
   put(t.along1[0] + i, hn::IfThenElse(flat, one, x1));
@@ -134,7 +134,7 @@ HWY_INLINE void set_triangles(const LeafCorners& corners, std::size_t i, EightTr
 
 constexpr std::size_t kVectors = 8 / hn::MaxLanes(Narrow());
 
-// From where to where eight triangles reach along an axis. In float, from their first corners.
+// Ends of eight triangles along an axis, in float, from their first corners.
 struct Corners {
   RowF a[kVectors], ab[kVectors], ac[kVectors];
 };
@@ -153,7 +153,7 @@ HWY_INLINE void reach_along(const Corners& t, const float (&n)[3], float& low, f
   high = hn::GetLane(hn::MaxOfLanes(d, most));
 }
 
-// The sum of normals as long as twice the areas, each turned to the side of `to`.
+// The sum of normals, each twice as long as its area and turned to the side of `to`.
 HWY_INLINE void mean_normal(const float (&normals)[3][8], const float (&to)[3], float (&mean)[3]) {
   const Narrow d;
   const auto tx = hn::Set(d, to[0]), ty = hn::Set(d, to[1]), tz = hn::Set(d, to[2]);

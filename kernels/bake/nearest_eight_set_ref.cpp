@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_eight_set_ref.cpp - triangles made ready for nearest_eight.cpp, and the boxes around
-// eight: the specification, in double.
+// nearest_eight_set_ref.cpp - prepares triangles for nearest_eight.cpp, and the boxes around eight:
+// the specification, in double.
 #include <algorithm>
 #include <cmath>
 
@@ -39,7 +39,7 @@ void put(float (&to)[2][8], std::size_t i, double x, double y) {
   to[1][i] = float(y);
 }
 
-// Along an axis, from where to where.
+// Ends along an axis.
 void reach_along(const LeafCorners& corners, const Row& axis, double& low, double& high) {
   low = 1e30;
   high = -1e30;
@@ -56,7 +56,7 @@ void reach_along(const LeafCorners& corners, const Row& axis, double& low, doubl
 void set_triangle(EightTriangles& t, std::size_t i, const double a[3], const double b[3],
                   const double c[3]) {
   constexpr double kFlat = 1e-6, kSliver = 1e-2;
-  constexpr float kDigits = 4e-6f;  // a float's, thirty times over
+  constexpr float kDigits = 4e-6f;  // thirty times the rounding of a float
   const double* corner[3] = {a, b, c};
   Row edge[3];
   double size[3];
@@ -66,7 +66,7 @@ void set_triangle(EightTriangles& t, std::size_t i, const double a[3], const dou
     size[k] = length(edge[k]);
     if (size[k] > size[e]) e = k;
   }
-  // The longest edge is the first: its direction is the surest.
+  // The longest edge comes first: its direction is the most precise.
   const double first = size[e], second = size[(e + 1) % 3], third = size[(e + 2) % 3];
   const double by_first = first > 1e-9 ? 1 / first : 0;
   for (std::size_t k = 0; k < 3; ++k) t.a[k][i] = float(corner[e][k]);
@@ -76,7 +76,7 @@ void set_triangle(EightTriangles& t, std::size_t i, const double a[3], const dou
   const Row n = cross(edge[e], edge[(e + 1) % 3]);
   const double area2 = length(n), height = area2 * by_first;
   put(t.frame[0], i, x);
-  if (!(height > kFlat)) {  // three times the longest edge; nothing lies over it
+  if (!(height > kFlat)) {  // becomes its longest edge, three times, without an inside
     const Row z = any_normal(x);
     put(t.frame[1], i, cross(z, x));
     put(t.frame[2], i, z);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sign_brick.cpp - the fast twin of sign_brick_ref: all cases at once, then the one that holds.
+// sign_brick.cpp - the fast twin of sign_brick_ref: computes all cases and selects the one that
+// holds.
 #include "kernels/bake/sign_brick.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sign_brick.h - from unsigned distances to the samples of a brick of 8 x 8 x 8 nodes.
+// sign_brick.h - turns unsigned distances into the signed samples of a brick of 8 x 8 x 8 nodes.
 //
-// io/bake/inside.cpp says what the samples are. Masks are bit 8*y + x of word z.
+// io/bake/inside.cpp defines the samples. Masks are bit 8*y + x of word z.
 #pragma once
 #include <cstdint>
 
@@ -11,9 +11,9 @@ namespace h6::kernels {
 
 struct BrickSides {
   const std::uint64_t* reached;   // from outside
-  const std::uint64_t* in_sight;  // of the others: the outside is on this side of the sheet
-  const Chain* chain;             // lengths of ways out, or none
-  bool corrected;                 // behind a sheet too the chain may tell more than the sheet
+  const std::uint64_t* in_sight;  // not reached, but on the outer side of a sheet
+  const Chain* chain;             // lengths of the chains to the outside, or null
+  bool corrected;                 // chains may correct the depth behind a sheet too
 };
 struct SignLimits {
   float offset, slack, corner_slack, crooked;  // [voxel]; crooked: a ratio

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// triangle_bricks.cpp - bricks of a tile: which a triangle comes near, and what is asked of their
-// nodes.
+// triangle_bricks.cpp - finds the bricks of a tile that a triangle comes near, and compares the
+// nodes of a brick with a level.
 #include <cmath>
 
 #include "kernels/bake/triangle_distance.h"
@@ -19,8 +19,8 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// BricksWithinReach of one vector of bricks. Apart from the loop over all, so that compilers take
-// numbers from where they are: few triangles come near more than one vector.
+// BricksWithinReach for one vector of bricks. A function apart from the loop, so that compilers
+// read its constants in place: few triangles come near more than one vector.
 HWY_NOINLINE std::uint64_t some_within_reach(const DistanceFacet& f, const float* first,
                                              const float* extent, float reach, std::size_t b) {
   const D d;
@@ -32,7 +32,7 @@ HWY_NOINLINE std::uint64_t some_within_reach(const DistanceFacet& f, const float
     value[k] = hn::MulAdd(p[0], hn::Set(d, f.gx[k]),
                           hn::MulAdd(p[1], hn::Set(d, f.gy[k]),
                                      hn::MulAdd(p[2], hn::Set(d, f.gz[k]), hn::Set(d, f.c[k]))));
-  // Planes: of the triangle, both sides, and through its edges, away from it.
+  // Planes: both sides of the triangle's own, and those through its edges, outwards.
   const VF s[3] = {value[0], value[1], value[2]}, w[3] = {value[3], value[4], value[5]};
   auto in = hn::Le(hn::Abs(value[6]), hn::Set(d, extent[6]));
   for (std::size_t e = 0; e < 3; ++e) in = hn::And(in, hn::Ge(w[e], hn::Set(d, -extent[3 + e])));

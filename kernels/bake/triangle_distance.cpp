@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // triangle_distance.cpp - the fast twin of triangle_distance_ref.
 //
-// A brick is 32 blocks of 4 x 2 x 2 nodes. A triangle is weighed at the nodes of a block only where
-// it may be the nearest of one: the block meets the region that its FacetRegion names, and the
-// triangle's plane comes nearer than the farthest of the block's nodes is so far. Both are tested
-// on the middles of all blocks at once: an affine function differs from its value there by at most
-// what it gains over half a block. Neither test can drop what would have lowered a distance, so the
-// order of the triangles does not change a bit.
+// A brick is 32 blocks of 4 x 2 x 2 nodes. A triangle is compared at the nodes of a block only
+// where it may be the nearest to one of them: the block meets its FacetRegion, and the triangle's
+// plane is nearer than the largest distance of the block so far. Both are tested at the middles of
+// all blocks at once: within a block an affine function differs from its value there by at most its
+// change over half a block. Neither test can drop a triangle that lowers a distance, so the order
+// of the triangles does not change a bit.
 //
-// In the frame of a triangle the distance is h^2 + min over edges (w^2 + beyond^2), where beyond is
-// how far the point lies past the ends of the edge; h^2 alone over the inside. All seven functions
-// are affine: on a block they are a constant pattern plus one number. Where other triangles answer
-// for an edge and its ends, it is left out of the minimum: on a closed mesh that is half of all
-// edges. What is left is the distance of a part of the triangle, so never too little.
+// In the frame of a triangle the squared distance is h^2 over the inside, else
+// h^2 + min over edges (w^2 + beyond^2), where beyond is the distance past the ends of the edge.
+// All seven functions are affine: on a block they are a constant pattern plus one number. Edges
+// that other triangles answer for, with their ends, are left out of the minimum: half of all edges
+// on a closed mesh. The result is then the distance to a part of the triangle, so never too small.
 #include "kernels/bake/triangle_distance.h"
 
 #include <algorithm>
@@ -38,7 +38,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 inline constexpr std::uint32_t kEachVisit = 16;
 
-// The functions of a triangle at places given from a first one, less their value there.
+// The functions of a triangle at places relative to a first one, less their values there.
 template <std::size_t kCount>
 struct Pattern {
   alignas(64) float v[kFunctions][kCount];
@@ -76,8 +76,8 @@ struct Ready {
   Pattern<kBlock> nodes;
   Pattern<kBlocks> middles;
   alignas(64) float planes[kPlanes][kBlocks];  // as in Pattern; those in use
-  alignas(64) float inside_from[3][kBlocks];  // what nodes of a block at the first node must be off
-                                              // an edge to lie inside it in this block
+  // How far off an edge the first block's node must be for a node of this block to be inside.
+  alignas(64) float inside_from[3][kBlocks];
   Gains gain = {};
 };
 HWY_INLINE void make_ready(Ready& t) {
@@ -104,14 +104,13 @@ HWY_INLINE void make_ready(Ready& t) {
   }
 }
 
-// A triangle as seen from the first node of a brick: its functions and the planes of its region
-// there.
+// A triangle's functions and the planes of its region at the first node of a brick.
 struct FirstNode {
   alignas(64) float function[8], plane[kPlanes];
 };
 
-// The blocks of a brick whose middles pass tests of one pattern after the other: all vectors of a
-// brick at once, since what they are tested against would else be spread out again for each.
+// The blocks of a brick whose middles pass a series of tests. All vectors of a brick are tested
+// together, so that each operand is broadcast once.
 struct Blocks {
   static constexpr std::size_t kLanes = hn::MaxLanes(D()), kVectors = kBlocks / kLanes;
   hn::Mask<D> in[kVectors];
@@ -150,8 +149,8 @@ struct Blocks {
   }
 };
 
-// The blocks of a brick where the triangle may lower a distance; `most`: the farthest squares so
-// far.
+// The blocks of a brick where the triangle may lower a distance; `most`: the largest square of each
+// block so far.
 HWY_INLINE std::uint32_t live_blocks(const Ready& t, const FirstNode& first, const float* most) {
   const D d;
   const FacetRegion& r = t.region;
@@ -235,7 +234,7 @@ HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t l
           const VF squared = hn::MulAdd(beyond, beyond, hn::Mul(off, off));
           nearest = e == 0 ? squared : hn::Min(nearest, squared);
           in = hn::Ge(off, hn::Set(d, f.inside_from));
-        } else {  // all that is asked of it
+        } else {
           in = hn::Ge(w[e], hn::Set(d, t.inside_from[e][b]));
         }
         inside = e == 0 ? in : hn::And(inside, in);
@@ -247,7 +246,7 @@ HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t l
   }
 }
 
-// Tells the farthest of the blocks in `lowered` anew.
+// Recomputes the largest square of the blocks in `lowered`.
 HWY_INLINE void tell_farthest(std::uint32_t lowered, const float* best, float* most) {
   const D d;
   for (; lowered != 0; lowered &= lowered - 1) {
@@ -259,7 +258,7 @@ HWY_INLINE void tell_farthest(std::uint32_t lowered, const float* best, float* m
   }
 }
 
-// Weighs one triangle in the bricks of `near`.
+// Compares one triangle in the bricks of `near`.
 template <int kEdges>
 HWY_INLINE void weigh(const DistanceFacet& f, const FacetRegion& r, std::uint64_t near,
                       std::int32_t name, TileRoom& room) {
@@ -274,7 +273,7 @@ HWY_INLINE void weigh(const DistanceFacet& f, const FacetRegion& r, std::uint64_
     values_at(f.gx, f.gy, f.gz, f.c, 8, x, y, z, first.function);
     if ((r.edges | r.corners) != 0) values_at(r.gx, r.gy, r.gz, r.c, kPlanes, x, y, z, first.plane);
     float *squared = room.squared + b * kBrickSamples, *most = room.most + b * kBlocks;
-    // What was the farthest stays an upper bound: it need not be told anew each time.
+    // The old largest square stays an upper bound, so it need not be recomputed each time.
     const std::uint32_t visit = room.visits[b]++;
     if (visit < kEachVisit || visit % kEachVisit == 0) {
       tell_farthest(room.lowered[b], squared, most);

@@ -26,8 +26,8 @@ double to_segment(V w, V e) {
 
 }  // namespace
 
-// Over the inside of the triangle the plane's distance holds, elsewhere that of the nearest edge.
-// The sides are told by the planes through the edges along the normal.
+// Over the inside of the triangle the distance is that to the plane, elsewhere that to the nearest
+// edge. Planes through the edges along the normal bound the inside.
 double point_triangle_squared(const double p[3], const double a[3], const double b[3],
                               const double c[3]) {
   const V ab = sub(from(b), from(a)), bc = sub(from(c), from(b)), ca = sub(from(a), from(c));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// triangle_tables.h - where blocks of nodes and bricks lie, and what float work is trusted with:
-// what the fast kernels of triangle_distance.h share.
+// triangle_tables.h - positions of blocks and bricks, and tolerances of float work, shared by the
+// fast kernels of triangle_distance.h.
 #pragma once
 #include <cstddef>
 
@@ -16,8 +16,8 @@ inline constexpr float kBrickRadius = 6.0622f;  // 3.5 sqrt(3), rounded up
 inline constexpr std::size_t kFunctions = 7;
 inline constexpr std::size_t kPlanes = 16;
 inline constexpr float kNobodyNear = 1e30f;
-inline constexpr float kRounding = 1e-4f;  // more than float work is wrong by [voxel]
-inline constexpr float kLeeway = 1e-2f;    // regions are taken larger by this [voxel]
+inline constexpr float kRounding = 1e-4f;  // above the error of float work [voxel]
+inline constexpr float kLeeway = 1e-2f;    // added to regions [voxel]
 
 // x fastest within a block and among blocks.
 struct BlockNodes {

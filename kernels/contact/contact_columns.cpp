@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // contact_columns.cpp - the SIMD twin of contact_columns_ref.cpp.
 //
-// Floats where a direction or a share results, doubles where depths differ by little. Agrees to a
-// few 2^-24, of |r| over the length that a torque is divided by.
+// Directions and shares are computed in float, gaps in double, since depths may differ by little.
+// Directions agree with the reference to a few 2^-24 times |r| over the length of the divisor.
 #include "kernels/contact/contact_columns.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -20,7 +20,7 @@ namespace h6::kernels::HWY_NAMESPACE {
 using DF = hn::ScalableTag<float>;
 using DD = hn::ScalableTag<double>;
 
-// D: of the lanes; columns are floats.
+// D: the tag of the lanes; columns are floats.
 template <class D>
 HWY_INLINE hn::Vec<D> column_at(D, const float* column, std::size_t i, std::size_t live) {
   if constexpr (sizeof(hn::TFromD<D>) == sizeof(float)) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// contact_columns.h - what the weighing rules need of every contact before they look at all of
-// them.
+// contact_columns.h - columns that the weighing rules compute for each contact on its own.
 #pragma once
 #include "kernels/views.h"
 
@@ -14,18 +13,20 @@ struct ContactColumns {
   std::size_t count;
 };
 
-// facing_i = clamp(N.g / edge, 0, 1): what opposes the gradient would pull the body in.
+// facing_i = clamp(N.g / edge, 0, 1). A contact whose normal opposes the gradient would pull the
+// body in.
 void contact_facing(const ContactColumns& c, float edge, float* facing);
 void contact_facing_ref(const ContactColumns& c, float edge, float* facing);
 
-// T = (r x N) / sqrt(|r x N|^2 + l0^2), Xu & Barbic 2016, Eq. (10), with l0 against blow-up where r
-// is parallel to N; 0 where the root is. With lever > 0, Eq. (13): T = (r x N) / lever.
+// T = (r x N) / sqrt(|r x N|^2 + l0^2): Xu & Barbic 2016, Eq. (10), with a floor l0 [m]. Without it
+// T is rounding noise of length 1 where r is parallel to N. T = 0 where the root is 0. With
+// lever > 0, Eq. (13): T = (r x N) / lever [m].
 void torque_directions(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                        float* tz);
 void torque_directions_ref(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                            float* tz);
 
-// Depths above 0: how many there are, and the largest, 0 where there is none. No NaN.
+// The number of depths above 0 and the largest depth, 0 when none is above 0. No NaN.
 struct Depths {
   std::size_t inside;
   float deepest;
@@ -33,7 +34,7 @@ struct Depths {
 Depths look_at_depths(const float* depth, std::size_t count);
 Depths look_at_depths_ref(const float* depth, std::size_t count);
 
-// e_i = depth_i - beta [N; r x N].u: depth less what damping takes at the relative velocity u.
+// e_i = depth_i - beta [N; r x N].u, with u the relative velocity (v, omega) and beta [s].
 void series_gap(const ContactColumns& c, const float* depth, double beta, const double u[6],
                 float* e);
 void series_gap_ref(const ContactColumns& c, const float* depth, double beta, const double u[6],

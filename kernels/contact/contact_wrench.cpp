@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // contact_wrench.cpp - the SIMD twin of contact_wrench_ref.cpp.
 //
-// Lanes are doubles: sums of many contacts nearly cancel, and products of floats are then exact. It
-// agrees with the reference to 1e-13 of the sum of magnitudes. Contacts go through a small stage of
-// columns, from which each row of the result is summed:
+// Lanes are doubles: sums of many contacts nearly cancel, and products of floats are exact in
+// double. The result agrees with the reference to 1e-13 of the sum of magnitudes. Contacts are
+// copied to a small stage of columns, and each row of the result is summed over the stage:
 //
 //     columns (float) -> stage: J, J_g, kw J, kw e, kw depth (double, 128 contacts)
 //                     -> lanes of 33 or 69 sums -> one reduction at the end
@@ -36,8 +36,8 @@ struct Stage {
   HWY_ALIGN double kwd[kStage];
 };
 
-// Lanes of every sum: force, elastic, B, K. Of B, which is symmetric, column `col` of row `row`
-// from `row` on.
+// Lanes of every sum: force, elastic, B, K. B is symmetric: row `row` has the columns from `row`
+// on.
 constexpr int kElastic = 6, kB = 12, kK = 33, kSums = 69;
 constexpr int row_of_b(int row) { return kB + 6 * row - row * (row - 1) / 2 - row; }  // column 0
 
@@ -62,9 +62,9 @@ HWY_INLINE Axis6 wrench_axis(VD x, VD y, VD z, VD rx, VD ry, VD rz) {
   return {{x, y, z, cross(ry, z, rz, y), cross(rz, x, rx, z), cross(rx, y, ry, x)}};
 }
 
-// Contacts from `first` on to the stage, until it is full or none is left: returns where it
-// stopped. A vector of contacts that carry nothing is left out, which changes no bit; lanes past
-// the end are zero and count for nothing. `staged`: how many lanes there are.
+// Copies contacts from `first` on to the stage until it is full or no contact is left, and returns
+// where it stopped. A vector of contacts without load is left out, which changes no bit. Lanes past
+// the end are zero. `staged`: the number of lanes on the stage.
 HWY_INLINE std::size_t fill(const WrenchColumns& c, const WrenchParameters& p, std::size_t first,
                             std::size_t end, Stage& stage, std::size_t& staged) {
   const DD d;
@@ -101,7 +101,8 @@ HWY_INLINE std::size_t fill(const WrenchColumns& c, const WrenchParameters& p, s
   return at;
 }
 
-// sum[col] += factor * columns[col] over the stage, for col from kFrom on; `fresh`: to nothing.
+// sum[col] += factor * columns[col] over the stage, for col from kFrom on; `fresh`: sums start at
+// 0.
 template <int kFrom>
 HWY_INLINE void add_row(const double* factor, const double (*columns)[kStage], std::size_t count,
                         bool fresh, double (*sum)[kWidth]) {
@@ -125,7 +126,7 @@ HWY_INLINE void add_row(const double* factor, const double (*columns)[kStage], s
 }
 
 #if HWY_TARGET != HWY_SCALAR
-// Halves are added until two lanes are left.
+// Adds the halves of a vector until two lanes are left.
 template <class D>
 HWY_INLINE void store_two(D d, hn::Vec<D> both, double* to) {
   if constexpr (hn::MaxLanes(D()) > 2) {

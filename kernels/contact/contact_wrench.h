@@ -3,9 +3,9 @@
 //
 // With J = [N; r x N], J_g = [g; r x g] and relative velocity u = (v, omega) of shell against field
 // at the shell body's centre of mass:
-//     e_i  = depth_i - beta * J_i.u                     one-sided: contacts with e_i <= 0 drop out
+//     e_i  = depth_i - beta * J_i.u                     one-sided: e_i <= 0 leaves the contact out
 //     f    = sum k w e J                                elastic force plus contact damping, no pull
-//     f_el = sum k w depth J                            elastic part of the contacts that are in
+//     f_el = sum k w depth J                            elastic part, over the same contacts
 //     K    = sum k w J J_g^T     (exact)  or  sum k w J J^T  (symmetric)      -df/dq without the
 //     B    = sum k w J J^T                                                     geometric term
 // The damping gradient -df/du is beta * B. In symmetric form K = B and only B is summed.
@@ -26,7 +26,7 @@ struct WrenchColumnsT {
 };
 using WrenchColumns = WrenchColumnsT<float>;
 
-// Sums in double. A slice of contacts makes one of these; slices are added in index order.
+// Sums in double of one slice of contacts; slices are added in index order.
 struct WrenchSum {
   double force[6] = {};       // f
   double elastic[6] = {};     // f_el
@@ -42,7 +42,7 @@ struct WrenchParameters {
   bool exact;
 };
 
-// The sum over contacts begin..end-1, in the place of what is in `sum`.
+// The sum over contacts begin..end-1; overwrites `sum`.
 void contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,
                     std::size_t begin, std::size_t end, WrenchSum& sum);
 inline WrenchSum contact_wrench(const WrenchColumns& contacts, const WrenchParameters& parameters,

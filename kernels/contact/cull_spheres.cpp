@@ -47,8 +47,8 @@ struct Culling {
   float margin;
 };
 
-// Appends the survivors among `lanes` and returns their number. A whole vector may be stored: at
-// most `first` survivors came before, so it ends within the rows already read.
+// Appends the survivors among `lanes` and returns their number. Storing a whole vector is safe: at
+// most `first` survivors were written before, so it ends within the rows already read.
 HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uint32_t first,
                                   std::uint32_t* survivors, float* clearance) {
   const DF d;
@@ -89,7 +89,7 @@ std::size_t cull_spheres_simd(const FieldView& field, const Affine& to_field,
                               const SpheresView& spheres, float radius_scale, bool wide,
                               float margin, const std::uint32_t* rows, std::uint32_t first,
                               std::size_t count, std::uint32_t* survivors, float* clearance) {
-  // A run of rows is a set of columns that starts at its first row.
+  // A run of rows is treated as columns that start at its first row.
   const std::size_t skip = rows == nullptr ? first : 0;
   const SpheresView from{spheres.x + skip, spheres.y + skip, spheres.z + skip,
                          spheres.radius + skip, spheres.count - skip};

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // cull_spheres.h - which spheres of a shell level may hold a contact.
 //
-// Xu & Barbic 2016, Sec. 3: a node is dropped when its signed distance exceeds its radius. Here
-// with a radius that provably also covers what interpolation adds: no contact is lost.
+// Xu & Barbic 2016, Sec. 3: a node is dropped when its signed distance exceeds its radius. The
+// radius used here provably covers the error of interpolation too, so no contact is lost.
 #pragma once
 #include "kernels/views.h"
 
 namespace h6::kernels {
 
-// How much larger than the margin the distance at a sphere's centre can be while a point inside the
-// sphere, s voxels away at most, still samples within the margin:
+// By how much the distance at a sphere's centre can exceed the margin while a point inside the
+// sphere, at most s voxels away, still samples within the margin:
 //     reach(0) = 0
 //     reach(s) = sqrt(3) s + r    for s < 1.6   interpolated distance is sqrt(3)-Lipschitz
 //                s + sqrt(3) + r  otherwise     it is within sqrt(3)/2 of the true one, at each end
-// r covers what rounding adds at both ends: int16 samples (2/2048) and float coordinates of fields
-// up to 2048 voxels wide. The short form needs all cells on the way to hold samples, which follows
-// where the field's band is at least 3 voxels and the margin at most 0.5; else set `wide`, and the
-// long form serves every s > 0.
+// r covers the rounding at both ends: int16 samples (2/2048) and float coordinates of fields up to
+// 2048 voxels wide. The first form is valid when all cells on the way hold samples, which follows
+// from a band of at least 3 voxels and a margin of at most 0.5. Otherwise set `wide`: the second
+// form then serves every s > 0.
 inline constexpr float kSqrt3 = 1.7320508f;
 inline constexpr float kReachRounding = 0.003f;
 inline constexpr float kShortReach = 1.6f;
@@ -25,8 +25,8 @@ inline constexpr float cull_reach(float s, bool wide) {
   return (s < kShortReach && !wide ? kSqrt3 * s : s + kSqrt3) + kReachRounding;
 }
 
-// How far something may move, at least, before a point that samples `distance` above the margin can
-// come within it: cull_reach turned round. Negative when it may touch already.
+// The distance that a point which samples `distance` above the margin can certainly move without
+// coming within the margin: the inverse of cull_reach. Negative when the point may touch already.
 inline constexpr float cull_clearance(float distance, bool wide) {
   const float d = distance - kReachRounding;
   const float long_form = d - kSqrt3;
@@ -40,10 +40,10 @@ inline constexpr float cull_clearance(float distance, bool wide) {
 // Writes to `survivors` (room for `count`; may be `rows` itself) every row r among rows[0..count-1]
 // (or first..first+count-1 when rows is null), in that order, with
 //     distance(r) <= cull_reach(radius[r] * radius_scale, wide) + margin        [voxels]
-// distance as sample_field says. Returns how many were written. When `clearance` (room for `count`)
-// is not null, entry k says how far the shell may move in the field's frame before sphere rows[k]
-// may hold a contact: cull_clearance(distance - margin) - radius; <= 0 of survivors. Rows past the
-// survivors hold nothing of use.
+// with the distance of sample_field. Returns the number of survivors; rows past them are
+// unspecified. When `clearance` (room for `count`) is not null, entry k is how far the shell may
+// move in the field's frame before sphere rows[k] may hold a contact:
+// cull_clearance(distance - margin) - radius, which is <= 0 for survivors.
 std::size_t cull_spheres(const FieldView& field, const Affine& to_field, const SpheresView& spheres,
                          float radius_scale, bool wide, float margin, const std::uint32_t* rows,
                          std::uint32_t first, std::size_t count, std::uint32_t* survivors,

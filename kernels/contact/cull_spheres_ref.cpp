@@ -15,7 +15,7 @@ std::size_t cull_spheres_ref(const FieldView& field, const Affine& to_field,
     const std::uint32_t row = rows != nullptr ? rows[k] : first + static_cast<std::uint32_t>(k);
     float distance;
     sample_field_ref(field, to_field, centres, &row, 1, &distance, nullptr, nullptr, nullptr);
-    // Xu & Barbic 2016, Sec. 3, with what interpolation adds.
+    // Xu & Barbic 2016, Sec. 3, with the error of interpolation.
     const float radius = spheres.radius[row] * radius_scale;
     const float reach = cull_reach(radius, wide);
     const bool keep = distance <= reach + margin;

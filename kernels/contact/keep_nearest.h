@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// keep_nearest.h - of many points those with the least distances, in the order in which they came.
+// keep_nearest.h - keeps the points with the least distances, in their order.
 #pragma once
 #include "kernels/contact/touch_groups.h"
 
 namespace h6::kernels {
 
-// The k-th least of `count` distances (1 <= k <= count) and how many are less than it. No NaN; -0
-// is 0.
+// The k-th least of `count` distances (1 <= k <= count) and the number of distances below it. No
+// NaN; -0 counts as 0.
 struct NearestLimit {
   float limit;
   std::size_t below;
@@ -14,8 +14,9 @@ struct NearestLimit {
 NearestLimit nearest_limit(const float* distance, std::size_t count, std::size_t k);
 NearestLimit nearest_limit_ref(const float* distance, std::size_t count, std::size_t k);
 
-// Of rows [begin, end) of `points` those below the limit, and the first `ties` of those at it, move
-// to `to` and on; to <= begin. Returns how many; `ties` is left with what it has not given.
+// Moves the rows of [begin, end) of `points` that are below the limit, and the first `ties` rows
+// that are equal to it, to rows `to` and on; to <= begin. Returns the number of rows moved; `ties`
+// is reduced by the number of equal rows among them.
 std::size_t keep_nearest(const Touching& points, std::size_t begin, std::size_t end, float limit,
                          std::size_t& ties, std::size_t to);
 std::size_t keep_nearest_ref(const Touching& points, std::size_t begin, std::size_t end,

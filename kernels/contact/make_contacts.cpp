@@ -37,8 +37,8 @@ struct PickedRows {
   VI point;
 };
 
-// Shell columns of a vector of rows, as they are: a gather costs more than reading whole vectors of
-// the shell and keeping what is asked for, where rows come in runs. Lanes from `live` on: any.
+// Shell columns at a vector of rows. Rows come in runs, and there reading whole vectors of the
+// shell and permuting them costs less than a gather. Lanes from `live` on are unspecified.
 HWY_INLINE PickedRows pick_rows(const ShellColumns& shell, const std::uint32_t* rows,
                                 std::size_t live) {
   const DF d;
@@ -49,7 +49,7 @@ HWY_INLINE PickedRows pick_rows(const ShellColumns& shell, const std::uint32_t* 
   const VI place = hn::And(row, hn::Set(di, kPlace)), base = hn::Sub(row, place);
   const auto index = hn::IndicesFromVec(d, place);
   const auto id_index = hn::IndicesFromVec(di, place);
-  // Where runs begin: where a base is not that of the lane before.
+  // A run begins where the base differs from that of the lane before.
   const VI before = hn::Max(hn::Sub(hn::Iota(di, 0), hn::Set(di, 1)), hn::Zero(di));
   const auto begins = hn::Or(
       hn::FirstN(di, 1), hn::Ne(base, hn::TableLookupLanes(base, hn::IndicesFromVec(di, before))));

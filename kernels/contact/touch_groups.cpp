@@ -17,31 +17,31 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-// What is looked at is staged, the points of one group behind those of another, some groups at a
-// time. Sixteen points, a batch, then go through three steps, some batches apart, so that none
-// waits for the one before: where they are in the table; where in the bricks; their samples. After
-// a pause each step asks for the memory of the next one too.
+// The points to sample are staged, those of one group behind those of another, some groups at a
+// time. Sixteen points, a batch, then go through three steps: find their entry in the table, their
+// cell in the bricks, their samples. The steps run some batches apart, so that none waits for the
+// memory of the one before. When the field is cold, each step also prefetches for the next.
 //
 //     batch  k + ahead: locate   k + ahead / 2: look_up   k: sample
 constexpr std::size_t kStaged = 32;  // groups
 constexpr std::size_t kRing = 16;
-constexpr std::size_t kAhead = 4;  // with what is read in the caches; kRing where it is not
+constexpr std::size_t kAhead = 4;  // batches, when the field is in the caches; else kRing
 
 struct Stage {
   static constexpr std::size_t kRoom = (kStaged + 1) * kGroup;
   HWY_ALIGN float x[kRoom], y[kRoom], z[kRoom], distance[kRoom];
   HWY_ALIGN std::int32_t row[kRoom];
-  std::size_t first[kStaged + 1];  // of each group; then their number
+  std::size_t first[kStaged + 1];  // staged point of each group; then the number of points
 };
 
 struct Ring {
-  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // of the table, then bytes among the bricks
+  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // index in the table, then byte offset in bricks
   HWY_ALIGN std::int32_t node[kRing][kGroup];
   HWY_ALIGN float fraction[3][kRing][kGroup];
-  bool plain[kRing];  // all in bricks: other batches are sampled anew
+  bool plain[kRing];  // all points lie in bricks; other batches take the general path
 };
 
-// Batches are whole: the last one is filled up with the first point.
+// The last batch is filled up with the first point.
 HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* groups,
                              const std::uint16_t* rows, std::size_t count, Stage& stage) {
   const DF d;
@@ -74,7 +74,7 @@ HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* grou
       hn::StoreU(hn::Set(d, column[0]), d, column + n + i);
 }
 
-// What batches are made of: a group each, or what is staged.
+// Source of the batches: a whole group each, or the staged points.
 struct WholeGroups {
   const PointsView& points;
   const std::uint32_t* groups;
@@ -190,7 +190,7 @@ Samples sample_anew(const FieldView& field, const Affine& to_field, const Points
   return s;
 }
 
-// Which distances are samples: of points in the grid, and there in a brick.
+// Lanes whose distance is a sample: points inside the grid, in a brick.
 template <class Points>
 hn::Mask<DF> in_bricks(const FieldView& field, const Affine& to_field, const Points& points,
                        std::size_t at) {
@@ -213,7 +213,7 @@ hn::Mask<DF> in_bricks(const FieldView& field, const Affine& to_field, const Poi
   return hn::AndNot(hn::RebindMask(d, hn::Lt(entry, hn::Zero(di))), inside);
 }
 
-// Writes what touches of so many batches behind what is written, and returns where that ends.
+// Appends the touching points of some batches and returns the new end.
 template <class Points>
 HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_field,
                                       const Points& points, std::size_t batches, float limit,
@@ -243,7 +243,7 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
       s.distance = hn::IfThenElse(real, s.distance, none);
       points.keep(at, s.distance);
       smallest = hn::Min(smallest, s.distance);
-      // Whole vectors are written, whatever touches: a branch would be guessed wrong too often.
+      // A whole vector is written in any case: a branch would be mispredicted too often.
       auto touching = hn::Lt(s.distance, hn::Set(d, limit));
       if (HWY_UNLIKELY(!ring.plain[k % kRing]) && limit > 0 && !hn::AllFalse(d, touching))
         touching = hn::Or(hn::Lt(s.distance, hn::Zero(d)),
@@ -269,7 +269,7 @@ HWY_INLINE std::uint32_t bits_of(M mask) {
   return bytes[0] | bytes[1] << 8;
 }
 
-// What is learnt of a group whose points are staged from `first` to `end`.
+// Fills `look` for a group whose points are staged from `first` to `end`.
 HWY_INLINE void learn_group(const Stage& stage, std::size_t first, std::size_t end, bool all,
                             const GroupLook& look, std::size_t k) {
   const DF d;

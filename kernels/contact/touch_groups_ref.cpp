@@ -10,7 +10,7 @@
 namespace h6::kernels {
 namespace {
 
-// Of every axis: f32 as affine_row of sample_field-inl.h has it, so that both see the same cell.
+// In float like affine_row of sample_field-inl.h, so that both find the same cell.
 bool in_brick(const FieldView& field, const Affine& to_field, const PointsView& points,
               std::uint32_t row) {
   std::int32_t brick[3];

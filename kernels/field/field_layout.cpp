@@ -11,14 +11,14 @@
 // and I(|x|^2) - |x|^2 = H^2 sum_a t_a (1 - t_a), hence
 //     D(x)^2 >= I(L^2) - H^2 sum_a t_a (1 - t_a).
 // Equality is possible, where the surface is a single point under a cell's middle. But a far cell
-// lies outside the band: the surface is no nearer to x than the cell's end and the band from there.
-// Call the larger of both J(x). And D changes no faster than one moves:
+// lies outside the band: D(x) is at least the way to the cell's end plus the band. Let J(x) be the
+// larger of the two bounds. D is 1-Lipschitz:
 //     D(x) >= D(c) - |x - c| >= J(c) - |x - c|   for every c of the cell.
-// What J lacks at a flat surface falls as 1 / D, so a c farther away is better, straight away from
-// the surface, where D grows as fast as one moves. The sampler takes the way of the squares'
-// gradient to the cell's end; were that another way, the bound would be loose, not wrong.
-// Corners are rounded down by 1/1024 voxel at least, so I by 2e-6 of itself at the farthest and by
-// more where they are near: more than the sampler's own rounding.
+// At a flat surface the gap between J and D falls as 1 / D, so a c farther away is better, straight
+// away from the surface, where D grows as |x - c|. The sampler follows the gradient of the squares
+// to the cell's end; in another direction the bound would be loose, not wrong. Corners are rounded
+// down by at least 1/1024 voxel, which lowers I by at least 2e-6 of itself: more than the sampler's
+// own rounding.
 #include "kernels/field/field_layout.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ namespace h6::kernels {
 namespace {
 
 constexpr double kEdge = 8.0;               // voxels a far cell
-constexpr double kFloatSlack = 1.0 / 1024;  // voxels: see the head comment
+constexpr double kFloatSlack = 1.0 / 1024;  // voxels; see the end of the head comment
 constexpr double kInt16Max = 32767.0;
 
 struct Cell {
@@ -67,7 +67,7 @@ FarBound far_bound(const h6FieldDef& def, const Cell& c) {
     inside |= value < 0;
     outside |= value > 0;
   }
-  if (inside && outside) return bound;  // no far cell holds the surface: nothing is known then
+  if (inside && outside) return bound;  // contradicts a far cell, so nothing is known: bound 0
   if (inside) bound.side = -1.0;
   std::copy_n(L, 8, bound.corner);
   return bound;
@@ -96,7 +96,7 @@ class BrickNodes {
     int local[3], neighbour = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const bool beyond = node[axis] == 8;
-      // Past the last brick there is no node, and no sample reads one: repeat the last.
+      // Past the last brick there is no node, and no sample reads one. Repeat the last node.
       local[axis] = !beyond ? node[axis] : in_grid_[axis] ? 0 : 7;
       if (beyond && in_grid_[axis]) neighbour |= 1 << axis;
     }
@@ -109,13 +109,13 @@ class BrickNodes {
     FarBound bound;
   };
 
-  // Neighbour k lies one brick on along the axes whose bit is set.
+  // Neighbour k lies one brick further along the axes whose bit is set in k.
   void look_up(const Cell& brick, int k) {
     Cell c = brick;
     for (int axis = 0; axis < 3; ++axis) {
       in_grid_[axis] = brick.at[axis] + 1 < def_.bricks[axis];
       if ((k >> axis & 1) != 0) ++c.at[axis];
-      if (c.at[axis] >= def_.bricks[axis]) return;  // never asked for
+      if (c.at[axis] >= def_.bricks[axis]) return;  // never read
     }
     const std::int32_t row = def_.brick_index[slot_of(def_, c)];
     if (row >= 0) {

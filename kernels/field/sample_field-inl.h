@@ -33,8 +33,8 @@ using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 using VI = hn::Vec<DI>;
 
-// ---- reading what lies anywhere: one lane after the other, four to a register. Gathers are
-// microcode on many processors, and take longer.
+// ---- gathers, done lane by lane, four to a register. The gather instruction is microcode on many
+// processors and takes longer.
 
 HWY_INLINE std::int32_t load_32(const void* from) {
   std::int32_t value;  // pairs are aligned to 16 bits
@@ -66,7 +66,7 @@ HWY_INLINE hn::Vec<D> join_fours(D d, const V4* four) {
 }
 #endif
 
-// The int32 at each index of a vector's worth.
+// The int32 at each index of a vector.
 HWY_INLINE VI gather_entries(const std::int32_t* table, const std::int32_t* at) {
   const DI di;
 #if HWY_TARGET == HWY_SCALAR
@@ -81,7 +81,7 @@ HWY_INLINE VI gather_entries(const std::int32_t* table, const std::int32_t* at) 
 #endif
 }
 
-// Two int16 so many bytes behind each byte offset of `pool`.
+// The two int16 at each byte offset of `pool` plus a constant.
 HWY_INLINE void gather_pairs(const std::int16_t* pool, const std::int32_t* at,
                              const int (&behind)[4], VI (&pair)[4]) {
   const DI di;
@@ -102,7 +102,8 @@ HWY_INLINE void gather_pairs(const std::int16_t* pool, const std::int32_t* at,
 #endif
 }
 
-// Bytes from a cell's first corner to the others: a row and a plane on in a brick, in a far cell.
+// Bytes from a cell's first corner to the next row and to the next plane, in a brick and in a far
+// cell.
 constexpr int kNearCorners[4] = {0, 2 * 9, 2 * 81, 2 * 90};
 constexpr int kFarCorners[4] = {0, 4, 8, 12};
 
@@ -112,8 +113,8 @@ HWY_INLINE VF low_half(VI pair) {
 HWY_INLINE VF high_half(VI pair) { return hn::ConvertTo(DF(), hn::ShiftRight<16>(pair)); }
 HWY_INLINE VF lerp(VF a, VF b, VF t) { return hn::MulAdd(t, hn::Sub(b, a), a); }
 
-// Up to a full vector of points of a column set: rows first..first+live-1, or those listed. Lanes
-// that are not live stand at the origin or repeat row 0.
+// Up to a vector of points: rows first..first+live-1 of the columns, or the listed rows. Lanes past
+// `live` are at the origin or repeat row 0.
 struct Lanes {
   const std::uint32_t* rows;
   std::size_t first, live;
@@ -136,7 +137,7 @@ HWY_INLINE VF affine_row(const float* m, VF x, VF y, VF z) {
   return hn::MulAdd(hn::Set(d, m[0]), x, hn::MulAdd(hn::Set(d, m[1]), y, t));
 }
 
-// One axis of a point inside the grid: which brick, which unit cell in it, where in that cell.
+// One axis of a point inside the grid: its brick, its unit cell in the brick, its fraction.
 struct Axis {
   VI brick, cell;
   VF fraction;
@@ -150,7 +151,7 @@ HWY_INLINE Axis split_axis(VF q, std::int32_t bricks) {
           hn::Sub(q, hn::ConvertTo(DF(), unit))};
 }
 
-// Where a unit cell is: its brick's entry in the table, its first node in that brick.
+// A unit cell: the table entry of its brick, and its first node in that brick.
 struct Cell {
   VI slot, node;
 };
@@ -197,7 +198,8 @@ HWY_INLINE VF band_and_end(VF x, VF y, VF z, float band) {
   return hn::MulAdd(hn::Min(low, hn::Sub(one, high)), hn::Set(d, 8.0f), hn::Set(d, band));
 }
 
-// How far a place can go in a direction n before its cell ends along one axis: over / under [n].
+// The way from a place along a direction n to the end of its cell on one axis: over / under, in
+// lengths of n.
 struct WayOut {
   VF over, under;
 };
@@ -211,7 +213,7 @@ HWY_INLINE WayOut shorter(const WayOut& a, const WayOut& b) {
   return {hn::IfThenElse(less, a.over, b.over), hn::IfThenElse(less, a.under, b.under)};
 }
 
-// Of a gradient of squares [quanta^2 a cell]: below it there is none.
+// A gradient of squares [quanta^2 a cell] below this counts as 0.
 constexpr float kLeastSlope = 1e-6f;
 
 // J where the gradient of the squares leaves the cell, less the way there [voxel].
@@ -224,7 +226,7 @@ HWY_INLINE VF bound_from_farther(const Squares& s, VF x, VF y, VF z, float band)
   VF ny = lerp(hn::Sub(row[1], row[0]), hn::Sub(row[3], row[2]), z);
   VF nz = hn::Sub(lerp(row[2], row[3], y), lerp(row[0], row[1], y));
   const WayOut end = shorter(way_out(z, nz), shorter(way_out(y, ny), way_out(x, nx)));
-  const VF way = hn::Div(end.over, hn::Max(end.under, hn::Set(d, kLeastSlope)));  // in gradients
+  const VF way = hn::Div(end.over, hn::Max(end.under, hn::Set(d, kLeastSlope)));  // gradients
   const VF length2 = hn::MulAdd(nx, nx, hn::MulAdd(ny, ny, hn::Mul(nz, nz)));
   x = hn::MulAdd(way, nx, x), y = hn::MulAdd(way, ny, y), z = hn::MulAdd(way, nz, z);
   return hn::NegMulAdd(hn::Mul(way, hn::Set(d, 8.0f)), hn::Sqrt(length2),
@@ -250,13 +252,13 @@ HWY_INLINE VF far_bound(const VF low[4], const VF step[4], VF x, VF y, VF z, VF 
   return hn::CopySign(bound, value);
 }
 
-// Byte offsets of first corners among the bricks.
+// Byte offsets of the first corners in the pool of bricks.
 HWY_INLINE VI near_offset(VI entry, VI node) {
   const DI di;
   return hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node));
 }
 
-// Pairs along x, and then along y and z, at fractions of the cell.
+// Interpolates pairs along x, then along y and z, at fractions of the cell.
 struct Corners {
   VF low[4], step[4];  // c[z][y] at x, and what is added to it at x + 1
 };
@@ -345,7 +347,7 @@ HWY_INLINE void sample_points(const FieldView& field, VF x, VF y, VF z, VF& dist
                               VF& gy, VF& gz) {
   const DF d;
   const VF zero = hn::Zero(d);
-  // 0 * v is 0 for finite v alone.
+  // 0 * v is 0 only for finite v.
   const auto finite =
       hn::Eq(hn::Add(hn::Mul(x, zero), hn::Add(hn::Mul(y, zero), hn::Mul(z, zero))), zero);
   x = hn::IfThenElseZero(finite, x);

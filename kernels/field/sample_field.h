@@ -5,13 +5,12 @@
 
 namespace h6::kernels {
 
-// For k in 0..count-1, point rows[k] (or k itself when rows is null) of `points` is carried to the
-// field by `to_field`; distance[k] in voxels, gx/gy/gz[k] its gradient per voxel in field axes, not
-// normalised. Gradient columns may all be null.
+// For k in 0..count-1, `to_field` maps point rows[k] (k itself when rows is null) of `points` to
+// the field. distance[k] is in voxels; gx/gy/gz[k] is its gradient per voxel in field axes, not
+// normalised. The gradient columns may all be null.
 //   in a brick        trilinear sample; its exact derivative
-//   in a far cell     a bound with the sign of the side: |distance| <= true |d|, at least 0
-//   (views.h);
-//                     the derivative of what interpolates the corners, which points the right way
+//   in a far cell     a bound with the sign of the side (views.h): 0 <= |distance| <= true |d|;
+//                     the derivative of the interpolated corners
 //   outside the grid  hypot(distance to the grid, value at the nearest grid point when positive)
 // A point that is not finite has distance +infinity and gradient 0.
 void sample_field(const FieldView& field, const Affine& to_field, const PointsView& points,

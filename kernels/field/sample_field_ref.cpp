@@ -9,7 +9,7 @@
 namespace h6::kernels {
 namespace {
 
-// Of a direction and of the squares' gradient: below it there is none.
+// A direction component or gradient of squares below this counts as 0.
 constexpr float kLeastSlope = 1e-6f, kLeastSlope2 = 1e-12f;
 
 struct Sample {
