@@ -7,7 +7,7 @@
 
 namespace h6::io::view {
 
-static_assert(std::endian::native == std::endian::little, "arrays are sent as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "arrays are sent as they are in memory");
 
 Envelope::Envelope() : arrays_(std::make_unique<nlohmann::ordered_json>()) {
   *arrays_ = nlohmann::ordered_json::array();
@@ -36,7 +36,7 @@ void Envelope::add(const std::string& name, const std::vector<std::uint8_t>& v) 
 
 std::string Envelope::pack(nlohmann::ordered_json head) const {
   head["arrays"] = *arrays_;
-  // Names come from files: what is not UTF-8 is replaced.
+  // Names come from files, so bytes that are not UTF-8 are replaced.
   std::string text = head.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   text.append((4 - text.size() % 4) % 4, ' ');
   const auto bytes = static_cast<std::uint32_t>(text.size());

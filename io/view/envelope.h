@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// envelope.h - one message to the page: what it is as JSON, and its numbers as they are in memory.
+// envelope.h - one message to the page: a head in JSON and arrays of numbers in binary.
 //
 //   u32 bytes of JSON | JSON, padded with blanks to 4 | arrays, each padded with zeros to 4
 //
 // The JSON has `kind` and `arrays`: [{"name", "type": "f32" | "u32" | "i16" | "u8", "count"}], in
-// the order in which they follow. All little-endian. io/view/page/src/envelope.ts reads it.
+// the order of the arrays. Numbers are little-endian. io/view/page/src/envelope.ts reads it.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -28,7 +28,7 @@ class Envelope {
   void add(const std::string& name, const std::vector<std::uint32_t>& values);
   void add(const std::string& name, const std::vector<std::int16_t>& values);
   void add(const std::string& name, const std::vector<std::uint8_t>& values);
-  // `head` without `arrays`: those are written from what was added.
+  // Writes `arrays` into `head` from what was added.
   std::string pack(nlohmann::ordered_json head) const;
   Message message(nlohmann::ordered_json head) const;
 

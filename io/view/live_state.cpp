@@ -32,18 +32,18 @@ void append(std::vector<float>& to, const h6Pose& p) {
     to.push_back(static_cast<float>(x));
 }
 
-// A quarter of an octave each, from 1/4 us.
+// Bins of a quarter octave from 1/4 us on.
 std::size_t bin_of(double us, std::size_t bins) {
   if (!(us > 0.25)) return 0;
   return std::min(bins - 1, static_cast<std::size_t>(4 * std::log2(4 * us)));
 }
 
-// The width of the hats that a method works with.
+// The width of the method's weight hats.
 double epsilon_of(const h6ContactDef& c) {
   return c.method == H6_METHOD_ROBUST ? c.epsilon_normal : c.epsilon;
 }
 
-constexpr std::size_t kMaxRows = 64;  // of strips, in a message
+constexpr std::size_t kMaxRows = 64;  // of the strips, in one message
 
 }  // namespace
 
@@ -136,7 +136,7 @@ Message LiveState::scene_message(std::vector<std::string>& remarks) const {
 
 Message LiveState::state_message() {
   Envelope envelope;
-  // At high rates the largest of each few.
+  // At high rates each row sent has the largest values of several.
   const std::size_t count = rows_.size() / kRow, step = (count + kMaxRows - 1) / kMaxRows;
   std::vector<float> rows;
   for (std::size_t i = 0; i < count; i += step) {
@@ -153,7 +153,7 @@ Message LiveState::state_message() {
   double lag = 0;
   std::vector<float> hands;
   if (held && any_) {
-    // Where the hand holds the body, as the scene sees it.
+    // The pose at which the hand would hold the body, in the scene.
     const h6Pose& hand = r.command[0].pose;
     const h6Vec3 wanted = apply(hand, loaded_.bodies[body].com);
     const h6Vec3 is = apply(r.body[0].pose, loaded_.bodies[body].com);
@@ -235,7 +235,7 @@ Message LiveState::slice_message(const Slice& slice) const {
         std::clamp(std::lround(128 + 2 * d / asset->voxel_size), 0l, 255l)));
   Envelope envelope;
   envelope.add("values", values);
-  // In the world, where the body is now.
+  // The plane in the world, at the body's present pose.
   h6Pose pose = loaded_.bodies[body].pose;
   if (7 * body + 6 < poses_.size()) {
     const float* at = &poses_[7 * body];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// live_state.h - a run as the page shows it: one message for each picture, made from the rows and
-// the newest contacts of a loop.
+// live_state.h - the messages that show a run on the page, made from the loop's rows and its newest
+// contacts.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -20,20 +20,21 @@ class LiveState {
   explicit LiveState(const LoadedScene& loaded);
   // The contact and coupling settings in force.
   void settings(const h6ContactDef& contact, const h6CouplingDef& coupling);
-  // A run begins: time counts from zero again.
+  // A run begins and time restarts at zero.
   void begin();
   void rows(const h6FrameRecord* rows, std::size_t count);
   void contacts(const h6LoopView& view);
   void recording(bool on) { recording_ = on; }
 
-  // {"kind": "scene", ...} with the bodies as they are drawn; remarks: what could not be.
+  // {"kind": "scene", ...} with the drawn bodies; `remarks` gets a sentence for each part that
+  // cannot be drawn.
   Message scene_message(std::vector<std::string>& remarks) const;
-  // {"kind": "state", ...}; the rows since the last one go with it.
+  // {"kind": "state", ...} with the rows since the last such message.
   Message state_message();
   // {"kind": "note", "text"}.
   static Message note(const std::string& text);
   // {"kind": "slice", ...}: signed distance on a plane through the first field, 0 .. 255 for -64 ..
-  // +64 voxels; null where no body has a field.
+  // +64 voxels. Null when no body has a field.
   Message slice_message(const Slice& slice) const;
 
   const h6FrameRecord& last() const { return last_; }
@@ -52,7 +53,7 @@ class LiveState {
   std::uint64_t late_[3] = {};
   std::vector<float> rows_, poses_, p_, n_, t_, w_, d_;
   std::vector<std::uint32_t> frame_bins_, wake_bins_;
-  std::array<double, 6> stiffness_{};  // sum w k N N^T: xx yy zz xy xz yz [N/m]
+  std::array<double, 6> stiffness_{};  // net, sum of w k N N^T: xx yy zz xy xz yz [N/m]
 };
 
 }  // namespace h6::io::view

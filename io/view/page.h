@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// page.h - the pages that io/view/page builds, as they lie in the program; empty where it was built
+// page.h - the HTML pages built from io/view/page, inside the program; empty when it was built
 // without node and npm.
 #pragma once
 #include <string>
@@ -8,8 +8,8 @@
 namespace h6::io::view {
 
 std::string_view live_page();
-std::string_view report_page();  // "@data@" stands where the data goes
-// Why there are none: one sentence.
+std::string_view report_page();  // "@data@" marks the place of the data
+// One sentence that tells why there are none.
 std::string no_page();
 
 }  // namespace h6::io::view

@@ -47,7 +47,7 @@ ordered_json spread(const std::vector<float>& v) {
           {"max", most}};
 }
 
-// gzip, so that the page's own DecompressionStream can read it.
+// In gzip format, which the page's DecompressionStream reads.
 std::string gzip(const std::string& raw) {
   z_stream z{};
   deflateInit2(&z, 9, Z_DEFLATED, 15 + 16, 9, Z_DEFAULT_STRATEGY);
@@ -241,7 +241,7 @@ class ReportWriter {
     const std::string name = head_["name"];
     head_["title"] = "hapsix report" + (name.empty() ? "" : ": " + name);
     head_["about"] = std::to_string(runs_.size()) +
-                     (runs_.size() == 1 ? " recording" : " recordings, laid over one another");
+                     (runs_.size() == 1 ? " recording" : " recordings, drawn over one another");
     head_["replay_about"] = about;
     head_["duration"] = duration_;
     head_["contact_origin"] = {origin[0], origin[1], origin[2]};
@@ -285,7 +285,7 @@ Result<std::string> make_report(const std::vector<ReportRun>& runs, const Loaded
   Envelope envelope;
   std::vector<std::string> remarks;
   ReportWriter writer(scene, envelope, remarks);
-  // One grid of 16 bits for all contacts.
+  // All contacts share one 16-bit grid.
   double low[3] = {1e30, 1e30, 1e30}, high[3] = {-1e30, -1e30, -1e30}, side = 1e-3;
   for (const ReportRun& run : runs)
     for (const auto& sample : run.contacts_)

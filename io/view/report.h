@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // report.h - recordings as one HTML file that opens from disk: strips as in Fig. 10 of Xu & Barbic
 // 2016, a replay in space with the Gauss sphere, the time of a frame by stage, late frames, events,
-// configuration, hashes, verdict. Several recordings are laid over one another.
+// configuration, hashes, verdict. Several recordings are drawn over one another.
 //
-// Size: strips keep the least and the greatest value of each of 3,000 spans, the replay 60 poses a
-// second (4,000 at most) and the 64 deepest contacts of each, bodies 60,000 triangles in all: below
-// 10 MB for any recording.
+// The file stays below 10 MB for any recording: strips keep the least and the greatest value of
+// each of 3,000 spans; the replay keeps 60 poses a second (4,000 at most) and the 64 deepest
+// contacts of each; all bodies together keep 60,000 triangles.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -19,21 +19,21 @@
 
 namespace h6::io::view {
 
-// One contact at one instant, world frame.
+// One contact at one instant, in the world frame.
 struct ReportContact {
   std::array<float, 3> position, normal, torque_direction;  // [m], unit, unit
   float weight, depth;                                      // share, [m]
 };
 
-// A recording on its way into a report: hand it over in pieces, in order.
+// A recording for a report, handed over in pieces and in order.
 class ReportRun {
  public:
-  // `frames` it will have in all.
+  // `frames` is the number of all its frames.
   ReportRun(std::string label, RecordingHead head, std::uint64_t frames);
   void add(const std::vector<h6FrameRecord>& frames);
   void events(std::vector<RecordingEvent> events, std::string summary_json);
 
-  // The frames of which the replay shows contacts, rising; contacts(i, ...) fills the i-th.
+  // The frames whose contacts the replay shows, ascending; contacts(i, ...) fills the i-th.
   const std::vector<std::uint64_t>& replay_frames() const { return replay_frames_; }
   void contacts(std::size_t sample, std::vector<ReportContact> all);
 
@@ -73,8 +73,8 @@ class ReportRun {
   std::uint64_t hash_ = 0;
 };
 
-// `scene` draws the bodies, nullptr: the replay has none, and `why` says so to the reader.
-// Fails when this build has no pages, or with no run.
+// `scene` gives the bodies; with nullptr the replay shows none, and `why` tells the reader the
+// reason. Fails when this build has no pages, and when `runs` is empty.
 Result<std::string> make_report(const std::vector<ReportRun>& runs, const LoadedScene* scene,
                                 const std::string& why);
 

@@ -28,8 +28,7 @@ std::optional<Mesh> mesh_of(const std::optional<Source>& source, Unit unit,
   return std::nullopt;
 }
 
-// A mesh that serves field and shell is drawn once; the field's, if they differ, is what others
-// touch.
+// Field and shell of a body are mostly baked from the same mesh, so one of them is drawn.
 std::optional<Mesh> mesh_of(const SceneBody& body, Unit unit, std::vector<std::string>& remarks) {
   if (auto mesh = mesh_of(body.shell, unit, remarks)) return mesh;
   return mesh_of(body.field, unit, remarks);
@@ -62,8 +61,8 @@ Drawn quantise(const Mesh& mesh) {
   return out;
 }
 
-// Edges collapse within 1 % of the body's size; where that does not reach the number asked for
-// (soups are all borders), vertices merge regardless of what hangs together.
+// Edges collapse within 1 % of the body's size. Soups consist of borders, which do not collapse;
+// where too many triangles stay, vertices merge without regard to topology.
 void simplify(Drawn& d, std::size_t triangles) {
   if (d.index.size() <= 3 * triangles) return;
   std::vector<float> points(d.position.begin(), d.position.end());
@@ -75,7 +74,7 @@ void simplify(Drawn& d, std::size_t triangles) {
   if (count > 3 * triangles + triangles)
     count = meshopt_simplifySloppy(fewer.data(), d.index.data(), d.index.size(), points.data(),
                                    vertices, 3 * sizeof(float), 3 * triangles, 0.05f, nullptr);
-  if (count == 0) return;  // nothing would be left of it: drawn as it is
+  if (count == 0) return;  // nothing would be left: draw it in full
   fewer.resize(count);
   std::vector<std::uint32_t> place(vertices);
   const std::size_t left =
@@ -140,7 +139,7 @@ ordered_json draw_scene(const LoadedScene& loaded, const DrawLimits& limits, Env
     if (drawn[i]) {
       Drawn& d = *drawn[i];
       const std::size_t own = d.index.size() / 3;
-      if (total > limits.triangles)  // each body gives up the same share, small ones none
+      if (total > limits.triangles)  // bodies are cut by the same factor, but none below 2,000
         simplify(d, std::max<std::size_t>(2000, own * limits.triangles / total));
       if (d.index.size() / 3 < own)
         remarks.push_back("'" + body.name + "' is drawn with " +

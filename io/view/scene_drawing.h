@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_drawing.h - the bodies of a scene as the page draws them.
+// scene_drawing.h - the bodies of a scene for the page to draw.
 //
-// A body with a mesh is drawn by it, 16 bits a coordinate on a cube around it (for a part of 1 m:
-// 15 um), simplified where it has more triangles than asked for. One with a baked shell only is
-// drawn by its points; one with a baked field only is not drawn.
+// A body with a mesh is drawn as that mesh, with 16 bits a coordinate on a cube around it (15 um
+// for a part of 1 m), and simplified when it has more triangles than the limit. A body with only a
+// baked shell is drawn as the shell's points; one with only a baked field is not drawn.
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 
@@ -18,7 +18,7 @@ struct DrawLimits {
 
 // Adds position<i>, index<i> or points<i> of body i to `envelope`, and returns the head's part:
 // {"bodies": [{"name", "fixed", "pose", "com", "origin", "step"}], "hand_body", "voxel", "unit",
-// "per_metre", "name"}. What cannot be read is a sentence in `remarks`, not a failure.
+// "per_metre", "name"}. A file that cannot be read is a sentence in `remarks`, not a failure.
 nlohmann::ordered_json draw_scene(const LoadedScene& scene, const DrawLimits& limits,
                                   Envelope& envelope, std::vector<std::string>& remarks);
 

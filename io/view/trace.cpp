@@ -55,7 +55,7 @@ Outcome Trace::write(const std::filesystem::path& file) const {
       "thread\"}},\n"
       "{\"ph\":\"M\",\"pid\":1,\"tid\":2,\"name\":\"thread_name\",\"args\":{\"name\":\"helper\"}}";
   for (const Row& r : rows_) {
-    // Microseconds; a frame begins at its deadline, then wakes up, then works.
+    // In microseconds. A frame begins at its deadline, then the thread wakes up, then it works.
     const double deadline = 1e6 * r.time, start = deadline + std::max(0.0, r.wakeup_us);
     if (r.wakeup_us > 0)
       print(text,
@@ -68,14 +68,14 @@ Outcome Trace::write(const std::filesystem::path& file) const {
           static_cast<unsigned>(r.status));
     double stages = 0;
     for (const double us : r.stage_us) stages += us;
-    // What is not a stage (reading samples, hashing) stands before them and after them.
+    // Time outside the stages (reading samples, hashing) is split evenly before and after them.
     double at = start + std::max(0.0, 0.5 * (r.frame_us - stages));
     for (int s = 0; s < H6_STAGE_COUNT; ++s) {
       print(text, ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":1,\"name\":\"%s\",\"ts\":%.3f,\"dur\":%.3f}",
             h6StageName(static_cast<h6Stage>(s)), at, r.stage_us[s]);
       at += r.stage_us[s];
     }
-    if (r.helper_slices)  // from its first slice on, as if it had not waited between them
+    if (r.helper_slices)  // drawn without the waits between its slices
       print(text,
             ",\n{\"ph\":\"X\",\"pid\":1,\"tid\":2,\"name\":\"%u slices\",\"ts\":%.3f,\"dur\":%.3f}",
             r.helper_slices, start + r.helper_start_us, r.helper_us);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// trace.h - the last seconds of a run as a timeline that chrome://tracing and ui.perfetto.dev open:
-// each frame with its stages and, on a thread of its own, what the helper took of it; wake-up, late
-// frames and their cause, contacts and depth.
+// trace.h - the last seconds of a run as a timeline for chrome://tracing and ui.perfetto.dev: each
+// frame with its stages, the helper's share on a thread of its own, wake-up times, late frames and
+// their cause, contacts and depth.
 #pragma once
 #include <deque>
 #include <filesystem>
@@ -13,10 +13,10 @@ namespace h6::io::view {
 
 class Trace {
  public:
-  // The newest `frames` are kept.
+  // Keeps the newest `frames` frames.
   explicit Trace(std::size_t frames) : most_(frames) {}
   void add(const h6FrameRecord* rows, std::size_t count);
-  // JSON in the Trace Event Format, written aside and put in place.
+  // Writes JSON in the Trace Event Format, aside and then renamed.
   Outcome write(const std::filesystem::path& file) const;
 
  private:

@@ -60,7 +60,7 @@ Result<ViewRequest> contact(const json& object) {
     std::uint32_t pieces;
     if (!method->is_string() ||
         h6MethodFromName(method->get_ref<const std::string&>().c_str(), &known, &pieces) != 0)
-      return wrong("'method' is not the name of one");
+      return wrong("'method' is not the name of a method");
     set.method = method->get<std::string>();
   }
   if (!number(object, "stiffness", 1, 1e6, set.stiffness))
@@ -82,7 +82,7 @@ Result<ViewRequest> turn(const json& object) {
 
 Result<ViewRequest> parse_request(std::string_view text) {
   const json object = json::parse(text, nullptr, false);
-  if (!object.is_object()) return wrong("it is no JSON object");
+  if (!object.is_object()) return wrong("it is not a JSON object");
   const auto what = object.find("do");
   if (what == object.end() || !what->is_string()) return wrong("'do' is missing");
   const auto& name = what->get_ref<const std::string&>();

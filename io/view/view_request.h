@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// view_request.h - what the page may ask for, read from a text that anyone could have sent.
+// view_request.h - the page's requests, parsed from a text that is not trusted.
 #pragma once
 #include <array>
 #include <string>
@@ -11,11 +11,11 @@
 
 namespace h6::io::view {
 
-// Take the hand, or give it back to its path.
+// The mouse takes the hand, or gives it back to its path.
 struct Grab {
   bool on = false;
 };
-// Where the page wants the hand to be: mesh frame of its body, world frame [m], unit quaternion.
+// The wanted pose of the hand: the mesh frame of its body in the world [m], unit quaternion.
 struct MoveHand {
   h6Pose pose{};
 };
@@ -23,12 +23,12 @@ struct Clutch {
   bool on = false;
 };
 struct SetContact {
-  std::string method;           // with its pieces, "gauss6+facing"; empty: as it is
-  double stiffness = 0;         // [N/m]; 0: as it is
-  double epsilon = 0;           // 0: as it is
-  double max_depth_voxels = 0;  // of the coupling; 0: as it is
+  std::string method;           // with its pieces, "gauss6+facing"; empty: unchanged
+  double stiffness = 0;         // [N/m]; 0: unchanged
+  double epsilon = 0;           // 0: unchanged
+  double max_depth_voxels = 0;  // of the coupling; 0: unchanged
 };
-// 1: real time; below: slow motion; 0: paused.
+// 1: real time; between 0 and 1: slow motion; 0: paused.
 struct SetPace {
   double pace = 1;
 };
@@ -36,7 +36,8 @@ struct Reset {};
 struct Record {
   bool on = false;
 };
-// A plane through the first field: axis 0 .. 2, and where along it, 0 .. 1 of the field's extent.
+// A plane through the first field: its normal axis 0 .. 2, and its place on it, 0 .. 1 of the
+// field's extent.
 struct Slice {
   int axis = 2;
   double at = 0.5;
@@ -44,7 +45,7 @@ struct Slice {
 using ViewRequest = std::variant<Grab, MoveHand, Clutch, SetContact, SetPace, Reset, Record, Slice>;
 
 // {"do": "grab", "on": true}, {"do": "hand", "p": [x, y, z], "q": [w, x, y, z]}, ... Every number
-// is checked to be finite and in its range; a failure is a sentence for the page.
+// must be finite and in its range; a failure is a sentence for the page.
 Result<ViewRequest> parse_request(std::string_view text);
 
 }  // namespace h6::io::view

@@ -28,7 +28,7 @@ using beast::error_code;
 constexpr std::size_t kOutstanding = 64;
 constexpr auto kRequestTime = std::chrono::seconds(10);
 
-// As long for a wrong guess as for a right one.
+// Takes the same time for wrong and right guesses, so the time tells nothing about the token.
 bool same(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   unsigned char differ = 0;
@@ -44,7 +44,7 @@ std::string random_token() {
   return text;
 }
 
-// The value of `token` in "/path?a=b&token=T"; empty without one.
+// The value of `token` in "/path?a=b&token=T"; empty when there is none.
 std::string_view token_of(std::string_view target) {
   const auto query = target.find('?');
   if (query == std::string_view::npos) return {};
@@ -68,7 +68,7 @@ struct ViewServer::Body {
   ServerOptions options;
   std::string page, port_text;
   Receive receive;
-  std::size_t connections = 0;  // outlives io: what io still holds counts down
+  std::size_t connections = 0;  // before io, whose handlers still count down when it is destroyed
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
   Message greeting;
@@ -86,7 +86,7 @@ struct ViewServer::Body {
   }
 };
 
-// A page that is open: one message on its way, the newest live one behind it.
+// An open page: one message is being sent, the newest live message waits behind it.
 class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
  public:
   Client(Body& body, tcp::socket socket) : body_(body), stream_(std::move(socket)) {}
@@ -162,7 +162,7 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
   bool open_ = false;
 };
 
-// A request: answered, refused, or made into a client.
+// One request: it is answered, refused, or becomes a client.
 class ViewServer::Body::Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(Body& body, tcp::socket socket) : body_(body), stream_(std::move(socket)) {
@@ -196,7 +196,7 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
                    "the token is missing: open the whole address that hapsix printed");
     const bool upgrade = websocket::is_upgrade(request);
     if (path == "/live") {
-      if (!upgrade) return reply(http::status::upgrade_required, "a WebSocket is wanted here");
+      if (!upgrade) return reply(http::status::upgrade_required, "this address is for a WebSocket");
       if (!body_.known_origin(view_of(request[http::field::origin])))
         return reply(http::status::forbidden, "not from this page");
       if (body_.watching.size() >= body_.options.max_clients)
@@ -206,11 +206,11 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
       return;
     }
     if (request.method() != http::verb::get && request.method() != http::verb::head)
-      return reply(http::status::method_not_allowed, "GET is all there is");
+      return reply(http::status::method_not_allowed, "only GET is supported");
     reply(http::status::ok, {});
   }
 
-  // Without `refusal` the page.
+  // Sends the page, or a refusal.
   void reply(http::status status, std::string_view refusal) {
     response_.emplace(status, 11);
     http::response<http::string_body>& r = *response_;
@@ -250,7 +250,7 @@ void ViewServer::Body::accept() {
       if (connections < options.max_connections)
         std::make_shared<Connection>(*this, std::move(socket))->start();
       else
-        ++refused_count;  // the socket closes as it goes
+        ++refused_count;  // the socket closes when it goes out of scope
     }
     accept();
   });
@@ -303,7 +303,7 @@ void ViewServer::greet(Message message) {
 }
 void ViewServer::publish(Message live) {
   asio::post(body_->io, [this, live] {
-    const auto clients = body_->watching;  // sending may end one
+    const auto clients = body_->watching;  // sending may end a client, which leaves `watching`
     for (const auto& client : clients) client->live(live);
   });
 }

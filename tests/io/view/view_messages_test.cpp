@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the page asks, and what it is sent: requests that anyone could have written, envelopes,
-// timelines.
+// The messages between page and program: requests from an untrusted text, envelopes, timelines.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "io/view/envelope.h"
+#include "io/view/page.h"
 #include "io/view/trace.h"
 #include "io/view/view_request.h"
 
@@ -30,7 +30,18 @@ const T* asked(const h6::Result<ViewRequest>& r) {
 
 }  // namespace
 
-TEST_CASE("requests are read as they were meant") {
+TEST_CASE("the pages keep the notices of the packages they contain") {
+  if (live_page().empty()) {
+    MESSAGE("skipped: built without node and npm");
+    return;
+  }
+  for (const std::string_view page : {live_page(), report_page()})
+    for (const char* notice :
+         {"three.js authors", "Copyright (c) 2022 Leon Sorokin", "Permission is hereby granted"})
+      CHECK_MESSAGE(page.find(notice) != page.npos, notice);
+}
+
+TEST_CASE("each request is parsed into its members") {
   const auto grab = parse_request(R"({"do":"grab","on":true})");
   REQUIRE(asked<Grab>(grab));
   CHECK(asked<Grab>(grab)->on);
@@ -38,14 +49,15 @@ TEST_CASE("requests are read as they were meant") {
   REQUIRE(asked<SetContact>(set));
   CHECK(asked<SetContact>(set)->method == "gauss6+facing");
   CHECK(asked<SetContact>(set)->stiffness == 2e4);
-  CHECK(asked<SetContact>(set)->epsilon == 0);  // as it is
+  CHECK(asked<SetContact>(set)->epsilon == 0);  // unchanged
   CHECK(asked<Reset>(parse_request(R"({"do":"reset"})")));
   const auto slice = parse_request(R"({"do":"slice","axis":1,"at":0.25})");
   REQUIRE(asked<Slice>(slice));
   CHECK(asked<Slice>(slice)->axis == 1);
 }
 
-TEST_CASE("a hand's quaternion is made unit length; places that are none are refused") {
+TEST_CASE(
+    "a hand's quaternion is made unit length; poses that are not finite or too far are refused") {
   const auto hand = parse_request(R"({"do":"hand","p":[0.1,-2,3e-3],"q":[0.8,0,0.6001,0]})");
   REQUIRE(asked<MoveHand>(hand));
   const h6Pose& p = asked<MoveHand>(hand)->pose;
@@ -60,7 +72,7 @@ TEST_CASE("a hand's quaternion is made unit length; places that are none are ref
     CHECK_MESSAGE(!parse_request(wrong), wrong);
 }
 
-TEST_CASE("what is out of range, of another type or unknown is one sentence") {
+TEST_CASE("a member that is out of range, of another type or unknown gives one sentence") {
   for (const char* wrong :
        {"", "[]", "null", "{", R"({"do":1})", R"({"do":"fly"})", R"({"do":"grab","on":1})",
         R"({"do":"pace","pace":2})", R"({"do":"pace","pace":-0.1})",
@@ -76,8 +88,7 @@ TEST_CASE("what is out of range, of another type or unknown is one sentence") {
   }
 }
 
-TEST_CASE(
-    "1e5 fuzzed requests: no crash, and nothing gets through that is not finite and in range") {
+TEST_CASE("1e5 fuzzed requests: no crash, and every accepted number is finite and in range") {
   std::mt19937 random(3);
   const std::string seeds[] = {
       R"({"do":"hand","p":[0.1,-2,3e-3],"q":[0.8,0,0.6,0]})",
@@ -114,7 +125,7 @@ TEST_CASE(
       CHECK((c->epsilon >= 0 && c->epsilon <= 2));
     }
   }
-  CHECK(through > 10000);  // the fuzzer also makes good ones
+  CHECK(through > 10000);  // the fuzzer also makes valid requests
 }
 
 TEST_CASE("deeply nested requests do not use up the stack") {
@@ -122,7 +133,7 @@ TEST_CASE("deeply nested requests do not use up the stack") {
   CHECK(!parse_request("{\"do\":" + std::string(4000, '{')));
 }
 
-TEST_CASE("an envelope comes apart into what went in") {
+TEST_CASE("an envelope unpacks into the arrays that were added") {
   Envelope envelope;
   envelope.add("f", std::vector<float>{1.5f, -2});
   envelope.add("b", std::vector<std::uint8_t>{1, 2, 3});  // padded to four

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The view's server seen from the network: who gets in, who is thrown out, who waits for whom.
+// The view's server as clients see it: whom it admits, whom it closes, and that nobody waits.
 #include <doctest/doctest.h>
 
 #include <arpa/inet.h>
@@ -38,7 +38,7 @@ bool soon(const std::function<bool()>& what, double seconds = 20) {
   return true;
 }
 
-// Bytes to and from the server, nothing more: what is wrong on purpose must be possible.
+// A raw socket, so that a test can send malformed requests.
 struct Line {
   int fd = -1;
   explicit Line(int port, int receive_buffer = 0) {
@@ -59,12 +59,12 @@ struct Line {
     std::size_t done = 0;
     while (done < text.size()) {
       const ssize_t n = ::send(fd, text.data() + done, text.size() - done, MSG_NOSIGNAL);
-      if (n <= 0) return;  // it has hung up
+      if (n <= 0) return;  // the server closed the connection
       done += static_cast<std::size_t>(n);
     }
   }
-  // What comes within so many ms of silence, at most `most` bytes; `closed` when the other end hung
-  // up.
+  // The bytes that arrive until so many ms of silence, at most `most`; `closed` when the server
+  // closed the connection.
   std::string read(int ms, bool* closed = nullptr, std::size_t most = 1 << 22) const {
     std::string all;
     char buffer[65536];
@@ -82,7 +82,7 @@ struct Line {
   }
 };
 
-// One masked frame of a client (RFC 6455, Sec. 5.2), short ones only where `claim` is not given.
+// One masked frame of a client (RFC 6455, Sec. 5.2). Without `claim` only short frames.
 std::string frame(const std::string& text, int opcode = 1, std::uint64_t claim = 0) {
   const std::uint64_t size = claim ? claim : text.size();
   std::string out(1, static_cast<char>(0x80 | opcode));
@@ -137,11 +137,11 @@ struct Server {
   }
 };
 
-// A page that is connected.
+// A connected page.
 struct Client : Line {
   explicit Client(const Server& s, int receive_buffer = 0) : Line(s.port, receive_buffer) {
     send(s.upgrade("/live?token=" + s.token, "http://" + s.host()));
-    std::string answer;  // up to its empty line, not a byte more
+    std::string answer;  // exactly up to its empty line
     for (char c; answer.find("\r\n\r\n") == std::string::npos && recv(fd, &c, 1, 0) == 1;)
       answer += c;
     REQUIRE(answer.rfind("HTTP/1.1 101", 0) == 0);
@@ -154,7 +154,7 @@ int status(const std::string& reply) {
 
 }  // namespace
 
-TEST_CASE("the page is for who has the token, at this address") {
+TEST_CASE("the page is served only with the token and at this address") {
   const Server s;
   const std::string page = s.get("/?token=" + s.token, s.host());
   CHECK(status(page) == 200);
@@ -168,17 +168,17 @@ TEST_CASE("the page is for who has the token, at this address") {
     CHECK_MESSAGE(status(reply) == 403, target);
     CHECK(reply.find("the page") == std::string::npos);
   }
-  // A foreign name that leads here (DNS rebinding).
+  // A foreign name that resolves to this address (DNS rebinding).
   CHECK(status(s.get("/?token=" + s.token, "evil.example:" + std::to_string(s.port))) == 403);
   CHECK(status(s.get("/?token=" + s.token, "127.0.0.1:1")) == 403);
   CHECK(status(s.get("/etc/passwd?token=" + s.token, s.host())) == 404);
   CHECK(s.server->refused() == 8);
 }
 
-TEST_CASE("nobody listens but this machine") {
+TEST_CASE("only this machine can connect") {
   const Server s;
   CHECK(s.server->address().rfind("http://127.0.0.1:", 0) == 0);
-  // Other addresses of this machine lead nowhere: 127.0.0.2 is one that every machine has.
+  // The server does not listen on other addresses of this machine, such as 127.0.0.2.
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in to{};
   to.sin_family = AF_INET;
@@ -205,7 +205,7 @@ TEST_CASE("a WebSocket must come from this page and bring the token") {
   CHECK(tried("/live?token=wrong", here) == 403);
 }
 
-TEST_CASE("what a client says is heard, and what is told reaches it, the greeting first") {
+TEST_CASE("texts reach the program, messages reach the client, and the greeting comes first") {
   Server s;
   s.server->greet(std::make_shared<const std::string>("hello"));
   const Client client(s);
@@ -220,7 +220,7 @@ TEST_CASE("what a client says is heard, and what is told reaches it, the greetin
 
 TEST_CASE("oversize and malformed messages close that client only") {
   ServerOptions options;
-  options.stall_seconds = 600;  // not what is tested here
+  options.stall_seconds = 600;  // so that only the cause under test closes a client
   Server s(options);
   const Client good(s);
   const std::string huge(5000, 'x');
@@ -243,10 +243,10 @@ TEST_CASE("oversize and malformed messages close that client only") {
 }
 
 TEST_CASE(
-    "a client that does not read holds nobody up, misses live messages, and is closed when told "
+    "a client that does not read delays nobody, misses live messages, and is closed when told "
     "too much") {
   ServerOptions options;
-  options.stall_seconds = 600;  // not what is tested here
+  options.stall_seconds = 600;  // so that only the cause under test closes a client
   Server s(options);
   const Client stalled(s, 4096), reader(s);
   const auto live = std::make_shared<const std::string>(std::string(100000, 'L'));
@@ -256,8 +256,8 @@ TEST_CASE(
     read += reader.read(5).size();
   }
   read += reader.read(300).size();
-  CHECK(read > 1000000);                                  // the one that reads went on seeing
-  CHECK(soon([&] { return s.server->clients() == 2; }));  // nothing piled up for the other
+  CHECK(read > 1000000);  // the client that reads still got its messages
+  CHECK(soon([&] { return s.server->clients() == 2; }));  // the other one has no backlog
   for (int i = 0; i < 200; ++i) s.server->say(live);
   CHECK(soon([&] {
     (void)reader.read(5);
@@ -269,7 +269,7 @@ TEST_CASE("a client that is killed is forgotten") {
   Server s;
   {
     const Client killed(s);
-    linger at_once{1, 0};  // a reset instead of a goodbye
+    linger at_once{1, 0};  // close() then sends a reset
     setsockopt(killed.fd, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
   }
   const auto live = std::make_shared<const std::string>(std::string(1000, 'L'));
@@ -279,15 +279,15 @@ TEST_CASE("a client that is killed is forgotten") {
   }));
 }
 
-TEST_CASE("one that only pings or says nothing at all is closed after the time for a stall") {
+TEST_CASE("a silent client is closed after the stall time") {
   ServerOptions options;
   options.stall_seconds = 1;
   Server s(options);
-  const Client silent(s);  // does not answer the server's pings either
+  const Client silent(s);  // it does not answer the server's pings either
   CHECK(soon([&] { return s.server->clients() == 0; }));
 }
 
-TEST_CASE("more clients and connections than there is room for are turned away") {
+TEST_CASE("clients and connections beyond the limits are refused") {
   ServerOptions options;
   options.max_clients = 2;
   options.max_connections = 6;
@@ -296,14 +296,14 @@ TEST_CASE("more clients and connections than there is room for are turned away")
   const Line third(s.port);
   third.send(s.upgrade("/live?token=" + s.token, "http://" + s.host()));
   CHECK(status(third.read(1000, nullptr, 64)) == 503);
-  // Connections that say nothing take their places until they time out; then others are refused.
+  // Silent connections hold their places until they time out; until then others are refused.
   std::vector<std::unique_ptr<Line>> idle;
   for (int i = 0; i < 40; ++i) idle.push_back(std::make_unique<Line>(s.port));
   CHECK(soon([&] { return s.server->refused() > 20; }));
   CHECK(s.server->clients() == 2);
 }
 
-TEST_CASE("a port that is taken is a sentence") {
+TEST_CASE("a port in use gives one sentence") {
   const Server s;
   ServerOptions options;
   options.port = static_cast<std::uint16_t>(s.port);
@@ -334,14 +334,14 @@ TEST_CASE("1e5 random requests and frames: no crash, and the page is still serve
                                 "{\"do\":",
                                 std::string(3, '\0')};
   std::size_t sent = 0;
-  while (sent < 20000) {  // pieces of requests, many a connection
+  while (sent < 20000) {  // pieces of requests, on many connections
     const Line line(s.port);
     std::string text;
     for (int i = 0; i < 100; ++i, ++sent)
       text += random() % 4 ? pieces[random() % std::size(pieces)] : junk(random() % 40);
     line.send(text);
   }
-  while (sent < 100000) {  // frames, until the client is thrown out
+  while (sent < 100000) {  // frames, until the server closes the client
     const Client client(s);
     for (int i = 0; i < 400; ++i, ++sent) {
       std::string f = frame(junk(random() % 100), static_cast<int>(random() % 3));

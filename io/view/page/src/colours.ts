@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Colours of the whole page. The map from weight to colour runs from dark blue (shares its
-// stiffness with many) to yellow (has all of it), and stays readable without colour vision.
+// Colours of the pages. A contact's weight maps to dark blue (it shares its stiffness with many) up
+// to yellow (it has all of it); the map is readable without colour vision.
 const stops = [
   [0.27, 0.0, 0.33], [0.23, 0.32, 0.55], [0.13, 0.57, 0.55], [0.37, 0.79, 0.38], [0.99, 0.91, 0.14],
 ];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Taking the part in hand: a drag that begins on the part or its ghost moves the hand in the plane
-// of the screen, with the right button or Shift it turns it about the part's centre of mass, the
-// wheel moves it along the line of sight. Everywhere else the mouse turns the camera.
+// Moves the hand with the mouse. A drag that begins on the part or its ghost moves the hand in the
+// plane of the screen; with the right button or Shift it turns the hand about the part's centre of
+// mass; the wheel moves it along the line of sight. A drag that begins elsewhere turns the camera.
 import * as THREE from 'three';
 import type { View3D } from './view3d';
 
@@ -24,7 +24,7 @@ export class Drag {
 
   constructor(private view: View3D, private com: THREE.Vector3, private moves: HandMoves) {
     const canvas = view.renderer.domElement;
-    // Before the camera's own handlers, so that a drag on the part is not also a turn of the camera.
+    // Captured before the camera's handlers: a drag on the part must not turn the camera as well.
     canvas.addEventListener('pointerdown', (e) => this.down(e), { capture: true });
     canvas.addEventListener('pointermove', (e) => this.moved(e));
     for (const what of ['pointerup', 'pointercancel'] as const) canvas.addEventListener(what, (e) => this.up(e));

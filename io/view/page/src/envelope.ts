@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One message of the program: JSON head and typed arrays (io/view/envelope.h).
+// A message from the program: a JSON head and typed arrays, see io/view/envelope.h.
 export type Numbers = Float32Array | Uint32Array | Int16Array | Uint8Array;
 
 export interface Packet {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Gauss sphere: normals N (red) and torque directions T (blue) of all contacts, seen from where
-// the camera of the scene stands. Dots behind the sphere are faint.
+// The Gauss sphere: normals N (red) and torque directions T (blue) of all contacts, seen in the
+// direction of the scene's camera. Dots on the far side are faint.
 import { Quaternion, Vector3 } from 'three';
 import { normalColour, torqueColour } from './colours';
 

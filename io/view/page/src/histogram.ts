@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long frames took: bins of a quarter octave, from 1/4 us; the counts are drawn on a log scale.
+// Histograms of times: bins of a quarter octave from 1/4 us on, counts on a logarithmic scale.
 export const binLow = (bin: number) => 0.25 * 2 ** (bin / 4);
 
 export function percentile(bins: ArrayLike<number>, share: number): number {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of `hapsix run --view`: shows what comes, sends what the person does.
+// The page of `hapsix run --view`: shows the messages of the run and sends the user's requests.
 import * as THREE from 'three';
 import { floats, unpack, type Packet } from './envelope';
 import { GaussSphere } from './gauss';
@@ -34,7 +34,7 @@ function chip(id: string, text: string, kind: string) {
 }
 
 function load(packet: Packet) {
-  if (scene) { location.reload(); return; }  // another run at the same address
+  if (scene) { location.reload(); return; }  // another run serves the same address now
   scene = packet.head;
   $('scene').textContent = scene.name;
   $('lag-unit').textContent = scene.unit;
@@ -64,7 +64,7 @@ function load(packet: Packet) {
   }
 }
 
-// What is in force, shown on the controls (also after another client changed it).
+// Shows the settings in force on the controls; another client may have changed them.
 function settings(c: any) {
   $<HTMLSelectElement>('method').value = c.method;
   if ($<HTMLSelectElement>('method').value !== c.method) {
@@ -102,7 +102,7 @@ function show(packet: Packet) {
   $('frame-text').textContent = `p50 ${short(percentile(frame, 0.5))}, p99 ${short(percentile(frame, 0.99))}`;
   const late = h.late;
   $('wake-text').textContent = `p99 ${short(percentile(wake, 0.99))}, late ${late.compute} / ${late.wakeup} / ${late.stolen}`;
-  $('wake-text').title = 'late frames: through their own computation / late wake-up / time stolen by the machine';
+  $('wake-text').title = 'late frames by cause: own computation / late wake-up / time stolen by the machine';
   $('safety').innerHTML = '';
   const chips: [string, string][] = h.fault !== 'none' ? [[`fault: ${h.fault}`, 'bad']] : [];
   if (h.cause !== 'none') chips.push([h.cause, 'warn']);
@@ -124,9 +124,8 @@ function keep(packet: Packet) {
   const fresh = floats(packet, 'rows');
   if (!fresh.length) return;
   const end = fresh[fresh.length - width];
-  let all = new Float32Array(rows.length + fresh.length);
-  if (rows.length && end < rows[rows.length - width]) rows = new Float32Array(0);  // a reset
-  all = new Float32Array(rows.length + fresh.length);
+  if (rows.length && end < rows[rows.length - width]) rows = new Float32Array(0);  // the run was reset
+  const all = new Float32Array(rows.length + fresh.length);
   all.set(rows);
   all.set(fresh, rows.length);
   let first = 0;
@@ -199,10 +198,10 @@ function tick(now: number) {
 }
 connect();
 requestAnimationFrame(tick);
-// What a test looks at: numbers, not pixels.
+// The browser tests read numbers here instead of pixels.
 (window as any).hapsix = {
   view, ask, state: () => newest?.head,
-  // The deepest contact since a time of the run [voxel].
+  // The greatest penetration depth since a time of the run [voxel].
   deepest(since: number) {
     let most = 0;
     for (let i = 0; i < rows.length; i += width) if (rows[i] >= since) most = Math.max(most, rows[i + 4]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of `hapsix report`: recordings side by side, from the data inside the page.
+// The page of `hapsix report`: shows the recordings whose data the page contains.
 import { floats, unpack, type Packet } from './envelope';
 import { series as colours } from './colours';
 import { GaussSphere } from './gauss';
@@ -123,7 +123,7 @@ class Replay {
     this.strips.mark(this.at);
   }
 
-  // The last sample of the run at or before a time.
+  // The last replay sample at or before the shown time; -1: there is none.
   private index(): number {
     const t = floats(this.packet, `replay_t${this.run}`);
     let low = 0, high = t.length - 1;
@@ -196,7 +196,7 @@ async function start() {
   try {
     view = new View3D($('space'));
   } catch (error) {
-    console.error(error);  // It has said so in its place; the rest of the report does without.
+    console.error(error);  // View3D shows a sentence in its place; the rest of the report works.
   }
   if (view) {
     replay = new Replay(packet, view, strips);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Principal axes of a symmetric 3 x 3 matrix (Jacobi rotations): the net stiffness of all contacts.
+// Principal axes of a symmetric 3 x 3 matrix by Jacobi rotations, for the net stiffness.
 import { Matrix4 } from 'three';
 
-// xx yy zz xy xz yz in; eigenvalues, and a rotation whose columns are the axes.
+// `m` is xx yy zz xy xz yz. Returns the eigenvalues and a rotation whose columns are the axes.
 export function principalAxes(m: ArrayLike<number>): { values: [number, number, number]; axes: Matrix4 } {
   const a = [[m[0], m[3], m[4]], [m[3], m[1], m[5]], [m[4], m[5], m[2]]];
   const v = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];

@@ -6,7 +6,7 @@ import { series as colours } from './colours';
 export interface StripSpec {
   title: string;
   column: number;  // of a row: time, contacts, force, torque, depth, frame time
-  line?: number;   // a level worth a line of its own
+  line?: number;   // a level that gets a dashed line
 }
 
 export const specs: StripSpec[] = [
@@ -46,7 +46,7 @@ export class Strips {
       (p) => p.setSize({ width: this.width(), height: this.height }))).observe(where);
   }
 
-  // One table of rows a label, all on the same times or joined onto them.
+  // One table of rows for each label; tables with other times are joined.
   show(tables: { rows: Float32Array; width: number }[]) {
     const joined = tables.length === 1 ? null : tables;
     specs.forEach((spec, i) => {
@@ -68,7 +68,7 @@ export class Strips {
     this.plots.forEach((p) => p.redraw(false));
   }
 
-  private width() {  // of one column of the grid they stand in
+  private width() {  // of one column of the grid
     const columns = getComputedStyle(this.where).gridTemplateColumns.split(' ').length;
     return Math.max(160, Math.floor(this.where.clientWidth / columns) - 4);
   }

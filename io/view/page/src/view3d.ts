@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scene in space: environment, part, the hand's ghost, contacts as arrows, the deepest point,
-// the net-stiffness ellipsoid, a slice of the field. World frame in metres, shrunk to the scene's
-// size so that the camera's depth range fits any part.
+// the net-stiffness ellipsoid, a slice of the field. The world frame is in metres; `root` scales it
+// by the scene's size, so that the camera's depth range fits any part.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Packet } from './envelope';
@@ -144,13 +144,13 @@ export class View3D {
     if (box.isEmpty()) box.set(new THREE.Vector3(-0.05, -0.05, -0.05), new THREE.Vector3(0.05, 0.05, 0.05));
     this.radius = 0.5 * box.getSize(new THREE.Vector3()).length();
     this.root.scale.setScalar(1 / this.radius);
-    // Near enough to see the part, far enough to know where it is.
+    // Near enough to see the part, far enough to see its surroundings.
     const focus = (part.isEmpty() ? box : part).getCenter(new THREE.Vector3()).divideScalar(this.radius);
     const near = part.isEmpty() ? 1 : Math.max(0.3, 0.7 * part.getSize(new THREE.Vector3()).length() / this.radius);
     this.orbit.target.copy(focus);
     const place = (scale: number) => this.camera.position.copy(focus).add(new THREE.Vector3(1.2, -1.9, 1.3).multiplyScalar(1.25 * scale));
     place(near);
-    if (this.partHidden()) place(1);  // deep inside: from without, and through it
+    if (this.partHidden()) place(1);  // the part is deep inside: look at the whole scene
     this.orbit.update();
   }
 
@@ -198,7 +198,8 @@ export class View3D {
     }
   }
 
-  // Net stiffness (xx yy zz xy xz yz), as long as the part where it is `full` or more.
+  // Draws the net stiffness (xx yy zz xy xz yz). An axis is 0.12 of the scene's radius at `full`, at
+  // most three times that.
   stiffness(m: ArrayLike<number>, full: number, shown: boolean) {
     const body = this.bodies[this.hand];
     this.ellipsoid.visible = shown && !!body && m.length === 6 && m[0] + m[1] + m[2] > 0;
@@ -211,8 +212,8 @@ export class View3D {
       .multiply(new THREE.Matrix4().makeScale(size[0], size[1], size[2]));
   }
 
-  // A slice through a field: 128 + 2 d in voxels, rows along v of its plane. Blue outside, red
-  // inside, a line every eight voxels, the surface white.
+  // Draws a slice through a field. Values are 128 + 2 d with d in voxels, in rows along v. Outside
+  // is blue, inside red, the surface white, with a line every eight voxels.
   showSlice(packet: Packet | null) {
     if (this.slice) {
       this.root.remove(this.slice);
@@ -263,7 +264,7 @@ export class View3D {
 
   hasSlice() { return this.slice !== null; }
 
-  // Where on the canvas (0 .. 1) a body can be pointed at, or null.
+  // A place on the canvas (0 .. 1) where the body can be pointed at; null: none.
   visiblePoint(body: number): { x: number; y: number } | null {
     const ray = new THREE.Raycaster(), n = 40;
     this.camera.updateMatrixWorld();
@@ -277,7 +278,7 @@ export class View3D {
     return hits.length ? hits[hits.length >> 1] : null;
   }
 
-  // 1: solid, below: seen through.
+  // 1: solid; below 1: transparent.
   environmentOpacity(value: number) {
     for (const paint of this.environment) {
       paint.transparent = value < 1;

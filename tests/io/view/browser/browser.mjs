@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chromium without a screen, over its DevTools protocol: open a page, look into it, use the mouse.
+// Drives headless Chromium over its DevTools protocol: opens a page, evaluates in it, uses the mouse.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -66,7 +66,7 @@ export class Browser {
     return new Promise((done, failed) => this.#waiting.set(id, { done, failed }));
   }
   async go(url) { await this.send('Page.navigate', { url }); }
-  // The value of an expression in the page; promises are waited for.
+  // The value of an expression in the page; waits for a promise.
   async value(expression) {
     const r = await this.send('Runtime.evaluate', { expression, returnByValue: true, awaitPromise: true });
     if (r.exceptionDetails) throw new Error(r.exceptionDetails.exception?.description ?? r.exceptionDetails.text);

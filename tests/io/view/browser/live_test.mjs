@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The live view, used as a person uses it: node --test with HAPSIX_PROGRAM, HAPSIX_CHROMIUM and
-// HAPSIX_PICTURES (a folder for screenshots) set. `./dev test-view` does that.
+// Uses the live view as a person would. Run by node --test with HAPSIX_PROGRAM, HAPSIX_CHROMIUM and
+// HAPSIX_PICTURES (a folder for screenshots) set; `./dev test-view` does that.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
@@ -30,9 +30,9 @@ after(async () => {
   if (folder) rmSync(folder, { recursive: true, force: true });
 });
 
-// The hand is taken and moved until something touches.
+// Takes the hand and moves it until there is a contact.
 async function push() {
-  // Where the part is on the screen.
+  // The part's place on the screen.
   const at = await browser.value(`(() => {
     const v = window.hapsix.view, part = v.bodies[v.hand];
     const box = v.renderer.domElement.getBoundingClientRect();
@@ -56,7 +56,7 @@ async function push() {
 test('the page loads and draws the scene', async () => {
   await until(async () => await browser.value('Boolean(window.hapsix?.state())'), 'a state arrives');
   await wait(1500);
-  // Not one colour all over: the canvas shows something.
+  // More than one colour: the canvas shows something.
   const colours = await browser.value(`(() => {
     const c = window.hapsix.view.renderer.domElement, g = document.createElement('canvas');
     g.width = 200; g.height = 120;
@@ -82,7 +82,7 @@ test('dragging the part into the obstacle makes contacts, and the part lags behi
   const robust = await browser.value(`window.hapsix.deepest(${(await state()).time - 0.4})`);
   assert.ok((await state()).contacts > 0);
   assert.ok((await state()).lag > 0);
-  // The same hand, another method: global scaling gives way.
+  // At the same hand pose global scaling penetrates deeper.
   const switched = (await state()).time;
   await browser.value(`window.hapsix.ask({ do: 'contact', method: 'global' })`);
   await until(async () => (await state()).contact.method === 'global', 'global is in force');
@@ -115,4 +115,4 @@ test('a slice of the field is shown', async () => {
   await browser.picture(join(pictures, 'live-slice.png'));
 });
 
-test('the browser had nothing to complain about', () => assert.deepEqual(browser.problems, []));
+test('the browser reports no error', () => assert.deepEqual(browser.problems, []));

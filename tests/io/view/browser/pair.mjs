@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What being looked at costs: the same run with and without three clients, turn about. One client
-// reads, one never reads, one is killed on the way. `./dev bench view` runs it.
+// The cost of viewers: the same run with and without three clients, in turn. One client reads, one
+// never reads, one is killed during the run. `./dev bench view` runs it.
 import { execFileSync, spawn } from 'node:child_process';
 import WebSocket from 'ws';
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A report, opened from disk as a person opens it: no server, nothing fetched.
+// Opens a report from disk as a person would: without a server, and nothing is fetched.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync, statSync } from 'node:fs';
@@ -51,7 +51,7 @@ test('the scrubber moves the part, and contacts are there', async () => {
     return { x: [p.x, p.y, p.z], contacts: Number(document.getElementById('n-contacts').textContent) };
   })()`);
   const end = await browser.value('window.hapsix.head.duration');
-  // The second run: under `global` the part is through by then.
+  // The second run, because under `global` the part has popped through by then.
   await browser.value(`(() => { const w = document.getElementById('which'); w.value = '1'; w.dispatchEvent(new Event('change')); })()`);
   const first = await seen(0), later = await seen(0.6 * end);
   assert.notDeepEqual(first.x, later.x);
@@ -68,7 +68,7 @@ test('the scrubber moves the part, and contacts are there', async () => {
   await browser.picture(join(pictures, 'report-replay.png'));
 });
 
-test('nothing was fetched and nothing went wrong', async () => {
+test('nothing was fetched and no error occurred', async () => {
   assert.deepEqual(browser.problems, []);
   assert.equal(await browser.value('performance.getEntriesByType("resource").filter((r) => r.name.startsWith("http")).length'), 0);
 });
