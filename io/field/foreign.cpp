@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// foreign.cpp - a narrow-band level set made by another program, as a field.
+// foreign.cpp - a field from a narrow-band level set of another program.
 //
-// Trusted are values nearer than the background (the half width of the band). A cell nearer than
-// background - sqrt(3) voxels to the surface has trusted values at all its nodes: that is our band.
+// Its values are distances where they are below the background, the half width of its band. A cell
+// nearer to the surface than background - sqrt(3) voxels has such values at all its nodes: this is
+// the band of our field.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/SignedFloodFill.h>
 
@@ -34,13 +35,13 @@ FloatGrid::Ptr only_level_set(const openvdb::GridPtrVec& grids) {
   return floats == 1 && any->getGridClass() == openvdb::GRID_UNKNOWN ? any : nullptr;
 }
 
-// Steps from each brick to the nearest one that is `near`, diagonals included; capped.
+// The number of steps, diagonals included, from each brick to the nearest one that is `near`.
 std::vector<int> steps_to_near(const std::array<std::int32_t, 3>& size,
                                const std::vector<std::uint8_t>& near) {
   constexpr int kCap = 1024;
   std::vector<int> steps(near.size());
   for (std::size_t i = 0; i < near.size(); ++i) steps[i] = near[i] ? 0 : kCap;
-  // The set grows by one layer at a time, diagonals included.
+  // The set of near bricks grows by one layer at a time.
   std::vector<std::size_t> layer, next;
   for (std::size_t i = 0; i < near.size(); ++i)
     if (near[i]) layer.push_back(i);
@@ -94,7 +95,7 @@ void far_bounds(FloatGrid& grid, const Frame& frame, const std::vector<std::uint
   for (int c = 0; c <= nz; ++c)
     for (int b = 0; b <= ny; ++b)
       for (int a = 0; a <= nx; ++a) {
-        // A node past the last brick borders on it: the bound of that brick less one step.
+        // A node past the last brick has the bound of that brick less one step.
         const int over = (a == nx) || (b == ny) || (c == nz);
         const std::size_t cell = (std::size_t(std::min(c, nz - 1)) * std::size_t(ny) +
                                   std::size_t(std::min(b, ny - 1))) *
@@ -130,7 +131,7 @@ Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::str
   }
   if (leaves.empty()) return Failure{name + " is an empty level set: there is no surface in it"};
   FieldData f;
-  // One empty brick all around: the border is outside.
+  // One empty brick all around puts the border outside.
   for (int k = 0; k < 3; ++k) {
     const std::int64_t bricks = (std::int64_t(high[k]) - low[k]) / 8 + 3;
     if (bricks > kMaxBricksOnSide || std::abs(std::int64_t(low[k])) > (1 << 30))

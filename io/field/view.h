@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// view.h - a baked field as a function of place. Everything here is in GRID coordinates:
-// voxels, node (i, j, k) of the field at (i, j, k).
+// view.h - samples a baked field at any place. Coordinates are in voxels: node (i, j, k) of the
+// field is at (i, j, k).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -24,7 +24,7 @@ class FieldView {
     return {o.x + h * g.x, o.y + h * g.y, o.z + h * g.z};
   }
 
-  // Trilinear [voxel]. False where a corner has no sample: far from the surface.
+  // Trilinear [voxel]. False where a corner has no sample, far from the surface.
   bool distance(const Vec3& g, double& d, Vec3* gradient = nullptr) const;
   // The eight corners of a cell [m], x fastest; false where one has no sample.
   bool corners(const std::array<std::int32_t, 3>& cell, float out[8]) const;
@@ -33,7 +33,8 @@ class FieldView {
   const FieldData& field_;
 };
 
-// The same of eight corners: value and gradient at fractions of the cell, in the corners' unit.
+// The trilinear value, and gradient unless null, of eight corners at fractions of their cell, in
+// the corners' unit.
 double trilinear(const float corner[8], const double at[3], Vec3* gradient);
 
 }  // namespace h6::io

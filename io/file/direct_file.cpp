@@ -19,7 +19,8 @@ std::size_t whole_pages(std::size_t bytes) {
   return (bytes + kDirectPage - 1) / kDirectPage * kDirectPage;
 }
 
-// Until all is done or an error; `moved` says how far it came, a file that ends is no error.
+// Repeats `call` until all bytes are moved, an error occurs (errno) or the file ends (0). `moved`
+// counts the bytes.
 template <class Call>
 int all_of(std::size_t bytes, std::size_t& moved, const Call& call) {
   for (moved = 0; moved < bytes;) {
@@ -55,7 +56,7 @@ int DirectFile::open(const std::filesystem::path& file, For purpose) {
   if (!S_ISREG(there.st_mode)) return EINVAL;
   size_ = std::uint64_t(there.st_size);
 #ifdef O_DIRECT
-  direct_ = ::open(file.c_str(), flags | O_DIRECT);  // many file systems refuse: then without
+  direct_ = ::open(file.c_str(), flags | O_DIRECT);  // some file systems refuse
   struct stat same {};
   const bool one = direct_ >= 0 && fstat(direct_, &same) == 0 && same.st_ino == there.st_ino &&
                    same.st_dev == there.st_dev;
@@ -80,7 +81,7 @@ int DirectFile::write(std::uint64_t at, const char* pages, std::size_t bytes) {
   if (use_direct_.load(std::memory_order_relaxed)) {
     const std::size_t whole = whole_pages(bytes);
     const int error = all_of(whole, done, [&](std::size_t from) {
-      // A write that was cut short ends anywhere; the rest goes the other way.
+      // After a short write the place is not aligned: the other descriptor writes the rest.
       if (from % kDirectPage != 0) return ssize_t{0};
       return pwrite(direct_, pages + from, whole - from, off_t(at + from));
     });
@@ -114,7 +115,7 @@ int DirectFile::read(std::uint64_t at, char* pages, std::size_t bytes) {
     std::size_t more = 0;
     const std::size_t whole = whole_pages(bytes - done);
     const int error = all_of(whole, more, [&](std::size_t from) {
-      if (from % kDirectPage != 0) return ssize_t{0};  // the file's end, or cut short
+      if (from % kDirectPage != 0) return ssize_t{0};  // the file's end, or a short read
       return pread(direct_, pages + done + from, whole - from, off_t(at + done + from));
     });
     if (error != 0 && error != EINVAL) return error;
@@ -126,7 +127,7 @@ int DirectFile::read(std::uint64_t at, char* pages, std::size_t bytes) {
     return pread(fd_, pages + done + from, bytes - done - from, off_t(at + done + from));
   });
   if (error != 0) return error;
-  return more == bytes - done ? 0 : EIO;  // somebody cut the file meanwhile
+  return more == bytes - done ? 0 : EIO;  // the file shrank meanwhile
 }
 
 int for_blocks(std::size_t count, std::size_t buffer_bytes,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// direct_file.h - large files in blocks by several threads, past the page cache where the file
-// system lets us: a field of a gigabyte then costs what the disk costs, and neither a copy in
-// memory nor what was in the cache.
+// direct_file.h - reads and writes large files in blocks on several threads, past the page cache
+// where the file system allows it. A field of a gigabyte then takes the disk's time alone: nothing
+// is copied into the page cache, and nothing is evicted from it.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -14,15 +14,17 @@
 
 namespace h6::io {
 
-inline constexpr std::size_t kDirectPage = 4096;  // blocks start at, and buffers hold, multiples
+// Blocks start at multiples of this in the file, and buffers hold multiples [bytes].
+inline constexpr std::size_t kDirectPage = 4096;
 
 struct FreeBuffer {
   void operator()(char* bytes) const;
 };
 using DirectBuffer = std::unique_ptr<char[], FreeBuffer>;
-DirectBuffer direct_buffer(std::size_t bytes);  // aligned to a page, whole pages; may be null
+// Whole pages, aligned to a page. Null when there is no memory.
+DirectBuffer direct_buffer(std::size_t bytes);
 
-// Calls return 0 or errno; any thread.
+// Calls return 0 or errno. Any thread may call read and write.
 class DirectFile {
  public:
   enum class For { reading, writing };
@@ -33,24 +35,24 @@ class DirectFile {
 
   int open(const std::filesystem::path& file, For purpose);
   std::uint64_t size() const { return size_; }  // when it was opened
-  // Claims the room, so that a full disk is known at once.
+  // Claims the space, so that a full disk is noticed at once.
   int reserve(std::uint64_t bytes);
-  // Whole pages, the last bytes of the file apart: what is behind them in the buffer, up to the
-  // page's end, may be written too, until `cut`.
+  // `bytes` is a multiple of the page, except at the end of the file. There the rest of the
+  // buffer's last page may be written too: `cut` removes it.
   int write(std::uint64_t at, const char* pages, std::size_t bytes);
   int cut(std::uint64_t bytes);
-  // Bytes behind the end stay as they are in the buffer. Those in the page cache come from there.
+  // Reads from the page cache what it holds. The buffer keeps its bytes past the end of the file.
   int read(std::uint64_t at, char* pages, std::size_t bytes);
 
  private:
-  int fd_ = -1, direct_ = -1;  // the same file, the second past the page cache or -1
+  int fd_ = -1, direct_ = -1;  // the same file; the second bypasses the page cache, or is -1
   std::atomic<bool> use_direct_{false};
   std::uint64_t size_ = 0;
 };
 
-// Calls body(i, buffer) once for every i in 0..count-1 on all threads of the machine, each with a
-// buffer of that many bytes, in rising order of start; stops after one that returns an errno. That
-// is returned, ENOMEM where there is no memory. A body must not throw.
+// Calls body(i, buffer) once for every i in 0..count-1, on all threads of the machine, in rising
+// order. Each thread has a buffer of `buffer_bytes`. Stops when a body returns an errno, and
+// returns it; ENOMEM when there is no buffer. A body must not throw.
 int for_blocks(std::size_t count, std::size_t buffer_bytes,
                const std::function<int(std::size_t, char*)>& body);
 

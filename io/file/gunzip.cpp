@@ -11,7 +11,7 @@ namespace h6::io {
 namespace {
 
 constexpr std::string_view kMagic = "\x1f\x8b";
-constexpr std::size_t kHarmless = std::size_t{16} << 20;  // too little to be a bomb
+constexpr std::size_t kHarmless = std::size_t{16} << 20;  // [bytes] whatever the ratio
 constexpr std::size_t kMaxRatio = 250;
 
 struct Inflater {
@@ -47,7 +47,7 @@ Result<std::string> inflate_all(std::string_view bytes, const std::string& name,
         return Failure{place(name, read,
                              "inflates to more than " + std::to_string(kMaxRatio) +
                                  " times its size, as no mesh does; refused.")};
-      // Doubling, but never past what the ratio allows: a bomb is noticed before it is stored.
+      // The buffer doubles, but not beyond the ratio: a bomb is noticed before it is stored.
       const std::size_t allowed = std::max(kHarmless, (read + 1) * kMaxRatio + kMaxRatio);
       out.resize(std::min({limit, written * 2 + 4096, std::max(allowed, written + 4096)}));
     }
@@ -64,7 +64,7 @@ Result<std::string> inflate_all(std::string_view bytes, const std::string& name,
 
     if (state == Z_STREAM_END) {
       const bool more = bytes.substr(read).starts_with(kMagic);
-      if (!more) break;  // anything else behind the last member is padding, as gzip has it
+      if (!more) break;  // gzip ignores other bytes after the last member, too
       inflateReset(&z);
     } else if (state == Z_BUF_ERROR || (state == Z_OK && read == bytes.size() && z.avail_out > 0)) {
       if (read == bytes.size())

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// json.cpp - one pass over the text without building anything, so that a hostile file costs
-// neither stack nor memory.
+// json.cpp - one pass over the text that builds no tree, so that a hostile file costs neither stack
+// nor memory.
 #include "io/file/json.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 constexpr std::size_t kDeepest = 32;
 constexpr std::size_t kMostValues = 1'000'000;
 
-// Bytes of a foreign file inside our sentence: short, and nothing a terminal would obey.
+// Text of a file for an error sentence: short, and without control characters for a terminal.
 std::string printable(const std::string& text, std::size_t most) {
   std::string out;
   for (const char c : text) {
@@ -60,7 +60,7 @@ class Gate final : public nlohmann::json_sax<Json> {
   }
 
   std::string complaint;
-  std::size_t position = 0;  // bytes read when a parse error was found; 0: no such error
+  std::size_t position = 0;  // bytes read up to a parse error; 0 without one
 
  private:
   bool value() {
@@ -78,7 +78,7 @@ class Gate final : public nlohmann::json_sax<Json> {
     return true;
   }
 
-  std::vector<std::set<std::string>> keys_;  // of the objects (and, empty, arrays) we are inside of
+  std::vector<std::set<std::string>> keys_;  // of each open object; empty for an open array
   std::size_t values_ = 0;
 };
 
@@ -89,7 +89,7 @@ Outcome check_json_text(const std::string& text, const std::string& name) {
   if (Json::sax_parse(text, &gate)) return Done{};
   if (gate.position == 0) return Failure{name + ": " + gate.complaint};
   const std::size_t end = std::min(gate.position, text.size());
-  // The position counts the offending byte itself.
+  // `end` is one past the byte that is wrong.
   const std::size_t at = end == 0 ? 0 : end - 1;
   const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(at), '\n');
   const std::size_t line_start = at == 0 ? std::string::npos : text.rfind('\n', at - 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// json.h - is this text JSON that is worth building a tree of?
+// json.h - checks a JSON text before a parser builds a tree of it.
 #pragma once
 #include <string>
 
@@ -7,9 +7,9 @@
 
 namespace h6::io {
 
-// A sentence with line and column when the text is not JSON; with what is too much when it nests
-// deeper than 32 or holds over a million values; with the key when an object has it twice (parsers
-// would silently take one of them). Memory stays that of the text.
+// Fails when the text is not JSON (the sentence gives line and column), nests deeper than 32, holds
+// over a million values, or has a key twice in one object (parsers silently take one of the two).
+// It needs no more memory than the text.
 Outcome check_json_text(const std::string& text, const std::string& name);
 
 }  // namespace h6::io

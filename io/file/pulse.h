@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// pulse.h - whether work shall go on: cheap enough to ask anywhere in it, from any thread.
+// pulse.h - whether long work was cancelled; cheap enough for inner loops and any thread.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -10,21 +10,22 @@
 
 namespace h6::io {
 
-// Between the loops of some work and the Progress it was given. Progress is heard only on the
-// thread that made the pulse, at most every 20 ms; the answer reaches all others.
+// Stands between the loops of some work and its Progress. It calls Progress only on the thread that
+// made the pulse, at most every 20 ms; all threads see the answer.
 class Pulse {
  public:
   explicit Pulse(const Progress& progress) : progress_(progress) {}
   Pulse(const Pulse&) = delete;
   Pulse& operator=(const Pulse&) = delete;
 
-  // The owner's thread only: what is done next, and which part of the whole that is.
+  // Begins a step and names it; it takes the work from `from` to `to` in [0, 1]. The owner's thread
+  // only.
   bool step(const char* what, double from, double to) {
     what_ = what, from_ = from, to_ = to, share_ = 0;
     return tell();
   }
-  void share(double done) { share_ = done < 1 ? done : 1; }  // of the step
-  // For work that has a Progress of its own.
+  void share(double done) { share_ = done < 1 ? done : 1; }  // how much of the step is done
+  // A Progress for work inside this step.
   Progress part() {
     return [this](const std::string& what, double done) {
       if (stopped_) return false;
@@ -35,7 +36,8 @@ class Pulse {
     };
   }
 
-  // False: stop, and leave whatever is half made. A hundred calls a millisecond cost nothing.
+  // False once cancelled: the caller returns at once, whatever is half made. A hundred calls a
+  // millisecond cost nothing.
   bool alive() {
     if (stopped_.load(std::memory_order_relaxed)) return false;
     if (!progress_ || std::this_thread::get_id() != owner_) return true;
@@ -59,7 +61,7 @@ class Pulse {
   Clock::time_point heard_{};
 };
 
-// For loops that may run without a pulse.
+// For loops with an optional pulse.
 inline bool alive(Pulse* pulse) { return !pulse || pulse->alive(); }
 
 }  // namespace h6::io

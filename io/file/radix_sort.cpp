@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// radix_sort.cpp - least significant digit first, 11 bits a round; digits that are the same in all
-// keys cost nothing. Blocks count and move their items side by side; each knows where its items of
-// a digit go from the counts of all blocks before it, so order does not depend on who moves first.
+// radix_sort.cpp - least significant digit first, 11 bits a round. A round is skipped when its
+// digit is the same in all keys. Blocks count and move their items in parallel; the counts of all
+// blocks give each block the places of its items, so the order does not depend on which moves
+// first.
 #include "io/file/radix_sort.h"
 
 #include <algorithm>
@@ -17,14 +18,14 @@ constexpr std::size_t digits = std::size_t{1} << digit_bits;
 constexpr std::size_t block_size = std::size_t{1} << 16;
 using Table = std::array<std::uint32_t, digits>;
 
-// Bits in which any two keys differ.
+// The bits in which some key differs from the first.
 std::uint64_t varying_bits(const KeyedIndices& items) {
   std::uint64_t varying = 0;
   for (const KeyedIndex& item : items) varying |= item.key ^ items[0].key;
   return varying;
 }
 
-// Counts become places: of the first item of each digit in each block.
+// Turns counts into the place of the first item of each digit in each block.
 void place_digits(std::vector<Table>& tables) {
   std::uint32_t next = 0;
   for (std::size_t digit = 0; digit < digits; ++digit) {

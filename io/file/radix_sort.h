@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// radix_sort.h - the order of many 64-bit keys, in linear time: equal keys keep their order, so a
-// sort never depends on the machine or on the number of threads.
+// radix_sort.h - sorts many 64-bit keys in linear time. The sort is stable, so its result depends
+// neither on the machine nor on the number of threads.
 #pragma once
 #include <cstdint>
 
@@ -15,8 +15,8 @@ struct KeyedIndex {
 };
 using KeyedIndices = RawVector<KeyedIndex>;
 
-// Ascending by key, stable. `spare` is scratch space of any size. When the pulse stops, the items
-// are left in some order, not all of them.
+// Ascending by key. `spare` is scratch space of any size. After the pulse stopped, the items are of
+// no use: some may be missing.
 void radix_sort(KeyedIndices& items, KeyedIndices& spare, unsigned threads = 1,
                 Pulse* pulse = nullptr);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// raw_vector.h - a vector whose new elements are not cleared: they are written next, by many
-// threads. Clearing gigabytes on one thread first takes a second in which nobody can cancel.
+// raw_vector.h - a vector that does not clear new elements, for loops that write all of them next.
+// Clearing gigabytes on one thread would take a second in which the user cannot cancel.
 #pragma once
 #include <memory>
 #include <new>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// samples.h - room for the samples of a field: a vector that is not filled when it grows, since all
-// of it is written once anyway, and that asks for large pages: a field of a gigabyte in pages of 4
-// KiB is a quarter of a million page faults.
+// samples.h - a vector for the samples of a field. It does not clear new elements, because all of
+// them are written next, and it asks for large pages: a field of a gigabyte in pages of 4 KiB would
+// cost a quarter of a million page faults.
 #pragma once
 #include <cstddef>
 #include <cstdlib>
@@ -31,7 +31,7 @@ struct SampleAllocator {
     void* room = std::aligned_alloc(align, (bytes + align - 1) / align * align);
     if (room == nullptr) throw std::bad_alloc();
 #ifdef __linux__
-    if (align == kPage) madvise(room, bytes, MADV_HUGEPAGE);  // a wish: failure changes nothing
+    if (align == kPage) madvise(room, bytes, MADV_HUGEPAGE);  // only a hint
 #endif
     return static_cast<T*>(room);
   }
@@ -49,7 +49,7 @@ struct SampleAllocator {
   }
 };
 
-// Many of anything, likewise not filled.
+// The same for elements of any type.
 template <class T>
 using Large = std::vector<T, SampleAllocator<T>>;
 using Samples = Large<float>;

@@ -13,7 +13,8 @@ const char* find_byte(const char* from, const char* end, char byte) {
   return found ? static_cast<const char*>(found) : end;
 }
 
-// Bytes of the UTF-8 sequence at the start of `text`, 0: not UTF-8, or a control character.
+// The length in bytes of the UTF-8 character at the start of `text`; 0 for a control character and
+// for bytes that are not UTF-8.
 std::size_t printable_sequence(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
@@ -48,17 +49,17 @@ TextScan::TextScan(std::string_view text, bool continued)
     : at_(text.data()),
       line_end_(text.data()),
       end_(text.data() + text.size()),
-      // Lines of very old files end in a carriage return alone.
+      // Very old files end their lines with a carriage return alone.
       newline_(text.find('\n') == text.npos ? '\r' : '\n'),
       continued_(continued) {
-  // The byte order mark of some editors.
+  // Some editors write a byte order mark.
   if (text.starts_with("\xef\xbb\xbf")) line_end_ = at_ += 3;
 }
 
 bool TextScan::next_line() {
   const char* next = started_ && line_end_ != end_ ? line_end_ + 1 : started_ ? end_ : at_;
   if (next == end_) {
-    at_ = line_end_ = end_;  // nothing is left of the last line either
+    at_ = line_end_ = end_;  // so that word() finds nothing more of the last line
     return false;
   }
   at_ = next;
@@ -112,7 +113,7 @@ const char* parse_number(std::string_view word, double& value) {
   if (error == std::errc::invalid_argument || end != word.data() + word.size())
     return word.empty() ? " is not a number (the line ends early)" : " is not a number";
   if (error == std::errc::result_out_of_range) {
-    // With at most 200 characters, only an exponent leads out of range, and its sign says where to.
+    // With at most 200 characters only an exponent leaves the range; its sign tells which end.
     const std::size_t exponent = word.find_first_of("eE");
     if (exponent == word.npos || word.substr(exponent + 1, 1) != "-")
       return " is too large for a number";

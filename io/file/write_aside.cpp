@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 // ---- the table a signal handler can read --------------------------------------------------------
 
-// `owner` is 0 while the place is free, -1 while its path is being written, else the process whose
-// file it is: a forked child inherits the table, and the files in it are not the child's to remove.
+// `owner` is 0 while the place is free, -1 while its path is being written, else the process that
+// owns the file: a forked child inherits the table but must not remove its parent's files.
 struct Unfinished {
   std::atomic<int> owner{0};
   char path[PATH_MAX];
@@ -60,12 +60,12 @@ Failure cannot_write(const fs::path& file, const std::string& why) {
   return {"Cannot write " + file.string() + ": " + why + "."};
 }
 
-// A new, empty file, on disk and in the table until it is renamed or this goes. It enters the table
-// first: a signal in between finds a name that is not there yet, instead of missing one that is.
+// A new, empty file, on disk and in the table until it is renamed or this is destroyed. It enters
+// the table first: a signal in between finds a name without a file, which is harmless.
 class TemporaryFile {
  public:
   explicit TemporaryFile(fs::path path) : path_(std::move(path)), registered_(path_.string()) {
-    // Only a name nobody has: a killed process with our number may have left one behind.
+    // O_EXCL: a killed process with our number may have left a file of this name behind.
     const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     error_ = fd < 0 ? errno : 0;
     ours_ = fd >= 0;
@@ -77,14 +77,14 @@ class TemporaryFile {
     if (ours_) unlink(path_.c_str());
   }
   const fs::path& path() const { return path_; }
-  int error() const { return error_; }  // errno of its creation, 0: it is there
+  int error() const { return error_; }  // errno of its creation, or 0
 
   // 0 or errno.
   int sync_and_rename(const fs::path& file, const struct stat* replaced) {
     const int fd = open(path_.c_str(), O_RDONLY | O_CLOEXEC);
     if (fd < 0) return errno;
     if (replaced) (void)!fchmod(fd, replaced->st_mode & 0777);  // some file systems have no modes
-    // Other errors mean a file system that cannot sync; the data are as safe as it gets there.
+    // Other errors mean that the file system cannot sync.
     const bool lost = fsync(fd) != 0 && (errno == EIO || errno == ENOSPC || errno == EDQUOT);
     const int error = lost ? errno : 0;
     close(fd);
@@ -103,7 +103,7 @@ class TemporaryFile {
 
 fs::path temporary_name(const fs::path& file) {
   static std::atomic<unsigned> counter{0};
-  // Cut, so that a name near the file system's limit of 255 bytes still has a temporary one.
+  // Cut, because file systems limit names to 255 bytes.
   const std::string stem = file.stem().string().substr(0, 100);
   std::string ending = file.extension().string();
   if (ending.size() > 32) ending.clear();
@@ -118,7 +118,7 @@ void sync_folder(const fs::path& folder) {
   close(fd);
 }
 
-// The writer's sentence; it names the file that was asked for, not the temporary one.
+// The writer's sentence, about the requested file instead of the temporary one.
 Failure about(const fs::path& file, const fs::path& temporary, std::string why) {
   const std::string asked = file.string(), other = temporary.string();
   for (std::size_t at = 0; (at = why.find(other, at)) != std::string::npos; at += asked.size())
@@ -144,7 +144,7 @@ Outcome write_aside(const fs::path& file, const std::function<Outcome(const fs::
   if (file.filename().empty() || file.filename() == "." || file.filename() == "..")
     return cannot_write(file, "this names a folder, give a file name");
   std::error_code failed;
-  // Absolute, so that a change of the working folder meanwhile leads nowhere else.
+  // Absolute, because another thread may change the working folder meanwhile.
   fs::path target = fs::absolute(file, failed);
   if (failed) return cannot_write(file, failed.message());
   if (fs::is_symlink(target, failed)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_aside.h - a file is whole or not there: written beside its place, then renamed.
+// write_aside.h - writes a file beside its place and renames it, so that it is whole or absent.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -23,8 +23,8 @@ Outcome write_aside(const std::filesystem::path& file,
 // of SIGINT and SIGTERM just before it ends:
 //     extern "C" void on_signal(int signal) { h6::io::remove_unfinished(); _exit(128 + signal); }
 // A write_aside that is still running afterwards fails with a sentence; nothing else is harmed.
-// The table has 32 places; a write beyond them is done all the same but would not be cleaned up.
-// SIGKILL leaves NAME.unfinished-PID-N.EXT behind: never a half `file`.
+// The table has 32 places; further writes work but are not cleaned up. SIGKILL leaves
+// NAME.unfinished-PID-N.EXT behind, but never a half-written `file`.
 void remove_unfinished() noexcept;
 
 }  // namespace h6::io

@@ -6,7 +6,7 @@
 namespace h6::io {
 namespace {
 
-// About 7 GB while it is read.
+// They need about 7 GB while the file is read.
 constexpr std::uint64_t kMaxTriangles = 50'000'000, kMaxPoints = 3 * kMaxTriangles;
 constexpr std::size_t kMaxParts = 100'000;
 
@@ -14,7 +14,7 @@ struct Total {
   std::uint64_t triangles = 0, points = 0, faces = 0, corners = 0;
 };
 
-// Sums cannot overflow: they are looked at after every shape, none of which is larger than memory.
+// Sums are checked after every shape, and no shape is larger than memory: they cannot overflow.
 Total count(const std::vector<Placed>& placed, const MeshSource& source) {
   Total total;
   for (const Placed& p : placed) {

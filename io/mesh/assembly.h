@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// assembly.h - formats that are trees of nodes: shapes, where each is placed, and the mesh of
-// all of them. Inside io only; glTF and COLLADA share it.
+// assembly.h - one mesh from shapes that nodes place, for glTF and COLLADA. Inside io/mesh only.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -13,11 +12,11 @@
 
 namespace h6::io {
 
-// x -> A x + t, row by row; not orthogonal: scales may differ by axis, mirror, and nest.
+// x -> A x + t, row by row. A need not be orthogonal: scales may differ by axis, and mirror.
 struct Affine {
   std::array<std::array<double, 4>, 3> row{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 };
-Affine operator*(const Affine& outer, const Affine& inner);  // inner first
+Affine operator*(const Affine& outer, const Affine& inner);  // applies inner first
 Vec3 operator*(const Affine& m, const Vec3& p);
 bool mirrors(const Affine& m);  // det A < 0
 
@@ -26,7 +25,7 @@ Affine scaling(double x, double y, double z);
 // Of a unit quaternion.
 Affine rotation(double x, double y, double z, double w);
 
-// One drawn thing, in its own frame and the file's unit; however often it is placed, read once.
+// The polygons of one mesh or geometry, in its own frame and the file's unit.
 struct Shape {
   std::vector<Vec3> points;
   std::vector<std::uint32_t> corners;  // in range
@@ -39,12 +38,12 @@ struct Placed {
   std::string part;
 };
 
-// Nodes a file may have once all references are followed.
+// The most nodes of a file, each counted as often as it is referred to.
 constexpr std::size_t kMaxNodes = 1'000'000;
 
-// Every placed shape in order, one part each, welded. A mirrored shape is turned inside out by its
-// transform, so its faces are listed backwards: what was outward stays outward. A few hundred bytes
-// can place a shape billions of times: what it comes to is counted before anything is made.
+// All placed shapes in order, one part each, welded. Faces of a mirrored shape are listed
+// backwards, so that outward stays outward. A few hundred bytes can place a shape billions of
+// times: sizes are summed and checked before anything is allocated.
 Mesh expand(const std::vector<Placed>& placed, const MeshSource& source);
 
 }  // namespace h6::io

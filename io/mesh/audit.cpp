@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// audit.cpp - counts what is wrong with a mesh. Sorting instead of maps: half a second for
-// millions of triangles, and the same answer whatever the order of the input.
+// audit.cpp - counts the defects of a mesh. It sorts instead of using maps, which takes half a
+// second for millions of triangles.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -22,8 +22,8 @@ double largest(const Vec3& a) { return std::max({std::abs(a.x), std::abs(a.y), s
 
 bool collapsed(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-// No area within the rounding of the coordinates: three points of a line, once scaled from
-// millimetres, are off it by about 1e-16 of their distance from the origin.
+// Whether the area is no more than rounding: three points on a line, scaled from millimetres, leave
+// it by about 1e-16 of their distance from the origin.
 bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
   const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)}));
@@ -41,7 +41,7 @@ std::size_t count_degenerate(const Mesh& mesh) {
       }));
 }
 
-// One triangle of each set of three vertices (the first), in order.
+// The first triangle of each set of three vertices, in order.
 std::vector<Triangle> drop_duplicates(const Mesh& mesh) {
   struct Key {
     std::uint64_t low_two;  // smallest vertex in the upper half, middle one in the lower
@@ -71,8 +71,8 @@ std::vector<Triangle> drop_duplicates(const Mesh& mesh) {
 }
 
 void count_edges(const std::vector<Triangle>& triangles, MeshAudit& out) {
-  // An edge is one integer, smaller vertex first, and the way it is run rides in the lowest bit.
-  // Vertex numbers are below 2^31: as many vertices would be 50 GB.
+  // An edge is one integer: the smaller vertex, the larger one, and its direction in the lowest
+  // bit. Vertex numbers are below 2^31, since as many vertices would be 50 GB.
   std::vector<std::uint64_t> edges;
   edges.reserve(triangles.size() * 3);
   for (const Triangle& t : triangles) {
@@ -128,8 +128,8 @@ void measure_box(const Mesh& mesh, MeshAudit& out) {
   }
 }
 
-// Divergence theorem, about the middle of the box: about the origin, a small part far away would
-// be the difference of large numbers.
+// By the divergence theorem, about the middle of the box: about the origin, the volume of a small
+// part far away would be a difference of large numbers.
 double signed_volume(const Mesh& mesh, const std::vector<Triangle>& triangles, const Vec3& low,
                      const Vec3& high) {
   const Vec3 middle = {(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};

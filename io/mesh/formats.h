@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// formats.h - what the readers of the mesh formats share. Inside io only.
+// formats.h - what the readers of the mesh formats share. Inside io/mesh only.
 //
-// STL, OBJ and PLY are read here and not by a package: assimp 5.2 takes ten to twenty times as long
-// (1.8 M triangles, welded: 3.8, 3.2, 1.4 s against 0.2, 0.35, 0.15), reads 1e400, NaN and PLY
-// faces that name missing vertices without a word, and cannot name the line, byte or triangle that
-// is wrong. glTF and COLLADA, trees of nodes with transforms, are read here too: assimp follows a
-// COLLADA node that holds itself until the stack ends, and crashes on 5 of 2,000 small mutations of
-// a tetrahedron's file.
+// No package reads the formats: assimp 5.2 takes ten to twenty times as long (1.8 M triangles,
+// welded: 3.8, 3.2 and 1.4 s for STL, OBJ and PLY against 0.2, 0.35 and 0.15), accepts 1e400, NaN
+// and faces of missing vertices, cannot name the line or byte that is wrong, and crashes on damaged
+// COLLADA files.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -18,16 +16,16 @@
 
 namespace h6::io {
 
-// Thrown by the readers below, caught by parse_mesh and read_mesh, which return the sentence.
+// The readers below throw it; parse_mesh and read_mesh catch it and return the sentence.
 struct BadMesh {
   std::string sentence;
 };
 
 struct MeshSource {
   std::string_view bytes;  // of the whole file, inflated
-  std::string name;        // stands in every sentence
+  std::string name;        // begins every sentence
   double scale;            // metres in the file's unit of length
-  // Of the file, for files it names; null: it came as bytes, and nothing is beside it.
+  // The file's folder, where other files that it names are; null when only bytes were given.
   const std::filesystem::path* folder = nullptr;
 
   // "name, place: what."
@@ -35,7 +33,7 @@ struct MeshSource {
   [[noreturn]] void fail(const std::string& what) const;
 };
 
-// Points and faces as a file lists them, before the weld.
+// Points and faces in the order of the file, before the weld.
 struct Polygons {
   std::vector<Vec3> points;            // [m]
   std::vector<std::uint32_t> corners;  // indices into points, face by face; in range
@@ -47,15 +45,15 @@ struct Polygons {
 Mesh read_stl(const MeshSource& source);
 Mesh read_obj(const MeshSource& source);
 Mesh read_ply(const MeshSource& source);
-Mesh read_gltf(const MeshSource& source);  // .gltf and .glb, told apart by their first bytes
+Mesh read_gltf(const MeshSource& source);  // .gltf and .glb; the first bytes tell which
 Mesh read_collada(const MeshSource& source);
 
-// Throws if the file cannot be the STL it says it is: from its first bytes (84 are enough) and its
-// size, before the rest is read.
+// Throws unless first bytes (84 suffice) and size fit an STL, so that other files are not read
+// whole.
 void check_stl_size(std::string_view head, std::uint64_t size, const MeshSource& source);
 
-// The first `count` bytes (fewer if it is shorter) of a file that the mesh names: in the mesh's
-// folder or below it, never above, elsewhere or in a network.
+// The first `count` bytes (fewer if it is shorter) of a file that the mesh names. It must lie in
+// the mesh's folder or below.
 std::string read_beside(const MeshSource& source, const std::string& name, std::uint64_t count);
 
 // Cuts the faces into triangles, in order, and welds.
@@ -63,11 +61,11 @@ Mesh assemble(Polygons&& polygons, const MeshSource& source);
 
 [[noreturn]] void fail_coordinate(const MeshSource& source, const std::string& place, double value);
 
-// A coordinate in the file's unit, in metres; throws unless it is finite and within 1e6 m.
-// `place()` is called for the sentence only.
+// Converts a coordinate from the file's unit to metres; throws unless it is finite and within 1e6
+// m. `place()` gives the place for the sentence.
 template <class Place>
 double coordinate(const MeshSource& source, double value, const Place& place) {
-  const double metres = value * source.scale + 0.0;  // + 0.0: no minus zero
+  const double metres = value * source.scale + 0.0;  // + 0.0 turns -0 into 0
   if (!(metres >= -1e6 && metres <= 1e6)) fail_coordinate(source, place(), value);
   return metres;
 }

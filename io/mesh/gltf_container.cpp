@@ -6,7 +6,7 @@
 namespace h6::io {
 namespace {
 
-constexpr std::size_t kMostJson = std::size_t{512} << 20;  // ten times that as a tree
+constexpr std::size_t kMostJson = std::size_t{512} << 20;  // its tree takes ten times as much
 constexpr int kDeepest = 64;
 
 std::uint32_t word_at(std::string_view bytes, std::size_t at) {
@@ -15,7 +15,7 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
   return value;
 }
 
-// Header "glTF", 2, length; then chunks of length, type and bytes: JSON first, BIN second.
+// A .glb is a header ("glTF", 2, length) and chunks (length, type, bytes): JSON first, BIN second.
 GltfContainer open_glb(const MeshSource& source) {
   const std::string_view bytes = source.bytes;
   if (bytes.size() < 20) source.fail("the file ends inside the header of a .glb: it is truncated");
@@ -45,7 +45,7 @@ GltfContainer open_glb(const MeshSource& source) {
   return out;
 }
 
-// The parser keeps its own stack, but what deep nesting builds is no glTF.
+// No glTF nests deeply; a tree of hostile depth could exhaust the stack when it is destroyed.
 void check_depth(std::string_view text, const MeshSource& source) {
   int depth = 0;
   bool quoting = false;

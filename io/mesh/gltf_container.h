@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gltf_container.h - what a glTF is packed in: a .glb's chunks, base64 and percent signs.
+// gltf_container.h - unpacks a glTF: the chunks of a .glb, base64 and percent codes.
 #pragma once
 #include <optional>
 #include <string>
@@ -10,11 +10,11 @@
 namespace h6::io {
 
 struct GltfContainer {
-  std::string_view text;                 // JSON, of a size and depth that can be parsed
+  std::string_view text;                 // JSON, small and flat enough to be parsed
   std::optional<std::string_view> blob;  // the chunk BIN of a .glb
 };
 
-// A .glb is known by its first bytes, whatever its name; everything else is taken for JSON.
+// Files that do not begin as a .glb are taken for JSON.
 GltfContainer open_gltf(const MeshSource& source);
 
 std::string decode_base64(std::string_view text, const MeshSource& source);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// mesh_file.cpp - from a file or from bytes to a mesh, and back to a binary STL. The formats are in
-// stl.cpp, obj.cpp, ply.cpp, gltf.cpp and collada.cpp.
+// mesh_file.cpp - reads a mesh from a file or from bytes, and writes a binary STL. The readers of
+// the formats are in stl.cpp, obj.cpp, ply.cpp, gltf.cpp and collada.cpp.
 #include "io/mesh/mesh_file.h"
 
 #include <fcntl.h>
@@ -52,7 +52,7 @@ struct Format {
   Reader read;
   bool has_unit = false;
 };
-// Another format is one more line here and one more reader.
+// A new format is one more line here and one more reader.
 constexpr Format kFormats[] = {{".stl", read_stl},        {".obj", read_obj},
                                {".ply", read_ply},        {".gltf", read_gltf, true},
                                {".glb", read_gltf, true}, {".dae", read_collada, true}};
@@ -67,7 +67,7 @@ struct Named {
   bool gz;
 };
 
-// By the ending alone. Throws for one that is not known.
+// Decides by the ending alone; throws when it is unknown.
 Named format_of(const std::string& name) {
   fs::path path(lower_case(name));
   const bool gz = path.extension() == ".gz";
@@ -81,7 +81,7 @@ Named format_of(const std::string& name) {
                 "; export the mesh as .stl, .obj, .ply, .glb or .dae (.gz is fine too)."};
 }
 
-// Mistakes that look the same in every format.
+// Checks for mistakes that any format may have.
 void check_start(std::string_view bytes, const MeshSource& source) {
   if (bytes.empty()) source.fail("the file is empty");
   if (bytes.starts_with("\x1f\x8b"))
@@ -90,7 +90,7 @@ void check_start(std::string_view bytes, const MeshSource& source) {
     source.fail("this is a Git LFS pointer, not the mesh; fetch it with 'git lfs pull'");
 }
 
-// Nobody holds what is larger in the hand; millimetres taken for metres are.
+// A larger mesh is more likely in millimetres than a part for a hand.
 constexpr double kLargest = 20;  // [m]
 void remark_size(const MeshSource& source, Mesh& mesh) {
   const double across = bounds_of(mesh).longest();
@@ -128,7 +128,7 @@ Result<Mesh> caught(const std::string& name, const Work& work) {
 
 // ---- the file -----------------------------------------------------------------------------------
 
-// What a file may take, inflated: a reader needs about as much again.
+// The most bytes of a file, inflated: half of the memory, since a reader needs as much again.
 std::size_t most_bytes() {
   const auto pages = static_cast<std::size_t>(std::max(1L, sysconf(_SC_PHYS_PAGES)));
   const auto page = static_cast<std::size_t>(std::max(1L, sysconf(_SC_PAGE_SIZE)));
@@ -138,7 +138,7 @@ std::size_t most_bytes() {
 class OpenFile {
  public:
   OpenFile(const fs::path& path, const MeshSource& source) : source_(source) {
-    // Not blocking: a named pipe in place of a file would be waited for without end.
+    // Without O_NONBLOCK, opening a named pipe would wait for its writer.
     fd_ = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd_ < 0 && errno == ENOENT) source.fail("there is no such file");
     if (fd_ < 0) source.fail(std::string("cannot be opened: ") + std::strerror(errno));
@@ -160,7 +160,7 @@ class OpenFile {
     return size_;
   }
 
-  // `count` bytes more, fewer at the file's end.
+  // Appends `count` bytes, fewer at the end of the file.
   void read_more(std::string& bytes, std::size_t count) {
     const std::size_t begin = bytes.size();
     bytes.resize(begin + count);
@@ -190,7 +190,7 @@ std::string read_bytes(const fs::path& path, const MeshSource& source, const Nam
   std::string bytes;
   constexpr std::size_t kStart = 4096;
   file.read_more(bytes, static_cast<std::size_t>(std::min<std::uint64_t>(size, kStart)));
-  // From its start alone, before a file of any size is taken into memory.
+  // A file of the wrong kind is refused before all of it is in memory.
   if (!named.gz) check_start(bytes, source);
   if (!named.gz && named.format->read == read_stl) check_stl_size(bytes, size, source);
   if (size > most_bytes())
@@ -218,7 +218,7 @@ struct Point3f {
   float x, y, z;
 };
 
-// Of unit length; zero where the triangle has no area, as readers expect.
+// A unit vector, or zero for a triangle without area, as readers expect.
 Point3f normal_of(const Point3f& a, const Point3f& b, const Point3f& c) {
   const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z;
   const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
@@ -237,7 +237,7 @@ StlTriangle stl_triangle(const std::array<Point3f, 3>& corners) {
   return bytes;
 }
 
-// Empty, or why it cannot be written.
+// Why the mesh cannot be written; empty when it can.
 std::string unwritable(const Mesh& mesh, double scale) {
   if (mesh.triangles.empty()) return "the mesh has no triangle";
   if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
@@ -259,7 +259,7 @@ Outcome write_triangles(const fs::path& file, const Mesh& mesh, Unit unit) {
     return Failure{"Cannot write " + file.string() + ": " + std::strerror(errno) + "."};
   };
   if (!out) return fault();
-  // Must not start with "solid": readers that look no further would take it for text.
+  // It must not start with "solid": some readers would take the file for text.
   static constexpr const char* kUnits[] = {"m", "mm", "cm", "in"};
   char head[84] = {};
   std::snprintf(head, 80, "binary STL by hapsix, unit of length: %s",
@@ -341,7 +341,7 @@ Result<Mesh> read_mesh(const fs::path& file, Unit unit) {
   const std::string name = file.string();
   return caught(name, [&]() -> Result<Mesh> {
     const MeshSource source{{}, name, metres(unit)};
-    // A file that is not there is the nearer mistake than an ending that is not known.
+    // A missing file is reported before an unknown ending.
     OpenFile(file, source).size();
     const Named named = format_of(name);
     const fs::path folder = file.parent_path();

@@ -15,20 +15,24 @@ double metres(Unit unit);
 const char* unit_name(Unit unit);  // "m", "mm", "cm", "in"
 Result<Unit> unit_from_name(const std::string& name);
 
-// One sentence and no mesh when the file is missing, empty, not what its name says, truncated,
-// holds a coordinate that is not finite or beyond 1e6 m, or has no triangle. A remark asks for the
-// unit where metres were assumed and make it larger than 20 m. The sentence names file and place
-// (byte, line, triangle or vertex number). Triangles keep the file's order; polygons are cut in
-// place, concave ones too. Parts are the `o` and `g` of an OBJ ("object/group"), the solids of a
-// text STL and the nodes of glTF and COLLADA, whose transforms are applied; axes stay the file's
-// own. A glTF is in metres and a COLLADA in its own <unit>: `unit` counts only for one that has
-// none, and a remark in the mesh says so. Nothing is dropped silently: a face that cannot be used
-// is an error, and so are data behind the last triangle a header announces (fewer than 50 bytes
-// behind a binary STL, and blanks or zeros behind a PLY, are padding).
+// Fails when the file is missing, empty, truncated, of another format than its name says, has no
+// triangle, or has a coordinate that is not finite or beyond 1e6 m. The sentence names the file and
+// the place (byte, line, triangle or vertex number).
+//
+// Triangles keep the file's order; polygons, concave ones too, are cut where they stand. Parts are
+// the `o` and `g` of an OBJ ("object/group"), the solids of a text STL, and the nodes of glTF and
+// COLLADA, whose transforms are applied. Axes stay the file's own.
+//
+// A glTF is in metres and a COLLADA in its own <unit>; `unit` counts only for a COLLADA without
+// one, and a remark in the mesh says so. A remark also asks for the unit when metres were assumed
+// and the mesh is larger than 20 m.
+//
+// Nothing is dropped silently. A face that cannot be used is an error, and so are data after the
+// last triangle of a header's count, except padding: fewer than 50 bytes after a binary STL, blanks
+// or zeros after a PLY.
 Result<Mesh> read_mesh(const std::filesystem::path& file, Unit unit = Unit::m);
 
-// The same from bytes; `name` decides the format by its ending and stands in the sentence. Files
-// beside a .gltf are out of reach.
+// The same from bytes. The ending of `name` decides the format. Files beside a .gltf are not read.
 Result<Mesh> parse_mesh(const std::string& bytes, const std::string& name, Unit unit = Unit::m);
 
 // Binary STL, written aside and renamed.

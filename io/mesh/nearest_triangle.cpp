@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_triangle.cpp - boxes split at the median of the triangles' middles, by rank: a balanced
-// tree for any mesh. Distances in double; boxes in float, rounded outwards.
+// nearest_triangle.cpp - a node's triangles are split at the median of their centres, so that the
+// tree is balanced for any mesh. Distances are double; boxes are float, rounded outwards.
 #include "io/mesh/nearest_triangle.h"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ Vec3 cross(const Vec3& a, const Vec3& b) {
 double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 double part(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
-// Height over the longest side below 1e-12 of it: rounding, not area.
+// False when the height over the longest side is below 1e-12 of that side: this is rounding.
 bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = minus(b, a), v = minus(c, a), w = minus(c, b), n = cross(u, v);
   const double longest2 = std::max({dot(u, u), dot(v, v), dot(w, w)});
@@ -36,7 +36,7 @@ Vec3 nearest_on_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
   return along(a, u, uu > 0 ? std::clamp(dot(minus(p, a), u) / uu, 0.0, 1.0) : 0);
 }
 
-// The foot of the perpendicular when it lies inside all three edges, else the nearest of the edges.
+// The foot of the perpendicular when it lies in the triangle, else the nearest point of the edges.
 Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c,
                          const Vec3& n) {
   const Vec3 w = minus(p, a), x = cross(n, w);
@@ -82,7 +82,7 @@ NearestTriangle::NearestTriangle(const Mesh& mesh, unsigned threads, Pulse* puls
   if (corners_.empty()) return;
   const auto count = std::uint32_t(corners_.size());
   nodes_.resize(nodes_of(count));
-  // The top of the tree on this thread, what hangs below it on all.
+  // This thread builds the top of the tree, all threads build what is below.
   std::vector<std::array<std::uint32_t, 3>> later;
   build(0, 0, count, std::max(count / 32, 1024u), &later);
   sched::parallel_for(later.size(), threads, [&](std::size_t i) {
@@ -103,7 +103,7 @@ void NearestTriangle::fit(Node& node) const {
   for (int k = 0; k < 3; ++k) node.low[k] = down(low[k]), node.high[k] = up(high[k]);
 }
 
-// Parts of at most `stop` triangles are left for `later`.
+// Puts parts of at most `stop` triangles into `later` instead of building them.
 void NearestTriangle::build(std::uint32_t at, std::uint32_t first, std::uint32_t count,
                             std::uint32_t stop, std::vector<std::array<std::uint32_t, 3>>* later) {
   if (later && count <= stop) {
@@ -140,7 +140,7 @@ NearTriangle NearestTriangle::operator()(const Vec3& place, double within) const
   NearTriangle best;
   best.distance2 = within * within;
   if (nodes_.empty()) return best;
-  Later stack[64];  // balanced: never deeper than 32
+  Later stack[64];  // the balanced tree is at most 32 deep
   int waiting = 0;
   stack[waiting++] = {0, 0};
   while (waiting > 0) {
@@ -150,7 +150,8 @@ NearTriangle NearestTriangle::operator()(const Vec3& place, double within) const
     if (node.second == 0) {
       for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
         const Corners& t = corners_[i];
-        const double height = dot(minus(place, t.a), t.normal);  // a little less: it is rounded
+        const double height =
+            dot(minus(place, t.a), t.normal);  // the factor below allows for rounding
         if (height * height * (1 - 1e-9) > best.distance2) continue;
         const Vec3 q = nearest_on_triangle(place, t.a, t.b, t.c, t.normal), d = minus(q, place);
         const double d2 = dot(d, d);

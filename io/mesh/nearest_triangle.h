@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_triangle.h - the point of a mesh nearest to a place, exactly: a tree of boxes.
+// nearest_triangle.h - the exact nearest point of a mesh, by a tree of boxes.
 #pragma once
 #include <cstdint>
 #include <limits>
@@ -18,18 +18,20 @@ struct NearTriangle {
 
 class NearestTriangle {
  public:
-  // Of the mesh's triangles that have area. Indices must be in range, vertices finite. After the
-  // pulse stopped it must not be asked.
+  // Takes the triangles that have area. Indices must be in range, vertices finite. When the pulse
+  // stops, the tree is incomplete and must not be used.
   NearestTriangle(const Mesh& mesh, unsigned threads, Pulse* pulse = nullptr);
   bool empty() const { return corners_.empty(); }
-  // The first of equally near ones. Nothing at `within` or farther is found.
+  // The nearest triangle closer than `within`; of equally near ones, that of the lowest number.
   NearTriangle operator()(const Vec3& place,
                           double within = std::numeric_limits<double>::infinity()) const;
 
  private:
-  struct Node {  // of items [first, first + count); a node's second child follows all of its first
+  // The box of triangles [first, first + count). The first child follows its node; `second` is the
+  // place of the other one.
+  struct Node {
     float low[3], high[3];
-    std::uint32_t first, count, second;  // second 0: a leaf
+    std::uint32_t first, count, second;  // second is 0 in a leaf
   };
   struct Corners {
     Vec3 a, b, c, normal;  // unit

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// obj.cpp - Wavefront OBJ: `v` and `f`, polygons cut into triangles, negative indices, lines
-// continued by a backslash; `o` and `g` are parts. Texture, normals, materials, points and lines
-// are passed over. A statement nobody knows is an error: a damaged `f` would otherwise be a hole.
+// obj.cpp - Wavefront OBJ: vertices and polygons, with negative indices and lines continued by a
+// backslash; `o` and `g` are parts. Texture, normals, materials, points and lines are ignored. An
+// unknown statement is an error, because a damaged `f` would leave a hole.
 #include <algorithm>
 #include <array>
 #include <string>
@@ -46,7 +46,7 @@ class ObjReader {
       else if (!passed_over(statement))
         fail(quoted(statement) + " is no statement of an OBJ file");
     }
-    // Only now: a face may name vertices that stand behind it.
+    // This check comes last, because a face may name vertices that follow it.
     if (largest_ >= polygons_.points.size() && !polygons_.sizes.empty())
       source_.fail("line " + std::to_string(largest_line_),
                    "a face names vertex " + std::to_string(std::uint64_t{largest_} + 1) +
@@ -65,7 +65,7 @@ class ObjReader {
     return coordinate(source_, value, [&] { return place(); });
   }
 
-  // A weight or a colour behind the three numbers has no meaning for polygons.
+  // Numbers after the third, a weight or a colour, have no meaning for polygons.
   void vertex() {
     if (polygons_.points.size() >= kMaxPoints) fail("more vertices than can be read");
     const double x = number(), y = number(), z = number();
@@ -116,14 +116,13 @@ class ObjReader {
     part_ = -1;
   }
 
-  // Numbered when its first face comes: names without faces are no parts. The same name again is
-  // the same part.
+  // The number of the current part. A part begins with its first face; equal names are one part.
   std::int32_t part() {
     if (part_ >= 0) return part_;
     const std::string name =
         object_.empty() || group_.empty() ? object_ + group_ : object_ + "/" + group_;
     const auto next = static_cast<std::int32_t>(polygons_.part_names.size());
-    // A name a few bytes long in the file may take hundreds here.
+    // A few bytes of the file may give a name of hundreds.
     if (next >= kMaxParts) fail("more than " + std::to_string(kMaxParts) + " parts (o, g)");
     const auto [found, is_new] = part_numbers_.try_emplace(name, next);
     if (is_new) polygons_.part_names.push_back(name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ply.cpp - PLY, text and binary in either byte order: x y z of the element `vertex` and the
-// corner list of `face`; every other element and property is stepped over.
+// ply.cpp - PLY, text and binary in either byte order. It reads x y z of the element `vertex` and
+// the corner list of `face`, and skips every other element and property.
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -12,18 +12,18 @@
 namespace h6::io {
 namespace {
 
-// Where the reader is, for the sentence.
+// Where the reader is, for error sentences.
 struct Row {
   const PlyElement* element = nullptr;
   std::uint64_t number = 0;  // from 0
   std::string name() const { return element->name + " " + std::to_string(number + 1); }
 };
 
-// The two bodies, text and binary, have the same members, and the reader below is written once:
-//   real(type), whole(type)   the next value
-//   skip(type, n)             n values
-//   left()                    bytes that are left
-//   smallest(type)            bytes a value takes at least
+// A text body and a binary body have the same members, so that there is one reader for both:
+//   real(type), whole(type)   returns the next value
+//   skip(type, n)             skips n values
+//   left()                    the number of bytes left
+//   smallest(type)            the fewest bytes of a value
 class TextBody {
  public:
   TextBody(const MeshSource& source, const PlyHeader& header, const Row& row)
@@ -150,7 +150,7 @@ class PlyReader {
  private:
   [[noreturn]] void fail(const std::string& what) const { source_.fail(body_.place(), what); }
 
-  // Before anything is stored or looped over: a count is only a claim.
+  // A count of the header is checked before anything is allocated by it.
   void check_room(const PlyElement& element) const {
     std::uint64_t row = 0;
     for (const PlyProperty& property : element.properties)
@@ -239,8 +239,8 @@ class PlyReader {
       for (const PlyProperty& property : element.properties) step_over(property);
   }
 
-  // Only at the end: `face` may stand before `vertex`, and data behind the last row mean that a
-  // count is wrong and something would be missing.
+  // These checks come last, because `face` may stand before `vertex`. Data after the last row mean
+  // that a count is wrong and that something would be missing.
   void check_whole() {
     if (!has_vertices_) source_.fail("it has no element 'vertex'");
     if (polygons_.sizes.empty())

@@ -52,12 +52,12 @@ class HeaderReader {
   }
 
  private:
-  // Lines are looked for in the header only: the body may be binary. Generous; scanning stops at
-  // end_header.
+  // Where the header ends, or may end: the body may be binary, so lines are read in the header
+  // only.
   static std::size_t header_end(const MeshSource& source) {
     const std::size_t found = source.bytes.find("end_header");
     if (found == source.bytes.npos) return std::min<std::size_t>(source.bytes.size(), 1 << 16);
-    // And its own line end: "\n", "\r\n", or "\r" alone, behind which a "\n" is data.
+    // Its line ends with "\n", "\r\n" or "\r" alone; after the last, a "\n" belongs to the data.
     const bool newlines = source.bytes.substr(0, found).find('\n') != source.bytes.npos;
     std::size_t end = found + 10;
     if (end < source.bytes.size() && source.bytes[end] == '\r') ++end;

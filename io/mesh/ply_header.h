@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ply_header.h - what a PLY file says it holds.
+// ply_header.h - the header of a PLY file.
 #pragma once
 #include <cstdint>
 #include <string>

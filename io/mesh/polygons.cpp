@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// polygons.cpp - cuts the faces of all formats but STL into triangles, and welds.
+// polygons.cpp - cuts faces into triangles, and welds; all formats but STL use it.
 #include <cmath>
 #include <span>
 
@@ -16,15 +16,15 @@ struct Flat {
   double u, v;
 };
 
-// > 0: a, b, c turn left.
+// Positive when a, b, c turn left.
 double turn(const Flat& a, const Flat& b, const Flat& c) {
   return (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
 }
 
-// The loop seen along the axis nearest to its normal (Newell's), counter-clockwise. Faces are flat
-// or nearly so; where one is not, this is still one way to cut it that never fails.
+// The loop projected along the axis nearest to its normal (Newell's method), counter-clockwise.
+// Faces are nearly flat; the projection of others is cut just the same.
 std::vector<Flat> flatten(const std::vector<Vec3>& points, Loop loop) {
-  const Vec3 base = points[loop[0]];  // differences: far from the origin, products lose everything
+  const Vec3 base = points[loop[0]];  // far from the origin, products would lose all digits
   double nx = 0, ny = 0, nz = 0;
   for (std::size_t i = 0; i < loop.size(); ++i) {
     const Vec3 &p = points[loop[i]], &q = points[loop[(i + 1) % loop.size()]];
@@ -55,7 +55,7 @@ void add_fan(Loop loop, std::size_t from, std::vector<Triangle>& out) {
     out.push_back({loop[from], loop[(from + i) % n], loop[(from + i + 1) % n]});
 }
 
-// All triangles of the fan wind the same way: then they cover the face once.
+// Whether all triangles of the fan have the same winding: then they cover the face once.
 bool is_fan(const std::vector<Flat>& flat, std::size_t from) {
   const std::size_t n = flat.size();  // 0 for a triangle
   for (std::size_t i = 1; i + 1 < n; ++i)
@@ -63,9 +63,9 @@ bool is_fan(const std::vector<Flat>& flat, std::size_t from) {
   return true;
 }
 
-// Cuts off one ear after the other: a convex corner whose triangle holds no other corner. Takes the
-// square of the number of corners, more for evil ones: false when `budget`, in corners looked at,
-// is used up.
+// Cuts off one ear after the other: a convex corner whose triangle holds no other corner. This is
+// quadratic in the number of corners, cubic at worst. False when `budget`, counted in corners
+// visited, is used up.
 bool clip_ears(Loop loop, const std::vector<Flat>& flat, std::uint64_t& budget,
                std::vector<Triangle>& out) {
   std::vector<std::uint32_t> left(loop.size());
@@ -77,7 +77,7 @@ bool clip_ears(Loop loop, const std::vector<Flat>& flat, std::uint64_t& budget,
     if (!(turn(a, b, c) > 0)) return false;
     for (const std::uint32_t i : left) {
       const Flat& p = flat[i];
-      // Bridges to holes pass the same place twice: a twin of a corner does not block its ear.
+      // A bridge to a hole passes a place twice: the twin of a corner does not block its ear.
       if ((p.u == a.u && p.v == a.v) || (p.u == b.u && p.v == b.v) || (p.u == c.u && p.v == c.v))
         continue;
       if (turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0) return false;
@@ -99,7 +99,7 @@ bool clip_ears(Loop loop, const std::vector<Flat>& flat, std::uint64_t& budget,
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(at));
     tried = 0;
   }
-  // More than three are left where the face crosses itself or has no area: nothing is right there.
+  // More than three are left when the face crosses itself or has no area: no cut is right then.
   for (std::size_t i = 1; i + 1 < left.size(); ++i)
     out.push_back({loop[left[0]], loop[left[i]], loop[left[i + 1]]});
   return true;
@@ -119,8 +119,8 @@ bool triangulate(const std::vector<Vec3>& points, Loop loop, std::uint64_t& budg
 }  // namespace
 
 Mesh assemble(Polygons&& polygons, const MeshSource& source) {
-  // Half a second, and as much again as reading the file took: room for a concave face of thousands
-  // of corners, or for any number of small ones.
+  // About half a second and the time of reading the file: enough for a concave face of thousands of
+  // corners, or for any number of small ones.
   std::uint64_t budget = 200'000'000 + 200 * std::uint64_t{polygons.corners.size()};
   Mesh mesh;
   mesh.part_names = std::move(polygons.part_names);

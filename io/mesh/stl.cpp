@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // stl.cpp - STL, text and binary.
 //
-// Binary: 80 bytes of anything, the number of triangles n (uint32), n times 50 bytes: normal and
-// three vertices (12 floats), two bytes of anything; little endian. So its size is 84 + 50 n, and
-// that, not the word "solid" with which some programs begin their binary files, tells the two kinds
-// apart. Normals are ignored: many files have wrong ones, and the winding says the same.
+// A binary STL is 80 bytes of anything, the number of triangles n (uint32), and n times 50 bytes:
+// normal and three vertices (12 floats), two bytes of anything; little endian. Its size, 84 + 50 n,
+// tells the two kinds apart; some programs begin their binary files with "solid". Normals are
+// ignored: many files have wrong ones, and the winding gives them.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -29,7 +29,8 @@ T load(std::string_view bytes, std::size_t at) {
 }
 
 bool looks_like_text(std::string_view head) {
-  // 512 bytes hold at least eight triangles' attributes or the upper bytes of the count: zeros.
+  // In 512 bytes of a binary file some are zero: the upper bytes of the count, or the two bytes
+  // after a triangle.
   for (const char c : head.substr(0, 512)) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte < 0x20 && c != '\n' && c != '\r' && c != '\t' && c != '\f' && c != '\v') return false;
@@ -44,7 +45,7 @@ std::string_view first_word(std::string_view head) {
 
 enum class Kind { text, binary };
 
-// Accepted behind the last triangle: fewer bytes than one more triangle would take.
+// Fewer bytes after the last triangle than one more would take are accepted as padding.
 Kind kind_of(std::string_view head, std::uint64_t size, const MeshSource& source) {
   const bool has_count = size >= kHead && head.size() >= kHead;
   const std::uint64_t announced = has_count ? load<std::uint32_t>(head, 80) : 0;
@@ -134,7 +135,7 @@ class TextStl {
       fail(std::string("'") + wanted + "' should stand here, not " + quoted(word));
   }
 
-  // The name, which may be any words or none, ends with the line; so do those of endsolid.
+  // A name, of any number of words, ends with the line; so does that of endsolid.
   void solid() {
     const std::string name = printable(scan_.rest());
     scan_.next_line();

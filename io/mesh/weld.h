@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// weld.h - equal points become one vertex. Exact: no tolerance, so no two features of a part ever
-// merge and the result does not depend on the order of floating-point work.
+// weld.h - makes equal points one vertex. There is no tolerance, so no two features of a part
+// merge.
 //
-// A hash table with linear probing holds only (hash tag, vertex number), 8 bytes a slot, and the
-// points a few places ahead are hashed and their slots prefetched: the loop waits for memory, not
-// for arithmetic. Vertices are numbered in order of first appearance.
+// A hash table with linear probing holds (hash tag, vertex number), 8 bytes a slot. The loop is
+// bound by memory, so it hashes points a few places ahead and prefetches their slots. Vertices are
+// numbered in order of first appearance.
 #pragma once
 #include <array>
 #include <bit>
@@ -18,10 +18,10 @@ namespace h6::io {
 
 struct Welded {
   std::vector<Vec3> vertices;        // (unique points) in order of first appearance
-  std::vector<std::uint32_t> index;  // (points) each one's vertex
+  std::vector<std::uint32_t> index;  // (points) the vertex of each
 };
 
-// Every zero positive, so that equal points have equal bits.
+// Turns -0 into +0, so that equal points have equal bits.
 inline Vec3 without_minus_zero(const Vec3& p) { return {p.x + 0.0, p.y + 0.0, p.z + 0.0}; }
 
 class WeldTable {
@@ -38,7 +38,7 @@ class WeldTable {
 
   void prefetch(std::uint64_t hash) const { __builtin_prefetch(&slots_[hash & mask_]); }
 
-  // The number of p in `vertices`, where it is added if it is new.
+  // The number of p in `vertices`; adds p when it is new.
   std::uint32_t find_or_add(const Vec3& p, std::uint64_t hash, std::vector<Vec3>& vertices) {
     std::size_t at = hash & mask_;
     for (; slots_[at] != kEmpty; at = (at + 1) & mask_) {
@@ -74,7 +74,7 @@ class WeldTable {
   std::size_t mask_;
 };
 
-// `point(i)` is the i-th of `count` points, without minus zeros. Fewer than 2^32 - 1 of them.
+// `point(i)` is the i-th of `count` points, without minus zeros; count < 2^32 - 1.
 template <class Point>
 Welded weld_points(std::size_t count, std::size_t expected_vertices, const Point& point) {
   constexpr std::size_t kAhead = 16;

@@ -6,7 +6,7 @@
 namespace h6::io {
 namespace {
 
-// Hash of a list of hashes, one a column, so that no two columns run together.
+// Hashes the sizes and hashes of columns, so that a value cannot move to the next column unnoticed.
 class Columns {
  public:
   template <class Column>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// asset_hash.h - a fingerprint of a field or shell as the engine gets it, whatever it came from.
+// asset_hash.h - a fingerprint of the data of a field or shell, as the engine gets them.
 //
-// What a baked file says it was baked from proves nothing about what is in it now. 128 bits as 32
-// hex digits; names of parts and how it was made do not count.
+// The input hash in a baked file does not prove what the file holds now; this hash does. It has 128
+// bits, as 32 hex digits, and leaves out the names of parts and the history.
 #pragma once
 #include <string>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// load_scene.h - from a scene to what the engine runs: assets baked or taken from the cache, one
-// model, definitions of bodies and hands.
+// load_scene.h - makes of a scene what the engine runs: the model with all assets, and the
+// definitions of bodies and hands.
 #pragma once
 #include <memory>
 #include <string>
@@ -13,14 +13,14 @@
 
 namespace h6::io {
 
-// One field or shell, whoever uses it: bodies with the same content share one.
+// One field or shell. Bodies with the same content share it.
 struct LoadedAsset {
   std::string body;  // the first that uses it
   bool is_field = false;
-  std::string hash;  // mesh: of content and bake parameters; a file or points: of what they hold
+  std::string hash;  // asset_key of a mesh; asset_hash of a file or points
   bool from_cache = false;
-  bool rebuilt = false;        // the cache had a file for it, but damaged or of something else
-  double seconds = 0;          // to bake or to read
+  bool rebuilt = false;        // its file in the cache was damaged or of something else
+  double seconds = 0;          // to bake or to read it
   double voxel_size = 0;       // field [m]
   h6Vec3 origin{};             // field: its first node, mesh frame [m]
   std::array<int, 3> nodes{};  // field: per axis
@@ -43,12 +43,12 @@ struct LoadedScene {
   std::vector<std::string> warnings;
 
   int body_index(const std::string& name) const;
-  double duration() const;  // the scene's, or to the end of its longest path [s]
-  // Points at bodies and hands: valid while this object stays where it is.
+  double duration() const;  // the scene's, or that of its longest path [s]
+  // It points at bodies and hands of this object.
   h6SessionDef session_def() const;
 };
 
-// Reads, bakes and converts. A sentence that names body and file when something is wrong.
+// Reads, bakes and converts. An error names the body and the file.
 Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress = {});
 
 }  // namespace h6::io
