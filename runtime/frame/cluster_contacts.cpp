@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// cluster_contacts.cpp - near contacts become one. Kim et al. 2003; METHOD.md, Sec. 3.
+// cluster_contacts.cpp - merges near contacts into one. Kim et al. 2003; METHOD.md, Sec. 3.
 //
-// A grid whose cells have a diagonal of the threshold: contacts of one cell hang together without
-// a test, and only cells up to two apart can be linked. Cells are sorted, x fastest, so that five
-// of them in a row are found at once. Nothing is allocated.
+// The cells of a grid have the threshold as their diagonal. So contacts of one cell are in one
+// cluster without a test, and only cells up to two apart can be linked. Cells are sorted, x
+// fastest, so that one search finds five of them in a row. Nothing is allocated.
 #include <algorithm>
 #include <cmath>
 
@@ -14,14 +14,14 @@ namespace {
 
 constexpr int kBits = 21;                          // of a coordinate in a cell's key
 constexpr double kMostCells = (1 << (kBits - 1));  // along an axis
-constexpr int kReach = 2;  // cells: beyond it, two are farther apart than the threshold
+constexpr int kReach = 2;                          // cells farther apart than this cannot be linked
 
 std::uint64_t key_of(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
   return (z << kBits | y) << kBits | x;
 }
 
-// Keys of the rows; coordinates are shifted by kReach so that neighbours never underflow. Where
-// contacts spread over more cells than a key holds, cells grow.
+// Computes the rows' cells. Coordinates are shifted by kReach so that neighbours never underflow.
+// Where contacts spread over more cells than a key holds, the cells grow.
 void fill_cells(const Contacts& c, std::size_t begin, std::size_t n, double distance,
                 std::uint64_t* cell) {
   const float* const axes[3] = {c.rx + begin, c.ry + begin, c.rz + begin};
@@ -31,7 +31,7 @@ void fill_cells(const Contacts& c, std::size_t begin, std::size_t n, double dist
     low[k] = *least;
     extent = std::max(extent, double{*most} - *least);
   }
-  // A little less than the diagonal asks for: rounding must not put a link into one cell.
+  // A little less than the diagonal allows, so that rounding puts no two unlinked rows into a cell.
   const double edge = std::max(distance / std::sqrt(3.0) * (1 - 1e-6), extent / kMostCells);
   for (std::size_t i = 0; i < n; ++i) {
     std::uint64_t at[3];
@@ -47,7 +47,7 @@ struct Linker {
   double distance2;
   const std::uint64_t* cell;
   const std::uint32_t* order;  // rows by cell
-  std::uint32_t* root;         // a row of the same cluster, none above itself
+  std::uint32_t* root;         // a row of the same cluster, never above the row itself
 
   std::uint32_t find(std::uint32_t i) const {
     while (root[i] != i) i = root[i] = root[root[i]];
@@ -68,14 +68,14 @@ struct Linker {
                  z = double{c.rz[begin + i]} - c.rz[begin + j];
     return x * x + y * y + z * z < distance2;
   }
-  // One link is enough: each cell hangs together already.
+  // One link is enough, because each cell is in one cluster already.
   void link_cells(std::size_t a, std::size_t a_end, std::size_t b, std::size_t b_end) const {
     if (find(order[a]) == find(order[b])) return;
     for (std::size_t i = a; i < a_end; ++i)
       for (std::size_t j = b; j < b_end; ++j)
         if (near(order[i], order[j])) return link(order[i], order[j]);
   }
-  // Cells of one row of the grid, `from` .. `to` by key.
+  // Links cell `a` to the cells of one row of the grid, keys `from` to `to`.
   void link_row(std::size_t a, std::size_t a_end, std::uint64_t from, std::uint64_t to) const {
     std::size_t b =
         std::lower_bound(order, order + count, from,
@@ -90,7 +90,7 @@ struct Linker {
     for (std::size_t a = 0, a_end; a < count; a = a_end) {
       a_end = run_end(a);
       for (std::size_t i = a + 1; i < a_end; ++i) link(order[a], order[i]);
-      // Neighbours with a larger key; the smaller ones have looked this way already.
+      // Only neighbours with a larger key: those with a smaller one have been linked already.
       const std::uint64_t key = cell[order[a]];
       for (int dz = 0; dz <= kReach; ++dz)
         for (int dy = dz == 0 ? 0 : -kReach; dy <= kReach; ++dy) {
@@ -107,7 +107,7 @@ void copy_row(Contacts& c, std::size_t from, std::size_t to) {
   each_column(c, [&](auto* column) { column[to] = column[from]; });
 }
 
-// Running means by depth; weight holds the sum of depths, facing the deepest so far.
+// Running means weighted by depth. weight holds the sum of depths, facing the largest so far.
 void merge_row(Contacts& c, std::size_t from, std::size_t to) {
   const float depth = c.depth[from];
   c.weight[to] += depth;

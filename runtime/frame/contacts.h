@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// contacts.h - the contacts of one shell body: structure of arrays, one row a touching point.
+// contacts.h - the contacts of one shell body in columns, one row for each touching point.
 #pragma once
 #include <cstdint>
 
@@ -22,7 +22,7 @@ struct Contacts {
   std::size_t count, capacity;
 };
 
-// One list of columns serves allocation and checks.
+// The one list of all columns.
 template <class F>
 void each_column(Contacts& c, F&& f) {
   for (float** column : {&c.depth, &c.nx, &c.ny, &c.nz, &c.gx, &c.gy, &c.gz, &c.rx, &c.ry, &c.rz,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// share_gate.h - whether the helper is to be asked: both ways are timed now and then.
+// share_gate.h - decides by timing whether a second thread helps.
 //
-// What a second thread writes, or reads, has to come over from its core's cache, and what that
-// costs is the machine's affair: on virtual ones it changes while a program runs. Sums of 1,000
-// contacts took 25 us alone and 17 on two threads while both cores had a cache in common, 18 and 27
-// when not. Whoever runs the slices, the bits are the same, so the gate may go by the clock.
+// Data that a second thread writes must come over from its core's cache. The cost depends on the
+// machine, and on virtual ones it changes while a program runs: sums of 1,000 contacts took 25 us
+// on one thread and 17 on two while both cores shared a cache, and 18 and 27 when they did not. The
+// bits are the same on any thread, so the gate may go by the clock.
 #pragma once
 #include <algorithm>
 #include <bit>
@@ -15,13 +15,13 @@ namespace h6 {
 
 class ShareGate {
  public:
-  // Is work of `size` to be shared this time? It is then told how long that took.
+  // Is work of `size` to be shared this time? took() must then say how long it took.
   bool share(std::size_t size) {
     now_ = &kinds_[std::min<std::size_t>(std::bit_width(size), kKinds) - 1];
     size_ = static_cast<double>(size);
     const std::uint32_t phase = now_->times++ % kEvery;
     trial_ = phase < kTrial;
-    // The first ones find in the caches what the other way left there.
+    // The first trials find the caches as the other way left them, so they do not count.
     settled_ = phase % kTrial >= kTrial / 2 || phase >= 2 * kTrial;
     way_ = now_->shares != trial_;
     return way_;
@@ -40,12 +40,12 @@ class ShareGate {
   }
 
  private:
-  static constexpr std::size_t kKinds = 24;     // of sizes: powers of two
-  static constexpr std::uint32_t kEvery = 512;  // times until the other way is tried again
-  static constexpr std::uint32_t kTrial = 8;    // so many times
-  static constexpr double kGain = 0.95;         // what sharing must save before it is begun
+  static constexpr std::size_t kKinds = 24;     // of sizes, by powers of two
+  static constexpr std::uint32_t kEvery = 512;  // calls until the other way is tried again
+  static constexpr std::uint32_t kTrial = 8;    // calls of a trial
+  static constexpr double kGain = 0.95;         // sharing begins below this share of the time alone
   struct Kind {
-    double each[2] = {};  // ns of one alone and shared
+    double each[2] = {};  // time of one item alone and shared [ns]
     std::uint32_t times = 0;
     bool shares = true;
   } kinds_[kKinds];

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// solve.cpp - Eigen's factorisations are here, and nowhere else in a step: they compile slowly.
+// solve.cpp - the factorisations of a step, all in one file because Eigen's compile slowly.
 #include "runtime/frame/solve.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-// One body's system all in registers, without a loop: twice as fast.
+// Unrolled, one body's system stays in registers: twice as fast.
 #if defined(__GNUC__) && !defined(__clang__)
 #define H6_UNROLL_SIX _Pragma("GCC unroll 6")
 #elif defined(__clang__)
@@ -17,9 +17,9 @@
 namespace h6 {
 namespace {
 
-// A x = b by LDL^T without pivots or square roots, which positive matrices do not need. Of the
-// lower triangle. What follows from a column is taken from all behind it at once, so that only
-// pivots wait for one another. False when a pivot is not positive.
+// Solves A x = b by LDL^T, from the lower triangle, without pivoting or square roots, which
+// positive matrices do not need. Each column is eliminated from all later ones at once, so that
+// only pivots depend on one another. False when a pivot is not positive.
 template <class Matrix, class Vector>
 bool solve_positive(const Matrix& A, const Vector& b, Vector& x) {
   constexpr int kMost = Matrix::MaxRowsAtCompileTime;
@@ -59,7 +59,7 @@ bool solve(h6Gradient form, const Matrix& A, const Vector& b, Vector& x) {
     x = A.partialPivLu().solve(b);
   } else {
     if (solve_positive(A, b, x)) return x.allFinite();
-    // Semidefinite, or nearly: with pivots.
+    // Semidefinite or nearly so: with pivoting.
     const Eigen::LDLT<Matrix> factors(A);
     if (factors.info() != Eigen::Success || !factors.isPositive()) return false;
     x = factors.solve(b);

@@ -5,19 +5,19 @@
 
 namespace h6 {
 
-inline constexpr int kIslandBodies = 4;  // that are one system
+inline constexpr int kIslandBodies = 4;  // bodies that are solved as one system
 
-// Of an island of bodies. The number of unknowns is a number at run time, the storage fixed.
+// The system of an island of bodies: size known at run time, storage fixed.
 using IslandMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
                                    6 * kIslandBodies, 6 * kIslandBodies>;
 using IslandVector =
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6 * kIslandBodies, 1>;
 
-// A x = b. False when A is not what `form` promises, or the answer is not finite.
+// Solves A x = b. False when A is not positive where `form` is symmetric, or x is not finite.
 bool solve_system(h6Gradient form, const Mat6& A, const Vec6& b, Vec6& x);
 bool solve_system(h6Gradient form, const IslandMatrix& A, const IslandVector& b, IslandVector& x);
 
-// For a body that never turns: its rotation is no unknown.
+// Takes the rotation of a body that never turns out of the system.
 template <class Matrix, class Vector>
 void hold_rotation(Matrix& A, Vector& b, int body) {
   const int first = 6 * body + 3;

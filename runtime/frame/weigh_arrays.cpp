@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// weigh_arrays.cpp - h6WeighContacts: the rules for contacts of any simulator.
+// weigh_arrays.cpp - h6WeighContacts: the weight rules for contacts of any simulator.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -11,12 +11,12 @@
 namespace h6 {
 namespace {
 
-// Everything that a call needs, laid out in one block.
+// All that a call needs, in one block.
 struct Work {
   Contacts contacts{};
   ClusterScratch cluster{};
-  std::uint32_t* source = nullptr;  // (rows) the contact that a row was, before clusters
-  char* scratch = nullptr;          // of weigh_columns, for any rule
+  std::uint32_t* source = nullptr;  // (rows) the index of each row's contact, before clustering
+  char* scratch = nullptr;          // of weigh_columns, large enough for any rule
 };
 
 void lay_out(Work& work, Arena& arena, std::size_t count) {
@@ -24,7 +24,7 @@ void lay_out(Work& work, Arena& arena, std::size_t count) {
   work.cluster = {arena.take<std::uint32_t>(count), arena.take<std::uint32_t>(count),
                   arena.take<std::uint64_t>(count)};
   work.source = arena.take<std::uint32_t>(count);
-  h6ContactDef hungriest{};  // two trees, from the fewest contacts on
+  h6ContactDef hungriest{};  // two trees, even for few contacts
   hungriest.method = H6_METHOD_GAUSS6;
   work.scratch = arena.take<char>(weigh_scratch_bytes(hungriest, count));
 }
@@ -36,7 +36,7 @@ std::size_t bytes_of(std::size_t count) {
   return counting.used() + kAlignment;  // the block may start anywhere
 }
 
-// The caller's block, or one from the heap that lives as long as this does.
+// The caller's block, or one from the heap.
 class Block {
  public:
   Block(const h6ContactArrays& in, std::size_t bytes)
@@ -103,7 +103,7 @@ void fill_rows(const h6ContactArrays& in, bool series, Work& work) {
     const float* g = in.gradients ? in.gradients + 3 * i : n;
     const double length = length3(g);
     const float unit = length > 1e-6 ? static_cast<float>(1 / length) : 1.0f;
-    if (!(length > 1e-6)) g = n;  // a gradient that vanishes has no direction
+    if (!(length > 1e-6)) g = n;  // a vanishing gradient has no direction
     const std::size_t row = c.count++;
     c.depth[row] = in.depths[i];
     c.nx[row] = n[0], c.ny[row] = n[1], c.nz[row] = n[2];
@@ -114,7 +114,7 @@ void fill_rows(const h6ContactArrays& in, bool series, Work& work) {
   }
 }
 
-// A cluster's weight goes to its contacts in proportion to their depths.
+// Gives each contact its weight. A cluster's weight is shared in proportion to depth.
 void hand_out_weights(const h6ContactArrays& in, std::size_t rows_before, bool clustered,
                       Work& work, float* weights) {
   std::fill_n(weights, in.count, 0.0f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// weighing.h - the rules of METHOD.md, Sec. 3, on columns of contacts: shared by a session's frame
-// and by h6WeighContacts.
+// weighing.h - the weight rules of METHOD.md, Sec. 3, on columns of contacts. A frame and
+// h6WeighContacts share them.
 #pragma once
 #include "kernels/contact/contact_columns.h"
 #include "kernels/contact/contact_wrench.h"
@@ -11,12 +11,12 @@
 
 namespace h6 {
 
-// Shares of stiffness of all rows, for every rule but `series`. `lever`: the body's radius [m].
-// `team` may be null. `scratch`: weigh_scratch_bytes of any count from c.count on, or null, which
-// costs time where contacts are many.
+// Fills facing, T, weight and load of all rows, for every rule but `series`. `lever`: the body's
+// radius [m]. `team` may be null. `scratch`: weigh_scratch_bytes of c.count or more, or null, which
+// is slower for many contacts.
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                    sched::FrameTeam* team, void* scratch = nullptr);
-// What weigh_columns can use for up to `count` contacts; 0 where the rule has no use for it.
+// The scratch that weigh_columns uses for up to `count` contacts; 0 where the rule needs none.
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
 
 // Rows begin..end-1.
@@ -44,28 +44,28 @@ struct ClusterScratch {
 };
 inline constexpr std::uint32_t kNoCluster = UINT32_MAX;
 
-// Single linkage: rows of begin..end-1 nearer than `distance` [m] are one contact, and whatever
-// hangs together so. Every cluster becomes one row, written from `out` (<= begin) on: depth, N, g
-// and r are means weighted by depth, point is the deepest one. A cluster whose normals cancel has
-// no direction and is left out. Returns the row behind the last; root[i] then is the row that row
-// begin + i went to, or kNoCluster. Depths must be above 0.
+// Single linkage: two rows of begin..end-1 nearer than `distance` [m] are in one cluster. Every
+// cluster becomes one row, written from `out` (<= begin) on: depth, N, g and r are means weighted
+// by depth, `point` is that of the deepest row. A cluster whose normals cancel has no direction and
+// is left out. Returns the row behind the last. root[i] is then the row that row begin + i went to,
+// or kNoCluster. Depths must be above 0.
 std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, std::size_t out,
                              double distance, const ClusterScratch& scratch);
 
 // ---- series
 // --------------------------------------------------------------------------------------
 
-// L: farther than any contact of this body can be.
+// L, an upper bound on the arms of the body's contacts [m].
 inline double series_lever(double radius, double voxel) { return radius > voxel ? radius : voxel; }
 
-// e of rows begin..end-1 goes to load: depth less what damping takes at the relative velocity u.
+// Writes e of rows begin..end-1 to load: the depth less the damping at the relative velocity u.
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end);
-// Facing, kappa, slack, load (from e), weight; y is the start and then the extension.
+// Fills facing, kappa, slack, load (from e) and weight. y holds the start and then the extension.
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6]);
 // sum lambda J, sum kappa J J_g^T and sum kappa J J^T over rows that carry load.
 kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,
                                    std::size_t end);
-// c S^-2: the spring in unscaled coordinates, in k.
+// c S^-2: the spring in unscaled coordinates, in units of k.
 Mat6 series_spring(const h6ContactDef& def, double lever);
 
 inline Mat6 row_major(const double m[36]) {
