@@ -13,6 +13,8 @@ namespace {
 // the speeds of an encoder's noise the deficit over the motion would be any number.
 constexpr double kFullSpeed = 0.05;
 constexpr double kStill = 1e-9;  // motion in a frame below which there is no direction [m]
+constexpr double kMemory =
+    0.02;  // the share rises again in this time; changes are held as long [s]
 
 void shorten(Vec3& v, double most) {
   const double n = v.norm();
@@ -158,8 +160,12 @@ bool touches(const h6Session& s, std::int32_t body) {
 void HandPort::move(const h6Pose& pose, const h6Wrench& wrench) {
   if (placed_) {
     const Quat q = from(pose.q), before = from(pose_.q);
-    moved_ = from(pose.p) + q * com_ - from(pose_.p) - before * com_;
-    turned_ = log_rotation(q * before.conjugate());
+    const Vec3 moved = from(pose.p) + q * com_ - from(pose_.p) - before * com_,
+               turned = log_rotation(q * before.conjugate());
+    move_change_ = std::max(move_change_, (moved - moved_).norm());
+    turn_change_ = std::max(turn_change_, (turned - turned_).norm());
+    moved_ = moved;
+    turned_ = turned;
     energy_ += from(wrench.force).dot(moved_) + from(wrench.torque).dot(turned_);
     if (!std::isfinite(energy_)) energy_ = 0;
   }
@@ -167,9 +173,9 @@ void HandPort::move(const h6Pose& pose, const h6Wrench& wrench) {
   placed_ = true;
 }
 
-bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double dt) const {
-  if (!known_) return false;
-  Vec3 force = from(felt.force), torque = from(felt.torque);
+// Takes energy from the hand along its motion. True when it changed the wrench.
+bool HandPort::add_damper(Vec3& force, Vec3& torque, double max_force, double max_torque,
+                          double dt) const {
   // What is felt acts on the hand, so it is energy that leaves.
   const double deficit = force.dot(moved_) + torque.dot(turned_) - energy_;
   // Force and torque are made one by the lever that their bounds have.
@@ -183,8 +189,37 @@ bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double 
   torque -= damper * lever * lever * turned_;
   shorten(force, force_bound);
   shorten(torque, torque_bound);
-  felt = {to(force), to(torque)};
   return true;
+}
+
+// The share of the wrench, 0 .. 1, with which the next motion cannot take more than the port has.
+double HandPort::share_for(const Vec3& force, const Vec3& torque) const {
+  const double out = force.dot(moved_) + torque.dot(turned_);
+  // The next motion differs from the last one by up to the changes seen lately: the wrench then
+  // takes out between out - 2 doubt and out + 2 doubt.
+  const double doubt = 0.5 * (force.norm() * move_change_ + torque.norm() * turn_change_);
+  if (energy_ >= std::max(out, 0.0) || out <= -2 * doubt) return 1;
+  const double room = energy_ + doubt;
+  return room > 0 ? room / (std::max(out, 0.0) + doubt) : 0;
+}
+
+bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double dt) {
+  if (!known_) return false;
+  Vec3 force = from(felt.force), torque = from(felt.torque);
+  bool changed = add_damper(force, torque, max_force, max_torque, dt);
+  // Down at once, up slowly: a share that comes back in one frame is felt as a click, and would
+  // follow a tremor up and down.
+  share_ = std::min(share_for(force, torque), share_ + dt / kMemory);
+  const double held = std::max(0.0, 1 - dt / kMemory);
+  move_change_ *= held;
+  turn_change_ *= held;
+  if (share_ < 1) {
+    force *= share_;
+    torque *= share_;
+    changed = true;
+  }
+  if (changed) felt = {to(force), to(torque)};
+  return changed;
 }
 
 void observe_hand(h6Session& s, Hand& hand) {

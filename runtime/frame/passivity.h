@@ -23,23 +23,31 @@ class HandPort {
   void start(double stored) {
     energy_ = stored;
     known_ = true;
+    share_ = 1;
   }
   // The engine holds no more than `stored` [J]: what was put in beyond that is spent and finances
   // nothing later.
   void spend(double stored) { energy_ = std::min(energy_, stored); }
-  // Changes the wrench that the hand is about to feel so that E stays at 0 or above if the motion
-  // goes on as it was; true when it did. Neither force nor torque exceeds its bound by that.
-  bool damp(h6Wrench& felt, double max_force, double max_torque, double dt) const;
+  // Once a frame of `dt` seconds, after move. Changes the wrench that the hand is about to feel so
+  // that E stays at 0 or above if the next motion is like the last one, and within one frame's work
+  // of 0 if it is not; true when it did. Neither force [N] nor torque [N m] exceeds the larger of
+  // its bound and what it was.
+  bool damp(h6Wrench& felt, double max_force, double max_torque, double dt);
   void forget() { known_ = false; }  // E is not known until the next start
   bool known() const { return known_; }
   double energy() const { return energy_; }
 
  private:
+  bool add_damper(Vec3& force, Vec3& torque, double max_force, double max_torque, double dt) const;
+  double share_for(const Vec3& force, const Vec3& torque) const;
+
   Vec3 com_ = Vec3::Zero();
   double energy_ = 0;
   bool known_ = false, placed_ = false;
   h6Pose pose_{{0, 0, 0}, {1, 0, 0, 0}};
-  Vec3 moved_ = Vec3::Zero(), turned_ = Vec3::Zero();  // since the sample before
+  Vec3 moved_ = Vec3::Zero(), turned_ = Vec3::Zero();  // since the sample before [m], [rad]
+  double move_change_ = 0, turn_change_ = 0;  // how much that changed from frame to frame, held
+  double share_ = 1;                          // of the wrench, in the last frame
 };
 
 struct Hand;
