@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "hapsix/vector.h"
 #include "io/scene/load_scene.h"
 #include "io/scenes/scenes.h"
 
@@ -55,21 +56,14 @@ Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6D
   return session;
 }
 
-h6Vec3 rotate(const h6Quat& q, const h6Vec3& v) {
-  const double tx = 2 * (q.y * v.z - q.z * v.y), ty = 2 * (q.z * v.x - q.x * v.z),
-               tz = 2 * (q.x * v.y - q.y * v.x);
-  return {v.x + q.w * tx + q.y * tz - q.z * ty, v.y + q.w * ty + q.z * tx - q.x * tz,
-          v.z + q.w * tz + q.x * ty - q.y * tx};
-}
-
 // The next frame's contacts against all points at the pose before it. Points within a thousandth of
 // a voxel of the surface may fall on either side: they are sampled here along another path.
 bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   const h6Pose pose = h6GetBody(session, 1).pose;
   std::vector<double> points, depth(alpha()->watched_points.size());
   for (const h6Vec3& p : alpha()->watched_points) {
-    const h6Vec3 q = rotate(pose.q, p);
-    points.insert(points.end(), {q.x + pose.p.x, q.y + pose.p.y, q.z + pose.p.z});
+    const h6Vec3 q = place(pose, p);
+    points.insert(points.end(), {q.x, q.y, q.z});
   }
   h6SampleField(alpha()->model.get(), alpha()->bodies[0].field, points.data(), depth.size(),
                 depth.data(), nullptr, nullptr);

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "device/forward_arm.h"
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 h6Quat slerp(const h6Quat& a, h6Quat b, double s) {
   double c = dot(a, b);
   if (c < 0) {
-    b = {-b.w, -b.x, -b.y, -b.z};
+    b = -b;
     c = -c;
   }
   double wa = 1 - s, wb = s;
@@ -37,8 +37,7 @@ h6DeviceSample HandPath::keyframe(double t) const {
   const std::size_t i = static_cast<std::size_t>(after - time.begin());
   const h6Pose &a = pose[i - 1], &b = pose[i];
   const double seconds = time[i] - time[i - 1], s = (t - time[i - 1]) / seconds;
-  sample.pose.p = {a.p.x + s * (b.p.x - a.p.x), a.p.y + s * (b.p.y - a.p.y),
-                   a.p.z + s * (b.p.z - a.p.z)};
+  sample.pose.p = a.p + s * (b.p - a.p);
   sample.pose.q = slerp(a.q, b.q, s);
   sample.velocity.linear = {(b.p.x - a.p.x) / seconds, (b.p.y - a.p.y) / seconds,
                             (b.p.z - a.p.z) / seconds};

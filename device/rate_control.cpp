@@ -5,24 +5,17 @@
 #include <cmath>
 #include <cstdio>
 
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {
-
-h6Vec3 limited(const h6Vec3& v, double most) {
-  const double n = norm(v);
-  return n > most ? (most / n) * v : v;
-}
-
-double dot3(const h6Vec3& a, const h6Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // v without a share of what goes against the felt f; all of it is taken at `most`.
 h6Vec3 yielding(const h6Vec3& v, const h6Vec3& f, double most) {
   const double n = norm(f);
   if (!(most > 0) || !(n > 0) || !std::isfinite(n)) return v;
   const h6Vec3 along = (1 / n) * f;
-  const double against = std::min(0.0, dot3(v, along));
+  const double against = std::min(0.0, dot(v, along));
   return v - (against * std::min(1.0, n / most)) * along;
 }
 
@@ -95,8 +88,8 @@ h6Velocity RateControl::wanted(const std::array<double, 6>& a) const {
 
 // As fast as the figures allow, and there within the step when it is near enough.
 h6Velocity RateControl::homewards(double dt) const {
-  return {limited((1 / dt) * (home_x_ - x_), figures_.speed),
-          limited((1 / dt) * turn(q_, home_q_), figures_.turn_speed)};
+  return {at_most((1 / dt) * (home_x_ - x_), figures_.speed),
+          at_most((1 / dt) * turn(q_, home_q_), figures_.turn_speed)};
 }
 
 h6DeviceSample RateControl::step(const std::array<double, 6>& axes, std::uint32_t buttons,

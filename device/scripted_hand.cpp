@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "device/forward_arm.h"
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 class Writer {
  public:
   Writer(double metres, const h6Pose& home, const h6Vec3& grip)
-      : unit_(metres), grip_(grip), home_q_(device::unit(home.q)), q_(home_q_) {
+      : unit_(metres), grip_(grip), home_q_(h6::unit(home.q)), q_(home_q_) {
     home_x_ = x_ = home.p + rotate(q_, grip);
     keep();
   }

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "device/path_device.h"
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {
@@ -67,11 +67,6 @@ Outcome check_figures(const ArmFigures& a) {
   if (!std::isfinite(norm(a.person.grip)))
     return Failure{"the grip of the simulated arm is not finite"};
   return Done{};
-}
-
-h6Vec3 limited(const h6Vec3& v, double most) {
-  const double n = norm(v);
-  return n > most ? (most / n) * v : v;
 }
 
 double rounded(double x, double step) { return step > 0 ? step * std::round(x / step) : x; }
@@ -219,7 +214,7 @@ h6Wrench SimulatedArm::motors() const {
     out = spring_to_command(arm_.driver_stiffness, arm_.driver_damping,
                             arm_.driver_rotational_stiffness, arm_.driver_rotational_damping);
   }
-  return {limited(out.force, arm_.max_force), limited(out.torque, arm_.max_torque)};
+  return {at_most(out.force, arm_.max_force), at_most(out.torque, arm_.max_torque)};
 }
 
 // The wrench that goes with a sample.

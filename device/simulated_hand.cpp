@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "device/path_device.h"
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 

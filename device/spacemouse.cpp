@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "device/hand_path.h"
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 
 namespace h6::device {
 namespace {
@@ -12,11 +12,6 @@ namespace {
 constexpr double kFrequency = 38;  // natural, critically damped [rad/s]
 // The hand is back on its path when it is nearer than that [m], [rad].
 constexpr double kNear = 1e-6, kNearAngle = 1e-5;
-
-h6Vec3 at_most(const h6Vec3& v, double most) {
-  const double n = norm(v);
-  return n > most ? (most / n) * v : v;
-}
 
 }  // namespace
 

@@ -12,9 +12,6 @@ namespace {
 constexpr std::size_t kSlice = 1024;
 constexpr std::uint32_t kLook = 48;  // triangles around a vertex; more are not looked at
 
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
 // The triangles around each vertex, in order. Every thread reads all triangles and takes those at
 // its range of vertices.
 struct Rings {
@@ -78,10 +75,10 @@ Features::Gradient inwards(const Surface& surface, std::uint32_t triangle, std::
   std::uint32_t third = t[0];
   for (std::uint32_t v : t)
     if (v != a && v != b) third = v;
-  const Vec3 along = minus(surface.vertices[b], surface.vertices[a]);
-  Vec3 in = minus(surface.vertices[third], surface.vertices[a]);
+  const Vec3 along = surface.vertices[b] - surface.vertices[a];
+  Vec3 in = surface.vertices[third] - surface.vertices[a];
   const double slanted2 = dot(in, in), part = dot(in, along) / dot(along, along);
-  in = minus(in, {part * along.x, part * along.y, part * along.z});
+  in = in - part * along;
   const double length = std::sqrt(dot(in, in));
   if (!(length * length > 1e-12 * slanted2) || !(length > 1e-6)) return {};
   const double over = 1 / length;
@@ -113,13 +110,13 @@ void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t 
   std::size_t count = 0;
   Vec3 sum{0, 0, 0};
   for (std::size_t i = 0; i < spokes.count; ++i) {
-    Vec3 d = minus(surface.vertices[spokes.end[i]], p);
+    Vec3 d = surface.vertices[spokes.end[i]] - p;
     const double length = std::sqrt(dot(d, d));
     if (!(length > 1e-9)) continue;
     const double over = 1 / length;
-    d = {d.x * over, d.y * over, d.z * over};
+    d = over * d;
     if (i < 2)  // the first triangle's
-      sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
+      sum = sum + d;
     else
       direction[count++] = d;
   }
@@ -138,7 +135,7 @@ void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t 
       }
     const Vec3 d = direction[best];
     from = {float(d.x), float(d.y), float(d.z)};
-    sum = {sum.x + d.x, sum.y + d.y, sum.z + d.z};
+    sum = sum + d;
     direction[best] = direction[--count];
   }
 }

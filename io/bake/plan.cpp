@@ -13,19 +13,15 @@ namespace {
 
 using Corners = std::array<Vec3, 3>;
 
-Vec3 minus(const Vec3& p, const Vec3& q) { return {p.x - q.x, p.y - q.y, p.z - q.z}; }
-double squared(const Vec3& p) { return p.x * p.x + p.y * p.y + p.z * p.z; }
-double axis(const Vec3& p, int k) { return k == 0 ? p.x : k == 1 ? p.y : p.z; }
-
 constexpr double kPiece = 4;     // [voxel] longest edge
 constexpr double kPieces = 3e7;  // a second's work: of more, some triangles are left out
 
 // About how many pieces a triangle falls into.
 double pieces_of(const Corners& c) {
-  const Vec3 u = minus(c[1], c[0]), v = minus(c[2], c[0]);
-  const Vec3 n{u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
-  const double longest = std::sqrt(std::max({squared(u), squared(v), squared(minus(u, v))}));
-  return 1 + 2 * longest / kPiece + 2 * std::sqrt(squared(n)) / (kPiece * kPiece);
+  const Vec3 u = c[1] - c[0], v = c[2] - c[0];
+  const Vec3 n = cross(u, v);
+  const double longest = std::sqrt(std::max({dot(u, u), dot(v, v), dot(u - v, u - v)}));
+  return 1 + 2 * longest / kPiece + 2 * std::sqrt(dot(n, n)) / (kPiece * kPiece);
 }
 
 // The bricks near triangles, one bit each.
@@ -40,7 +36,7 @@ class Bricks {
     double longest2 = -1;
     for (int k = 0; k < 3; ++k) {
       const Vec3 &p = c[std::size_t(k)], &q = c[std::size_t((k + 1) % 3)];
-      const double l2 = squared(minus(p, q));
+      const double l2 = dot(p - q, p - q);
       if (l2 > longest2) longest2 = l2, a = k;
     }
     if (longest2 > kPiece * kPiece) {
@@ -53,7 +49,8 @@ class Bricks {
     }
     int low[3], high[3];
     for (int k = 0; k < 3; ++k) {
-      const auto [least, most] = std::minmax({axis(c[0], k), axis(c[1], k), axis(c[2], k)});
+      const auto [least, most] =
+          std::minmax({component(c[0], k), component(c[1], k), component(c[2], k)});
       // Nodes 0..7 of a brick, 8 voxels from one brick to the next.
       low[k] = std::max(0, int(std::ceil((least - reach_ - 7) / 8)));
       high[k] = std::min(grid_.bricks[std::size_t(k)] - 1, int(std::floor((most + reach_) / 8)));

@@ -20,11 +20,6 @@ constexpr int kSide = 2 * kView * kFine + 1;
 struct Facet {
   Vec3 a, e, f;  // corner and two edges
 };
-Vec3 sub(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 // Whether p + t d, t in [0, 1], meets the triangle (T. Moeller, B. Trumbore, 1997). Touching
 // counts.
@@ -33,7 +28,7 @@ bool meets(const Vec3& p, const Vec3& d, const Facet& t) {
   const Vec3 h = cross(d, t.f);
   const double det = dot(t.e, h);
   if (det == 0) return false;
-  const Vec3 s = sub(p, t.a), q = cross(s, t.e);
+  const Vec3 s = p - t.a, q = cross(s, t.e);
   const double u = dot(s, h) / det, v = dot(d, q) / det, w = dot(t.f, q) / det;
   return u >= -kTouch && v >= -kTouch && u + v <= 1 + kTouch && w >= 0 && w <= 1;
 }
@@ -54,7 +49,7 @@ class View {
       const auto& t = surface_.triangles[tiles.triangle[i]];
       const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
                  &c = surface_.vertices[t[2]];
-      facets.push_back({a, sub(b, a), sub(c, a)});
+      facets.push_back({a, b - a, c - a});
     }
     return facets;
   }

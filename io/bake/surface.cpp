@@ -17,13 +17,10 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec3 sub(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-
 // Height over the longest side below 1e-12 of it: rounding, not area.
 bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 u = sub(b, a), v = sub(c, a), w = sub(c, b);
-  const Vec3 n = {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
+  const Vec3 u = b - a, v = c - a, w = c - b;
+  const Vec3 n = cross(u, v);
   const double longest2 = std::max({dot(u, u), dot(v, v), dot(w, w)});
   return dot(n, n) > 1e-24 * longest2 * longest2;
 }

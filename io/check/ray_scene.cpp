@@ -11,30 +11,24 @@
 namespace h6::io {
 namespace {
 
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
 Vec3 on_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 e = minus(b, a);
-  const double t = std::clamp(dot(minus(p, a), e) / dot(e, e), 0.0, 1.0);
-  return {a.x + t * e.x, a.y + t * e.y, a.z + t * e.z};
+  const Vec3 e = b - a;
+  const double t = std::clamp(dot(p - a, e) / dot(e, e), 0.0, 1.0);
+  return a + t * e;
 }
 // Of a triangle with area: straight below, or on the nearest edge.
 Vec3 point_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 n = cross(minus(b, a), minus(c, a)), w = minus(p, a);
+  const Vec3 n = cross(b - a, c - a), w = p - a;
   const auto left_of = [&](const Vec3& q, const Vec3& r) {
-    return dot(cross(minus(r, q), minus(p, q)), n) >= 0;
+    return dot(cross(r - q, p - q), n) >= 0;
   };
   if (left_of(a, b) && left_of(b, c) && left_of(c, a)) {
     const double h = dot(w, n) / dot(n, n);
-    return {p.x - h * n.x, p.y - h * n.y, p.z - h * n.z};
+    return p - h * n;
   }
   Vec3 best = on_edge(p, a, b);
   for (const Vec3& q : {on_edge(p, b, c), on_edge(p, c, a)})
-    if (dot(minus(p, q), minus(p, q)) < dot(minus(p, best), minus(p, best))) best = q;
+    if (dot(p - q, p - q) < dot(p - best, p - best)) best = q;
   return best;
 }
 
@@ -52,9 +46,9 @@ std::vector<std::uint32_t> that_count(const Mesh& mesh) {
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& f = mesh.triangles[t];
     const Vec3& a = mesh.vertices[f[0]];
-    const Vec3 u = minus(mesh.vertices[f[1]], a), v = minus(mesh.vertices[f[2]], a);
+    const Vec3 u = mesh.vertices[f[1]] - a, v = mesh.vertices[f[2]] - a;
     const Vec3 n = cross(u, v);
-    const double longest2 = std::max({dot(u, u), dot(v, v), dot(minus(v, u), minus(v, u))});
+    const double longest2 = std::max({dot(u, u), dot(v, v), dot(v - u, v - u)});
     if (!(dot(n, n) > 1e-24 * longest2 * longest2)) continue;  // a line
     keys.push_back({f, t});
     std::sort(keys.back().corners.begin(), keys.back().corners.end());
@@ -117,8 +111,8 @@ Result<std::unique_ptr<RayScene>> RayScene::make(const Mesh& mesh) {
   for (const std::uint32_t t : e->triangle)
     for (const std::uint32_t v : mesh.triangles[t]) {
       const Vec3& p = mesh.vertices[v];
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+      low = min(low, p);
+      high = max(high, p);
     }
   if (!e->triangle.empty()) {
     e->middle = {(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};
@@ -207,9 +201,9 @@ void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossi
     const std::uint32_t t = embree_->triangle[i];
     const auto& f = mesh_.triangles[t];
     const Vec3& a = mesh_.vertices[f[0]];
-    const Vec3 n = cross(minus(mesh_.vertices[f[1]], a), minus(mesh_.vertices[f[2]], a));
+    const Vec3 n = cross(mesh_.vertices[f[1]] - a, mesh_.vertices[f[2]] - a);
     const double fall = dot(n, along);
-    all.push_back({t, fall != 0 ? std::max(0.0, dot(n, minus(a, from)) / fall) : 0});
+    all.push_back({t, fall != 0 ? std::max(0.0, dot(n, a - from) / fall) : 0});
   }
   std::sort(all.begin(), all.end(), [](const Crossing& a, const Crossing& b) {
     return a.t != b.t ? a.t < b.t : a.triangle < b.triangle;
@@ -259,7 +253,7 @@ SurfacePlaces::SurfacePlaces(const Mesh& mesh) : mesh_(mesh) {
   double sum = 0;
   for (const auto& f : mesh.triangles) {
     const Vec3& a = mesh.vertices[f[0]];
-    const Vec3 n = cross(minus(mesh.vertices[f[1]], a), minus(mesh.vertices[f[2]], a));
+    const Vec3 n = cross(mesh.vertices[f[1]] - a, mesh.vertices[f[2]] - a);
     sum_.push_back(sum += std::sqrt(dot(n, n)) / 2);
   }
 }
@@ -277,7 +271,7 @@ SurfacePlaces::Place SurfacePlaces::operator()(Dice& dice) const {
   if (u + v > 1) u = 1 - u, v = 1 - v;
   const auto& f = mesh_.triangles[t];
   const Vec3& a = mesh_.vertices[f[0]];
-  const Vec3 b = minus(mesh_.vertices[f[1]], a), c = minus(mesh_.vertices[f[2]], a);
+  const Vec3 b = mesh_.vertices[f[1]] - a, c = mesh_.vertices[f[2]] - a;
   return {std::uint32_t(t),
           {a.x + u * b.x + v * c.x, a.y + u * b.y + v * c.y, a.z + u * b.z + v * c.z}};
 }

@@ -13,8 +13,6 @@ namespace {
 
 constexpr double kFacing = 0.70710678;  // cosine of 45 degrees
 
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
 struct Found {
   double thickness = -1, gap = -1;  // < 0: none
   bool bowl = false, sheet = false, buried = false;
@@ -32,7 +30,7 @@ class Probe {
     const Vec3& in = faces_.inward[at.triangle];
     // Solids that a step out of the place's own ends in: left less entered on the way to infinity.
     std::vector<Crossing> way;
-    cross(at, {-in.x, -in.y, -in.z}, way);
+    cross(at, -in, way);
     int around = 0;
     for (const Crossing& c : way) around += into(c, in) > 0 ? 1 : -1;
     if (around > 0) {

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <thread>
 
+#include "hapsix/vector.h"
+
 namespace h6::cli {
 namespace {
 
@@ -25,16 +27,11 @@ bool usable(const h6DeviceSample& s) {
   return std::fabs(sum) < 1e6 && std::fabs(q2 - 1) < 2e-3;  // false for what is no number, too
 }
 
-double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-h6Vec3 minus(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 double& part(h6Vec3& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; }
 
 // The turn from a to b, small angles.
 h6Vec3 turned(const h6Quat& a, const h6Quat& b) {
-  const h6Quat c{a.w, -a.x, -a.y, -a.z};
-  h6Quat d{
-      b.w * c.w - b.x * c.x - b.y * c.y - b.z * c.z, b.w * c.x + b.x * c.w + b.y * c.z - b.z * c.y,
-      b.w * c.y - b.x * c.z + b.y * c.w + b.z * c.x, b.w * c.z + b.x * c.y - b.y * c.x + b.z * c.w};
+  const h6Quat d = product(b, conjugate(a));
   const double sign = d.w < 0 ? -2 : 2;
   return {sign * d.x, sign * d.y, sign * d.z};
 }
@@ -81,7 +78,7 @@ std::string danger(const Frames& f, const h6Pose& start) {
   if (f.lost) return "the device was lost";
   if (!f.good) return "the device sent what is no place or no rotation";
   if (norm(f.sample.velocity.linear) > 1) return "the device moved faster than 1 m/s";
-  if (norm(minus(f.sample.pose.p, start.p)) > 0.1) return "the device moved farther than 0.1 m";
+  if (norm(f.sample.pose.p - start.p) > 0.1) return "the device moved farther than 0.1 m";
   return "";
 }
 
@@ -122,7 +119,7 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
       if (!go_on(w)) return false;
       if (i != 220) continue;  // a little after the height: what yields lags
       h6Vec3 moved =
-          torque ? turned(before.q, frames.sample.pose.q) : minus(frames.sample.pose.p, before.p);
+          torque ? turned(before.q, frames.sample.pose.q) : frames.sample.pose.p - before.p;
       p.moved = sign * part(moved, axis);
     }
     for (int i = 0; i < 100; ++i)

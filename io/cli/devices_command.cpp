@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "device/spacemouse.h"
+#include "hapsix/vector.h"
 #include "io/cli/commands.h"
 #include "io/cli/device_check.h"
 #include "io/console/checks.h"
@@ -113,14 +114,11 @@ ordered_json counts(const SampleCount& s) {
 // One line of what a device says: millimetres, degrees, buttons, force.
 std::string live_line(const h6DeviceSample& s, bool lost, const OpenedDevice& opened) {
   if (lost) return "lost";
-  const h6Quat& q = s.pose.q;
-  const double turned =
-      114.59155902616465 * std::atan2(std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z), std::fabs(q.w));
-  const h6Vec3& f = s.wrench.force;
+  const double degrees = 57.29577951308232 * norm(turn({1, 0, 0, 0}, s.pose.q));
   char text[160];
   std::snprintf(text, sizeof text, "%+8.2f %+8.2f %+8.2f mm %6.1f deg  buttons %x  %.2f N ",
-                1e3 * s.pose.p.x, 1e3 * s.pose.p.y, 1e3 * s.pose.p.z, turned, s.buttons,
-                std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z));
+                1e3 * s.pose.p.x, 1e3 * s.pose.p.y, 1e3 * s.pose.p.z, degrees, s.buttons,
+                norm(s.wrench.force));
   return text + (opened.live ? opened.live() : std::string{});
 }
 

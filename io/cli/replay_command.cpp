@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "hapsix/vector.h"
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
 #include "io/record/recording.h"
@@ -65,9 +66,8 @@ struct Figures {
     max_depth_voxels = std::max(max_depth_voxels, f.max_depth_voxels);
     frame_us.add(f.frame_us);
     for (const h6DeviceCommand& c : r.command) {
-      const h6Wrench& w = c.wrench;
-      max_force = std::max(max_force, std::hypot(w.force.x, w.force.y, w.force.z));
-      max_torque = std::max(max_torque, std::hypot(w.torque.x, w.torque.y, w.torque.z));
+      max_force = std::max(max_force, norm(c.wrench.force));
+      max_torque = std::max(max_torque, norm(c.wrench.torque));
     }
     verdict.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
                   (f.status & H6_STATE_NOT_FINITE) == 0);

@@ -16,6 +16,7 @@
 #include <variant>
 
 #include "device/steering.h"
+#include "hapsix/vector.h"
 #include "io/console/checks.h"
 #include "io/run/recorded_run.h"
 #include "io/run/run_observer.h"
@@ -164,13 +165,11 @@ class Viewer : public RunObserver {
     if (!wish_.held) return;
     if (!wish_.clutched && state_.any()) {
       const h6FrameRecord& r = state_.last();
-      const h6Vec3 &d = r.hand[0].pose.p, &s = r.command[0].pose.p;
-      offset_ = {d.x - s.x, d.y - s.y, d.z - s.z};
+      offset_ = r.hand[0].pose.p - r.command[0].pose.p;
     }
     wish_.placed = true;
     wish_.pose = move.pose;
-    wish_.pose.p = {move.pose.p.x + offset_.x, move.pose.p.y + offset_.y,
-                    move.pose.p.z + offset_.z};
+    wish_.pose.p = move.pose.p + offset_;
     steering_->wish(wish_);
   }
   void act(const io::view::Clutch& clutch) {

@@ -8,10 +8,6 @@
 namespace h6::cli {
 namespace {
 
-using io::operator+;
-using io::operator-;
-using io::operator*;
-
 // A closed cycle: down while tilted, flat while down, up while flat (or the other way round). Work
 // done by the contacts, in peaks of the work done against them.
 double cycle_work(const io::LoadedScene& loaded, const MethodColumn& method, bool reverse) {
@@ -32,10 +28,10 @@ double cycle_work(const io::LoadedScene& loaded, const MethodColumn& method, boo
     else
       z = 4.6 + 3.6 * (u - 2.0 / 3);
     const h6Vec3 p = {0, 0, z * kMm}, turn = {0.5 * tilt, tilt, 0};  // one axis: angles add up
-    const h6Wrench f = elastic_wrench(probe.at({p, io::turn_by(turn)}), kProbeStiffness);
+    const h6Wrench f = elastic_wrench(probe.at({p, turn_by(turn)}), kProbeStiffness);
     if (i > 0) {
-      work += 0.5 * io::dot(f.force + last.force, p - last_p) +
-              0.5 * io::dot(f.torque + last.torque, turn - last_turn);
+      work += 0.5 * dot(f.force + last.force, p - last_p) +
+              0.5 * dot(f.torque + last.torque, turn - last_turn);
       stored = std::max(stored, -work);
     }
     last = f, last_p = p, last_turn = turn;
@@ -58,7 +54,7 @@ double bounce_peak(const io::LoadedScene& loaded, const MethodColumn& method, do
   def.gravity = {0, 0, -9.8};
   const SessionPtr session(h6CreateSession(loaded.model.get(), &def, nullptr));
   if (!session) return 0;
-  const h6BodyState start{{{0, 0, 8.3 * kMm}, io::turn_by({0.03, 0.06, 0})}, {}};
+  const h6BodyState start{{{0, 0, 8.3 * kMm}, turn_by({0.03, 0.06, 0})}, {}};
   h6SetBody(session.get(), 1, &start);
   const h6BodyDef& body = def.bodies[1];
   const double first = body.mass * 9.8 * (start.pose.p.z - 5 * kMm);
@@ -68,11 +64,10 @@ double bounce_peak(const io::LoadedScene& loaded, const MethodColumn& method, do
     h6DeviceCommand command{};
     h6Step(session.get(), &sample, &command);
     const h6BodyState state = h6GetBody(session.get(), 1);
-    const h6Quat q = state.pose.q;
-    const h6Vec3 w = io::rotate({q.w, -q.x, -q.y, -q.z}, state.velocity.angular);
+    const h6Vec3 w = rotate(conjugate(state.pose.q), state.velocity.angular);
     const double turning =
         body.inertia[0] * w.x * w.x + body.inertia[1] * w.y * w.y + body.inertia[2] * w.z * w.z;
-    const double energy = 0.5 * body.mass * io::dot(state.velocity.linear, state.velocity.linear) +
+    const double energy = 0.5 * body.mass * dot(state.velocity.linear, state.velocity.linear) +
                           0.5 * turning + body.mass * 9.8 * (state.pose.p.z - 5 * kMm);
     most = std::max(most, std::isfinite(energy) ? energy / first : 1e9);
   }

@@ -11,15 +11,13 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "hapsix/vector.h"
 #include "io/record/recording.h"
 
 namespace h6::cli {
 namespace {
 
 constexpr double kLate = 0.2;  // the verdict's own window [s]
-
-double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-h6Vec3 minus(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
 // Sums a run up, row by row.
 class Tally {
@@ -37,7 +35,7 @@ class Tally {
     if (f.contacts) contacts_ += f.contacts, ++touching_;
     out_.max_depth_voxels = std::max(out_.max_depth_voxels, f.max_depth_voxels);
     out_.final_depth_voxels = f.max_depth_voxels;
-    out_.force_jump = std::max(out_.force_jump, norm(minus(force, force_)));
+    out_.force_jump = std::max(out_.force_jump, norm(force - force_));
     force_ = force;
     if (r.time >= late_from_) {
       const double v = norm(r.body[0].velocity.linear);

@@ -7,13 +7,7 @@
 #include "io/experiments/probe.h"
 
 namespace h6::cli {
-namespace {
-
-using io::operator+;
-using io::operator-;
-using io::operator*;
-
-}  // namespace
+namespace {}  // namespace
 
 Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console) {
   Study out;
@@ -37,7 +31,7 @@ Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& 
   const Way ways[] = {{"tilt to flat", flat->get(), 1,
                        [](double t) {
                          const double a = 0.05 * (1 - t);
-                         return h6Pose{{0, 0, 4.6 * kMm}, io::turn_by({0.5 * a, a, 0})};
+                         return h6Pose{{0, 0, 4.6 * kMm}, turn_by({0.5 * a, a, 0})};
                        }},
                       {"slide off an edge", edge->get(), 0.5, [](double t) {
                          return h6Pose{{-12.5 * kMm + 50 * kMm * t, 0, 4.6 * kMm}, {1, 0, 0, 0}};
@@ -55,7 +49,7 @@ Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& 
           for (int i = 0; i <= steps; ++i) {
             const h6Pose pose = ways[w].at(ways[w].seconds * i / steps);
             const h6Vec3 f = elastic_wrench(probe.at(pose), 1 / kProbeVoxel).force;
-            if (i > 0) found[w][fine][m] = std::max(found[w][fine][m], io::length(f - last));
+            if (i > 0) found[w][fine][m] = std::max(found[w][fine][m], norm(f - last));
             last = f;
           }
         });
@@ -77,8 +71,8 @@ namespace {
 
 // How the obstacle's mesh is turned before it is baked; its pose turns it back. Its surface then
 // crosses the lattice at all angles, as parts of a machine do.
-const h6Quat kBakedTurn = io::turn_by({0.37, 0.61, 0.23});
-const h6Quat kTurnedBack = io::turn_by({-0.37, -0.61, -0.23});
+const h6Quat kBakedTurn = turn_by({0.37, 0.61, 0.23});
+const h6Quat kTurnedBack = turn_by({-0.37, -0.61, -0.23});
 
 io::Scene ripple_scene(const io::Mesh& obstacle, io::PointCloud points) {
   return posed_scene("ripple", io::moved(obstacle, {{0, 0, 0}, kBakedTurn}), std::move(points),
@@ -88,7 +82,7 @@ io::Scene ripple_scene(const io::Mesh& obstacle, io::PointCloud points) {
 // A ridge along x: the upper half of a cylinder of 4 mm, in 256 sides of the whole.
 io::Mesh ridge() {
   const io::Mesh upright = io::prism_mesh({0, 0, 0}, 4 * kMm, -40 * kMm, 40 * kMm, 256);
-  const h6Quat lie = io::turn_by({0, std::numbers::pi / 2, 0});
+  const h6Quat lie = turn_by({0, std::numbers::pi / 2, 0});
   return io::moved(upright, {{0, 0, -4 * kMm}, lie});
 }
 
@@ -161,7 +155,7 @@ Ripple ripple_of(const io::LoadedScene& loaded, const MethodColumn& method,
   double lever = 0;
   const io::PointCloud& points = *loaded.scene.bodies[1].shell->points;
   for (std::size_t i = 0; i < points.x.size(); ++i)
-    lever = std::max(lever, io::length({points.x[i], points.y[i], points.z[i]}));
+    lever = std::max(lever, norm({points.x[i], points.y[i], points.z[i]}));
   std::vector<h6Wrench> all;
   h6Vec3 force{}, torque{};
   for (int i = 0; i < kFrames; ++i) {
@@ -171,10 +165,10 @@ Ripple ripple_of(const io::LoadedScene& loaded, const MethodColumn& method,
   }
   for (const h6Wrench& w : all) {
     const h6Vec3 df = w.force - force, dt = w.torque - torque;
-    out.force += io::dot(df, df) / kFrames, out.torque += io::dot(dt, dt) / kFrames;
+    out.force += dot(df, df) / kFrames, out.torque += dot(dt, dt) / kFrames;
   }
   out.force = std::sqrt(out.force), out.torque = std::sqrt(out.torque) / lever;
-  out.mean = io::length(force);
+  out.mean = norm(force);
   return out;
 }
 
@@ -213,7 +207,7 @@ Study study_ripple(const std::vector<MethodColumn>& columns, const Console& cons
                     return h6Pose{{0.4 * kMm, 0, (-35 + 20 * t) * kMm}, {1, 0, 0, 0}};
                   }});
   ways.push_back({"ball in a bowl", ripple_scene(fine_bowl(), ball(500)), [](double t) {
-                    return h6Pose{{0, 0, -0.2 * kMm}, io::turn_by({0, 0, 2 * t})};
+                    return h6Pose{{0, 0, -0.2 * kMm}, turn_by({0, 0, 2 * t})};
                   }});
   out.table = head("surface", columns);
   out.table[0].push_back("field");

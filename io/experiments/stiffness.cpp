@@ -10,10 +10,6 @@
 namespace h6::cli {
 namespace {
 
-using io::operator+;
-using io::operator-;
-using io::operator*;
-
 constexpr double kPi = std::numbers::pi;
 
 // Largest eigenvalue of a symmetric 3 x 3 matrix: power iteration, shifted to be positive.
@@ -108,7 +104,7 @@ io::PointCloud cone(double spacing) {  // its tip down, 20 mm high, in a seat of
     for (int j = 0; j < count; ++j) {
       const double angle = 2 * kPi * (j + 0.5 * (i % 2)) / count;
       const h6Vec3 out = {std::cos(angle), std::sin(angle), 0};
-      const h6Vec3 normal = io::unit(height * out - radius * h6Vec3{0, 0, 1});
+      const h6Vec3 normal = unit(height * out - radius * h6Vec3{0, 0, 1});
       io::add_shell_point(cloud, r * out + h6Vec3{0, 0, (t - 1) * height} + down, -1.0 * normal);
     }
   }
@@ -212,8 +208,8 @@ io::Scene two_planes(double angle) {
   block.shell->bake.levels = 3;
   std::vector<io::SceneBody> planes;
   for (const double side : {-1.0, 1.0}) {
-    const h6Quat turn = io::turn_by({0, -side * angle, 0});
-    const h6Vec3 up = io::rotate(turn, {0, 0, 1}), along = io::rotate(turn, {1, 0, 0});
+    const h6Quat turn = turn_by({0, -side * angle, 0});
+    const h6Vec3 up = rotate(turn, {0, 0, 1}), along = rotate(turn, {1, 0, 0});
     const h6Vec3 middle = {side * 20 * kMm, 0, -5 * kMm};
     io::add_face(*block.shell->points, middle - kProbeDepth * up, 4 * kMm * along, {0, 4 * kMm, 0},
                  kSide, kSide, up);

@@ -6,7 +6,7 @@ namespace h6::io {
 
 h6FieldDef FieldData::def() const {
   h6FieldDef d{};
-  d.origin = {origin.x, origin.y, origin.z};
+  d.origin = origin;
   d.voxel_size = voxel_size;
   for (std::size_t k = 0; k < 3; ++k) d.bricks[k] = bricks[k];
   d.brick_index = brick_index.data();

@@ -13,11 +13,6 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 double largest(const Vec3& a) { return std::max({std::abs(a.x), std::abs(a.y), std::abs(a.z)}); }
 
 bool collapsed(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
@@ -25,7 +20,7 @@ bool collapsed(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] 
 // Whether the area is no more than rounding: three points on a line, scaled from millimetres, leave
 // it by about 1e-16 of their distance from the origin.
 bool has_no_area(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = minus(b, a), ac = minus(c, a), bc = minus(c, b);
+  const Vec3 ab = b - a, ac = c - a, bc = c - b;
   const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)}));
   const double reach = std::max({largest(a), largest(b), largest(c)});
   const Vec3 n = cross(ab, ac);
@@ -123,8 +118,8 @@ void measure_box(const Mesh& mesh, MeshAudit& out) {
   if (mesh.vertices.empty()) return;
   out.low = out.high = mesh.vertices.front();
   for (const Vec3& p : mesh.vertices) {
-    out.low = {std::min(out.low.x, p.x), std::min(out.low.y, p.y), std::min(out.low.z, p.z)};
-    out.high = {std::max(out.high.x, p.x), std::max(out.high.y, p.y), std::max(out.high.z, p.z)};
+    out.low = min(out.low, p);
+    out.high = max(out.high, p);
   }
 }
 
@@ -135,8 +130,8 @@ double signed_volume(const Mesh& mesh, const std::vector<Triangle>& triangles, c
   const Vec3 middle = {(low.x + high.x) / 2, (low.y + high.y) / 2, (low.z + high.z) / 2};
   double six_volumes = 0;
   for (const Triangle& t : triangles) {
-    const Vec3 a = minus(mesh.vertices[t[0]], middle), b = minus(mesh.vertices[t[1]], middle),
-               c = minus(mesh.vertices[t[2]], middle);
+    const Vec3 a = mesh.vertices[t[0]] - middle, b = mesh.vertices[t[1]] - middle,
+               c = mesh.vertices[t[2]] - middle;
     six_volumes += dot(a, cross(b, c));
   }
   return six_volumes / 6;

@@ -17,12 +17,6 @@ namespace {
 using Triangle = std::array<std::uint32_t, 3>;
 constexpr std::uint32_t none = UINT32_MAX;
 
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
 // For each vertex the first one with the same place.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& vertices, Pulse* pulse) {
   KeyedIndices order(vertices.size()), spare;
@@ -97,7 +91,7 @@ void Orientation::measure() {
   table_.inward.assign(faces_.size(), Vec3{0, 0, 0});
   for (std::uint32_t t = 0; t < faces_.size(); ++t) {
     for (int k = 0; k < 3; ++k) faces_[t][k] = same[mesh_.triangles[t][k]];
-    const Vec3 n = cross(minus(corner(t, 1), corner(t, 0)), minus(corner(t, 2), corner(t, 0)));
+    const Vec3 n = cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
     const double length = std::sqrt(dot(n, n));
     if (!(length > 0)) continue;
     table_.area[t] = length / 2;
@@ -189,18 +183,16 @@ void Orientation::spread(std::uint32_t start) {
   }
   const Vec3 origin = corner(start, 0);  // near: volumes of small pieces far out stay exact
   for (const std::uint32_t t : piece.triangles) {
-    const double six = dot(minus(corner(t, 0), origin),
-                           cross(minus(corner(t, 1), origin), minus(corner(t, 2), origin)));
+    const double six =
+        dot(corner(t, 0) - origin, cross(corner(t, 1) - origin, corner(t, 2) - origin));
     piece.volume += (reversed_[t] ? -six : six) / 6;
     piece.area += table_.area[t];
     if (!reversed_[t]) piece.area_kept += table_.area[t];
     piece.turned = piece.turned || reversed_[t];
     for (int k = 0; k < 3; ++k) {
       const Vec3& v = corner(t, k);
-      piece.low = {std::min(piece.low.x, v.x), std::min(piece.low.y, v.y),
-                   std::min(piece.low.z, v.z)};
-      piece.high = {std::max(piece.high.x, v.x), std::max(piece.high.y, v.y),
-                    std::max(piece.high.z, v.z)};
+      piece.low = min(piece.low, v);
+      piece.high = max(piece.high, v);
     }
   }
   pieces_.push_back(std::move(piece));
@@ -232,10 +224,10 @@ void Orientation::find_open_pieces() {
     piece.volume = 0;
     Vec3 across{};  // of all vector areas, twice: that of the lids that are missing
     for (const std::uint32_t t : piece.triangles) {
-      const double six = dot(minus(corner(t, 0), middle),
-                             cross(minus(corner(t, 1), middle), minus(corner(t, 2), middle)));
+      const double six =
+          dot(corner(t, 0) - middle, cross(corner(t, 1) - middle, corner(t, 2) - middle));
       piece.volume += (reversed_[t] ? -six : six) / 6;
-      const Vec3 n = cross(minus(corner(t, 1), corner(t, 0)), minus(corner(t, 2), corner(t, 0)));
+      const Vec3 n = cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
       const double sign = reversed_[t] ? -1 : 1;
       across = {across.x + sign * n.x, across.y + sign * n.y, across.z + sign * n.z};
     }
@@ -247,11 +239,11 @@ void Orientation::find_open_pieces() {
 int Orientation::crossings(const Piece& piece, const Vec3& from, const Vec3& along) const {
   int count = 0;
   for (const std::uint32_t t : piece.triangles) {
-    const Vec3 e1 = minus(corner(t, 1), corner(t, 0)), e2 = minus(corner(t, 2), corner(t, 0));
+    const Vec3 e1 = corner(t, 1) - corner(t, 0), e2 = corner(t, 2) - corner(t, 0);
     const Vec3 p = cross(along, e2);
     const double det = dot(e1, p);
     if (det == 0) continue;
-    const Vec3 s = minus(from, corner(t, 0)), q = cross(s, e1);
+    const Vec3 s = from - corner(t, 0), q = cross(s, e1);
     const double u = dot(s, p) / det, v = dot(along, q) / det;
     count += u >= 0 && v >= 0 && u + v <= 1 && dot(e2, q) / det > 0;
   }
@@ -366,7 +358,7 @@ FaceTable Orientation::run() {
     table_.bowl[t] = pieces_[piece_of_[t]].bowl;
     if (bool(reversed_[t]) == pieces_[piece_of_[t]].flip) continue;
     Vec3& n = table_.inward[t];
-    n = {-n.x, -n.y, -n.z};
+    n = -n;
   }
   warn();
   return std::move(table_);

@@ -36,24 +36,14 @@ Mesh weld(const Mesh& mesh) {
 }
 
 Mesh moved(const Mesh& mesh, const h6Pose& pose) {
-  const auto [w, x, y, z] = pose.q;
   Mesh out = mesh;
-  for (Vec3& v : out.vertices) {
-    // v + 2 w (q x v) + 2 q x (q x v)
-    const Vec3 t{2 * (y * v.z - z * v.y), 2 * (z * v.x - x * v.z), 2 * (x * v.y - y * v.x)};
-    v = {pose.p.x + v.x + w * t.x + (y * t.z - z * t.y),
-         pose.p.y + v.y + w * t.y + (z * t.x - x * t.z),
-         pose.p.z + v.z + w * t.z + (x * t.y - y * t.x)};
-  }
+  for (Vec3& v : out.vertices) v = place(pose, v);
   return out;
 }
 
 MeshBounds bounds_of(const Mesh& mesh) {
   MeshBounds b{mesh.vertices.front(), mesh.vertices.front()};
-  for (const Vec3& p : mesh.vertices) {
-    b.low = {std::min(b.low.x, p.x), std::min(b.low.y, p.y), std::min(b.low.z, p.z)};
-    b.high = {std::max(b.high.x, p.x), std::max(b.high.y, p.y), std::max(b.high.z, p.z)};
-  }
+  for (const Vec3& p : mesh.vertices) b.low = min(b.low, p), b.high = max(b.high, p);
   return b;
 }
 

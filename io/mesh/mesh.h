@@ -8,13 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "hapsix/types.h"
+#include "hapsix/vector.h"
 
 namespace h6::io {
 
-struct Vec3 {
-  double x, y, z;
-};
+using Vec3 = h6Vec3;
 
 // Vertices in metres. Triangles index them; after read_mesh every index is in range and every
 // vertex finite, vertices are welded exactly (equal coordinates are one vertex), zero-area

@@ -13,39 +13,29 @@ namespace {
 
 constexpr std::uint32_t leaf_size = 4;
 
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec3 along(const Vec3& a, const Vec3& d, double s) {
-  return {a.x + s * d.x, a.y + s * d.y, a.z + s * d.z};
-}
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-double part(const Vec3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
-
 // False when the height over the longest side is below 1e-12 of that side: this is rounding.
 bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 u = minus(b, a), v = minus(c, a), w = minus(c, b), n = cross(u, v);
+  const Vec3 u = b - a, v = c - a, w = c - b, n = cross(u, v);
   const double longest2 = std::max({dot(u, u), dot(v, v), dot(w, w)});
   return dot(n, n) > 1e-24 * longest2 * longest2;
 }
 
 Vec3 nearest_on_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 u = minus(b, a);
+  const Vec3 u = b - a;
   const double uu = dot(u, u);
-  return along(a, u, uu > 0 ? std::clamp(dot(minus(p, a), u) / uu, 0.0, 1.0) : 0);
+  return a + (uu > 0 ? std::clamp(dot(p - a, u) / uu, 0.0, 1.0) : 0) * u;
 }
 
 // The foot of the perpendicular when it lies in the triangle, else the nearest point of the edges.
 Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c,
                          const Vec3& n) {
-  const Vec3 w = minus(p, a), x = cross(n, w);
-  const Vec3 u = minus(b, a), v = minus(c, a);
+  const Vec3 w = p - a, x = cross(n, w);
+  const Vec3 u = b - a, v = c - a;
   const double at_b = dot(x, v), at_c = -dot(x, u), all = dot(cross(u, v), n);  // barycentric
-  if (at_b >= 0 && at_c >= 0 && at_b + at_c <= all) return along(p, n, -dot(w, n));
+  if (at_b >= 0 && at_c >= 0 && at_b + at_c <= all) return p - dot(w, n) * n;
   Vec3 best = nearest_on_edge(p, a, b);
   for (const Vec3& q : {nearest_on_edge(p, b, c), nearest_on_edge(p, c, a)}) {
-    const Vec3 d = minus(q, p), e = minus(best, p);
+    const Vec3 d = q - p, e = best - p;
     if (dot(d, d) < dot(e, e)) best = q;
   }
   return best;
@@ -75,7 +65,7 @@ NearestTriangle::NearestTriangle(const Mesh& mesh, unsigned threads, Pulse* puls
     const auto& f = mesh.triangles[t];
     const Vec3 &a = mesh.vertices[f[0]], &b = mesh.vertices[f[1]], &c = mesh.vertices[f[2]];
     if (!has_area(a, b, c)) continue;
-    const Vec3 n = cross(minus(b, a), minus(c, a));
+    const Vec3 n = cross(b - a, c - a);
     const double length = std::sqrt(dot(n, n));
     corners_.push_back({a, b, c, {n.x / length, n.y / length, n.z / length}, t});
   }
@@ -95,8 +85,8 @@ void NearestTriangle::fit(Node& node) const {
   for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
     for (const Vec3* v : {&corners_[i].a, &corners_[i].b, &corners_[i].c}) {
       for (int k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], part(*v, k));
-        high[k] = std::max(high[k], part(*v, k));
+        low[k] = std::min(low[k], component(*v, k));
+        high[k] = std::max(high[k], component(*v, k));
       }
     }
   }
@@ -119,7 +109,7 @@ void NearestTriangle::build(std::uint32_t at, std::uint32_t first, std::uint32_t
     if (node.high[k] - node.low[k] > node.high[axis] - node.low[axis]) axis = k;
   }
   const auto middle = [axis](const Corners& t) {
-    return part(t.a, axis) + part(t.b, axis) + part(t.c, axis);
+    return component(t.a, axis) + component(t.b, axis) + component(t.c, axis);
   };
   const auto begin = corners_.begin() + first;
   std::nth_element(begin, begin + count / 2, begin + count,
@@ -150,10 +140,9 @@ NearTriangle NearestTriangle::operator()(const Vec3& place, double within) const
     if (node.second == 0) {
       for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
         const Corners& t = corners_[i];
-        const double height =
-            dot(minus(place, t.a), t.normal);  // the factor below allows for rounding
+        const double height = dot(place - t.a, t.normal);  // the factor below allows for rounding
         if (height * height * (1 - 1e-9) > best.distance2) continue;
-        const Vec3 q = nearest_on_triangle(place, t.a, t.b, t.c, t.normal), d = minus(q, place);
+        const Vec3 q = nearest_on_triangle(place, t.a, t.b, t.c, t.normal), d = q - place;
         const double d2 = dot(d, d);
         const bool nearer =
             d2 < best.distance2 ||

@@ -36,7 +36,7 @@ std::vector<Flat> flatten(const std::vector<Vec3>& points, Loop loop) {
   std::vector<Flat> flat;
   flat.reserve(loop.size());
   for (const std::uint32_t index : loop) {
-    const Vec3 p = {points[index].x - base.x, points[index].y - base.y, points[index].z - base.z};
+    const Vec3 p = points[index] - base;
     Flat f{};
     if (az >= ax && az >= ay)
       f = nz >= 0 ? Flat{p.x, p.y} : Flat{p.y, p.x};

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "hapsix/vector.h"
 #include "io/run/run_observer.h"
 #include "io/run/run_setup.h"
 #include "io/view/trace.h"
@@ -23,8 +24,6 @@ struct LoopDeleter {
 };
 
 constexpr double kTraceSeconds = 10;
-
-double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
 // Everything that is made of the stream of frames, one row at a time.
 class Watcher {

@@ -125,7 +125,7 @@ class Loader {
                   [](const FieldData& data, LoadedAsset& asset) {
                     asset.is_field = true;
                     asset.voxel_size = data.voxel_size;
-                    asset.origin = {data.origin.x, data.origin.y, data.origin.z};
+                    asset.origin = data.origin;
                     for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
                     asset.bricks = data.brick_count();
                   });
@@ -172,7 +172,7 @@ class Loader {
             "its mass properties cannot be derived (no shell, no closed mesh): state 'com' and "
             "'inertia'"};
     }
-    def.com = body.com ? *body.com : h6Vec3{found->com.x, found->com.y, found->com.z};
+    def.com = body.com ? *body.com : found->com;
     std::array<double, 6> inertia = body.inertia ? *body.inertia : found->inertia;
     if (body.com && !body.inertia) {  // derived about its own centre: move it to the stated one
       const double x = def.com.x - found->com.x, y = def.com.y - found->com.y,

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "hapsix/vector.h"
 #include "io/file/write_aside.h"
 #include "io/scene/scene_file.h"
 
@@ -69,18 +70,12 @@ void put_number(std::ostream& out, double value, char after) {
 
 // ---- between rows ------------------------------------------------------------------------------
 
-h6Vec3 mix(const h6Vec3& a, const h6Vec3& b, double s) {
-  return {a.x + s * (b.x - a.x), a.y + s * (b.y - a.y), a.z + s * (b.z - a.z)};
-}
+h6Vec3 mix(const h6Vec3& a, const h6Vec3& b, double s) { return a + s * (b - a); }
 
 // b * conjugate(a), with the sign that turns by at most half a turn.
 h6Quat shorter_turn(const h6Quat& a, const h6Quat& b) {
-  h6Quat d = {b.w * a.w + b.x * a.x + b.y * a.y + b.z * a.z,
-              -b.w * a.x + b.x * a.w - b.y * a.z + b.z * a.y,
-              -b.w * a.y + b.x * a.z + b.y * a.w - b.z * a.x,
-              -b.w * a.z - b.x * a.y + b.y * a.x + b.z * a.w};
-  if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
-  return d;
+  const h6Quat d = product(b, conjugate(a));
+  return d.w < 0 ? -d : d;
 }
 
 // The rotation vector of a turn of at most half a turn.
@@ -96,9 +91,7 @@ h6Quat slerp(const h6Quat& a, const h6Quat& b, double s) {
   const double half = 0.5 * s * std::hypot(turn.x, turn.y, turn.z);
   const double factor = half > 1e-12 ? 0.5 * s * std::sin(half) / half : 0.5 * s;
   const h6Quat d = {std::cos(half), factor * turn.x, factor * turn.y, factor * turn.z};
-  const h6Quat q = {
-      d.w * a.w - d.x * a.x - d.y * a.y - d.z * a.z, d.w * a.x + d.x * a.w + d.y * a.z - d.z * a.y,
-      d.w * a.y - d.x * a.z + d.y * a.w + d.z * a.x, d.w * a.z + d.x * a.y - d.y * a.x + d.z * a.w};
+  const h6Quat q = product(d, a);
   const double norm = std::hypot(std::hypot(q.w, q.x), std::hypot(q.y, q.z));
   return {q.w / norm, q.x / norm, q.y / norm, q.z / norm};
 }

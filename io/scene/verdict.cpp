@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hapsix/vector.h"
+
 namespace h6::io {
 namespace {
 
@@ -15,14 +17,6 @@ constexpr double kChatterDepth = 0.1;      // peak to peak [voxels]
 constexpr double kUnstableFactor = 100;    // of the hand's peak speed
 constexpr double kLeastPeakSpeed = 10e-3;  // [m/s]
 constexpr std::size_t kClusterSize = 48;
-
-h6Vec3 add(const h6Vec3& a, const h6Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-h6Vec3 sub(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-double dot(const h6Vec3& a, const h6Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-h6Vec3 cross(const h6Vec3& a, const h6Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-h6Quat conjugate(const h6Quat& q) { return {q.w, -q.x, -q.y, -q.z}; }
 
 struct Rotation {
   double m[3][3];
@@ -65,7 +59,7 @@ bool touches(const Box& box, const h6Vec3& centre, double radius) {
 }
 
 double angle_between(const h6Quat& a, const h6Quat& b) {
-  const double cosine = std::abs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z);
+  const double cosine = std::abs(dot(a, b));
   return 2 * std::acos(std::min(1.0, cosine));
 }
 
@@ -96,7 +90,7 @@ VerdictWatch::VerdictWatch(const SceneVerdict& rules, std::vector<h6Vec3> points
   points_.push_back(com_);
   const double share = 1 / static_cast<double>(points_.size());
   for (const h6Vec3& p : points_) {
-    mean_ = add(mean_, {share * p.x, share * p.y, share * p.z});
+    mean_ = mean_ + share * p;
     const double products[6] = {p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z};
     for (int i = 0; i < 6; ++i) second_[i] += share * products[i];
   }
@@ -112,10 +106,9 @@ void VerdictWatch::cluster_points(std::size_t first, std::size_t count) {
   const auto end = begin + static_cast<std::ptrdiff_t>(count);
   h6Vec3 low = *begin, high = *begin;
   for (auto p = begin; p != end; ++p) {
-    low = {std::min(low.x, p->x), std::min(low.y, p->y), std::min(low.z, p->z)};
-    high = {std::max(high.x, p->x), std::max(high.y, p->y), std::max(high.z, p->z)};
+    low = min(low, *p), high = max(high, *p);
   }
-  const h6Vec3 size = sub(high, low);
+  const h6Vec3 size = high - low;
   if (count > kClusterSize) {
     const auto along = size.x >= size.y && size.x >= size.z ? &h6Vec3::x
                        : size.y >= size.z                   ? &h6Vec3::y
@@ -131,7 +124,7 @@ void VerdictWatch::cluster_points(std::size_t first, std::size_t count) {
                      static_cast<std::uint32_t>(first),
                      static_cast<std::uint32_t>(count)};
   for (auto p = begin; p != end; ++p) {
-    const h6Vec3 arm = sub(*p, cluster.centre);
+    const h6Vec3 arm = *p - cluster.centre;
     cluster.radius = std::max(cluster.radius, std::sqrt(dot(arm, arm)));
   }
   cluster.radius *= 1 + 1e-9;  // rounding of the transform
@@ -160,18 +153,14 @@ double VerdictWatch::mean_motion2(const h6Pose& from, const h6Pose& to) const {
   const h6Quat &a = from.q, &b = to.q;
   h6Quat middle = {a.w + b.w, a.x + b.x, a.y + b.y, a.z + b.z};
   double sign = 1;
-  if (a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0) {
+  if (dot(a, b) < 0) {
     middle = {a.w - b.w, a.x - b.x, a.y - b.y, a.z - b.z};
     sign = -1;
   }
-  const double norm2 =
-      middle.w * middle.w + middle.x * middle.x + middle.y * middle.y + middle.z * middle.z;
-  // b a* = (cos t/2, n sin t/2)
-  const h6Vec3 turn = {2 * sign * (-b.w * a.x + b.x * a.w - b.y * a.z + b.z * a.y),
-                       2 * sign * (-b.w * a.y + b.x * a.z + b.y * a.w - b.z * a.x),
-                       2 * sign * (-b.w * a.z - b.x * a.y + b.y * a.x + b.z * a.w)};
-  const double scale = 1 / std::sqrt(norm2);
-  return mean_speed2(sub(to.p, from.p), turn,
+  const h6Quat d = product(b, conjugate(a));  // (cos t/2, n sin t/2)
+  const h6Vec3 turn = 2 * sign * h6Vec3{d.x, d.y, d.z};
+  const double scale = 1 / std::sqrt(dot(middle, middle));
+  return mean_speed2(to.p - from.p, turn,
                      {middle.w * scale, middle.x * scale, middle.y * scale, middle.z * scale});
 }
 
@@ -179,11 +168,11 @@ bool VerdictWatch::entered(const h6Pose& body) const {
   if (clusters_.empty()) return false;
   const Rotation r(body.q);
   for (const Cluster& cluster : clusters_) {
-    const h6Vec3 centre = add(body.p, r * cluster.centre);
+    const h6Vec3 centre = body.p + r * cluster.centre;
     for (const Box& box : rules_.forbidden) {
       if (!touches(box, centre, cluster.radius)) continue;
       for (std::uint32_t i = cluster.first; i < cluster.first + cluster.count; ++i)
-        if (contains(box, add(body.p, r * points_[i]))) return true;
+        if (contains(box, body.p + r * points_[i])) return true;
     }
   }
   return false;
@@ -221,7 +210,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
 
   const h6Velocity& v = body.velocity;
   const h6Vec3 com_arm = Rotation(body.pose.q) * com_;
-  const h6Vec3 origin_velocity = sub(v.linear, cross(v.angular, com_arm));
+  const h6Vec3 origin_velocity = v.linear - cross(v.angular, com_arm);
   peak_speed2_ = std::max(peak_speed2_, mean_speed2(origin_velocity, v.angular, body.pose.q));
   peak_hand_speed2_ =
       std::max(peak_hand_speed2_, mean_speed2(hand_velocity.linear, hand_velocity.angular, hand.q));
@@ -244,7 +233,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
 
 bool VerdictWatch::arrived() const {
   if (first_) return false;
-  const h6Vec3 off = sub(last_body_.pose.p, rules_.target->p);
+  const h6Vec3 off = last_body_.pose.p - rules_.target->p;
   const bool turned = rules_.tolerance_angle > 0 &&
                       angle_between(last_body_.pose.q, rules_.target->q) > rules_.tolerance_angle;
   return std::sqrt(dot(off, off)) <= rules_.tolerance && !turned;

@@ -20,11 +20,10 @@ std::vector<Triangle> triangles_of(const Mesh& mesh) {
   for (const auto& ids : mesh.triangles) {
     Triangle t{};
     for (int i = 0; i < 3; ++i) {
-      const Vec3& v = mesh.vertices[ids[i]];
-      t.corner[i] = {v.x, v.y, v.z};
+      t.corner[i] = mesh.vertices[ids[i]];
       t.centre = t.centre + (1.0 / 3) * t.corner[i];
     }
-    for (const h6Vec3& p : t.corner) t.radius = std::max(t.radius, length(p - t.centre));
+    for (const h6Vec3& p : t.corner) t.radius = std::max(t.radius, norm(p - t.centre));
     out.push_back(t);
   }
   return out;
@@ -41,7 +40,7 @@ double segment_distance(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const
   const double s0 = det > 1e-12 * uu * vv ? clamp01((uv * vw - vv * uw) / det) : 0;
   const double t = vv > 0 ? clamp01((vw + s0 * uv) / vv) : 0;
   const double s = uu > 0 ? clamp01((t * uv - uw) / uu) : 0;
-  return length(w + s * u - t * v);
+  return norm(w + s * u - t * v);
 }
 
 // Distance to the face, or infinity where the foot is outside: then an edge is nearer.
@@ -82,7 +81,7 @@ double mesh_distance(const Mesh& a, const Mesh& b) {
   double best = std::numeric_limits<double>::infinity();
   for (const Triangle& s : as)
     for (const Triangle& t : bs)
-      if (length(s.centre - t.centre) - s.radius - t.radius < best)
+      if (norm(s.centre - t.centre) - s.radius - t.radius < best)
         best = std::min(best, triangle_distance(s, t));
   return best;
 }

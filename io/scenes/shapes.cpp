@@ -11,7 +11,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 std::uint32_t add_vertex(Mesh& mesh, const h6Vec3& p) {
-  mesh.vertices.push_back({p.x, p.y, p.z});
+  mesh.vertices.push_back(p);
   return static_cast<std::uint32_t>(mesh.vertices.size() - 1);
 }
 
@@ -30,35 +30,6 @@ void add_point(PointCloud& cloud, const h6Vec3& p, const h6Vec3& inward) {
 }
 
 }  // namespace
-
-h6Vec3 operator+(const h6Vec3& a, const h6Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-h6Vec3 operator-(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-h6Vec3 operator*(double s, const h6Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
-double dot(const h6Vec3& a, const h6Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-h6Vec3 cross(const h6Vec3& a, const h6Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-double length(const h6Vec3& a) { return std::sqrt(dot(a, a)); }
-h6Vec3 unit(const h6Vec3& a) { return (1 / length(a)) * a; }
-
-h6Quat product(const h6Quat& a, const h6Quat& b) {
-  return {
-      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
-}
-
-h6Vec3 rotate(const h6Quat& q, const h6Vec3& v) {
-  const h6Vec3 axis = {q.x, q.y, q.z};
-  const h6Vec3 t = 2 * cross(axis, v);
-  return v + q.w * t + cross(axis, t);
-}
-
-h6Quat turn_by(const h6Vec3& rotation_vector) {
-  const double angle = length(rotation_vector);
-  if (angle == 0) return {1, 0, 0, 0};
-  const h6Vec3 axis = (std::sin(angle / 2) / angle) * rotation_vector;
-  return {std::cos(angle / 2), axis.x, axis.y, axis.z};
-}
 
 h6Quat from_axes(const h6Vec3& x, const h6Vec3& y, const h6Vec3& z) {
   // Of the four squares 4w^2, 4x^2, 4y^2, 4z^2 the largest is safe to divide by.
@@ -138,7 +109,7 @@ void add_box(PointCloud& cloud, const h6Vec3& half, double spacing) {
   const h6Vec3 axes[3] = {{half.x, 0, 0}, {0, half.y, 0}, {0, 0, half.z}};
   // A side that is a multiple of the spacing up to rounding has just as many points.
   const auto cells = [&](const h6Vec3& axis) {
-    return std::max(1, static_cast<int>(std::ceil(2 * length(axis) / spacing - 1e-9)));
+    return std::max(1, static_cast<int>(std::ceil(2 * norm(axis) / spacing - 1e-9)));
   };
   for (int a = 0; a < 3; ++a)
     for (const double side : {-1.0, 1.0}) {
@@ -179,7 +150,7 @@ std::array<double, 6> cylinder_inertia(double mass, double radius, double half_l
 HandPath& HandPath::wait(double seconds) { return go_to(pose(), seconds); }
 
 HandPath& HandPath::move_by(const h6Vec3& offset, double speed) {
-  return go_to({pose().p + offset, pose().q}, length(offset) / speed);
+  return go_to({pose().p + offset, pose().q}, norm(offset) / speed);
 }
 
 HandPath& HandPath::go_to(const h6Pose& pose, double seconds) {

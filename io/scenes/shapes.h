@@ -1,25 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // shapes.h - what generated scenes are made of: primitive meshes, point grids, hand paths. Metres.
 #pragma once
+#include "hapsix/vector.h"
 #include "io/scene/scene.h"
 
 namespace h6::io {
 
 inline constexpr double kMm = 1e-3;
 
-// ---- small vectors -----------------------------------------------------------------------------
-
-h6Vec3 operator+(const h6Vec3& a, const h6Vec3& b);
-h6Vec3 operator-(const h6Vec3& a, const h6Vec3& b);
-h6Vec3 operator*(double s, const h6Vec3& a);
-double dot(const h6Vec3& a, const h6Vec3& b);
-h6Vec3 cross(const h6Vec3& a, const h6Vec3& b);
-double length(const h6Vec3& a);
-h6Vec3 unit(const h6Vec3& a);
-h6Vec3 rotate(const h6Quat& q, const h6Vec3& v);
-h6Quat product(const h6Quat& a, const h6Quat& b);                     // b first, then a
-h6Quat turn_by(const h6Vec3& rotation_vector);                        // [rad]
-h6Quat from_axes(const h6Vec3& x, const h6Vec3& y, const h6Vec3& z);  // right-handed, unit
+// The rotation that turns the axes of the world into x, y, z: right-handed, unit.
+h6Quat from_axes(const h6Vec3& x, const h6Vec3& y, const h6Vec3& z);
 
 // ---- closed meshes, wound outward --------------------------------------------------------------
 

@@ -113,8 +113,8 @@ class Bake {
     for (const auto& triangle : mesh.triangles) {
       for (const std::uint32_t v : triangle) {
         const Vec3& p = mesh.vertices[v];
-        low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-        high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+        low = min(low, p);
+        high = max(high, p);
       }
     }
     const double longest = std::max({high.x - low.x, high.y - low.y, high.z - low.z});

@@ -28,8 +28,7 @@ std::vector<double> weigh(const Mesh& mesh, const FaceTable& faces, double spaci
     for (int k = 0; k < 3; ++k) {
       const Vec3 &a = mesh.vertices[mesh.triangles[t][k]],
                  &b = mesh.vertices[mesh.triangles[t][(k + 1) % 3]];
-      const double dx = a.x - b.x, dy = a.y - b.y, dz = a.z - b.z;
-      longest2 = std::max(longest2, dx * dx + dy * dy + dz * dz);
+      longest2 = std::max(longest2, dot(a - b, a - b));
     }
     const double longest = std::sqrt(longest2);
     double weight = area;
@@ -122,7 +121,7 @@ class Judge {
       if (!reach_.field->distance(to, d[k])) return false;
     }
     slope = {d[0] - d[1], d[2] - d[3], d[4] - d[5]};
-    const double length = std::sqrt(slope.x * slope.x + slope.y * slope.y + slope.z * slope.z);
+    const double length = norm(slope);
     if (!(length > 1)) return false;  // of 2: between walls that face each other
     slope = {slope.x / length, slope.y / length, slope.z / length};
     return true;

@@ -20,11 +20,6 @@ namespace {
 constexpr double layer_low = 0.1, layer_high = 0.6;  // [voxel]
 constexpr double out_again = 0.3, slack = 0.5;       // [voxel]
 
-double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec3 scaled(const Vec3& a, double s) { return {s * a.x, s * a.y, s * a.z}; }
-Vec3 plus(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-
 // Three numbers in [0, 1) of 63 bits.
 void three_units(std::uint64_t bits, double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = double((bits >> (21 * k)) & 0x1FFFFF) * 0x1p-21;
@@ -110,23 +105,23 @@ std::uint32_t settle(const ZeroSet& of, OrientedPoint& q) {
   const FieldView view(*of.field);
   const double h = of.field->voxel_size, sigma = of.field->offset;
   Vec3 n{-q.n[0], -q.n[1], -q.n[2]};
-  Vec3 p = view.to_metres(plus({q.p[0], q.p[1], q.p[2]}, scaled(n, out_again)));
+  Vec3 p = view.to_metres(Vec3{q.p[0], q.p[1], q.p[2]} + out_again * n);
   NearTriangle hit;
   for (int round = 0; round < 5; ++round) {
     hit = (*of.nearest)(p, sigma + (out_again + slack) * h);
     if (hit.triangle == UINT32_MAX) hit = (*of.nearest)(p);
     const double u = std::sqrt(hit.distance2);
-    if (u > 1e-6 * h) n = scaled(minus(p, hit.point), 1 / u);
+    if (u > 1e-6 * h) n = (1 / u) * (p - hit.point);
     if (u >= sigma) break;
-    p = plus(hit.point, scaled(n, sigma + out_again * h));
+    p = hit.point + (sigma + out_again * h) * n;
   }
-  const Vec3 place = view.from_metres(plus(hit.point, scaled(n, sigma)));
+  const Vec3 place = view.from_metres(hit.point + sigma * n);
   if (of.triangle_normals) {  // on the side of the way out
     const auto& f = of.mesh->triangles[hit.triangle];
     const Vec3& a = of.mesh->vertices[f[0]];
-    const Vec3 u = minus(of.mesh->vertices[f[1]], a), v = minus(of.mesh->vertices[f[2]], a);
-    const Vec3 m{u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
-    n = scaled(m, (dot(m, n) < 0 ? -1 : 1) / std::sqrt(dot(m, m)));
+    const Vec3 u = of.mesh->vertices[f[1]] - a, v = of.mesh->vertices[f[2]] - a;
+    const Vec3 m = cross(u, v);
+    n = (dot(m, n) < 0 ? -1 : 1) / std::sqrt(dot(m, m)) * m;
   }
   q = {{float(place.x), float(place.y), float(place.z)}, {float(-n.x), float(-n.y), float(-n.z)}};
   return hit.triangle;

@@ -5,27 +5,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "hapsix/vector.h"
 #include "io/view/scene_drawing.h"
 
 namespace h6::io::view {
 namespace {
 
 using nlohmann::ordered_json;
-
-double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-
-h6Vec3 rotate(const h6Quat& q, const h6Vec3& v) {
-  const auto cross = [](const h6Vec3& a, const h6Vec3& b) -> h6Vec3 {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  };
-  const h6Vec3 u{q.x, q.y, q.z}, c = cross(u, v), d = cross(u, c);
-  return {v.x + 2 * (q.w * c.x + d.x), v.y + 2 * (q.w * c.y + d.y), v.z + 2 * (q.w * c.z + d.z)};
-}
-
-h6Vec3 apply(const h6Pose& pose, const h6Vec3& v) {
-  const h6Vec3 r = rotate(pose.q, v);
-  return {pose.p.x + r.x, pose.p.y + r.y, pose.p.z + r.z};
-}
 
 void append(std::vector<float>& to, const h6Pose& p) {
   for (const double x : {p.p.x, p.p.y, p.p.z, p.q.w, p.q.x, p.q.y, p.q.z})
@@ -155,9 +141,9 @@ Message LiveState::state_message() {
   if (held && any_) {
     // The pose at which the hand would hold the body, in the scene.
     const h6Pose& hand = r.command[0].pose;
-    const h6Vec3 wanted = apply(hand, loaded_.bodies[body].com);
-    const h6Vec3 is = apply(r.body[0].pose, loaded_.bodies[body].com);
-    lag = norm({wanted.x - is.x, wanted.y - is.y, wanted.z - is.z});
+    const h6Vec3 wanted = place(hand, loaded_.bodies[body].com);
+    const h6Vec3 is = place(r.body[0].pose, loaded_.bodies[body].com);
+    lag = norm(wanted - is);
     append(hands, hand);
   }
   envelope.add("poses", poses_);
@@ -249,7 +235,7 @@ Message LiveState::slice_message(const Slice& slice) const {
   return envelope.message({{"kind", "slice"},
                            {"width", width},
                            {"height", height},
-                           {"corner", list(apply(pose, {corner[0], corner[1], corner[2]}))},
+                           {"corner", list(place(pose, {corner[0], corner[1], corner[2]}))},
                            {"u", list(rotate(pose.q, {along_u[0], along_u[1], along_u[2]}))},
                            {"v", list(rotate(pose.q, {along_v[0], along_v[1], along_v[2]}))}});
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "hapsix/vector.h"
 #include "io/view/envelope.h"
 #include "io/view/page.h"
 #include "io/view/scene_drawing.h"
@@ -19,10 +20,6 @@ using nlohmann::ordered_json;
 constexpr std::uint64_t kSpans = 3000, kReplaySamples = 4000;
 constexpr std::size_t kContacts = 64, kLateFrames = 200, kEvents = 500, kTriangles = 60000;
 constexpr double kReplayRate = 60;
-
-float norm(const h6Vec3& v) {
-  return static_cast<float>(std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z));
-}
 
 void append(std::vector<float>& to, const h6Pose& p) {
   for (const double x : {p.p.x, p.p.y, p.p.z, p.q.w, p.q.x, p.q.y, p.q.z})
@@ -92,9 +89,10 @@ void ReportRun::add(const std::vector<h6FrameRecord>& frames) {
 }
 
 void ReportRun::row(const h6FrameRecord& r) {
+  const h6Wrench& felt = r.command[0].wrench;
   const std::array<float, 5> now = {
-      static_cast<float>(r.report.contacts), norm(r.command[0].wrench.force),
-      1e3f * norm(r.command[0].wrench.torque), static_cast<float>(r.report.max_depth_voxels),
+      static_cast<float>(r.report.contacts), static_cast<float>(norm(felt.force)),
+      1e3f * static_cast<float>(norm(felt.torque)), static_cast<float>(r.report.max_depth_voxels),
       static_cast<float>(r.report.frame_us)};
   if (span_.frames == 0) {
     span_.time = r.time;

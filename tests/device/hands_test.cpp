@@ -8,6 +8,7 @@
 
 #include "device/path_device.h"
 #include "device/simulated_hand.h"
+#include "hapsix/vector.h"
 
 using namespace h6;
 using namespace h6::device;
@@ -47,7 +48,7 @@ TEST_CASE("a path's velocity is the derivative of its pose") {
 TEST_CASE("a path goes the short way round whatever the quaternions' signs") {
   HandPath path{{0, 1}, {at(0, 0, 0, 0.2), at(0, 0, 0, 0.6)}};
   h6Quat& q = path.pose[1].q;
-  q = {-q.w, -q.x, -q.y, -q.z};
+  q = -q;
   const h6Quat m = path.at(0.5).pose.q;
   CHECK(std::fabs(2 * std::atan(m.z / m.w)) == h6::test::near(0.4));
   CHECK(path.at(0.5).velocity.angular.z == h6::test::near(0.4));

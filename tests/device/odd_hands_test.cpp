@@ -17,6 +17,7 @@
 #include "device/path_device.h"
 #include "device/recorded_hand.h"
 #include "device/scripted_hand.h"
+#include "hapsix/vector.h"
 #include "tests/support/near.h"
 
 using namespace h6;
@@ -99,8 +100,7 @@ TEST_CASE("each kind of trouble is what it is called, and nothing else") {
       lost += seen.lost[i] != 0;
       if (seen.lost[i]) continue;
       const h6DeviceSample &s = seen.samples[i], &before = seen.samples[i - 1];
-      bad += !finite(s) || std::fabs(s.pose.q.w * s.pose.q.w + s.pose.q.x * s.pose.q.x +
-                                     s.pose.q.y * s.pose.q.y + s.pose.q.z * s.pose.q.z - 1) > 1e-9;
+      bad += !finite(s) || std::fabs(dot(s.pose.q, s.pose.q) - 1) > 1e-9;
       same +=
           off_path(s, 1e-3 * static_cast<double>(i)) < 1 && std::memcmp(&s, &before, sizeof s) == 0;
       if (!finite(s) || !finite(before) || seen.lost[i - 1]) continue;

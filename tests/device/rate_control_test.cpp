@@ -10,6 +10,7 @@
 #include <string>
 
 #include "device/rate_control.h"
+#include "hapsix/vector.h"
 #include "tests/support/near.h"
 
 using namespace h6;
@@ -28,10 +29,6 @@ h6Velocity settled(RateFigures f, const Axes& axes, const h6Wrench& felt = {}) {
   h6DeviceSample s{};
   for (int i = 0; i < 1000; ++i) s = rate.step(axes, 0, felt, dt);
   return s.velocity;
-}
-double length(const h6Vec3& v) { return std::hypot(v.x, v.y, v.z); }
-double distance(const h6Vec3& a, const h6Vec3& b) {
-  return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
 }
 
 }  // namespace
@@ -53,8 +50,8 @@ TEST_CASE("nothing moves in the dead zone, and speed rises from zero at its edge
   RateFigures f;
   f.dead_zone = 0.1;
   for (const double a : {0.0, 0.05, 0.0999, -0.0999})
-    CHECK(length(settled(f, {a, a, a, a, a, a}).linear) == 0);
-  CHECK(length(settled(f, {0.101, 0, 0, 0, 0, 0}).linear) < 1e-5);
+    CHECK(norm(settled(f, {a, a, a, a, a, a}).linear) == 0);
+  CHECK(norm(settled(f, {0.101, 0, 0, 0, 0, 0}).linear) < 1e-5);
   double before = 0;
   for (double a = 0.12; a <= 1; a += 0.02) {
     const double v = settled(f, {a, 0, 0, 0, 0, 0}).linear.x;
@@ -89,7 +86,7 @@ TEST_CASE("with the lock only the axis that leads moves, and it changes only for
   h6DeviceSample s = rate.step({0.5, 0.4, 0, 0.3, 0, 0}, 0, {}, dt);
   CHECK(s.velocity.linear.x > 0);
   CHECK(s.velocity.linear.y == 0);
-  CHECK(length(s.velocity.angular) == 0);
+  CHECK(norm(s.velocity.angular) == 0);
   s = rate.step({0.5, 0.55, 0, 0, 0, 0}, 0, {}, dt);
   CHECK(s.velocity.linear.x > 0);  // not by a tenth
   s = rate.step({0.5, 0.7, 0, 0, 0, 0}, 0, {}, dt);
@@ -102,23 +99,12 @@ TEST_CASE("the pose is the integral of the velocity, and what it turns about sta
   const h6Vec3 grip{0.1, 0.02, -0.03};
   RateControl rate(f, origin, grip);
   h6DeviceSample before = rate.step({}, 0, {}, dt);
-  CHECK(length(before.pose.p) == near(0.0).epsilon(1e-15));
+  CHECK(norm(before.pose.p) == near(0.0).epsilon(1e-15));
   for (int i = 0; i < 2000; ++i) {
     const h6DeviceSample now = rate.step({0, 0, 0, 0.3, -0.9, 0.5}, 0, {}, dt);
-    // The grip: p + q (grip).
-    const auto at = [&](const h6Pose& p) {
-      const h6Quat& q = p.q;
-      const double x = grip.x, y = grip.y, z = grip.z;
-      const double tx = 2 * (q.y * z - q.z * y), ty = 2 * (q.z * x - q.x * z),
-                   tz = 2 * (q.x * y - q.y * x);
-      return h6Vec3{p.p.x + x + q.w * tx + q.y * tz - q.z * ty,
-                    p.p.y + y + q.w * ty + q.z * tx - q.x * tz,
-                    p.p.z + z + q.w * tz + q.x * ty - q.y * tx};
-    };
-    CHECK(distance(at(now.pose), grip) < 1e-12);
-    const h6Vec3 moved{(now.pose.p.x - before.pose.p.x) / dt, (now.pose.p.y - before.pose.p.y) / dt,
-                       (now.pose.p.z - before.pose.p.z) / dt};
-    CHECK(distance(moved, now.velocity.linear) < 2e-4);  // first order in dt
+    CHECK(norm(place(now.pose, grip) - grip) < 1e-12);
+    const h6Vec3 moved = (1 / dt) * (now.pose.p - before.pose.p);
+    CHECK(norm(moved - now.velocity.linear) < 2e-4);  // first order in dt
     before = now;
   }
 }
@@ -145,10 +131,10 @@ TEST_CASE("reset brings the hand home no faster than it may move, and a push end
   for (int i = 0; i < 1000; ++i) rate.step({1, -1, 0.5, 0.2, 0.6, -1}, 0, {}, dt);
   h6DeviceSample s = rate.step({}, f.reset_buttons, {}, dt);
   int frames = 0;
-  for (; frames < 5000 && distance(s.pose.p, home.p) > 1e-9; ++frames) {
+  for (; frames < 5000 && norm(s.pose.p - home.p) > 1e-9; ++frames) {
     const h6Vec3 before = s.pose.p;
     s = rate.step({}, 0, {}, dt);
-    CHECK(distance(s.pose.p, before) <= (f.speed + 0.05 * f.turn_speed) * dt * (1 + 1e-9));
+    CHECK(norm(s.pose.p - before) <= (f.speed + 0.05 * f.turn_speed) * dt * (1 + 1e-9));
   }
   CHECK(frames < 5000);
   CHECK(std::fabs(s.pose.q.y) == near(0.8).epsilon(1e-9));
@@ -156,7 +142,7 @@ TEST_CASE("reset brings the hand home no faster than it may move, and a push end
   rate.step({}, f.reset_buttons, {}, dt);
   for (int i = 0; i < 50; ++i) s = rate.step({1, 0, 0, 0, 0, 0}, 0, {}, dt);  // changed my mind
   for (int i = 0; i < 2000; ++i) s = rate.step({}, 0, {}, dt);
-  CHECK(distance(s.pose.p, home.p) > 1e-3);
+  CHECK(norm(s.pose.p - home.p) > 1e-3);
 }
 
 TEST_CASE("what pushes against a felt wrench comes to a stop, what leaves it or slides does not") {
@@ -187,10 +173,8 @@ TEST_CASE("whatever comes in, the pose stays finite, a rotation, and no faster t
         rate.step({value(), value(), value(), value(), value(), value()},
                   static_cast<std::uint32_t>(random() % 4),
                   {{value(), value(), value()}, {value(), value(), value()}}, step);
-    const double n = s.pose.q.w * s.pose.q.w + s.pose.q.x * s.pose.q.x + s.pose.q.y * s.pose.q.y +
-                     s.pose.q.z * s.pose.q.z;
-    REQUIRE(std::fabs(n - 1) < 1e-9);
-    REQUIRE(distance(s.pose.p, before.pose.p) <= std::sqrt(3.0) * f.speed * 0.1 * 1.001);
+    REQUIRE(std::fabs(dot(s.pose.q, s.pose.q) - 1) < 1e-9);
+    REQUIRE(norm(s.pose.p - before.pose.p) <= std::sqrt(3.0) * f.speed * 0.1 * 1.001);
     before = s;
   }
 }

@@ -2,6 +2,7 @@
 // A simulated arm and the person who holds it, by physics: what springs, delays, encoders and
 // motors must do whatever the figures are.
 #include "device/simulated_arm.h"
+#include "hapsix/vector.h"
 
 #include <doctest/doctest.h>
 
@@ -27,7 +28,6 @@ h6Pose at(double x, double y = 0, double z = 0, double angle = 0) {
   return {{x, y, z}, {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}};
 }
 double angle_of(const h6Pose& pose) { return 2 * std::atan2(pose.q.z, pose.q.w); }
-double length(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
 // Encoders and sensor without steps.
 ArmFigures ideal() {
@@ -81,7 +81,7 @@ TEST_CASE("with nothing in the way the handle follows the path and comes to rest
   rig.run(4);
   CHECK(rig.sample.pose.p.y == near(0.03).epsilon(1e-6));
   CHECK(angle_of(rig.sample.pose) == near(0.4).epsilon(1e-6));
-  CHECK(length(rig.sample.velocity.linear) < 1e-6);
+  CHECK(norm(rig.sample.velocity.linear) < 1e-6);
 }
 
 TEST_CASE("a sample's exact velocity is the derivative of its pose") {
@@ -114,7 +114,7 @@ TEST_CASE("a constant wrench moves the handle by wrench over stiffness of arm an
             .epsilon(1e-6));
   rig.device.stop(rig.device.self);
   rig.run(5);
-  CHECK(length(rig.sample.pose.p) < 1e-6);
+  CHECK(norm(rig.sample.pose.p) < 1e-6);
 }
 
 TEST_CASE("the torque turns the handle about the grip") {
@@ -136,7 +136,7 @@ TEST_CASE("motors give no more than their rating") {
   rig.command.wrench = {{300, 0, 400}, {0, 0, 5}};
   rig.run(5);
   const double give = 1 / arm.person.stiffness + 1 / arm.grip_stiffness;
-  CHECK(length(rig.sample.pose.p) == near(2 * give).epsilon(1e-6));
+  CHECK(norm(rig.sample.pose.p) == near(2 * give).epsilon(1e-6));
   CHECK(rig.device.capabilities.max_force == 2);
 }
 
@@ -159,10 +159,10 @@ TEST_CASE("a command is first seen one frame later, plus one frame for each fram
       int seen = 0;
       for (int i = 1; i < 10 && !seen; ++i) {
         rig.read();
-        if (length(rig.sample.velocity.linear) > 1e-9) seen = i;
+        if (norm(rig.sample.velocity.linear) > 1e-9) seen = i;
         rig.write();
       }
-      CHECK(length(before.velocity.linear) < 1e-9);
+      CHECK(norm(before.velocity.linear) < 1e-9);
       CHECK(seen == 1 + delay);
       // Held for one frame, not longer: on its own a free mass gains F h / m, less what friction
       // and grip take.
@@ -335,11 +335,11 @@ TEST_CASE("what swings freely swings less and less, in every mode and for any fi
         rig.command.pose = at(0);
         rig.run(0.1);
         double early = 0, late = 0;
-        rig.run(2, [&] { early = std::max(early, length(rig.sample.velocity.linear)); });
+        rig.run(2, [&] { early = std::max(early, norm(rig.sample.velocity.linear)); });
         rig.run(4);
-        rig.run(2, [&] { late = std::max(late, length(rig.sample.velocity.linear)); });
+        rig.run(2, [&] { late = std::max(late, norm(rig.sample.velocity.linear)); });
         CHECK(late <= 0.7 * early + 0.05);  // 0.05 m/s: the encoders' own noise
-        CHECK(length(rig.sample.velocity.angular) < 5);
+        CHECK(norm(rig.sample.velocity.angular) < 5);
       }
 }
 
@@ -387,7 +387,7 @@ TEST_CASE("figures at the ends of their ranges stay finite and bounded") {
       Rig rig({{0, 0.1}, {at(0), at(0.01, 0, 0, 0.2)}}, arm, mode);
       rig.command.wrench = {{1, 0, 0}, {0, 0, 0.01}};
       double farthest = 0;
-      rig.run(0.5, [&] { farthest = std::max(farthest, length(rig.sample.pose.p)); });
+      rig.run(0.5, [&] { farthest = std::max(farthest, norm(rig.sample.pose.p)); });
       CHECK(farthest < 20);  // 1 N on 10 g that nobody holds: F t^2 / 2 m = 12.5 m
       CHECK(std::isfinite(rig.sample.pose.q.w + rig.sample.wrench.torque.z));
     }

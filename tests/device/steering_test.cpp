@@ -7,9 +7,10 @@
 #include <memory>
 
 #include "device/hand_path.h"
-#include "device/rotation.h"
+#include "hapsix/vector.h"
 #include "tests/support/near.h"
 
+using namespace h6;
 using namespace h6::device;
 
 namespace {

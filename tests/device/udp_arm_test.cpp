@@ -20,6 +20,7 @@
 
 #include "device/plugin.h"
 #include "hapsix/hapsix.h"
+#include "hapsix/vector.h"
 #include "tests/support/near.h"
 #include "tests/support/sanitized.h"
 
@@ -104,10 +105,7 @@ struct Floor {
   ~Floor() { h6DestroySession(session), h6DestroyModel(model); }
 };
 
-double force(const h6FrameRecord& r) {
-  const h6Vec3& f = r.command[0].wrench.force;
-  return std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z);
-}
+double force(const h6FrameRecord& r) { return norm(r.command[0].wrench.force); }
 
 }  // namespace
 

@@ -9,23 +9,14 @@
 #include <cstring>
 
 #include "hapsix/hapsix.h"
+#include "hapsix/vector.h"
 #include "tests/support/analytic.h"
 
 namespace h6::test {
 
 inline constexpr double mm = 1e-3;
 
-inline double norm(const h6Vec3& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
-inline h6Vec3 minus(const h6Vec3& a, const h6Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline h6Vec3 cross(const h6Vec3& a, const h6Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline h6Vec3 place(const h6Pose& pose, const h6Vec3& v) {  // p + q v q*
-  const h6Vec3 u{pose.q.x, pose.q.y, pose.q.z};
-  const h6Vec3 t = cross(u, v), c = cross(u, t);
-  return {pose.p.x + v.x + 2 * (pose.q.w * t.x + c.x), pose.p.y + v.y + 2 * (pose.q.w * t.y + c.y),
-          pose.p.z + v.z + 2 * (pose.q.w * t.z + c.z)};
-}
+using h6::cross, h6::dot, h6::norm, h6::place, h6::operator+, h6::operator-, h6::operator*;
 inline h6Quat about(double x, double y, double z, double angle) {  // the axis is unit
   const double s = std::sin(angle / 2);
   return {std::cos(angle / 2), s * x, s * y, s * z};

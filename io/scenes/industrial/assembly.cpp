@@ -16,7 +16,7 @@ Vec3 metres_of(const h6Vec3& p) { return {kMm * p.x, kMm * p.y, kMm * p.z}; }
 double distance_to_segment(const h6Vec3& p, const h6Vec3& a, const h6Vec3& b) {
   const h6Vec3 ab = b - a;
   const double s = std::clamp(dot(p - a, ab) / std::max(dot(ab, ab), 1e-300), 0.0, 1.0);
-  return length(p - a - s * ab);
+  return norm(p - a - s * ab);
 }
 
 // Longest edge first; equal ones in the order of their vertices.
@@ -63,8 +63,7 @@ class Splitter {
   }
   void push(std::uint32_t a, std::uint32_t b) {
     const Vec3 &p = mesh_.vertices[a], &q = mesh_.vertices[b];
-    const double x = p.x - q.x, y = p.y - q.y, z = p.z - q.z;
-    queue_.push({x * x + y * y + z * z, std::min(a, b), std::max(a, b)});
+    queue_.push({dot(p - q, p - q), std::min(a, b), std::max(a, b)});
   }
 
   void split(const Edge& edge, const std::vector<std::size_t>& faces) {
@@ -132,7 +131,7 @@ void Assembly::leave_hole(const std::string& name, const h6Vec3& near, int trian
   for (std::size_t t = range.first; t < range.first + range.count; ++t) order.push_back(t);
   const auto nearest_to = [&](const h6Vec3& p) {
     return [&centre, p](std::size_t s, std::size_t t) {
-      return length(centre(s) - p) < length(centre(t) - p);
+      return norm(centre(s) - p) < norm(centre(t) - p);
     };
   };
   const h6Vec3 middle = centre(*std::min_element(order.begin(), order.end(), nearest_to(near)));

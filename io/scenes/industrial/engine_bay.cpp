@@ -6,7 +6,7 @@ namespace h6::io {
 namespace industrial {
 
 Frame starter_seat() {
-  const h6Vec3 up = unit({0, -0.34, 0.94}), along = {1, 0, 0};
+  const h6Vec3 up = unit(h6Vec3{0, -0.34, 0.94}), along = {1, 0, 0};
   return {kStarterSeat, cross(up, along), up, along};
 }
 

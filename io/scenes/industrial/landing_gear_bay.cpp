@@ -15,7 +15,7 @@ constexpr Frame kBack = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // 2-D (
 
 void add_rivets(Assembly& a, const std::string& name, const h6Vec3& from, const h6Vec3& to,
                 const h6Vec3& out, double apart) {
-  const double length_mm = length(to - from);
+  const double length_mm = norm(to - from);
   const int count = std::max(1, static_cast<int>(length_mm / apart));
   const Piece one = rivet(7, 24);
   for (int i = 0; i <= count; ++i)

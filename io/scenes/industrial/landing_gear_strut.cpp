@@ -72,7 +72,7 @@ void add_torque_links(Assembly& a) {
   for (const bool upper : {true, false}) {
     const h6Vec3 from = upper ? top : low;
     const h6Vec3 along = unit(apex - from);
-    const double length_mm = length(apex - from);
+    const double length_mm = norm(apex - from);
     const Frame frame = {from, along, {1, 0, 0}, cross(along, {1, 0, 0})};
     Outline link{hull({{0, 62, 30}, {0, -62, 30}, {length_mm, 0, 34}}, 64), {}};
     link.holes = {circle(34, 48, {62, 0}), circle(24, 40, {132, 0}), circle(15, 32, {188, 0}),
@@ -106,7 +106,7 @@ void add_torque_links(Assembly& a) {
 void add_brace(Assembly& a, const std::string& name, const h6Vec3& from, const h6Vec3& to,
                const h6Vec3& pin, double depth) {
   const h6Vec3 along = unit(to - from), across = unit(cross(pin, along));
-  const double length_mm = length(to - from);
+  const double length_mm = norm(to - from);
   const Frame web = {from, along, across, cross(along, across)};
   Outline plate{hull({{0, 0, 0.62 * depth}, {length_mm, 0, 0.62 * depth}}, 56),
                 {circle(17, 40), circle(17, 40, {length_mm, 0})}};
@@ -136,7 +136,7 @@ void add_braces(Assembly& a) {
   add_brace(a, "lock link", {250, 0, 1500}, {110, 0, 1580}, {0, 1, 0}, 44);
   for (const double y : {-40.0, 40.0}) {
     const h6Vec3 p = {250, y, 1500}, q = {420, y, 1380};
-    const double span = length(q - p);
+    const double span = norm(q - p);
     a.add("down lock spring", rod(helix(15, (span - 50) / 26, 26, 28), 3.2, 10),
           facing(p + 25 / span * (q - p), q - p));
     for (const auto& [e, d] : {std::pair{p, q - p}, {q, p - q}})

@@ -18,7 +18,7 @@ using Corners = std::array<h6Vec3, 3>;
 // Share of the full solid angle (van Oosterom, Strackee 1983).
 double solid_angle(const Corners& t, const h6Vec3& p) {
   const h6Vec3 a = t[0] - p, b = t[1] - p, c = t[2] - p;
-  const double la = length(a), lb = length(b), lc = length(c);
+  const double la = norm(a), lb = norm(b), lc = norm(c);
   return 2 *
          std::atan2(dot(a, cross(b, c)),
                     la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb) /
@@ -28,12 +28,12 @@ double solid_angle(const Corners& t, const h6Vec3& p) {
 double to_segment(const h6Vec3& p, const h6Vec3& a, const h6Vec3& b) {
   const h6Vec3 ab = b - a;
   const double s = std::clamp(dot(p - a, ab) / std::max(dot(ab, ab), 1e-300), 0.0, 1.0);
-  return length(p - a - s * ab);
+  return norm(p - a - s * ab);
 }
 
 double to_triangle(const Corners& t, const h6Vec3& p) {
   const h6Vec3 n = cross(t[1] - t[0], t[2] - t[0]);
-  const double size = length(n);
+  const double size = norm(n);
   bool over = size > 0;
   for (std::size_t k = 0; k < 3 && over; ++k)
     over = dot(cross(t[(k + 1) % 3] - t[k], p - t[k]), n) >= 0;
@@ -112,7 +112,7 @@ void Prober::fill(IndustrialTruth& truth, std::size_t probes) const {
 Prober::Probe Prober::behind(const Assembly::Range& range, std::size_t triangle) const {
   const auto [a, b, c] = all_.corners(triangle);
   const h6Vec3 n = cross(b - a, c - a);
-  if (length(n) < 1e-9) return {{}, range.part, 0};
+  if (norm(n) < 1e-9) return {{}, range.part, 0};
   for (const double depth : {8.0, 4.0, 2.0}) {  // [voxel]
     const h6Vec3 p = (1.0 / 3) * (a + b + c) - (depth * voxel_) * unit(n);
     double winding = 0, nearest = 1e300;
@@ -191,8 +191,8 @@ void Prober::surroundings(IndustrialTruth& truth, std::size_t probes) const {
   cells.size = 4 * voxel_;
   h6Vec3 low = all_.points_.front(), high = low;
   for (const h6Vec3& p : all_.points_) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    low = min(low, p);
+    high = max(high, p);
   }
   const double border = margin + 2 * cells.size;
   cells.low = low - h6Vec3{border, border, border};

@@ -48,7 +48,7 @@ Frame at(double x, double y, double z) {
 Frame facing(const h6Vec3& origin, const h6Vec3& direction, const h6Vec3& hint) {
   const h6Vec3 z = unit(direction);
   h6Vec3 x = hint - dot(hint, z) * z;
-  if (length(x) < 1e-3)
+  if (norm(x) < 1e-3)
     x = std::abs(z.y) < 0.9 ? h6Vec3{0, 1, 0} - z.y * z : h6Vec3{0, 0, 1} - z.z * z;
   x = unit(x);
   return {origin, x, cross(z, x), z};
@@ -165,7 +165,7 @@ Piece rod(const Line& line, const std::function<double(double)>& radius, int sid
   double s = 0;
   const std::vector<Frame> frames = frames_along(line);
   for (std::size_t i = 0; i < line.size(); ++i) {
-    if (i > 0) s += length(line[i] - line[i - 1]);
+    if (i > 0) s += norm(line[i] - line[i - 1]);
     Line ring;
     for (const P2& p : circle(radius(s), sides)) ring.push_back(frames[i].at({p.x, p.y, 0}));
     rings.push_back(std::move(ring));
@@ -222,8 +222,8 @@ namespace {
 
 // Centripetal Catmull-Rom between b and c (Barry and Goldman's pyramid), 0 <= s <= 1.
 h6Vec3 catmull_rom(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const h6Vec3& d, double s) {
-  const double t1 = std::sqrt(length(b - a)), t2 = t1 + std::sqrt(length(c - b));
-  const double t3 = t2 + std::sqrt(length(d - c)), t = t1 + s * (t2 - t1);
+  const double t1 = std::sqrt(norm(b - a)), t2 = t1 + std::sqrt(norm(c - b));
+  const double t3 = t2 + std::sqrt(norm(d - c)), t = t1 + s * (t2 - t1);
   const auto mix = [t](const h6Vec3& p, double tp, const h6Vec3& q, double tq) {
     return ((tq - t) / (tq - tp)) * p + ((t - tp) / (tq - tp)) * q;
   };
@@ -238,7 +238,7 @@ Line resampled(const Line& dense, double spacing) {
   double s = 0;
   int next = 1;
   for (std::size_t i = 1; i < dense.size(); ++i) {
-    const double step = length(dense[i] - dense[i - 1]);
+    const double step = norm(dense[i] - dense[i - 1]);
     for (; next < pieces && s + step >= total * next / pieces; ++next)
       out.push_back(dense[i - 1] +
                     ((total * next / pieces - s) / step) * (dense[i] - dense[i - 1]));
@@ -277,7 +277,7 @@ Line companion(const Line& line, double radius, double angle, double lay) {
   double s = 0;
   const std::vector<Frame> frames = frames_along(line);
   for (std::size_t i = 0; i < line.size(); ++i) {
-    if (i > 0) s += length(line[i] - line[i - 1]);
+    if (i > 0) s += norm(line[i] - line[i - 1]);
     const double a = angle + 2 * kPi * s / lay;
     out.push_back(frames[i].at({radius * std::cos(a), radius * std::sin(a), 0}));
   }
@@ -286,14 +286,14 @@ Line companion(const Line& line, double radius, double angle, double lay) {
 
 double line_length(const Line& line) {
   double s = 0;
-  for (std::size_t i = 1; i < line.size(); ++i) s += length(line[i] - line[i - 1]);
+  for (std::size_t i = 1; i < line.size(); ++i) s += norm(line[i] - line[i - 1]);
   return s;
 }
 
 Frame frame_on(const Line& line, double s) {
   const std::vector<Frame> frames = frames_along(line);
   for (std::size_t i = 1; i < line.size(); ++i) {
-    const double step = length(line[i] - line[i - 1]);
+    const double step = norm(line[i] - line[i - 1]);
     if (s <= step || i + 1 == line.size()) {
       Frame out = frames[i - 1];
       out.o = line[i - 1] + std::min(s / step, 1.0) * (line[i] - line[i - 1]);

@@ -35,7 +35,7 @@ std::vector<double> equal_lengths(int pieces) {
   std::vector<double> along(kSteps + 1, 0.0);
   const auto parameter = [](double step) { return kEnd * (2 * step / kSteps - 1); };
   for (int i = 1; i <= kSteps; ++i)
-    along[i] = along[i - 1] + length(alpha_point(parameter(i)) - alpha_point(parameter(i - 1)));
+    along[i] = along[i - 1] + norm(alpha_point(parameter(i)) - alpha_point(parameter(i - 1)));
   std::vector<double> out;
   for (int k = 0; k <= pieces; ++k) {
     const double wanted = along.back() * k / pieces;
@@ -60,7 +60,7 @@ Mesh sweep_tube() {
       const double angle = 2 * std::numbers::pi * i / kSides;
       const h6Vec3 p = alpha_point(t) + (kTubeRadius * std::cos(angle)) * up +
                        (kTubeRadius * std::sin(angle)) * left;
-      mesh.vertices.push_back({p.x, p.y, p.z});
+      mesh.vertices.push_back(p);
     }
   }
   const auto at = [](int ring, int side) {
@@ -73,7 +73,7 @@ Mesh sweep_tube() {
     }
   for (const int ring : {0, kSegments}) {
     const h6Vec3 centre = alpha_point(parameters[ring]);
-    mesh.vertices.push_back({centre.x, centre.y, centre.z});
+    mesh.vertices.push_back(centre);
     const auto middle = static_cast<std::uint32_t>(mesh.vertices.size() - 1);
     for (int i = 0; i < kSides; ++i) {
       const std::uint32_t p = at(ring, i), q = at(ring, i + 1);
@@ -104,7 +104,7 @@ h6Vec3 alpha_point(double t) {
 
 double alpha_end() { return kEnd; }
 
-h6Vec3 alpha_outward() { return unit({kLoopLength, -kWidth, 0}); }
+h6Vec3 alpha_outward() { return unit(h6Vec3{kLoopLength, -kWidth, 0}); }
 
 h6Vec3 alpha_tip() {
   static const std::vector<double> parameters = equal_lengths(kSegments);

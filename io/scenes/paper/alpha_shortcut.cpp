@@ -60,13 +60,13 @@ Path shortcut_path() {
   hand.wait(0.3);
   h6Vec3 tip = tip_over_strand(kStart);
   const auto slide_to = [&](const h6Vec3& next) {
-    hand.go_to(tool_with_tip_at(next), length(next - tip) / kSpeed);
+    hand.go_to(tool_with_tip_at(next), norm(next - tip) / kSpeed);
     tip = next;
   };
   constexpr int kSteps = 55;
   for (int i = 1; i <= kSteps; ++i)
     slide_to(tip_over_strand(kStart + (alpha_end() - kStart) * i / kSteps));
-  slide_to(tip + 88 * kMm * unit({1, -1, 0}));
+  slide_to(tip + 88 * kMm * unit(h6Vec3{1, -1, 0}));
 
   // Twisting while it pulls: about each axis in turn.
   const h6Pose end = hand.pose();
@@ -130,7 +130,7 @@ Path alpha_push(int index) {
   h6Vec3 tip = tip_over_strand(kStart);
   for (int i = 1; i <= 20; ++i) {  // to the gap
     const h6Vec3 next = tip_over_strand(kStart + (1 - kStart) * i / 20);
-    hand.go_to(tool_with_tip_at(next), length(next - tip) / kSpeed);
+    hand.go_to(tool_with_tip_at(next), norm(next - tip) / kSpeed);
     tip = next;
   }
   const h6Pose gap = hand.pose();

@@ -18,7 +18,7 @@ PointCloud cone_shell(double radius, double height, double spacing, const h6Vec3
   for (int i = -reach; i <= reach; ++i)
     for (int j = -reach; j <= reach; ++j) {
       const h6Vec3 p = {(i + sampler.shift()) * spacing, (j + sampler.shift()) * spacing, 0};
-      if (length(p) < radius) add_shell_point(cloud, p - com, {0, 0, 1});
+      if (norm(p) < radius) add_shell_point(cloud, p - com, {0, 0, 1});
     }
   const int rows = static_cast<int>(std::ceil(std::hypot(radius, height) / spacing));
   for (int i = 0; i < rows; ++i) {

@@ -24,7 +24,7 @@ void add_peg(PointCloud& cloud, double radius, double half_length, Sampler& samp
   for (int i = -reach; i <= reach; ++i)
     for (int j = -reach; j <= reach; ++j) {
       const h6Vec3 p = {(i + sampler.shift()) * spacing, (j + sampler.shift()) * spacing, 0};
-      if (length(p) < radius) add_shell_point(cloud, p - h6Vec3{0, 0, half_length}, {0, 0, 1});
+      if (norm(p) < radius) add_shell_point(cloud, p - h6Vec3{0, 0, half_length}, {0, 0, 1});
     }
 }
 

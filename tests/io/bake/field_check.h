@@ -19,15 +19,7 @@ namespace field_check {
 using h6::io::FieldData;
 using h6::io::Mesh;
 using h6::io::Vec3;
-
-inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
-inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec3 cross(Vec3 a, Vec3 b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline double norm(Vec3 a) { return std::sqrt(dot(a, a)); }
+using namespace h6;  // vectors
 
 struct Random {
   std::mt19937_64 engine;
@@ -210,19 +202,15 @@ class Judge {
     for (std::size_t i = begin; i < end; ++i)
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3 v = corner(i, k);
-        node.low = {std::min(node.low.x, v.x), std::min(node.low.y, v.y),
-                    std::min(node.low.z, v.z)};
-        node.high = {std::max(node.high.x, v.x), std::max(node.high.y, v.y),
-                     std::max(node.high.z, v.z)};
+        node.low = min(node.low, v);
+        node.high = max(node.high, v);
       }
     const std::size_t at = nodes_.size();
     nodes_.push_back(node);
     if (end - begin <= 6) return;
     const Vec3 size = node.high - node.low;
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const auto key = [&](std::uint32_t t) {
-      return axis == 0 ? middle_[t].x : axis == 1 ? middle_[t].y : middle_[t].z;
-    };
+    const auto key = [&](std::uint32_t t) { return component(middle_[t], axis); };
     const std::size_t half = (begin + end) / 2;
     std::nth_element(order_.begin() + long(begin), order_.begin() + long(half),
                      order_.begin() + long(end),

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "hapsix/vector.h"
 #include "io/scene/verdict.h"
 
 using namespace h6;
@@ -288,8 +289,7 @@ TEST_CASE("a scene with a target ends arrived or stuck, by place and by angle") 
   CHECK(judge(rules, 0.6, calm) == Verdict::stuck);
   rules.tolerance_angle = 0.11;
   CHECK(judge(rules, 0.6, calm) == Verdict::arrived);
-  const h6Quat q = rules.target->q;
-  rules.target->q = {-q.w, -q.x, -q.y, -q.z};  // the same orientation
+  rules.target->q = -rules.target->q;  // the same orientation
   CHECK(judge(rules, 0.6, calm) == Verdict::arrived);
   rules.target->p.y = 1.1e-3;
   CHECK(judge(rules, 0.6, calm) == Verdict::stuck);

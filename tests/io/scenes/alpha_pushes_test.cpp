@@ -42,7 +42,7 @@ double linking(const h6Pose& tool) {
     for (std::size_t j = 0; j < b.size(); ++j) {
       const h6Vec3 &p = a[i], &q = a[(i + 1) % a.size()], &r = b[j], &s = b[(j + 1) % b.size()];
       const h6Vec3 apart = 0.5 * (p + q - r - s);
-      sum += dot(apart, cross(q - p, s - r)) / std::pow(length(apart), 3);
+      sum += dot(apart, cross(q - p, s - r)) / std::pow(norm(apart), 3);
     }
   return std::abs(sum) / (4 * kPi);
 }
@@ -89,20 +89,20 @@ TEST_CASE("pushes begin as the shortcut does and differ, each within 30 degrees 
   double widest = 0;
   for (int i = 0; i < kPushes; ++i) {
     const Path path = alpha_push(i), again = alpha_push(i);
-    CHECK(length(path.front().pose.p - shortcut.hands[0].path.front().pose.p) < 1e-12);
+    CHECK(norm(path.front().pose.p - shortcut.hands[0].path.front().pose.p) < 1e-12);
     REQUIRE(path.size() == again.size());
-    CHECK(length(path.back().pose.p - again.back().pose.p) == 0);
+    CHECK(norm(path.back().pose.p - again.back().pose.p) == 0);
     // The gap is where the tool is last led slowly; from there the hand goes 250 mm.
     const h6Vec3 end = path.back().pose.p;
     h6Vec3 gap = path.front().pose.p;
     for (const PathRow& row : path)
-      if (length(row.pose.p - end) > 249 * kMm && length(row.pose.p - end) < 251 * kMm)
+      if (norm(row.pose.p - end) > 249 * kMm && norm(row.pose.p - end) < 251 * kMm)
         gap = row.pose.p;
-    CHECK(length(end - gap) == h6::test::near(250 * kMm).epsilon(1e-6));
+    CHECK(norm(end - gap) == h6::test::near(250 * kMm).epsilon(1e-6));
     const double angle = std::acos(std::min(1.0, dot(unit(end - gap), alpha_outward())));
     CHECK(angle < kPi / 6 + 1e-6);
     widest = std::max(widest, angle);
-    for (const h6Vec3& other : ends) CHECK(length(end - other) > kMm);
+    for (const h6Vec3& other : ends) CHECK(norm(end - other) > kMm);
     ends.push_back(end);
   }
   CHECK(widest > kPi / 9);
@@ -116,7 +116,7 @@ TEST_CASE("no point of the tool can be in a forbidden box while the loops are li
   const std::vector<h6Vec3> still = ring({{0, 0, 0}, {1, 0, 0, 0}});
   double reach = 0;
   for (const auto& v : alpha.mesh.vertices)
-    for (const h6Vec3& q : still) reach = std::max(reach, length(h6Vec3{v.x, v.y, v.z} - q));
+    for (const h6Vec3& q : still) reach = std::max(reach, norm(v - q));
   REQUIRE(scene.verdict.forbidden.size() == 7);
   for (const Box& box : scene.verdict.forbidden)
     for (const h6Vec3& p : still) {

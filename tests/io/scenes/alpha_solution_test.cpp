@@ -42,12 +42,6 @@ Scene solution() {
   return *scene;
 }
 
-h6Vec3 vertex(const Mesh& mesh, std::uint32_t i) {
-  return {mesh.vertices[i].x, mesh.vertices[i].y, mesh.vertices[i].z};
-}
-
-h6Vec3 placed(const h6Pose& pose, const h6Vec3& p) { return pose.p + rotate(pose.q, p); }
-
 // ---- a tube as a chain of straight pieces ------------------------------------------------------
 
 // Centres of the mesh's rings. A triangle joins two neighbouring rings, or closes an end, and every
@@ -57,7 +51,7 @@ h6Vec3 placed(const h6Pose& pose, const h6Vec3& p) { return pose.p + rotate(pose
 std::vector<h6Vec3> chain_of(const Mesh& mesh) {
   std::vector<h6Vec3> out(mesh.vertices.size() / kSides);
   for (std::uint32_t i = 0; i < out.size() * kSides; ++i)
-    out[i / kSides] = out[i / kSides] + (1.0 / kSides) * vertex(mesh, i);
+    out[i / kSides] = out[i / kSides] + (1.0 / kSides) * mesh.vertices[i];
   return out;
 }
 
@@ -67,7 +61,7 @@ double segment_distance(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const
   const auto to_point = [](const h6Vec3& p, const h6Vec3& from, const h6Vec3& to) {
     const h6Vec3 u = to - from;
     const double s = std::clamp(dot(p - from, u) / dot(u, u), 0.0, 1.0);
-    return length(from + s * u - p);
+    return norm(from + s * u - p);
   };
   double best =
       std::min({to_point(a, c, d), to_point(b, c, d), to_point(c, a, b), to_point(d, a, b)});
@@ -85,19 +79,14 @@ double chain_distance(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b
   double best = 1;
   for (std::size_t i = 0; i + 1 < a.size(); ++i)
     for (std::size_t j = 0; j + 1 < b.size(); ++j)
-      if (length(a[i] - b[j]) - length(a[i + 1] - a[i]) - length(b[j + 1] - b[j]) < best)
+      if (norm(a[i] - b[j]) - norm(a[i + 1] - a[i]) - norm(b[j + 1] - b[j]) < best)
         best = std::min(best, segment_distance(a[i], a[i + 1], b[j], b[j + 1]));
   return best;
 }
 
 std::vector<h6Vec3> placed(const h6Pose& pose, std::vector<h6Vec3> points) {
-  for (h6Vec3& p : points) p = placed(pose, p);
+  for (h6Vec3& p : points) p = place(pose, p);
   return points;
-}
-
-double turned(const h6Quat& a, const h6Quat& b) {
-  const h6Quat d = product(b, {a.w, -a.x, -a.y, -a.z});
-  return 2 * std::atan2(std::hypot(d.x, std::hypot(d.y, d.z)), std::abs(d.w));
 }
 
 // ---- linking -----------------------------------------------------------------------------------
@@ -107,9 +96,9 @@ const h6Pose kHere = {{0, 0, 0}, {1, 0, 0, 0}};
 // The loop, closed by a segment across the gap, itself cut in pieces.
 std::vector<h6Vec3> ring(const h6Pose& pose) {
   std::vector<h6Vec3> out;
-  for (int i = 0; i <= 240; ++i) out.push_back(placed(pose, alpha_point(-1 + i / 120.0)));
+  for (int i = 0; i <= 240; ++i) out.push_back(place(pose, alpha_point(-1 + i / 120.0)));
   for (int i = 1; i < 20; ++i)
-    out.push_back(placed(pose, (1 - i / 20.0) * alpha_point(1) + (i / 20.0) * alpha_point(-1)));
+    out.push_back(place(pose, (1 - i / 20.0) * alpha_point(1) + (i / 20.0) * alpha_point(-1)));
   return out;
 }
 
@@ -120,7 +109,7 @@ double gauss_linking(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b)
     for (std::size_t j = 0; j < b.size(); ++j) {
       const h6Vec3 &p = a[i], &q = a[(i + 1) % a.size()], &r = b[j], &s = b[(j + 1) % b.size()];
       const h6Vec3 apart = 0.5 * (p + q - r - s);
-      sum += dot(apart, cross(q - p, s - r)) / std::pow(length(apart), 3);
+      sum += dot(apart, cross(q - p, s - r)) / std::pow(norm(apart), 3);
     }
   return sum / (4 * kPi);
 }
@@ -137,10 +126,10 @@ TEST_CASE("every point of an alpha is within the tube's radius of the chain of i
   const auto rings = static_cast<std::uint32_t>(chain.size());
   REQUIRE(alpha.mesh.vertices.size() == rings * kSides + 2);  // and the middles of both caps
   for (std::uint32_t i = 0; i < rings * kSides; ++i)
-    REQUIRE(length(vertex(alpha.mesh, i) - chain[i / kSides]) < alpha.tube_radius + 1e-8);
+    REQUIRE(norm(alpha.mesh.vertices[i] - chain[i / kSides]) < alpha.tube_radius + 1e-8);
   const std::uint32_t caps[2] = {rings * kSides, rings * kSides + 1};
-  CHECK(length(vertex(alpha.mesh, caps[0]) - chain.front()) < 1e-8);
-  CHECK(length(vertex(alpha.mesh, caps[1]) - chain.back()) < 1e-8);
+  CHECK(norm(alpha.mesh.vertices[caps[0]] - chain.front()) < 1e-8);
+  CHECK(norm(alpha.mesh.vertices[caps[1]] - chain.back()) < 1e-8);
   for (const auto& triangle : alpha.mesh.triangles) {
     std::uint32_t low = rings, high = 0;
     for (const std::uint32_t v : triangle) {
@@ -159,7 +148,7 @@ TEST_CASE(
   const std::vector<h6Vec3> chain = chain_of(mesh);
   double reach = 0;  // of the tool from its mesh frame's origin
   for (std::uint32_t i = 0; i < mesh.vertices.size(); ++i)
-    reach = std::max(reach, length(vertex(mesh, i)));
+    reach = std::max(reach, norm(mesh.vertices[i]));
   const Path& path = scene.hands.front().path;
   double before = 0, tightest = 1;
   h6Pose last = path.front().pose;
@@ -169,7 +158,7 @@ TEST_CASE(
     tightest = std::min(tightest, now);
     // On its way here no point of the tool moved farther than this; each end of the interval
     // guards its half.
-    const double moved = length(pose.p - last.p) + reach * turned(last.q, pose.q);
+    const double moved = norm(pose.p - last.p) + reach * norm(turn(last.q, pose.q));
     INFO("t = " << i * kTick << " s, clearance " << now / kMm << " mm");
     REQUIRE(now > 0.5 * kMm);
     if (i > 0) REQUIRE(before + now > moved + 0.1 * kMm);
@@ -187,7 +176,7 @@ TEST_CASE("the meshes' own distance, triangle by triangle, is no less than the t
   double tightest = 1;
   for (double t = 0; t < path.back().t; t += 0.05) {
     const h6Pose pose = sample_path(path, t);
-    if (length(pose.p) > 30 * kMm) break;  // apart: the chains say enough
+    if (norm(pose.p) > 30 * kMm) break;  // apart: the chains say enough
     const double tubes = chain_distance(chain, placed(pose, chain)) - 2 * make_alpha().tube_radius;
     const double meshes = mesh_distance(mesh, moved(mesh, pose));
     INFO("t = " << t);
@@ -207,7 +196,7 @@ TEST_CASE("hooked at the start, as the shortcut's alphas are, and not at the end
   CHECK(links(path.front().pose) == h6::test::near(1).epsilon(0.02));
   CHECK(links(make_scene("alpha-shortcut")->bodies[1].pose) == h6::test::near(1).epsilon(0.02));
   CHECK(links(path.back().pose) < 0.02);
-  CHECK(length(path.back().pose.p) > 149 * kMm);
+  CHECK(norm(path.back().pose.p) > 149 * kMm);
 }
 
 TEST_CASE("no point of the tool moves faster than 60 mm/s, and the hand's velocity never jumps" *
@@ -217,15 +206,15 @@ TEST_CASE("no point of the tool moves faster than 60 mm/s, and the hand's veloci
   const Path& path = scene.hands.front().path;
   const auto velocity = [&](std::uint32_t v, double t) {
     const h6Velocity hand = sample_path_velocity(path, t);
-    const h6Vec3 arm = rotate(sample_path(path, t).q, vertex(mesh, v));
+    const h6Vec3 arm = rotate(sample_path(path, t).q, mesh.vertices[v]);
     return hand.linear + cross(hand.angular, arm);
   };
   double fastest = 0, jump = 0;
   for (std::size_t i = 1; i + 1 < path.size(); ++i)
     for (std::uint32_t v = 0; v < mesh.vertices.size(); v += 5) {
       const h6Vec3 here = velocity(v, path[i].t - 1e-4);
-      fastest = std::max(fastest, length(here));
-      jump = std::max(jump, length(velocity(v, path[i].t + 1e-4) - here));
+      fastest = std::max(fastest, norm(here));
+      jump = std::max(jump, norm(velocity(v, path[i].t + 1e-4) - here));
     }
   CHECK(fastest < 60 * kMm);
   CHECK(jump < 6 * kMm);  // in 20 ms
@@ -264,8 +253,8 @@ TEST_CASE("the engine follows the way: the tool arrives, within one voxel of the
     watch.frame(t, sample.pose, sample.velocity, body, frame.max_depth_voxels,
                 (frame.status & H6_STATE_NOT_FINITE) == 0);
     for (std::size_t k = 0; k < l.watched_points.size(); k += 50)
-      farthest = std::max(farthest, length(placed(body.pose, l.watched_points[k]) -
-                                           placed(sample.pose, l.watched_points[k])));
+      farthest = std::max(farthest, norm(place(body.pose, l.watched_points[k]) -
+                                         place(sample.pose, l.watched_points[k])));
   }
   MESSAGE("the tool's points come no farther from the hand's than " << farthest / kMm << " mm");
   CHECK(contacts == 0);

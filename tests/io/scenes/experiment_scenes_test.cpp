@@ -104,7 +104,7 @@ TEST_CASE("a density of 2 or 0.5 doubles or halves the points, jitter keeps them
       double& most = scene == &plain ? far : farther;
       for (std::size_t i = 0; i < c.x.size(); ++i) {
         const h6Vec3 p = {c.x[i], c.y[i], c.z[i]};
-        most = std::max(most, length(p));
+        most = std::max(most, norm(p));
       }
     }
     CHECK(farther < far + 0.5 * kMm);

@@ -39,11 +39,9 @@ const IndustrialInput& gear() {
   return input;
 }
 
-h6Vec3 point(const Vec3& v) { return {v.x, v.y, v.z}; }
-
 Corners corners(const Mesh& mesh, std::size_t t) {
   const auto& k = mesh.triangles[t];
-  return {point(mesh.vertices[k[0]]), point(mesh.vertices[k[1]]), point(mesh.vertices[k[2]])};
+  return {mesh.vertices[k[0]], mesh.vertices[k[1]], mesh.vertices[k[2]]};
 }
 
 bool same(const Mesh& a, const Mesh& b) {
@@ -84,18 +82,18 @@ std::vector<Corners> part_of(const Mesh& mesh, std::int32_t part) {
 double to_segment(const h6Vec3& p, const h6Vec3& a, const h6Vec3& b) {
   const h6Vec3 ab = b - a;
   const double s = std::clamp(dot(p - a, ab) / std::max(dot(ab, ab), 1e-300), 0.0, 1.0);
-  return length(p - a - s * ab);
+  return norm(p - a - s * ab);
 }
 
 double to_triangle(const h6Vec3& p, const Corners& t) {
   const h6Vec3 n = cross(t[1] - t[0], t[2] - t[0]);
   double edges = 1e9;
-  bool over = length(n) > 0;
+  bool over = norm(n) > 0;
   for (std::size_t k = 0; k < 3; ++k) {
     edges = std::min(edges, to_segment(p, t[k], t[(k + 1) % 3]));
     over = over && dot(cross(t[(k + 1) % 3] - t[k], p - t[k]), n) >= 0;
   }
-  return over ? std::abs(dot(p - t[0], n)) / length(n) : edges;
+  return over ? std::abs(dot(p - t[0], n)) / norm(n) : edges;
 }
 
 double to_all(const h6Vec3& p, const std::vector<Corners>& triangles) {
@@ -202,7 +200,7 @@ void check_surroundings(const IndustrialInput& input) {
   std::vector<double> nearest(probes, 1e9);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Corners c = corners(mesh, t);
-    const double size = std::max(length(c[1] - c[0]), length(c[2] - c[0]));
+    const double size = std::max(norm(c[1] - c[0]), norm(c[2] - c[0]));
     for (std::size_t i = 0; i < probes; ++i) {
       const h6Vec3& p = input.truth.outside[i].p;
       const h6Vec3 way = p - c[0];
@@ -250,7 +248,7 @@ void check_holes(const IndustrialInput& input) {
     CAPTURE(input.mesh.part_names[static_cast<std::size_t>(hole.part)]);
     CHECK(hole.width > 2 * truth.voxel);
     CHECK(hole.width < 5 * truth.voxel);
-    CHECK(length(hole.normal) == h6::test::near(1));
+    CHECK(norm(hole.normal) == h6::test::near(1));
     // Its middle is as far from what is left as the ball that passes is large, at most.
     const std::vector<Corners> rest = part_of(input.mesh, hole.part);
     CHECK(2 * to_all(hole.centre, rest) > 0.5 * hole.width);
@@ -344,7 +342,7 @@ TEST_CASE("soups are the same every time, with probes and without" *
   const IndustrialTruth again = make_engine_bay(kProbes).truth;
   REQUIRE(again.inside.size() == bay().truth.inside.size());
   for (std::size_t i = 0; i < again.inside.size(); ++i)
-    CHECK(length(again.inside[i].p - bay().truth.inside[i].p) == 0);
+    CHECK(norm(again.inside[i].p - bay().truth.inside[i].p) == 0);
 }
 
 TEST_CASE("probes in solids are inside one of their part's pieces by parity" *
@@ -383,13 +381,13 @@ double least_distance(const Mesh& soup, const Mesh& part) {
     return Cell{number(p.x), number(p.y), number(p.z)};
   };
   std::map<Cell, std::vector<h6Vec3>> cells;
-  h6Vec3 low = point(part.vertices[0]), high = low;
+  h6Vec3 low = part.vertices[0], high = low;
   for (std::size_t t = 0; t < part.triangles.size(); ++t) {
     const Corners c = corners(part, t);
     for (const h6Vec3& p : {c[0], (1.0 / 3) * (c[0] + c[1] + c[2])}) {
       cells[cell_of(p)].push_back(p);
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+      low = min(low, p);
+      high = max(high, p);
     }
   }
   double nearest = kCell;
@@ -438,16 +436,16 @@ TEST_CASE("the industrial scenes have the paper's sizes; their parts start and e
     CHECK(!scene->verdict.target);
 
     const Path& path = scene->hands.front().path;
-    CHECK(length(path.front().pose.p - part.pose.p) == 0);
-    CHECK(length(path.back().pose.p - part.pose.p) < 1e-12);
+    CHECK(norm(path.front().pose.p - part.pose.p) == 0);
+    CHECK(norm(path.back().pose.p - part.pose.p) < 1e-12);
     for (std::size_t i = 1; i < path.size(); ++i) {
       REQUIRE(path[i].t > path[i - 1].t);
-      CHECK(length(path[i].pose.p - path[i - 1].pose.p) <= 0.1001 * (path[i].t - path[i - 1].t));
+      CHECK(norm(path[i].pose.p - path[i - 1].pose.p) <= 0.1001 * (path[i].t - path[i - 1].t));
     }
     // Where the hand waits, its tightest place, and at the start: vertices of neither come near a
     // triangle of the other, nor do triangles' centres.
     const h6Pose tight = sample_path(path, path.back().t / 2);
-    CHECK(length(tight.p - part.pose.p) > 0.15);
+    CHECK(norm(tight.p - part.pose.p) > 0.15);
     const double voxel = (std::string(name) == "engine-bay" ? bay() : gear()).truth.voxel;
     CHECK(least_distance(*soup.field->mesh_data, moved(*part.shell->mesh_data, tight)) > 2 * voxel);
     CHECK(least_distance(*soup.field->mesh_data, moved(*part.shell->mesh_data, part.pose)) >

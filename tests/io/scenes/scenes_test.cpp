@@ -45,10 +45,6 @@ const SceneBody& body_of(const Scene& scene, const std::string& name) {
   return scene.bodies.front();
 }
 
-h6Vec3 vertex(const Mesh& mesh, std::uint32_t i) {
-  return {mesh.vertices[i].x, mesh.vertices[i].y, mesh.vertices[i].z};
-}
-
 // Points of the body's shell, mesh frame: the grid's, or its mesh's vertices and triangle centres.
 std::vector<h6Vec3> shell_points(const SceneBody& body) {
   std::vector<h6Vec3> out;
@@ -56,9 +52,10 @@ std::vector<h6Vec3> shell_points(const SceneBody& body) {
     for (std::size_t i = 0; i < cloud->x.size(); ++i)
       out.push_back({cloud->x[i], cloud->y[i], cloud->z[i]});
   if (const auto& mesh = body.shell->mesh_data) {
-    for (std::uint32_t i = 0; i < mesh->vertices.size(); ++i) out.push_back(vertex(*mesh, i));
+    for (std::uint32_t i = 0; i < mesh->vertices.size(); ++i) out.push_back(mesh->vertices[i]);
     for (const auto& t : mesh->triangles)
-      out.push_back((1.0 / 3) * (vertex(*mesh, t[0]) + vertex(*mesh, t[1]) + vertex(*mesh, t[2])));
+      out.push_back((1.0 / 3) *
+                    (mesh->vertices[t[0]] + mesh->vertices[t[1]] + mesh->vertices[t[2]]));
   }
   return out;
 }
@@ -80,8 +77,9 @@ bool any_forbidden(const Scene& scene, const std::vector<h6Vec3>& points, const 
 double winding(const Mesh& mesh, const h6Vec3& p) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {
-    const h6Vec3 a = vertex(mesh, t[0]) - p, b = vertex(mesh, t[1]) - p, c = vertex(mesh, t[2]) - p;
-    const double la = length(a), lb = length(b), lc = length(c);
+    const h6Vec3 a = mesh.vertices[t[0]] - p, b = mesh.vertices[t[1]] - p,
+                 c = mesh.vertices[t[2]] - p;
+    const double la = norm(a), lb = norm(b), lc = norm(c);
     sum += 2 * std::atan2(dot(a, cross(b, c)),
                           la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
   }
@@ -98,7 +96,7 @@ std::vector<h6Vec3> centre_line(double from, double to, int pieces, const h6Pose
 double least_distance(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b) {
   double best = 1e9;
   for (const h6Vec3& p : a)
-    for (const h6Vec3& q : b) best = std::min(best, length(p - q));
+    for (const h6Vec3& q : b) best = std::min(best, norm(p - q));
   return best;
 }
 
@@ -111,7 +109,7 @@ std::vector<h6Vec3> ring(const h6Pose& pose) { return centre_line(-1, 1, 300, po
 double linking(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b) {
   double sum = 0;
   const auto angle = [](const h6Vec3& u, const h6Vec3& v, const h6Vec3& w) {
-    const double lu = length(u), lv = length(v), lw = length(w);
+    const double lu = norm(u), lv = norm(v), lw = norm(w);
     return std::atan2(dot(u, cross(v, w)),
                       lu * lv * lw + dot(u, v) * lw + dot(v, w) * lu + dot(w, u) * lv);
   };
@@ -171,7 +169,7 @@ TEST_CASE("inward unit normals point into the solid that the grid stands on") {
       REQUIRE(c.x.size() > 500);
       for (std::size_t i = 0; i < c.x.size(); ++i) {
         const h6Vec3 n = {c.nx[i], c.ny[i], c.nz[i]}, p = {c.x[i], c.y[i], c.z[i]};
-        REQUIRE(std::abs(length(n) - 1) < 1e-6);
+        REQUIRE(std::abs(norm(n) - 1) < 1e-6);
         REQUIRE(dot(n, p) < -4.9e-3);  // both solids are convex, 5 mm thick or more around com
       }
     }
@@ -218,22 +216,22 @@ TEST_CASE("hands start where their body is, never jump, and rest for 0.4 s at th
     CAPTURE(entry.name);
     for (const SceneHand& hand : scene.hands) {
       const h6Pose start = body_of(scene, hand.body).pose, first = hand.path.front().pose;
-      CHECK(length(first.p - start.p) == 0);
+      CHECK(norm(first.p - start.p) == 0);
       CHECK(hand.path.front().t == 0);
       for (std::size_t i = 1; i < hand.path.size(); ++i) {
         const PathRow &a = hand.path[i - 1], &b = hand.path[i];
         REQUIRE(b.t > a.t);
         const h6Quat& q = b.pose.q;
         REQUIRE(std::abs(std::hypot(std::hypot(q.w, q.x), std::hypot(q.y, q.z)) - 1) < 1e-12);
-        REQUIRE(length(b.pose.p - a.pose.p) <= 60 * kMm * (b.t - a.t));
+        REQUIRE(norm(b.pose.p - a.pose.p) <= 60 * kMm * (b.t - a.t));
         const h6Velocity v = sample_path_velocity(hand.path, (a.t + b.t) / 2);
-        REQUIRE(length(v.angular) < 6);
+        REQUIRE(norm(v.angular) < 6);
       }
       const double end = hand.path.back().t;
       CHECK(end < 8);
       const h6Velocity late = sample_path_velocity(hand.path, end - 0.4);
-      CHECK(length(late.linear) == 0);
-      CHECK(length(late.angular) < 1e-12);
+      CHECK(norm(late.linear) == 0);
+      CHECK(norm(late.angular) < 1e-12);
     }
   }
 }
@@ -276,7 +274,7 @@ TEST_CASE("peg-in-hole has Fig. 10's grid, clearance and depth") {
   double nearest = 1, farthest = 0, deepest = 0;
   for (const auto& t : block.triangles)
     for (int e = 0; e < 3; ++e) {
-      const h6Vec3 middle = 0.5 * (vertex(block, t[e]) + vertex(block, t[(e + 1) % 3]));
+      const h6Vec3 middle = 0.5 * (block.vertices[t[e]] + block.vertices[t[(e + 1) % 3]]);
       const double r = std::hypot(middle.x, middle.y);
       if (middle.z > -29 * kMm && r < 12 * kMm)
         nearest = std::min(nearest, r), farthest = std::max(farthest, r);
@@ -296,7 +294,7 @@ TEST_CASE("the alpha has exactly 1,008 triangles and lies on its tube") {
   CHECK(2 * alpha.tube_radius == h6::test::near(kTube));
   const std::vector<h6Vec3> line = centre_line(-alpha_end(), alpha_end(), 4000, kHere);
   for (std::uint32_t i = 0; i < alpha.mesh.vertices.size(); ++i) {
-    const double r = least_distance({vertex(alpha.mesh, i)}, line);
+    const double r = least_distance({alpha.mesh.vertices[i]}, line);
     REQUIRE(r < alpha.tube_radius * 1.001);
     const bool on_tube = r > alpha.tube_radius * 0.999, cap_centre = r < 1e-5;
     REQUIRE((on_tube || cap_centre));
@@ -352,11 +350,11 @@ TEST_CASE("the hand's way unlinks the alphas and is blocked by nothing but the g
     h6Vec3 where{};
     for (const h6Vec3& p : centre_line(-alpha_end(), alpha_end(), 400, pose))
       for (const h6Vec3& q : still)
-        if (length(p - q) < distance) distance = length(p - q), where = 0.5 * (p + q);
+        if (norm(p - q) < distance) distance = norm(p - q), where = 0.5 * (p + q);
     tightest = std::min(tightest, distance);
     if (distance < kTube) {
       INFO("collides at t = " << t);
-      REQUIRE(length(where) < 12 * kMm);  // the gap is at the origin
+      REQUIRE(norm(where) < 12 * kMm);  // the gap is at the origin
     }
   }
   CHECK(tightest < kTube - 1 * kMm);  // it does collide
@@ -370,7 +368,7 @@ TEST_CASE(
   // farther from the static ring than from the farthest point of the tool's ring.
   double reach = 0;
   for (const h6Vec3& p : shell_points(body_of(scene, "tool")))
-    for (const h6Vec3& q : ring(kHere)) reach = std::max(reach, length(p - q));
+    for (const h6Vec3& q : ring(kHere)) reach = std::max(reach, norm(p - q));
   REQUIRE(scene.verdict.forbidden.size() == 1);
   const Box& box = scene.verdict.forbidden.front();
   for (const h6Vec3& p : ring(kHere)) {
@@ -379,7 +377,7 @@ TEST_CASE(
     };
     const h6Vec3 gap = {outside(p.x, box.low.x, box.high.x), outside(p.y, box.low.y, box.high.y),
                         outside(p.z, box.low.z, box.high.z)};
-    REQUIRE(length(gap) > reach + 1 * kMm);
+    REQUIRE(norm(gap) > reach + 1 * kMm);
   }
   // Where the hand rests, much of the tool is in it: a method that lets it through is caught.
   const h6Pose end = scene.hands.front().path.back().pose;

@@ -57,13 +57,13 @@ void check_ratios(const ShellData& shell) {
 double distance_to_plane(const Mesh& mesh, const ShellData& s, std::size_t i) {
   const auto& f = mesh.triangles[s.source[i]];
   const Vec3 a = mesh.vertices[f[0]], b = mesh.vertices[f[1]], c = mesh.vertices[f[2]];
-  const Vec3 n = cross(minus(b, a), minus(c, a)), p = point(s, i);
+  const Vec3 n = cross(b - a, c - a), p = point(s, i);
   // Within the triangle: never on the outer side of an edge by more than rounding.
-  double out = std::abs(dot(minus(p, a), n)) / std::sqrt(dot(n, n));
+  double out = std::abs(dot(p - a, n)) / std::sqrt(dot(n, n));
   const Vec3 corners[3] = {a, b, c};
   for (int k = 0; k < 3; ++k) {
-    const Vec3 edge = minus(corners[(k + 1) % 3], corners[k]), side = cross(n, edge);
-    out = std::max(out, -dot(minus(p, corners[k]), side) / std::sqrt(dot(side, side)));
+    const Vec3 edge = corners[(k + 1) % 3] - corners[k], side = cross(n, edge);
+    out = std::max(out, -dot(p - corners[k], side) / std::sqrt(dot(side, side)));
   }
   return out;
 }
@@ -127,7 +127,7 @@ TEST_CASE("no part of the surface is left out: every place has a point near it")
     const Vec3 p{r * std::cos(a), r * std::sin(a), z};
     double best = INFINITY;
     for (std::size_t k = 0; k < shell.size(); ++k) {
-      const Vec3 d = minus(p, point(shell, k));
+      const Vec3 d = p - point(shell, k);
       best = std::min(best, dot(d, d));
     }
     widest = std::max(widest, std::sqrt(best));
@@ -331,10 +331,10 @@ TEST_CASE("children hang from the nearest point of their level") {
     for (std::size_t r = s.level_first[k]; r < s.level_first[k + 1]; ++r) {
       for (std::size_t c = 1; c < s.node_child_count[r]; ++c) {
         const Vec3 p = point(s, s.node_point[s.node_first_child[r] + c]);
-        const Vec3 own = minus(p, point(s, s.node_point[r]));
+        const Vec3 own = p - point(s, s.node_point[r]);
         double best = INFINITY;
         for (std::size_t q = 0; q < s.level_points[k]; ++q) {
-          const Vec3 d = minus(p, point(s, q));
+          const Vec3 d = p - point(s, q);
           best = std::min(best, dot(d, d));
         }
         CHECK(dot(own, own) == best);

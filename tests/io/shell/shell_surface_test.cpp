@@ -62,7 +62,6 @@ Grid grid_of(const Mesh& mesh, const ShellBake& options) {
   return {field->voxel_size, field->offset};
 }
 
-double length(const Vec3& v) { return std::sqrt(dot(v, v)); }
 double distance_to(const Mesh& mesh, std::size_t t, const Vec3& p) {
   double corner[4][3] = {{p.x, p.y, p.z}};
   for (int k = 0; k < 3; ++k) {
@@ -205,8 +204,8 @@ TEST_CASE("no point is on the inner wall of a tank, sound or with torn walls") {
       double nearest = INFINITY, worst = 1;
       for (std::size_t i = 0; i < shell.size(); ++i) {
         const Vec3 p = point(shell, i);
-        nearest = std::min(nearest, length(p));
-        worst = std::min(worst, -dot(p, normal(shell, i)) / length(p));
+        nearest = std::min(nearest, norm(p));
+        worst = std::min(worst, -dot(p, normal(shell, i)) / norm(p));
       }
       CHECK(nearest > 0.97);
       CHECK(worst > 0.9);  // all of them inwards; facets and torn edges tilt some
@@ -260,7 +259,7 @@ TEST_CASE("normals are right within two degrees on spheres, cylinders and tori")
             const Vec3 p = point(shell, i), out = shape.out(p);
             if (&shape == &shapes[2] && std::abs(p.z) > 0.02 - 2 * voxel) continue;  // ends
             ++seen;
-            worst = std::min(worst, -dot(out, normal(shell, i)) / length(out));
+            worst = std::min(worst, -dot(out, normal(shell, i)) / norm(out));
           }
           CAPTURE(offset);
           CAPTURE(int(normals));
@@ -310,7 +309,7 @@ TEST_CASE("cracks and T-junctions make no points within and none astray") {
       const Vec3 p = point(shell, i);
       const double out = std::max({-p.x, -p.y, -p.z, p.x - 1, p.y - 1, p.z - 1});
       CHECK(out > 0);
-      CHECK(dot(minus({0.5, 0.5, 0.5}, p), normal(shell, i)) > 0);
+      CHECK(dot(Vec3{0.5, 0.5, 0.5} - p, normal(shell, i)) > 0);
       nearest = std::min(nearest, distance_to(mesh, p));
     }
     CHECK(nearest > grid.offset - 0.05 * grid.voxel);

@@ -18,13 +18,9 @@ namespace shells {
 using h6::io::Mesh;
 using h6::io::ShellData;
 using h6::io::Vec3;
+using namespace h6;  // vectors
 constexpr double pi = 3.14159265358979323846;
 
-inline Vec3 minus(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline double dot(const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 inline Vec3 point(const ShellData& s, std::size_t i) { return {s.x[i], s.y[i], s.z[i]}; }
 inline Vec3 normal(const ShellData& s, std::size_t i) { return {s.nx[i], s.ny[i], s.nz[i]}; }
 
@@ -119,7 +115,7 @@ inline Spacing spacing(const ShellData& s, std::size_t count, bool one_side = fa
     const Vec3 p = point(s, order[i]);
     double best = INFINITY;
     const auto look = [&](std::size_t k) {
-      const Vec3 d = minus(point(s, order[k]), p);
+      const Vec3 d = point(s, order[k]) - p;
       if (d.x * d.x > best) return false;
       if (!one_side || dot(normal(s, order[k]), normal(s, order[i])) > -0.694)
         best = std::min(best, dot(d, d));

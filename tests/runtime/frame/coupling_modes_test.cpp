@@ -38,10 +38,10 @@ TEST_CASE("a quasi-static body rests where a dynamic one comes to rest") {
         CAPTURE(z);
         const auto [moving, felt_moving] = rest(H6_COUPLING_DYNAMIC, 6000);
         const auto [at_rest, felt_at_rest] = rest(H6_COUPLING_STATIC, 400);
-        CHECK(norm(minus(moving.pose.p, at_rest.pose.p)) < 1e-7);
+        CHECK(norm(moving.pose.p - at_rest.pose.p) < 1e-7);
         CHECK(angle_between(moving.pose.q, at_rest.pose.q) < 1e-5);
-        CHECK(norm(minus(felt_moving.force, felt_at_rest.force)) < 1e-3);
-        CHECK(norm(minus(felt_moving.torque, felt_at_rest.torque)) < 1e-5);
+        CHECK(norm(felt_moving.force - felt_at_rest.force) < 1e-3);
+        CHECK(norm(felt_moving.torque - felt_at_rest.torque) < 1e-5);
         CHECK(norm(felt_at_rest.force) > 0.5);
       }
 }
@@ -65,8 +65,7 @@ TEST_CASE("a quasi-static body has no velocity and takes no step longer than its
         for (const double x : {-outermost, outermost})
           for (const double y : {-outermost, outermost}) {
             const h6Vec3 corner{x, y, -5 * mm};
-            longest =
-                std::max(longest, norm(minus(place(after.pose, corner), place(before, corner))));
+            longest = std::max(longest, norm(place(after.pose, corner) - place(before, corner)));
           }
       }
       CHECK(longest <= most * mm * (1 + 1e-9));
@@ -101,7 +100,7 @@ TEST_CASE("in free space a quasi-static body reaches the hand, saturated and far
       CHECK((h6GetFrame(scene.session).status & H6_COUPLING_SATURATED) != 0);
       const h6DeviceCommand felt = scene.hold(target, 400);
       CAPTURE(angle);
-      CHECK(norm(minus(scene.body().pose.p, target.p)) < 1e-9);
+      CHECK(norm(scene.body().pose.p - target.p) < 1e-9);
       CHECK(angle_between(scene.body().pose.q, target.q) < 1e-8);
       CHECK(norm(felt.wrench.force) < 1e-6);
     }
@@ -112,7 +111,7 @@ TEST_CASE("within one step of the hand a free quasi-static body is there after o
   scene.hand.coupling.mode = H6_COUPLING_STATIC;
   scene.open();
   scene.hold(pose(0.1 * mm, 0.2 * mm, 5.5 * mm), 1);
-  CHECK(norm(minus(scene.body().pose.p, {0.1 * mm, 0.2 * mm, 5.5 * mm})) < 1e-12);
+  CHECK(norm(scene.body().pose.p - h6Vec3{0.1 * mm, 0.2 * mm, 5.5 * mm}) < 1e-12);
 }
 
 TEST_CASE("a quasi-static body does not feel how fast it came") {
@@ -139,7 +138,7 @@ TEST_CASE("before the first good sample a quasi-static and a direct body stay wh
     h6DeviceSample nothing = hand_at(pose(1, 2, 3));
     nothing.pose.p.y = NAN;
     const h6DeviceCommand felt = scene.hold(nothing, 5);
-    CHECK(norm(minus(scene.body().pose.p, {0, 0, 5.2 * mm})) < 1e-15);
+    CHECK(norm(scene.body().pose.p - h6Vec3{0, 0, 5.2 * mm}) < 1e-15);
     CHECK(norm(scene.body().velocity.linear) == 0);
     CHECK(norm(felt.wrench.force) == 0);
     CHECK((h6GetFrame(scene.session).status & H6_HAND_NOT_FINITE) != 0);
@@ -154,13 +153,13 @@ TEST_CASE("a direct body is where the hand is, and moves as it moves") {
     const h6DeviceSample sample = wild(i);
     scene.hold(sample, 1);
     const h6BodyState state = scene.body();
-    CHECK(norm(minus(state.pose.p, sample.pose.p)) < 1e-16);
+    CHECK(norm(state.pose.p - sample.pose.p) < 1e-16);
     CHECK(angle_between(state.pose.q, sample.pose.q) < 1e-14);
     // Of the centre of mass: what the origin has, and what turning adds.
-    const h6Vec3 lever = minus(place(sample.pose, {0, 0, 1 * mm}), sample.pose.p);
+    const h6Vec3 lever = place(sample.pose, {0, 0, 1 * mm}) - sample.pose.p;
     const h6Vec3 turning = cross(sample.velocity.angular, lever);
-    CHECK(norm(minus(minus(state.velocity.linear, sample.velocity.linear), turning)) < 1e-14);
-    CHECK(norm(minus(state.velocity.angular, sample.velocity.angular)) == 0);
+    CHECK(norm(state.velocity.linear - sample.velocity.linear - turning) < 1e-14);
+    CHECK(norm(state.velocity.angular - sample.velocity.angular) == 0);
   }
 }
 
@@ -189,8 +188,8 @@ TEST_CASE("a direct hand feels the contacts of its own pose, in the same frame")
     CAPTURE(h6MethodName(method));
     CHECK(norm(force) > 0.5);
     CHECK(norm(torque) > 1e-3);
-    CHECK(norm(minus(felt.wrench.force, force)) < 1e-5 * norm(force));
-    CHECK(norm(minus(felt.wrench.torque, torque)) < 1e-5 * norm(torque));
+    CHECK(norm(felt.wrench.force - force) < 1e-5 * norm(force));
+    CHECK(norm(felt.wrench.torque - torque) < 1e-5 * norm(torque));
   }
 }
 

@@ -114,10 +114,10 @@ TEST_CASE("admittance: what the device is told is the motion of the mesh frame")
   for (int i = 0; i < 400; ++i) {
     const h6Pose before = scene.told.pose;
     scene.push({{0.1 * std::sin(0.01 * i), 0, 0.05}, {1e-4, 2e-4 * std::cos(0.02 * i), 0}}, 1);
-    const h6Vec3 v = scene.told.velocity.linear, moved = minus(scene.told.pose.p, before.p);
-    if (i > 0) worst = std::max(worst, norm(minus(v, {moved.x / ms, moved.y / ms, moved.z / ms})));
+    const h6Vec3 v = scene.told.velocity.linear, moved = scene.told.pose.p - before.p;
+    if (i > 0) worst = std::max(worst, norm(v - h6Vec3{moved.x / ms, moved.y / ms, moved.z / ms}));
     fastest = std::max(fastest, norm(v));
-    CHECK(norm(minus(scene.told.pose.p, scene.body().pose.p)) == 0);
+    CHECK(norm(scene.told.pose.p - scene.body().pose.p) == 0);
     // The safety chain makes the quaternion unit once more.
     CHECK(std::fabs(scene.told.pose.q.x - scene.body().pose.q.x) < 1e-15);
   }
@@ -134,7 +134,7 @@ TEST_CASE("a wrench without numbers counts as none, and the frame says so") {
       h6Wrench wrench = force(0.5, 0, 0);
       wrench.torque.y = wrong;
       CHECK((scene.push(wrench, 50) & H6_HAND_NOT_FINITE) != 0);
-      CHECK(norm(minus(scene.told.pose.p, {0, 0, 5.2 * mm})) < 1e-12);
+      CHECK(norm(scene.told.pose.p - h6Vec3{0, 0, 5.2 * mm}) < 1e-12);
       CHECK((scene.push(force(0.5, 0, 0), 50) & H6_HAND_NOT_FINITE) == 0);
       CHECK(scene.told.pose.p.x > 0.1 * mm);
     }
@@ -270,8 +270,8 @@ TEST_CASE("pseudo-admittance: manipulandum and body start together, and stay whe
   scene.bodies[1].pose.p.z = 100 * mm;
   scene.open();
   scene.push({}, 100);
-  CHECK(norm(minus(scene.told.pose.p, {0, 0, 100 * mm})) < 1e-15);
-  CHECK(norm(minus(scene.body().pose.p, {0, 0, 100 * mm})) < 1e-15);
+  CHECK(norm(scene.told.pose.p - h6Vec3{0, 0, 100 * mm}) < 1e-15);
+  CHECK(norm(scene.body().pose.p - h6Vec3{0, 0, 100 * mm}) < 1e-15);
   CHECK(norm(scene.told.velocity.linear) == 0);
 }
 
@@ -446,7 +446,7 @@ TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows i
   h6SetBody(scene.session, 1, &there);
   h6DeviceSample sample = hand_at(there.pose);
   for (int i = 0; i < 20; ++i) h6Step(scene.session, &sample, &scene.told);
-  CHECK(norm(minus(scene.body().pose.p, there.pose.p)) < 1e-12);
+  CHECK(norm(scene.body().pose.p - there.pose.p) < 1e-12);
   CHECK(norm(scene.body().velocity.linear) < 1e-12);
   // One frame of two pushes: the bodies are where they were, only the manipulanda differ.
   const auto hash_after = [](double mass) {
@@ -457,7 +457,7 @@ TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows i
     pushed.hand.coupling.rotational_stiffness = 1e-300;
     pushed.open();
     pushed.push(force(0.5, 0, 0), 1);
-    CHECK(norm(minus(pushed.body().pose.p, {0, 0, 100 * mm})) < 1e-15);
+    CHECK(norm(pushed.body().pose.p - h6Vec3{0, 0, 100 * mm}) < 1e-15);
     return h6GetFrame(pushed.session).state_hash;
   };
   CHECK(hash_after(0.1) == hash_after(0.1));

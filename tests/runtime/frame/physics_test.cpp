@@ -81,9 +81,8 @@ TEST_CASE("saturation bounds spring and damper together, at any hand speed") {
     h6DeviceCommand felt;
     h6Step(scene.session, &sample, &felt);
     const auto &f = felt.wrench.force, &t = felt.wrench.torque;
-    CHECK(std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z) <= 5 * (1 + 1e-9));
-    CHECK(std::sqrt(t.x * t.x + t.y * t.y + t.z * t.z) <=
-          h6GetCoupling(scene.session, 0).max_torque * (1 + 1e-9));
+    CHECK(norm(f) <= 5 * (1 + 1e-9));
+    CHECK(norm(t) <= h6GetCoupling(scene.session, 0).max_torque * (1 + 1e-9));
   }
 }
 

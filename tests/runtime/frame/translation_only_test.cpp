@@ -51,8 +51,7 @@ TEST_CASE("a body of translations alone keeps its orientation to the bit and giv
       CHECK(norm(scene.body().velocity.angular) == 0);
       CHECK((h6GetFrame(scene.session).status & (H6_SOLVE_FAILED | H6_STATE_NOT_FINITE)) == 0);
       // The wrist turns, the body's mesh frame does not go round with it.
-      if (way.mode == H6_COUPLING_DIRECT)
-        CHECK(norm(minus(scene.body().pose.p, sample.pose.p)) < 1e-15);
+      if (way.mode == H6_COUPLING_DIRECT) CHECK(norm(scene.body().pose.p - sample.pose.p) < 1e-15);
     }
     CHECK(touched > 0);
     // No hand is so fast: what it felt on the way was cut to nothing.
@@ -84,7 +83,7 @@ TEST_CASE("without torques a body of translations alone moves as one of six degr
       const std::vector<h6Vec3> three = heights(true), six = heights(false);
       double worst = 0, lowest = 1;
       for (std::size_t i = 0; i < three.size(); ++i) {
-        worst = std::max(worst, norm(minus(three[i], six[i])));
+        worst = std::max(worst, norm(three[i] - six[i]));
         lowest = std::min(lowest, three[i].z);
       }
       CHECK(lowest < 4.95 * mm);  // it did touch
@@ -126,7 +125,7 @@ TEST_CASE("where its mass sits and how it is spread is nothing to a body of tran
     };
     const std::vector<h6Vec3> here = path_with({0, 0, 0}, 1e-5),
                               there = path_with({8 * mm, -5 * mm, 3 * mm}, 3e-6);
-    for (std::size_t i = 0; i < here.size(); ++i) CHECK(norm(minus(here[i], there[i])) < 1e-9);
+    for (std::size_t i = 0; i < here.size(); ++i) CHECK(norm(here[i] - there[i]) < 1e-9);
   }
 }
 

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "hapsix/hapsix.h"
+#include "hapsix/vector.h"
 #include "tests/support/box_on_floor.h"
 #include "tests/support/sanitized.h"
 
@@ -23,14 +24,12 @@ constexpr std::uint32_t kDeadMan = 1;
 
 enum Fault { kNone, kFreeze, kNaN, kJump, kUnplug, kStall, kLetGo, kRush, kSenseless, kFaults };
 
-double dot(const h6Vec3& a, const h6Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
 // How far `now` is from the nearest point between nothing and `last`: towards nothing any step may
 // be made, all else is slew.
 double slewed(const h6Vec3& now, const h6Vec3& last) {
   const double l2 = dot(last, last);
   const double s = l2 > 0 ? std::clamp(dot(now, last) / l2, 0.0, 1.0) : 0;
-  return norm({now.x - s * last.x, now.y - s * last.y, now.z - s * last.z});
+  return norm(now - s * last);
 }
 
 // A hand that leans on the floor, wanders about and meets faults.
