@@ -28,7 +28,7 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Largest memory of the process so far.
+// The process's largest memory so far.
 std::size_t peak_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -59,7 +59,7 @@ void add_common(CLI::App* command, Common& c, const char* ending) {
       ->check(whole_within(0, 1024));
 }
 
-// Whatever is wrong with the names of files is told before the bake.
+// Checks the file names before the bake, which may take minutes.
 Outcome check_files(const Common& c) {
   if (Outcome there = check_input(c.mesh); !there) return there;
   std::error_code error;
@@ -90,7 +90,7 @@ void add_unless_empty(std::vector<std::string>& all, std::string sentence) {
   if (!sentence.empty()) all.push_back(std::move(sentence));
 }
 
-// Why a bake failed, and where the mesh's place has to do with it.
+// Why a bake failed; says so too when the mesh lies too far from the origin.
 int bake_failed(const Console& console, const Common& c, const Input& input, std::string why) {
   const std::string far = io::too_far_for_floats(input.audit.low, input.audit.high);
   if (!far.empty() && why.ends_with('.')) why.pop_back();
@@ -127,7 +127,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   io::FieldBakeReport report;
   Result<io::FieldData> field = io::bake_field(input->mesh, o.bake, &report, console.progress());
   if (!field) return bake_failed(console, o.common, *input, field.error());
-  // Its samples hold wherever it lies, but the file may have lost the shape already.
+  // The field is as good far from the origin, but the file's own numbers may have lost the shape.
   if (const std::string name = o.common.mesh;
       name.ends_with("stl") || name.ends_with("STL") || name.ends_with("stl.gz"))
     add_unless_empty(report.warnings, io::too_far_for_floats(input->audit.low, input->audit.high));

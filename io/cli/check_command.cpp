@@ -34,7 +34,7 @@ struct CheckOptions {
   io::ExactCheckOptions exact;
 };
 
-// One mesh and the field it is for.
+// One mesh and the options of its field.
 struct Subject {
   std::string name;
   io::Mesh mesh;
@@ -53,8 +53,9 @@ ordered_json spread(const std::vector<double>& lengths, double voxel) {
   return out;
 }
 
-// Depth grows to the middle of a wall; beyond it contact pushes out on the other side. One contact
-// carries the whole stiffness, however many share it.
+// The force at which a wall gives way. Penetration depth grows up to the middle of a wall; beyond
+// it contact pushes out on the other side. Contacts share one stiffness, so one contact stands for
+// all.
 double holding_force(double stiffness, double thickness, double offset) {
   return stiffness * (thickness / 2 + offset);
 }
@@ -122,7 +123,7 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls, cons
                 m["holding_force_N"].get<double>());
 }
 
-// How far bounds are below the distance, where there is somewhere to ask.
+// How far the far bounds are below the distance, as far as places were found to compare them.
 std::string looseness(const io::ExactCheck& c) {
   char text[128];
   std::string all;
@@ -151,7 +152,7 @@ void print(const io::ExactCheck& c) {
       c.far_wrong, looseness(c).c_str());
 }
 
-// What is worth a sentence of its own.
+// Findings that deserve a warning sentence.
 std::vector<std::string> warnings_of(const Subject& s, const io::MeshAudit& a,
                                      const io::Walls& walls, const io::FieldPlan& p) {
   std::vector<std::string> out = s.mesh.remarks;
@@ -216,7 +217,7 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
                  {"bowls_share", walls->bowls},
                  {"sheets_share", walls->sheets},
                  {"buried_share", walls->buried}};
-  // The thinnest hundredth: a few rays that graze an edge are no wall.
+  // The thinnest hundredth: a few rays graze an edge and see no wall.
   const double thin = walls->sheets > 0.001 ? 0 : io::quantile(walls->thickness, 0.01);
   const bool known = walls->sheets > 0.001 || !walls->thickness.empty();
   m["holding_force_N"] =
@@ -241,7 +242,7 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
   return m;
 }
 
-// The mesh of a field or a shell; none of a baked file or of given points.
+// The mesh that a field or a shell is baked from; null for baked files and given points.
 template <class Source>
 Result<io::Mesh> mesh_of(const Source& source, const io::Scene& scene) {
   if (source.mesh_data) return *source.mesh_data;
@@ -249,7 +250,7 @@ Result<io::Mesh> mesh_of(const Source& source, const io::Scene& scene) {
   return io::read_mesh(source.mesh, source.unit.value_or(scene.unit));
 }
 
-// The bodies of a scene that are touched as fields.
+// The bodies of a scene that have a field.
 Result<std::vector<Subject>> subjects_of_scene(const io::Scene& scene) {
   std::vector<Subject> out;
   for (const io::SceneBody& b : scene.bodies) {
@@ -262,7 +263,7 @@ Result<std::vector<Subject>> subjects_of_scene(const io::Scene& scene) {
   return out;
 }
 
-// How far every shell is from a field where the scene begins, less the field's offset.
+// The distance of every shell from a field at the start of the scene, less the field's offset.
 Result<ordered_json> clearances(const Console& console, const io::Scene& scene, const Subject& s,
                                 const ordered_json& m, unsigned threads) {
   ordered_json list = ordered_json::array();

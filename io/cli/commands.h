@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// commands.h - one function a subcommand: adds it to the program; its work runs after parsing.
+// commands.h - one function for each subcommand: it adds the command; the work runs after parsing.
 #pragma once
 #include <functional>
 
@@ -11,7 +11,7 @@ class App;
 
 namespace h6::cli {
 
-// What the chosen subcommand does; its exit code is the program's.
+// The work of the chosen subcommand; returns the program's exit code.
 struct Program {
   Console console;
   std::function<int()> work;

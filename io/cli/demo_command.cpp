@@ -32,7 +32,7 @@ void print(const std::vector<RunSummary>& runs, bool virtual_time) {
   for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
 }
 
-// Where there is no page to put it on, the demo does without.
+// Without the page's files there is no report; the demo still runs.
 Outcome report(const Console& console, const DemoOptions& o, const std::vector<RunSummary>& runs,
                nlohmann::ordered_json& json) {
   if (io::view::report_page().empty()) return Done{};
@@ -85,7 +85,7 @@ int demo_command(const Console& console, DemoOptions o) {
     return console.fail(reported.error());
   if (o.view.on) {
     o.view.folder = o.folder;
-    o.run = {};  // a run without an end, by the scene's own settings, nothing recorded unasked
+    o.run = {};  // endless, with the scene's own settings; records only on request
     const Outcome viewed = view_scene(**loaded, o.run, o.view, console, [](const RunSummary&) {});
     if (!viewed) return console.fail(viewed.error());
   }

@@ -24,25 +24,25 @@ bool usable(const h6DeviceSample& s) {
                      s.velocity.linear.z + s.velocity.angular.x + s.velocity.angular.y +
                      s.velocity.angular.z;
   const double q2 = p.q.w * p.q.w + p.q.x * p.q.x + p.q.y * p.q.y + p.q.z * p.q.z;
-  return std::fabs(sum) < 1e6 && std::fabs(q2 - 1) < 2e-3;  // false for what is no number, too
+  return std::fabs(sum) < 1e6 && std::fabs(q2 - 1) < 2e-3;  // false for NaN, too
 }
 
 double& part(h6Vec3& v, int i) { return i == 0 ? v.x : i == 1 ? v.y : v.z; }
 
-// The turn from a to b, small angles.
+// The rotation vector from a to b, for small angles.
 h6Vec3 turned(const h6Quat& a, const h6Quat& b) {
   const h6Quat d = product(b, conjugate(a));
   const double sign = d.w < 0 ? -2 : 2;
   return {sign * d.x, sign * d.y, sign * d.z};
 }
 
-// A device at 1 kHz, one frame after the other.
+// Reads and writes a device at 1 kHz.
 class Frames {
  public:
   explicit Frames(const h6Device& device) : device_(device), next_(Clock::now()) {
     sample.pose.q.w = 1;
   }
-  // Waits for its time, reads, writes.
+  // One frame: waits for its time, reads, writes.
   void run(const h6Wrench& wrench) {
     std::this_thread::sleep_until(next_);
     next_ =
@@ -73,7 +73,7 @@ class Frames {
   Clock::time_point next_;
 };
 
-// Why the check must not go on; empty: it may.
+// Why the check must stop; empty when it may go on.
 std::string danger(const Frames& f, const h6Pose& start) {
   if (f.lost) return "the device was lost";
   if (!f.good) return "the device sent what is no place or no rotation";
@@ -117,7 +117,7 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
       h6Wrench w{};
       part(torque ? w.torque : w.force, axis) = sign * most * 0.5 * (1 - std::cos(kPi * i / 200));
       if (!go_on(w)) return false;
-      if (i != 220) continue;  // a little after the height: what yields lags
+      if (i != 220) continue;  // a little after the peak: a device that yields lags
       h6Vec3 moved =
           torque ? turned(before.q, frames.sample.pose.q) : frames.sample.pose.p - before.p;
       p.moved = sign * part(moved, axis);
@@ -132,7 +132,7 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
                torque = std::min(0.1 * c.max_torque, 1.0);
   bool going = true;
   for (int i = 0; i < 500 && going; ++i) going = go_on({});
-  // What renders no force may have a light for it.
+  // A device without motors may show the force by a light.
   for (int i = 0; i < 1000 && going && c.dof_out == 0; ++i) going = go_on({{0, 0, force}, {}});
   for (const bool turn : {false, true})
     for (int axis = 0; axis < 3; ++axis)

@@ -11,23 +11,23 @@ namespace h6::cli {
 
 // Samples of one device, taken at 1 kHz.
 struct SampleCount {
-  std::uint64_t frames = 0, failed = 0;  // reads, and those that said "lost"
-  std::uint64_t unusable = 0;            // not finite, out of this world, or no rotation
-  std::uint64_t changed = 0;             // other than the one before
+  std::uint64_t frames = 0, failed = 0;  // reads, and reads that found the device lost
+  std::uint64_t unusable = 0;            // not finite, absurdly large, or not a rotation
+  std::uint64_t changed = 0;             // different from the sample before
   double read_us_max = 0, write_us_max = 0;
 };
 
 // One push of the self check.
 struct Push {
   std::string what;    // "force +x"
-  double applied = 0;  // at its height [N] or [N m]
-  double moved = 0;    // the way of the push, at its height [m] or [rad]
+  double applied = 0;  // at its peak [N] or [N m]
+  double moved = 0;    // along the push, at its peak [m] or [rad]
 };
 
 struct CheckResult {
   SampleCount samples;
   std::vector<Push> pushes;
-  std::string trouble;  // why it ended early, or what is wrong; empty: all is well
+  std::string trouble;  // why the check ended early, or what is wrong; empty: all is well
 };
 
 // Called once a frame; false ends it.
@@ -36,11 +36,11 @@ using EachFrame = std::function<bool(double time, const h6DeviceSample&, bool lo
 // Reads at 1 kHz and commands nothing but zero.
 SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each);
 
-// Half a second of samples; then pushes of 0.4 s along and about every axis, each rising smoothly
-// to 10 % of the rating (and never more than 10 N or 1 N m) and back. A device that renders no
-// force is told of one for a second instead. Ends at zero at once when the device is lost, sends
-// what is no place, moves faster than 1 m/s or farther than 0.1 m, or `each` says so; the device is
-// then stopped.
+// Takes samples for half a second. Then pushes for 0.4 s along and about every axis; each push
+// rises smoothly to 10 % of the rating (at most 10 N or 1 N m) and falls again. A device that
+// renders no force gets a constant command for a second instead. The check commands zero, stops the
+// device and ends at once when the device is lost, sends an invalid pose, moves faster than 1 m/s
+// or farther than 0.1 m, or when `each` returns false.
 CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each);
 
 }  // namespace h6::cli

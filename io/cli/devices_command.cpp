@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// devices_command.cpp - hapsix devices: which there are, why one cannot be used, what one says.
+// devices_command.cpp - hapsix devices: lists devices, says why one cannot be used, watches and
+// tests one.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -31,7 +32,7 @@ const char* layout_name(device::ReportLayout layout) {
   return layout == device::ReportLayout::joint ? "one report" : "unknown, the reports will tell";
 }
 
-// Every cap that is plugged in, and whether it can be opened.
+// Every SpaceMouse that is plugged in, and whether it can be opened.
 ordered_json caps() {
   ordered_json list = ordered_json::array();
   for (const device::SpaceMouseInfo& found : device::list_spacemice(device::system_hid())) {
@@ -111,7 +112,7 @@ ordered_json counts(const SampleCount& s) {
           {"changed", s.changed}, {"read_us_max", s.read_us_max}, {"write_us_max", s.write_us_max}};
 }
 
-// One line of what a device says: millimetres, degrees, buttons, force.
+// One line for a sample: millimetres, degrees, buttons, force.
 std::string live_line(const h6DeviceSample& s, bool lost, const OpenedDevice& opened) {
   if (lost) return "lost";
   const double degrees = 57.29577951308232 * norm(turn({1, 0, 0, 0}, s.pose.q));
@@ -122,7 +123,7 @@ std::string live_line(const h6DeviceSample& s, bool lost, const OpenedDevice& op
   return text + (opened.live ? opened.live() : std::string{});
 }
 
-// On a terminal one line that is written over, 20 times a second; else one every half second.
+// A terminal shows one line, rewritten 20 times a second; a file gets a line every half second.
 class LiveView {
  public:
   LiveView(const Console& console, const OpenedDevice& opened)
@@ -214,7 +215,7 @@ int devices_command(const Console& console, DevicesOptions o) {
                 opened->device.capabilities.max_force, opened->device.capabilities.max_torque);
     if (!opened->about.empty()) std::printf("%s\n", opened->about.c_str());
   }
-  // A signal stops the motors where it arrives; the view then ends.
+  // The signal handler stops the motors at once; the view ends after it.
   set_signal_hook(
       [](void* context) {
         const auto& d = *static_cast<const h6Device*>(context);

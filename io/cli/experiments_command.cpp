@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // experiments_command.cpp - hapsix experiments [NAME...]: the paper's experiments, every method, as
-// tables anyone can re-run.
+// tables that anyone can reproduce.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -27,7 +27,7 @@ struct Chosen {
   std::vector<const StudyKind*> studies;
 };
 
-// Nothing named: everything.
+// Without names: every scene and study.
 Result<Chosen> choose(const std::vector<std::string>& names) {
   Chosen out;
   std::vector<std::string> known;

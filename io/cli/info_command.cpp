@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// info_command.cpp - hapsix info FILE: what a file is, and what is wrong with it.
+// info_command.cpp - hapsix info FILE: describes a file and what is wrong with it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
@@ -28,7 +28,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// A value as a person reads it: lists of plain values in one line, of an object its plain members.
+// A value as text: a list of plain values on one line, an object by its plain members.
 std::string text_of(const ordered_json& value) {
   if (value.is_string())
     return value.get_ref<const std::string&>().empty() ? "-" : value.get<std::string>();
@@ -47,7 +47,7 @@ std::string text_of(const ordered_json& value) {
   return out.empty() ? "-" : out;
 }
 
-// A line a key, a line an object of a list; the same facts as the JSON.
+// One line for each key and for each object of a list: the same facts as the JSON.
 void print(const ordered_json& object) {
   for (const auto& [key, value] : object.items()) {
     const bool list = value.is_array() && !value.empty() && value.front().is_object();
@@ -67,7 +67,7 @@ int show(const Console& console, const ordered_json& object) {
 
 ordered_json vec(const io::Vec3& v) { return {v.x, v.y, v.z}; }
 
-// Every part and how many triangles it has; none for a mesh of one part.
+// Every part and its number of triangles; empty for a mesh of one part.
 ordered_json part_list(const io::Mesh& mesh) {
   std::vector<std::size_t> count(mesh.part_names.size());
   for (const std::int32_t part : mesh.part) ++count[static_cast<std::size_t>(part)];
@@ -128,7 +128,7 @@ Result<ordered_json> shell_info(const std::string& file) {
                       {"input_hash", s->input_hash}};
 }
 
-// How often each thing happened, also where a killed run left no summary.
+// Counts each status bit from the frames: a killed run leaves no summary.
 ordered_json event_counts(const std::vector<io::RecordingEvent>& events) {
   ordered_json counts = ordered_json::object();
   for (const io::RecordingEvent& e : events)
@@ -202,14 +202,14 @@ Result<ordered_json> path_info(const std::string& file, io::Unit unit) {
   return ordered_json{{"kind", "path"}, {"rows", p->size()}, {"seconds", p->back().t}};
 }
 
-// A header names its elements within the first kilobytes.
+// The header names its elements within the first kilobytes.
 bool has_faces(const std::string& file) {
   char head[4096] = {};
   std::ifstream(file, std::ios::binary).read(head, sizeof head - 1);
   return std::string(head).find("element face") != std::string::npos;
 }
 
-// A .ply without faces is a shell, or wants to be one.
+// A .ply without faces is taken for a shell.
 Result<ordered_json> ply_info(const Console& console, const std::string& file, io::Unit unit) {
   return has_faces(file) ? mesh_info(console, file, unit) : shell_info(file);
 }

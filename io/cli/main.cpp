@@ -12,7 +12,7 @@ using namespace h6::cli;
 
 namespace {
 
-// The subcommand that the words lead to, and its name with all above it.
+// The subcommand that was chosen, and its full name.
 const CLI::App* reached(const CLI::App& app, std::string& name) {
   const CLI::App* at = &app;
   name = at->get_name();
@@ -23,7 +23,7 @@ const CLI::App* reached(const CLI::App& app, std::string& name) {
   return at;
 }
 
-// A sentence: what is wrong with the command line, and where to read more.
+// One sentence: what is wrong with the command line, and which --help to read.
 std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
   std::string command, what = error.what();
   const CLI::App* at = reached(app, command);
@@ -32,7 +32,7 @@ std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
   const bool missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
   const bool extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
   const std::vector<std::string> unknown = app.remaining(true);
-  if ((missing || extra) && !unknown.empty()) {  // a word that nothing knows explains the rest
+  if ((missing || extra) && !unknown.empty()) {  // an unknown word explains the other errors
     const std::string word = unknown.front().substr(0, unknown.front().find('='));
     std::vector<std::string> known = next;
     const bool option = word.rfind('-', 0) == 0;
@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
   app.fallthrough();
   app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   app.get_formatter()->column_width(26);
-  // Subcommands inherit what stands above them.
+  // Subcommands inherit these settings.
   app.footer("Every command takes --json. Exit code: 0 done, 1 failed, 2 wrong usage.");
   Program program;
   app.add_flag("--json", program.console.json, "One JSON object on stdout, messages on stderr");

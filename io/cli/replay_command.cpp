@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// replay_command.cpp - hapsix replay REC.h5: the recorded hand once more, in virtual time.
+// replay_command.cpp - hapsix replay REC.h5: runs the recorded hand again, in virtual time.
 //
 //   recording --head--> scene, settings, SIMD target --> session
 //             --rows--> samples -> h6Step -> row <-- compared to the bit --> recorded row
@@ -45,7 +45,7 @@ std::string hex(std::uint64_t value) {
   return text;
 }
 
-// One run as a person compares it.
+// The figures by which a person compares two runs.
 struct Figures {
   std::uint64_t frames = 0;
   double contacts = 0, max_depth_voxels = 0, max_force = 0, max_torque = 0;
@@ -187,7 +187,7 @@ class Replay {
                   session_->threads() == 1 ? "" : "s");
   }
 
-  // What a person is told of a divergence.
+  // The sentence for a divergence.
   std::string sentence() const {
     const io::RowDifference& d = divergence->where;
     char text[400];
@@ -213,7 +213,7 @@ class Replay {
   static constexpr std::uint64_t kPiece = 4096;
 
   bool same(const h6FrameRecord& row, const h6FrameRecord& now) {
-    // Times are not bits of the state; nor is what the safety chain made of a late frame.
+    // Times are not part of the state, nor is the safety chain's answer to a late frame.
     if (!io::first_difference(row, now, head_.hands, false)) return true;
     divergence =
         Divergence{row.report.frame, row.time, *io::first_difference(row, now, head_.hands, true),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// report_command.cpp - hapsix report REC.h5... -o OUT.html: recordings as one file to look at.
+// report_command.cpp - hapsix report REC.h5... -o OUT.html: recordings as one HTML file.
 //
-// Recordings hold what devices and bodies did; contacts are made again by running each recorded
-// hand once more. Where that is not possible any more, the report says so and does without.
+// Recordings hold the motion of devices and bodies. Their contacts are computed again by replaying
+// each recorded hand. Where that is no longer possible, the report says so and leaves them out.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>
@@ -36,7 +36,7 @@ std::vector<io::view::ReportContact> contacts_now(const RecordedSession& s) {
     if (!c.count) continue;
     const h6BodyState state = h6GetBody(s.session(), body);
     const h6Quat& q = state.pose.q;
-    // Arms are from the centre of mass.
+    // Contact arms start at the centre of mass.
     const double m[3] = {loaded.bodies[b].com.x, loaded.bodies[b].com.y, loaded.bodies[b].com.z};
     const double u[3] = {q.x, q.y, q.z}, p[3] = {state.pose.p.x, state.pose.p.y, state.pose.p.z};
     double centre[3];

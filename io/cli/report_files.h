@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// report_files.h - recordings in, one HTML file out.
+// report_files.h - makes one HTML file from recordings.
 #pragma once
 #include <string>
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace h6::cli {
 
-// Its size in bytes. What the report has to do without, a recording's contacts for instance, is
-// said on stderr and in the report.
+// Returns its size in bytes. Messages on stderr and in the report name what is missing, for
+// instance a recording's contacts.
 Result<std::size_t> write_report(const std::vector<std::string>& recordings,
                                  const std::string& output, const Console& console);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_command.cpp - hapsix run SCENE.json: forces and a verdict out.
+// run_command.cpp - hapsix run SCENE.json: runs a scene and prints forces and a verdict.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
@@ -25,7 +25,7 @@ Result<io::Scene> find_scene(const std::string& name) {
   for (const io::SceneName& scene : io::scene_names()) known.push_back(scene.name);
   if (!is_file && std::find(known.begin(), known.end(), name) != known.end())
     return io::make_scene(name);
-  if (!is_file && std::filesystem::path(name).extension() != ".json") {  // meant as a name
+  if (!is_file && std::filesystem::path(name).extension() != ".json") {  // the user meant a name
     const std::string like = nearest(name, known);
     return Failure{"there is neither a file nor a generated scene '" + name + "'" +
                    (like.empty() ? "; 'hapsix scene list' shows what there is"
@@ -49,7 +49,8 @@ int run_command(const Console& console, const std::string& name, const RunOption
     for (const io::SceneHand& hand : scene->hands) {
       if (Outcome known = check_device(hand.device); !known)
         return console.fail(name + ": hand of '" + hand.body + "': " + known.error());
-      if (hand.device.rfind("plugin:", 0) == 0)  // code; a scene may come from anyone
+      if (hand.device.rfind("plugin:", 0) ==
+          0)  // a plug-in is code, and a scene may come from anyone
         return console.fail(name + ": hand of '" + hand.body +
                             "': a scene does not load plug-ins by itself, give it with --device");
     }
@@ -72,8 +73,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
   const std::string stopped =
       "interrupted after " + std::to_string(summary->loop.frames) + " frames";
   nlohmann::ordered_json json = to_json(*summary, **loaded, options.virtual_time);
-  if (summary->interrupted)
-    json["error"] = stopped;  // what there was of the run, in the same object
+  if (summary->interrupted) json["error"] = stopped;  // beside the figures of the run up to there
   console.result(json);
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
@@ -119,7 +119,8 @@ void add_run(CLI::App& app, Program& program) {
                   "1 (default), or 2 for a helper on the other core; same bits")
       ->option_text("N")
       ->check(whole_within(1, 2));
-  run->add_option("--spin", o->spin_us, "Poll the clock so long before each deadline; default 0")
+  run->add_option("--spin", o->spin_us,
+                  "Poll the clock for this long before each deadline; default 0")
       ->option_text("MICROSECONDS")
       ->check(number_within(0, 10000));
   run->add_option(

@@ -19,7 +19,7 @@ std::string late(const RunSummary& run, std::uint64_t frames) {
   return run.virtual_time ? "-" : std::to_string(frames);
 }
 
-// Whose field or shell, made how.
+// How an asset was obtained.
 const char* origin(const io::LoadedScene& scene, const io::LoadedAsset& asset) {
   if (asset.from_cache) return "from the cache";
   const int index = scene.body_index(asset.body);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tables.h - runs as a person reads them.
+// tables.h - the summaries of runs as tables for a terminal.
 #pragma once
 #include <string>
 #include <vector>
@@ -12,9 +12,10 @@ namespace h6::cli {
 std::string table(const std::vector<RunSummary>& runs);
 // Late frames by cause and by how late, coarse frames; empty when there were none.
 std::string late_table(const RunSummary& run);
-// The deepest contact over time, with the half-voxel line: full height is twice that line or more.
+// A chart of the deepest contact over time with the half-voxel line; its height is at least twice
+// that line.
 std::string depth_strip(const RunSummary& run);
-// What was baked or taken from the cache, a line each.
+// One line for each asset that was baked or taken from the cache.
 std::string assets(const io::LoadedScene& scene);
 
 }  // namespace h6::cli

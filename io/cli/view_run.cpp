@@ -32,10 +32,10 @@ using Clock = std::chrono::steady_clock;
 using io::view::ViewRequest;
 
 constexpr auto kPicture = std::chrono::microseconds(16667);
-constexpr std::size_t kWaiting = 256;        // wishes not looked at yet
+constexpr std::size_t kWaiting = 256;        // requests of the page that wait
 constexpr std::size_t kViewContacts = 2000;  // arrows
 
-// From the server's thread to ours.
+// Carries requests from the server's thread to the program's.
 class Wishes {
  public:
   void add(std::string_view text) {
@@ -45,7 +45,7 @@ class Wishes {
       refused_ = request.error();
       return;
     }
-    // Of the hand's places only the last counts.
+    // Only the last place of the hand counts.
     if (std::holds_alternative<io::view::MoveHand>(*request) && !waiting_.empty() &&
         std::holds_alternative<io::view::MoveHand>(waiting_.back()))
       waiting_.pop_back();
@@ -66,7 +66,7 @@ class Wishes {
   std::string refused_;
 };
 
-// The browser of the person at this screen, if there is one; it lives on by itself.
+// Opens the user's browser, if there is one; it outlives this program.
 bool open_browser(const std::string& address) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
   const pid_t child = fork();
@@ -160,7 +160,7 @@ class Viewer : public RunObserver {
     wish_.placed = false;
     steering_->wish(wish_);
   }
-  // The page speaks of the scene; the device may be elsewhere, after the clutch.
+  // The page gives places in the scene; after clutching, the device's frame is shifted from it.
   void act(const io::view::MoveHand& move) {
     if (!wish_.held) return;
     if (!wish_.clutched && state_.any()) {
@@ -193,7 +193,8 @@ class Viewer : public RunObserver {
     }
     if (set.max_depth_voxels > 0) {
       coupling_.max_depth_voxels = set.max_depth_voxels;
-      coupling_.max_force = coupling_.max_torque = 0;  // derived from it
+      coupling_.max_force = coupling_.max_torque =
+          0;  // the engine derives them from the new stiffness
     }
     apply(*setup_);
     h6Error error{};
@@ -213,7 +214,7 @@ class Viewer : public RunObserver {
     note_("settings", io::settings_text(contact_, coupling_));
   }
   void act(const io::view::SetPace& set) {
-    if (!setup_->devices.real_time.empty())  // it would be sent too little, too late
+    if (!setup_->devices.real_time.empty())  // its commands would come too rarely
       return server_->say(io::view::LiveState::note("the device '" + setup_->devices.real_time +
                                                     "' lives on the clock: no slow motion"));
     h6SetPace(loop_, set.pace);
@@ -251,7 +252,7 @@ class Viewer : public RunObserver {
   const Console& console_;
   io::view::LiveState state_;
   Wishes wishes_;
-  std::unique_ptr<io::view::ViewServer> server_;  // after what its thread calls
+  std::unique_ptr<io::view::ViewServer> server_;  // last: its thread calls the members above
   h6ContactDef contact_{};
   h6CouplingDef coupling_{};
   std::shared_ptr<device::Steering> steering_;

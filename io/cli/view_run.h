@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// view_run.h - a run that is looked at: `hapsix run SCENE --view`.
+// view_run.h - a run with a live page: `hapsix run SCENE --view`.
 //
-// The page's server is on a thread of its own, the run on the haptic thread; between them this,
-// on the program's thread: rows and contacts out, 60 pictures a second; wishes of the page in. A
-// reset or a recording begins the run again; other settings do not.
+// The page's server has a thread of its own, and the run has the haptic thread. The program's
+// thread connects them: it sends rows and contacts to the page 60 times a second and passes the
+// page's requests on. A reset or a recording begins the run again; other settings do not.
 #pragma once
 #include <functional>
 #include <string>
@@ -20,13 +20,13 @@ struct ViewOptions {
   bool on = false;
   int port = 0;              // 0: any free one
   bool open = true;          // a browser, where there is a screen
-  std::string folder = ".";  // for what is recorded from the page
+  std::string folder = ".";  // for recordings that the page starts
 };
 
-// --view, --port, --no-browser. What they are kept in must live until the program has parsed.
+// Adds --view, --port and --no-browser. `view` must live until the program has parsed.
 void add_view_options(CLI::App& command, ViewOptions& view);
 
-// Runs until the user ends it, or until `options.duration`. `done` gets each run's summary.
+// Runs until the user ends it or `options.duration` is over. `done` gets each run's summary.
 Outcome view_scene(const io::LoadedScene& scene, const RunOptions& options, const ViewOptions& view,
                    const Console& console, const std::function<void(const RunSummary&)>& done);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// checks.h - what can be said about an argument before any work is done: mistakes are told within
-// milliseconds, not after a long bake.
+// checks.h - checks of arguments before any work begins: a mistake is reported within milliseconds,
+// not after a long bake.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -48,7 +48,7 @@ inline std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-// For options: an empty string, or what is wrong with the text.
+// Checks for options. Each returns an empty string, or what is wrong with the text.
 using Check = std::function<std::string(const std::string&)>;
 
 inline Check number_above(double low) {
@@ -99,7 +99,7 @@ inline std::string nearest(const std::string& text, const std::vector<std::strin
   return best;
 }
 
-// A regular file that is there: a pipe would keep the reader waiting for ever.
+// The file must exist and be regular: a pipe would keep the reader waiting for ever.
 inline Outcome check_input(const std::string& file) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(file, error);
@@ -111,7 +111,7 @@ inline Outcome check_input(const std::string& file) {
   return Done{};
 }
 
-// A place where a file can be made. Asked before a bake of minutes, not after.
+// A file can be made there. Commands check this before a bake of minutes, not after it.
 inline Outcome check_output(const std::string& file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error))
@@ -123,7 +123,7 @@ inline Outcome check_output(const std::string& file) {
   return Done{};
 }
 
-// A file is known by its ending, here and in other programs.
+// Programs recognise a file by its ending.
 inline Check ends_with(std::string ending) {
   return [ending = std::move(ending)](const std::string& text) {
     const bool good = text.size() > ending.size() &&

@@ -25,7 +25,7 @@ namespace {
 std::atomic<void (*)(void*)> signal_hook{nullptr};
 std::atomic<void*> signal_context{nullptr};
 
-// The first signal asks; a second one ends the program at once, tidily.
+// The first signal asks the work to end; a second one cleans up and exits at once.
 void on_signal(int number) {
   if (auto hook = signal_hook.load()) hook(signal_context.load());
   if (interrupted.exchange(true)) {
@@ -34,7 +34,7 @@ void on_signal(int number) {
   }
 }
 
-// A crash stops the devices first and is then what it would have been.
+// A crash first stops the devices, then takes its default course.
 constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGQUIT};
 struct sigaction before_crash[std::size(kCrashes)];
 void on_crash(int number) {
@@ -70,7 +70,7 @@ void set_signal_hook(void (*hook)(void*), void* context) {
 
 namespace {
 
-// In a handler: what cannot be written is lost.
+// For signal handlers: text that cannot be written is lost.
 void write_all(int to, const std::string& text) {
   for (std::size_t done = 0; done < text.size();) {
     const ssize_t some = write(to, text.data() + done, text.size() - done);
@@ -82,7 +82,8 @@ void write_all(int to, const std::string& text) {
 }  // namespace
 
 EndsAtOnce::EndsAtOnce(const Console& console, const std::string& sentence) {
-  static std::string error, result;  // the handler may not allocate, nor find them gone
+  static std::string error,
+      result;  // the handler must not allocate, and must not find them destroyed
   error = (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("hapsix: " + sentence) + "\n";
   result = console.json ? Console::text({{"error", sentence}}, 2) + "\n" : "";
   set_signal_hook(
@@ -104,7 +105,7 @@ void Console::warn(const std::vector<std::string>& sentences) const {
 }
 
 int Console::fail(std::string sentence, int code) const {
-  // Sentences come from many places: here they all end alike.
+  // Sentences come from many places; this gives them all the same ending.
   if (!sentence.empty() && sentence.back() == '.') sentence.pop_back();
   log("hapsix: " + sentence);
   if (json) result({{"error", sentence}});
@@ -131,7 +132,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// "about 3 s left", as if the rest went like what is done; empty while that says little.
+// "about 3 s left", from the speed so far; empty while too little is done to tell.
 std::string time_left(double seconds, double share) {
   if (seconds < 1 || share < 0.02 || share >= 1) return "";
   const double left = seconds * (1 - share) / share;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// energy.cpp - what a closed cycle costs or gives, and whether a bounce grows.
+// energy.cpp - the net work of a closed cycle, and whether a bounce gains energy.
 #include <algorithm>
 #include <cmath>
 

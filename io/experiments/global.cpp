@@ -34,7 +34,7 @@ constexpr Variant kVariants[] = {
 
 bool fails(const RunFigures& run) { return !run.moved_on() || run.max_depth_voxels > 0.5; }
 
-// For the scenes in which n0 = 10 does not fail: what does.
+// For scenes in which n0 = 10 does not fail: names what fails there.
 std::string why_held(const Claim& claim, const std::vector<RunFigures>& runs) {
   if (fails(runs[0])) return "";
   std::string found;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// grid.h - what studies that run scenes share: every scene with every column.
+// grid.h - runs every scene with every column, for the studies that need such a table.
 #pragma once
 #include "io/experiments/studies.h"
 
@@ -7,10 +7,10 @@ namespace h6::cli {
 
 using Loaded = std::unique_ptr<io::LoadedScene>;
 
-// A table's first row: what the rows are, then the columns' names.
+// A table's head: what the rows are, then the names of the columns.
 TextTable head(const std::string& first, const std::vector<MethodColumn>& columns);
 
-// One after the other; those that fail are left empty.
+// Loads the scenes in order; a scene that fails is null.
 std::vector<Loaded> load_all(std::vector<io::Scene> scenes);
 
 // Scene s with column m is at [s][m].

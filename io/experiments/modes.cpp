@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// modes.cpp - the peg in the hand of a simulated arm, in every device mode and with
-// delay (Fig. 13).
+// modes.cpp - the peg held by a simulated arm, in every device mode and with delay (Fig. 13).
 #include <algorithm>
 #include <cmath>
 
@@ -35,7 +34,7 @@ bool stable(const RunFigures& run) {
          run.late_depth_swing < 0.1;
 }
 
-// One run; `factor` on the mode's gain, 1 for the defaults.
+// One run with the mode's gain times `factor`.
 RunFigures run_mode(const io::LoadedScene& loaded, const MethodColumn& method, const Mode& mode,
                     int delay, double factor) {
   RunChange change;
@@ -56,7 +55,7 @@ RunFigures run_mode(const io::LoadedScene& loaded, const MethodColumn& method, c
   return run_experiment(loaded, change);
 }
 
-// In steps from the default, -kSteps .. kSteps; below that: not even so.
+// The largest stable gain in steps from the default, -kSteps .. kSteps; lower when none is stable.
 int largest_gain(const std::function<bool(int)>& holds) {
   if (holds(kSteps)) return kSteps;
   int low = -kSteps - 1, high = kSteps;
@@ -71,7 +70,7 @@ int largest_gain(const std::function<bool(int)>& holds) {
   return low;
 }
 
-// The gain's own figure after so many steps.
+// The value of the gain after so many steps.
 double gain_value(Gain gain, const io::LoadedScene& loaded, int steps) {
   const double first =
       gain == Gain::coupling ? loaded.hands[0].coupling.stiffness : io::SceneArm{}.grip_stiffness;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// probe.h - studies of contacts at given poses: a free body that nothing holds is put
-// somewhere, and what touches there is read.
+// probe.h - contacts at given poses: a study puts a free body somewhere and reads its contacts.
 #pragma once
 #include "io/experiments/grid.h"
 

@@ -6,7 +6,7 @@
 namespace h6::cli {
 namespace {
 
-// Letters, not bytes: UTF-8 continuation bytes take no room.
+// Width in letters: UTF-8 continuation bytes take no room.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
@@ -17,10 +17,10 @@ std::string prototype_cell(const TableScene& scene, const std::string& column) {
   return found == scene.prototype.end() ? "–" : found->second;
 }
 
-// The word before the figure: what the prototype's cell says happened.
+// The verdict in a cell: the word before the figure.
 std::string verdict_word(const std::string& cell) { return cell.substr(0, cell.find(' ')); }
 
-// Columns in which the engine's verdict is not the prototype's.
+// Columns in which the engine's verdict differs from the prototype's.
 std::vector<std::string> flips(const SceneRow& row, const std::vector<MethodColumn>& columns) {
   std::vector<std::string> out;
   for (std::size_t m = 0; m < columns.size(); ++m) {

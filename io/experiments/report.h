@@ -7,16 +7,16 @@
 
 namespace h6::cli {
 
-// Rows of cells, the first is the head; columns as wide as they need.
+// Rows of cells, the first of which is the head; columns get the width that they need.
 using TextTable = std::vector<std::vector<std::string>>;
 std::string plain(const TextTable& table);
 std::string markdown(const TextTable& table);
 
-// One study beside the scenes' table: what it measures and how, its table, the same as JSON.
+// One study: what it measures and how, its table, and the same figures as JSON.
 struct Study {
   std::string name, title, about;
   TextTable table;
-  std::string after;  // what follows from the table; may be empty
+  std::string after;  // the conclusion, below the table; may be empty
   nlohmann::ordered_json json;
 };
 

@@ -68,7 +68,7 @@ class Tally {
   std::size_t touching_ = 0, late_ = 0;
 };
 
-// The definitions of a run: the scene's, with what is to be different.
+// The definitions of a run: the scene's, with the changes applied.
 Outcome open(const RunChange& change, RunSetup& run) {
   for (h6HandDef& hand : run.hand_defs) {
     h6CouplingDef& c = hand.coupling;
@@ -172,7 +172,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
               const std::string& label) {
   std::atomic<std::size_t> next{0}, done{0};
-  std::exception_ptr thrown;  // out of memory, say: for the caller's thread
+  std::exception_ptr thrown;  // for instance out of memory; rethrown on the caller's thread
   std::mutex lock;
   const auto work = [&] {
     for (std::size_t i; !interrupted.load() && (i = next.fetch_add(1)) < jobs.size();) {

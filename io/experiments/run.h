@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// run.h - one run of a scene in virtual time on the calling thread, and what the tables
-// say about it; many of them side by side.
+// run.h - runs a scene in virtual time on the calling thread and measures the figures of the
+// tables; runs independent pieces of work side by side.
 #pragma once
 #include <functional>
 #include <optional>
@@ -37,7 +37,7 @@ struct RunChange {
   const io::Path* path = nullptr;   // of the first hand, null: the scene's
   std::string device = "path";      // of every hand, as `hapsix run --device` takes it
   std::optional<io::SceneArm> arm;  // of every hand, none: the scene's
-  // Has the last word on the definitions, once for every hand: modes, filters, ...
+  // Called last on the definitions, once for every hand: modes, filters, ...
   std::function<void(h6SessionDef&, h6HandDef&)> also;
   std::string record;  // .h5 file, empty: none
 };
@@ -54,7 +54,7 @@ struct RunFigures {
   double frame_us_p50 = 0, frame_us_p99 = 0;
   h6Pose final_pose{};  // of the first hand's body
   h6Status status = 0;
-  std::string error;       // the run could not be made
+  std::string error;       // why the run failed; empty when it did not
   bool moved_on() const {  // what a scene of the paper calls held
     return error.empty() && (verdict == io::Verdict::held || verdict == io::Verdict::arrived);
   }

@@ -181,7 +181,8 @@ std::vector<SceneRow> run_scene_table(const std::vector<const TableScene*>& scen
   std::vector<SceneRow> rows(scenes.size());
   std::vector<std::unique_ptr<SharedScene>> shared;
   std::vector<std::function<void()>> jobs;
-  for (std::size_t s = scenes.size(); s-- > 0;) {  // the largest stands last: it goes first
+  for (std::size_t s = scenes.size();
+       s-- > 0;) {  // in reverse: the largest is last in the list and should start first
     const TableScene* scene = scenes[s];
     rows[s] = {scene, std::vector<RunFigures>(columns.size()),
                std::vector<std::string>(columns.size())};

@@ -18,18 +18,18 @@ struct TableScene {
   const char* figure;
   const char* claim;       // the paper's, in one sentence
   const char* difference;  // why the engine's row differs from the prototype's; may be empty
-  // Makes it with a shell sampled like that; null: only as it is.
+  // Makes the scene with another sampling of its shell; null: only its own sampling.
   io::Scene (*sampled)(const io::Sampling&);
-  bool thin;  // its shell is explicit and small: part of re-sampling and of "push harder"
+  bool thin;  // its shell is explicit and small: in the studies of sampling and of force
   std::map<std::string, const char*> prototype;  // column -> its verdict and depth [voxel]
 };
 const std::vector<TableScene>& table_scenes();
 
-// A scene's assets, made once, whichever of its runs comes first.
+// A scene's assets: the first run to come makes them, the others share them.
 class SharedScene {
  public:
   explicit SharedScene(std::function<Result<io::Scene>()> make) : make_(std::move(make)) {}
-  // Null when it cannot be made: error() says why.
+  // Null when the scene cannot be loaded: error() says why.
   const io::LoadedScene* get();
   const std::string& error() const { return error_; }
 
@@ -46,12 +46,12 @@ struct SceneRow {
   std::vector<std::string> recordings;
 };
 
-// All scenes against all columns; recordings go to `folder` unless it is empty.
+// Runs all scenes with all columns; recordings go to `folder` unless it is empty.
 std::vector<SceneRow> run_scene_table(const std::vector<const TableScene*>& scenes,
                                       const std::vector<MethodColumn>& columns,
                                       const std::string& folder, const Console& console);
 
-// "held .21": the words of the verdict, and the deepest contact [voxel].
+// "held .21": the verdict and the deepest contact [voxel].
 std::string cell(const RunFigures& run);
 
 }  // namespace h6::cli

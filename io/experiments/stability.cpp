@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// stability.cpp - the largest contact stiffness that a run stands, per method, sampling
-// and integrator.
+// stability.cpp - the largest stable contact stiffness per method, sampling and integrator.
 #include <cmath>
 
 #include "io/experiments/grid.h"
@@ -20,8 +19,8 @@ constexpr Setting kSettings[] = {{"explicit, undamped", H6_EXPLICIT, 0},
 constexpr double kLeastStiffness = 500;  // [N/m]
 constexpr int kDoublings = 18;           // to 1.3e8 N/m
 
-// No bound that a pull of these paths reaches: a saturated coupling does not damp, and the question
-// is what the contacts do. Softer contacts are deeper, which is not instability: nothing forbidden.
+// The coupling's bound is out of reach: a saturated coupling does not damp, and this study is about
+// the contacts. No region is forbidden: soft contacts go deep, which is not instability.
 io::Scene for_stability(io::Scene scene) {
   scene.coupling.max_force = 20;
   scene.coupling.max_torque = 0.6;
@@ -29,7 +28,7 @@ io::Scene for_stability(io::Scene scene) {
   return scene;
 }
 
-// The cone only as far as the ceiling, 5 mm into it.
+// The cone's path ends 5 mm into the ceiling.
 io::Scene cone_at_ceiling() {
   io::Scene scene = io::cone_in_gap({0.5, 0, 1});
   io::HandPath hand(scene.hands[0].path.front().pose);
@@ -38,7 +37,7 @@ io::Scene cone_at_ceiling() {
   return scene;
 }
 
-// In doublings of the least stiffness; -1: not even that.
+// In doublings of the least stiffness; -1: unstable at the least.
 int largest_stable(const io::LoadedScene& loaded, RunChange change) {
   const auto stable = [&](int doublings) {
     change.stiffness = kLeastStiffness * std::exp2(doublings);

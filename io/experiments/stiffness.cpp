@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// stiffness.cpp - how stiff the weighted contacts are together: against the sampling of
-// flat and curved patches, and against the angle between two planes.
+// stiffness.cpp - the net stiffness of the weighted contacts: against the sampling of flat and
+// curved patches, and against the angle between two planes.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -32,7 +32,7 @@ struct Matrix3 {
   double m[3][3] = {};
 };
 
-// Sum w N N^T: what the implicit step takes the stiffness for.
+// Sum w N N^T: the stiffness that the implicit step assumes.
 Matrix3 frozen_stiffness(const h6Contacts& c) {
   Matrix3 out;
   for (std::size_t i = 0; i < c.count; ++i) {
@@ -43,7 +43,8 @@ Matrix3 frozen_stiffness(const h6Contacts& c) {
   return out;
 }
 
-// The symmetric part of -dF/dx in k, by central differences over 0.02 voxel: what a hand feels.
+// The stiffness that a hand feels, in k: the symmetric part of -dF/dx, by central differences over
+// 0.02 voxel.
 Matrix3 felt_stiffness(Probe& probe, const h6Pose& pose) {
   constexpr double kStep = 0.01 * kProbeVoxel;
   double A[3][3];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// studies.h - what the paper's experiments ask beside single scenes: how stable, how
-// smooth, how dependent on the sampling each method is.
+// studies.h - studies of the methods beside the table of scenes: how stable and how smooth each
+// method is, and how much it depends on the sampling.
 #pragma once
 #include "io/experiments/report.h"
 

@@ -58,7 +58,8 @@ struct Both {
     old_value = std::max(old_value, a), new_value = std::max(new_value, b);
   }
 };
-// The two figures of an object that has one for each column; a pointer says where in there.
+// The two columns' figures in an object with one entry for each column; the pointer names the
+// figure.
 Both both(const ordered_json& row, const char* pointer = "") {
   const ordered_json::json_pointer at(pointer);
   return {row.at(kOld).at(at).get<double>(), row.at(kNew).at(at).get<double>()};

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// weighing.h - `series` beside `robust`, criterion by criterion, from what was
-// measured.
+// weighing.h - compares `series` with `robust` by every figure that was measured.
 #pragma once
 #include "io/experiments/report.h"
 
 namespace h6::cli {
 
-// Rows for whatever of scenes and studies was run; no rows when nothing compares the two.
+// Has rows only for the scenes and studies that were run; none when nothing compares the two.
 Study weigh_series(const std::vector<SceneRow>& rows, const std::vector<MethodColumn>& columns,
                    const std::vector<Study>& studies);
 

@@ -36,14 +36,14 @@ double segment_distance(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const
   const h6Vec3 u = b - a, v = d - c, w = a - c;
   const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uw = dot(u, w), vw = dot(v, w);
   const double det = uu * vv - uv * uv;
-  // Clamp along the first, answer on the second, clamp there and answer back.
+  // Clamp on the first, project onto the second, clamp there and project back.
   const double s0 = det > 1e-12 * uu * vv ? clamp01((uv * vw - vv * uw) / det) : 0;
   const double t = vv > 0 ? clamp01((vw + s0 * uv) / vv) : 0;
   const double s = uu > 0 ? clamp01((t * uv - uw) / uu) : 0;
   return norm(w + s * u - t * v);
 }
 
-// Distance to the face, or infinity where the foot is outside: then an edge is nearer.
+// Distance to the face; infinity when the foot is outside it, where an edge is nearer.
 double face_distance(const h6Vec3& p, const Triangle& t) {
   const h6Vec3 u = t.corner[1] - t.corner[0], v = t.corner[2] - t.corner[0];
   const h6Vec3 n = cross(u, v), w = p - t.corner[0];

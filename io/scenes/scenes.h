@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scenes.h - scenes that the program makes itself: no file is needed.
+// scenes.h - generated scenes: they need no files.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// shapes.h - what generated scenes are made of: primitive meshes, point grids, hand paths. Metres.
+// shapes.h - parts of generated scenes: primitive meshes, point grids, hand paths. Metres.
 #pragma once
 #include "hapsix/vector.h"
 #include "io/scene/scene.h"
@@ -19,8 +19,8 @@ Mesh box_mesh(const h6Vec3& low, const h6Vec3& high);
 // floor is at -depth.
 Mesh block_with_hole(double half_side, double height, double radius, double depth, int segments);
 
-// Smallest distance between the surfaces of two meshes, 0 when they cross; all triangle pairs whose
-// spheres are not too far. For checking a scene's clearances, not for the frame.
+// Smallest distance between the surfaces of two meshes, 0 when they cross. It tries all triangle
+// pairs whose bounding spheres are near enough: for checks of clearance, too slow for a frame.
 double mesh_distance(const Mesh& a, const Mesh& b);
 
 // ---- explicit shells: grids of cell centres ----------------------------------------------------

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// assembly.cpp - pieces to one mesh: refined to an exact count, or spoilt.
+// assembly.cpp - joins pieces to one mesh and refines it to an exact count or gives it defects.
 #include "io/scenes/industrial/assembly.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// assembly.h - many pieces put together to one mesh, sound or as bad as exports are, and
+// assembly.h - joins many pieces to one mesh, sound or with the defects of CAD exports, and records
 // what is known about it by construction.
 #pragma once
 #include <string>
@@ -31,7 +31,7 @@ class Dice {
 
 enum class Kind { solid, sheet, wire };
 
-// What is done to a sound assembly.
+// The defects that a sound assembly gets.
 struct Defects {
   int narrow_holes;       // single triangles missing, one a solid at most
   double flipped_pieces;  // share of pieces wound inside out
@@ -46,7 +46,7 @@ class Assembly {
   // One piece of the part `name`; a part may have many.
   void add(const std::string& name, const Piece& piece, const Frame& frame = {},
            Kind kind = Kind::solid);
-  // A thin solid rod that is remembered by its centre line.
+  // A thin solid rod; its centre line is recorded.
   void add_wire(const std::string& name, const Line& line, double radius);
   // Of the last piece of a part the `triangles` nearest to the triangle whose centre is nearest to
   // `near` (world) will be missing. Not for sheets: a probe on one could fall into the hole.

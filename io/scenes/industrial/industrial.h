@@ -10,7 +10,7 @@
 
 namespace h6::io {
 
-// Where a soup is solid and where it is not, whatever an algorithm says. World frame [m].
+// Where a soup is solid and where it is not, known by construction. World frame [m].
 struct IndustrialTruth {
   struct Probe {
     h6Vec3 p;

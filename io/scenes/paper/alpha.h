@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// alpha.h - what the scenes with two alphas have in common.
+// alpha.h - shared parts of the scenes with two alphas.
 #pragma once
 #include <string>
 
