@@ -49,18 +49,18 @@ enum {
   H6_DEVICE_LOST = 1u << 8,
   /* The frame before this one ended after its deadline. */
   H6_LATE = 1u << 9,
-  /* Energy would have been made at a hand or a contact: the passivity controller damped it. */
+  /* Energy would have been made at a hand or a contact: the passivity controller took it away. */
   H6_PASSIVITY = 1u << 10,
-  /* The frame would have overrun h6SessionDef.frame_budget_us: contacts of the last
-   * h6FrameReport.coarse_pairs pairs are those of coarse_points points in sixteen, or few. Raise the
-   * budget, lower the rate, or give the shell fewer points. */
+  /* The frame would have overrun h6SessionDef.frame_budget_us: the last h6FrameReport.coarse_pairs
+   * pairs sampled only coarse_points of each sixteen points. Raise the budget, lower the rate, or give
+   * the shell fewer points. */
   H6_COARSE = 1u << 11
 };
 
 /* The name of one status bit ("contacts dropped"), or NULL when the bit has no name. */
 H6_API const char* h6StatusName(h6Status bit);
 
-/* Why a call failed: one sentence for a person, saying what, where and what to do. */
+/* Why a call failed: one sentence that says what is wrong, where, and what to do. */
 typedef struct h6Error {
   char message[512];
 } h6Error;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-/* device.h - what the engine asks of a haptic device, and what it promises in return.
+/* device.h - what a haptic device must do for the engine, and what the engine promises in return.
  *
  * Thread rules: read and write are called by the haptic thread alone, once a frame, and must return
  * at once with what is there (a device with slow input keeps a thread of its own). stop may be
  * called by any thread and by a signal handler at any time, several times and while another thread is
  * in write: it puts the device into its safe state (zero force), takes no lock and allocates nothing.
  *
- * What is left to the device: nothing here runs after SIGKILL or a loss of power, so a real device
- * needs a watchdog of its own that goes to zero when no command has come for some 20 ms. What it is
- * told is safe as it is; it must not smooth or predict commands beyond the last one.
+ * A real device needs a watchdog of its own that goes to zero force when no command has come for some
+ * 20 ms: nothing here runs after SIGKILL or a loss of power. Commands are safe as they are; the device
+ * must not smooth them, nor predict beyond the last one.
  */
 #ifndef HAPSIX_DEVICE_H
 #define HAPSIX_DEVICE_H
@@ -31,27 +31,27 @@ typedef struct h6DeviceCapabilities {
   h6Vec3   workspace_min, workspace_max; /* equal: not limited                                [m]  */
   double   rate;            /* samples a second it can take and give; 0: any                 [Hz]  */
   uint32_t modes;           /* H6_IMPEDANCE ...                                                    */
-  double   freeze_time;     /* samples that stay the same to the bit for so long mean that the device
-                               hangs; 0: they can stay the same (encoders at rest, a path)    [s]  */
+  double   freeze_time;     /* equal samples (to the bit) for this long mean that the device hangs;
+                               0: samples may stay equal (encoders at rest, a path)           [s]  */
   bool     frame_time;      /* a simulation that lives on the frames' own time: no frame is late for
-                               it, and no watchdog minds it                                        */
+                               it, and the watchdog ignores it                                     */
 } h6DeviceCapabilities;
 
-/* What a device says: where the hand holds the mesh frame of its body. */
+/* A device's input: where the hand holds the mesh frame of its body. */
 typedef struct h6DeviceSample {
   h6Pose     pose;     /* world frame                                                              */
   h6Velocity velocity; /* of the mesh frame's origin, world frame                                  */
   uint32_t   buttons;
   h6Wrench   wrench;   /* on the manipulandum, world frame, torque about the body's centre of mass:
-                          what a force sensor (admittance) or the driver's coupling
-                          (pseudo-admittance) says; not read in impedance mode           [N, N m]  */
-  uint32_t   sequence; /* counts the device's own samples, so that a hanging one is known within
-                          50 ms; always 0: it does not count                                       */
+                          from a force sensor (admittance) or the driver's coupling
+                          (pseudo-admittance); not read in impedance mode                [N, N m]  */
+  uint32_t   sequence; /* counts the device's own samples, so that a device that hangs is found
+                          within 50 ms; always 0: the device does not count                        */
 } h6DeviceSample;
 
-/* Where a hand's device stands. Output can be anything but zero (admittance: the pose held) in
- * `active` alone, and on the way down in `armed` and `degraded`, decay_time at most. Nothing but
- * h6Arm leads from absent, ready, lost and from a latched fault to armed.
+/* State of a hand's device. Only in `active` can the output differ from zero (admittance: from a held
+ * pose), and in `armed` and `degraded` while it decays, at most decay_time. Only h6Arm leads from
+ * absent, ready, lost and a latched fault to armed.
  *
  *   absent --a sample--> ready --h6Arm--> armed <--dead-man button--> active
  *   armed, active --trouble--> degraded --over in time--> armed, active; --latched and over--> ready
@@ -61,8 +61,8 @@ typedef enum h6DeviceState {
   H6_READY,      /* samples come; not armed, or a fault is latched                                 */
   H6_ARMED,      /* armed, and the dead-man button is not held                                     */
   H6_ACTIVE,     /* renders                                                                        */
-  H6_DEGRADED,   /* samples are unusable or stand still, or commands come too late: decays, then
-                    latches                                                                        */
+  H6_DEGRADED,   /* samples are not finite or frozen, or commands come too late: the output decays,
+                    then latches                                                                   */
   H6_LOST,       /* reading or writing fails                                                       */
   H6_DEVICE_STATE_COUNT
 } h6DeviceState;
@@ -74,56 +74,56 @@ typedef enum h6Cause {
   H6_CAUSE_CLAMPED,     /* cut to the rating                                                       */
   H6_CAUSE_SLEWED,      /* changed too fast                                                        */
   H6_CAUSE_NOT_FINITE,  /* NaN or infinity: zero, latched                                          */
-  H6_CAUSE_LATE,        /* commands come too late: held a frame, decays, then latched              */
+  H6_CAUSE_LATE,        /* commands come too late: held for a frame, decays, then latched          */
   H6_CAUSE_DEVICE_LOST, /* read or write failed: zero, latched                                     */
   H6_CAUSE_STOPPED,     /* the program asked for it                                                */
   H6_CAUSE_SPEED,       /* admittance: the pose would have moved faster than the device may        */
   H6_CAUSE_CLUTCHED,    /* the hand holds the clutch: nothing is rendered                          */
-  H6_CAUSE_PASSIVITY,   /* damped, because energy would have been made                             */
-  H6_CAUSE_POWER,       /* would have given the hand more power than it may get                    */
+  H6_CAUSE_PASSIVITY,   /* damped or scaled down, because energy would have been made              */
+  H6_CAUSE_POWER,       /* scaled down to the largest power that the hand may get                  */
   H6_CAUSE_DERATED,     /* less because the hand is fast                                           */
   H6_CAUSE_OVERSPEED,   /* the hand is faster than it may be: zero, latched                        */
   H6_CAUSE_SOFT_START,  /* rises after arming, a jump or trouble                                   */
   H6_CAUSE_DEAD_MAN,    /* the dead-man button is not held: decays                                 */
   H6_CAUSE_DISARMED,    /* not armed: decays                                                       */
   H6_CAUSE_POSE_JUMP,   /* the hand cannot have moved so far: zero, then a soft start              */
-  H6_CAUSE_BAD_SAMPLE,  /* the device sends no numbers: held a frame, decays, then latched         */
+  H6_CAUSE_BAD_SAMPLE,  /* samples are not finite: held for a frame, decays, then latched          */
   H6_CAUSE_FROZEN,      /* the device sends the same sample for too long: decays, then latched     */
-  H6_CAUSE_WATCHDOG,    /* the haptic thread stood still: devices were stopped; latched            */
+  H6_CAUSE_WATCHDOG,    /* the haptic thread stalled: devices were stopped; latched                */
   H6_CAUSE_COUNT
 } h6Cause;
 H6_API const char* h6CauseName(h6Cause cause);
 
-/* What a device is told. Always finite, inside the rating, slew-limited. */
+/* A command to a device. Always finite, inside the rating, slew-limited. */
 typedef struct h6DeviceCommand {
   h6Wrench   wrench;  /* on the hand, world frame, torque about the body's centre of mass; zero in
                          the admittance modes                                                      */
   h6Pose     pose;    /* where the device should hold the mesh frame, world frame; in impedance mode
                          the manipulandum, for show                                                */
-  h6Velocity velocity;/* its own, of the mesh frame's origin; zero in impedance mode               */
-  h6Cause    cause;   /* the gravest                                                               */
-  uint32_t   causes;  /* all: bits 1u << h6Cause                                                   */
+  h6Velocity velocity;/* of that mesh frame's origin, world frame; zero in impedance mode          */
+  h6Cause    cause;   /* the gravest cause                                                         */
+  uint32_t   causes;  /* all causes: bits 1u << h6Cause                                            */
 } h6DeviceCommand;
 
 /* What the safety chain of a hand has done. */
 typedef struct h6HandSafety {
   h6DeviceState state;
   h6Cause       fault;                 /* latched, until h6Arm; or H6_CAUSE_NONE                   */
-  uint64_t      frames[H6_CAUSE_COUNT];/* with this cause                                          */
-  uint64_t      times[H6_CAUSE_COUNT]; /* that it came up                                          */
+  uint64_t      frames[H6_CAUSE_COUNT];/* frames with this cause                                   */
+  uint64_t      times[H6_CAUSE_COUNT]; /* times that this cause began                              */
 } h6HandSafety;
 
 typedef struct h6Device {
   void*                self;
   h6DeviceCapabilities capabilities;
-  /* The newest sample at `time` seconds since the loop began. 0, or non-zero: the device is lost. Both
-   * are called every frame while it is lost, too: with zero the next time it is there again. */
+  /* The newest sample at `time` seconds since the loop began. Returns 0; non-zero: the device is lost.
+   * read and write are called in every frame, also while it is lost; a 0 then says that it is back. */
   int  (*read)(void* self, double time, h6DeviceSample* out);
   int  (*write)(void* self, double time, const h6DeviceCommand* command);
   void (*stop)(void* self);
-  /* May be NULL. Lets commands through again: when the loop starts armed and at every h6ArmLoop, by the
-   * haptic thread, which it must not hold up. A device that has it renders nothing from a stop to the
-   * next arm, whatever it is told. 0, or non-zero: it cannot, and the hand stays as it is. */
+  /* May be NULL. Lets commands through again. The haptic thread calls it when the loop starts armed and
+   * at every h6ArmLoop; it must return at once. A device that has it renders nothing from a stop to the
+   * next arm, whatever the commands. Returns 0; non-zero: it cannot, and the hand stays as it is. */
   int  (*arm)(void* self);
 } h6Device;
 

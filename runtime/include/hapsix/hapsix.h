@@ -33,16 +33,16 @@ H6_API h6SafetyDef   h6DefaultSafetyDef(void);  /* the device's ratings, soft st
 H6_API h6HandDef     h6DefaultHandDef(void);
 H6_API h6SessionDef  h6DefaultSessionDef(void); /* implicit, 1000 Hz, 16384 contacts, 1 thread       */
 
-/* The weights as a filter, without scene or session: any penalty simulator can call it. With
- * w from `contact` and J = [N; r x N], J_g = [g; r x g], u the velocity (METHOD.md, Sec. 2, 3):
+/* The weights as a function, without scene or session, for any penalty simulator. With w from
+ * `contact`, J = [N; r x N], J_g = [g; r x g] and u the velocity (METHOD.md, Sec. 2, 3):
  *     wrench    = sum w k max(0, depth - beta J.u) J                                   [N, N m]
  *     stiffness = d wrench/dq = -sum w k J J^T;  H6_EXACT: -sum w k J J_g^T and the geometric term
  *     damping   = d wrench/du = -beta sum w k J J^T        both 6 x 6, row by row, q = (x, theta)
- * and the forms of `series` (always from a cold start). `voxel` > 0 [m] is the length that l0 and
- * cluster_voxels are measured in, `lever` > 0 [m] at least the largest |r| (the body's radius, not
- * the patch's: it should not change from call to call). weights (count), wrench, stiffness (36),
- * damping (36) may each be NULL. A clustered contact has its share of its cluster's weight, by
- * depth. Nothing is allocated when scratch is given. 0, or -1 with `error` filled. */
+ * `series` has its own forms and always starts cold. `voxel` > 0 [m] is the length that l0 and
+ * cluster_voxels are measured in. `lever` > 0 [m] is at least the largest |r|; take the body's radius
+ * and not the patch's, since it should not change from call to call. weights (count), wrench, stiffness
+ * (36), damping (36) may each be NULL. A clustered contact gets its share, by depth, of its cluster's
+ * weight. Nothing is allocated when scratch is given. Returns 0, or -1 with `error` filled. */
 H6_API int    h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts,
                               double voxel, double lever, float* weights, h6Wrench* wrench,
                               double* stiffness, double* damping, h6Error* error);
@@ -59,8 +59,8 @@ H6_API void     h6DestroyModel(h6Model* model);
 H6_API size_t   h6ModelBytes(const h6Model* model);
 
 /* A signed distance query for tools and tests: points (count x 3) in the field's mesh frame [m].
- * distance (count) [m]; gradient (count x 3), unit length where it is defined, may be NULL; exact
- * (count) may be NULL: 1 where the distance is a sample, 0 where it is a bound. -1: no such field. */
+ * distance (count) [m]; gradient (count x 3), unit length where it is defined, or NULL; exact (count)
+ * or NULL: 1 where the distance is a sample, 0 where it is a bound. Returns 0; -1: no such field. */
 H6_API int h6SampleField(const h6Model* model, int32_t field, const double* points, size_t count,
                          double* distance, double* gradient, uint8_t* exact);
 
@@ -71,58 +71,58 @@ H6_API void       h6DestroySession(h6Session* session);
 /* One frame of 1/rate seconds: samples of each hand in, a wrench for each hand out. */
 H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
-/* For the next step only: so many pairs, the last ones in their order, are traversed coarsely, with
- * so many points of each sixteen (8, 4, 2, 1, or 0: few of 1), whatever the clock says. What stands
- * in h6FrameReport as coarse_pairs and coarse_points repeats a run in anytime mode to the bit. */
+/* For the next step only: traverses the last `pairs` pairs coarsely, with `points` of each sixteen
+ * points (8, 4, 2, 1; 0: the 64 deepest contacts of 1), whatever the clock says. With coarse_pairs and
+ * coarse_points of each h6FrameReport this repeats a run in anytime mode to the bit. */
 H6_API void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points);
 
 /* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
-/* What the contacts of h6GetContacts are with: for each row the `part` and the `triangle` that the
- * field names for the brick (8 voxels wide) in which the contact is, -1 where it names none, or
- * the contact is deeper than all bricks. Each array has room for `count` rows, or is NULL. Until
- * the next step, like the contacts; a frame spends nothing on it. */
+/* What each row of h6GetContacts touches: the `part` and the `triangle` that the field names for the
+ * brick (8 voxels wide) around the contact; -1 where it names none, or where the contact is deeper
+ * than all bricks. Each array has room for `count` rows, or is NULL. Valid until the next step, like
+ * the contacts; a frame spends no time on it. */
 H6_API void          h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
                                     int32_t* triangle);
 H6_API h6FrameReport h6GetFrame(const h6Session* session);
-/* What the zeros of the defs became: coupling in use by a hand, the voxel of a body [m]. */
+/* Values derived from zeros of the defs: a hand's coupling in use, a body's voxel [m]. */
 H6_API h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand);
 H6_API double        h6GetVoxel(const h6Session* session, int32_t body);
 
 /* Ratings that the safety chain keeps a hand's output inside; a loop sets them from its devices.
  * Without them: 100 N and 10 N m. Values above those are cut down to them. */
 H6_API void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities);
-/* A session begins armed. h6Disarm lets every output decay to zero. h6Fault latches it at zero at
- * once, for this cause. h6Arm clears faults and starts again, softly; it leaves a hand alone whose
- * device is absent, lost, frozen or sends no numbers. h6Rearm is the same. While a loop runs, only
- * its own functions below. */
+/* A session begins armed. h6Disarm lets every output decay to zero. h6Fault latches every output at
+ * zero at once, for this cause. h6Arm clears faults and starts again softly; it does nothing for a hand
+ * whose device is absent, lost, frozen or sends samples that are not finite. h6Rearm is the same as
+ * h6Arm. While a loop runs, use only the loop's own functions below. */
 H6_API void h6Arm(h6Session* session);
 H6_API void h6Disarm(h6Session* session);
 H6_API void h6Fault(h6Session* session, h6Cause cause);
 H6_API void h6Rearm(h6Session* session);
-/* For the next step only, of a program that steps by itself: this hand's device could not be read or
- * written, all outputs latch; so many seconds lie between the last commands and the next ones. */
+/* For the next step only, in a program that steps by itself. h6LoseDevice: this hand's device failed
+ * to read or write; all outputs latch. h6NoteInterval: seconds from the last commands to the next. */
 H6_API void h6LoseDevice(h6Session* session, int32_t hand);
 H6_API void h6NoteInterval(h6Session* session, double seconds);
-/* What came to a hand's safety chain from outside before a step: requests, faults, deadlines. What of
- * the last step h6GetSafetyInput gives, and h6SetSafetyInput for the next one, repeats a recorded run
- * to the bit, also where outputs move bodies (admittance modes). */
+/* The input of a hand's safety chain from outside before a step: requests, faults, deadlines.
+ * h6GetSafetyInput gives that of the last step; h6SetSafetyInput sets it for the next one, which
+ * repeats a recorded run to the bit, also where outputs move bodies (admittance modes). */
 typedef struct h6SafetyInput {
   uint32_t asked;         /* H6_ASKED_*; a fault's h6Cause in the byte from bit 8 on               */
-  double   overdue;       /* so much too late comes the command of this step                  [s]  */
+  double   overdue;       /* how late the command of this step comes                          [s]  */
 } h6SafetyInput;
 enum {
   H6_ASKED_ARM          = 1u << 0,
   H6_ASKED_DISARM       = 1u << 1, /* after an H6_ASKED_ARM of the same step                       */
   H6_ASKED_LOST         = 1u << 2, /* the device could not be read, or written before              */
-  H6_ASKED_FROM_FAULT   = 1u << 3, /* what H6_ASKED_ARM found: it cleared a fault,                 */
-  H6_ASKED_FROM_DISARMED= 1u << 4  /* it was not armed                                             */
+  H6_ASKED_FROM_FAULT   = 1u << 3, /* H6_ASKED_ARM found a fault and cleared it                    */
+  H6_ASKED_FROM_DISARMED= 1u << 4  /* H6_ASKED_ARM found the hand disarmed                         */
 };
 H6_API h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand);
 H6_API void          h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input);
-/* Of the last step, and counts since the session was made. */
+/* State and fault after the last step, and counts since the session was made. */
 H6_API h6HandSafety h6GetSafety(const h6Session* session, int32_t hand);
 
 /* ---- the haptic loop ---------------------------------------------------------------------------- */
@@ -137,22 +137,22 @@ typedef struct h6FrameRecord {
   double          wakeup_us;                   /* start after the deadline                         */
   uint32_t        late;                        /* H6_LATE_*                                        */
   h6DeviceState   state[H6_MAX_HANDS];
-  double          late_us;                     /* of a late frame: its end after the next deadline */
-  double          cpu_us;                      /* of the haptic thread in the tick, devices and all;
-                                                  0 in virtual time                                */
+  double          late_us;                     /* of a late frame: end minus the next deadline     */
+  double          cpu_us;                      /* CPU time of the haptic thread in this period, with
+                                                  devices; 0 in virtual time                       */
   h6SafetyInput   safety_input[H6_MAX_HANDS];
-  uint32_t        settings;                    /* so often was the session changed before it       */
+  uint32_t        settings;                    /* number of h6ChangeSession before this frame      */
 } h6FrameRecord;
 
 enum { H6_LATE_COMPUTE = 1u << 0, H6_LATE_WAKEUP = 1u << 1, H6_LATE_STOLEN = 1u << 2 };
 
 typedef struct h6LoopDef {
-  double   duration;      /* seconds of frames; 0: until h6StopLoop                                */
+  double   duration;      /* seconds of frames; 0: until h6RequestStop                         [s] */
   bool     virtual_time;  /* as fast as possible, the clock counts frames: same code, same bits    */
   bool     realtime;      /* ask for pinning, SCHED_FIFO and locked memory                         */
   int32_t  core;          /* -1: the last one                                                      */
   double   spin_us;       /* poll the clock this long before each deadline instead of sleeping [us]*/
-  size_t   ring_frames;   /* records kept for a slow reader; overruns are counted. 0: none         */
+  size_t   ring_frames;   /* records kept for a slow reader; lost ones are counted. 0: none        */
   bool     disarmed;      /* every output stays at zero until h6ArmLoop                            */
   size_t   view_contacts; /* rows of contacts kept for a viewer; 0: no viewer                      */
 } h6LoopDef;
@@ -162,7 +162,7 @@ H6_API h6LoopDef h6DefaultLoopDef(void);  /* real time, realtime asked for, 1000
 #define H6_LATE_BINS 6
 typedef struct h6LateHistogram { uint64_t frames[H6_LATE_BINS]; } h6LateHistogram;
 
-/* What of the real-time treatment that was asked for was had. `governor`: of its core, "" unknown. */
+/* Which real-time requests the system granted. `governor`: of that core; "": not known. */
 typedef struct h6Granted {
   int32_t core;           /* pinned to it; -1: not pinned                                          */
   bool    fifo;           /* SCHED_FIFO                                                            */
@@ -182,24 +182,24 @@ typedef struct h6LoopReport {
   h6Status status;        /* all bits seen                                                         */
   h6Cause  fault;         /* why the output is latched at zero, or H6_CAUSE_NONE                   */
   double   wakeup_us_max;
-  char     granted[1024]; /* what real-time support was granted, and how to get the rest           */
-  uint64_t watchdog_trips;/* the haptic thread stood still so often, and devices were stopped      */
+  char     granted[1024]; /* which real-time requests were granted, and how to get the others      */
+  uint64_t watchdog_trips;/* times the watchdog found the haptic thread stalled, stopping devices  */
   h6HandSafety hand[H6_MAX_HANDS];
-  h6Granted grant;        /* the same to be read by a program                                      */
+  h6Granted grant;        /* the same for programs                                                 */
   h6LateHistogram late_us_compute, late_us_stolen, late_us_wakeup;
-  uint64_t coarse_frames; /* with H6_COARSE                                                        */
+  uint64_t coarse_frames; /* frames with H6_COARSE                                                 */
 } h6LoopReport;
 
-/* Starts the haptic thread; `devices` has one entry per hand and must outlive the loop. Unless every
- * device lives on the frames' time, a watchdog thread stops the devices when no command has been sent
- * for a frame and a decay_time; the outputs are then latched at zero. */
+/* Starts the haptic thread. `devices` has one entry per hand and must outlive the loop. A watchdog
+ * thread stops the devices when no command has been sent for a frame and a decay_time, and latches the
+ * outputs at zero; there is none when every device lives on the frames' own time (frame_time). */
 H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
                            h6Error* error);
 /* Takes up to `capacity` records, oldest first; call from one reader thread. Never blocks the loop. */
 H6_API size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity);
 /* For one viewer on a thread of its own: bodies and contacts of the newest frame, about 125 times a
- * second. False when there is nothing newer than at the last call. The arrays stay until the next
- * call that gives true; what was not fetched in time is gone, the loop never waits. World frame. */
+ * second. False when there is nothing newer than at the last call. The arrays stay valid until the next
+ * call that gives true. The loop never waits: frames that were not fetched are lost. World frame. */
 typedef struct h6ViewContact {
   float   position[3];         /*                                                             [m]  */
   float   normal[3];           /* inward unit normal of the point                                  */
@@ -215,30 +215,30 @@ typedef struct h6LoopView {
   size_t   row_count;     const h6ViewContact* contacts;/* all, or evenly picked ones              */
 } h6LoopView;
 H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
-/* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused). Devices are given the time of the
- * frames; for hands that live on it, not for a real arm. Any thread. */
+/* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused). Devices get the time of the frames,
+ * so this is for simulated hands (frame_time), not for a real arm. Any thread. */
 H6_API void   h6SetPace(h6Loop* loop, double pace);
-/* Other settings while it runs: `next` has the same model, bodies, hands and rate. Between two frames
- * it takes over poses, velocities, hands and the state of their safety chains, and what the bodies
- * did before is forgotten otherwise (coherence, warm starts). Filters and safety limits of the hands
- * stay what they were. Returns the session before, to be
- * destroyed by the caller; NULL with `error` filled: nothing has changed. Waits for the frame in
- * progress; one thread at a time, not the haptic one. */
+/* Changes settings while the loop runs: `next` has the same model, bodies, hands and rate. Between two
+ * frames it takes over poses, velocities, hands and the state of their safety chains; other history is
+ * forgotten (coherence, warm starts). Filters and safety limits of the hands stay as they were.
+ * Returns the previous session, which the caller destroys; or NULL with `error` filled, and nothing
+ * has changed. Waits for the frame in progress. One thread at a time may call it, not the haptic
+ * thread. */
 H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);
-/* The same between two steps of a program that steps by itself. False: nothing has changed. */
+/* The same between two steps of a program that steps by itself. False: `error` is filled, no change. */
 H6_API bool   h6TakeOver(h6Session* next, const h6Session* before, h6Error* error);
 H6_API bool   h6LoopRunning(const h6Loop* loop);
-/* Asks it to end after the current frame; any thread, and a signal handler. */
+/* Asks the loop to end after the current frame; any thread, and a signal handler. */
 H6_API void   h6RequestStop(h6Loop* loop);
 /* The same as h6Arm and h6Disarm, for the next frame; any thread. */
 H6_API void   h6ArmLoop(h6Loop* loop);
 H6_API void   h6DisarmLoop(h6Loop* loop);
-/* Stops every device now, sends nothing more, ends the loop; waits 2 ms at most for a command on its
- * way. For any thread and a signal handler; h6HaltAll does it to every loop of the process, as its
- * exit does by itself. Signal handlers are the program's to install. */
+/* Stops every device now, sends nothing more and ends the loop; waits at most 2 ms for a command that
+ * is being written. Any thread, and a signal handler. h6HaltAll halts every loop of the process, and
+ * so does the exit of the process. The program installs its signal handlers itself. */
 H6_API void   h6HaltLoop(h6Loop* loop);
 H6_API void   h6HaltAll(void);
-/* Waits for the end, stops the devices, gives the report; records can still be read until
+/* Waits for the loop's end, stops the devices and gives the report. Records can be read until
  * h6DestroyLoop. */
 H6_API h6LoopReport h6JoinLoop(h6Loop* loop);
 H6_API void         h6DestroyLoop(h6Loop* loop);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/* types.h - what a model and a session are made of.
+/* types.h - the data of models and sessions: fields, shells, bodies, hands, reports.
  *
  * Units are SI (m, kg, s, N, rad). Every pose is that of the MESH FRAME: it carries a point of the
  * mesh file, in metres, to the world. Quaternions are (w, x, y, z), unit.
@@ -80,8 +80,8 @@ typedef struct h6BodyDef {
   h6Vec3     com;        /* centre of mass, mesh frame                                        [m]  */
   double     inertia[6]; /* xx yy zz xy xz yz about com, mesh axes; all zero: from the shell's
                             points, each an equal share of the mass                       [kg m^2] */
-  int32_t    shell;      /* index into the model's shells, or -1                                   */
-  int32_t    field;      /* index into the model's fields, or -1                                   */
+  int32_t    shell;      /* index into the model's shells, or -1: none                             */
+  int32_t    field;      /* index into the model's fields, or -1: none                             */
   bool       translation_only; /* 3-DoF: never turns, feels no torque (Xu & Barbic 2016, Sec. 3.1) */
 } h6BodyDef;
 
@@ -92,7 +92,7 @@ typedef struct h6PairDef { int32_t shell_body; int32_t field_body; } h6PairDef;
 typedef enum h6Method {
   H6_METHOD_NONE = 0, /* every contact has the full stiffness                                      */
   H6_METHOD_GLOBAL,   /* McNeely 1999: n0/n once there are n0 contacts                             */
-  H6_METHOD_CLUSTER,  /* Kim 2003: one contact a cluster of near ones                              */
+  H6_METHOD_CLUSTER,  /* Kim 2003: near contacts are merged into one                               */
   H6_METHOD_GAUSS3,   /* the paper's Eq. 6-9: density of normals                                   */
   H6_METHOD_GAUSS6,   /* the paper's Eq. 10-12: density of normals plus density of torque directions*/
   H6_METHOD_ROBUST,   /* product density, weighted by depth, contacts facing away dropped          */
@@ -100,8 +100,8 @@ typedef enum h6Method {
   H6_METHOD_COUNT
 } h6Method;
 
-/* Pieces that can be added one by one. The first three make `robust` out of the paper's methods;
- * the others are options of the Gauss methods (`robust` among them); the rest do not read them. */
+/* Pieces that can be added one by one. The first three turn the paper's methods into `robust`; the
+ * others are options of the Gauss methods (gauss3, gauss6, robust). Other methods ignore them all. */
 enum {
   H6_PIECE_FACING = 1u << 0, /* contacts whose normal opposes the field's gradient fade out        */
   H6_PIECE_DEPTH  = 1u << 1, /* contacts enter the density in proportion to their depth            */
@@ -114,22 +114,22 @@ enum {
 
 typedef struct h6ContactDef {
   h6Method method;          /* default robust                                                      */
-  uint32_t pieces;          /* H6_PIECE_*; robust has the first three whatever stands here         */
+  uint32_t pieces;          /* H6_PIECE_*; robust always has the first three                       */
   double   stiffness;       /* k, > 0                                                       [N/m]  */
   double   damping;         /* beta, >= 0: damping of a contact is beta * its stiffness       [s]  */
-  double   global_n0;       /* `global`: contacts from which the stiffness is shared, >= 1         */
+  double   global_n0;       /* `global`: number of contacts above which they share, >= 1           */
   double   epsilon;         /* `gauss3`, `gauss6`: half-width of the density hat, (0, 2]           */
   double   epsilon_normal;  /* `robust`: half-width of the hat over normals, (0, 2]                */
   double   epsilon_torque;  /* `robust`: half-width of the hat over torque directions, (0, 2]      */
-  double   torque_length;   /* l0: lever arms below it count for less; 0: one voxel (robust), none
-                               (others)                                                       [m]  */
-  double   series_c;        /* `series`: the dial c, in (2, 1e6]: net stiffness is at most c k     */
+  double   torque_length;   /* l0: lever arms below it count less; 0: one voxel for robust, none for
+                               the others                                                     [m]  */
+  double   series_c;        /* `series`: c in (2, 1e6]; the net stiffness is at most c k           */
   double   margin_voxels;   /* `series`: points nearer than this take part before they touch,
                                0 .. 2 voxels of the field                                          */
   double   cluster_voxels;  /* `cluster`, `+cluster`: contacts nearer than this are one, in (0.01,
                                100] voxels                                                         */
-  bool     passivity;       /* observe the work of each shell body's contacts and damp what they
-                               would make out of nothing (Hannaford & Ryu 2002)                    */
+  bool     passivity;       /* observe the work of each shell body's contacts and damp energy that
+                               they would generate (Hannaford & Ryu 2002)                          */
 } h6ContactDef;
 
 typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
@@ -138,7 +138,7 @@ typedef enum h6Gradient {
   H6_EXACT          /* J J_g^T and the geometric term: pivoted LU                                  */
 } h6Gradient;
 
-/* What stands between a hand's manipulandum and its body (METHOD.md, Sec. 4). */
+/* The coupling between a hand's manipulandum and its body (METHOD.md, Sec. 4). */
 typedef enum h6CouplingMode {
   H6_COUPLING_DYNAMIC = 0, /* a body with mass on a damped spring                                  */
   H6_COUPLING_STATIC,      /* quasi-static: each frame one step towards the pose in which spring and
@@ -146,8 +146,8 @@ typedef enum h6CouplingMode {
   H6_COUPLING_DIRECT       /* none: the body is where the hand is, the hand feels its contacts     */
 } h6CouplingMode;
 
-/* Virtual coupling: Wan & McNeely 2003; saturation: Barbic & James 2008 (METHOD.md, Sec. 4). Zero
- * means "derive it", as said. */
+/* Virtual coupling: Wan & McNeely 2003; saturation: Barbic & James 2008 (METHOD.md, Sec. 4). Where a
+ * comment gives a meaning for 0, the engine derives the value. */
 typedef struct h6CouplingDef {
   h6CouplingMode mode;
   double stiffness;           /* k_VC                                                       [N/m]  */
@@ -160,66 +160,66 @@ typedef struct h6CouplingDef {
                                  half a voxel                                                      */
 } h6CouplingDef;
 
-/* Between a device and the scene: indexing and scaling of motion (METHOD.md, Sec. 4). Zeros of
- * h6HandDef are not valid; h6DefaultHandDef passes everything through unchanged. */
+/* Between a device and the scene: indexing and scaling of motion (METHOD.md, Sec. 4). Scales of 0 are
+ * not valid; h6DefaultHandDef passes everything through unchanged. */
 typedef struct h6HandFilterDef {
-  double   motion_scale;    /* metres in the scene a metre of the device, > 0; default 1           */
+  double   motion_scale;    /* metres in the scene per metre of the device, > 0; default 1         */
   double   rotation_scale;  /* the same for angles, > 0; default 1                                 */
-  double   force_scale;     /* newtons at the device a newton in the scene, torque alike, > 0;
-                               default 1; equal to motion_scale keeps power                        */
-  uint32_t clutch_buttons;  /* while one of these is down the device moves alone and the hand feels
-                               nothing: indexing; 0: no clutch                                     */
+  double   force_scale;     /* newtons at the device per newton in the scene, torque alike, > 0;
+                               default 1; power is kept when all three scales are equal            */
+  uint32_t clutch_buttons;  /* indexing: while one of these is down the device moves alone and the
+                               hand feels nothing; 0: no clutch                                    */
   bool     relative;        /* the first sample takes the body where it is, wherever the device is */
 } h6HandFilterDef;
 
 enum { H6_IMPEDANCE = 1u << 0, H6_ADMITTANCE = 1u << 1, H6_PSEUDO_ADMITTANCE = 1u << 2 };
 
-/* The safety chain of a hand's output (METHOD.md, "The safety chain"). It is always on; what is set
- * here can only make it tighter than the device's own ratings: a loop refuses values above them.
- * h6DefaultSafetyDef fills in what is not zero by default. */
+/* The safety chain of a hand's output (METHOD.md, "The safety chain"). It is always on. These settings
+ * can only make it tighter than the device's own ratings: a loop refuses values above them.
+ * h6DefaultSafetyDef fills in the defaults that are not 0. */
 typedef struct h6SafetyDef {
   double   max_force;       /* 0: the device's rating                                         [N]  */
-  double   max_torque;      /*                                                              [N m]  */
+  double   max_torque;      /* 0: the device's rating                                       [N m]  */
   double   max_force_rate;  /* slew limit; 0: the device's                                  [N/s]  */
-  double   max_torque_rate; /*                                                            [N m/s]  */
-  double   max_power;       /* that the hand may be given; 0: max_force at 1 m/s              [W]  */
-  double   max_speed;       /* admittance modes, of the motion sent; 0: the device's        [m/s]  */
-  double   derate_speed;    /* of the hand; from here on the wrench falls linearly to nothing at
-                               cut_speed; 0: half of that                                   [m/s]  */
-  double   cut_speed;       /* of the hand; zero, latched; 0: twice the device's max_velocity, at
-                               most 5 m/s. A turn counts as the speed at 0.2 m              [m/s]  */
-  double   soft_start;      /* from nothing to the whole output after every arming, pose jump and
+  double   max_torque_rate; /* slew limit; 0: the device's                                [N m/s]  */
+  double   max_power;       /* most power to the hand; 0: max_force at 1 m/s                  [W]  */
+  double   max_speed;       /* admittance modes: of the motion sent; 0: the device's        [m/s]  */
+  double   derate_speed;    /* speed of the hand above which the wrench falls linearly, to zero at
+                               cut_speed; 0: half of cut_speed                              [m/s]  */
+  double   cut_speed;       /* speed of the hand at which the output latches at zero; 0: twice the
+                               device's max_velocity, at most 5; a turn counts at 0.2 m     [m/s]  */
+  double   soft_start;      /* from zero to the whole output after every arming, pose jump and
                                recovery, 0 .. 10; default 0.1                                 [s]  */
-  double   decay_time;      /* from the whole output to nothing, 0.001 .. 0.02; default 0.02  [s]  */
-  double   pose_jump;       /* a sample that is farther from the last one than this and what a hand
-                               at 5 m/s moves in a frame is a jump; so is a turn by half a radian;
+  double   decay_time;      /* from the whole output to zero, 0.001 .. 0.02; default 0.02     [s]  */
+  double   pose_jump;       /* a sample is a jump when it is farther from the last one than this plus
+                               the way of a hand at 5 m/s in a frame, or turned by half a radian;
                                0.001 .. 0.05; default 0.02                                    [m]  */
-  double   freeze_time;     /* samples that stay the same for so long mean a frozen device, at most
+  double   freeze_time;     /* equal samples for this long mean that the device is frozen, at most
                                1; 0: the device's                                             [s]  */
   uint32_t dead_man_buttons;/* nothing is rendered unless one of these is held; 0: none            */
 } h6SafetyDef;
 
-/* How an arm and the engine talk (Xu & Barbic 2016, Fig. 13; METHOD.md, Sec. 4):
- *   impedance         pose in, wrench out
- *   admittance        wrench of the person in (a force sensor), pose and velocity of the body out;
- *                     the coupling's bounds are those of the wrench; its springs are not used
- *   pseudo-admittance wrench of the driver's own coupling in, pose and velocity of a manipulandum
- *                     with mass out; the virtual coupling stands between manipulandum and body */
+/* How an arm and the engine exchange data (Xu & Barbic 2016, Fig. 13; METHOD.md, Sec. 4):
+ *   impedance         in: pose; out: wrench
+ *   admittance        in: wrench of the person (a force sensor); out: pose and velocity of the body;
+ *                     the coupling's bounds limit the wrench; its springs are not used
+ *   pseudo-admittance in: wrench of the driver's own coupling; out: pose and velocity of a
+ *                     manipulandum with mass, which the virtual coupling ties to the body */
 typedef struct h6HandDef {
-  int32_t         body;     /* which moves with this hand                                          */
+  int32_t         body;     /* index of the body that moves with this hand                         */
   uint32_t        mode;     /* H6_IMPEDANCE (default), H6_ADMITTANCE or H6_PSEUDO_ADMITTANCE       */
   h6CouplingDef   coupling;
   h6HandFilterDef filter;
   double          manipulandum_mass;  /* pseudo-admittance, > 0; its inertia is the body's in the
                                          same ratio as the masses; default 0.1               [kg]  */
-  double          driver_stiffness;   /* pseudo-admittance: what the driver's coupling has, so that */
-  double          driver_damping;     /* the step can be implicit in it; 0: not known  [N/m, N s/m] */
+  double          driver_stiffness;   /* pseudo-admittance: of the driver's coupling, so that the   */
+  double          driver_damping;     /* step can be implicit in it; 0: not known      [N/m, N s/m] */
   double          admittance_damping; /* admittance: of the free body, >= 0; 0: derived; rotation:
                                          see METHOD.md                                     [N s/m] */
-  bool            passivity;          /* observe the energy that leaves through this hand and take
-                                         back by damping what was never put in
-                                         (Hannaford & Ryu 2002)                                    */
-  h6SafetyDef     safety;   /* of what goes to the device                                          */
+  bool            passivity;          /* observe the energy that leaves through this hand; damp the
+                                         wrench, or send a share of it, where more would leave
+                                         than was put in (Hannaford & Ryu 2002)                    */
+  h6SafetyDef     safety;   /* of the output to the device                                         */
 } h6HandDef;
 
 typedef struct h6SessionDef {
@@ -232,21 +232,21 @@ typedef struct h6SessionDef {
   h6Gradient   gradient;
   double       rate;          /* frames per second, 100 .. 10000                             [Hz]  */
   h6Vec3       gravity;       /* default 0: the arm carries the part                      [m/s^2]  */
-  size_t       max_contacts;  /* a shell body; storage is reserved once                            */
+  size_t       max_contacts;  /* per shell body; storage is reserved once                          */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
-  double       frame_budget_us; /* anytime mode: a step that would take longer stops traversal at the
-                                   deepest complete tier (H6_COARSE). It reads the clock: no two runs
-                                   leave out the same, h6SetCoarse repeats one. 0: never, and in
-                                   virtual time [us]                                               */
+  double       frame_budget_us; /* anytime mode: a step that would take longer samples fewer points
+                                   (H6_COARSE). It reads the clock, so runs differ in the points they
+                                   leave out; h6SetCoarse repeats one. 0: off; always off in virtual
+                                   time [us]                                                       */
   h6Allocator  allocator;
 } h6SessionDef;
 
 #define H6_MAX_HANDS 8
 #define H6_MAX_BODIES 256
 
-/* Contacts of any simulator, for h6WeighContacts: one row a contact, x y z next to each other. All
- * in one frame; arms and torques are about one point, the body's centre of mass. */
+/* Contacts of any simulator, for h6WeighContacts: one row per contact, x y z next to each other. All in
+ * one frame of reference; arms and torques are about one point, the body's centre of mass. */
 typedef struct h6ContactArrays {
   size_t            count;
   const float*      normals;   /* (count x 3) unit, the direction in which the contact pushes       */
@@ -265,8 +265,8 @@ typedef struct h6ContactArrays {
 typedef struct h6BodyState { h6Pose pose; h6Velocity velocity; } h6BodyState;
 
 /* The contacts of one shell body in the last frame. Columns of `count` rows, valid until the next
- * step. World frame. With clusters a row is a cluster: its means weighted by depth, and its deepest
- * point. Under `series` there are rows with depth <= 0, about to touch: weight 0, load maybe not. */
+ * step. World frame. With clusters a row is a cluster: means weighted by depth, and the index of its
+ * deepest point. Under `series`, rows with depth <= 0 are about to touch: weight 0, load >= 0. */
 typedef struct h6Contacts {
   size_t          count;
   const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
@@ -276,9 +276,9 @@ typedef struct h6Contacts {
   const float*    tx; const float* ty; const float* tz; /* torque direction T                      */
   const float*    weight;                        /* share of the stiffness                         */
   const uint32_t* point;                         /* index into the shell's points                  */
-  const int32_t*  field_body;                    /* the body whose field it is                     */
+  const int32_t*  field_body;                    /* the body whose field it touches                */
   const float*    load;                          /* force along N over k: weight * depth; `series`:
-                                                    lambda, with what damping takes           [m]  */
+                                                    lambda, which includes damping            [m]  */
 } h6Contacts;
 
 /* Stages of a frame, in order. */
@@ -298,25 +298,25 @@ typedef struct h6FrameReport {
   uint64_t frame;                     /* 0 for the first                                           */
   h6Status status;
   uint32_t contacts;                  /* points that touch, over all shell bodies                  */
-  double   max_depth;                 /* deepest contact, 0 without one                       [m]  */
+  double   max_depth;                 /* depth of the deepest contact, 0 without contacts     [m]  */
   double   max_depth_voxels;          /* the same in voxels of its field                           */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
   uint64_t state_hash;                /* of poses and velocities after the step and of the samples */
-  uint32_t series_iterations;         /* `series`: Newton steps, the most of any shell body        */
-  double   series_residual;           /* `series`: the largest left, of c * the deepest e          */
+  uint32_t series_iterations;         /* `series`: most Newton steps of any shell body             */
+  double   series_residual;           /* `series`: largest gradient left, over c * the largest e   */
   /* With h6SessionDef.net_stiffness: extreme eigenvalues of S J^T w k J S over all shell bodies'
-   * contacts, S = diag(1,1,1,1/L,1/L,1/L) with L the body's radius: how stiff the contacts are
-   * together, whatever their number. 0 without contacts.                                   [N/m]  */
+   * contacts, S = diag(1,1,1,1/L,1/L,1/L) with L the body's radius: the net stiffness of all
+   * contacts together. 0 without contacts.                                                 [N/m]  */
   double   net_stiffness_min, net_stiffness_max;
-  double   passivity_energy;          /* observed at the worst port: < 0 where energy was made; 0
-                                         when nothing is observed                             [J]  */
+  double   passivity_energy;          /* E of the port with the least: < 0 where energy was made; 0
+                                         when no port is observed                             [J]  */
   double   helper_start_us, helper_us;/* threads 2: the helper's first slice after the frame began, and
                                          its time in slices                                        */
   uint32_t helper_slices;
-  uint32_t coarse_pairs;             /* so many pairs, the last ones, were traversed coarsely       */
-  uint32_t coarse_points;            /* of each sixteen points so many were looked at there: 1, 2, 4,
-                                        8; 0: 1, and a shell body kept its 64 deepest contacts there */
+  uint32_t coarse_pairs;             /* number of pairs, the last ones, that were traversed coarsely */
+  uint32_t coarse_points;            /* points of each sixteen that were sampled there: 1, 2, 4, 8;
+                                        0: 1, and a shell body kept only its 64 deepest contacts    */
   double   missed_depth_voxels;      /* H6_COARSE: no point that was left out is deeper, as long as
                                         none is deeper than its field's band                        */
 } h6FrameReport;
