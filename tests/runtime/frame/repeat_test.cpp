@@ -120,9 +120,10 @@ TEST_CASE("an arm that was late, was disarmed and armed again moves the body the
     arm.mode = mode, arm.stall_at = 100, arm.stall_ms = 8;
     const h6Device device = arm.device();
     int asked = 0;
+    std::size_t disarmed_at = 0;  // this thread may be starved: count from the frame it has seen
     const Run first = run(box, device, 0.6, [&](h6Loop* loop, std::size_t frames) {
-      if (frames > 200 && asked == 0) h6DisarmLoop(loop), ++asked;
-      if (frames > 260 && asked == 1) h6ArmLoop(loop), ++asked;
+      if (asked == 1 && frames > disarmed_at + 60) h6ArmLoop(loop), ++asked;
+      if (asked == 0 && frames > 200) h6DisarmLoop(loop), disarmed_at = frames, ++asked;
     });
     REQUIRE(ever(first.rows, H6_CAUSE_LATE));
     REQUIRE(ever(first.rows, H6_CAUSE_DISARMED));
