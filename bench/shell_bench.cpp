@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // shell_bench.cpp - mesh in memory to shell in memory: bake/shell/points:56823/threads:T of the
-// starter motor (18,580 triangles), and bake/shell/MESH/points:N/threads:T of other inputs: the
-// actuator (25,191), a torus of one closed piece, a soup of slit tori with points where its field
-// is zero and with points on its triangles; with HAPSIX_BENCH_SOUPS=1 also the engine bay (505,276)
-// and the landing gear (1,789,551).
+// starter motor (18,580 triangles), and bake/shell/MESH/points:N/threads:T of other meshes: the
+// actuator (25,191), a torus of one closed piece, a soup of slit tori with points on the zero set
+// of its field and with points on its triangles; with HAPSIX_BENCH_SOUPS=1 also the engine bay
+// (505,276) and the landing gear (1,789,551).
 //
-// A shell is judged before it is timed, and what was found stands beside its time:
-//   spacing      least over mean distance between neighbours, of the worst level with ten points
-//   off_surface  the point farthest from where it shall lie [voxel of a field of 256]
-//   normal_deg   the normal farthest from the analytic one, on the torus
-//   levels       whose spheres were all found to hold all their descendants
+// Each shell is judged before it is timed. Counters:
+//   spacing      least over mean distance of neighbours, on the worst level of ten points or more
+//   off_surface  largest distance of a point from its surface [voxel of a field of 256]
+//   normal_deg   largest angle between a normal and the analytic one, on the torus
+//   levels       number of levels; every sphere was found to hold all its descendants
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 #include <string>
 
 #include "io/bake/plan.h"
-#include "io/mesh/nearest_triangle.h"
+#include "io/mesh/ray_scene.h"
 #include "io/scenes/industrial/industrial.h"
 #include "io/shell/bake_shell.h"
 #include "tests/io/shell/shell_test_meshes.h"
@@ -30,7 +30,7 @@ namespace {
 using namespace h6;
 using Normal = std::function<io::Vec3(const io::Vec3&)>;
 
-// Made when it is first asked for, kept for all who ask.
+// A mesh that is made on first use and kept.
 class Input {
  public:
   explicit Input(std::function<io::Mesh()> make, Normal inward = {})
@@ -39,7 +39,7 @@ class Input {
     if (mesh_.triangles.empty()) mesh_ = make_();
     return mesh_;
   }
-  const Normal inward;  // where it is known
+  const Normal inward;  // empty: not known
 
  private:
   std::function<io::Mesh()> make_;
@@ -70,7 +70,7 @@ io::Mesh slit_tori(int count) {
   return mesh;
 }
 
-// What is wrong with a shell, or nothing, and its figures.
+// Sets the counters of a shell and returns what is wrong with it, or an empty string.
 std::string judge(Input& input, const io::ShellData& shell, const io::ShellBake& options,
                   benchmark::State& state) {
   const io::Mesh& mesh = input.mesh();
@@ -86,11 +86,12 @@ std::string judge(Input& input, const io::ShellData& shell, const io::ShellBake&
   const auto plan = io::plan_field(mesh, io::audit(mesh), options.field);
   if (!plan) return plan.error();
   const double aim = options.surface == io::ShellSurface::field ? plan->offset : 0;
-  const io::NearestTriangle nearest(mesh, 0);
+  const auto nearest = io::RayScene::make(mesh);
+  if (!nearest) return nearest.error();
   double off = 0, turned = 0;
   for (std::size_t i = 0; i < shell.size(); i += 7) {
     const io::Vec3 p = shells::point(shell, i);
-    off = std::max(off, std::abs(std::sqrt(nearest(p).distance2) - aim) / plan->voxel_size);
+    off = std::max(off, std::abs((*nearest)->distance(p) - aim) / plan->voxel_size);
     if (!input.inward) continue;
     const double cosine = shells::dot(shells::normal(shell, i), input.inward(p));
     turned = std::max(turned, std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / shells::pi);
@@ -144,7 +145,7 @@ void add(const std::string& name, const InputPtr& input, std::size_t points,
   add("torus100k/", torus, 1'000'000);
   add("soup100k/field/", soup, 56823, io::ShellSurface::field);
   add("soup100k/", soup, 56823);
-  // Large inputs take seconds to make and to judge: only when asked for.
+  // Large inputs take seconds to make and to judge, so they are optional.
   if (const char* soups = std::getenv("HAPSIX_BENCH_SOUPS"); soups && *soups && *soups != '0') {
     add("soup500k/", input([] { return io::make_engine_bay().mesh; }), 56823);
     add("soup1800k/", input([] { return io::make_landing_gear().mesh; }), 56823);

@@ -85,12 +85,12 @@ const Rooms& below() {
 
 // Where each package enters: a room, or a box with all its rooms.
 const std::vector<std::pair<std::string, std::set<std::string>>> packages = {
-    {"hwy/", {"kernels"}},      {"tbb/", {"sched"}},       {"oneapi/", {"sched"}},
-    {"Eigen/", {"runtime"}},    {"Spectra/", {"runtime"}}, {"openvdb/", {"io/field"}},
-    {"embree3/", {"io/check"}}, {"hdf5", {"io/record"}},   {"H5", {"io/record"}},
-    {"xxhash", {"io/file"}},    {"pugixml", {"io/mesh"}},  {"nlohmann/", {"io"}},
-    {"CLI/", {"io/cli"}},       {"boost/", {"io/view"}},   {"meshoptimizer", {"io/view"}},
-    {"zlib.h", {"io"}},         {"hidapi", {"device"}},    {"doctest/", {"tests"}},
+    {"hwy/", {"kernels"}},     {"tbb/", {"sched"}},       {"oneapi/", {"sched"}},
+    {"Eigen/", {"runtime"}},   {"Spectra/", {"runtime"}}, {"openvdb/", {"io/field"}},
+    {"embree3/", {"io/mesh"}}, {"hdf5", {"io/record"}},   {"H5", {"io/record"}},
+    {"xxhash", {"io/file"}},   {"pugixml", {"io/mesh"}},  {"nlohmann/", {"io"}},
+    {"CLI/", {"io/cli"}},      {"boost/", {"io/view"}},   {"meshoptimizer", {"io/view"}},
+    {"zlib.h", {"io"}},        {"hidapi", {"device"}},    {"doctest/", {"tests"}},
     {"benchmark/", {"bench"}},
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tree.h - the distance of any point to the surface. Private to bake_*.cpp.
+// tree.h - the distance of grid nodes to the surface. Private to this folder.
 #pragma once
 #include <span>
 
@@ -8,19 +8,20 @@
 
 namespace h6::io::bake {
 
-// Triangles in the order of Hilbert's curve, eight to a leaf, eight leaves or nodes to a node: no
-// pointers between nodes, every level is an array. The nearest distance does not depend on where a
-// search starts.
+// A tree without pointers: each level is an array, a leaf has eight triangles, a node has eight
+// leaves or nodes, and the triangles follow Hilbert's curve. The distance it finds does not depend
+// on where a search starts. io/mesh/ray_scene.h says when to use which of the two searches.
 class TriangleTree {
  public:
   TriangleTree(const Surface& surface, const Grid& grid, unsigned threads);
 
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   using Found = kernels::NearestFound;  // [voxel^2]; place in this tree
-  // A lower bound of the distance [voxel], by less than kTight. `found`: on entry the square of
-  // anything above the distance; on return a place to start from at points near by. Looks around
-  // up to kStarts places first, no two of them together(), and where one of these is within
-  // `enough`, no further: 0.
+  // Returns a lower bound of the distance [voxel], less than kTight below it; or 0, as soon as a
+  // triangle in one of the starting leaves is within `enough`. `start`: places of triangles that
+  // are probably near, at most kStarts, no two of them together(). `found`: on entry, `squared` is
+  // the square of any upper bound of the distance; on return, `place` is a start for points near
+  // by.
   static constexpr std::size_t kStarts = 4;
   double search(const double (&p)[3], std::span<const std::uint32_t> start, double enough,
                 Found& found) const;
@@ -34,12 +35,12 @@ class TriangleTree {
   double search_exactly(const double (&p)[3], double best2, std::uint32_t& nearest) const;
 
   const Surface& surface_;
-  double middle_[3];               // float coordinates are about this
+  double middle_[3];               // origin of the float coordinates
   Large<std::uint32_t> triangle_;  // place -> triangle
   Large<kernels::EightTriangles> leaf_;
   Large<kernels::EightTurnedBoxes> around_leaf_;
   std::vector<Large<kernels::EightBoxes>> level_;  // last: one node
-  kernels::NearestTree tree_;                      // all of this
+  kernels::NearestTree tree_;                      // views of all of these
 };
 
 }  // namespace h6::io::bake

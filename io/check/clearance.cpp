@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// clearance.cpp - see clearance.h.
 #include "io/check/clearance.h"
 
 #include <algorithm>
 #include <vector>
 
-#include "io/check/ray_scene.h"
+#include "io/check/surface_places.h"
+#include "io/mesh/ray_scene.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {

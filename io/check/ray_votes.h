@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// ray_votes.h - on which side of a mesh a place is, as rays see it, and whether it can be left.
+// ray_votes.h - the side of a mesh that a place is on, by votes of rays, and ways out of it.
 #pragma once
 #include <vector>
 
-#include "io/check/ray_scene.h"
+#include "io/check/surface_places.h"
 #include "io/mesh/inward_normals.h"
+#include "io/mesh/ray_scene.h"
 
 namespace h6::io {
 
 class RayVotes {
  public:
-  // Of the mesh that `rays` and `faces` are of; both must outlive this.
+  // `rays` and `faces` must be of the same mesh and must outlive this.
   RayVotes(const RayScene& rays, const FaceTable& faces) : rays_(rays), faces_(faces) {}
 
-  // A ray says inside when it crosses the mesh an odd number of times, or leaves more of its closed
-  // pieces than it enters: parts that overlap are one solid. Five that agree decide, or ten in
-  // eleven; where the mesh has pieces that do not close, half of all rays cross any of them that is
-  // near, and 23 of 24 must agree. Else it is in doubt.
+  // A ray votes inside if it crosses the mesh an odd number of times, or leaves more closed pieces
+  // than it enters, so that overlapping parts are one solid. Five rays that agree decide, or ten in
+  // eleven. If the mesh has open pieces, 23 of 24 must agree, since half of all rays cross an open
+  // piece that is near. Otherwise the side is doubtful.
   enum class Side { outside, inside, doubtful };
   Side side(const Vec3& place, Dice& dice) const;
 
-  // Whether a ball of radius `clearance` [m] (0: a point) finds a way to far outside that touches
-  // no triangle: straight runs in random directions, each begun somewhere along the one before.
-  // True is proof; false is not, a narrow way is easily missed.
+  // Whether a ball of radius `clearance` [m] (0: a point) finds a way far outside that touches no
+  // triangle, by up to `runs` straight runs in random directions, each from somewhere along the one
+  // before. True is a proof. False is none, since the search easily misses a narrow way.
   bool way_out(const Vec3& place, double clearance, int runs, Dice& dice) const;
 
  private:

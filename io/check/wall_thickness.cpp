@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+// wall_thickness.cpp - see wall_thickness.h.
 #include "io/check/wall_thickness.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "io/check/ray_scene.h"
+#include "io/check/surface_places.h"
 #include "io/mesh/inward_normals.h"
+#include "io/mesh/ray_scene.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
@@ -28,7 +30,7 @@ class Probe {
     found.bowl = faces_.bowl[at.triangle];
     if (found.sheet) return found;
     const Vec3& in = faces_.inward[at.triangle];
-    // Solids that a step out of the place's own ends in: left less entered on the way to infinity.
+    // In how many other solids the place lies: left minus entered on the way out to infinity.
     std::vector<Crossing> way;
     cross(at, -in, way);
     int around = 0;
@@ -51,7 +53,7 @@ class Probe {
   }
 
  private:
-  // Without the triangle it starts on, and without sheets.
+  // Crossings without those of sheets and of the triangle that the ray starts on.
   void cross(const SurfacePlaces::Place& at, const Vec3& along, std::vector<Crossing>& way) const {
     rays_.crossings(at.p, along, way);
     std::erase_if(way,
@@ -74,7 +76,7 @@ Result<Walls> measure_walls(const Mesh& mesh, const WallOptions& options) {
   const Result<std::unique_ptr<RayScene>> rays = RayScene::make(mesh);
   if (!rays) return rays.failure();
   const FaceTable faces = face_table(mesh);
-  const SurfacePlaces places(mesh, faces.area);  // what is there twice counts once
+  const SurfacePlaces places(mesh, faces.area);  // a triangle that is stored twice counts once
   Walls walls;
   if (!(places.area() > 0) || options.places == 0) return walls;
   const Probe probe(**rays, faces);

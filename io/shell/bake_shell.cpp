@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // bake_shell.cpp - points on the surface, then levels and tree.
 //
-// Many candidates, spread evenly over the area that can be reached from outside, are thinned out to
-// the number asked for (see blue_noise.h); build_tree makes the levels of those. What is reached is
-// what a field says, baked here for that: of a mesh that is one closed piece all is, without
-// asking.
+// Many candidates, spread evenly over the area that the outside reaches, are thinned out to the
+// wanted number (blue_noise.h), and build_tree makes their levels. A field that is baked here
+// decides what the outside reaches. A mesh of one closed piece needs no field: all of it is
+// reached.
 #include "io/shell/bake_shell.h"
 
 #include <algorithm>
@@ -72,7 +72,7 @@ std::string millimetres(double metres) {
   return text;
 }
 
-// The field's complaints stand after the name of a file; these here stand alone.
+// Makes a full sentence of a failure of the field bake, which expects a file name before it.
 std::string sentence(std::string text) {
   if (text == "cancelled" || text.empty()) return text;
   text[0] = char(std::toupper(static_cast<unsigned char>(text[0])));
@@ -81,7 +81,7 @@ std::string sentence(std::string text) {
 
 using Warnings = std::vector<std::string>;
 
-// Points to be thinned out, and what makes a point of the shell out of each.
+// The steps of bake_shell and the data they share.
 class Bake {
  public:
   Bake(const Mesh& mesh, const ShellBake& options, Warnings& warnings, Pulse& pulse)
@@ -98,15 +98,15 @@ class Bake {
   }
 
  private:
-  // Candidates of a field count in its voxels.
+  // The unit of candidates [m]: a voxel for those of a field.
   double unit() const { return surface_ == ShellSurface::field ? field_->voxel_size : 1; }
   Demand demand() const {
     return {options_.points, options_.spacing / unit(), options_.seed, options_.threads};
   }
 
-  // Of a sound mesh only what the outside reaches is asked for. Half a voxel of offset is the least
-  // that no step from node to node can cross, and spares the field its search for gaps narrower
-  // than a voxel: seconds, where many parts lie on one another.
+  // For a sound mesh, the field only has to say what the outside reaches. With half a voxel of
+  // offset, the least that no step from node to node can cross, the bake skips its search for gaps
+  // narrower than a voxel, which takes seconds where many parts touch.
   static void step_off(const Mesh& mesh, FieldBake& options) {
     if (options.offset >= 0) return;
     Vec3 low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
@@ -127,7 +127,7 @@ class Bake {
     FieldBake options = options_.field;
     if (sound) step_off(mesh_, options);
     options.threads = options_.threads;
-    options.cavities = Cavities::solid;  // a shell is touched from outside
+    options.cavities = Cavities::solid;  // a shell is only touched from outside
     pulse_.step("finding the outside", 0.05, 0.4);
     Result<FieldData> field = bake_field(mesh_, options, &report_, pulse_.part());
     if (!field) return Failure{sentence(field.error())};
@@ -178,16 +178,18 @@ class Bake {
     pulse_.step("spreading points", 0.4, 0.8);
     Result<Candidates> samples = sample_zero_set(*field_, demand(), pulse_);
     if (!samples) return samples;
-    // Half as many again as are wanted, where the grid has them; then exactly there.
+    // First half as many again as are wanted, at the grid's accuracy; then those move exactly to
+    // the surface.
     const Thinned some = thinned(*samples, demand().spacing * 0.8, options_.points * 3 / 2);
     if (some.cancelled) return cancelled_;
     for (std::size_t i = 0; i < some.chosen.size(); ++i) {
       samples->points[i] = samples->points[some.chosen[i]];
     }
     samples->points.resize(some.chosen.size());
-    const NearestTriangle nearest(mesh_, options_.threads, &pulse_);
+    const Result<std::unique_ptr<RayScene>> nearest = RayScene::make(mesh_);
+    if (!nearest) return Failure{sentence(nearest.error())};
     if (!pulse_.alive()) return cancelled_;
-    settle({&mesh_, &*field_, &nearest, options_.normals == ShellNormals::triangles},
+    settle({&mesh_, &*field_, nearest->get(), options_.normals == ShellNormals::triangles},
            options_.threads, pulse_, *samples);
     if (!pulse_.alive()) return cancelled_;
     if (field_->offset > 0) {
@@ -200,7 +202,7 @@ class Bake {
     return samples;
   }
 
-  // By spacing when there is one, else the number.
+  // By the spacing if it is > 0, else by the number.
   Thinned thinned(const Candidates& samples, double spacing, std::size_t number) {
     Thinning thinning;
     thinning.fixed_radius = spacing > 0;
@@ -256,7 +258,7 @@ class Bake {
   FieldBakeReport report_;
 };
 
-constexpr const char* mode_names[] = {"auto", "triangles", "field"};  // of both enums, in order
+constexpr const char* mode_names[] = {"auto", "triangles", "field"};  // both enums, in order
 
 template <class Mode>
 std::optional<Mode> mode_from_name(const std::string& name) {
@@ -278,16 +280,16 @@ const char* name_of(ShellSurface surface) { return mode_names[int(surface)]; }
 const char* name_of(ShellNormals normals) { return mode_names[int(normals)]; }
 
 double candidates_for(double points, bool by_spacing) {
-  // A fixed spacing has no second round to fill its gaps and needs more. Very large shells get
-  // fewer: theirs alone fill gigabytes.
+  // A fixed spacing needs more, since no second round fills its gaps. Very large shells get fewer
+  // to save memory.
   const double each = points > 2e6 ? 4 : by_spacing ? 24 : 12;
   return std::max(4096.0, each * points);
 }
 
 Result<double> Demand::wanted(double area) const {
   if (!by_spacing()) return double(points);
-  // Random darts that keep a distance r from one another cover 0.547 of a plane with discs of
-  // radius r/2 when no more fit: r = 0.83 sqrt(area / points).
+  // Random darts at least r apart cover 0.547 of a plane with discs of radius r/2 when no more fit:
+  // r = 0.83 sqrt(area / points).
   const double count = std::max(1.0, 0.70 * area / (spacing * spacing));
   if (count <= double(max_shell_points)) return count;
   return Failure{"This spacing gives about " + std::to_string(std::llround(count / 1e6)) +

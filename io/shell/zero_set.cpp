@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // zero_set.cpp - candidates on the zero set of a field.
 //
-// Darts fall evenly into the volume; those that end in a layer half a voxel thick just outside the
-// surface count. |grad d| = 1 there, so a layer of one thickness holds equally many above every
-// piece of surface, whatever its slope against the grid. Outside, samples are exact distances (less
-// the offset), inside they need not be: nothing below looks there. What is left of them after a
-// first thinning is then drawn to the nearest point of the mesh until the offset is all that lies
-// between: exact, whatever the grid rounds off.
+// Darts fall uniformly into the volume. Those that hit a layer half a voxel thick just outside the
+// surface count. |grad d| = 1 there, so the layer holds equally many above every piece of surface,
+// whatever its slope against the grid. Samples outside are exact distances minus the offset;
+// samples inside need not be, and nothing here uses them. A first thinning follows. Then each
+// candidate moves along the line to the nearest point of the mesh until the offset is all that lies
+// between, which is exact even where the grid rounds creases off.
 #include <algorithm>
 #include <cmath>
 
@@ -20,12 +20,12 @@ namespace {
 constexpr double layer_low = 0.1, layer_high = 0.6;  // [voxel]
 constexpr double out_again = 0.3, slack = 0.5;       // [voxel]
 
-// Three numbers in [0, 1) of 63 bits.
+// Three numbers in [0, 1) from 63 bits.
 void three_units(std::uint64_t bits, double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = double((bits >> (21 * k)) & 0x1FFFFF) * 0x1p-21;
 }
 
-struct Part {  // of one brick
+struct Part {  // the candidates of one brick
   RawVector<OrientedPoint> points;
 };
 
@@ -39,7 +39,7 @@ class Layer {
   }
   std::size_t bricks() const { return bricks_.size(); }
 
-  // `rate` darts a cell, on average. Without `part` only counted.
+  // Throws `rate` darts per cell on average and returns the hits, which `part` gets if it is given.
   std::size_t throw_darts(std::size_t row, double rate, Part* part) const {
     const std::size_t brick = bricks_[row];
     const auto bx = std::size_t(field_.bricks[0]), by = std::size_t(field_.bricks[1]);
@@ -67,8 +67,8 @@ class Layer {
   }
 
  private:
-  // A look at the cell's first node alone: trilinear values within a cell differ by at most its
-  // diagonal, a little more where the field jumps.
+  // A quick test of the cell's first node: trilinear values within a cell differ by at most its
+  // diagonal, and by a little more where the field jumps.
   bool holds_layer(std::size_t brick, std::int32_t node) const {
     const float* samples = field_.samples.data() + std::size_t(field_.brick_index[brick]) * 512;
     return samples[node] < 2.5 * field_.voxel_size;
@@ -98,25 +98,26 @@ class Layer {
   std::vector<std::uint32_t> bricks_;
 };
 
-// From just outside the zero set to where the distance to the mesh is the offset. Between the
-// nearest point and a place farther out than that, the nearest point stays the same: the answer is
-// exact. Too near (the grid rounds creases off): a little out, and again.
+// Moves a point from just outside the zero set to where the distance to the mesh is the offset, and
+// returns the nearest triangle. On the way from a place to its nearest point, the nearest point
+// stays the same, so the result is exact. A place nearer than the offset (the grid rounds creases
+// off) first moves out, and the search starts again.
 std::uint32_t settle(const ZeroSet& of, OrientedPoint& q) {
   const FieldView view(*of.field);
   const double h = of.field->voxel_size, sigma = of.field->offset;
   Vec3 n{-q.n[0], -q.n[1], -q.n[2]};
   Vec3 p = view.to_metres(Vec3{q.p[0], q.p[1], q.p[2]} + out_again * n);
-  NearTriangle hit;
+  RayScene::Near hit;
   for (int round = 0; round < 5; ++round) {
-    hit = (*of.nearest)(p, sigma + (out_again + slack) * h);
-    if (hit.triangle == UINT32_MAX) hit = (*of.nearest)(p);
-    const double u = std::sqrt(hit.distance2);
+    hit = of.nearest->nearest(p, sigma + (out_again + slack) * h);
+    if (hit.triangle == RayScene::kNoTriangle) hit = of.nearest->nearest(p);
+    const double u = hit.distance;
     if (u > 1e-6 * h) n = (1 / u) * (p - hit.point);
     if (u >= sigma) break;
     p = hit.point + (sigma + out_again * h) * n;
   }
   const Vec3 place = view.from_metres(hit.point + sigma * n);
-  if (of.triangle_normals) {  // on the side of the way out
+  if (of.triangle_normals) {  // towards the outside
     const auto& f = of.mesh->triangles[hit.triangle];
     const Vec3& a = of.mesh->vertices[f[0]];
     const Vec3 u = of.mesh->vertices[f[1]] - a, v = of.mesh->vertices[f[2]] - a;
@@ -137,7 +138,7 @@ Result<Candidates> sample_zero_set(const FieldData& field, const Demand& demand,
     });
     return pulse.alive();
   };
-  constexpr double pilot = 2;  // darts a cell
+  constexpr double pilot = 2;  // darts per cell
   const double thickness = layer_high - layer_low;
   std::vector<std::size_t> hits(layer.bricks(), 0);
   if (!each([&](std::size_t row) { hits[row] = layer.throw_darts(row, pilot, nullptr); }))

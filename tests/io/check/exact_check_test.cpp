@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Embree's answers against a judge that uses none of it, and the exact check against fields that
-// are right and fields that were spoilt by hand.
+// Compares Embree's answers with an independent judge, and runs the exact check on right fields and
+// on fields with known errors.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using namespace h6::io;
 
 namespace {
 
-// Sheets and slivers of all sizes, anywhere.
+// Random sheets and slivers of all sizes.
 Mesh shards(int count) {
   Mesh mesh;
   Random random(3);
@@ -62,7 +62,7 @@ ExactCheck check(const Mesh& mesh, const FieldData& field, unsigned threads = 2)
   return *found;
 }
 
-// A ball within a ball, both wound outward as far as winding goes.
+// A ball within a ball, both wound outward.
 Mesh hollow_ball() {
   Mesh mesh = sphere({0, 0, 0}, 1.0);
   add(mesh, sphere({0, 0, 0}, 0.5));
@@ -83,6 +83,24 @@ TEST_CASE("distances by Embree are exact in double: near, far, far from the orig
       const double truth = judge.distance(p), found = rays->distance(p);
       CHECK(std::fabs(found - truth) < 1e-12 * (1 + norm(by)));
     }
+  }
+}
+
+TEST_CASE("the first of equally near triangles is the nearest, and none at the limit or beyond") {
+  Mesh mesh = patch(8, 8, [](double s, double t) { return Vec3{s, t, 0}; });
+  std::reverse(mesh.triangles.begin(), mesh.triangles.end());
+  const auto rays = rays_at(mesh);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const Vec3 above = mesh.vertices[v] + Vec3{0, 0, 0.25};
+    std::uint32_t first = 0;
+    const auto has = [&](const auto& t) { return t[0] == v || t[1] == v || t[2] == v; };
+    while (!has(mesh.triangles[first])) ++first;
+    const RayScene::Near near = rays->nearest(above);
+    CHECK(near.triangle == first);
+    CHECK(near.distance == 0.25);
+    CHECK(norm(near.point - mesh.vertices[v]) < 1e-12);
+    CHECK(rays->nearest(above, 0.26).triangle == first);
+    CHECK(rays->nearest(above, 0.25).triangle == RayScene::kNoTriangle);
   }
 }
 
@@ -138,7 +156,7 @@ TEST_CASE("votes: parts that overlap are one solid, a hollow is not, a bowl can 
   CHECK(!votes.way_out({1.5, 5.1, 0}, 0, 300, dice));
   CHECK(!votes.way_out({0.5, 0.5, 0.5}, 0, 300, dice));
 
-  // A box whose lid is off: a small ball comes out of it, one as wide as it does not.
+  // A small ball leaves a box without a lid; a ball as wide as the box does not.
   Mesh open = box({0, 0, 0}, {1, 1, 1});
   std::erase_if(open.triangles, [&](const auto& t) {
     return open.vertices[t[0]].z + open.vertices[t[1]].z + open.vertices[t[2]].z > 2.99;
@@ -177,7 +195,7 @@ TEST_CASE("bake_field's fields agree with their meshes: closed, overlapping, ope
   CHECK(both.inside > 30);
   CHECK(both.inside_gap > 0);
   CHECK(both.inside_gap < 1);
-  // With a hole it drains: every distance is right, and the votes tell the side that was lost.
+  // With a hole it drains: every distance is right, and the votes show the lost side.
   Mesh open = torus(1.0, 0.4);
   open.triangles.resize(open.triangles.size() - 40);
   const ExactCheck c = check(open, bake(open));
@@ -204,7 +222,7 @@ TEST_CASE(
   REQUIRE_MESSAGE(c, c.error());
   CHECK(c->nearer > 30);
   CHECK(c->agrees());
-  asked.sealed = false;  // what was done is not what was said
+  asked.sealed = false;  // hides from the check that the bake sealed holes
   c = check_exactly(holed, *field, asked);
   REQUIRE_MESSAGE(c, c.error());
   CHECK(!c->agrees());
@@ -254,7 +272,7 @@ TEST_CASE("whatever is wrong with a field shows, and where") {
   CHECK(c.far_wrong > 100);
   CHECK(c.far_excess > 0.9);
 
-  FieldData careful = good;  // three voxels too careful: safe, and said to be loose
+  FieldData careful = good;  // three voxels too low: safe, but reported as loose
   for (float& f : careful.far_grid)
     f = std::copysign(std::max(0.f, std::fabs(f) - float(3 * good.voxel_size)), f);
   c = check(mesh, careful);
@@ -312,7 +330,7 @@ TEST_CASE("a plan is the bake's own voxel, offset and size, and its bricks to a 
   FieldBake tiny;
   tiny.voxel_size = 1e-6;
   CHECK(!plan_field(open, audit(open), tiny));  // the bake's own sentence
-  // So much surface that not every triangle can be looked at: still a figure, and soon.
+  // Too much surface to look at every triangle: the estimate still comes soon.
   Mesh heap;
   for (int i = 0; i < 40; ++i)
     add(heap, turned(box({-1, -1, -1}, {1, 1, 1}, 1), 0.1 * i, 0.07 * i));

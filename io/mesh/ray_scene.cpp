@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/check/ray_scene.h"
+// ray_scene.cpp - Embree proposes triangles, double decides (see ray_scene.h).
+#include "io/mesh/ray_scene.h"
 
 #include <embree3/rtcore.h>
 
@@ -16,7 +17,7 @@ Vec3 on_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
   const double t = std::clamp(dot(p - a, e) / dot(e, e), 0.0, 1.0);
   return a + t * e;
 }
-// Of a triangle with area: straight below, or on the nearest edge.
+// The point nearest to p of a triangle with area: the foot of the perpendicular, or on an edge.
 Vec3 point_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = cross(b - a, c - a), w = p - a;
   const auto left_of = [&](const Vec3& q, const Vec3& r) {
@@ -32,7 +33,7 @@ Vec3 point_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   return best;
 }
 
-// Triangles with area, the first of each three corners.
+// The triangles with area, of each three corners the first.
 std::vector<std::uint32_t> that_count(const Mesh& mesh) {
   struct Key {
     std::array<std::uint32_t, 3> corners;
@@ -69,9 +70,9 @@ constexpr double kSlack = 1e-6;  // of the cube's half side
 struct RayScene::Embree {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  std::vector<std::uint32_t> triangle;  // (primitives) of the mesh
+  std::vector<std::uint32_t> triangle;  // (primitives) index in the mesh
   Vec3 middle{};
-  double half = 1;  // [m] is 1 for Embree
+  double half = 1;  // [m] Embree's unit
 
   ~Embree() {
     if (scene) rtcReleaseScene(scene);
@@ -142,37 +143,45 @@ Result<std::unique_ptr<RayScene>> RayScene::make(const Mesh& mesh) {
   return std::unique_ptr<RayScene>(new RayScene(mesh, std::move(e)));
 }
 
-RayScene::Near RayScene::nearest(const Vec3& place) const {
+RayScene::Near RayScene::nearest(const Vec3& place, double within) const {
   struct Search {
     const RayScene* self;
     double p[3];
-    double best2 = std::numeric_limits<double>::infinity();
-    double slack = 0;  // in Embree's unit
+    double best2;
+    double slack;  // in Embree's unit
     std::uint32_t triangle = kNoTriangle;
-  } search{this, {place.x, place.y, place.z}};
+    float radius() const {
+      return float(std::sqrt(best2) / self->embree_->half * (1 + kSlack) + slack);
+    }
+  };
+  if (embree_->triangle.empty()) return {};
   const Vec3 at = embree_->inside(place);
-  search.slack = kSlack * std::max({1.0, std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
+  const double slack = kSlack * std::max({1.0, std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
+  Search search{this, {place.x, place.y, place.z}, within * within, slack};
   RTCPointQuery query{};
   query.x = float(at.x), query.y = float(at.y), query.z = float(at.z);
-  query.radius = std::numeric_limits<float>::infinity();
+  query.radius = search.radius();
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   const auto look = [](RTCPointQueryFunctionArguments* args) {
     auto& s = *static_cast<Search*>(args->userPtr);
     const Mesh& mesh = s.self->mesh_;
-    const auto& f = mesh.triangles[s.self->embree_->triangle[args->primID]];
+    const std::uint32_t t = s.self->embree_->triangle[args->primID];
     double c[3][3];
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3& v = mesh.vertices[f[k]];
+      const Vec3& v = mesh.vertices[mesh.triangles[t][k]];
       c[k][0] = v.x, c[k][1] = v.y, c[k][2] = v.z;
     }
     const double d2 = kernels::point_triangle_squared(s.p, c[0], c[1], c[2]);
-    if (d2 >= s.best2) return false;
-    s.best2 = d2, s.triangle = s.self->embree_->triangle[args->primID];
-    args->query->radius = float(std::sqrt(d2) / s.self->embree_->half * (1 + kSlack) + s.slack);
+    // Embree proposes triangles in an order that depends on the threads that built its tree: ties
+    // must not be won by order.
+    const bool tie = d2 == s.best2 && s.triangle != kNoTriangle && t < s.triangle;
+    if (!(d2 < s.best2) && !tie) return false;
+    s.best2 = d2, s.triangle = t;
+    args->query->radius = s.radius();
     return true;
   };
-  if (!embree_->triangle.empty()) rtcPointQuery(embree_->scene, &query, &context, look, &search);
+  rtcPointQuery(embree_->scene, &query, &context, look, &search);
   if (search.triangle == kNoTriangle) return {};
   const auto& f = mesh_.triangles[search.triangle];
   return {std::sqrt(search.best2), search.triangle,
@@ -189,7 +198,7 @@ void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossi
       if (args->valid[i] == 0) continue;
       auto* collect = static_cast<Collect*>(args->context);
       collect->found.push_back(RTCHitN_primID(args->hit, args->N, i));
-      args->valid[i] = 0;  // and on
+      args->valid[i] = 0;  // the ray goes on
     }
   };
   RTCRayHit ray = embree_->ray(from, along);
@@ -228,52 +237,5 @@ double RayScene::free_way(const Vec3& from, const Vec3& along) const {
 }
 
 double RayScene::reach() const { return 5 * embree_->half; }
-
-std::uint64_t Dice::next() {
-  std::uint64_t z = state_ += 0x9E3779B97F4A7C15u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return z ^ (z >> 31);
-}
-double Dice::within(double low, double high) {
-  return low + (high - low) * double(next() >> 11) * 0x1p-53;
-}
-Vec3 Dice::direction() {
-  for (;;) {
-    const Vec3 d{within(-1, 1), within(-1, 1), within(-1, 1)};
-    const double length2 = dot(d, d);
-    if (length2 > 1 || length2 < 0.01) continue;
-    const double length = std::sqrt(length2);
-    return {d.x / length, d.y / length, d.z / length};
-  }
-}
-
-SurfacePlaces::SurfacePlaces(const Mesh& mesh) : mesh_(mesh) {
-  sum_.reserve(mesh.triangles.size());
-  double sum = 0;
-  for (const auto& f : mesh.triangles) {
-    const Vec3& a = mesh.vertices[f[0]];
-    const Vec3 n = cross(mesh.vertices[f[1]] - a, mesh.vertices[f[2]] - a);
-    sum_.push_back(sum += std::sqrt(dot(n, n)) / 2);
-  }
-}
-
-SurfacePlaces::SurfacePlaces(const Mesh& mesh, const std::vector<double>& area) : mesh_(mesh) {
-  sum_.reserve(area.size());
-  double sum = 0;
-  for (const double a : area) sum_.push_back(sum += a);
-}
-
-SurfacePlaces::Place SurfacePlaces::operator()(Dice& dice) const {
-  const auto found = std::upper_bound(sum_.begin(), sum_.end(), dice.within(0, sum_.back()));
-  const auto t = std::min(std::size_t(found - sum_.begin()), sum_.size() - 1);
-  double u = dice.within(0, 1), v = dice.within(0, 1);
-  if (u + v > 1) u = 1 - u, v = 1 - v;
-  const auto& f = mesh_.triangles[t];
-  const Vec3& a = mesh_.vertices[f[0]];
-  const Vec3 b = mesh_.vertices[f[1]] - a, c = mesh_.vertices[f[2]] - a;
-  return {std::uint32_t(t),
-          {a.x + u * b.x + v * c.x, a.y + u * b.y + v * c.y, a.z + u * b.z + v * c.z}};
-}
 
 }  // namespace h6::io
