@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// surface.cpp - which triangles of a mesh count, whether they close, and the grid around them.
+// surface.cpp - the triangles that count, whether they close, and the grid around them.
 #include <algorithm>
 #include <cstdio>
 #include <utility>
@@ -17,7 +17,7 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-// Height over the longest side below 1e-12 of it: rounding, not area.
+// A height below 1e-12 of the longest side is rounding, not area.
 bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = b - a, v = c - a, w = c - b;
   const Vec3 n = cross(u, v);
@@ -28,7 +28,7 @@ bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
 constexpr std::size_t kSlice = 16384;  // triangles
 std::size_t slices_of(std::size_t count) { return (count + kSlice - 1) / kSlice; }
 
-// Calls body(slice, i) for every triangle, slices side by side.
+// Calls body(slice, i) for every triangle, slices in parallel.
 template <class F>
 void each_triangle(std::size_t count, unsigned threads, F&& body) {
   sched::parallel_for(slices_of(count), threads, [&](std::size_t s) {
@@ -36,14 +36,13 @@ void each_triangle(std::size_t count, unsigned threads, F&& body) {
   });
 }
 
-// Something about a vertex.
 struct Item {
   std::uint32_t vertex, what;
 };
 
-// Calls `each(range, begin, end)` for the items of every vertex that has some, in order of making,
-// ranges of vertices side by side: so many fit the cache. `make(i, add)` calls add(item) for
-// triangle i, the same whenever it is asked.
+// Calls `each(range, begin, end)` for the items of every vertex that has some, in the order of
+// triangles. Ranges of vertices, which fit the cache, run in parallel. `make(i, add)` calls
+// add(item) for the items of triangle i; it is called twice and must repeat itself.
 constexpr std::size_t kRanges = 128;
 template <class Make, class Each>
 void by_vertex(std::size_t vertices, std::size_t triangles, unsigned threads, Make&& make,
@@ -106,8 +105,8 @@ std::vector<std::uint8_t> find_duplicates(const Mesh& mesh, unsigned threads) {
   return duplicate;
 }
 
-// Flat triangles carry edges too: a T-junction closed by one is closed. Those with two equal
-// vertices carry one edge twice, which changes nothing.
+// Flat triangles count too, since one may close a T-junction. Triangles with two equal vertices
+// have one edge twice, which changes nothing.
 void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, unsigned threads,
                  Surface& surface) {
   struct alignas(64) Count {
@@ -142,89 +141,96 @@ std::string number(double value) {
   return text;
 }
 
-}  // namespace
+constexpr std::size_t kNone = ~std::size_t{0};
+constexpr double kHuge = std::numeric_limits<double>::max();
 
-Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
-  const std::size_t count = mesh.triangles.size(), slices = slices_of(count);
-  constexpr std::size_t kNone = ~std::size_t{0};
-  // What is found slice by slice, put together in their order.
-  struct Found {
-    std::size_t no_vertex = kNone, not_finite = kNone;  // first such triangle
-    std::size_t duplicates = 0, flat = 0, kept = 0;
-    double low[3], high[3];
-  };
-  constexpr double kHuge = std::numeric_limits<double>::max();
-  std::vector<Found> found(slices);
+Outcome check_indices(const Mesh& mesh, unsigned threads) {
+  const std::size_t count = mesh.triangles.size();
+  std::vector<std::size_t> bad(slices_of(count), kNone);  // the first triangle of each slice
   each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
     for (std::uint32_t v : mesh.triangles[i])
-      if (v >= mesh.vertices.size()) found[s].no_vertex = std::min(found[s].no_vertex, i);
+      if (v >= mesh.vertices.size()) bad[s] = std::min(bad[s], i);
   });
-  for (const Found& f : found) {
-    if (f.no_vertex == kNone) continue;
-    for (std::uint32_t v : mesh.triangles[f.no_vertex])
-      if (v >= mesh.vertices.size())
-        return Failure{"triangle " + std::to_string(f.no_vertex) + " names vertex " +
-                       std::to_string(v) + ", but the mesh has " +
-                       std::to_string(mesh.vertices.size())};
-  }
-  Surface surface;
-  const std::vector<std::uint8_t> duplicate = find_duplicates(mesh, threads);
-  count_edges(mesh, duplicate, threads, surface);
+  const auto first = std::find_if(bad.begin(), bad.end(), [](std::size_t i) { return i != kNone; });
+  if (first == bad.end()) return Done{};
+  const auto vertex = *std::find_if(mesh.triangles[*first].begin(), mesh.triangles[*first].end(),
+                                    [&](std::uint32_t v) { return v >= mesh.vertices.size(); });
+  return Failure{"triangle " + std::to_string(*first) + " names vertex " + std::to_string(vertex) +
+                 ", but the mesh has " + std::to_string(mesh.vertices.size())};
+}
 
-  std::vector<std::uint8_t> keep(count, 0);
-  for (Found& f : found) {
-    std::fill_n(f.low, 3, kHuge);
-    std::fill_n(f.high, 3, -kHuge);
-  }
-  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
-    Found& f = found[s];
+// The findings in a slice of triangles.
+struct Slice {
+  std::size_t not_finite = kNone;  // first triangle with such a coordinate
+  std::size_t duplicates = 0, flat = 0, kept = 0;
+  double low[3] = {kHuge, kHuge, kHuge}, high[3] = {-kHuge, -kHuge, -kHuge};
+};
+
+// Sets `keep` (triangles) to 1 for triangles that are neither duplicates nor flat.
+std::vector<Slice> sift(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate,
+                        unsigned threads, std::vector<std::uint8_t>& keep) {
+  std::vector<Slice> slices(slices_of(mesh.triangles.size()));
+  each_triangle(mesh.triangles.size(), threads, [&](std::size_t s, std::size_t i) {
+    Slice& slice = slices[s];
     if (duplicate[i]) {
-      ++f.duplicates;
+      ++slice.duplicates;
       return;
     }
     const Triangle& t = mesh.triangles[i];
     const Vec3 corner[3] = {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
     for (const Vec3& p : corner)
-      if (!std::isfinite(p.x + p.y + p.z)) f.not_finite = std::min(f.not_finite, i);
+      if (!std::isfinite(p.x + p.y + p.z)) slice.not_finite = std::min(slice.not_finite, i);
     if (!has_area(corner[0], corner[1], corner[2])) {
-      ++f.flat;
+      ++slice.flat;
       return;
     }
     for (const Vec3& p : corner) {
       const double at[3] = {p.x, p.y, p.z};
       for (std::size_t k = 0; k < 3; ++k) {
-        f.low[k] = std::min(f.low[k], at[k]);
-        f.high[k] = std::max(f.high[k], at[k]);
+        slice.low[k] = std::min(slice.low[k], at[k]);
+        slice.high[k] = std::max(slice.high[k], at[k]);
       }
     }
     keep[i] = 1;
-    ++f.kept;
+    ++slice.kept;
   });
-  double low[3] = {kHuge, kHuge, kHuge}, high[3] = {-kHuge, -kHuge, -kHuge};
+  return slices;
+}
+
+}  // namespace
+
+Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
+  if (const Outcome fine = check_indices(mesh, threads); !fine) return fine.failure();
+  Surface surface;
+  const std::vector<std::uint8_t> duplicate = find_duplicates(mesh, threads);
+  count_edges(mesh, duplicate, threads, surface);
+  std::vector<std::uint8_t> keep(mesh.triangles.size(), 0);
+  std::vector<Slice> slices = sift(mesh, duplicate, threads, keep);
   std::size_t kept = 0;
-  for (Found& f : found) {
-    if (f.not_finite != kNone)
-      return Failure{"triangle " + std::to_string(f.not_finite) +
+  double low[3] = {kHuge, kHuge, kHuge}, high[3] = {-kHuge, -kHuge, -kHuge};
+  for (Slice& slice : slices) {
+    if (slice.not_finite != kNone)
+      return Failure{"triangle " + std::to_string(slice.not_finite) +
                      " has a coordinate that is not finite"};
-    surface.duplicates += f.duplicates;
-    surface.flat += f.flat;
-    kept += std::exchange(f.kept, kept);  // from here on: where the slice's go
+    surface.duplicates += slice.duplicates;
+    surface.flat += slice.flat;
+    kept += std::exchange(slice.kept, kept);  // from here on, where the slice's first one goes
     for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], f.low[k]);
-      high[k] = std::max(high[k], f.high[k]);
+      low[k] = std::min(low[k], slice.low[k]);
+      high[k] = std::max(high[k], slice.high[k]);
     }
   }
   if (kept == 0)
     return Failure{"the mesh has no triangle with area: there is nothing to make a field of"};
   surface.low = {low[0], low[1], low[2]};
   surface.high = {high[0], high[1], high[2]};
-  const bool parts = mesh.part.size() == count;
+  const bool parts = mesh.part.size() == mesh.triangles.size();
   surface.triangles.resize(kept);
   surface.source.resize(kept);
   if (parts) surface.part.resize(kept);
-  each_triangle(count, threads, [&](std::size_t s, std::size_t i) {
+  each_triangle(mesh.triangles.size(), threads, [&](std::size_t s, std::size_t i) {
     if (!keep[i]) return;
-    const std::size_t to = found[s].kept++;
+    const std::size_t to = slices[s].kept++;
     surface.triangles[to] = mesh.triangles[i];
     surface.source[to] = std::int32_t(i);
     if (parts) surface.part[to] = mesh.part[i];
@@ -239,8 +245,8 @@ Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
   return surface;
 }
 
-// The longest side gets `voxels` nodes. Around the mesh stay the wanted padding and never less than
-// the band, the offset and two voxels: the border of the grid is outside for certain.
+// The longest side gets `voxels` nodes. The padding around the mesh is at least band + offset + two
+// voxels, so that the border of the grid is certainly outside.
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed) {
   if (options.voxel_size <= 0 && (options.voxels < 16 || options.voxels > 2048))
     return Failure{"a field takes 16 to 2048 voxels on its longest side, not " +
