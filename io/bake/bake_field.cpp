@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // bake_field.cpp - a field from a mesh, step by step (see grid.h).
 //
-// Meaning of the sign: H. Xu, J. Barbic, "Signed distance fields for polygon soup meshes", 2014.
-// What the outside cannot reach is inside: winding is never looked at, so inside-out, mixed or
-// doubled meshes give the same field.
+// The sign: H. Xu, J. Barbic, "Signed distance fields for polygon soup meshes", 2014. All that the
+// outside cannot reach is inside. Winding has no effect, so inside-out, mixed or doubled meshes
+// give the same field.
 #include "io/bake/bake_field.h"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ void Steps::clock(const std::string& what) const {
 
 std::vector<FieldBakeReport::Stage> Steps::stages() const {
   clock("");
-  std::vector<FieldBakeReport::Stage> sum;  // a stage that was left and entered again is one
+  std::vector<FieldBakeReport::Stage> sum;  // a stage entered twice counts once
   for (const FieldBakeReport::Stage& s : stages_) {
     if (s.name.empty()) continue;
     const auto same = std::find_if(sum.begin(), sum.end(),
@@ -109,7 +109,7 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
                   " are no obstacles there; bake with more voxels, or with an offset");
 }
 
-// Distances of all bricks near the surface.
+// Finds the bricks near the surface and their distances.
 Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned threads,
                 const bake::Steps& steps, double from, double to, bake::NarrowBand& band) {
   using namespace bake;

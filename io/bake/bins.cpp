@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// bins.cpp - which triangles come within reach of which bricks.
+// bins.cpp - which triangles are within reach of which bricks.
 //
-// A triangle visits the tiles of its box, and in each all 64 bricks at once. Where tiles are many,
-// the range is halved and each half is kept only if no plane of the triangle separates it (face
-// normal and the edges' normals in the coordinate planes), so a long diagonal sliver costs as much
-// as the tiles it passes.
+// A triangle visits the tiles of its box and tests the 64 bricks of a tile at once. If the tiles
+// are many, their range is halved, and a half is dropped if a plane of the triangle separates it
+// (the face, or an edge's normal in a coordinate plane). So a long diagonal sliver costs only the
+// tiles that it passes.
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -21,7 +21,7 @@ constexpr std::size_t kMaxPairs = 200'000'000;
 constexpr std::size_t kSlice = 1024;             // triangles
 constexpr int kTile = 8 * kernels::kTileBricks;  // nodes along a side
 constexpr long kFew = 12;                        // tiles
-constexpr double kRounding = 4e-3;               // float at 2048 voxels, several times over
+constexpr double kRounding = 4e-3;               // several roundings of a float at 2048 voxels
 
 struct Range {
   int low[3], high[3];  // tiles, inclusive
@@ -30,8 +30,8 @@ struct Range {
   }
 };
 
-// Half-spaces {n.x <= level} that hold the triangle; n is unit. A box beyond one by more than reach
-// has no node within reach.
+// Half-spaces {n.x <= level} that contain the triangle; n is a unit vector. A box that lies beyond
+// one of them by more than the reach has no node within reach.
 struct Separators {
   double n[20][3], level[20];
   int count = 0;
@@ -113,7 +113,7 @@ struct Pair {
   std::uint32_t tile, triangle;
 };
 
-// Bricks of a tile that lie in the grid.
+// The bricks of a tile that lie in the grid.
 std::uint64_t bricks_there(const Grid& grid, const int (&tile)[3]) {
   std::uint64_t there = 0;
   for (int b = 0; b < 64; ++b)
@@ -123,13 +123,13 @@ std::uint64_t bricks_there(const Grid& grid, const int (&tile)[3]) {
   return there;
 }
 
-// A triangle and the tiles that its box, made larger by the reach, meets: any, if low <= high.
+// A triangle and the tiles that meet its box, enlarged by the reach.
 struct Boxed {
   std::uint32_t triangle;
   Range tiles;
 };
 
-// Triangles that are looked at together. Corners are seen from the first node of the first tile.
+// Triangles that are prepared together. Corners are relative to the first node of the first tile.
 struct Batch {
   static constexpr std::size_t kMost = 64;
   std::vector<Boxed> boxed;
@@ -196,7 +196,8 @@ void bin_triangles(const Surface& surface, const Grid& grid, const Tiles& tiles,
     bin_triangle(grid, tiles, batch.boxed[i], batch.corners.data() + 9 * i, batch.facets[i], out);
 }
 
-// Rows in the order of cells, layer by layer; returns how many. They are not made if too many.
+// Numbers the rows in the order of cells and returns how many there are; makes none if there are
+// too many.
 std::size_t number_rows(const Grid& grid, const std::vector<std::uint64_t>& used, unsigned threads,
                         NarrowBand& band) {
   const Tiles& tiles = band.tiles;
@@ -249,12 +250,12 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
   const std::size_t tile_count =
       std::size_t(tiles.size[0]) * std::size_t(tiles.size[1]) * std::size_t(tiles.size[2]);
   const std::size_t slices = (surface.triangles.size() + kSlice - 1) / kSlice;
-  // Each worker takes slices until none is left, and counts what it finds in them for itself: tiles
-  // next to one another in space are so in the mesh, and two threads would wait for one another.
+  // Each worker takes slices until none is left and keeps its own counts: successive triangles
+  // mostly fall into the same tiles, so shared counts would make the threads wait for each other.
   struct Worker {
     std::vector<std::vector<Pair>> slices;
-    std::vector<std::uint64_t> used;  // (tiles) bricks
-    std::vector<std::size_t> place;   // (tiles) how many pairs, then where the next one goes
+    std::vector<std::uint64_t> used;  // (tiles) bricks with a triangle
+    std::vector<std::size_t> place;   // (tiles) number of pairs, later where the next one goes
   };
   std::vector<Worker> workers(
       std::min<std::size_t>(threads != 0 ? threads : sched::machine_threads(), slices));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// chains.cpp - chains of neighbouring nodes from the reached set (see chains.h).
+// chains.cpp - chains of neighbouring nodes to the reached set.
 #include "io/bake/chains.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ TileRows::TileRows(const Grid& grid, const NarrowBand& band, const Reached& reac
   }
 }
 
-// What of a brick lies in the room: all of it, or the side of a brick around the tile.
+// The part of a brick that lies in the room: all of it, or the side of a brick around the tile.
 struct ChainRoom::Box {
   std::uint8_t x, y, z;               // its first node there
   std::uint8_t width, lines, layers;  // 8 or 1
@@ -89,7 +89,7 @@ void ChainRoom::copy(const Box& box, const Chain* from) {
     }
 }
 
-// Where nothing is reached, and nothing passes, all is far.
+// Chains from the nodes of R alone; all are far where the brick has none and `passes` is false.
 void ChainRoom::seed(const Box& box, const NodeMask& wet, const float* u, float offset,
                      bool passes) {
   std::uint64_t mask[8], any = 0;
@@ -124,7 +124,7 @@ void ChainRoom::fill(const Grid& grid, const NarrowBand& band, const Reached& re
       wanted[at[2] + i / 3] |= std::uint64_t{brick.around >> (3 * i) & 7}
                                << (TileRows::kSide * (at[1] + i % 3) + at[0]);
   }
-  std::array<std::uint8_t, TileRows::kPlaces> from;  // places whose bricks lie in memory
+  std::array<std::uint8_t, TileRows::kPlaces> from;  // places with a row
   std::size_t count = 0;
   for (int c = 0; c < TileRows::kSide; ++c)
     for (; wanted[c] != 0; wanted[c] &= wanted[c] - 1) {
@@ -135,7 +135,7 @@ void ChainRoom::fill(const Grid& grid, const NarrowBand& band, const Reached& re
       else
         from[count++] = std::uint8_t(p);
     }
-  // They lie anywhere: they are asked for in time.
+  // Rows are scattered over memory, so they are prefetched.
   constexpr std::size_t kLater = 8, kSoon = 3;
   const auto row = [&](std::size_t i) { return std::size_t(rows.row[from[i]]); };
   const auto held = [&](std::size_t r) { return chains != nullptr && chains->holds(r); };

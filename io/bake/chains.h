@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// chains.h - how far nodes are from the reached set along chains of neighbours. Private to
-// bake_*.cpp; inside.cpp says what for.
+// chains.h - lengths of chains of neighbouring nodes to the reached set R. Private to this folder;
+// inside.cpp says what they are for.
 #pragma once
 #include "io/bake/grid.h"
 #include "kernels/bake/chain_step.h"
@@ -11,10 +11,10 @@ using kernels::Chain;
 using kernels::kChainFar;
 using kernels::kChainUnit;
 
-// Chains start at a node, not on the border of R [voxel]: by this much they are too long at most,
-// where R is flat; and where it is a crease or a corner, sqrt(3) - 1.
+// Chains end at a node, not on the border of R. So they are too long [voxel] by at most kSlack
+// where the border is flat, and by sqrt(3) - 1 where it has a crease or a corner.
 inline constexpr float kSlack = 0.15f, kCornerSlack = 0.74f;
-inline constexpr float kCrooked = 1.135f;  // longest chain over straight line, rounding included
+inline constexpr float kCrooked = 1.135f;  // most of chain over straight line, with rounding
 
 // The rows of a tile and of the bricks around it. Bricks (a,b,c), from -1 to 4, have the place
 // (6*(c + 1) + b + 1)*6 + a + 1.
@@ -22,7 +22,7 @@ struct TileRows {
   static constexpr int kSide = kernels::kTileBricks + 2;
   static constexpr std::size_t kPlaces = std::size_t(kSide) * kSide * kSide;
   std::array<std::int32_t, kPlaces> row;  // -1: no row
-  std::array<bool, kPlaces> outside;  // where there is no row: all reached; beyond the grid it is
+  std::array<bool, kPlaces> outside;      // bricks without a row: all in R, as beyond the grid
   TileRows(const Grid& grid, const NarrowBand& band, const Reached& reached, std::size_t tile);
 
   static constexpr std::size_t place(int a, int b, int c) {
@@ -32,14 +32,14 @@ struct TileRows {
     const int at = int(place);
     return {at % kSide - 1, at / kSide % kSide - 1, at / (kSide * kSide) - 1};
   }
-  // Neighbour i = 13 + dx + 3*dy + 9*dz is so much further.
+  // Steps of places to the neighbours 13 + dx + 3*dy + 9*dz.
   static constexpr std::array<int, 27> kBeside = [] {
     std::array<int, 27> by{};
     for (int i = 0; i < 27; ++i)
       by[std::size_t(i)] = (kSide * (i / 9 - 1) + i / 3 % 3 - 1) * kSide + i % 3 - 1;
     return by;
   }();
-  // The tile's own rows, in order: f(place, row).
+  // Calls f(place, row) for the tile's own rows, in order.
   template <class F>
   void each(F&& f) const {
     for (int c = 0; c < kernels::kTileBricks; ++c)
@@ -60,14 +60,15 @@ struct Around {
       outside[i] = rows.outside[at];
     }
   }
-  // Where a node lies whose coordinates leave the brick by at most 8.
+  // The entry of a node; its coordinates may leave the brick by up to 8.
   static std::size_t entry(int x, int y, int z) {
     return std::size_t(13 + ((x + 8) / 8 - 1) + 3 * ((y + 8) / 8 - 1) + 9 * ((z + 8) / 8 - 1));
   }
 };
 
-// The nodes of the middle brick that have one of the given nodes among the 27 around them.
-// `nodes[i]`: those of neighbour i; with kOthers, those that are not given.
+// The nodes of the middle brick that have one of the given nodes among the 27 around them,
+// themselves included. `nodes[i]`: the given nodes of neighbour i; with kOthers, the nodes NOT
+// given.
 template <bool kOthers = false>
 NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
   constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
@@ -93,14 +94,15 @@ NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
   return out;
 }
 
-// Chains of some rows, tile by tile: tiles of one parity are never neighbours and the rows of a
-// tile have an order, so a pass over the eight parities gives the same result on any number of
-// threads. A pass is at least three steps.
+// Chains of some rows, tile by tile. Tiles of one parity are never neighbours, and the rows of a
+// tile have an order, so a pass over the eight parities gives the same bits with any number of
+// threads. A pass extends chains by at least three steps.
 inline constexpr int kStepsAPass = 3;
 class Chains {
  public:
-  // `buried`: which rows have a buried sheet in or beside them, read by `pass` too; through the
-  // others chains go where they are not held. Without it they do not.
+  // `rows`: the rows to hold chains for. `buried` (must outlive this): the rows with a buried sheet
+  // in or beside them; chains pass through rows that are neither held nor buried. Without `buried`
+  // they pass through no row that is not held.
   Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
          const std::vector<std::uint8_t>& rows, unsigned threads,
          const std::vector<std::uint8_t>* buried = nullptr);
@@ -122,24 +124,23 @@ class Chains {
   std::vector<std::int32_t> slot_;  // (rows) or -1; tile by tile
   std::vector<Chain, SampleAllocator<Chain>> chain_;
   std::vector<std::uint8_t> some_;  // (slots) whether the row may have a chain at all
-  std::array<std::vector<std::uint32_t>, 8> tiles_;  // that have such rows, by parity
+  std::array<std::vector<std::uint32_t>, 8> tiles_;  // tiles with such rows, by parity
 };
 
-// What is known of the nodes of a tile and of one layer around it: chains of rows that are held, of
-// the others the reached nodes. 0.1 MB.
+// The chains of a tile's nodes and of one layer of nodes around it; rows that are not held have
+// chains at their nodes of R only. 0.1 MB.
 class ChainRoom {
  public:
   static constexpr std::size_t kLine = 48, kLayer = kLine * 34;
-  // A brick, and which of its neighbours are wanted: bit i as in Around, 13 for itself.
+  // A brick, and which of its neighbours are wanted: bits as in Around, 13 for itself.
   struct Wanted {
     std::size_t place;
     std::uint32_t around;
   };
   static constexpr std::uint32_t kAllAround = (1u << 27) - 1;
-  // The room is for these bricks and the nodes of neighbours next to them; elsewhere it holds
-  // anything.
-  // `through`: in rows that are neither held nor marked here, nodes that are not reached count too,
-  // u + offset from R: the sheets in and beside them border R.
+  // Fills the wanted bricks and the adjoining nodes of their neighbours; the rest is undefined.
+  // With `through`, nodes outside R also get a chain of u + offset in rows that are neither held
+  // nor marked in it: the sheets in and beside those rows border R.
   void fill(const Grid& grid, const NarrowBand& band, const Reached& reached, const Chains* chains,
             const TileRows& rows, const std::vector<Wanted>& bricks,
             const std::vector<std::uint8_t>* through);

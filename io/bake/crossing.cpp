@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // crossing.cpp - which edges between neighbouring nodes the surface crosses, exactly.
 //
-// Vertices are rounded once to 2^-18 voxel: a closed mesh stays closed, and from then on everything
-// is integer arithmetic without error. Each triangle is drawn, once along each axis, onto the
-// lattice lines inside its projection, BORDER INCLUDED: a line through an edge or a vertex meets
-// the faces on both sides of it, so nothing slips through. Triangles parallel to a line need not be
-// looked at: where a closed surface parts two sides, a face that is not parallel touches the same
-// point. A line that meets a face exactly at a node puts that node ON the surface.
+// Vertices are rounded once to 2^-18 voxel, which keeps a closed mesh closed; all that follows is
+// integer arithmetic without error. Along each axis, a triangle meets the lattice lines inside its
+// projection, BORDER INCLUDED: a line through an edge or a vertex meets the faces on both sides, so
+// no line slips through. Triangles parallel to a line need no test: where a closed surface
+// separates two sides, a face that is not parallel touches the same point. Where a line meets a
+// face exactly at a node, the node is ON the surface.
 #include <algorithm>
 
 #include "io/bake/grid.h"
@@ -15,7 +15,7 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr int kFraction = 18;  // bits of a voxel; 2048 voxels: 29 bits
+constexpr int kFraction = 18;  // bits after the point; 2048 voxels take 29 bits
 constexpr std::int64_t kVoxel = std::int64_t{1} << kFraction;
 __extension__ typedef __int128 Wide;
 
@@ -24,14 +24,14 @@ using Point = std::array<std::int64_t, 3>;  // tile-local, 2^-18 voxel
 std::int64_t floor_voxel(std::int64_t v) { return v >> kFraction; }
 std::int64_t ceil_voxel(std::int64_t v) { return -((-v) >> kFraction); }
 
-// To the nearest 2^-18 voxel, the same for every triangle of a vertex.
+// To the nearest 2^-18 voxel. Every triangle at a vertex gets the same.
 std::int64_t rounded(double voxels) {
   const double v = voxels * double(kVoxel);
   return std::int64_t(v + std::copysign(0.5, v));
 }
 
-// A triangle along an axis: where its corners are, and what of the first one and of the ways from
-// it to the others a share of the area is worth.
+// A triangle along an axis: its corners' coordinates, and factors that make a coordinate of the
+// barycentric shares of the area.
 struct Along {
   std::int64_t corner[3];
   double first, second, third;  // [voxel]; the last two per area
@@ -45,19 +45,19 @@ Along make_along(const Point (&p)[3], std::size_t axis, std::int64_t area) {
   return a;
 }
 
-// Where a line meets a triangle: the node at or before the hit, and whether it is the hit.
+// Where a line meets a triangle: the node at or before the hit, and whether the hit is that node.
 struct Hit {
   std::int64_t node;
   bool exact;
 };
-// `at` is right to 1e-11 voxel; integers() is asked where that does not tell.
+// `at` is right to 1e-11 voxel; where that does not decide, integers() does.
 template <class Integers>
 Hit locate(double at, Integers&& integers) {
   const std::int64_t before = std::int64_t(at) - (at < 0);
   const double rest = at - double(before);
   return rest > 1e-9 && rest < 1 - 1e-9 ? Hit{before, false} : integers();
 }
-// From where the corners are along the line, and their shares > 0 of the area.
+// From the corners' coordinates along the line and their shares > 0 of the area.
 Hit locate_exactly(const std::int64_t (&corner)[3], const std::int64_t (&share)[3],
                    std::int64_t area) {
   const Wide numerator =
@@ -74,8 +74,8 @@ static_assert(kSide == kernels::kLatticeSide && kVoxel == std::int64_t(kernels::
 // A tile's rows, by brick.
 using Rows = std::array<std::int32_t, 64>;
 
-// The line along `axis` through nodes (j, k) of the other two axes meets a triangle. The edge from
-// a node belongs to the node's brick.
+// Marks that the line along `axis` through nodes (j, k) of the other two axes meets a triangle. The
+// edge from a node belongs to the node's brick.
 template <std::size_t axis>
 void mark(const Hit& hit, std::int64_t j, std::int64_t k, const Rows& rows,
           std::vector<Crossing>& crossings) {
@@ -91,7 +91,8 @@ void mark(const Hit& hit, std::int64_t j, std::int64_t k, const Rows& rows,
   (hit.exact ? c.on : c.edge[axis]).set(node);
 }
 
-// Twice the area that the line (j, k) makes with each two corners, and that of the triangle.
+// Twice the areas that the line (j, k) makes with each two corners; returns their sum, twice the
+// triangle's area.
 template <std::size_t axis>
 std::int64_t shares(const Point (&p)[3], std::int64_t j, std::int64_t k, std::int64_t (&share)[3]) {
   constexpr std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -123,10 +124,10 @@ void mark_small(const Point (&p)[3], const kernels::LatticeHits& hits,
   }
 }
 
-// For triangles whose areas doubles do not hold. Which lines meet one cannot be guessed, so none is
-// branched on: those that do are listed first.
+// For triangles too large for the kernel's arithmetic. Which lines meet one is unpredictable, so
+// they are listed without branches first.
 struct Lines {
-  std::int64_t first, last;  // that a triangle may meet, along an axis of the tile
+  std::int64_t first, last;  // lines that a triangle may meet, along an axis of the tile
 };
 template <std::size_t axis>
 void draw_large(const Point (&p)[3], const std::array<Lines, 3>& lines, const Rows& rows,
@@ -140,7 +141,7 @@ void draw_large(const Point (&p)[3], const std::array<Lines, 3>& lines, const Ro
   if (area == 0) return;
   const std::int64_t turn = area > 0 ? 1 : -1;
   area *= turn;
-  std::int64_t line[3], per_j[3], per_k[3];  // barycentric, times area; and from line to line
+  std::int64_t line[3], per_j[3], per_k[3];  // barycentric shares, and their steps
   for (std::size_t i = 0; i < 3; ++i) {
     const Point &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
     const std::int64_t du = turn * (b[u] - a[u]), dv = turn * (b[v] - a[v]);

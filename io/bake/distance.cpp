@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// distance.cpp - the unsigned distance of a tile's nodes to the triangles near them, and what
-// the later steps ask about it, while it is in the cache.
+// distance.cpp - the unsigned distance of a tile's nodes to the triangles near them, and masks for
+// the later steps, made while the distances are in the cache.
 #include <algorithm>
 
 #include "io/bake/grid.h"
@@ -8,25 +8,25 @@
 namespace h6::io::bake {
 namespace {
 
-// The kernel works in float: corners farther away than this are cut off first, in double.
+// The kernel works in float, so triangles that reach farther than this are first cut in double.
 constexpr double kFar = 100;  // [voxel]
 
 using Corner = std::array<double, 3>;
 
-// Which corners and edges (edge e from corner e to the next) of a triangle a part of it has; -1:
-// none.
+// Which corner and edge of the triangle each corner and edge of a part is; kOwn: the cut made it.
+// Edge e runs from corner e to the next.
 constexpr std::int8_t kOwn = -1;
 struct Part {
   std::array<std::int8_t, 3> corner, edge;
 };
 
-// A triangle that is not cut, its corners in such an order that the edges it is weighed along come
+// A triangle that is not cut. Its corners are in such an order that the edges to be measured come
 // first.
 struct Whole {
   Part part;
-  std::uint8_t weighed;
+  std::uint8_t weighed;  // number of edges to be measured
 };
-// By `owned` of Features. A corner that it answers for is the end of an edge it is weighed along.
+// For a value of Features::owned. An owned corner is the end of an edge that is measured.
 constexpr Whole make_whole(unsigned owned) {
   unsigned edges = owned & 7;
   const unsigned ends = edges | edges << 1 | edges >> 2;
@@ -48,7 +48,7 @@ constexpr std::array<Whole, 64> kWholes = make_wholes();
 
 struct PolygonCorner {
   Corner at;
-  std::int8_t corner, edge;  // as in Part; the edge that leaves it
+  std::int8_t corner, edge;  // as in Part; the edge leaves this corner
 };
 using Polygon = std::vector<PolygonCorner>;
 
@@ -75,7 +75,7 @@ void add_triangle(std::vector<double>& corners, const Corner& a, const Corner& b
   corners.insert(corners.end(), c.begin(), c.end());
 }
 
-// What of a large triangle can be within reach of the tile, as a fan.
+// The part of a large triangle that can be within reach of the tile, as a fan.
 void add_part_near(std::vector<double>& corners, std::vector<Part>& parts, const Corner (&t)[3],
                    double reach) {
   Polygon polygon{{t[0], 0, 0}, {t[1], 1, 1}, {t[2], 2, 2}}, scratch;
@@ -91,20 +91,20 @@ void add_part_near(std::vector<double>& corners, std::vector<Part>& parts, const
   }
 }
 
-// The triangles of a tile, cut and ready.
+// The triangles of a tile, cut and prepared for the kernel.
 struct Facets {
   std::vector<kernels::DistanceFacet> facet;
-  std::vector<kernels::FacetRegion> region;  // at least as many; only what is in use is set
+  std::vector<kernels::FacetRegion> region;  // may be longer than facet
   std::vector<std::uint64_t> near;           // bricks
   std::vector<double> corners;               // 9 each, tile-local
-  std::vector<Part> part;                    // what they are of their triangle
-  std::vector<std::int32_t> owner;           // triangle
-  std::vector<std::uint8_t> weighed;         // edges; what was cut is along its seams too
+  std::vector<Part> part;
+  std::vector<std::int32_t> owner;    // triangle
+  std::vector<std::uint8_t> weighed;  // edges to be measured; parts of a cut triangle: all
   struct Place {
-    std::uint32_t facet, k, source;  // edge or corner k of the facet; where Features tell of it
+    std::uint32_t facet, k, source;  // edge or corner k of the facet; its index in Features
   };
-  std::vector<Place> edge, end;        // that the triangle answers for
-  std::vector<std::size_t> large;      // entries of the tile's list that are cut
+  std::vector<Place> edge, end;        // owned edges and corners
+  std::vector<std::size_t> large;      // entries of the tile's list that must be cut
   std::vector<std::uint32_t> in_tile;  // triangles that may meet the tile itself
   void resize(std::size_t count) {
     near.resize(count);
@@ -123,7 +123,7 @@ void set_plane(kernels::FacetRegion& region, std::size_t k, const Features::Grad
   region.c[k] = float(-(g[0] * zero_at[0] + g[1] * zero_at[1] + g[2] * zero_at[2]));
 }
 
-// Bit k: the triangle answers for the edge or corner that is place k of this part of it.
+// Bit k: place k of this part is an edge or corner that the triangle owns.
 template <class Places>
 std::uint8_t owned_places(const Places& places, unsigned owned) {
   unsigned bits = 0;
@@ -131,7 +131,7 @@ std::uint8_t owned_places(const Places& places, unsigned owned) {
   return std::uint8_t(bits);
 }
 
-// All cache lines of a small thing.
+// Prefetches a small object, which may lie on two cache lines.
 template <class T>
 void ask_for(const T* first, std::size_t count = 1) {
   const char* at = reinterpret_cast<const char*>(first);
@@ -139,8 +139,8 @@ void ask_for(const T* first, std::size_t count = 1) {
   __builtin_prefetch(at + count * sizeof(T) - 1);
 }
 
-// What the triangles of a list need lies anywhere: it is asked for in time, what a triangle names
-// when that is there.
+// The data of a tile's triangles is scattered over memory, so it is prefetched: first the triangle,
+// later the vertices that it names.
 void ask_for_triangle(const Surface& surface, const Features& features, std::uint32_t t) {
   ask_for(&surface.triangles[t]);
   __builtin_prefetch(&features.owned[t]);
@@ -149,13 +149,12 @@ void ask_for_corners(const Surface& surface, std::uint32_t t) {
   for (const std::uint32_t v : surface.triangles[t]) ask_for(&surface.vertices[v]);
 }
 
-// Where facets may be the nearest, as far as the parts of triangles show it. Beyond an edge that
-// cutting made, or that two parts share, no part is the nearest within reach: the whole triangle
-// goes on there. What lies behind both of the triangle's edges at a corner lies behind every edge
-// between them, so behind those of the part.
+// Sets the regions in which facets may be the nearest. Beyond an edge that the cut made, no part is
+// the nearest within reach, since the whole triangle continues there. A point behind both of the
+// triangle's edges at a corner is behind every edge between them, and so behind those of the part.
 //
-// Which edges and corners a triangle answers for cannot be guessed, so none is branched on: they
-// are listed first.
+// Which edges and corners a triangle owns is unpredictable, so they are listed without branches
+// first.
 void set_regions(const Surface& surface, const Features& features, Facets& out) {
   const std::size_t count = out.facet.size();
   if (out.region.size() < count) out.region.resize(count);
@@ -195,7 +194,7 @@ void set_regions(const Surface& surface, const Features& features, Facets& out) 
   }
 }
 
-// The tile's edges between nodes run from its first node to past its last.
+// Lists the triangles that may meet the tile, which ends one voxel past its last nodes.
 void list_in_tile(Facets& out) {
   constexpr float kLast = 8.0f * kernels::kTileBricks, kRounding = 1e-3f;
   out.in_tile.resize(out.facet.size());
@@ -298,7 +297,7 @@ std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& 
     float* u = band.nodes(r);
     if (weighed >> b & 1)
       kernels::brick_distance(*room, std::size_t(b), u);
-    else  // of large triangles that were cut, nothing was left here
+    else  // the cut left nothing of the large triangles here
       std::fill_n(u, kBrickSamples, float(grid.reach()));
     band.first_node[r] = u[0];
     band.free[r] = above(u, float(grid.offset));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// features.cpp - which triangle answers for an edge or corner, and what the others that share
-// it say about where it may be nearest (see kernels::FacetRegion).
+// features.cpp - which triangle owns an edge or corner, and how the other triangles there bound the
+// region in which it can be the nearest (kernels::FacetRegion).
 #include <algorithm>
 
 #include "io/bake/grid.h"
@@ -10,10 +10,10 @@ namespace h6::io::bake {
 namespace {
 
 constexpr std::size_t kSlice = 1024;
-constexpr std::uint32_t kLook = 48;  // triangles around a vertex; more are not looked at
+constexpr std::uint32_t kLook = 48;  // most triangles considered around a vertex
 
-// The triangles around each vertex, in order. Every thread reads all triangles and takes those at
-// its range of vertices.
+// The triangles around each vertex, in ascending order. Every thread reads all triangles and takes
+// those at its own range of vertices.
 struct Rings {
   std::vector<std::uint32_t> first;
   Large<std::uint32_t> triangle;
@@ -32,7 +32,7 @@ struct Rings {
     };
     corners([&](std::uint32_t v, std::uint32_t) { ++first[v]; });
     std::uint32_t sum = 0;
-    for (std::uint32_t& f : first) f = sum += f;  // ends, which go down to starts
+    for (std::uint32_t& f : first) f = sum += f;  // ends; the next pass lowers them to starts
     corners([&](std::uint32_t v, std::uint32_t i) { triangle[--first[v]] = i; });
   }
   std::uint32_t count(std::uint32_t v) const { return first[v + 1] - first[v]; }
@@ -41,7 +41,7 @@ struct Rings {
 // The edges at a vertex, in the order in which its triangles name their other ends.
 struct Spokes {
   struct Triangles {
-    std::uint32_t first, second;  // the first two that have the edge; equal: there is one
+    std::uint32_t first, second;  // the first two triangles of the edge; equal if it has one
   };
   std::size_t count = 0;
   std::array<std::uint32_t, 2 * kLook> end;
@@ -68,7 +68,8 @@ struct Spokes {
   }
 };
 
-// Into the plane of the triangle, across its edge from a to b; zero when that is rounding.
+// The unit vector in the triangle's plane, across its edge from a to b into it; zero where rounding
+// decides.
 Features::Gradient inwards(const Surface& surface, std::uint32_t triangle, std::uint32_t a,
                            std::uint32_t b) {
   const auto& t = surface.triangles[triangle];
@@ -85,7 +86,7 @@ Features::Gradient inwards(const Surface& surface, std::uint32_t triangle, std::
   return {float(in.x * over), float(in.y * over), float(in.z * over)};
 }
 
-// Of an edge's triangles the first one answers for it. `owned` (3 triangles): by which edge.
+// The first triangle of an edge owns it. `owned` (3 triangles): whether it owns that edge.
 void look_at_edge(const Surface& surface, const Rings& rings, std::uint32_t vertex,
                   std::uint32_t end, const Spokes::Triangles& of, std::vector<std::uint8_t>& owned,
                   Features& out) {
@@ -101,8 +102,8 @@ void look_at_edge(const Surface& surface, const Rings& rings, std::uint32_t vert
   out.across[at] = of.second == of.first ? Features::Gradient{} : inwards(surface, of.second, a, b);
 }
 
-// Up to four edges from a vertex that are not the first triangle's own: each next one the one that
-// leans away most from those before.
+// Chooses up to four edges from a vertex that the first triangle does not have, each time the one
+// that points away most from those before.
 void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t vertex,
                     Features& out) {
   const Vec3& p = surface.vertices[vertex];
@@ -115,7 +116,7 @@ void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t 
     if (!(length > 1e-9)) continue;
     const double over = 1 / length;
     d = over * d;
-    if (i < 2)  // the first triangle's
+    if (i < 2)  // an edge of the first triangle
       sum = sum + d;
     else
       direction[count++] = d;
@@ -148,7 +149,7 @@ void find_features(const Surface& surface, unsigned threads, Features& out) {
   out.owned.resize(triangles);
   out.across.resize(3 * triangles);
   out.from.resize(4 * vertices);
-  // Each edge is looked at from the end that has fewer triangles around it.
+  // Each edge is handled at the end that has fewer triangles around it.
   std::vector<std::uint8_t> owned(3 * triangles, 0);
   sched::parallel_for((vertices + kSlice - 1) / kSlice, threads, [&](std::size_t s) {
     for (std::size_t i = s * kSlice; i < std::min(vertices, (s + 1) * kSlice); ++i) {
@@ -170,7 +171,7 @@ void find_features(const Surface& surface, unsigned threads, Features& out) {
       std::uint8_t bits = 0;
       for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t at = 3 * t + k;
-        // With more around both ends nobody looked.
+        // The loop above skipped edges with too many triangles around both ends.
         if (rings.count(corner[k]) > kLook && rings.count(corner[(k + 1) % 3]) > kLook) {
           owned[at] = 1;
           out.across[at] = {};

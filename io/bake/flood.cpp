@@ -17,7 +17,7 @@ bool same(const NodeMask& a, const NodeMask& b) {
   return differ == 0;
 }
 
-// The six faces of a brick.
+// Whether the brick is at the border of the grid, and which of its nodes are.
 bool on_border(const Grid& grid, const std::array<int, 3>& at) {
   for (std::size_t k = 0; k < 3; ++k)
     if (at[k] == 0 || at[k] + 1 == grid.bricks[k]) return true;
@@ -36,8 +36,8 @@ NodeMask border_nodes(const Grid& grid, const std::array<int, 3>& at) {
   return m;
 }
 
-// Along a line of nodes that are `by` bits apart, there and back, where one, two and four steps up
-// lead.
+// Floods lines of nodes that are `by` bits apart, up and down. `one`, `two`, `four`: from which
+// nodes one, two and four steps up are free.
 std::uint64_t flow(std::uint64_t wet, std::uint64_t one, std::uint64_t two, std::uint64_t four,
                    int by) {
   wet |= (wet & one) << by;
@@ -104,8 +104,8 @@ void Flood::each_slab(F&& f) {
   sched::parallel_for(slabs_.size(), threads_, [&](std::size_t s) { f(slabs_[s]); });
 }
 
-// Nodes that water comes to from the six neighbours. source(cell): what is wet there, or null;
-// `uncut`: no edge of a source is crossed.
+// The nodes of a row that draw water from the six neighbours. source(cell): the wet nodes there, or
+// null. `uncut`: no triangle crosses an edge of a source.
 template <class F>
 NodeMask Flood::drawn(std::size_t r, bool uncut, F&& source) const {
   const std::size_t cell = band_.cell[r];
@@ -173,7 +173,7 @@ bool Flood::from_nodes(const Masks& seeds, std::uint8_t tag) {
     }
   });
   if (std::none_of(slabs_.begin(), slabs_.end(), [](const Slab& s) { return s.any; })) return false;
-  // Over rows nearly all are seeds and full now: the others ask them, not the other way round.
+  // Over rows, nearly all rows are seeds and full now, so it is cheaper that the others draw.
   if (over_ == Over::rows) {
     each_slab([&](Slab& slab) {
       for (std::size_t r = slab.first_row; r < slab.end_row; ++r) {
@@ -228,7 +228,7 @@ void Flood::absorb(Slab& slab, const std::vector<Drop>& drops, std::size_t layer
   }
 }
 
-// False: these nodes are wet already, or not passable.
+// Returns false if all these nodes are wet already or not passable.
 bool Flood::take(std::size_t r, const NodeMask& nodes) {
   const NodeMask bits = nodes & free_[r] & ~wet_[r];
   if (!bits.any()) return false;
@@ -258,8 +258,8 @@ void Flood::offer(Slab& slab, std::size_t cell, const NodeMask& nodes) {
 }
 
 void Flood::flood(Slab& slab) {
-  // Whole cells first: most others then get all their water at once. The others in the order in
-  // which they were met, which is mostly that of memory.
+  // Open cells come first, so that most others get all their water at once. The others follow in
+  // the order in which they were met, which is mostly that of memory.
   for (std::size_t next = 0; slab.busy();) {
     std::size_t cell;
     if (!slab.whole.empty()) {
@@ -279,13 +279,13 @@ void Flood::flood(Slab& slab) {
   }
 }
 
-// Inside one brick, until nothing changes: along x and y in steps of one, two and four nodes.
+// Floods inside one brick until nothing changes, along x and y in steps of one, two and four nodes.
 void Flood::spread(std::size_t r) {
   const Crossing& c = crossing(r);
   const auto& pass = free_[r].z;
   std::array<std::uint64_t, 8> x1, x2, x4, y1, y2, y4, up, wet = wet_[r].z, before;
   for (std::size_t z = 0; z < 8; ++z) {
-    // From a node to the next one, the one after it, the fourth.
+    // Nodes from which one, two and four steps are free.
     x1[z] = pass[z] & pass[z] >> 1 & ~c.edge[0].z[z] & kNotX7;
     x2[z] = x1[z] & x1[z] >> 1;
     x4[z] = x2[z] & x2[z] >> 2;
@@ -306,7 +306,7 @@ void Flood::spread(std::size_t r) {
   if (wet == pass) state_[band_.cell[r]] |= kFull;
 }
 
-// Into the six neighbours.
+// Passes a cell's water on to its six neighbours.
 void Flood::spill(Slab& slab, std::size_t cell) {
   const bool whole = (state_[cell] & kOpen) != 0;
   const NodeMask& wet = whole ? kAllNodes : wet_[std::size_t(band_.row[cell])];

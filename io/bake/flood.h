@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// flood.h - what water reaches over nodes, 64 at a time. Private to bake_*.cpp.
+// flood.h - flood fill over nodes, 64 at a time. Private to this folder.
 //
-// A node is passable when its mask says so; it is left through edges that no triangle crosses.
-// Bricks without a row are all passable, so the flood takes them whole. The result is a set: the
-// order of work and the number of threads do not show in it.
+// The flood moves between passable nodes along edges that no triangle crosses. Bricks without a row
+// are all passable and are filled as a whole. The result is a set, so it does not depend on the
+// order of work or the number of threads.
 #pragma once
 #include <algorithm>
 
@@ -17,7 +17,7 @@ inline constexpr std::uint64_t kY0 = 0xff, kY7 = std::uint64_t{0xff} << 56;
 
 inline const Crossing kOpenEdges{};
 
-// Nodes of the face towards a neighbour, as nodes of the neighbour, through edges that are not cut.
+// The neighbour's nodes that `nodes` reach through the common face, along edges that are not cut.
 inline NodeMask through(const NodeMask& nodes, const Crossing& edges, std::size_t axis, int step) {
   NodeMask in;
   const auto& cut = edges.edge[axis].z;
@@ -69,13 +69,12 @@ inline NodeMask after(const NodeMask& m, std::size_t axis) {
   return out;
 }
 
-// Layers of bricks make slabs. A slab is flooded by one thread at a time; what runs over into the
-// slabs above and below waits there as drops for the next round.
+// Layers of bricks make slabs. One thread at a time floods a slab; drops that leave it wait for the
+// next round.
 //
-// A row whose nodes are all passable, by every edge, is like a brick without a row: it takes all
-// its water at once. These are open cells. Those that hang together with the border are found as
-// bits, 64 cells at a time, and the rows between them draw from them; only what is left is handed
-// on from brick to brick.
+// An open cell is a brick without a row, or a row whose nodes and edges are all passable: it fills
+// as a whole. The open cells connected with the border are found first, as bits, 64 at a time. The
+// rows next to them draw water from them, and only the rest passes water from brick to brick.
 class Flood {
  public:
   enum class Edges { cut, open };
@@ -84,11 +83,11 @@ class Flood {
   Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges, unsigned threads,
         Over over = Over::cells);
 
-  // From all around: the border of the grid is outside, and connected. Over cells.
+  // Floods from the border of the grid. Needs Over::cells.
   void from_border();
 
-  // From more nodes, as far as they are passable and dry; false: none is. Bricks without a row that
-  // are reached now get the tag.
+  // Floods from further nodes. Returns false if none of them is passable and dry. Bricks without a
+  // row that this call reaches get the tag.
   bool from_nodes(const Masks& seeds, std::uint8_t tag);
   bool from_nodes(const std::vector<RowNodes>& seeds, std::uint8_t tag);
 
@@ -99,19 +98,18 @@ class Flood {
  private:
   struct Drop {
     std::uint32_t cell;
-    std::uint64_t bits;  // nodes of the layer next to the slab it comes from
+    std::uint64_t bits;  // nodes of the layer next to the slab that the drop left
   };
   struct Slab {
     int first = 0, end = 0;  // layers
     std::size_t first_row = 0, end_row = 0;
-    std::vector<std::uint32_t> whole, queue;  // cells that are open, and others
+    std::vector<std::uint32_t> whole, queue;  // open cells; other cells
     std::vector<Drop> down, up;
-    std::vector<RowNodes> given;  // what rows found with their neighbours
-    bool any = false;             // of the seeds, a node was dry and passable
+    std::vector<RowNodes> given;  // nodes that rows drew from their neighbours
+    bool any = false;             // a seed was dry and passable
     bool busy() const { return !whole.empty() || !queue.empty(); }
   };
-  // What is known of a cell: bits. Full: it has all the water it can have. Dirty: water came that
-  // has not spread in it.
+  // Bits of a cell's state. Full: it can take no more water. Dirty: new water has not spread in it.
   static constexpr std::uint8_t kQueued = 1, kOpen = 2, kFull = 4, kDirty = 8;
 
   const Crossing& crossing(std::size_t r) const {
@@ -142,11 +140,11 @@ class Flood {
   std::vector<std::uint8_t> state_, cell_;  // (cells)
   std::vector<Slab> slabs_;
   int thick_ = 1;      // layers of a slab
-  std::size_t words_;  // of a line of cells
+  std::size_t words_;  // for a line of cells
   std::uint8_t tag_ = 0;
 };
 
-// The six neighbours of each node, rows only: walls are never farther away than that.
+// The six neighbours of the nodes, as far as they lie in rows: walls are never farther away.
 Masks neighbours(const Grid& grid, const NarrowBand& band, const Masks& nodes, unsigned threads);
 
 }  // namespace h6::io::bake::flooding

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// flood_cells.cpp - which open cells of a flood (flood.h) hang together with the border.
+// flood_cells.cpp - which open cells of a flood (flood.h) are connected with the border.
 #include <algorithm>
 
 #include "io/bake/flood.h"
@@ -7,7 +7,7 @@
 namespace h6::io::bake::flooding {
 namespace {
 
-// Bits of one word that hang together with those in `wet`, along the word.
+// The bits of `open` that are connected with those of `wet` along the word.
 std::uint64_t along(std::uint64_t wet, std::uint64_t open) {
   std::uint64_t up = open, down = open;
   for (int by = 1; by < 64; by *= 2) {
@@ -20,7 +20,7 @@ std::uint64_t along(std::uint64_t wet, std::uint64_t open) {
 
 }  // namespace
 
-// All open cells that hang together with one on the border: a line of them along x is a few words.
+// All open cells connected with one on the border; a line of cells along x is a few words.
 std::vector<std::uint64_t> Flood::open_from_border() const {
   const std::size_t nx = std::size_t(grid_.bricks[0]), ny = std::size_t(grid_.bricks[1]),
                     nz = std::size_t(grid_.bricks[2]), lines = ny * nz, layer = ny * words_;

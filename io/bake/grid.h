@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// grid.h - what the steps of a field bake hand to each other. Private to bake_*.cpp.
+// grid.h - the data that the steps of a field bake pass on. Private to this folder.
 //
-// All steps work in GRID coordinates: voxels, node (i,j,k) of the field at (i,j,k). Metres come
-// back only when the result is written.
+// All steps work in GRID coordinates: the unit is a voxel, and node (i,j,k) lies at (i,j,k). Only
+// the last steps return to metres.
 //
 //   surface -> grid -> bins -> narrow band (unsigned u, crossings) -> flood -> inside -> samples
 //                                                                             far grid ----^
@@ -29,19 +29,19 @@ namespace h6::io::bake {
 
 using kernels::kBrickSamples;
 
-// Nodes in a box around the mesh, centred on it: a symmetric part gets a symmetric field, and a
-// mesh far from the origin loses no digits.
+// The nodes fill a box around the mesh and share its centre, so that a symmetric part gets a
+// symmetric field and a mesh far from the origin keeps its digits.
 struct Grid {
   Vec3 centre{};     // of the mesh's box, mesh frame [m]
   double voxel = 0;  // [m]
   std::array<std::int32_t, 3> bricks{};
   double offset = 0;  // sigma [voxel]
   double band = 0;    // [voxel]
-  double seal = 0;    // width of holes to close [voxel]; 0 once they are closed
+  double seal = 0;    // width of the holes to close [voxel]; 0 when none is left to close
 
-  // u is exact up to here.
+  // The unsigned distance u is exact up to here.
   double reach() const { return std::max(offset + band + 2.0, seal / 2 + 1.0); }
-  // A cell with a point within band of the zero set has a corner at most half a cell further off.
+  // If a cell has a point within the band, one of its corners lies at most half a diagonal beyond.
   double near_zero_set() const { return offset + band + 0.8661 + 1e-3; }
   std::size_t cells() const {
     return std::size_t(bricks[0]) * std::size_t(bricks[1]) * std::size_t(bricks[2]);
@@ -51,7 +51,7 @@ struct Grid {
            std::size_t(a);
   }
   std::array<int, 3> place(std::size_t cell) const {
-    // At most 256^3: 32 bits divide faster.
+    // There are at most 256^3 cells, and 32 bits divide faster.
     const std::uint32_t x = std::uint32_t(bricks[0]), y = std::uint32_t(bricks[1]);
     const std::uint32_t line = std::uint32_t(cell) / x;
     return {int(std::uint32_t(cell) - line * x), int(line % y), int(line / y)};
@@ -67,23 +67,23 @@ struct Grid {
   }
 };
 
-// The triangles that count: with area, each once. Vertices are in metres until `to_grid`.
+// The mesh without its flat and repeated triangles. Vertices are in metres until `to_grid`.
 struct Surface {
   Large<Vec3> vertices;
   Large<std::array<std::uint32_t, 3>> triangles;
   Large<std::int32_t> part;    // (triangles) or empty
-  Large<std::int32_t> source;  // (triangles) of the mesh; -1: a plug
+  Large<std::int32_t> source;  // (triangles) index in the mesh; -1: a plug of plug_holes
   Vec3 low{}, high{};          // [m]
   std::size_t duplicates = 0, flat = 0;
-  std::size_t open_edges = 0;  // of one face
-  std::size_t odd_edges = 0;   // of an odd number of faces
+  std::size_t open_edges = 0;  // edges of one face
+  std::size_t odd_edges = 0;   // edges of an odd number of faces
   bool closed = false;         // every edge has an even number of faces
 };
 Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
 
-// One bit a node of a brick: word z, bit 8*y + x.
+// One bit for each node of a brick: word z, bit 8*y + x.
 struct NodeMask {
   std::array<std::uint64_t, 8> z{};
   bool get(std::size_t n) const { return z[n / 64] >> (n % 64) & 1; }
@@ -95,7 +95,8 @@ struct NodeMask {
   }
 };
 inline constexpr NodeMask kAllNodes{{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull}};
-// Of the 27 around a brick (bit 13 + dx + 3*dy + 9*dz) those with a node beside one of these.
+// Which of the 27 bricks around a brick (bit 13 + dx + 3*dy + 9*dz) have a node beside one of
+// `nodes`.
 inline std::uint32_t neighbours_of(const NodeMask& nodes) {
   std::uint64_t layer[3] = {nodes.z[0], 0, nodes.z[7]};
   for (std::uint64_t z : nodes.z) layer[1] |= z;
@@ -106,25 +107,25 @@ inline std::uint32_t neighbours_of(const NodeMask& nodes) {
     bits |= std::uint32_t((layer[i / 9] & kY[i / 3 % 3] & kX[i % 3]) != 0) << i;
   return bits;
 }
-using Masks = Large<NodeMask>;  // (rows) not cleared
-// Nodes of a row.
+using Masks = Large<NodeMask>;  // (rows), not cleared on creation
+// Some nodes of one row.
 struct RowNodes {
   std::uint32_t row;
   NodeMask nodes;
 };
 
-// Where the surface runs between nodes: bit n of edge[k] is the edge from node n along axis k.
-// Touching counts. Nodes exactly on the surface are in `on`.
+// Which edges between nodes the surface crosses: bit n of edge[k] is the edge from node n along
+// axis k. Touching counts as crossing. `on` has the nodes exactly on the surface.
 struct Crossing {
   std::array<NodeMask, 3> edge;
   NodeMask on;
 };
 
-// Triangles are kept by tiles of 4^3 bricks. `near` says which bricks of the tile a triangle may be
-// within reach of; the order within a tile means nothing.
+// The triangles of each tile of 4^3 bricks. `near` says which bricks of the tile a triangle may be
+// within reach of. The order within a tile has no meaning.
 struct Tiles {
   std::array<int, 3> size{};
-  std::vector<std::size_t> first;  // (tiles + 1) into the lists
+  std::vector<std::size_t> first;  // (tiles + 1) where a tile's entries begin
   Large<std::uint32_t> triangle;
   Large<std::uint64_t> near;  // bit (c*4 + b)*4 + a
   std::size_t count() const { return first.size() - 1; }
@@ -142,108 +143,109 @@ struct Tiles {
   }
 };
 
-// What neighbours say about where a triangle may be the nearest (kernels::FacetRegion).
+// Where a triangle can be the nearest one, as its neighbours bound it (kernels::FacetRegion).
 struct Features {
-  using Gradient = std::array<float, 3>;  // of unit length, or zero: nothing is known
-  Large<std::uint8_t> owned;              // (triangles) bit e: edge e, bit 3 + v: corner v
-  Large<Gradient> across;                 // (3 triangles) into another triangle of an owned edge
-  Large<Gradient> from;                   // (4 vertices) along edges that leave it
+  using Gradient = std::array<float, 3>;  // unit vector, or zero: gives no bound
+  // One triangle owns each edge and each corner, and only its owner measures it.
+  Large<std::uint8_t> owned;  // (triangles) bit e: owns edge e, bit 3 + v: owns corner v
+  Large<Gradient> across;     // (3 triangles) from an owned edge into the other triangle
+  Large<Gradient> from;       // (4 vertices) along up to four edges that leave the vertex
 };
 // features.cpp
 void find_features(const Surface& surface, unsigned threads, Features& out);
 
-// Bricks that a triangle comes near to, and what is known of their nodes. Rows are candidates, in
-// the order of cells.
+// The bricks near triangles, one row each in the order of cells, and what is known of their nodes.
 struct NarrowBand {
   Tiles tiles;
   Features features;                   // of the surface, for measure_tile
   std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
   std::vector<std::uint32_t> cell;     // (rows)
   Samples u;                           // (rows x 512) unsigned distance, at most reach [voxel]
-  Masks free;                          // (rows) u > offset, and not on the surface
+  Masks free;                          // (rows) nodes with u > offset that are not on the surface
   std::vector<float> first_node;       // (rows) u of the row's first node
-  std::vector<std::uint32_t> towards;  // (rows) bit i: near neighbour i is the zero set
-  std::vector<Crossing> crossing;      // (rows), or empty where offset >= 0.5: not needed there
+  std::vector<std::uint32_t> towards;  // (rows) bit i: the zero set is near neighbour brick i
+  std::vector<Crossing> crossing;      // (rows); empty where offset >= 0.5, which needs none
   std::vector<std::int32_t> part;      // (rows) or empty
-  std::vector<std::int32_t> triangle;  // (rows) of the mesh, nearest to the brick's middle; or -1
+  std::vector<std::int32_t> triangle;  // (rows) of the mesh, near the brick's middle; or -1
   std::size_t rows() const { return cell.size(); }
   float* nodes(std::size_t r) { return u.data() + r * kBrickSamples; }
   const float* nodes(std::size_t r) const { return u.data() + r * kBrickSamples; }
 };
 
-// Steps report through this; false: cancelled.
+// Progress and clock of a bake. Functions return false when the user cancelled.
 class Steps {
  public:
   explicit Steps(const Progress& progress) : progress_(progress) {}
-  // Runs body(i) in parallel, telling progress between slices of the work.
+  // Runs body(i) for all i < count in parallel and reports progress between slices.
   bool run(const std::string& what, double from, double to, std::size_t count, unsigned threads,
            const std::function<void(std::size_t)>& body) const;
   bool tell(const std::string& what, double done) const {
     clock(what);
     return !progress_ || progress_(what, done);
   }
-  // From now on it is this that takes the time.
+  // The time from now on belongs to stage `what`.
   void clock(const std::string& what) const;
   std::vector<FieldBakeReport::Stage> stages() const;
 
  private:
   const Progress& progress_;
-  mutable std::vector<FieldBakeReport::Stage> stages_;  // the last one is running
+  mutable std::vector<FieldBakeReport::Stage> stages_;  // the last one runs
   mutable std::int64_t since_ns_ = 0;
 };
 
-// bins.cpp: tiles, cells and rows. A sentence when there are too many.
+// bins.cpp: fills tiles, cells and rows. Fails, with a sentence, when there are too many.
 Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
                         NarrowBand& band);
-// distance.cpp, crossing.cpp: what is known of the rows of one tile.
-// The first returns the triangles that may meet the tile itself, which the second needs; they are
-// there until the thread measures another.
+// distance.cpp: distances of the rows of one tile. Returns the triangles that may meet the tile
+// itself; the list is valid until the same thread measures another tile.
 std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& grid,
                                             std::size_t tile, NarrowBand& band);
+// crossing.cpp: crossings of the rows of one tile, by the list that measure_tile returned.
 void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile,
                 std::span<const std::uint32_t> triangles, NarrowBand& band);
 
-// seal.cpp: facets across holes up to grid.seal wide; returns how many, a square voxel each.
+// seal.cpp: adds facets across holes up to grid.seal wide and returns how many; each is a square
+// voxel.
 std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads,
                        Surface& surface);
 
-// sign.cpp: what the outside reaches without passing u <= offset or crossing a triangle.
+// sign.cpp: the set R that the outside reaches without entering u <= offset or crossing a triangle.
 struct Reached {
   Masks node;                      // (rows)
-  std::vector<std::uint8_t> cell;  // (cells) all of it, where it has no row
+  std::vector<std::uint8_t> cell;  // (cells) for cells without a row: not 0: all of it
 };
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads);
-// pockets.cpp: those of the candidates from which a reached node can be reached after all.
+// pockets.cpp: the candidates that the outside reaches after all, through gaps finer than a voxel.
 std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
                                 const std::vector<RowNodes>& candidates, const Masks& wet,
                                 unsigned threads);
 
 class Chains;  // chains.h
 
-// inside.cpp: what the signed distances need besides u, and which rows are needed at all.
+// inside.cpp: which rows the field needs, and what their signed distances need besides u.
 struct Inside {
-  std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within band of the zero set
-  Masks in_sight;                    // (rows) not reached, yet R is on this side of the sheet
-  // Where sheets are buried: lengths of the ways out; a row that has them may be corrected by them.
+  std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within the band
+  Masks in_sight;                    // (rows) nodes not in R, but on R's side of the sheet
+  // Lengths of the ways out to R, for the rows near sheets that lie buried in the solid.
   std::shared_ptr<const Chains> chains;
   std::vector<std::uint8_t> corrected;  // (rows)
-  // Other nodes whose depth is not told by u alone, by row: below cracks.
+  // Nodes below cracks: u alone does not give their depth.
   struct Depth {
     std::uint32_t node;
     float depth;  // [voxel]
   };
   std::vector<std::vector<Depth>> depths;
-  std::size_t thin_edges = 0;  // surface between two outside nodes with no inside node near
+  std::size_t thin_edges = 0;  // crossed edges between two nodes of R with no inside node near
   std::size_t inside_nodes = 0;
 };
 bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
                  const Steps& steps, Inside& inside);
-// samples.cpp: the needed rows' signed distances [m], in place of u, and where they are.
+// samples.cpp: the needed rows' signed distances [m], which take the place of u, and their index.
 void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, const Inside& inside,
                    unsigned threads, FieldData& field);
 
-// far.cpp: lower bounds [m] with sign at every eighth node.
+// far.cpp: signed lower bounds of the distance [m] at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
                       const Reached& reached, unsigned threads, const Steps& steps,
                       std::vector<float>& far);

@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // inside.cpp - from unsigned distances u and the reached set R to signed distances.
 //
-// Nodes of R get u - offset: exact. For the others the distance to R is wanted.
-// - No part of R is nearer than offset - u (u is 1-Lipschitz and is `offset` on the border of R).
+// Nodes of R get u - offset, which is exact. The others need their distance to R.
+// - No part of R is nearer than offset - u (u is 1-Lipschitz and equals `offset` on the border of
+// R).
 // - A straight line from p to a point r of R that is shorter than u(p) + u(r) meets no surface: the
-//   two empty balls overlap. So if every such line is longer, p lies behind a sheet, and R begins
-//   at u + offset: exactly there if the sheet that p is nearest to borders R.
+//   two empty balls overlap. If every such line is longer, p lies behind a sheet, and R begins at
+//   u + offset or farther off: exactly there if the sheet nearest to p borders R.
 // - Chains of nodes give an upper bound D >= distance to R: D(r) = offset - u(r) on R, and
-//   D(p) = min over the 26 neighbours of D(q) + |p - q|. They are at most 13 % too long.
+//   D(p) = min over the 26 neighbours q of D(q) + |p - q|. They are at most 13 % too long.
 // Hence, for p not in R:
 //   D <  u + offset: R is in sight: max(offset - u, (D - slack)/1.13), which is offset - u along
 //     smooth sheets and the depth of the dent below a crack.
-//   D >= u + offset: behind a sheet: u + offset. Sheets buried in the solid (two parts run into
-//     each other) do not border R, and u + offset is too short there:
+//   D >= u + offset: p is behind a sheet: u + offset. Sheets buried in the solid (two parts
+//   overlap)
+//     do not border R, and u + offset is too short there:
 //     max(u + offset, (D - corner slack)/1.13), a lower bound of the way to the nodes of R.
-// What is outside without a node of R, a groove between nodes say, begins no chain, and D goes the
-// long way round: on one mesh all 22 nodes that were too deep lie behind a gap narrower than a
-// voxel, 20 of them with no node of R within a voxel of the nearest point. Chains pass through
-// bricks that have no buried sheet in or beside them by u + offset; where they did not, nodes at
-// the edge of the others came out up to 1.4 voxel too deep.
+// An outside that holds no node of R, such as a groove between nodes, starts no chain. D then goes
+// the long way round, and the depth is too large. Bricks without a buried sheet in or beside them
+// hold no chains; there chains pass by u + offset, or else nodes at the edge of the other bricks
+// come out up to 1.4 voxel too deep.
 #include <algorithm>
 #include <atomic>
 #include <optional>
@@ -32,8 +33,8 @@ namespace {
 
 constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
 
-// A brick is kept when a cell of its own, or one that shares its nodes, has a point within band of
-// the zero set. Only where R is near.
+// Whether a cell of the brick, or one that shares its nodes, has a point within the band. Means
+// something only where R is near.
 bool near_zero_set(const NarrowBand& band, const Around& around) {
   bool near = false;
   for (std::size_t i = 0; i < 27; ++i) {
@@ -57,8 +58,8 @@ std::size_t count(const NodeMask& nodes) {
   return n;
 }
 
-// Nodes with a reached node among the 27 around them, themselves included; `nodes` tells those of a
-// row. With kOthers: with one that is not reached.
+// Nodes with one of `nodes` (rows) among the 27 around them, themselves included. With kOthers:
+// with one that is NOT in `nodes`.
 template <bool kOthers = false>
 NodeMask beside_any(const Around& around, const Masks& nodes) {
   std::array<const NodeMask*, 27> at;
@@ -69,7 +70,7 @@ NodeMask beside_any(const Around& around, const Masks& nodes) {
   return spread<kOthers>(at);
 }
 
-// The same as far as the brick alone tells: mostly enough. `flip`: of the others.
+// The same within the brick alone, which mostly decides. `flip` all ones: as kOthers.
 NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
   constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
   std::uint64_t layer[10] = {};
@@ -83,7 +84,7 @@ NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
   return out;
 }
 
-// Whether u at a node's neighbour (entry 13 + dx + 3*dy + 9*dz) is more than at the one across.
+// Whether u is larger at a node's neighbour (13 + dx + 3*dy + 9*dz) than at the opposite one.
 bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& around, int node,
                    int neighbour) {
   const int by[3] = {neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1};
@@ -96,7 +97,7 @@ bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& aroun
   return u(x + by[0], y + by[1], z + by[2]) > u(x - by[0], y - by[1], z - by[2]);
 }
 
-// The steps of look_inside, with what they share.
+// The steps of look_inside and the data they share.
 class Look {
  public:
   Look(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
@@ -118,7 +119,7 @@ class Look {
     inside_.depths.resize(band_.rows());
     inspect_rows();
     find_corrected();
-    inside_.in_sight = std::move(band_.free);  // not needed any more, but the room is
+    inside_.in_sight = std::move(band_.free);  // only for its memory
     constexpr std::size_t kSlice = 4096;
     sched::parallel_for((band_.rows() + kSlice - 1) / kSlice, threads_, [&](std::size_t slice) {
       const std::size_t first = slice * kSlice, end = std::min(band_.rows(), first + kSlice);
@@ -134,8 +135,8 @@ class Look {
   }
 
  private:
-  // How many nodes a chain takes from R to a node on the near side of a sheet, at most: one step
-  // can gain a voxel in any direction.
+  // The most nodes that a chain takes from R to a node on the near side of a sheet, and across the
+  // sheet: one step gains a voxel in any direction.
   int hops_in_sight() const { return offset_ > 0 ? int(std::ceil(offset_ + 0.05f)) : 0; }
   int hops_across() const { return offset_ > 0 ? int(std::ceil(2 * offset_ + 0.2f)) : 0; }
 
@@ -148,7 +149,7 @@ class Look {
     });
   }
 
-  // Which rows are needed, and have nodes inside, sheets buried there, thin walls.
+  // Finds the rows that are needed, those with nodes inside, those with buried sheets, thin walls.
   void inspect_rows() {
     beside_.resize(offset_ > 0 ? band_.rows() : 0);
     std::atomic<std::size_t> thin{0}, dry{0};
@@ -162,7 +163,7 @@ class Look {
           all &= w;
         }
         const bool whole = all == ~std::uint64_t{0};
-        // A row alone mostly tells enough; what is around it lies in 27 places.
+        // The row alone mostly decides, and the rows around it are scattered over memory.
         const bool near = band_.towards[r] >> 13 & 1;
         std::optional<Around> around;
         if (some == 0 || !near) around.emplace(rows, place);
@@ -183,10 +184,12 @@ class Look {
     inside_.inside_nodes = dry;
   }
 
-  // - Whether the surface crosses an edge, or meets a node, with nothing reached around: a sheet
-  //   buried in the solid. (Next to reached nodes it may be a groove narrower than a voxel.)
-  // - Crossed edges between reached nodes without a node inside anywhere around: a wall thinner
-  //   than the spacing. A sharp rim has nodes inside close by and does not count.
+  // - A sheet is buried in the solid where the surface crosses an edge, or meets a node, with no
+  // node
+  //   of R around. (Next to nodes of R it may be a groove narrower than a voxel.)
+  // - A wall is thinner than a voxel where an edge between nodes of R is crossed with no node
+  // inside
+  //   around. A sharp rim has nodes inside close by and does not count.
   void inspect_crossings(const TileRows& rows, std::size_t place, std::size_t r,
                          std::size_t& thin) {
     const Crossing& c = band_.crossing[r];
@@ -214,8 +217,9 @@ class Look {
           thin += std::size_t(std::popcount(bits));
   }
 
-  // With an offset, what lies within it of a sheet and farther from R than the far side of a sheet
-  // that borders R is buried. Depths are corrected there and one brick around.
+  // With an offset, a node is near a buried sheet if u <= offset and it is farther from R than the
+  // far side of a sheet that borders R can be. Depths are corrected in such bricks and one brick
+  // around.
   void find_corrected() {
     if (beside_.empty() && std::find(buried_.begin(), buried_.end(), 1) == buried_.end()) return;
     Masks wide, last;
@@ -268,7 +272,7 @@ class Look {
     return true;
   }
 
-  // A row to look at, its nodes in question and what is known of them.
+  // A row with nodes whose side is to be found.
   struct Asked {
     std::size_t place, row;
     bool held;
@@ -276,8 +280,9 @@ class Look {
     kernels::ChainSides sides;
   };
 
-  // Which side of its sheet a node is on, where u alone does not tell. Chains that are held tell it
-  // by themselves; the nodes around a brick are needed for the others, and where a sheet is close.
+  // Finds the side of the sheet that nodes are on, where u alone does not decide. Chains that are
+  // held decide by themselves; otherwise, and where a sheet is close, the nodes around the brick
+  // are needed.
   void look(std::size_t tile) {
     if (band_.tiles.first[tile] == band_.tiles.first[tile + 1]) return;
     thread_local const auto room = std::make_unique<ChainRoom>();
@@ -327,8 +332,9 @@ class Look {
         inside_.depths[r].push_back({std::uint32_t(n), dent});
       }
     }
-    // So close to a sheet chains cannot tell the side: the nearest way to R goes through q; R's
-    // side is where u grows, so q is farther from the sheet than its mirror image.
+    // So close to a sheet, chains cannot decide the side. The nearest way to R goes through a
+    // neighbour q. On R's side u grows along that way: q is farther from the sheet than the node
+    // opposite to q.
     NodeMask close;
     for (std::size_t z = 0; z < 8; ++z) close.z[z] = row.todo.z[z] & row.sides.close[z];
     if (!close.any()) return;

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// leaves.cpp - the order of triangles in the tree (see leaves.h).
+// leaves.cpp - the order of triangles in the tree.
 //
-// Triangles in the order of Hilbert's curve lie together, but eights of them that follow each other
-// on it lie anyhow: around edges, across faces. So every 512 of them are halved until eights are
-// left, each time along the axis that leaves the smallest boxes: a search of the tree then weighs
-// two thirds of the leaves.
+// Hilbert's curve keeps neighbours together, but eight successive triangles on it may still lie
+// around an edge or across faces. So every run of 512 is halved until eights are left, each time
+// along the axis that gives the smallest boxes. A search then looks at a third fewer leaves.
 #include "io/bake/leaves.h"
 
 #include <algorithm>
@@ -16,15 +15,15 @@
 namespace h6::io::bake {
 namespace {
 
-// Steps of eight, of which compilers make vectors.
+// Eight at a time, so that the compiler makes vectors.
 using Eight = std::array<std::uint32_t, 8>;
 
-// Cells along an axis, and how wide they are: the grid has at most 2048 voxels. No smaller, since
-// what lies in one is put in order by halving.
+// Cells along an axis, and their width: the grid has at most 2048 voxels. Smaller cells gain
+// nothing, since the halving orders the content of a cell.
 constexpr std::uint32_t kCells = 256;
 constexpr double kCell = 8;  // [voxel]
 
-// Ten bits each, interleaved.
+// Spreads ten bits, to be interleaved with those of two other axes.
 std::uint32_t apart(std::uint32_t v) {
   v &= 0x3ff;
   v = (v | v << 16) & 0x030000ff;
@@ -33,10 +32,9 @@ std::uint32_t apart(std::uint32_t v) {
   return (v | v << 2) & 0x09249249;
 }
 
-// The places of eight cells on Hilbert's curve, which leaves no cube before it has been everywhere
-// in it and never jumps: what follows each other lies together (J. Skilling, "Programming the
-// Hilbert curve", 2004: reflect and exchange axes from the largest cube down, then undo the Gray
-// code).
+// The places of eight cells on Hilbert's curve. The curve never jumps and finishes a cube before it
+// leaves it, so successors are neighbours (J. Skilling, "Programming the Hilbert curve", 2004:
+// reflect and exchange axes from the largest cube down, then undo the Gray code).
 Eight hilbert(std::array<Eight, 3> c) {
   for (std::uint32_t half = kCells / 2; half > 1; half /= 2)
     for (Eight& axis : c)
@@ -57,8 +55,8 @@ Eight hilbert(std::array<Eight, 3> c) {
   return place;
 }
 
-// By the upper half of the words, which has 24 bits; equal ones keep their order. Slices count and
-// move side by side; each knows its places from the counts of all.
+// A stable radix sort by the upper half of the words, which has 24 bits. Slices count in parallel;
+// from the counts of all, each slice knows where its words go.
 void sort_by_code(Large<std::uint64_t>& words, unsigned threads) {
   constexpr std::size_t kSlice = 65536, kDigits = 4096;
   Large<std::uint64_t> other(words.size());
@@ -81,13 +79,13 @@ void sort_by_code(Large<std::uint64_t>& words, unsigned threads) {
   }
 }
 
-// Halves up to so many triangles until eights are left.
+// Orders up to kMost triangles by halving them until eights are left.
 class Halves {
  public:
   static constexpr std::size_t kMost = 512;
 
   void order(const Surface& surface, std::uint32_t* triangles, std::size_t count) {
-    // First all indices, then all corners: few of them wait for each other.
+    // All indices before all corners: loads that do not wait for each other overlap.
     std::array<std::uint32_t, 3> corners[kMost];
     for (std::size_t i = 0; i < count; ++i) corners[i] = surface.triangles[triangles[i]];
     float low[3][kMost], high[3][kMost];
@@ -125,7 +123,7 @@ class Halves {
  private:
   using Index = std::uint16_t;
 
-  // By the middles along an axis, in steps; the order within a step is left as it is.
+  // A counting sort by the middles along an axis, in steps; the order within a step stays.
   void sort(std::size_t k, std::size_t count) {
     constexpr int kStep = 128;
     Index digit[kMost], place[2 * kernels::ShortBox::kMost / kStep + 1] = {};
@@ -164,7 +162,7 @@ class Halves {
     halve(first + half, rest);
   }
 
-  kernels::ShortBox box_[kMost];  // in parts of the box around all
+  kernels::ShortBox box_[kMost];  // scaled by the box around all
   Index sorted_[3][kMost];
   std::uint8_t upper_[kMost];
 };

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// plan.cpp - counts the bricks near the triangles, by boxes around pieces of them.
 #include "io/bake/plan.h"
 
 #include <algorithm>
@@ -14,9 +15,9 @@ namespace {
 using Corners = std::array<Vec3, 3>;
 
 constexpr double kPiece = 4;     // [voxel] longest edge
-constexpr double kPieces = 3e7;  // a second's work: of more, some triangles are left out
+constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
 
-// About how many pieces a triangle falls into.
+// About how many pieces a triangle is cut into.
 double pieces_of(const Corners& c) {
   const Vec3 u = c[1] - c[0], v = c[2] - c[0];
   const Vec3 n = cross(u, v);
@@ -24,13 +25,13 @@ double pieces_of(const Corners& c) {
   return 1 + 2 * longest / kPiece + 2 * std::sqrt(dot(n, n)) / (kPiece * kPiece);
 }
 
-// The bricks near triangles, one bit each.
+// The set of bricks near triangles.
 class Bricks {
  public:
   Bricks(const bake::Grid& grid) : grid_(grid), reach_(grid.near_zero_set()) {
     near_.resize(grid.cells());
   }
-  // By pieces of it, each with a box around it.
+  // Halves the triangle's longest edge until the pieces are small, and marks the box of each.
   void mark(const Corners& c) {
     int a = 0;
     double longest2 = -1;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// pockets.cpp - nodes at the bottom of grooves narrower than a voxel.
+// pockets.cpp - outside nodes at the bottom of grooves narrower than a voxel.
 //
-// Such a node is outside, yet all edges to its neighbours are crossed: the flood cannot step down
-// to it. Each candidate is judged alone: first by the parity of crossings towards reached nodes
-// (odd: it is the tip of a solid, and nearly all are), then by looking for a reached node in plain
-// view, and at last by walking on a lattice eight times finer, a few voxels far.
+// Triangles cross all edges from such a node to its neighbours, so the flood cannot reach it. Each
+// candidate is judged alone. The parity of crossings towards reached nodes rejects nearly all (odd:
+// the tip of a solid). Then a reached node in plain view decides, and at last a walk of a few
+// voxels on a lattice eight times finer.
 #include <algorithm>
 
 #include "io/bake/grid.h"
@@ -13,7 +13,7 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr int kView = 2;  // nodes, along each axis; never beyond the triangles a row knows
+constexpr int kView = 2;  // nodes along each axis; a row knows all triangles so far
 constexpr int kFine = 8;  // steps a voxel
 constexpr int kSide = 2 * kView * kFine + 1;
 
@@ -38,7 +38,7 @@ class View {
   View(const Surface& surface, const Grid& grid, const NarrowBand& band, const Masks& wet)
       : surface_(surface), grid_(grid), band_(band), wet_(wet) {}
 
-  // The facets that nodes of a row can have near them.
+  // The facets near the nodes of a row.
   std::vector<Facet> facets_of(std::size_t row) const {
     const Tiles& tiles = band_.tiles;
     const std::array<int, 3> brick = grid_.place(band_.cell[row]);
@@ -81,7 +81,7 @@ class View {
            wet_[std::size_t(r)].get(std::size_t(((n[2] & 7) * 8 + (n[1] & 7)) * 8 + (n[0] & 7)));
   }
 
-  // Breadth first from the middle of a cube of fine steps to any reached node in it.
+  // Searches breadth first, from the middle of a cube of fine steps, for a reached node in it.
   bool walks_outside(const std::vector<Facet>& near, const std::array<int, 3>& p) const {
     std::vector<std::uint8_t> seen(kSide * kSide * kSide, 0);
     std::vector<int> queue{int(seen.size() / 2)};

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // samples.cpp - from unsigned distances to the samples of the field, in place.
 //
-// Rows become bricks in the same order, and no brick lies behind its row. Chunks are signed side by
-// side, each in order, right into the room of their bricks. Where that is room of rows that a chunk
-// before may still read, bricks wait in a buffer; when it is full all chunks are waited for. A
-// field of a gigabyte is never there twice.
+// The needed rows become bricks in the same order, and no brick lies after its row. Chunks are
+// signed in parallel, straight into their final place. Bricks whose place an earlier chunk may
+// still read wait in a buffer; before it overflows, all chunks finish. So a field of a gigabyte is
+// never in memory twice.
 #include <algorithm>
 
 #include "io/bake/chains.h"
@@ -20,14 +20,14 @@ constexpr std::size_t kBuffer = 2048;  // bricks: 4 MiB
 
 struct Chunk {
   std::size_t begin, end;            // bricks
-  std::size_t late_begin, late_end;  // of them, those that wait
-  std::size_t buffer;                // where in it
+  std::size_t late_begin, late_end;  // the bricks among them that wait
+  std::size_t buffer;                // their place in the buffer
 };
 
-// Chunks from this brick on whose late bricks fit the buffer.
+// The chunks from brick `begin` on whose waiting bricks fit the buffer.
 std::vector<Chunk> next_chunks(const std::vector<std::uint32_t>& kept, std::size_t begin) {
   std::vector<Chunk> chunks;
-  const std::size_t first_row = kept[begin];  // all rows before have been read
+  const std::size_t first_row = kept[begin];  // all rows before it have been read
   for (std::size_t at = begin, buffered = 0; at < kept.size(); at += kChunk) {
     const std::size_t end = std::min(kept.size(), at + kChunk);
     const std::size_t late = std::clamp(first_row, at, end);

@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// seal.cpp - plugs for holes up to a width, so that a part with missing triangles does not
-// drain.
+// seal.cpp - plugs for holes up to a width, so that a part with missing triangles does not drain.
 //
-// 1. The wide outside W: where the middle of a ball of that width can come from outside.
-// 2. All that such a ball sweeps is outside: node p is when |p - q| <= u(q) for a q in W. The ball
-//    around q holds no surface, so p is in plain view of q. (Measured along chains of nodes, which
-//    are a little longer: never too much.)
-// 3. Corners are left over that a ball is too round for. A space left over that lies within a few
-//    steps of what is swept, all of it, is a corner and is given back; one that goes deeper is
-//    behind a hole, or at the end of a gap narrower than the width.
-// 4. Between nodes swept and nodes left behind a facet is put across the edge. These facets are
-//    surface like any other from then on: distances, offset, flood and far grid take them as they
-//    are.
-// So this closes: holes and gaps narrower than the width that lead to anything deeper than about
-// the width. It leaves open: whatever a ball of the width can get to, and all concave corners.
+// 1. The wide outside W: where the middle of a ball of that width can move from outside.
+// 2. The volume that the ball sweeps is outside: node p, if |p - q| <= u(q) for a q in W. The ball
+//    around q holds no surface, so p is in plain view of q. Lengths are measured along chains of
+//    nodes, which are a little longer, so never too much is swept.
+// 3. The ball is too round for corners. A remaining space is a corner, and stays outside, if all of
+//    it lies within a few steps of the swept volume. A deeper one is behind a hole, or at the end
+//    of a gap narrower than the width.
+// 4. A facet is put across each edge between the outside and the spaces behind. From then on these
+//    facets are surface like any other for distances, offset, flood and far grid.
+// This closes holes and gaps narrower than the width that lead to anything deeper than about the
+// width. It leaves open all that a ball of the width can reach, and all concave corners.
 #include <algorithm>
 #include <unordered_map>
 
@@ -26,7 +24,7 @@ namespace {
 
 using namespace flooding;
 
-// Nodes of a mask that stand on one side of something, all rows.
+// mask(row) for all rows.
 template <class F>
 Masks for_rows(const NarrowBand& band, unsigned threads, F&& mask) {
   Masks out(band.rows());
@@ -41,7 +39,7 @@ NodeMask farther_than(const float* u, float level) {
   return mask;
 }
 
-// What balls around the nodes of W sweep, W included.
+// The nodes that balls around the nodes of W sweep, W included.
 Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, double radius,
             unsigned threads) {
   std::vector<std::uint8_t> rows(band.rows());
@@ -59,11 +57,11 @@ Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, doubl
   });
 }
 
-// Adds to `open` what is left over of `free` in corners; returns what is behind holes.
+// Adds the corners left over of band.free to `open`; returns the nodes behind holes.
 Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, unsigned threads,
                    Masks& open) {
   Masks near = open;
-  // The corner of three walls is (sqrt 3 - 1) radii from a ball, and as many steps times sqrt 3.
+  // The corner of three walls is (sqrt 3 - 1) radii from the ball: sqrt 3 times as many steps.
   const int steps = int(std::ceil(1.27 * radius)) + 1;
   for (int i = 0; i < steps; ++i) {
     const Masks next = neighbours(grid, band, near, threads);
@@ -80,7 +78,7 @@ Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, unsi
   return behind.take_wet();
 }
 
-// Edges from a node on one side to a node on the other become facets across their middles.
+// Puts a facet across the middle of each edge between a node of one side and one of the other.
 class Plugs {
  public:
   Plugs(const Grid& grid, const NarrowBand& band, Surface& surface)
@@ -111,7 +109,7 @@ class Plugs {
   std::size_t facets() const { return (surface_.triangles.size() - first_) / 2; }
 
  private:
-  // Corners are half way between nodes: twice their coordinates are whole.
+  // Corners lie half way between nodes, so twice their coordinates are integers.
   std::uint32_t corner(const std::array<int, 3>& twice) {
     const std::uint64_t key = (std::uint64_t(twice[2] + 1) << 26 | std::uint64_t(twice[1] + 1))
                                   << 26 |
@@ -147,7 +145,7 @@ class Plugs {
 std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads,
                        Surface& surface) {
   const double radius = grid.seal / 2;
-  if (radius <= grid.offset) return 0;  // the offset closes as much
+  if (radius <= grid.offset) return 0;  // the offset already closes such holes
   const Masks roomy = for_rows(
       band, threads, [&](std::size_t r) { return farther_than(band.nodes(r), float(radius)); });
   Flood flood(grid, band, roomy, Flood::Edges::open, threads);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sign.cpp - what is outside: a flood over nodes, 64 at a time.
+// sign.cpp - the outside: the nodes that a flood (flood.h) reaches from the border.
 //
-// A node is passable when u > offset and it is not on the surface; it is left through edges that no
-// triangle crosses. Bricks without a row are all passable, so the flood takes them whole. The
-// result is a set: the order of work does not show in it.
+// A node is passable if u > offset and it is not on the surface.
 #include <algorithm>
 
 #include "io/bake/flood.h"
@@ -14,8 +12,8 @@ namespace {
 
 using namespace flooding;
 
-// Regions by nesting: 0 outside, 1 behind one wall, 2 behind two, ... A wall is what the flood
-// cannot pass: crossed edges and the nodes that are not passable. Even regions are empty.
+// Regions by nesting: 0 is outside, 1 behind one wall, 2 behind two, ... A wall is what the flood
+// cannot pass: crossed edges and nodes that are not passable. Regions of even depth are empty.
 Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& free, unsigned threads,
                       Flood& flood) {
   Reached empty{flood.wet(), {}};
@@ -42,8 +40,8 @@ Reached open_cavities(const Grid& grid, const NarrowBand& band, const Masks& fre
   return empty;
 }
 
-// Dry nodes that hang together with no roomy place, a node with six free edges to dry nodes:
-// bottoms of grooves, and tips of solids.
+// Dry nodes that are not connected with a roomy one, which has six free edges to dry nodes. They
+// are bottoms of grooves or tips of solids.
 std::vector<RowNodes> cramped_nodes(const Grid& grid, const NarrowBand& band, const Masks& dry,
                                     unsigned threads) {
   Masks roomy(dry.size());
@@ -54,7 +52,7 @@ std::vector<RowNodes> cramped_nodes(const Grid& grid, const NarrowBand& band, co
     const Crossing& own = band.crossing[r];
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (int step : {-1, 1}) {
-        // Dry nodes of this brick and its neighbour, moved to the node they are the neighbour of.
+        // Nodes that have a free edge to a dry neighbour, in this brick or the next one.
         NodeMask linked = step > 0 ? before(dry[r], axis) & ~own.edge[axis]
                                    : after(dry[r] & ~own.edge[axis], axis);
         std::array<int, 3> to = at;
@@ -99,7 +97,7 @@ Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, 
   const Masks& free = band.free;
   Flood outside(grid, band, free, Flood::Edges::cut, threads);
   outside.from_border();
-  // In a soup every crack is a pocket, and parity tells nothing: there they stay inside.
+  // In a soup every crack would be a pocket and parity means nothing, so pockets stay inside.
   if (!band.crossing.empty() && surface.closed)
     reach_pockets(surface, grid, band, free, threads, outside);
   if (cavities == Cavities::hollow) return open_cavities(grid, band, free, threads, outside);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // tree.cpp - closest-point search over triangles (see tree.h).
 //
-// Boxes and triangles are weighed eight at a time in float, by bounds that are never more than the
-// truth (rounding to float included). The least of the triangles' bounds is one of the distance;
-// the triangle that gave it is measured in double, and where that tells more than a little more,
-// the search is done again with all that may be nearest measured in double.
+// The search compares eight boxes or eight triangles at a time in float, by lower bounds that allow
+// for rounding. The least bound of all triangles bounds the distance from below. Then the triangle
+// with the least bound is measured in double. If its distance is more than kTight above the bound,
+// the search runs again and measures every triangle that may be nearest in double.
 #include "io/bake/tree.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr float kRounded = 2.5e-4f;  // [voxel] float at 1024 voxels from the middle, four times
+constexpr float kRounded = 2.5e-4f;  // [voxel] four times a float's rounding at 1024 voxels
 
 kernels::EightBoxes no_boxes() {
   kernels::EightBoxes boxes;
@@ -89,11 +89,11 @@ double TriangleTree::squared_to(const double (&p)[3], std::uint32_t place) const
   return kernels::point_triangle_squared(p, pa, pb, pc);
 }
 
-// Looks at every leaf whose box is nearer than `most`, which may shrink meanwhile.
+// Calls look(leaf) for every leaf whose box is nearer than `most` (squared), which look may lower.
 template <class Look>
 void TriangleTree::walk(const float (&at)[3], const float& most, Look&& look) const {
   struct Entry {
-    float squared;  // bound of the distance
+    float squared;  // lower bound of the squared distance
     std::uint32_t level, node;
   };
   Entry stack[128];
@@ -102,7 +102,7 @@ void TriangleTree::walk(const float (&at)[3], const float& most, Look&& look) co
   while (depth > 0) {
     const Entry entry = stack[--depth];
     if (entry.squared >= most) continue;
-    // The start is nearly always the nearest: the order of what is left hardly matters.
+    // The start is nearly always the nearest, so the order of the rest hardly matters.
     float squared[8];
     if (entry.level > 0) {
       std::uint32_t live = kernels::eight_boxes(level_[entry.level][entry.node], at, most, squared);
@@ -136,14 +136,14 @@ double TriangleTree::search(const double (&p)[3], std::span<const std::uint32_t>
   if (double(found.above) <= most * most) return std::max(0.0, least - double(kRounded));
   const double squared = squared_to(p, found.place);
   if (squared <= most * most) return std::max(0.0, least - double(kRounded));
-  return search_exactly(p, squared, found.place);  // a sliver, or huge: weighed low
+  return search_exactly(p, squared, found.place);  // float's bound of slivers and huge ones is low
 }
 
 double TriangleTree::search_exactly(const double (&p)[3], double best2,
                                     std::uint32_t& nearest) const {
   const float at[3] = {float(p[0] - middle_[0]), float(p[1] - middle_[1]),
                        float(p[2] - middle_[2])};
-  // Bounds are for the point and corners as rounded to float.
+  // The kernels see the point and the corners rounded to float.
   const auto limit = [&] {
     const double reach = std::sqrt(best2) + double(kRounded);
     return float(reach * reach * (1 + 1e-6));

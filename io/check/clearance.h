@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// clearance.h - how far one mesh is from another, where they stand.
+// clearance.h - the distance between two meshes in given poses.
 #pragma once
 #include "hapsix/result.h"
 #include "hapsix/types.h"
@@ -7,10 +7,10 @@
 
 namespace h6::io {
 
-// The least distance [m] from the surface of `part` to that of `other`, in the poses of their mesh
-// frames: from all vertices of triangles and from `places` more, evenly by area. So an upper bound,
-// close to the truth for meshes finer than their gaps; parts that run into each other are about 0
-// apart. Infinity where one has no area.
+// The least distance [m] to the surface of `other` from all vertices of `part` and from `places`
+// random places on it, uniform by area. Poses are of the mesh frames. The result is an upper bound
+// of the distance, close to it for meshes finer than their gaps; for parts that overlap it is about
+// 0. It is infinity if one of the meshes has no area.
 Result<double> clearance(const Mesh& part, const h6Pose& part_pose, const Mesh& other,
                          const h6Pose& other_pose, unsigned threads, std::size_t places = 20000);
 

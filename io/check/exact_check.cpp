@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// exact_check.cpp - compares random places of a field with its mesh, by Embree.
 #include "io/check/exact_check.h"
 
 #include <algorithm>
@@ -13,11 +14,11 @@
 namespace h6::io {
 namespace {
 
-constexpr double kJitter = 2.5;      // voxels about the mesh
-constexpr double kNodeSlack = 1e-3;  // [voxel] what counts as exact
-constexpr double kFarSlack = 1e-4;   // [voxel] what the sampler's floats may add
-constexpr std::size_t kBlock = 128;  // places a task: sums are joined in the order of blocks
-constexpr int kRuns = 200;           // of a search for a way out
+constexpr double kJitter = 2.5;      // [voxel] how far near places lie from the mesh, per axis
+constexpr double kNodeSlack = 1e-3;  // [voxel] error that counts as exact
+constexpr double kFarSlack = 1e-4;   // [voxel] rounding of the engine's sampler
+constexpr std::size_t kBlock = 128;  // places per task; sums are joined in the order of blocks
+constexpr int kRuns = 200;           // straight runs in a search for a way out
 
 struct Worst {
   double most = 0, sum = 0;
@@ -44,7 +45,7 @@ struct Tally {
   }
 };
 
-// The engine's bounds: its own layout, without the bricks.
+// The bounds in the engine's own layout, without the bricks.
 class FarBounds {
  public:
   FarBounds(const FieldData& field, unsigned threads) : def_(field.def()) {
@@ -58,7 +59,8 @@ class FarBounds {
     });
   }
   bool any() const { return !far_.empty(); }
-  // At a place in voxels; false where there are samples, or where the side is not known.
+  // The bound at a place in voxels. Returns false where there are samples, or where the corners of
+  // the cell disagree about the side.
   bool operator()(const Vec3& g, double& bound, bool& inside) const {
     const std::size_t nx = std::size_t(def_.bricks[0]), ny = std::size_t(def_.bricks[1]);
     const std::size_t x = std::size_t(g.x / 8), y = std::size_t(g.y / 8), z = std::size_t(g.z / 8);
@@ -143,7 +145,7 @@ class Check {
     double bound = 0;
     bool inside = false;
     for (int tries = 0;; ++tries) {
-      if (tries == 64) return t;  // hardly a place without samples
+      if (tries == 64) return t;  // hardly any place lacks samples
       // The engine's last cell ends at the last node.
       g = {dice.within(0, 8 * field_.bricks[0] - 1), dice.within(0, 8 * field_.bricks[1] - 1),
            dice.within(0, 8 * field_.bricks[2] - 1)};
@@ -155,7 +157,7 @@ class Check {
     const Kept kept = promise(p, bound, inside, dice, t);
     if (!inside) t.gap.add(kept.gap);
     corner(g, dice, t);
-    // A tenth of them is asked by rays too, which cost more than distances.
+    // Rays cost more than distances, so only a tenth of the places gets them.
     if (i % 10 != 0) return t;
     if (kept.near.distance / h_ > std::max(2 * offset_, kNodeSlack))
       side(p, inside, kept.near.distance / h_, dice, t);
@@ -164,7 +166,7 @@ class Check {
   }
 
  private:
-  // What a bound promised, and by how much it was below the distance [voxel].
+  // The nearest point, and by how much the bound is below the distance [voxel].
   struct Kept {
     RayScene::Near near;
     double gap;
@@ -176,7 +178,7 @@ class Check {
       t.sum.far_wrong = 1, t.excess = std::max(t.excess, bound - most);
     return {near, most - bound};
   }
-  // The far grid where it is given, at a corner of the place's cell.
+  // The far grid at one of its own nodes, a corner of the place's cell.
   void corner(const Vec3& g, Dice& dice, Tally& t) const {
     const std::size_t c[3] = {std::size_t(g.x / 8), std::size_t(g.y / 8), std::size_t(g.z / 8)};
     const std::size_t nx = std::size_t(field_.bricks[0]) + 1,
@@ -187,8 +189,8 @@ class Check {
                 std::fabs(far), far < 0, dice, t);
     if (far >= 0) t.corner.add(kept.gap);
   }
-  // Whether there is outside on either side of the mesh there: else it is buried in the solid, and
-  // the way out is longer than to the mesh.
+  // Whether the outside is on either side of the mesh there. If not, the mesh is buried in the
+  // solid there, and the way out is longer than the distance to the mesh.
   bool outer(const RayScene::Near& near, Dice& dice) const {
     const Vec3& n = faces_.inward[near.triangle];
     for (const double step : {-1.05, 1.05}) {
@@ -199,8 +201,8 @@ class Check {
     }
     return false;
   }
-  // Where a ball of sigma and the diagonal of half a voxel passes, so does a flood from node to
-  // node; without an offset no way is too narrow. [voxel]
+  // The radius [voxel] of a ball where a flood from node to node certainly passes too: sigma and
+  // half a voxel's diagonal. Without an offset no way is too narrow.
   double room() const { return offset_ > 0 ? offset_ + 0.9 : 0; }
   bool leads_out(const Vec3& p, Dice& dice) const {
     return votes_.way_out(p, room() * h_, kRuns, dice);
@@ -219,11 +221,12 @@ class Check {
     return &field_.samples[std::size_t(row) * 512 + (at[2] % 8 * 8 + at[1] % 8) * 8 + at[0] % 8];
   }
 
-  // Of a node, as far as bake_field.h says what it is.
+  // Compares a node with what bake_field.h promises.
   void distance(double d, const RayScene::Near& near, Dice& dice, Tally& t) const {
     const double u = near.distance / h_;
-    // A plug is nearer than the mesh. What the mesh alone would allow: for a node in front of the
-    // surface its distance, for one in a solid the least depth that the offset leaves it.
+    // A node nearer to the surface than the mesh allows is next to a plug. The mesh allows a node
+    // in front of the surface its distance, a node in a solid the least depth that the offset
+    // leaves.
     const bool solid = d <= -offset_;
     const double to_surface = solid ? -d : d + offset_,
                  to_mesh = solid ? std::fabs(offset_ - u) : u;
@@ -270,7 +273,7 @@ class Check {
   const double h_, offset_;  // [m], [voxel]
 };
 
-// False: cancelled.
+// Adds ask(i) for all i < count to `sum`. Returns false when the user cancelled.
 template <class Ask>
 bool ask_all(std::size_t count, unsigned threads, const Progress& progress, const char* what,
              double from, double to, Tally& sum, const Ask& ask) {

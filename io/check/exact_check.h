@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// exact_check.h - a baked field against the mesh it is of: distances that are exact, sides by votes
-// of rays, the bound far from the surface as the engine reads it. Nothing of the bake is used.
+// exact_check.h - compares a baked field with its mesh: exact distances, sides by votes of rays,
+// and the bound far from the surface as the engine reads it. It shares no code with the bake.
 #pragma once
 #include <cstdint>
 
@@ -12,10 +12,10 @@
 namespace h6::io {
 
 struct ExactCheckOptions {
-  std::size_t points = 20000;      // of each kind
-  std::size_t far_points = 50000;  // where the engine has a bound only
+  std::size_t points = 20000;      // places near the mesh
+  std::size_t far_points = 50000;  // places where the engine has only a bound
   std::uint64_t seed = 1;
-  bool sealed = false;   // holes were closed: the surface may be nearer than the mesh
+  bool sealed = false;   // the bake closed holes: the surface may be nearer than the mesh
   unsigned threads = 0;  // 0: all; the result is the same for any number
 };
 
@@ -24,38 +24,40 @@ struct ExactCheck {
   // Nodes nearer than the band to the mesh: |sample - what bake_field.h says it is| [voxel].
   std::size_t nodes = 0;
   double worst_node = 0, mean_node = 0;
-  std::size_t buried = 0;  // others, nearest to what is buried in the solid: not comparable
-  std::size_t nearer = 0;  // others, nearer to the surface than to the mesh: sealed holes
-  // Others, deeper than the mesh is near although there is outside beyond it: where sheets are
-  // buried close by, the bake's estimate of the way out may be too long [voxel].
+  std::size_t buried = 0;  // other nodes, nearest to a buried sheet: not comparable
+  std::size_t nearer = 0;  // other nodes, nearer to the surface than to the mesh: sealed holes
+  // Other nodes, deeper than their distance to the mesh although the outside lies beyond it: next
+  // to buried sheets the bake's way out may be too long [voxel].
   std::size_t deep = 0;
   double worst_deep = 0;
-  // Any places outside and near: the error of trilinear interpolation, apart [voxel].
+  // Places outside, near the mesh and between nodes: the error of trilinear interpolation [voxel].
   std::size_t between = 0;
   double worst_between = 0, mean_between = 0;
-  // Sides of nodes near the mesh and of places anywhere in the grid. A ray votes inside when it
-  // crosses the mesh an odd number of times, or leaves more closed pieces than it enters; votes
-  // count where at least nine in ten agree.
+  // Sides of nodes near the mesh and of places anywhere in the grid. A ray votes inside if it
+  // crosses the mesh an odd number of times, or leaves more closed pieces than it enters. A vote
+  // counts if at least nine in ten rays agree.
   std::size_t voted = 0, doubtful = 0;
-  std::size_t drained = 0;   // outside, but rays say inside. Wrong in a closed mesh.
-  std::size_t filled = 0;    // inside, but rays say outside, and a way out is known. Likewise.
-  std::size_t enclosed = 0;  // inside, but rays say outside; no way out was found: cavities
+  std::size_t drained = 0;   // the field says outside, rays say inside: wrong if the mesh is closed
+  std::size_t filled = 0;    // the field says inside, rays found a way out: wrong likewise
+  std::size_t enclosed = 0;  // the field says inside, rays outside, no way out was found: cavities
   // In places without samples: the engine's lower bound of the distance [voxel].
   std::size_t far = 0, far_wrong = 0;
-  double far_excess = 0;  // most above the distance
-  // Mean below the distance: outside, likewise of the far grid itself at its own nodes, and inside,
-  // of a tenth of the places, where what is nearest has outside beyond it. Of how many places.
-  std::size_t outside = 0, inside = 0;
+  double far_excess = 0;  // the most that a bound is above the distance
+  // How far bounds are below the distance on average: outside; at the far grid's own nodes outside;
+  // inside (a tenth of the places, where the outside lies beyond the nearest triangle).
+  std::size_t outside = 0, inside = 0;  // number of places
   double far_gap = 0, corner_gap = 0, inside_gap = 0;
 
   std::size_t wrong_sides() const { return drained + filled; }
-  // A closed mesh, and nothing wrong with its field; of a soup the sides are a matter of opinion.
+  // Whether the field is right. Of a soup the sides are not judged: rays may leak through it too.
   bool agrees() const {
     return worst_node < 1e-3 && far_wrong == 0 && 20 * deep <= nodes &&
            (!closed || wrong_sides() == 0);
   }
 };
 
+// Needs a field of this mesh. Fails, with a sentence, if the mesh has no area, if the field is of
+// another mesh, or when the user cancels.
 Result<ExactCheck> check_exactly(const Mesh& mesh, const FieldData& field,
                                  const ExactCheckOptions& options, const Progress& progress = {});
 

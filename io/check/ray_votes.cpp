@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// ray_votes.cpp - see ray_votes.h.
 #include "io/check/ray_votes.h"
 
 #include <algorithm>
@@ -31,11 +32,12 @@ RayVotes::Side RayVotes::side(const Vec3& place, Dice& dice) const {
   return votes[1] > votes[0] ? Side::inside : Side::outside;
 }
 
-// How far a ball gets; infinity: away.
+// How far a ball moves before it touches the mesh; infinity if it never does.
 double RayVotes::run(const Vec3& from, const Vec3& along, double clearance) const {
   const double free = rays_.free_way(from, along);
   if (clearance <= 0) return free;
-  // Steps as long as nothing is near. Past the last triangle of the ray others may still be beside.
+  // Sphere tracing: each step is as long as the free distance. Beyond the last triangle on the ray,
+  // others may still be beside it.
   double t = 0, step = 0;
   for (int i = 0; i < 1000; ++i) {
     if (t > rays_.reach()) return std::isinf(free) ? free : t;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// blue_noise.cpp - see the header. The rounds run in parallel without depending on it: points live
-// in grid cells at least one radius wide, cells get one of 27 colours by their place modulo 3, and
-// cells of one colour cannot see each other's points (phase groups, L.-Y. Wei, "Parallel Poisson
-// disk sampling", 2008). Everything else is ours.
+// blue_noise.cpp - rounds of parallel dart throwing whose result does not depend on threads. Points
+// lie in grid cells at least one radius wide. A cell has one of 27 colours, by its place modulo 3,
+// and cells of one colour are too far apart to exclude each other's points (phase groups, L.-Y.
+// Wei, "Parallel Poisson disk sampling", 2008).
 #include "io/shell/blue_noise.h"
 
 #include <algorithm>
@@ -17,19 +17,20 @@ namespace h6::io {
 namespace {
 
 constexpr int axis_bits = 21;                     // of a cell's key, for each axis
-constexpr double cells_across = double(1 << 20);  // at most, so that keys have room at the rim
+constexpr double cells_across = double(1 << 20);  // most cells, so that keys have room at the rim
 constexpr std::size_t cells_a_slice = 256;
 
-// Cosine between normals that count as two sides: 134 degrees, a wedge of 46. Thread flanks (60)
-// and blunter edges keep their distance as on one surface; sharper ones would starve one another.
+// Normals with a smaller cosine are on two sides: 134 degrees, a wedge of 46. Thread flanks (60)
+// and blunter edges keep their distance as on one surface. The sides of sharper edges would starve
+// each other if they did.
 constexpr float opposed = -0.7f;
-// They still keep this share of the distance: the points of all sides together are blue noise, and
-// those of a sheet's two sides do not coincide.
+// Two sides keep this share of the distance, so that the points of all sides together are blue
+// noise and those of a sheet's two sides do not coincide.
 constexpr float across = 0.75f;
 
 struct Spot {  // 32 bytes: a cell's points lie together
   float p[3], n[3];
-  float gap;  // an accepted point is known to be this near [m]; on another side, / `across`
+  float gap;  // distance to a known accepted point [m]; on another side, / `across`
   std::uint32_t id;
 };
 
@@ -38,7 +39,7 @@ struct Row {  // accepted neighbours: cells [first, first + count) along x
 };
 
 struct Cell {
-  std::uint32_t first = 0, count = 0, accepted = 0;  // accepted spots stand first
+  std::uint32_t first = 0, count = 0, accepted = 0;  // accepted spots come first
   float open = 0;                                    // largest gap of the rest
 };
 
@@ -103,7 +104,7 @@ class Thrower {
   std::vector<std::uint32_t> fresh_;  // accepted in the last round
   double cell_ = 0;
   RawVector<Spot> spots_;
-  std::vector<float> gap_;  // by point, kept over rebuilt grids; empty: not known
+  std::vector<float> gap_;  // by point, kept when the grid is rebuilt; empty: not known
   std::vector<Cell> cells_;
   std::vector<std::uint64_t> keys_;  // of cells, ascending
   std::vector<std::array<Row, 9>> rows_;
@@ -125,7 +126,7 @@ void Thrower::slices(std::size_t count, const Body& body) const {
   }
 }
 
-// False: cancelled, and the grid is of no use.
+// Returns false when the user cancelled; the grid is then undefined.
 bool Thrower::build_grid(double radius) {
   // A little wider than the radius: distances are compared in float.
   cell_ = std::max(radius * 1.0001, box_.extent / cells_across);
@@ -159,7 +160,8 @@ void Thrower::find_cells() {
   }
 }
 
-// Cells in the nine rows about each cell: keys are sorted, so each row's place only moves forward.
+// Finds the cells in the nine rows around each cell. Keys are sorted, so each row's place only
+// moves forward.
 void Thrower::link_cells() {
   rows_.resize(cells_.size());
   slices(cells_.size(), [&](std::size_t, std::size_t from, std::size_t to) {
@@ -191,7 +193,7 @@ void Thrower::colour_cells() {
   }
 }
 
-// Within a cell: accepted points first, then a random order, the same in every grid.
+// Order within a cell: accepted points first, then a random order that is the same in every grid.
 void Thrower::place_spots() {
   spots_.resize(points_.size());
   slices(cells_.size(), [&](std::size_t, std::size_t from, std::size_t to) {
@@ -217,8 +219,8 @@ void Thrower::place_spots() {
   });
 }
 
-// Distance to an accepted point nearer than `radius`, or infinity. Not the nearest one: the search
-// ends at the first that is near enough to keep this spot closed for some rounds.
+// The distance to an accepted point nearer than `radius`, or infinity. The search ends at the first
+// point that is near enough to exclude this spot for some rounds, not at the nearest one.
 float Thrower::nearest_blocker(std::size_t cell_index, const Spot& spot, float radius) const {
   const float far2 = radius * radius, enough2 = 0.6f * far2;
   float best2 = far2;
@@ -260,8 +262,8 @@ void Thrower::throw_at(Cell& cell, std::size_t cell_index, float radius, std::si
   }
 }
 
-// Accepts whatever keeps `radius` from all others, until nothing more does. A few spots a cell
-// first, then all: a cell that chose alone among all its spots would set a pattern.
+// Accepts spots that keep `radius` from all others, until no more do. A few spots per cell come
+// first, then all: if a cell chose among all its spots before its neighbours, the grid would show.
 void Thrower::round(double radius) {
   fresh_.clear();
   std::vector<std::vector<std::uint32_t>> fresh;
@@ -301,7 +303,8 @@ void Thrower::forget_all() {
   gap_.clear();
 }
 
-// More than wanted: only points of the last round go, so the round before it still covers all.
+// Drops points if there are too many. Only points of the last round go, so that the round before it
+// still covers all.
 void Thrower::drop_excess() {
   const std::size_t excess = chosen_ - options_.target;
   const auto later = [&](std::uint32_t a, std::uint32_t b) {
@@ -313,7 +316,7 @@ void Thrower::drop_excess() {
   chosen_ = options_.target;
 }
 
-// Points that coincide: no distance tells them apart, any will do.
+// Fills up with points that coincide with chosen ones: no radius separates them.
 void Thrower::fill_up() {
   order_.clear();
   for (std::uint32_t id = 0; id < accepted_.size(); ++id) {
@@ -325,8 +328,8 @@ void Thrower::fill_up() {
   for (std::size_t i = 0; chosen_ < options_.target; ++i, ++chosen_) accepted_[order_[i].index] = 1;
 }
 
-// On a surface the count grows with 1/r^2; less than that at a time, so that the last round adds
-// little and most points keep the larger distance.
+// The next radius. On a surface the count grows with 1/r^2; steps are smaller than that suggests,
+// so that the last round adds little and most points keep the larger distance.
 double Thrower::next_radius(double radius) const {
   const double share = double(chosen_) / double(options_.target);
   return radius * std::clamp(std::pow(share, 0.4), 0.5, 0.985);
@@ -369,7 +372,8 @@ Thinned Thrower::run() {
     if (options_.fixed_radius || chosen_ == options_.target) return finish(radius);
     if (chosen_ < options_.target) {
       radius = next_radius(radius);
-    } else if (first && radius < 4 * box_.extent) {  // too many at once: start again, wider
+    } else if (first &&
+               radius < 4 * box_.extent) {  // far too many: start again with a larger radius
       const double share = double(chosen_) / double(options_.target);
       radius *= std::clamp(1.1 * std::sqrt(share), 1.2, 8.0);
       forget_all();

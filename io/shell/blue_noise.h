@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// blue_noise.h - out of many points, a given number that keep their distance from one another.
+// blue_noise.h - chooses a given number of points that keep their distance from one another.
 //
-// Greedy ("dart throwing") selection with a shrinking radius: a round at radius r accepts every
-// point that has no accepted point nearer than r; when fewer than the wanted number fit, r shrinks
-// and the next round fills the gaps. So every pair is at least the last r apart, every point that
-// was not chosen has a chosen one within the r before it, and the number is met exactly.
+// Greedy ("dart throwing") selection with a shrinking radius: a round at radius r accepts points
+// that have no accepted point nearer than r. If fewer than the wanted number fit, r shrinks and the
+// next round fills the gaps. So every pair is at least the last r apart, every point that was not
+// chosen has a chosen one within the last r but one, and the number is met exactly.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -21,20 +21,19 @@ struct OrientedPoint {
 };
 
 struct Thinning {
-  std::size_t target = 0;     // how many to choose; all when there are no more
-  double first_radius = 0;    // where to start [m], any guess > 0; too large costs rounds,
-                              // too small is noticed and repaired
+  std::size_t target = 0;     // how many to choose; all if there are no more
+  double first_radius = 0;    // > 0 [m]; a poor guess costs time, not quality
   bool fixed_radius = false;  // one round at first_radius, whatever number that gives
   bool both_sides = false;    // points whose normals differ by more than 134 degrees, as on the two
-                              // faces of a thin plate, only keep 0.75 of the radius
+                              // faces of a thin plate, keep only 0.75 of the radius
   std::uint64_t seed = 1;
   unsigned threads = 0;    // 0: all; the choice is the same for any number
-  Pulse* pulse = nullptr;  // told the share that is chosen; may be null
+  Pulse* pulse = nullptr;  // hears the share that is chosen; may be null
 };
 
 struct Thinned {
   std::vector<std::uint32_t> chosen;  // ascending
-  double spacing = 0;                 // no two (excluding) chosen points are nearer [m]
+  double spacing = 0;                 // no two chosen points that exclude each other are nearer [m]
   bool cancelled = false;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_point.cpp - split at the median along the widest axis, by rank and not by place, so that
-// coinciding points make no deep tree; leaves of eight.
+// nearest_point.cpp - nodes split at the median along the widest axis, by rank and not by
+// coordinate, so that coinciding points make no deep tree. Leaves have eight points.
 #include "io/shell/nearest_point.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace h6::io {
 namespace {
 constexpr std::uint32_t leaf_size = 8;
 
-// In double: differences of floats are then exact, and ties are real ties.
+// In double, where differences of floats are exact, so that only real ties are ties.
 double distance2(const float a[3], const float b[3]) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {

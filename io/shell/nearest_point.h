@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// nearest_point.h - the nearest of many points, for any arrangement of them: a balanced kd-tree.
+// nearest_point.h - the nearest of many points, by a balanced kd-tree.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace h6::io {
 
 class NearestPoint {
  public:
-  // Of points[ids[0]], points[ids[1]], ...; `points` must outlive this.
-  // After the pulse stopped it must not be asked.
+  // Searches points[ids[0]], points[ids[1]], ...; `points` must outlive this. If the pulse stopped,
+  // the tree is unfinished and must not be used.
   NearestPoint(std::span<const OrientedPoint> points, std::vector<std::uint32_t> ids,
                Pulse* pulse = nullptr);
-  // The id of a point nearest to points[query]; there must be at least one.
+  // The id of a point nearest to `query`. There must be at least one point.
   std::uint32_t operator()(const float query[3]) const;
 
  private:

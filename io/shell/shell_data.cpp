@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_data.cpp - see the header.
+// shell_data.cpp - the checks of shell_data.h.
 #include "io/shell/shell_data.h"
 
 #include <cmath>
@@ -58,7 +58,7 @@ Outcome check_level_table(const ShellData& s) {
   return Done{};
 }
 
-// Every row of a level is another one of its points.
+// Checks that the rows of a level are a permutation of its points.
 Outcome check_rows(const ShellData& s) {
   std::vector<std::uint32_t> seen(s.size(), 0);
   for (std::uint32_t k = 0; k < s.level_points.size(); ++k) {
@@ -75,8 +75,8 @@ Outcome check_rows(const ShellData& s) {
   return Done{};
 }
 
-// Children of a level's rows, in order, are the next level's rows, in order: so nothing is lost,
-// nothing is shared and no path runs in a circle.
+// Checks that the children of a level's rows, in order, are the next level's rows, in order. So no
+// row is lost or shared, and no path runs in a circle.
 Outcome check_children(const ShellData& s) {
   const std::size_t levels = s.level_points.size(), leaves = s.level_first[levels - 1];
   std::uint64_t expected = s.level_first[1];
@@ -146,7 +146,7 @@ Outcome check_point(const float p[3], const float n[3]) {
 }
 
 Outcome check_shell(const ShellData& shell) {
-  // In this order: each check relies on those before it.
+  // The order matters: each check relies on those before it.
   for (const auto check :
        {check_sizes, check_points, check_level_table, check_rows, check_children, check_spheres}) {
     if (Outcome fine = check(shell); !fine) return fine;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_file.cpp - the reader of shell_file.h. Nothing in a file is believed: counts are held
-// against its size before anything is reserved, and the whole shell is checked before it is given
-// out.
+// shell_file.cpp - the reader of shell_file.h. It trusts nothing in a file: it compares counts with
+// the file's size before it reserves memory, and it checks the whole shell before it returns it.
 #include "io/shell/shell_file.h"
 
 #include <bit>
@@ -31,7 +30,7 @@ struct Column {
   bool found = false;
 };
 
-// Values one after the other, from text or little-endian bytes.
+// Reads values one after the other, from text or little-endian bytes.
 class Body {
  public:
   Body(const MeshSource& source, const PlyHeader& header)
@@ -44,7 +43,7 @@ class Body {
   std::uint64_t left() const {
     return text_ ? scan_.rest().size() + scan_.behind().size() + 1 : bytes_.size() - at_;
   }
-  // Of one value: two bytes of text, a digit and a blank.
+  // The least size of a value; in text a digit and a blank.
   std::uint64_t smallest(PlyType type) const { return text_ ? 2 : size_of(type); }
 
   double next(PlyType type) {
@@ -157,7 +156,7 @@ void read_table(const MeshSource& source, Body& body, const PlyElement& element,
     if (column.real) column.real->reserve(element.count);
     if (column.whole) column.whole->reserve(element.count);
   }
-  if (row_bytes == 0) return;  // rows of nothing, however many
+  if (row_bytes == 0) return;  // empty rows need no memory
   for (std::uint64_t row = 0; row < element.count; ++row) {
     for (std::size_t i = 0; i < sinks.size(); ++i) {
       if (sinks[i])
@@ -168,7 +167,7 @@ void read_table(const MeshSource& source, Body& body, const PlyElement& element,
   }
 }
 
-// What the comments say that the elements cannot.
+// The comments of the header hold data that elements cannot.
 struct Remarks {
   std::string input_hash;
   std::optional<std::vector<std::uint32_t>> level_first;
@@ -210,12 +209,12 @@ Remarks read_remarks(const MeshSource& source, const PlyHeader& header) {
   return remarks;
 }
 
-struct VertexExtras {  // what `vertex` repeats of `node`
+struct VertexExtras {  // columns of `vertex` that repeat `node`
   std::vector<float> radius;
   std::vector<std::uint32_t> level, first_child, child_count;
 };
 
-// Repeated values must say the same, or one of the two is damaged.
+// If repeated values differ, one of the two is damaged.
 void check_extras(const MeshSource& source, const ShellData& shell, const VertexExtras& extras) {
   const std::vector<std::uint32_t> own = first_rows(shell);
   std::uint32_t level = 0;
@@ -261,10 +260,10 @@ ShellData without_tree(const MeshSource& source, ShellData read) {
   cloud.x = std::move(read.x), cloud.y = std::move(read.y), cloud.z = std::move(read.z);
   cloud.nx = std::move(read.nx), cloud.ny = std::move(read.ny), cloud.nz = std::move(read.nz);
   cloud.source = std::move(read.source);
-  for (std::size_t i = 0; i < cloud.x.size(); ++i) {  // other programs round their normals
+  for (std::size_t i = 0; i < cloud.x.size(); ++i) {  // other programs round normals
     const double x = cloud.nx[i], y = cloud.ny[i], z = cloud.nz[i];
     const double length = std::sqrt(x * x + y * y + z * z);
-    if (!(length > 0.5 && length < 2)) continue;  // build_shell says what is wrong
+    if (!(length > 0.5 && length < 2)) continue;  // build_shell will report it
     cloud.nx[i] = float(x / length);
     cloud.ny[i] = float(y / length);
     cloud.nz[i] = float(z / length);
@@ -310,7 +309,7 @@ ShellData read_all(const MeshSource& source) {
     }
   }
   if (!has_vertices) source.fail("it has no element 'vertex': there are no points in it");
-  if (has_nodes) {  // without them, these words mean anything
+  if (has_nodes) {  // without nodes these properties are another program's
     vertex.push_back({"radius", &extras.radius, nullptr, false});
     vertex.push_back({"level", nullptr, &extras.level, false});
     vertex.push_back({"first_child", nullptr, &extras.first_child, false});

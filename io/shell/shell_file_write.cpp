@@ -12,7 +12,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they lie in memory");
 
-// Rows go out in pieces: a shell of millions of points is not held twice.
+// Rows are written in pieces, so that a shell of millions of points is not in memory twice.
 class Rows {
  public:
   explicit Rows(std::ofstream& out) : out_(out) {}

@@ -2,8 +2,8 @@
 // tree.cpp - levels and sphere tree of given points.
 //
 // Levels are chosen from fine to coarse: each is a blue-noise subset of the one below it, so
-// S1 c S2 c ... holds by construction and each has its exact size. The coarse levels only steer
-// the traversal, so plain euclidean distance decides there, whatever the normals are.
+// S1 c S2 c ... holds by construction and each has its exact size. The coarse levels only steer the
+// traversal, so the Euclidean distance decides there and normals do not count.
 //
 //   rows:   level 1  [ a . . b . ]            a row is a node: a point and its sphere
 //           level 2  [ a x y . . b z . ]      the children of a: a itself, then the new points that
@@ -27,8 +27,8 @@ using Ids = std::vector<std::uint32_t>;
 
 constexpr std::uint32_t no_row = UINT32_MAX;
 
-// Between four (the natural ratio when the radius doubles) and three, the most levels that can be
-// had: fewer than asked for when there are too few points.
+// A level has 3 to 4 times the points of the one above it (4 is the ratio when the radius doubles).
+// If there are too few points for the wanted levels, the shell has as many as fit.
 struct LevelPlan {
   int levels;
   double ratio;
@@ -58,14 +58,14 @@ double diagonal(std::span<const OrientedPoint> points) {
   return std::sqrt(sum);
 }
 
-// Ids of each level, coarse first; empty when cancelled.
+// Ids of each level, coarse first; empty when the user cancelled.
 std::vector<Ids> choose_levels(std::span<const OrientedPoint> points, const TreeOptions& options) {
   const LevelPlan plan = plan_levels(points.size(), options.levels);
   std::vector<Ids> levels(std::size_t(plan.levels));
   Ids& finest = levels.back();
   finest.resize(points.size());
   for (std::uint32_t i = 0; i < finest.size(); ++i) finest[i] = i;
-  // Twice the squared diagonal is about the area of a bulky body; a guess too wide costs little.
+  // Twice the squared diagonal is about the area of a bulky body. A larger guess costs little.
   double radius = diagonal(points) * std::sqrt(2.0 / double(points.size()));
   if (options.spacing > 0) radius = options.spacing;
   std::vector<OrientedPoint> finer(points.begin(), points.end());
@@ -94,8 +94,8 @@ std::vector<Ids> choose_levels(std::span<const OrientedPoint> points, const Tree
   return levels;
 }
 
-// The first level in Morton order; all finer ones follow their parents, so neighbours in space stay
-// neighbours in memory.
+// Puts the first level into Morton order. Finer levels follow their parents, so neighbours in space
+// are neighbours in memory.
 void sort_along_curve(std::span<const OrientedPoint> points, const TreeOptions& options, Ids& ids) {
   float low[3] = {INFINITY, INFINITY, INFINITY}, extent = 0;
   for (int a = 0; a < 3; ++a) {
@@ -126,7 +126,7 @@ void sort_along_curve(std::span<const OrientedPoint> points, const TreeOptions& 
   for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = coded[i].index;
 }
 
-// The points of a level that are not in the coarser one, and for each the point it hangs from.
+// The points of a level that are not in the coarser one, and the parent of each.
 struct NewPoints {
   Ids ids, parents;
 };
@@ -149,7 +149,7 @@ NewPoints hang_new_points(std::span<const OrientedPoint> points, const Ids& coar
   return fresh;
 }
 
-// Rows of the next level: each row of this one followed by its new points.
+// The rows of the next level: each row of this one, followed by its new points.
 struct NextRows {
   Ids rows;                                 // ids
   std::vector<std::uint32_t> first, count;  // of the children, counted within the next level
@@ -175,8 +175,8 @@ NextRows next_rows(const Ids& rows, const NewPoints& fresh,
   return next;
 }
 
-// True distance, then up by more than any float evaluation of it can be off (METHOD.md, Sec. 6:
-// culling must never lose a descendant).
+// Radii are distances in double, rounded up by more than any evaluation in float can be off:
+// culling must never lose a descendant (METHOD.md, Sec. 6).
 float rounded_up(double distance) {
   if (distance == 0) return 0;
   return std::nextafter(float(distance * (1 + 1e-6)), INFINITY);
@@ -242,7 +242,7 @@ Result<ShellData> build_tree(std::span<const OrientedPoint> points,
     shell.level_first.push_back(first);
     shell.level_points.push_back(std::uint32_t(rows.size()));
     if (!alive(options.pulse)) return cancelled;
-    for (const auto id : rows) {  // points that are new here have no row yet
+    for (const auto id : rows) {  // points that are new on this level have no row yet
       if (row_of[id] != no_row) continue;
       place[id] = std::uint32_t(order.size());
       order.push_back(id);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tree.h - private to this box: the tree of points that are already laid out and checked.
+// tree.h - levels and sphere tree of points that are already checked. Private to this folder.
 #pragma once
 #include <span>
 
@@ -11,7 +11,7 @@ namespace h6::io {
 
 struct TreeOptions {
   int levels = 7;
-  double spacing = 0;  // of the points, when known [m]; 0: guessed
+  double spacing = 0;  // of the points [m]; 0: not known
   std::uint64_t seed = 1;
   unsigned threads = 0;
   Pulse* pulse = nullptr;  // may be null

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// triangles.cpp - candidates on the triangles of a mesh, evenly by area, and which of them
-// the outside reaches.
+// triangles.cpp - candidates on the triangles of a mesh, uniform by area, where the outside
+// reaches.
 #include <algorithm>
 #include <cmath>
 
@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::size_t slice_size = 4096;
 
-// A number in [0, 1) of the top bits.
+// A number in [0, 1) from the top bits.
 double unit(std::uint64_t bits) { return double(bits >> 11) * 0x1p-53; }
 
-// Running sum of weights (triangles + 1): candidates fall in proportion to area, but wires and
-// slivers get more: along a strip far narrower than the spacing, area alone leaves holes. `spacing`
-// is a rough one [m].
+// Running sum of weights (triangles + 1). Candidates fall in proportion to area, but wires and
+// slivers get more: area alone leaves holes along a strip far narrower than the spacing. `spacing`
+// may be rough [m].
 std::vector<double> weigh(const Mesh& mesh, const FaceTable& faces, double spacing) {
   const std::size_t count = mesh.triangles.size();
   std::vector<double> sum(count + 1, 0);
@@ -42,9 +42,9 @@ std::vector<double> weigh(const Mesh& mesh, const FaceTable& faces, double spaci
 }
 
 // Calls take(slice, i, triangle, place) for all candidates, slices in parallel. Candidate i lies in
-// the i-th of `count` equal parts of the running weight, within its triangle by the R2 sequence
-// (additive recurrence with the plastic number): even in large triangles, even over many small
-// ones, and a function of i alone, so that threads do not matter.
+// the i-th of `count` equal parts of the running weight; its place in the triangle follows the R2
+// sequence (additive recurrence with the plastic number). So candidates are even in large triangles
+// and over many small ones, and each depends on i alone, not on threads.
 template <class Take>
 void scatter(const Mesh& mesh, const FaceTable& faces, const std::vector<double>& weights,
              std::size_t count, const Demand& demand, Pulse& pulse, const Take& take) {
@@ -77,13 +77,13 @@ OrientedPoint oriented(const Vec3& p, const Vec3& n, double sign) {
           {float(sign * n.x), float(sign * n.y), float(sign * n.z)}};
 }
 
-// Judges sides of the surface by a look at the field half a voxel outside of its zero set: what is
-// clearly outside there is reached. Walls of gaps that the zero set does not enter are not.
+// Judges the sides of the surface. A side is reached if the field is clearly positive half a voxel
+// outside its zero set. So walls of gaps that the zero set does not enter are not reached.
 class Judge {
  public:
   Judge(const FaceTable& faces, const Reach& reach) : faces_(faces), reach_(reach) {}
 
-  // Appends the sides of a candidate that are reached; how many.
+  // Appends the sides of a candidate that are reached and returns how many they are.
   int operator()(std::size_t t, const Vec3& place, RawVector<OrientedPoint>& out_points) const {
     const Vec3& n = faces_.inward[t];
     int sides = 0;
@@ -109,8 +109,8 @@ class Judge {
     double d = 0;
     return reach_.field->distance(look(place, out, 0.5), d) && d > 0.25;
   }
-  // The field's slope a little outside. Differences over two whole voxels: what trilinear values
-  // are wrong by is the same at both ends.
+  // The field's slope a little outside, by differences over two whole voxels: the error of
+  // trilinear values is the same at both ends.
   bool outward(const Vec3& place, const Vec3& out, Vec3& slope) const {
     const Vec3 at = look(place, out, 1.1);
     double d[6];
@@ -122,7 +122,7 @@ class Judge {
     }
     slope = {d[0] - d[1], d[2] - d[3], d[4] - d[5]};
     const double length = norm(slope);
-    if (!(length > 1)) return false;  // of 2: between walls that face each other
+    if (!(length > 1)) return false;  // 2 is exact; less than half: between walls face to face
     slope = {slope.x / length, slope.y / length, slope.z / length};
     return true;
   }
@@ -131,7 +131,7 @@ class Judge {
   const Reach& reach_;
 };
 
-struct Part {  // of one slice
+struct Part {  // the candidates of one slice
   RawVector<OrientedPoint> points;
   RawVector<std::uint32_t> source;
   std::size_t hidden = 0;
@@ -170,7 +170,7 @@ Result<Candidates> sample_triangles(const Mesh& mesh, const FaceTable& faces, co
   Candidates out;
   double area = 0;
   for (const double a : faces.area) area += a;
-  double share = 1;  // sides that are reached, by triangles
+  double share = 1;  // reached sides per candidate
   if (reach.field) {
     constexpr std::size_t pilot = 65536;
     const std::vector<double> weights = weigh(mesh, faces, INFINITY);

@@ -31,8 +31,8 @@ FieldData must_bake(const Mesh& mesh, const FieldBake& options) {
 TEST_CASE(
     "bake_field: at a million random points the far bound is safe, and at its own nodes within "
     "a third of a voxel of the truth on average") {
-  // |far| is 1-Lipschitz-safe from each corner of a cell: the best corner less the way to it. On
-  // average over the corners themselves it must not be loose.
+  // Distances are 1-Lipschitz, so each corner's bound minus the way to it must be a bound too. At
+  // the corners themselves the bound must be tight on average.
   const auto check = [](const Mesh& mesh, const FieldBake& options, int points) {
     const FieldData field = must_bake(mesh, options);
     const Judge judge(mesh);

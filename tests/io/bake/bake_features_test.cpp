@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distances where triangles share edges and corners in every way: each node is weighed only with
-// triangles that answer for the feature it is nearest to.
+// Distances where triangles share edges and corners in every way: a node is measured only against
+// triangles that own the edge or corner nearest to it.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ using h6::io::FieldBake;
 
 namespace {
 
-// Of the nodes outside, within the band: how wrong the worst is [voxel].
+// The worst error at nodes outside, within the band [voxel].
 double worst_outside(const Mesh& mesh, int voxels) {
   FieldBake options;
   options.voxels = voxels;
@@ -38,7 +38,7 @@ double worst_outside(const Mesh& mesh, int voxels) {
   return worst;
 }
 
-// Triangles over the same few points, as it comes: edges of many faces, corners of more.
+// Random triangles over a few points: edges of many faces, corners of more.
 Mesh random_complex(int seed, std::uint32_t points, std::size_t triangles, double flat) {
   Random random(seed);
   Mesh mesh;

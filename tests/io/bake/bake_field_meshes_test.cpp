@@ -51,7 +51,7 @@ const Part kParts[] = {
     {"deformable/simpleBridge.obj", Unit::m, 192},
 };
 
-// Points spread over the triangles by area.
+// Random points on the triangles, uniform by area.
 class Surface {
  public:
   explicit Surface(const Mesh& mesh) : mesh_(mesh) {
@@ -85,8 +85,8 @@ struct Table {
   std::size_t wrong_winding = 0, wound = 0, overlaps = 0, cavities = 0;
 };
 
-// A sample's distance to the mesh, as far as the contract says what it is: outside u - offset;
-// inside a closed mesh at most beyond u where walls are buried; inside a soup at least offset - u.
+// The error of a sample, as far as bake_field.h defines it: outside it is u - offset; inside a
+// closed mesh it is u, or more where walls are buried; inside a soup it is at least offset - u.
 void check_node(const FieldData& f, double d, double u, Table& table) {
   const double h = f.voxel_size;
   ++table.nodes;
@@ -144,8 +144,8 @@ Table examine(const Mesh& mesh, const FieldData& f, const std::function<bool(Vec
     if (f.sign_mode == "closed" && u > 1e-4 * h) {
       ++table.voted;
       const bool odd = judge.inside_by_parity(at, random);
-      // Where shells overlap parity is even though it is inside: the winding number knows. Cavities
-      // are solid by definition: a field four times finer must not reach them either.
+      // Where shells overlap, parity is even inside; the winding number is right. Cavities are
+      // solid by definition, so a field four times finer must not reach them either.
       if ((d < 0) != odd) {
         const bool twice = d < 0 && std::fabs(judge.winding(at)) > 1.5;
         const bool cavity = d < 0 && !twice && finer(at);

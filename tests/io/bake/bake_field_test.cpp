@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields of meshes made here: distances, sides, bounds and bad input.
+// Fields of generated meshes: distances, sides, bounds and bad input.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -48,7 +48,7 @@ bool same_bits(const FieldData& a, const FieldData& b) {
          same(a.far_grid, b.far_grid) && same(a.part, b.part);
 }
 
-// Of a closed mesh: every sample is the distance to the mesh, with the sign of parity.
+// Closed meshes: every sample is the distance to the mesh, with the sign of parity.
 struct Verdict {
   double worst = 0;  // [voxel], where u is within reach
   std::size_t wrong_side = 0, nodes = 0, inside = 0;
@@ -144,7 +144,7 @@ TEST_CASE("bake_field: inside-out, mixed and doubled meshes give the same field"
       worst = std::max(worst, std::fabs(double(again.samples[i]) - field.samples[i]));
       CHECK((again.samples[i] < 0) == (field.samples[i] < 0));
     }
-    CHECK(worst < 1e-5 * field.voxel_size);  // a corner elsewhere in the list: the last bit only
+    CHECK(worst < 1e-5 * field.voxel_size);  // the order of corners changes the last bits
   }
 }
 
@@ -176,7 +176,7 @@ TEST_CASE("bake_field: two overlapping boxes are one solid, and the walls inside
     return p.x > low.x && p.y > low.y && p.z > low.z && p.x < high.x && p.y < high.y &&
            p.z < high.z;
   };
-  // The way out: to points of either surface that are not within the other box.
+  // The way out leads to points of either surface that are not inside the other box.
   std::vector<Vec3> skin;
   const std::pair<Vec3, Vec3> boxes[2] = {{{0, 0, 0}, {1, 0.6, 0.6}},
                                           {{0.5, 0.1, 0.1}, {1.5, 0.5, 0.5}}};
@@ -216,8 +216,8 @@ TEST_CASE("bake_field: two overlapping boxes are one solid, and the walls inside
 
 TEST_CASE(
     "bake_field: where walls are buried aslant, no node is deeper than the next outside is far") {
-  // Part of the second box is buried in the first: bricks that know of it lie beside bricks that do
-  // not, and the way out leads through those.
+  // A part of the second box is buried in the first. Bricks with a buried sheet lie beside bricks
+  // without one, and the way out leads through the latter.
   struct Second {
     Vec3 low, high;
     double turn, tilt;

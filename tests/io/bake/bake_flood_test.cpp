@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flood against one that walks from node to node.
+// Compares the flood with a simple walk from node to node.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -15,12 +15,12 @@ using h6::kernels::kBrickSamples;
 
 namespace {
 
-// Bricks with and without a row, nodes that are passable and edges that are crossed, as they come.
+// Random bricks with and without a row, passable nodes and crossed edges.
 struct Rock {
   Grid grid;
   NarrowBand band;
   Masks free;
-  std::vector<std::uint8_t> wet, wet_cell;  // of the walk: nodes; cells without a row, a tag
+  std::vector<std::uint8_t> wet, wet_cell;  // the walk's nodes; tags of cells without a row
 
   struct Kind {
     std::array<int, 3> bricks;
@@ -64,7 +64,7 @@ struct Rock {
     return r < 0 ? over == Flood::Over::cells : free[std::size_t(r)].get(in_brick(n));
   }
 
-  // From these nodes, tag by tag as the flood is asked.
+  // Walks on from these nodes, with the same tags as the flood.
   void walk(std::vector<std::array<int, 3>> from, Flood::Edges edges, Flood::Over over,
             std::uint8_t tag) {
     const auto enter = [&](const std::array<int, 3>& n) {
@@ -105,8 +105,8 @@ struct Rock {
   }
 };
 
-// Wide and narrow, more than a word of cells in a line, a maze of whole bricks, porous rock in
-// which water has far to go.
+// Wide and narrow grids, lines of more than a word of cells, a maze of whole bricks, and porous
+// rock with long ways.
 constexpr Rock::Kind kKinds[] = {
     {{7, 6, 5}, 0.5, 0.3, 0.9, 0.2},   {{70, 4, 3}, 0.55, 0.1, 0.0, 0.0},
     {{130, 3, 2}, 0.6, 0.3, 0.5, 0.5}, {{64, 3, 6}, 0.7, 0.2, 0.45, 0.3},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Holes of known width: without --seal a part drains through them, with it the part holds, and
-// nothing else moves.
+// Holes of known width: a part drains through them without --seal and holds with it, and nothing
+// else changes.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ FieldData must_bake(const Mesh& mesh, const FieldBake& options, FieldBakeReport*
   return *field;
 }
 
-// A unit box of n x n squares a side, less those whose middle `drop` names.
+// A unit box of n x n squares a side, without those whose middle `drop` selects.
 template <class Drop>
 Mesh box_without(int n, Drop&& drop, Vec3 size = {1, 1, 1}) {
   Mesh mesh = box({0, 0, 0}, size, n);
@@ -63,7 +63,7 @@ bool within(Vec3 p, Vec3 low, Vec3 high) {
   return p.x > low.x && p.y > low.y && p.z > low.z && p.x < high.x && p.y < high.y && p.z < high.z;
 }
 
-// Which side, wherever the field has a brick or a node of the far grid.
+// The side of a node, from its brick or from the far grid.
 bool inside(const FieldData& f, Vec3 p) {
   const Vec3 g = (1 / f.voxel_size) * (p - f.origin);
   if (const float* d =
@@ -100,7 +100,7 @@ TEST_CASE("seal: a box with a hole drains without it and holds with it") {
     CHECK_FALSE(inside(must_bake(mesh, options_with(0)), middle));
     CHECK_FALSE(inside(must_bake(mesh, options_with(0.5 * width)), middle));
     FieldBakeReport report;
-    // The hole's diagonal lets no ball of that width pass its sides.
+    // A ball as wide as the hole's diagonal cannot pass.
     const FieldData held = must_bake(mesh, options_with(1.3 * width), &report);
     CHECK(inside(held, middle));
     CHECK(wrong_nodes(held, {1, 1, 1}, hole, 0.8 * width) == 0);
@@ -142,7 +142,7 @@ TEST_CASE("seal: a mesh without holes is unchanged, bit for bit, concave corners
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
   };
   FieldBake plain = options_with(0), sealed = options_with(8 * kVoxel);
-  plain.sign = sealed.sign = h6::io::SignMode::flood;  // or a closed mesh would not be looked at
+  plain.sign = sealed.sign = h6::io::SignMode::flood;  // else sealing ignores a closed mesh
   Mesh room = box({0, 0, 0}, {1, 1, 1}, 4);            // a pit: five concave corners and edges
   std::erase_if(room.triangles, [&](const auto& t) {
     return std::all_of(t.begin(), t.end(),

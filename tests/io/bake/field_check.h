@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// field_check.h - meshes made here, and an independent judge of distance and side for field tests.
+// field_check.h - generated meshes, and an independent judge of distance and side for field tests.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -30,7 +30,7 @@ struct Random {
   std::size_t below(std::size_t n) { return std::size_t(engine() % n); }
 };
 
-// ---- meshes -------------------------------------------------------------------------------------
+// ---- Meshes -------------------------------------------------------------------------------------
 
 inline void add(Mesh& mesh, const Mesh& more) {
   const std::uint32_t base = std::uint32_t(mesh.vertices.size());
@@ -125,7 +125,7 @@ inline Mesh shifted(Mesh mesh, Vec3 by) {
   return mesh;
 }
 
-// ---- the judge ----------------------------------------------------------------------------------
+// ---- The judge ----------------------------------------------------------------------------------
 
 // Nearest point by the seven regions of the triangle (C. Ericson, Real-Time Collision Detection).
 inline double distance(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
@@ -273,7 +273,7 @@ class Judge {
   std::vector<Node> nodes_;
 };
 
-// ---- fields -------------------------------------------------------------------------------------
+// ---- Fields -------------------------------------------------------------------------------------
 
 inline Vec3 node_position(const FieldData& f, std::array<int, 3> n) {
   return f.origin + Vec3{f.voxel_size * n[0], f.voxel_size * n[1], f.voxel_size * n[2]};
@@ -302,7 +302,7 @@ inline void for_nodes(const FieldData& f,
         if (const float* d = node_sample(f, {i, j, k})) each({i, j, k}, double(*d));
 }
 
-// Trilinear between the nodes around p; false where one is missing.
+// Interpolates between the nodes around p; returns false where one is missing.
 inline bool interpolate(const FieldData& f, Vec3 p, double& value) {
   const Vec3 g = (1 / f.voxel_size) * (p - f.origin);
   const std::array<int, 3> n = {int(std::floor(g.x)), int(std::floor(g.y)), int(std::floor(g.z))};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The triangle and the part that each brick is named after: the nearest of the mesh as it was
-// given.
+// Each brick is named after the nearest triangle of the given mesh, and after its part.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -33,7 +32,7 @@ Vec3 middle_of(const FieldData& f, std::size_t cell) {
                                         8.0 * double(cell / x / y) + 3.5};
 }
 
-// Bricks whose triangle is not the nearest one [count], and those without a triangle.
+// Counts bricks whose triangle is not the nearest one, and bricks without a triangle.
 struct Judged {
   std::size_t bricks = 0, near = 0, wrong = 0, nameless = 0, wrong_part = 0;
 };
@@ -53,7 +52,7 @@ Judged judge(const FieldData& f, const Mesh& mesh) {
     double least = 1e300;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
       least = std::min(least, distance_to(mesh, t, p));
-    // Far from all of them, at the edge of the band, the bake has not looked at every one.
+    // At the edge of the band the bake does not see every triangle.
     const double slack = least < 8 * f.voxel_size ? 1e-4 : 1;
     j.wrong += distance_to(mesh, std::size_t(f.triangle[r]), p) > least + slack * f.voxel_size;
     j.near += least < 8 * f.voxel_size;
@@ -91,7 +90,7 @@ TEST_CASE("each brick is named after the nearest triangle, with parts and withou
 }
 
 TEST_CASE("triangles keep the numbers they have in the mesh, whatever the bake drops") {
-  // Flat ones and copies stand in front and in between.
+  // Flat triangles and copies come first and in between.
   const Mesh sound = sphere({0.01, 0, 0}, 0.02, 6);
   Mesh mesh = sound;
   mesh.triangles.clear();

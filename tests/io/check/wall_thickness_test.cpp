@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Walls and gaps of bodies whose thickness is known.
+// Walls and gaps of bodies of known thickness.
 #include <doctest/doctest.h>
 
 #include <cmath>

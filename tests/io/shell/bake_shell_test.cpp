@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shells: exact numbers, blue noise, inward normals, nested levels and spheres that lose nothing.
+// Shells have exact numbers of points, blue noise, inward normals, nested levels and whole spheres.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ double distance_to_plane(const Mesh& mesh, const ShellData& s, std::size_t i) {
   const auto& f = mesh.triangles[s.source[i]];
   const Vec3 a = mesh.vertices[f[0]], b = mesh.vertices[f[1]], c = mesh.vertices[f[2]];
   const Vec3 n = cross(b - a, c - a), p = point(s, i);
-  // Within the triangle: never on the outer side of an edge by more than rounding.
+  // Inside the triangle: beyond no edge by more than rounding.
   double out = std::abs(dot(p - a, n)) / std::sqrt(dot(n, n));
   const Vec3 corners[3] = {a, b, c};
   for (int k = 0; k < 3; ++k) {

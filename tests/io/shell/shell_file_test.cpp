@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shell files: back to the bit, readable by others, and no file can do harm.
+// Shell files come back to the bit, other programs can read them, and no file does harm.
 #include <doctest/doctest.h>
 
 #include <unistd.h>
@@ -26,7 +26,7 @@ using h6::io::write_shell;
 
 namespace {
 
-struct Folder {  // gone again when the test ends
+struct Folder {  // removed when the test ends
   fs::path path = fs::temp_directory_path() / ("hapsix-shell-test-" + std::to_string(getpid()));
   Folder() { fs::create_directories(path); }
   ~Folder() { fs::remove_all(path); }
@@ -224,7 +224,7 @@ TEST_CASE("two thousand damaged files: none does harm, what is accepted is whole
   for (int i = 0; i < 2000; ++i) {
     std::string bytes = good[i % 2];
     for (std::uint64_t flips = 1 + random() % 4; flips > 0; --flips) {
-      // Half of them in the header, where they do most.
+      // Half of the damage is in the header, where it matters most.
       const std::size_t range = random() % 2 ? bytes.size() : body_of(bytes);
       bytes[random() % range] ^= char(1u << random() % 8);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which surface a shell lies on: what the outside reaches, of sound meshes and of soups.
+// A shell lies on the surface that the outside reaches, of sound meshes and of soups.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -110,7 +110,7 @@ Mesh turned_at_random(Mesh mesh) {
   return mesh;
 }
 
-// Every vertex of every triangle its own, moved by a hair: no edge is shared.
+// Gives every triangle its own vertices and moves them by a hair, so that no edge is shared.
 Mesh cracked(const Mesh& mesh, double hair) {
   Mesh out;
   std::uint64_t n = 0;
@@ -126,7 +126,7 @@ Mesh cracked(const Mesh& mesh, double hair) {
   return out;
 }
 
-// Two boxes through each other, sheets through both, one of them there twice.
+// Two boxes that overlap, and sheets through both, one of them twice.
 Mesh messy() {
   Mesh mesh = box({0, 0, 0}, {1, 1, 1});
   add(mesh, inside_out(box({0.6, 0.6, 0.6}, {1.4, 1.4, 1.4})));

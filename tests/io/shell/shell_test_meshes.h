@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_test_meshes.h - closed bodies whose surface and inside are known, and what a sphere tree
-// has to be, told without the code under test.
+// shell_test_meshes.h - closed bodies with known surface and inside, and checks of a sphere tree
+// that share no code with the bake.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -99,9 +99,9 @@ inline Mesh inside_out(Mesh mesh) {
   return mesh;
 }
 
-// Least and mean distance to the nearest other point among the first `count`; `one_side`: of those
-// whose normals are less than 134 degrees apart, as the sides of a sheet are sampled each for
-// itself.
+// Least and mean distance to the nearest other point among the first `count`. `one_side`: counts
+// only points whose normals are less than 134 degrees apart, since the sides of a sheet are sampled
+// separately.
 struct Spacing {
   double least = INFINITY, mean = 0;
 };
@@ -134,7 +134,7 @@ inline Spacing spacing(const ShellData& s, std::size_t count, bool one_side = fa
   return out;
 }
 
-// The first promise of h6ShellDef that is broken; empty: none.
+// The first promise of h6ShellDef that the shell breaks; empty: none.
 inline const char* broken_promise(const ShellData& s) {
   const std::size_t levels = s.level_points.size();
   if (s.level_first.size() != levels + 1 || levels == 0 || s.level_first[0] != 0)
