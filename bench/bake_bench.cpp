@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // bake_bench.cpp - mesh in memory to asset in memory: bake/MESH/voxels:N/threads:T and
-// bake/MESH/points:N/threads:T; bake/openvdb/... is OpenVDB's meshToLevelSet on the same mesh and
-// voxel, in the same run. Meshes are made here; the files of $HAPSIX_BENCH_MESHES (a list separated
-// by colons) are baked too, and with HAPSIX_BENCH_SOUPS=1 the engine bay and the landing gear.
+// bake/MESH/points:N/threads:T. bake/openvdb/... is OpenVDB's meshToLevelSet on the same mesh and
+// voxel, in the same run. Meshes are generated; $HAPSIX_BENCH_MESHES (a list of files separated by
+// colons) adds more, and HAPSIX_BENCH_SOUPS=1 adds the engine bay and the landing gear.
 //
-// A field is checked before its time is told: distances at nodes outside against all triangles in
-// double, sides where a generated input says what is solid. peak_MB is that of the process while it
-// baked first, the mesh and what the benchmark holds included; ms_STAGE is the wall time of a
-// stage. Times are with memory that the process has: five bakes go before, untimed, and what they
-// free is kept. Getting it from the machine costs .13 ms a megabyte here at best, and where a
-// virtual machine has given idle memory back to its host 2 ms and more, whoever is first. ms_cold
-// is the time of a bake that has to, on as many threads; OpenVDB is timed in the same way.
+// Before a time is reported, the field is checked: distances at nodes outside against all triangles
+// in double, sides where a generated input says what is solid. peak_MB is the peak of the process
+// during the first bake, with the mesh and the benchmark's own data; ms_STAGE is the wall time of a
+// stage. Times exclude the cost of getting memory from the machine (0.13 ms per MB at best, more
+// than 2 ms where a virtual machine has returned idle memory to its host): five untimed bakes come
+// first, and the process keeps what they free. ms_cold is the first bake, which includes that cost.
+// OpenVDB is timed in the same way.
 //
 // bake/scaling/MESH/voxels:N bakes with one thread and with two in turn, since machines change
-// their speed: how many times faster two are, as a whole and stage by stage, medians over the
+// their speed, and reports how many times faster two are, in all and by stage, as medians over the
 // rounds. Both fields must be the same bits.
 #include <benchmark/benchmark.h>
 
@@ -46,7 +46,7 @@ namespace {
 
 using namespace h6;
 
-// A ring with teeth, two triangles a cell: closed, of any size.
+// A closed ring with teeth, two triangles per cell.
 io::Mesh gear(int around, int across) {
   io::Mesh mesh;
   for (int i = 0; i < around; ++i)
@@ -68,7 +68,7 @@ io::Mesh gear(int around, int across) {
   return mesh;
 }
 
-// Linux: forgets the peak, and what earlier benchmarks left with the allocator; reads it [MB].
+// Linux: resets the peak and frees memory that earlier benchmarks left; reads the peak [MB].
 void forget_peak() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -86,7 +86,7 @@ double peak_megabytes() {
   return 0;
 }
 
-// While one of these lives, memory that is freed stays with the process.
+// While one of these lives, the process keeps memory that is freed.
 class KeepMemory {
  public:
   KeepMemory() { set(0, -1); }
@@ -111,7 +111,7 @@ struct Input {
   std::vector<io::IndustrialTruth::Probe> inside, outside;
 };
 using InputPtr = std::shared_ptr<const Input>;
-// Made when the first benchmark asks for it, and kept.
+// Makes the input when the first benchmark asks for it, and keeps it.
 using Lazy = std::function<InputPtr()>;
 Lazy once(Lazy make) {
   return [make, made = std::make_shared<InputPtr>()] {
@@ -133,7 +133,7 @@ double distance_to_all(const io::Mesh& mesh, const double (&p)[3]) {
   return std::sqrt(least);
 }
 
-// Worst error at some nodes of the band outside [voxel].
+// The worst error at some nodes of the band outside [voxel].
 double worst_error(const io::FieldData& f, const io::Mesh& mesh) {
   constexpr std::size_t kNodes = 24;
   double worst = 0;
@@ -170,7 +170,7 @@ bool is_inside(const io::FieldData& f, const h6Vec3& p) {
   return f.far_grid[(coarse[2] * (by + 1) + coarse[1]) * (bx + 1) + coarse[0]] < 0;
 }
 
-// Probes with so much room that the offset and the voxel do not matter.
+// Counts wrong probes among those with so much room that offset and voxel do not matter.
 std::size_t wrong_sides(const io::FieldData& f, const Input& input) {
   const double room = f.offset + 8 * f.voxel_size;
   std::size_t wrong = 0;
@@ -193,8 +193,8 @@ void bake_field(benchmark::State& state, const Lazy& make, int voxels, unsigned 
   state.counters["ms_cold"] = 1e-6 * double(sched::now_ns() - begin);
   const double peak = peak_megabytes();
   const KeepMemory keep;
-  // As below: the allocator goes through a few places for large blocks until it meets none that is
-  // new.
+  // Without a report, as below: the allocator uses several places for large blocks before all of
+  // them have been touched.
   for (int i = 0; i < 4; ++i)
     if (auto field = io::bake_field(input->mesh, options, nullptr)) last = std::move(*field);
   for (auto _ : state) {
@@ -354,7 +354,7 @@ InputPtr industrial(io::IndustrialInput&& made) {
   add_fields("gear100k", ring, {256, 512}, true);
   add_shells("gear100k", ring);
   add_scaling("gear100k", ring, 512);
-  // Large inputs take seconds to bake, and their peer minutes: only when asked for.
+  // Large inputs take seconds to bake and minutes by OpenVDB, so they are optional.
   const char* which = std::getenv("HAPSIX_BENCH_SOUPS");
   if (which != nullptr && *which != '\0' && *which != '0') {
     constexpr std::size_t kProbes = 400;

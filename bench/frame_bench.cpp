@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // frame_bench.cpp - whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold.
 //
-// The tool is pushed into the gap until it has the contacts asked for, then held there. Before a
-// time is reported, the contacts of the frame are compared with a brute-force pass over all points.
+// The hand pushes the tool into the gap until it has the wanted contacts and then holds it. Before
+// a time is reported, the frame's contacts are compared with a brute-force test of all points.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ h6DeviceSample sample_at(double t) {
   return sample;
 }
 
-// Follows the scene's hand until the tool has `contacts`, at most to the path's end.
+// Follows the scene's hand until the tool has `contacts`, or to the end of the path.
 Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6DeviceSample* held) {
   h6SessionDef def = alpha()->session_def();
   def.contact.method = method;
@@ -56,8 +56,8 @@ Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6D
   return session;
 }
 
-// The next frame's contacts against all points at the pose before it. Points within a thousandth of
-// a voxel of the surface may fall on either side: they are sampled here along another path.
+// Compares the next frame's contacts with all points at the pose before it. Points within a
+// thousandth of a voxel of the surface may differ, since this samples them by another code path.
 bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   const h6Pose pose = h6GetBody(session, 1).pose;
   std::vector<double> points, depth(alpha()->watched_points.size());

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// hand_over_bench.cpp - what it costs to share a frame's work with the resident helper:
-//     sched/hand_over               the way of an empty slice there and of the news back
+// hand_over_bench.cpp - the cost of sharing a frame's work with the resident helper:
+//     sched/hand_over               an empty slice, from the caller to the helper and back
 //     sched/sums/us:N               arithmetic in registers, in slices of 1 us
-//     sched/columns/rows:N          columns that the caller has just written, read by whoever sums,
-//                                   and the caller reads what came out
+//     sched/columns/rows:N          sums of columns that the caller has just written; the caller
+//                                   reads the results
 //
-// Pinned to one core as a haptic thread is; a frame's worth of jobs after another. The results are
-// compared with the caller's own before times are reported.
+// The caller is pinned to one core like a haptic thread. Before times are reported, the results are
+// compared with the caller's own.
 #include <benchmark/benchmark.h>
 
 #include <sched.h>
@@ -50,7 +50,7 @@ double middle(std::vector<double>& us) {
   return us[us.size() / 2];
 }
 
-// The helper is made before the caller is pinned: it would be on the same core.
+// The helper starts before the caller is pinned, or it would inherit the caller's core.
 void hand_over(benchmark::State& state) {
   FrameTeam team(2);
   const Pinned pinned;
@@ -91,7 +91,7 @@ void compare(benchmark::State& state, const Before& before, const Job& job) {
   double slices = 0;
   for (auto _ : state) {
     for (int i = 0; i < 2 * kJobs; ++i) {
-      // A hundred with each in turn: the machine is the same for both.
+      // A hundred with each in turn, so that changes of the machine's speed affect both.
       FrameTeam& team = i / 100 % 2 ? two : one;
       team.begin_frame(now_ns());
       before(i);

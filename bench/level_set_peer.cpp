@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// level_set_peer.cpp - compiled with the flags of everything else, so that times compare.
+// level_set_peer.cpp - compiled with the same flags as the bake, so that times can be compared.
 #include "level_set_peer.h"
 
 #include <oneapi/tbb/global_control.h>

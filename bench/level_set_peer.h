@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// level_set_peer.h - the same job done by OpenVDB's meshToLevelSet, for comparison.
+// level_set_peer.h - OpenVDB's meshToLevelSet, the peer of our field bake.
 #pragma once
 #include <cstddef>
 
@@ -7,7 +7,7 @@
 
 namespace h6::bench {
 
-// Half-width 3 voxels, on so many threads of this process. Returns the number of leaf bricks.
+// Half-width 3 voxels, on `threads` threads. Returns the number of leaf bricks.
 std::size_t mesh_to_level_set(const io::Mesh& mesh, double voxel_size, unsigned threads);
 
 }  // namespace h6::bench

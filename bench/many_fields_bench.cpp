@@ -3,10 +3,10 @@
 // frame/many_fields/fields:N/threads:T/slow|fast
 // frame/two_hands/contacts:N/threads:T/slow|fast
 //
-// A ball of 56,823 points among N smaller balls, each an obstacle of its own; one in eight touches.
-// Slow: 0.01 voxel a frame; fast: the frame before stood a metre away, so nothing is remembered.
-// Two hands: each presses such a ball into one smaller ball, N contacts each.
-// One thread and two must give the same bits before a time is reported.
+// A ball of 56,823 points touches one in eight of N smaller balls, each an obstacle of its own.
+// Slow: 0.01 voxel a frame. Fast: the frame before was a metre away, so nothing can be reused. Two
+// hands: each presses such a ball into one smaller ball, N contacts each. Before a time is
+// reported, one thread and two must give the same bits.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ Session open(const Balls& balls, int fields, unsigned threads) {
   return Session(h6CreateSession(balls.model.handle, &def, nullptr));
 }
 
-// All hands alike.
+// The same sample for every hand.
 void step(h6Session* session, int i, bool fast) {
   if (fast) {
     const h6DeviceSample away = test::hand_at(test::pose(1, 0, 0));
@@ -92,7 +92,7 @@ Session open_hands(double deep, unsigned threads) {
   return Session(h6CreateSession(balls().model.handle, &def, nullptr));
 }
 
-// As deep as it takes for each hand to have so many contacts.
+// The depth at which each hand has so many contacts.
 double depth_for(double contacts) {
   double low = 0, high = 8;
   for (int i = 0; i < 20; ++i) {

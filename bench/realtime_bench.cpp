@@ -3,24 +3,23 @@
 //     realtime/alpha|socket/RATEHz/idle|loaded/threads:T/spin:US
 //     realtime/arithmetic/RATEHz/idle|loaded
 //
-// The alpha's hand goes its way there and back. 60 s at 1 kHz, 20 s at 4 kHz; then the same frames
-// for a sixth of that on a std::thread that sleeps until the next tick. HAPSIX_BENCH_SECONDS=3 in
-// the environment: 3 s. Socket: 10,000 contacts on a part that follows the hand exactly, with a
-// budget of 0.8 periods (anytime mode). Load, on both cores: a host that saturates TBB and a
-// streamer of memory. Before times are reported all frames are stepped again on one thread and must
-// have the same hashes. HAPSIX_BENCH_LATE=1: each late frame is printed, stage by stage, with its
-// page faults and the core's speed before and after it.
+// Alpha: the hand follows its path there and back, 60 s at 1 kHz or 20 s at 4 kHz. Then the same
+// frames run for a sixth of that on a std::thread that sleeps until the next tick.
+// HAPSIX_BENCH_SECONDS=3 sets the time to 3 s. Socket: 10,000 contacts on a part that follows the
+// hand exactly, with a budget of 0.8 periods (anytime mode). Load: a host that saturates TBB and a
+// streamer of memory, on both cores. Before times are reported, all frames are stepped again on one
+// thread and must have the same hashes. HAPSIX_BENCH_LATE=1 prints each late frame stage by stage,
+// with its page faults and the core's speed before and after it.
 //
-// late_compute: of which the thread's CPU time was over the period. On a virtual machine that clock
-// runs on while the host has the core and does not say so, and in interrupts. So these frames are
-// timed once more when all are stepped again: late_compute_again is how many of them take longer
-// than a period then too, again_max_us what the longest takes. unstolen_wakeup: of frames without a
-// sign of stolen time, that is wall and CPU time agree and the machine's count of stolen ticks
-// stands still about then.
+// late_compute: frames whose CPU time was over the period. On a virtual machine that clock also
+// counts interrupts and time that the host took without saying so. So those frames are timed again
+// when all are stepped again: late_compute_again is how many take longer than a period then too,
+// again_max_us the longest. unstolen_wakeup: wake-ups of frames without a sign of stolen time, that
+// is, wall and CPU time agree and the machine's count of stolen ticks did not move.
 //
-// Arithmetic: on the same thread a sum in registers that takes a coarse frame's time and touches no
-// memory. It cannot be late by its own work, so what it counts as that is what the machine took
-// from it and put on its CPU time; the rows above have that too.
+// Arithmetic: a sum in registers on the same thread, which takes a coarse frame's time and touches
+// no memory. It cannot be late by its own work, so its late_compute shows what the machine took and
+// counted as CPU time; the other rows contain as much.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
@@ -50,7 +49,7 @@ double seconds_at(double rate) {
   return seconds > 0 ? seconds : rate > 1000 ? 20 : 60;
 }
 
-// ---- load on both cores, while in scope
+// ---- Load on both cores while an object lives.
 
 class Load {
  public:
@@ -64,7 +63,7 @@ class Load {
           benchmark::DoNotOptimize(x);
         });
     });
-    threads_.emplace_back([this] {  // what is in the caches does not stay there
+    threads_.emplace_back([this] {  // flushes the caches again and again
       std::vector<double> memory(32 << 20);
       while (!stop_)
         for (std::size_t i = 0; i < memory.size() && !stop_; i += 8) memory[i] += 1;
@@ -81,7 +80,7 @@ class Load {
   std::vector<std::thread> threads_;
 };
 
-// ---- measuring
+// ---- Measuring.
 
 void report(benchmark::State& state, const std::string& what, std::vector<double>& us) {
   if (us.empty()) return;
@@ -115,7 +114,8 @@ bool asked_for_late() {
   return asked;
 }
 
-// What all cores together had stolen from them, as far as the machine says so; in ticks of 10 ms.
+// Ticks of 10 ms that the host has stolen from all cores together, as far as the machine reports
+// it.
 long stolen_ticks() {
   long cpu[8] = {};
   if (std::FILE* file = std::fopen("/proc/stat", "r")) {
@@ -127,8 +127,8 @@ long stolen_ticks() {
   return cpu[7];
 }
 
-// A hand that notes, at the beginning of a frame, what may make it long: page faults since the one
-// before it, and how fast the core computes in registers.
+// A hand that notes possible causes of long frames at the beginning of each frame: page faults
+// since the frame before, and the core's speed in registers.
 struct NotingHand {
   struct Note {
     long faults = 0;
@@ -163,7 +163,7 @@ struct NotingHand {
   }
 };
 
-// What is kept of each frame, to step it again.
+// The data of a frame that is needed to step it again.
 struct Stepped {
   h6DeviceSample hand;
   std::uint64_t hash;
@@ -172,9 +172,9 @@ struct Stepped {
   double again_us = 0;
 };
 
-// All frames once more, on one thread, in virtual time: the same bits. Those that were late by
-// their own work, as the thread's CPU time has it, find cold caches this time and are timed by the
-// same clock: what they take now is their work, and the rest was the machine's.
+// Steps all frames again on one thread in virtual time and compares their bits. Frames that were
+// late by their CPU time are timed again by the same clock, with cold caches: the time they take
+// now is their own work, and the rest was the machine's.
 bool same_again(Scene& scene, double rate, std::vector<Stepped>& frames) {
   const Session session = scene.session(rate, 1, false);
   for (Stepped& frame : frames) {
@@ -208,7 +208,7 @@ void print_late(const h6FrameRecord& row, const NotingHand& hand, double again_u
   std::fprintf(stderr, " again %.0f us\n", again_us);
 }
 
-// What one writes first: a thread that sleeps until the next tick.
+// The naive loop: a thread that sleeps until the next tick.
 std::uint64_t plain_thread(Scene& scene, double rate, double seconds, Times& times) {
   const Session session = scene.session(rate, 1, false);
   const h6Device hand = scene.hand();
@@ -235,6 +235,27 @@ std::uint64_t plain_thread(Scene& scene, double rate, double seconds, Times& tim
   return late;
 }
 
+void tell_again(benchmark::State& state, const std::vector<Stepped>& stepped, double period_us) {
+  double again_us = 0, late_again = 0;
+  for (const Stepped& frame : stepped)
+    if (frame.own) {
+      again_us = std::max(again_us, frame.again_us);
+      late_again += frame.again_us > period_us;
+    }
+  state.counters["late_compute_again"] = late_again;
+  state.counters["again_max_us"] = again_us;
+}
+
+void tell(benchmark::State& state, const h6LoopReport& result) {
+  state.counters["frames"] = static_cast<double>(result.frames);
+  state.counters["late_compute"] = static_cast<double>(result.late_compute);
+  state.counters["late_stolen"] = static_cast<double>(result.late_stolen);
+  state.counters["late_wakeup"] = static_cast<double>(result.late_wakeup);
+  state.counters["coarse"] = static_cast<double>(result.coarse_frames);
+  state.counters["records_lost"] = static_cast<double>(result.ring_overruns);
+  state.SetLabel(result.grant.fifo ? "FIFO" : "no FIFO");
+}
+
 void realtime(benchmark::State& state, const std::string& name, double rate, bool loaded,
               unsigned threads, double spin_us) {
   Scene& scene = scene_named(name);
@@ -252,10 +273,10 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
     const Loop loop(h6StartLoop(session.get(), &device, &def, &error));
     if (!loop) return state.SkipWithError(error.message);
     Times times;
-    double contacts = 0, missed = 0, period_us = 1e6 / rate;
+    double contacts = 0, missed = 0;
     std::vector<h6FrameRecord> rows(256), late;
     std::vector<Stepped> stepped;
-    std::vector<bool> robbed;  // each frame: something was stolen in it, or about its time
+    std::vector<bool> robbed;  // (frames) time was stolen in or around the frame
     std::uint64_t few = 0;
     long ticks = stolen_ticks();
     bool had_stolen = false;
@@ -296,28 +317,15 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
       if (!robbed[i]) kept.push_back(times.wakeup[i]);
     state.counters["unstolen_frames"] = static_cast<double>(kept.size());
     report(state, "unstolen_wakeup", kept);
-    double again_us = 0, late_again = 0;
-    for (const Stepped& frame : stepped)
-      if (frame.own) {
-        again_us = std::max(again_us, frame.again_us);
-        late_again += frame.again_us > period_us;
-      }
-    state.counters["late_compute_again"] = late_again;
-    state.counters["again_max_us"] = again_us;
+    tell_again(state, stepped, 1e6 / rate);
     state.counters["few"] = static_cast<double>(few);
     state.counters["missed_voxels"] = missed;
     times.tell(state, "");
     plain.tell(state, "plain_");
     state.counters["contacts"] = contacts;
-    state.counters["frames"] = static_cast<double>(result.frames);
-    state.counters["late_compute"] = static_cast<double>(result.late_compute);
-    state.counters["late_stolen"] = static_cast<double>(result.late_stolen);
-    state.counters["late_wakeup"] = static_cast<double>(result.late_wakeup);
-    state.counters["coarse"] = static_cast<double>(result.coarse_frames);
-    state.counters["records_lost"] = static_cast<double>(result.ring_overruns);
+    tell(state, result);
     state.counters["plain_frames"] = static_cast<double>(plain.total.size());
     state.counters["plain_late"] = static_cast<double>(plain_late);
-    state.SetLabel(result.grant.fifo ? "FIFO" : "no FIFO");
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// realtime_scenes.h - what runs in real time: sessions of one scene, and a hand for it.
+// realtime_scenes.h - the scenes of the real-time benchmarks: sessions and a hand.
 #pragma once
 #include <cmath>
 #include <memory>
@@ -56,7 +56,7 @@ class Alpha : public Scene {
   Result<std::unique_ptr<io::LoadedScene>> loaded_;
 };
 
-// A part in a socket that fits it, pushed in until 10,000 of its points touch, trembling by 0.02
+// A part in a socket that fits it, pushed in until 10,000 of its points touch. It trembles by 0.02
 // voxel.
 class Socket : public Scene {
  public:

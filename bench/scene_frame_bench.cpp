@@ -3,12 +3,12 @@
 //     frame/clutter|conforming/METHOD/contacts:N/threads:T/warm|cold/slow|fast
 //
 // Clutter: most of the part's surface is free. Conforming: a socket with 0.25 voxel of clearance.
-// The part is moved from where it is free until it has about the contacts asked for. Slow: 0.01
-// voxel a frame; fast: the frame before stood far outside the field, so nothing is remembered.
-// Contacts of the timed poses are compared with all points before a time is reported. While it is
-// timed the stepping thread keeps to one core, as a haptic thread does: the helper has the other.
+// The part moves in until it has about the wanted contacts. Slow: 0.01 voxel a frame. Fast: the
+// frame before was far outside the field, so nothing can be reused. Before a time is reported, the
+// contacts of the timed poses are compared with a test of all points. The stepping thread is pinned
+// to one core, like a haptic thread; the helper has the other.
 //     field/memory/voxels:1024/bricks:N
-// Time is that of h6CreateModel, `resident_mb` what it adds to this process.
+// The time is that of h6CreateModel; resident_mb is the memory that it adds to this process.
 #include <benchmark/benchmark.h>
 
 #include <pthread.h>
@@ -35,7 +35,7 @@ struct SessionDeleter {
   void operator()(h6Session* s) const { h6DestroySession(s); }
 };
 
-// Keeps this thread, not those it has started, to the last of its cores.
+// Pins this thread, but not the threads it has started, to the last of its cores.
 class OneCore {
  public:
   OneCore() {
@@ -91,8 +91,8 @@ double push_for(const h6Model* model, std::size_t wanted, double most) {
   return high;
 }
 
-// Points within a thousandth of a voxel of the surface may fall on either side: they are sampled
-// along another path here.
+// Points within a thousandth of a voxel of the surface may differ, since this samples them by
+// another code path.
 bool contacts_are_right(const h6Session* session, const h6Model* model, const h6Vec3& shift) {
   const auto d = depths(model, shift);
   const h6Contacts found = h6GetContacts(session, 1);
@@ -152,7 +152,7 @@ void frame(benchmark::State& state, bool socket, h6Method method, std::size_t wa
   double contacts = 0, helped = 0;
   int i = 0;
   const OneCore here;
-  // The helper has to wake, and to be moved to the other core.
+  // The helper has to wake up and move to the other core.
   const auto begun = std::chrono::steady_clock::now();
   for (int warm = 0; std::chrono::steady_clock::now() - begun < std::chrono::milliseconds(150);)
     step(fast ? push : slow(warm++));
@@ -187,7 +187,7 @@ double resident_bytes() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-// What is in the bricks does not matter to how much room they take.
+// The memory of bricks does not depend on their content.
 void memory(benchmark::State& state) {
   const auto bricks = static_cast<std::size_t>(state.range(0));
   for (auto _ : state) {
