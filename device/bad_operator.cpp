@@ -54,7 +54,7 @@ h6Vec3 BadOperator::direction() {
 }
 
 void BadOperator::begin(double time) {
-  // Seconds each lasts.
+  // Durations of each kind [s].
   static constexpr double shortest[kTroubles] = {0.2, 0.01, 0.005, 0.001, 0.001, 0.001};
   static constexpr double longest[kTroubles] = {1, 0.04, 0.4, 0.04, 0.2, 0.3};
   std::size_t kind;
@@ -67,7 +67,7 @@ void BadOperator::begin(double time) {
   const double most = kind_ == Trouble::shake  ? figures_.shake
                       : kind_ == Trouble::jerk ? figures_.jerk
                                                : figures_.jump;
-  // One at a time: the order in which arguments are computed is the compiler's choice.
+  // One draw a statement: the compiler chooses the order in which arguments are computed.
   const double far = random(0.1, 1) * most;
   way_ = far * direction();
   const double turned_by = random(0, kind_ == Trouble::jump ? kPi : 0.2);
@@ -77,7 +77,7 @@ void BadOperator::begin(double time) {
   ++times_[kind];
 }
 
-// `swing` of the way, and its rate of change.
+// Displaces a sample by `swing` times (way, axis); `rate` is the rate of change of swing [1/s].
 namespace {
 void displace(h6DeviceSample& s, const h6Vec3& way, const h6Vec3& axis, double swing, double rate) {
   s.pose.p = s.pose.p + swing * way;

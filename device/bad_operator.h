@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// bad_operator.h - a hand, and what goes wrong with hands: for soak tests of whatever is behind it.
+// bad_operator.h - a hand with faults, for soak tests of the engine behind it.
 //
 //     a device --sample--> shake | jerk | freeze | NaN | jump | unplug --sample--> engine
 //
-// Trouble comes one at a time, at random moments; a seed and the times asked for give the same to
-// the bit, on every machine.
+// Faults come one at a time, at random moments. The same seed and the same times of reading give
+// the same samples to the bit, on every machine.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -21,19 +21,20 @@ const char* trouble_name(Trouble trouble);
 struct BadOperatorFigures {
   std::uint64_t seed = 1;
   std::uint32_t kinds = (1u << kTroubles) - 1;  // bits 1u << Trouble
-  double every = 0.5;                           // mean time between two, 0.001 .. 1000 [s]
-  double shake = 5e-3;                          // amplitude at most, at 5 .. 15 Hz [m]
-  double jerk = 50e-3;                          // there and back within 10 .. 40 ms, at most [m]
-  double jump = 0.3;                            // somewhere else from one frame to the next [m]
+  double every = 0.5;                           // mean time between two faults, 0.001 .. 1000 [s]
+  double shake = 5e-3;                          // largest amplitude, at 5 .. 15 Hz, 0 .. 1 [m]
+  double jerk = 50e-3;  // largest way there and back within 10 .. 40 ms, 0 .. 1 [m]
+  double jump = 0.3;    // largest jump from one frame to the next, 0 .. 10 [m]
 };
 
 class BadOperator {
  public:
-  // `hand` is read all the while, so that its person goes on; it must outlive this object.
+  // `hand` is read in every frame, also during a fault, so that its person moves on; it must
+  // outlive this object. Fails with a sentence when a figure is out of range or `kinds` is empty.
   static Result<BadOperator> open(const h6Device& hand, const BadOperatorFigures& figures);
   h6Device device();
 
-  // How often each has come.
+  // How often each fault has begun.
   const std::array<std::uint64_t, kTroubles>& times() const { return times_; }
 
  private:
@@ -49,14 +50,14 @@ class BadOperator {
   h6Device hand_;
   BadOperatorFigures figures_;
   std::uint64_t state_;  // of the random numbers
-  double next_ = 0;      // when trouble begins [s]
+  double next_ = 0;      // start of the next fault [s]
   bool now_ = false;
   Trouble kind_ = Trouble::shake;
   double begun_ = 0, lasts_ = 0;  // [s]
-  h6Vec3 way_{}, axis_{};         // how far [m], and about what [rad]
-  double pace_ = 0;               // [Hz]
-  std::uint64_t which_ = 0;       // of the ways to spoil a sample
-  h6DeviceSample last_{};         // as it was passed on
+  h6Vec3 way_{}, axis_{};         // displacement [m] and rotation vector [rad]
+  double pace_ = 0;               // of a shake [Hz]
+  std::uint64_t which_ = 0;       // picks how a sample is spoilt
+  h6DeviceSample last_{};         // the last sample that was passed on
   bool unplugged_ = false;
   std::array<std::uint64_t, kTroubles> times_{};
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device_spec.h - the name of a device on a command line or in a scene, taken apart:
+// device_spec.h - parses the name of a device on a command line or in a scene:
 //
 //   NAME[:TARGET][?KEY=VALUE[&KEY=VALUE...]]
 //
@@ -18,11 +18,11 @@ struct DeviceSpec {
   std::vector<std::pair<std::string, std::string>> options;  // in the order they were given
 };
 
-// A sentence when a key has no value or stands twice.
+// Fails with a sentence when a key has no value or stands twice.
 Result<DeviceSpec> parse_device_spec(const std::string& text);
 
-// Takes options one by one; finish() is a sentence about the first that was wrong, or that nobody
-// asked for.
+// Reads options one by one into their values; an absent option leaves its value alone. finish()
+// fails with a sentence about the first option that was wrong or is not known.
 class OptionReader {
  public:
   explicit OptionReader(const DeviceSpec& spec) : spec_(spec), taken_(spec.options.size()) {}

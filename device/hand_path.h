@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// hand_path.h - where a hand should be at a time: keyframes in memory.
+// hand_path.h - the wanted pose of a hand over time: keyframes in memory.
 //
-// Devices receive arrays; files are read elsewhere.
+// Devices get arrays; io reads the files.
 #pragma once
 #include <memory>
 #include <vector>
@@ -17,11 +17,11 @@ struct HandPath {
   std::vector<double> time;  // [s], strictly increasing, at least one
   std::vector<h6Pose> pose;  // mesh frame of the body -> world, unit quaternions
 
-  // Who may take the hand away from it; empty: nobody.
+  // May take the hand away from its path; empty: the path alone counts.
   std::shared_ptr<Steering> steering{};
 
   double duration() const { return time.empty() ? 0 : time.back(); }
-  // Where it should be at t, which does not fall: pose and velocity; buttons only when steered.
+  // Wanted pose and velocity at time t [s], which must not decrease; buttons only when steered.
   h6DeviceSample at(double t) const { return steering ? steering->at(*this, t) : keyframe(t); }
   h6DeviceSample keyframe(double t) const;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hidapi, and nothing else of it anywhere.
+// hid_port.cpp - HID through hidapi; no other file includes hidapi.
 #include "device/hid_port.h"
 
 #include <hidapi.h>
@@ -26,7 +26,7 @@ std::string narrow(const wchar_t* text) {
   return out;
 }
 
-// hidapi 0.13 has no call for it. The file is readable by everyone.
+// hidapi 0.13 has no call for the descriptor. Everyone may read this file.
 std::vector<std::uint8_t> descriptor_of(const std::string& path) {
   const std::string node = path.substr(path.rfind('/') + 1);
   std::ifstream in("/sys/class/hidraw/" + node + "/device/report_descriptor", std::ios::binary);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// hid_port.h - the little of HID that a SpaceMouse needs. hidapi stands behind it, or a test.
+// hid_port.h - the part of HID that a SpaceMouse needs, implemented by hidapi or by a test.
 //
-// Not for the haptic thread: these calls enter the system and may wait.
+// Not for the haptic thread: these calls enter the kernel and may wait.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -23,7 +23,8 @@ struct HidInterface {
 class HidHandle {
  public:
   virtual ~HidHandle() = default;
-  // One report, its id first: its bytes; 0 when none came in time; -1 when the device is gone.
+  // Reads one report, its id first. Returns its length in bytes; 0 when none came in time; -1 when
+  // the device is gone.
   virtual int read(std::span<std::uint8_t> report, int timeout_ms) = 0;
   virtual bool write(std::span<const std::uint8_t> report) = 0;
 };
@@ -32,15 +33,15 @@ class HidPort {
  public:
   virtual ~HidPort() = default;
   virtual std::vector<HidInterface> list() = 0;
-  // A sentence when it cannot be opened: for want of permission, what to install.
+  // Fails with a sentence; when permission is missing, it says what to install.
   virtual Result<std::unique_ptr<HidHandle>> open(const std::string& path) = 0;
 };
 
-// The system's own; without hidapi in the build it lists nothing.
+// The system's devices; without hidapi in the build it lists none.
 HidPort& system_hid();
 bool built_with_hidapi();
 
-// Lets the person at the machine open these devices: the text of device/udev/70-hapsix.rules.
+// The text of device/udev/70-hapsix.rules, which lets the person at the machine open these devices.
 const char* udev_rules();
 
 }  // namespace h6::device

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For builds without hidapi: there are no HID devices.
+// hid_port_none.cpp - for builds without hidapi: there are no HID devices.
 #include "device/hid_port.h"
 
 namespace h6::device {

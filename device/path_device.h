@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// path_device.h - a hand that follows its path whatever it feels: an ideal, infinitely strong
+// path_device.h - a hand that follows its path whatever force it feels, like an infinitely strong
 // person.
 #pragma once
 #include <memory>
@@ -22,7 +22,7 @@ class PathDevice {
   h6DeviceCommand last_{};
 };
 
-// One sentence when rows are missing, out of order, not finite or not rotations.
+// Fails with a sentence when rows are missing, out of order, not finite or not rotations.
 Outcome check_path(const HandPath& path);
 
 }  // namespace h6::device

@@ -27,7 +27,7 @@ void to(const h6Vec3& v, double* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z
 h6Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 void to(const h6Quat& q, double* out) { out[0] = q.w, out[1] = q.x, out[2] = q.y, out[3] = q.z; }
 
-// A library, opened far enough to call its open.
+// A loaded library and its table of functions; no device is open yet.
 struct Loaded {
   void* library = nullptr;
   const h6DevicePluginV1* plugin = nullptr;
@@ -68,7 +68,7 @@ Result<Loaded> load(const std::string& path) {
 
 bool sensible(double value) { return value >= 0 && value <= 1e9; }
 
-// What it says of itself; empty: all is well.
+// The capability that makes no sense, for a sentence; empty: all are well.
 std::string nonsense(const h6PluginCapabilities& c) {
   if (!std::memchr(c.name, 0, sizeof c.name)) return "name without an end";
   if (c.dof_in != 3 && c.dof_in != 6) return "dof_in, which must be 3 or 6";
@@ -103,12 +103,12 @@ Result<void*> open_in(const h6DevicePluginV1& plugin, const PluginFile& file, co
   }
   if (const std::string what = nonsense(capabilities); !what.empty()) {
     plugin.close(device);
-    return Failure{file.path + ": makes no sense in what it says of itself: " + what};
+    return Failure{file.path + ": its capabilities make no sense: " + what};
   }
   return device;
 }
 
-// The child's part. Its answer is a sentence, empty when all went well.
+// Runs in the child. Returns a sentence, empty when all went well.
 std::string try_it(const PluginFile& file, const h6Pose& home, const h6Vec3& grip) {
   Result<Loaded> loaded = load(file.path);
   if (!loaded) return loaded.error();
@@ -139,7 +139,7 @@ std::string try_it(const PluginFile& file, const h6Pose& home, const h6Vec3& gri
   _exit(0);
 }
 
-// Whatever comes through the pipe until its end; false when that does not come in time.
+// Reads the pipe to its end, or 10,000 bytes; false when `patience` [s] runs out first.
 bool listen(int from, double patience, std::string& heard) {
   const auto end =
       std::chrono::steady_clock::now() + std::chrono::milliseconds(std::lround(1e3 * patience));
@@ -163,7 +163,7 @@ Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, do
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
     return Failure{file.path + ": cannot be tried out, no pipe (" + std::strerror(errno) + ")"};
-  std::fflush(nullptr);  // else the child would write it a second time
+  std::fflush(nullptr);  // else the child would write buffered output a second time
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);

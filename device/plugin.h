@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// plugin.h - a device out of a shared library (hapsix/device_plugin.h).
+// plugin.h - a device from a shared library (hapsix/device_plugin.h).
 //
-//   probe  in a child process: load, open, read once, close. A crash or a hang ends the child, and
-//          becomes a sentence
-//   open   in this process, only after that went well
+//   probe  in a child process: load, open, read once, close. A crash or a hang ends only the child,
+//          and the user gets a sentence
+//   open   in this process, only after the probe succeeded
 #pragma once
 #include <memory>
 #include <string>
@@ -23,9 +23,9 @@ struct PluginFile {
 
 class PluginDevice {
  public:
-  // `home` and `grip` as in h6PluginStart. `patience`: for the probe, after which it hangs [s]. A
-  // sentence when there is no such file, it is no plug-in or one for another version, its open
-  // fails, crashes or hangs, or what it says of itself makes no sense.
+  // `home` and `grip` as in h6PluginStart. A probe that takes longer than `patience` counts as hung
+  // [s]. Fails with a sentence when there is no such file, when it is no plug-in or one for another
+  // version, when its open fails, crashes or hangs, or when its capabilities make no sense.
   static Result<std::unique_ptr<PluginDevice>> open(const PluginFile& file, const h6Pose& home,
                                                     const h6Vec3& grip, double patience = 10);
   ~PluginDevice();
@@ -36,7 +36,7 @@ class PluginDevice {
   h6Device device();
   const std::string& about() const { return about_; }
 
-  // What the interface calls.
+  // The functions behind the interface.
   int read(double time, h6DeviceSample& out);
   int write(double time, const h6DeviceCommand& command);
   int arm();

@@ -10,7 +10,7 @@
 namespace h6::device {
 namespace {
 
-// v without a share of what goes against the felt f; all of it is taken at `most`.
+// v less a share of its component against the felt wrench f; at |f| = `most` the share is 1.
 h6Vec3 yielding(const h6Vec3& v, const h6Vec3& f, double most) {
   const double n = norm(f);
   if (!(most > 0) || !(n > 0) || !std::isfinite(n)) return v;
@@ -67,7 +67,7 @@ std::array<double, 6> RateControl::shaped(const std::array<double, 6>& axes) {
     std::size_t most = 0;
     for (std::size_t i = 1; i < 6; ++i)
       if (size(i) > size(most)) most = i;
-    // Another axis must lead by a fifth, else the lock would flutter.
+    // A new axis must lead by a fifth, else the lock would flutter between two.
     if (dominant_ < 0 || size(most) > 1.2 * size(static_cast<std::size_t>(dominant_)))
       dominant_ = static_cast<int>(most);
     for (std::size_t i = 0; i < 6; ++i)
@@ -86,7 +86,7 @@ h6Velocity RateControl::wanted(const std::array<double, 6>& a) const {
           figures_.turn_speed * to_world(a[3], a[4], a[5], figures_.y_up)};
 }
 
-// As fast as the figures allow, and there within the step when it is near enough.
+// As fast as the figures allow; a step that reaches home ends there.
 h6Velocity RateControl::homewards(double dt) const {
   return {at_most((1 / dt) * (home_x_ - x_), figures_.speed),
           at_most((1 / dt) * turn(q_, home_q_), figures_.turn_speed)};
@@ -115,7 +115,7 @@ h6DeviceSample RateControl::step(const std::array<double, 6>& axes, std::uint32_
       velocity_.linear = velocity_.linear + pass * (want.linear - velocity_.linear);
       velocity_.angular = velocity_.angular + pass * (want.angular - velocity_.angular);
       if (!moved && norm(velocity_.linear) < 1e-6 && norm(velocity_.angular) < 1e-6)
-        velocity_ = {};  // at rest, not on its way there for ever
+        velocity_ = {};  // else the low-pass would approach home for ever
     }
     x_ = x_ + dt * velocity_.linear;
     q_ = turned(q_, dt * velocity_.angular);

@@ -17,7 +17,7 @@ Result<std::unique_ptr<RecordedHand>> RecordedHand::open(std::vector<h6DeviceSam
 }
 
 h6Device RecordedHand::device() {
-  // As strong as a path is.
+  // The same ratings as a path.
   const auto path = PathDevice::open({{0}, {{{0, 0, 0}, {1, 0, 0, 0}}}});
   h6Device d{};
   d.capabilities = (*path)->device().capabilities;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_hand.h - a hand that gives the samples of an earlier run again, bit by bit, whatever is
-// felt; at rest where the last one was.
+// recorded_hand.h - a hand that repeats the samples of an earlier run to the bit, whatever force it
+// feels; after the last sample it rests there.
 #pragma once
 #include <memory>
 #include <vector>
@@ -12,8 +12,8 @@ namespace h6::device {
 
 class RecordedHand {
  public:
-  // `samples`: one a frame, `rate` a second, the first at time 0. At another rate the nearest is
-  // given. A sentence when there is none, or the rate is not in 1 .. 1e6.
+  // `samples`: one per frame, `rate` per second, the first at time 0. Read at another rate it gives
+  // the nearest sample. Fails with a sentence when there are none, or the rate is not in 1 .. 1e6.
   static Result<std::unique_ptr<RecordedHand>> open(std::vector<h6DeviceSample> samples,
                                                     double rate);
   h6Device device();

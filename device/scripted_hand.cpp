@@ -20,7 +20,7 @@ class Writer {
     keep();
   }
 
-  // False: not understood.
+  // False when the line is not understood.
   bool line(std::istringstream& words, const std::string& verb) {
     if (verb == "hold") return hold(words);
     if (verb == "press" || verb == "release") return button(words, verb == "press");
@@ -57,7 +57,7 @@ class Writer {
     script.buttons.push_back({time_, buttons_});
     return true;
   }
-  // Rows every few degrees: between rows the mesh frame's origin goes straight.
+  // Rows every few degrees, because between rows the mesh frame's origin moves on a straight line.
   bool go(const h6Vec3& to, const h6Vec3& turn_by, double seconds) {
     const h6Vec3 from = x_;
     const h6Quat q = q_;
@@ -68,7 +68,7 @@ class Writer {
       x_ = from + s * (to - from);
       q_ = turned(q, s * turn_by);
       time_ = begun + s * seconds;
-      if (!(time_ > script.path.time.back())) return false;  // too short to be told apart
+      if (!(time_ > script.path.time.back())) return false;  // too short for a row of its own
       keep();
     }
     return true;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// scripted_hand.h - a hand that does what a text says, line by line:
+// scripted_hand.h - a hand that follows a text, line by line:
 //
 //   move DX DY DZ in SECONDS      straight, world frame, in the text's unit of length
 //   turn RX RY RZ in SECONDS      about the grip: a rotation vector, world frame [degrees]
-//   home in SECONDS               to where it began
+//   home in SECONDS               back to its first pose
 //   hold SECONDS
 //   press N, release N            button 0 to 31
 //
-// What stands behind a # is not read.
+// A # begins a comment.
 #pragma once
 #include <string>
 #include <vector>
@@ -26,12 +26,12 @@ struct HandScript {
   std::vector<Buttons> buttons;  // in order of time
 };
 
-// `unit`: metres in one unit of length. `grip`: mesh frame [m]. A sentence names the line that is
-// not understood; at most 10,000 lines.
+// `unit`: metres per unit of length. `grip`: mesh frame [m]. Fails with a sentence that names the
+// line in error, or when there are more than 10,000 lines.
 Result<HandScript> read_hand_script(const std::string& text, double unit, const h6Pose& home,
                                     const h6Vec3& grip);
 
-// Another device with the buttons of a script: whoever follows its path. That device must outlive
+// Adds the buttons of a script to another device, which follows the script's path and must outlive
 // this object.
 class ScriptedHand {
  public:

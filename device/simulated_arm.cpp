@@ -14,7 +14,7 @@ constexpr double kInner = 1e-4;  // longest step of the drive [s]
 constexpr double kTwoPi = 6.283185307179586;
 
 // Servo and coupling are explicit in the measured state: with a step of 0.1 ms, 0.01 kg and
-// 1e-5 kg m^2 the highest of these stay below a third of what would be unstable.
+// 1e-5 kg m^2 the largest allowed values stay below a third of the limit of stability.
 Outcome check_figures(const ArmFigures& a) {
   const struct {
     const char* name;
@@ -74,7 +74,7 @@ h6Vec3 rounded(const h6Vec3& v, double step) {
   return {rounded(v.x, step), rounded(v.y, step), rounded(v.z, step)};
 }
 
-// How far outside of low .. high.
+// Signed distance of x beyond the interval low .. high; 0 inside.
 double beyond(double x, double low, double high) {
   return x < low ? x - low : x > high ? x - high : 0;
 }
@@ -82,12 +82,12 @@ double beyond(double x, double low, double high) {
 // Two masses in a row, one axis:  wanted ==[k, b]== second ==[k_grip, b_grip]== first.
 struct Chain {
   double h;
-  double m, b;            // of the first, and its friction
-  double m2, k2, b2;      // of the second, and what ties it to where it should be
-  double k_grip, b_grip;  // between them
+  double m, b;            // mass and friction of the first
+  double m2, k2, b2;      // mass of the second, spring and damper to its wanted place
+  double k_grip, b_grip;  // spring and damper between the two
 
-  // Implicit Euler for both speeds. The gaps are positions of the second against the first and of
-  // the wanted place against the second; a stop of stiffness k_stop is pressed by `pressed`.
+  // Implicit Euler for both speeds. gap: second minus first; gap2: wanted place minus second. A
+  // stop of stiffness k_stop is compressed by `pressed`.
   void step(double force, double gap, double gap2, double v_wanted, double k_stop, double pressed,
             double& v, double& v2) const {
     const double link = h * (b_grip + h * k_grip);
@@ -180,10 +180,10 @@ void SimulatedArm::step(double h, const h6DeviceSample& want, const h6Wrench& mo
                  arm_.grip_rotational_damping * (hand_.w - handle_.w);
 }
 
-// What the encoders say now, and the speed that follows from it.
+// Reads the encoders and estimates the speed from them.
 void SimulatedArm::measure(double h) {
   const h6Vec3 x = rounded(handle_.x, arm_.position_step);
-  // Whole steps away from the last reading, so that no orientation is special.
+  // Rounded relative to the last reading, so that no orientation is special.
   const h6Vec3 turned_by = rounded(turn(measured_.q, handle_.q), arm_.angle_step);
   const double pass = 1 - std::exp(-kTwoPi * arm_.velocity_filter * h);
   measured_.v = measured_.v + pass * ((1 / h) * (x - measured_.x) - measured_.v);
@@ -193,7 +193,7 @@ void SimulatedArm::measure(double h) {
   if (arm_.exact_velocity) measured_.v = handle_.v, measured_.w = handle_.w;
 }
 
-// What pulls the handle to the commanded pose, by what the drive knows.
+// Spring and damper that pull the handle to the commanded pose, from measured values.
 h6Wrench SimulatedArm::spring_to_command(double k, double b, double k_turn, double b_turn) const {
   const h6DeviceCommand& to = active();
   const h6Vec3 lever = rotate(to.pose.q, arm_.person.grip);
@@ -202,7 +202,7 @@ h6Wrench SimulatedArm::spring_to_command(double k, double b, double k_turn, doub
           k_turn * turn(measured_.q, to.pose.q) + b_turn * (to.velocity.angular - measured_.w)};
 }
 
-// The wrench on the handle.
+// The motors' wrench on the handle.
 h6Wrench SimulatedArm::motors() const {
   if (stopped_.load(std::memory_order_relaxed)) return {};
   h6Wrench out = active().wrench;

@@ -24,7 +24,7 @@ SimulatedHand::SimulatedHand(HandPath path, const Arm& arm) : path_(std::move(pa
   x_ = start.pose.p + rotate(q_, arm_.grip);
 }
 
-// Implicit in spring and damper, so that any stiffness and any frame length is stable.
+// Implicit in spring and damper, so that it is stable for any stiffness and any frame length.
 void SimulatedHand::advance(double time) {
   const double h = std::clamp(time - time_, 0.0, 0.1);
   time_ = time;
@@ -37,7 +37,7 @@ void SimulatedHand::advance(double time) {
 
   const h6Vec3 force = arm_.stiffness * (xw - x_) + arm_.damping * (vw - v_) + felt.force;
   const double m = arm_.mass + h * arm_.damping + h * h * arm_.stiffness;
-  // The spring's own change in this step, from the speed it already has.
+  // The last term is the change of the spring's force during the step, at the present speed.
   v_ = v_ + (h / m) * (force - (h * arm_.stiffness) * (v_ - vw));
   x_ = x_ + h * v_;
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// simulated_hand.h - a person without hardware: an arm of mass, spring and damper that wants to be
-// where its path says, and yields to the force it feels.
+// simulated_hand.h - a simulated person: a mass that spring and damper pull along a path, and that
+// yields to the force it feels.
 //
 //     path ==[ k, b ]== hand (m) <-- force from the device
 //
-// Impedance: the device's wrench is applied to the hand, the hand's pose is what the device reads.
+// Impedance mode: the commanded wrench acts on the hand, and the device reads the hand's pose.
 #pragma once
 #include <atomic>
 #include <memory>
@@ -22,11 +22,13 @@ struct Arm {
   double inertia = 1e-3;            // [kg m^2]
   double rotational_stiffness = 3;  // [N m/rad]
   double rotational_damping = 0.1;  // [N m s/rad]
-  h6Vec3 grip{0, 0, 0};  // what the torque is about: the body's centre of mass, mesh frame [m]
+  h6Vec3 grip{0, 0, 0};  // the body's centre of mass, about which torques act; mesh frame [m]
 };
 
 class SimulatedHand {
  public:
+  // Fails with a sentence when the path is not valid (check_path), a mass is not above 0, or a
+  // spring or damper is negative.
   static Result<std::unique_ptr<SimulatedHand>> open(HandPath path, const Arm& arm);
   h6Device device();
 
@@ -39,7 +41,7 @@ class SimulatedHand {
   h6Vec3 x_{}, v_{}, w_{};  // the grip's position and the hand's velocities, world frame
   h6Quat q_{1, 0, 0, 0};
   h6Wrench felt_{};
-  std::atomic<bool> stopped_{false};  // the device renders nothing any more
+  std::atomic<bool> stopped_{false};  // the device renders no force any more
 };
 
 }  // namespace h6::device

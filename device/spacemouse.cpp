@@ -32,7 +32,7 @@ std::vector<SpaceMouseInfo> list_spacemice(HidPort& port) {
   for (HidInterface& hid : port.list()) {
     if (!is_spacemouse(hid.vendor_id, hid.product_id, hid.usage_page, hid.usage)) continue;
     const bool seen = std::any_of(found.begin(), found.end(), [&](const SpaceMouseInfo& other) {
-      return other.hid.path == hid.path;  // a path stands once for each of its collections
+      return other.hid.path == hid.path;  // hidapi lists a path once for each collection
     });
     if (seen) continue;
     const ReportLayout layout = layout_of_descriptor(hid.descriptor);
@@ -65,7 +65,7 @@ SpaceMouse::~SpaceMouse() {
   if (thread_.joinable()) thread_.join();
 }
 
-// The first time any that fits; later only the same one.
+// The first call takes any device that fits; later calls only the same device.
 bool SpaceMouse::connect(std::string& trouble) {
   const bool again = !hid_.path.empty();
   trouble = options_.serial.empty()
@@ -110,7 +110,7 @@ void SpaceMouse::run() {
   if (handle_ && led_) (void)handle_->write(dark);
 }
 
-// All that is queued: only the newest counts, an old deflection must not be played back late.
+// Reads all queued reports and keeps the newest: an old deflection must not move the hand late.
 void SpaceMouse::drain(int timeout_ms) {
   std::array<std::uint8_t, 64> report;
   bool fresh = false;
@@ -145,7 +145,8 @@ void SpaceMouse::gone() {
   present_.store(false, std::memory_order_release);
 }
 
-// Lit from led_force on, dark again below half of it. A device without a light refuses: no matter.
+// The LED is on from led_force and off below half of it. A device without an LED refuses the
+// report; that does no harm.
 void SpaceMouse::light() {
   const double felt = felt_force_.load(std::memory_order_relaxed);
   const bool stopped = stopped_.load(std::memory_order_relaxed);

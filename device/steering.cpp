@@ -10,7 +10,7 @@ namespace h6::device {
 namespace {
 
 constexpr double kFrequency = 38;  // natural, critically damped [rad/s]
-// The hand is back on its path when it is nearer than that [m], [rad].
+// The hand is back on its path when it is nearer than this [m], [rad].
 constexpr double kNear = 1e-6, kNearAngle = 1e-5;
 
 }  // namespace
@@ -41,7 +41,7 @@ h6DeviceSample Steering::at(const HandPath& path, double time) {
     left_at_ = time - away_;
   }
   h6DeviceSample goal = path.keyframe(left_at_);
-  goal.velocity = {};  // its time stands still
+  goal.velocity = {};  // the path's time stands still
   if (wish_.held) {
     if (!wish_.placed) wish_.pose = was_held ? goal_ : hand_.pose;
     goal.pose = goal_ = wish_.pose;

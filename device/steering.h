@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// steering.h - somebody takes the hand away from its path, moves it, and gives it back.
+// steering.h - lets a user take the hand away from its path, move it, and give it back.
 //
-// While it is held the path's own time stands still; given back, the hand glides to where the path
-// was left and goes on from there. It follows what is asked of it like a critically damped spring,
-// never faster than a calm hand: a pointer that jumps does not make the part jump. A hand that was
-// never taken follows its path to the bit.
+// While the user holds the hand, the path's time stands still. Given back, the hand glides to the
+// point where it left the path and continues from there. It follows a wished pose like a critically
+// damped spring, never faster than a calm hand, so a pointer that jumps does not make the part
+// jump. A hand that was never taken follows its path to the bit.
 #pragma once
 #include <atomic>
 
@@ -20,26 +20,26 @@ class Steering {
   struct Wish {
     bool held = false;
     bool clutched = false;  // button 0
-    bool placed = false;    // `pose` is where it is wanted; else it stays where it is
+    bool placed = false;    // `pose` is the wanted pose; false: the hand stays where it is
     h6Pose pose{{0, 0, 0}, {1, 0, 0, 0}};
   };
   static constexpr double kMaxSpeed = 0.5, kMaxTurn = 4;  // [m/s], [rad/s]
 
-  // One thread, not the haptic one. Finite, a unit quaternion.
+  // For one thread, not the haptic one. The pose is finite, its quaternion unit.
   void wish(const Wish& wish) { wishes_.publish(wish); }
-  // The haptic thread, once a frame, `time` not falling [s].
+  // For the haptic thread, once a frame; `time` must not decrease [s].
   h6DeviceSample at(const HandPath& path, double time);
 
  private:
   void follow(const h6DeviceSample& goal, double h);
   sched::LatestValue<Wish> wishes_;
   Wish wish_;
-  h6DeviceSample hand_{};  // once it is off its path
+  h6DeviceSample hand_{};  // the hand while it is off its path
   bool off_path_ = false;
-  h6Pose goal_{{0, 0, 0}, {1, 0, 0, 0}};  // the last one, while held
+  h6Pose goal_{{0, 0, 0}, {1, 0, 0, 0}};  // the last wanted pose, while held
   double time_ = 0;
-  double away_ = 0;     // how long the hand was off its path so far [s]
-  double left_at_ = 0;  // where on the path it left it [s]
+  double away_ = 0;     // total time that the hand spent off its path [s]
+  double left_at_ = 0;  // time on the path at which the hand left it [s]
 };
 
 }  // namespace h6::device
