@@ -4,8 +4,8 @@
  *   build/release/hapsix_udp_arm --port 47806 &
  *   hapsix run SCENE --device 'plugin:build/release/plugins/udp_arm.so?port=47806'
  *
- * No thread: a datagram is sent and taken without waiting, once a frame. A command that is sent in
- * one frame is answered by the sample that is read in the next. */
+ * It needs no thread: once a frame it sends and receives datagrams without waiting. The answer to a
+ * frame's command is read in the next frame. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <math.h>
@@ -23,13 +23,13 @@
 #include "hapsix/device_plugin.h"
 
 typedef struct Device {
-  h6PluginStart start; /* options are not looked at after open */
+  h6PluginStart start; /* its options are not read after open */
   int socket;
   uint32_t number;
   UdpArmSample newest;
-  double heard;    /* when `newest` came [s] */
-  double waits;    /* since when a command has had no answer; 0: none has not [s] */
-  double patience; /* how long a command may have none [s] */
+  double heard;    /* arrival time of `newest` [s] */
+  double waits;    /* time of the oldest command without an answer; 0: none [s] */
+  double patience; /* longest wait for an answer [s] */
   atomic_int stopped;
 } Device;
 
@@ -56,11 +56,11 @@ static void send_command(Device* d, uint32_t motors, const h6PluginCommand* from
     memcpy(c.torque, from->torque, sizeof c.torque);
   }
   if (d->waits == 0) d->waits = now();
-  /* Nobody there, a full queue: known by the samples that do not come. */
+  /* When nobody listens or a queue is full, samples fail to come, and read reports that. */
   (void)!send(d->socket, &c, sizeof c, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
-/* Everything that has come; the newest is kept. */
+/* Reads all queued datagrams and keeps the newest. */
 static void take_samples(Device* d) {
   UdpArmSample s;
   for (int n = 0; n < 100; ++n) {
@@ -68,7 +68,7 @@ static void take_samples(Device* d) {
     if (bytes < 0 && errno != ECONNREFUSED) return;
     if (bytes != (ssize_t)sizeof s || s.mark != UDP_ARM_SAMPLE) continue;
     if ((int32_t)(s.number - d->newest.number) < 0 && now() - d->heard < 1)
-      continue; /* overtaken */
+      continue; /* older than `newest` */
     d->newest = s;
     d->heard = now();
     d->waits = 0;
@@ -140,20 +140,20 @@ static int open_device(const h6PluginStart* start, h6PluginCapabilities* can, vo
   can->max_force = 30, can->max_torque = 3;
   can->modes = H6_PLUGIN_IMPEDANCE;
   can->rate = 1000;
-  /* An arm that is gone is known by its silence, and said to be lost; later than that it would be
-   * taken for one that hangs. */
+  /* A silent arm is reported as lost after `patience`; a longer freeze_time keeps the host from
+   * calling it frozen before that. */
   can->freeze_time = d->patience < 0.5 ? 2 * d->patience : 1;
   *device = d;
   return 0;
 }
 
-/* home, moved and turned about the grip. */
+/* The pose is home, moved by what the arm moved and turned about the grip. */
 static int read_device(void* device, double time, h6PluginSample* out) {
   (void)time;
   Device* d = device;
   take_samples(d);
   if (d->waits != 0 && now() - d->waits > d->patience) return 1;
-  /* Of an old sample the pose is still the best there is, its velocity is not. */
+  /* An old sample's pose is still the best estimate; its velocity is not, and counts as 0. */
   const int silent = d->waits != 0 && now() - d->waits > 1e-3 * UDP_ARM_SILENCE;
   const UdpArmSample* s = &d->newest;
   const double *a = s->turned, *b = d->start.home_orientation;
@@ -186,7 +186,7 @@ static int write_device(void* device, double time, const h6PluginCommand* comman
   return 0;
 }
 
-/* Sends its own datagram and touches nothing that the haptic thread may be at. */
+/* Sends a datagram of its own and uses no data of the haptic thread. */
 static void stop_device(void* device) {
   Device* d = device;
   atomic_store(&d->stopped, 1);

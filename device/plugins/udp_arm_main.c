@@ -4,9 +4,9 @@
  *   hapsix_udp_arm [--port N] [--press METRES] [--period SECONDS]
  *
  * A handle of 0.3 kg in the hand of a person (500 N/m, 20 N s/m) who lowers it by METRES along -z
- * and raises it again. It lives on the machine's clock, 10 kHz, answers each command with one
- * sample, and gives no force when no command came for 20 ms - the watchdog that a real arm has in
- * its drive. */
+ * and raises it again. It runs on the machine's clock at 10 kHz and answers each command with one
+ * sample. It gives no force when no command came for 20 ms, like the watchdog in a real arm's
+ * drive. */
 #include <arpa/inet.h>
 #include <math.h>
 #include <netinet/in.h>
@@ -31,7 +31,7 @@ typedef struct Arm {
   double press, period;
 } Arm;
 
-/* From `from` to `to`, at most the last second of it. */
+/* Simulates from time `from` to `to` [s], at most the last second of that. */
 static void advance(Arm* arm, double from, double to) {
   const double h = 1e-4, mass = 0.3, stiffness = 500, damping = 20, turn = 6.283185307179586;
   if (to - from > 1) from = to - 1;
@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
   struct sockaddr_in at, from;
   memset(&at, 0, sizeof at);
   at.sin_family = AF_INET;
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK); /* nobody else's business */
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK); /* local only */
   at.sin_port = htons((uint16_t)number_after(argc, argv, "--port", UDP_ARM_PORT));
   const int s = socket(AF_INET, SOCK_DGRAM, 0);
   socklen_t size = sizeof at;

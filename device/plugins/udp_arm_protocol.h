@@ -3,8 +3,7 @@
  *
  *   plug-in --command, numbered--> arm --one sample for each, with the command's number--> plug-in
  *
- * Both sides are on machines of the same byte order. What is not of this size and mark is thrown
- * away.
+ * Both sides have the same byte order. A datagram of another size or mark is ignored.
  */
 #ifndef HAPSIX_UDP_ARM_PROTOCOL_H
 #define HAPSIX_UDP_ARM_PROTOCOL_H
@@ -12,8 +11,8 @@
 #include <stdint.h>
 
 enum { UDP_ARM_COMMAND = 0x31433668, UDP_ARM_SAMPLE = 0x31533668, UDP_ARM_PORT = 47806 };
-/* The arm gives no force when no command came for so long; the plug-in takes it for lost when a
- * command has no answer for so long, unless it is told otherwise. [ms] */
+/* The arm gives no force when no command came for this long. The plug-in reports the arm as lost
+ * when a command had no answer for this long, unless its options say otherwise. [ms] */
 enum { UDP_ARM_SILENCE = 20 };
 
 typedef struct UdpArmCommand {

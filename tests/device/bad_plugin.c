@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/* bad_plugin.c - plug-ins that go wrong, one for each value of WRONG. */
+/* bad_plugin.c - plug-ins that fail, in one way for each value of WRONG. */
 #define _GNU_SOURCE
 #include <signal.h>
 #include <stdio.h>
@@ -19,7 +19,7 @@ static int open_it(const h6PluginStart* start, h6PluginCapabilities* can, void**
   if (WRONG == HANG)
     for (;;) sleep(1);
   if (WRONG == REFUSES) {
-    memset(error, 'x', size); /* not even ended */
+    memset(error, 'x', size); /* without an end */
     memcpy(error, "the cable is not plugged in", 27);
     return 1;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands that need no hardware: a path followed exactly, and a person who yields.
+// hands_test.cpp - hands without hardware: one that follows a path exactly, one that yields.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real path through hidapi, with devices that umockdev makes: found, opened, read, lit,
-// unplugged and plugged in again.
+// hid_mock_test.cpp - the path through hidapi with devices that umockdev simulates: they are found,
+// opened, read, lit, unplugged and plugged in again.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -76,7 +76,7 @@ TEST_CASE(
   CHECK(list_spacemice(system_hid()).empty());
 }
 
-TEST_CASE("both layouts move a hand, buttons and battery are told, the light follows the force") {
+TEST_CASE("both layouts move a hand, buttons and battery are reported, the LED follows the force") {
   for (const bool joint : {false, true}) {
     CAPTURE(joint);
     MockCap cap = joint ? joint_cap() : MockCap{};
@@ -150,7 +150,7 @@ TEST_CASE(
   h6Device device = (*mouse)->device();
   using Clock = std::chrono::steady_clock;
   std::atomic<bool> ending{false};
-  std::atomic<std::int64_t> seen_ns[2] = {0, 0};  // when the hand first went to and fro
+  std::atomic<std::int64_t> seen_ns[2] = {0, 0};  // first motion of the hand in each direction
   std::thread frames([&] {
     auto deadline = Clock::now();
     double time = 0;

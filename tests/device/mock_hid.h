@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// mock_hid.h - SpaceMouse caps that the system believes in: umockdev puts a /sys and a /dev of the
-// test's own before this process and its children, so hidapi and the program run as they are.
+// mock_hid.h - simulated SpaceMouse caps: umockdev gives this process and its children a /sys and a
+// /dev of the test's own, so hidapi and the program run unchanged.
 //
-// umockdev is loaded at run time: the test builds without it, and says that it is skipped.
+// umockdev is loaded at run time. The test builds without it and then reports that it is skipped.
 #pragma once
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -24,7 +24,7 @@
 
 namespace h6::test {
 
-// Only what is used, as umockdev.h declares it; GError is not looked into.
+// The functions used here, as umockdev.h declares them; GError stays opaque.
 struct Umockdev {
   void* library = dlopen("libumockdev.so.0", RTLD_NOW);
   template <class F>
@@ -46,8 +46,8 @@ struct Umockdev {
   bool usable() const { return create && add && ioctls && device_end && remove; }
 };
 
-// For main: starts this program again with umockdev before the C library. 0: go on; else exit with
-// it, 77 for "skipped".
+// For main: starts this program again with umockdev preloaded. Returns 0 to go on; else the exit
+// code, 77 for "skipped".
 inline int enter_mock(char** argv) {
   const Umockdev u;
   void* const preload = dlopen("libumockdev-preload.so.0", RTLD_LAZY | RTLD_NOLOAD);
@@ -70,11 +70,11 @@ struct MockCap {
   std::string serial = "A1", product = "SpaceMouse Compact";
   unsigned product_id = 0xc635;
   Bytes descriptor = spacemouse_descriptor(false);
-  std::string node{};  // "hidraw0", and the port of the bus: where it was plugged last
+  std::string node{};  // for example "hidraw0"; and its port on the bus
   int port = 0;
 };
 
-// One machine; use one a process.
+// A simulated machine; one per process.
 class MockMachine {
  public:
   MockMachine() : bed_(u_.create()) {
@@ -93,7 +93,7 @@ class MockMachine {
       rmdir(folder_.c_str());
     }
   }
-  // At a node and a place on the bus that were never used: umockdev does not take them twice.
+  // Plugs in at a new node and a new port: umockdev does not accept the same ones twice.
   bool plug(MockCap& cap) {
     cap.node = "hidraw" + std::to_string(plugged_++);
     cap.port = plugged_;
@@ -117,7 +117,7 @@ class MockMachine {
     const std::uint32_t size = static_cast<std::uint32_t>(cap.descriptor.size());
     const Bytes size_bytes{static_cast<std::uint8_t>(size), static_cast<std::uint8_t>(size >> 8), 0,
                            0};
-    // struct hidraw_report_descriptor holds 4096 bytes whatever the size.
+    // struct hidraw_report_descriptor always holds 4096 bytes.
     Bytes whole = size_bytes + cap.descriptor;
     whole.resize(4 + 4096);
     std::ofstream(folder_ + "/ioctls")
@@ -126,11 +126,11 @@ class MockMachine {
     return u_.ioctls(bed_, ("/dev/" + cap.node).c_str(), (folder_ + "/ioctls").c_str(), nullptr);
   }
   void unplug(const MockCap& cap) {
-    // Its readers see a hang-up; umockdev itself would keep it. The other end stays open: the
-    // number of its terminal must not be given again.
+    // Readers must see a hang-up; umockdev alone would keep the node open. The other end stays open
+    // so that the number of its terminal is not given out again.
     (void)open(("/dev/" + cap.node).c_str(), O_RDWR | O_NOCTTY);
     close(end_of(cap));
-    // Children first: their links on the bus go with them.
+    // Children first: they take their links on the bus with them.
     for (const std::string& path : {raw_path(cap), hid_path(cap), face_path(cap), usb_path(cap)})
       u_.remove(bed_, ("/sys" + path).c_str());
   }
@@ -140,7 +140,7 @@ class MockMachine {
     const ssize_t n = write(end_of(cap), report.data(), report.size());
     return n == static_cast<ssize_t>(report.size());
   }
-  // What was written to the device within `ms`, whether it is open by then or not.
+  // Bytes written to the device within `ms` [ms]; the device may be opened during that time.
   Bytes received(const MockCap& cap, int ms) {
     std::uint8_t bytes[64];
     for (;; ms -= 5) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands that go wrong on purpose, hands that do what a text says, hands of an earlier run.
+// odd_hands_test.cpp - hands with faults, hands that follow a script, hands that repeat a
+// recording.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -28,7 +29,7 @@ namespace {
 
 const h6Pose origin{{0, 0, 0}, {1, 0, 0, 0}};
 
-// Slowly to x = 0.1 m in 100 s: no two samples are the same.
+// Moves slowly to x = 0.1 m in 100 s, so that no two samples are equal.
 std::unique_ptr<PathDevice> drift() {
   return std::move(*PathDevice::open({{0, 100}, {origin, {{0.1, 0, 0}, {1, 0, 0, 0}}}}));
 }
@@ -88,7 +89,7 @@ TEST_CASE("a bad operator: the same seed gives the same trouble to the bit, anot
   CHECK(run_bad(f, 30).lost != a.lost);
 }
 
-TEST_CASE("each kind of trouble is what it is called, and nothing else") {
+TEST_CASE("each kind of trouble does what its name says, and nothing else") {
   for (std::size_t k = 0; k < kTroubles; ++k) {
     const Trouble kind = static_cast<Trouble>(k);
     CAPTURE(std::string(trouble_name(kind)));
@@ -120,7 +121,7 @@ TEST_CASE("each kind of trouble is what it is called, and nothing else") {
   }
 }
 
-TEST_CASE("a shaking hand says how fast it is") {
+TEST_CASE("a shaking hand reports its own velocity") {
   const Seen seen = run_bad(only(Trouble::shake), 20);
   double worst = 0, fastest = 0;
   for (std::size_t i = 1; i + 1 < seen.samples.size(); ++i) {
@@ -128,7 +129,7 @@ TEST_CASE("a shaking hand says how fast it is") {
     const double v = (b.pose.p.z - a.pose.p.z) / 2e-3;
     if (off_path(a, 1e-3 * static_cast<double>(i - 1)) < 1e-9 ||
         off_path(b, 1e-3 * static_cast<double>(i + 1)) < 1e-9)
-      continue;  // it begins or ends here
+      continue;  // a fault begins or ends here
     worst = std::max(worst, std::fabs(v - s.velocity.linear.z));
     fastest = std::max(fastest, std::fabs(v));
   }
@@ -165,7 +166,7 @@ TEST_CASE("a script: moves, turns about the grip, comes home, holds, presses") {
   }
 }
 
-TEST_CASE("a line that a script may not have is named") {
+TEST_CASE("a sentence names the line of a script that is wrong") {
   for (const char* text :
        {"jump 1 2 3 in 1", "move 1 2 in 1", "move 1 2 3 in 0", "hold -1", "press 32",
         "move nan 0 0 in 1", "hold 1 2", "turn 1 2 3 for 1", "home", "hold 1e-300\nhold 1e-300"}) {
@@ -203,7 +204,7 @@ TEST_CASE("a recorded hand gives its samples to the bit, then stays where the la
   CHECK(!RecordedHand::open({}, 1000));
 }
 
-TEST_CASE("the name of a device is taken apart; what is wrong with it is a sentence") {
+TEST_CASE("the name of a device is parsed; an error in it is a sentence") {
   const auto spec = parse_device_spec("plugin:./a:b.so?host=10.0.0.7&empty=&x=a?b");
   REQUIRE(spec);
   CHECK(spec->name == "plugin");

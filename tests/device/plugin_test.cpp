@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices out of shared libraries: the template, and every way to be wrong.
+// plugin_test.cpp - devices from shared libraries: the template, and every way to fail.
 #include <doctest/doctest.h>
 
 #include <cstdlib>
@@ -51,7 +51,7 @@ TEST_CASE("the template is opened where the body begins, yields to a force, and 
   CHECK(d.write(d.self, 0, &c) == 0);
   for (int i = 1; i <= 3000; ++i) CHECK(d.read(d.self, 1e-3 * i, &s) == 0);
   CHECK(s.pose.p.z == near(home.p.z + 0.02).epsilon(1e-3));
-  d.stop(d.self);  // no force any more, whatever is told
+  d.stop(d.self);  // no force any more, whatever the commands
   CHECK(d.write(d.self, 3, &c) == 0);
   for (int i = 3001; i <= 6000; ++i) CHECK(d.read(d.self, 1e-3 * i, &s) == 0);
   CHECK(s.pose.p.z == near(home.p.z).epsilon(1e-3));
@@ -86,7 +86,7 @@ TEST_CASE("the template has less than 80 lines, and its own build line builds it
   std::filesystem::remove_all(name.data());
 }
 
-TEST_CASE("what is not a plug-in, or one for another version, is told so") {
+TEST_CASE("a file that is no plug-in, or one for another version, is refused with the reason") {
   says(sentence("absent"), "there is no such file");
   says(sentence("bad_symbol"), "h6_device_plugin_v1");
   says(sentence("bad_abi"), "is for version 7");
@@ -103,7 +103,8 @@ TEST_CASE("an open that crashes, ends the process or hangs costs a sentence and 
   says(sentence("bad_hang", 0.3), "did not end within 0.3 s");
 }
 
-TEST_CASE("an open that fails is quoted, cut to what fits; one that says nothing is told so") {
+TEST_CASE(
+    "a failed open is quoted, cut to what fits; one that gives no reason is reported as such") {
   says(sentence("bad_refuses"), "the cable is not plugged in");
   CHECK(sentence("bad_refuses").size() < 600);
   says(sentence("bad_silent"), "did not say why");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A cap's deflection as velocity: dead zone, curve, scales, dominant axis, buttons, yielding.
+// rate_control_test.cpp - a cap's deflection as velocity: dead zone, curve, scales, dominant axis,
+// buttons, yielding.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -23,7 +24,7 @@ using Axes = std::array<double, 6>;
 const h6Pose origin{{0, 0, 0}, {1, 0, 0, 0}};
 constexpr double dt = 1e-3;
 
-// Velocity once the low-pass has settled.
+// The velocity after the low-pass has settled.
 h6Velocity settled(RateFigures f, const Axes& axes, const h6Wrench& felt = {}) {
   RateControl rate(f, origin, {});
   h6DeviceSample s{};
@@ -88,13 +89,13 @@ TEST_CASE("with the lock only the axis that leads moves, and it changes only for
   CHECK(s.velocity.linear.y == 0);
   CHECK(norm(s.velocity.angular) == 0);
   s = rate.step({0.5, 0.55, 0, 0, 0, 0}, 0, {}, dt);
-  CHECK(s.velocity.linear.x > 0);  // not by a tenth
+  CHECK(s.velocity.linear.x > 0);  // a lead of a tenth does not change it
   s = rate.step({0.5, 0.7, 0, 0, 0, 0}, 0, {}, dt);
   CHECK(s.velocity.linear.x == 0);
   CHECK(s.velocity.linear.y < 0);
 }
 
-TEST_CASE("the pose is the integral of the velocity, and what it turns about stays where it is") {
+TEST_CASE("the pose is the integral of the velocity, and the centre of a turn does not move") {
   RateFigures f;
   const h6Vec3 grip{0.1, 0.02, -0.03};
   RateControl rate(f, origin, grip);
@@ -140,12 +141,13 @@ TEST_CASE("reset brings the hand home no faster than it may move, and a push end
   CHECK(std::fabs(s.pose.q.y) == near(0.8).epsilon(1e-9));
   for (int i = 0; i < 500; ++i) rate.step({1, 0, 0, 0, 0, 0}, 0, {}, dt);
   rate.step({}, f.reset_buttons, {}, dt);
-  for (int i = 0; i < 50; ++i) s = rate.step({1, 0, 0, 0, 0, 0}, 0, {}, dt);  // changed my mind
+  for (int i = 0; i < 50; ++i)
+    s = rate.step({1, 0, 0, 0, 0, 0}, 0, {}, dt);  // the user pushes while the hand goes home
   for (int i = 0; i < 2000; ++i) s = rate.step({}, 0, {}, dt);
   CHECK(norm(s.pose.p - home.p) > 1e-3);
 }
 
-TEST_CASE("what pushes against a felt wrench comes to a stop, what leaves it or slides does not") {
+TEST_CASE("motion against a felt wrench stops; motion away from it or along it does not") {
   RateFigures f;
   f.yield_force = 5, f.yield_torque = 0.5;
   const h6Wrench wall{{5, 0, 0}, {0, 0, 0.5}};
@@ -158,7 +160,7 @@ TEST_CASE("what pushes against a felt wrench comes to a stop, what leaves it or 
   CHECK(settled(f, {-1, 0, 0, 0, 0, 0}, wall).linear.x == near(-f.speed));
 }
 
-TEST_CASE("whatever comes in, the pose stays finite, a rotation, and no faster than the figures") {
+TEST_CASE("for any input the pose stays finite, a rotation, and no faster than the figures") {
   RateFigures f;
   f.yield_force = 1, f.yield_torque = 1;
   RateControl rate(f, origin, {});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A simulated arm and the person who holds it, by physics: what springs, delays, encoders and
-// motors must do whatever the figures are.
+// simulated_arm_test.cpp - a simulated arm and its person, by physics: properties of springs,
+// delays, encoders and motors that hold for any figures.
 #include "device/simulated_arm.h"
 #include "hapsix/vector.h"
 
@@ -29,7 +29,7 @@ h6Pose at(double x, double y = 0, double z = 0, double angle = 0) {
 }
 double angle_of(const h6Pose& pose) { return 2 * std::atan2(pose.q.z, pose.q.w); }
 
-// Encoders and sensor without steps.
+// An arm whose encoders and sensor do not quantise.
 ArmFigures ideal() {
   ArmFigures arm;
   arm.position_step = arm.angle_step = arm.force_step = arm.torque_step = 0;
@@ -57,7 +57,7 @@ struct Rig {
     REQUIRE(device.write(device.self, time(), &command) == 0);
     ++frame;
   }
-  // Frames with the command as it is, or as `each` makes it.
+  // Runs frames with the present command, or with the one that `each` makes.
   void run(
       double seconds, const std::function<void()>& each = [] {}) {
     for (const int end = frame + static_cast<int>(seconds / kFrame + 0.5); frame < end;) {
@@ -77,7 +77,7 @@ TEST_CASE("with nothing in the way the handle follows the path and comes to rest
   double worst = 0;
   rig.run(1, [&] { worst = std::max(worst, std::fabs(rig.sample.pose.p.x - 0.05 * rig.time())); });
   CHECK(worst < 2e-3);  // springs: of the order of v / w at the start, v b / k later
-  CHECK(worst > 1e-6);  // it is a person, not a rail
+  CHECK(worst > 1e-6);  // the person yields, unlike a rail
   rig.run(4);
   CHECK(rig.sample.pose.p.y == near(0.03).epsilon(1e-6));
   CHECK(angle_of(rig.sample.pose) == near(0.4).epsilon(1e-6));
@@ -164,8 +164,8 @@ TEST_CASE("a command is first seen one frame later, plus one frame for each fram
       }
       CHECK(norm(before.velocity.linear) < 1e-9);
       CHECK(seen == 1 + delay);
-      // Held for one frame, not longer: on its own a free mass gains F h / m, less what friction
-      // and grip take.
+      // The command acts for one frame only: on its own a free mass gains F h / m, less what
+      // friction and grip take.
       if (mode != H6_IMPEDANCE) continue;
       const double gained = rig.sample.velocity.linear.x;
       CHECK(gained < 20 * kFrame / arm.mass);
@@ -199,7 +199,7 @@ TEST_CASE("a velocity estimated from steps is right on average and rough in deta
   ArmFigures arm = ideal();
   arm.exact_velocity = false;
   arm.position_step = 1e-4, arm.angle_step = 1e-3;
-  // Speeds whose steps do not keep time with the frames.
+  // Speeds whose encoder steps are not in phase with the frames.
   const double v = 0.0517, w = 0.4913;
   Rig rig({{0, 2}, {at(0), at(2 * v, 0, 0, 2 * w)}}, arm, H6_IMPEDANCE);
   rig.run(1);
@@ -226,7 +226,7 @@ TEST_CASE("the handle stays in the workspace, however far the person reaches") {
   CHECK(pressed < 4e-3);
 }
 
-TEST_CASE("admittance: the handle is where it is told, whatever the person wants") {
+TEST_CASE("admittance: the handle is at the commanded pose, whatever the person wants") {
   for (const bool real : {false, true}) {
     CAPTURE(real);
     const ArmFigures arm = real ? ArmFigures{} : ideal();
@@ -280,7 +280,7 @@ TEST_CASE("admittance: the sensor measures what the person pushes with") {
   CHECK(rig.sample.wrench.torque.z == near(turn * twist).epsilon(0.1));
   const double counts = rig.sample.wrench.force.y / arm.force_step;
   CHECK(std::fabs(counts - std::round(counts)) < 1e-6);
-  // Motors off, the person has their way and nothing is left to push against.
+  // With the motors off, the person reaches the goal and pushes against nothing.
   rig.device.stop(rig.device.self);
   rig.run(4);
   CHECK(std::fabs(rig.sample.wrench.force.y) < 2 * arm.force_step);
@@ -294,7 +294,7 @@ TEST_CASE("pseudo-admittance: the wrench is the driver's coupling to the command
   double largest = 0;
   rig.run(1.5, [&] {
     const h6DeviceSample& s = rig.sample;
-    const h6DeviceCommand& to = rig.command;  // of the last frame: what acts while time passed
+    const h6DeviceCommand& to = rig.command;  // of the last frame: it acted during this one
     const double f =
         800 * (s.pose.p.x - to.pose.p.x) + 7 * (s.velocity.linear.x - to.velocity.linear.x);
     const double t = 800 * 9e-4 * (angle_of(s.pose) - angle_of(to.pose)) +
@@ -307,7 +307,7 @@ TEST_CASE("pseudo-admittance: the wrench is the driver's coupling to the command
     rig.command.velocity.angular.z = 0.05;
   });
   CHECK(largest > 1);
-  // The motors press the handle with the opposite: at rest it holds the person's springs.
+  // The motors apply the opposite wrench, which at rest balances the person's springs.
   rig.command.velocity = {};
   rig.command.pose = at(0);
   rig.run(4);
@@ -316,7 +316,7 @@ TEST_CASE("pseudo-admittance: the wrench is the driver's coupling to the command
   CHECK(rig.sample.wrench.force.x == near(k * (0.01 - rig.sample.pose.p.x)).epsilon(1e-6));
 }
 
-TEST_CASE("what swings freely swings less and less, in every mode and for any figures") {
+TEST_CASE("a free swing decays in every mode and for any figures") {
   for (const std::uint32_t mode : {H6_IMPEDANCE, H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE})
     for (const double person : {0.0, 500.0, 1e5})
       for (const double k_dd : {500.0, 4000.0}) {
@@ -363,7 +363,7 @@ TEST_CASE("without any damping a swing never grows") {
     spin_last = std::max(spin_last, std::fabs(angle_of(rig.sample.pose)));
   });
   CHECK(last < first);
-  CHECK(last > 0.5 * first);  // nor is it damped away by the integration
+  CHECK(last > 0.5 * first);  // the integration does not damp it away either
   CHECK(spin_last < spin_first);
 }
 
@@ -388,7 +388,7 @@ TEST_CASE("figures at the ends of their ranges stay finite and bounded") {
       rig.command.wrench = {{1, 0, 0}, {0, 0, 0.01}};
       double farthest = 0;
       rig.run(0.5, [&] { farthest = std::max(farthest, norm(rig.sample.pose.p)); });
-      CHECK(farthest < 20);  // 1 N on 10 g that nobody holds: F t^2 / 2 m = 12.5 m
+      CHECK(farthest < 20);  // 1 N on a free mass of 10 g: F t^2 / 2 m = 12.5 m
       CHECK(std::isfinite(rig.sample.pose.q.w + rig.sample.wrench.torque.z));
     }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a SpaceMouse sends: both layouts, buttons, battery, and bytes that mean nothing.
+// spacemouse_report_test.cpp - reports of a SpaceMouse: both layouts, buttons, battery, random
+// bytes.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -28,8 +29,8 @@ const ReportLayout layouts[] = {ReportLayout::unknown, ReportLayout::split, Repo
 
 TEST_CASE("a cap with two reports: translation and turn come one by one and keep each other") {
   SpaceMouseState s;
-  // As a SpaceNavigator sends them: at rest, a turn about y of -30, translation, button 1, both,
-  // none.
+  // In a SpaceNavigator's order: at rest, a turn about y of -30, translation, button 1, both
+  // buttons, no button.
   CHECK(take_report(Bytes{1, 0, 0, 0, 0, 0, 0}, ReportLayout::split, s) == ReportKind::motion);
   CHECK(take_report(Bytes{2, 0, 0, 0xe2, 0xff, 0, 0}, ReportLayout::split, s) ==
         ReportKind::motion);
@@ -73,7 +74,7 @@ TEST_CASE("the descriptor tells the layout, and a damaged one tells nothing") {
   const Bytes mouse{0x05, 0x01, 0x09, 0x02, 0xa1, 0x01, 0x85, 0x01,
                     0x75, 0x08, 0x95, 0x03, 0x81, 0x06, 0xc0};
   CHECK(layout_of_descriptor(mouse) == ReportLayout::unknown);
-  for (std::size_t n = 0; n < 40; ++n)  // before all axes are told
+  for (std::size_t n = 0; n < 40; ++n)  // cut before all axes are described
     CHECK(layout_of_descriptor(std::span(split).first(n)) == ReportLayout::unknown);
 }
 
@@ -121,7 +122,7 @@ TEST_CASE("a report that is cut short is ignored and changes nothing") {
   }
 }
 
-TEST_CASE("a million random reports: every state stays in range, what is ignored changes nothing") {
+TEST_CASE("a million random reports: states stay in range, ignored reports change nothing") {
   std::mt19937 random(20250701);
   SpaceMouseState s;
   std::size_t taken[4] = {};
@@ -138,10 +139,10 @@ TEST_CASE("a million random reports: every state stays in range, what is ignored
     if (kind == ReportKind::ignored) wrong += !(s == before);
   }
   CHECK(wrong == 0);
-  for (const std::size_t n : taken) CHECK(n > 10000);  // the fuzzer reached all of it
+  for (const std::size_t n : taken) CHECK(n > 10000);  // the fuzzer reached every kind of report
 }
 
-TEST_CASE("random and mutilated descriptors are read to an end") {
+TEST_CASE("reading random and damaged descriptors always ends") {
   std::mt19937 random(7);
   std::size_t seen[3] = {};
   for (int i = 0; i < 200000; ++i) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// spacemouse_samples.h - report descriptors of 3Dconnexion caps, item by item, and reports as such
-// caps send them.
+// spacemouse_samples.h - report descriptors of 3Dconnexion caps, item by item, and sample reports.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -26,7 +25,7 @@ inline Bytes axes_report(std::uint8_t id, std::uint8_t first, std::uint8_t count
 inline Bytes spacemouse_descriptor(bool joint) {
   Bytes d{0x05, 0x01, 0x09, 0x08, 0xa1, 0x01};
   d = joint ? d + axes_report(1, 0x30, 6) : d + axes_report(1, 0x30, 3) + axes_report(2, 0x33, 3);
-  // Report 3: 2 buttons and 14 bits of filling; report 4: the light; report 0x17: the battery.
+  // Report 3: 2 buttons and 14 bits of padding; report 4: the LED; report 0x17: the battery.
   d = d + Bytes{0xa1, 0x02, 0x85, 0x03, 0x05, 0x01, 0x05, 0x09, 0x19, 0x01, 0x29,
                 0x02, 0x15, 0x00, 0x25, 0x01, 0x35, 0x00, 0x45, 0x01, 0x75, 0x01,
                 0x95, 0x02, 0x81, 0x02, 0x95, 0x0e, 0x81, 0x03, 0xc0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The SpaceMouse's two threads, with a HID port of the test's own: newest wins, stale is released,
-// unplug and replug, light, battery, permission.
+// spacemouse_test.cpp - the SpaceMouse's two threads with a simulated HID port: the newest report
+// counts, old input is released; unplugging, LED, battery, permission.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace {
 
 const h6Pose origin{{0, 0, 0}, {1, 0, 0, 0}};
 
-// One device that can be pulled out, and what is written to it.
+// One device that can be unplugged; it keeps what is written to it.
 class Bench final : public HidPort {
  public:
   std::mutex lock;
@@ -128,7 +128,7 @@ struct Opened {
 
 }  // namespace
 
-TEST_CASE("a push moves the hand; of a queue only the newest counts") {
+TEST_CASE("a push moves the hand; only the newest of queued reports counts") {
   Opened o;
   h6DeviceSample s{};
   CHECK(o.read(s) == 0);
@@ -172,7 +172,7 @@ TEST_CASE("unplugged it is lost, at rest; replugged it goes on from where the ha
                         Bench::interface("/dev/hidraw7", "A1")};
   o.bench.plug(true);
   REQUIRE(soon([&] { return o.mouse->status().present; }));
-  CHECK(o.bench.opened == "/dev/hidraw7");  // the same one, whatever its node is called now
+  CHECK(o.bench.opened == "/dev/hidraw7");  // the same device at another node
   CHECK(o.mouse->status().replugs == 1);
   CHECK(o.read(s) == 0);
   CHECK(s.pose.p.x == there.x);
@@ -214,7 +214,7 @@ TEST_CASE(
   CHECK(o.mouse->status().felt_force == 2);
 }
 
-TEST_CASE("battery and buttons are told") {
+TEST_CASE("battery and buttons are reported") {
   Opened o;
   o.bench.send({0x17, 64});
   o.bench.send({3, 2, 0});

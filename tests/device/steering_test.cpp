@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hand that somebody takes off its path and gives back: no jump, bounded speed, the path's own
-// time stands still meanwhile.
+// steering_test.cpp - a user takes a hand off its path and gives it back: no jump, bounded speed,
+// and the path's time stands still meanwhile.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@ h6Pose at(double x, double angle = 0) {
   return {{x, 0, 0}, {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}};
 }
 
-// 10 cm and a quarter of a turn in two seconds.
+// A path of 10 cm and a quarter of a turn in two seconds.
 HandPath path() {
   HandPath p;
   p.time = {0, 2};
@@ -52,7 +52,7 @@ TEST_CASE("a hand that is taken goes where it is wanted, at a calm speed, withou
   for (; t < 0.5; t += kFrame) last = p.at(t);
   wish.held = true;
   p.steering->wish(wish);
-  for (int i = 0; i < 100; ++i, t += kFrame) {  // not told where to: it comes to rest
+  for (int i = 0; i < 100; ++i, t += kFrame) {  // no wanted pose: it comes to rest
     const h6DeviceSample now = p.at(t);
     CHECK(norm(now.pose.p - last.pose.p) < 1e-3 * Steering::kMaxSpeed + 1e-9);
     last = now;
@@ -64,7 +64,7 @@ TEST_CASE("a hand that is taken goes where it is wanted, at a calm speed, withou
     const h6DeviceSample now = p.at(t);
     CHECK(norm(now.pose.p - last.pose.p) <= kFrame * Steering::kMaxSpeed * 1.0001);
     CHECK(norm(turn(last.pose.q, now.pose.q)) <= kFrame * Steering::kMaxTurn * 1.0001);
-    // What it says of its velocity is how it moves.
+    // The reported velocity is the motion.
     CHECK(norm(now.pose.p - last.pose.p - kFrame * now.velocity.linear) < 1e-9);
     last = now;
   }
@@ -86,7 +86,7 @@ TEST_CASE("a hand that is given back goes on where its path was left") {
   p.steering->wish(wish);
   for (int i = 0; i < 1500; ++i, t += kFrame) (void)p.at(t);
   p.steering->wish({});
-  // It takes the path up again at the time it left it, however long that was ago.
+  // It continues the path from the time at which it left it.
   bool back = false;
   for (int i = 0; i < 5000 && !back; ++i, t += kFrame) {
     const double before = p.at(t).pose.p.x;

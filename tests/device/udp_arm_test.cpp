@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The worked example: an arm in a process of its own, reached through UDP, in the hand of a session
-// at 1 kHz; killed, started again.
+// udp_arm_test.cpp - the example plug-in: a session at 1 kHz and an arm in another process, reached
+// through UDP; the arm is killed and started again.
 #include <dlfcn.h>
 #include <doctest/doctest.h>
 #include <signal.h>
@@ -32,7 +32,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 const std::string library = HAPSIX_PLUGIN_FOLDER "/udp_arm.so";
 
-// The other process; killed with its object. Port 0: any, asked back.
+// The arm's process, killed with this object. Port 0: the system picks one, and the arm prints it.
 class ArmProcess {
  public:
   explicit ArmProcess(int port = 0) {
@@ -67,7 +67,7 @@ class ArmProcess {
   pid_t pid_ = -1;
 };
 
-// A machine that does something else may hold the other process up: that is not what is tested.
+// A busy machine may delay the arm's process; the test must not fail for that.
 PluginFile at(int port) { return {library, {{"port", std::to_string(port)}, {"timeout", "300"}}}; }
 
 // A floor at z = 0 and a part of one point, 5 mm above it, 1 kHz.
@@ -181,7 +181,7 @@ TEST_CASE(
   arm->end();
   CHECK(run_until(
       [](const h6FrameRecord& r) { return (r.report.status & H6_DEVICE_LOST) && force(r) == 0; }));
-  // Unless the machine held the haptic thread up before: then the output was at zero already.
+  // Except when the machine delayed the haptic thread before: then the output was already zero.
   const auto expected = [](h6Cause cause) {
     return cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_WATCHDOG || cause == H6_CAUSE_LATE;
   };
@@ -197,7 +197,7 @@ TEST_CASE(
     CHECK(force(rows[i]) == 0);
     lowest = std::min(lowest, rows[i].hand[0].pose.p.z);
   }
-  CHECK(lowest < 0);  // it is read
+  CHECK(lowest < 0);  // its samples are read again
   h6RequestStop(loop);
   const h6LoopReport report = h6JoinLoop(loop);
   CHECK(expected(report.fault));
