@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// target.cpp - all benchmarks on a lesser instruction set: HAPSIX_BENCH_TARGET=AVX2 hapsix_bench.
+// target.cpp - all benchmarks on the SIMD target that HAPSIX_SIMD names.
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
@@ -10,9 +10,8 @@
 namespace {
 
 const bool chosen = [] {
-  const char* name = std::getenv("HAPSIX_BENCH_TARGET");
-  if (name != nullptr && *name != '\0' && !h6::kernels::force_target(name)) {
-    std::fprintf(stderr, "HAPSIX_BENCH_TARGET: this machine or build has no %s\n", name);
+  if (const char* const why = h6::kernels::force_target_from_environment()) {
+    std::fprintf(stderr, "%s\n", why);
     std::exit(2);
   }
   benchmark::AddCustomContext("simd_target", h6::kernels::target_name());

@@ -3,7 +3,9 @@
 #include "kernels/targets.h"
 
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <string>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/targets.cpp"
@@ -28,13 +30,22 @@ HWY_EXPORT(name_of_this_target);
 
 namespace {
 
-// What the machine can run, apart from what is forced. Asked once: the answer changes while forced.
+// What the machine can run. Found once: Highway's answer changes while a target is forced.
 std::int64_t machine_targets() {
   static const std::int64_t targets = [] {
     hwy::SetSupportedTargetsForTest(0);
     return HWY_SUPPORTED_TARGETS & HWY_TARGETS;
   }();
   return targets;
+}
+
+std::int64_t home_targets = 0;  // of force_target(nullptr); 0: the best of the machine
+
+// The one of `targets` with this name, 0 when there is none.
+std::int64_t target_in(std::int64_t targets, const char* name) {
+  for (std::int64_t left = targets; left != 0; left &= left - 1)
+    if (std::strcmp(name, hwy::TargetName(left & -left)) == 0) return left & -left;
+  return 0;
 }
 
 }  // namespace
@@ -51,14 +62,28 @@ std::size_t supported_targets(const char** names, std::size_t capacity) {
 }
 
 bool force_target(const char* name) {
-  std::int64_t chosen = name == nullptr ? machine_targets() : 0;
-  for (std::int64_t left = machine_targets(); name != nullptr && left != 0; left &= left - 1) {
-    if (std::strcmp(name, hwy::TargetName(left & -left)) == 0) chosen = left & -left;
-  }
-  if (chosen == 0) return false;
-  hwy::SetSupportedTargetsForTest(name == nullptr ? 0 : chosen);
-  hwy::GetChosenTarget().Update(chosen);
+  const std::int64_t chosen = name == nullptr ? home_targets : target_in(machine_targets(), name);
+  if (name != nullptr && chosen == 0) return false;
+  hwy::SetSupportedTargetsForTest(chosen);  // 0: what the machine has
+  hwy::GetChosenTarget().Update(chosen == 0 ? machine_targets() : chosen);
   return true;
+}
+
+const char* force_target_from_environment(bool* built) {
+  const char* const name = std::getenv("HAPSIX_SIMD");
+  if (name == nullptr || *name == '\0') return nullptr;
+  if (built != nullptr) *built = target_in(HWY_TARGETS, name) != 0;
+  if (force_target(name)) {
+    home_targets = target_in(machine_targets(), name);
+    return nullptr;
+  }
+  static std::string why;
+  why = std::string("HAPSIX_SIMD=") + name + " is not a SIMD target of this machine; it has";
+  const char* names[32];
+  const std::size_t count = supported_targets(names, 32);
+  for (std::size_t i = 0; i < count; ++i)
+    why += std::string(i == 0 ? " " : i + 1 == count ? " and " : ", ") + names[i];
+  return why.c_str();
 }
 
 }  // namespace h6::kernels

@@ -7,6 +7,7 @@
 #include "hapsix/base.h"
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
+#include "kernels/targets.h"
 
 using namespace h6::cli;
 
@@ -60,6 +61,16 @@ std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
   return what + (what.back() == '?' ? " '" : "; '") + command + " --help' tells more";
 }
 
+std::string version() {
+  std::string text = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." +
+                     std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH) +
+                     "\nSIMD targets of this machine, best first:";
+  const char* names[32];
+  const std::size_t count = h6::kernels::supported_targets(names, 32);
+  for (std::size_t i = 0; i < count; ++i) text += std::string(" ") + names[i];
+  return text;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -72,9 +83,7 @@ int main(int argc, char** argv) {
   app.footer("Every command takes --json. Exit code: 0 done, 1 failed, 2 wrong usage.");
   Program program;
   app.add_flag("--json", program.console.json, "One JSON object on stdout, messages on stderr");
-  app.set_version_flag("--version", std::string("hapsix ") + std::to_string(H6_VERSION_MAJOR) +
-                                        "." + std::to_string(H6_VERSION_MINOR) + "." +
-                                        std::to_string(H6_VERSION_PATCH));
+  app.set_version_flag("--version", version);
   add_bake(app, program);
   add_check(app, program);
   add_run(app, program);
@@ -100,6 +109,8 @@ int main(int argc, char** argv) {
       program.console.json = program.console.json || std::string(argv[i]) == "--json";
     return program.console.fail(mistake(app, e), kUsage);
   }
+  if (const char* why = h6::kernels::force_target_from_environment())
+    return program.console.fail(why, kUsage);
   install_signal_handlers();
   try {
     return program.console.finish(program.work());

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <random>
@@ -41,7 +42,9 @@ class Random {
   std::mt19937_64 engine_;
 };
 
+// Those of the machine, or the one that HAPSIX_SIMD names.
 inline std::vector<std::string> all_targets() {
+  if (const char* forced = std::getenv("HAPSIX_SIMD"); forced && *forced) return {forced};
   const char* names[32];
   const std::size_t count = supported_targets(names, 32);
   // What they share is the same in all of them.
@@ -66,6 +69,9 @@ class Column {
  public:
   Column(std::size_t count, std::size_t shift)
       : data_(count + 96, std::numeric_limits<float>::quiet_NaN()), shift_(shift), count_(count) {}
+  // The first row depends on the address of the data, which a copy does not keep.
+  Column(const Column&) = delete;
+  Column(Column&&) = default;
   float* begin() {
     const auto address = reinterpret_cast<std::uintptr_t>(data_.data());
     return data_.data() + (64 - address % 64) % 64 / sizeof(float) + shift_;

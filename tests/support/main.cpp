@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// main.cpp - of every test program that has none of its own.
+// main.cpp - main of every test program that has none of its own.
 #include <doctest/doctest.h>
 
 #include <cstdio>
+
+#include "tests/support/forced_target.h"
 
 namespace {
 
@@ -31,6 +33,7 @@ struct CountMatches : doctest::IReporter {
 REGISTER_LISTENER("matches", 1, CountMatches);
 
 int main(int argc, char** argv) {
+  if (const int code = h6::test::force_target_or_exit_code()) return code;
   const int failed = doctest::Context(argc, argv).run();
   if (failed == 0 && matching == 0) {
     std::fprintf(stderr, "No test matches this filter.\n");

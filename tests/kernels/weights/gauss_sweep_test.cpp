@@ -64,7 +64,8 @@ TEST_CASE("gauss_sweep: contacts of one direction weigh the same one after the o
     for (const Hat hat : {Hat::normal, Hat::sum}) {
       // Nine in ten stand on three walls: in runs, or by turns.
       const std::size_t n = 3000;
-      Contacts runs = contacts_of(Set::spread, n, kPaper), turns = runs;
+      Contacts runs = contacts_of(Set::spread, n, kPaper);
+      Contacts turns = contacts_of(Set::spread, n, kPaper);
       for (std::size_t i = 0; i < n; ++i) {
         if (i % 10 == 9) continue;
         for (int k = 0; k < 3; ++k) {

@@ -27,6 +27,7 @@
 
 #include "hapsix/hapsix.h"
 #include "tests/support/ball_in_bowl.h"
+#include "tests/support/forced_target.h"
 #include "tests/support/sanitized.h"
 
 namespace {
@@ -441,6 +442,7 @@ TEST_CASE("too many contacts: the deepest are kept, the frame says so") {
 }
 
 int main(int argc, char** argv) {
+  if (const int code = h6::test::force_target_or_exit_code()) return code;
   doctest::Context context(argc, argv);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   if (argc == 6 && std::string(argv[1]) == kForbidden) {

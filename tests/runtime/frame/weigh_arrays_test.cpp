@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
+#include "tests/kernels/kernel_test.h"
 #include "tests/support/analytic.h"
 #include "tests/support/near.h"
 
@@ -232,6 +233,32 @@ TEST_CASE("weights of every method follow the points when these are put in anoth
     CHECK(a.wrench.force.z == near(b.wrench.force.z).epsilon(1e-4));
     CHECK((a.K - b.K).norm() <= 1e-4 * a.K.norm());
   }
+}
+
+// About the ball's own centre r is parallel to N, and r x N is rounding noise, which a direction
+// without a floor blows up to length 1: weights then depend on the processor.
+TEST_CASE(
+    "gauss6 with a torque length: where r is parallel to N, every SIMD target gives one share") {
+  const Rows rows = cap(300);
+  h6ContactDef def = method(H6_METHOD_GAUSS6);
+  def.torque_length = mm;
+  def.epsilon = 0.1;
+  std::vector<double> want;  // 2 / phi, where all torque directions are 0
+  for (std::size_t i = 0; i < 300; ++i) {
+    double phi = 300;
+    for (std::size_t j = 0; j < 300; ++j) {
+      double gap2 = 0;
+      for (int k = 0; k < 3; ++k)
+        gap2 += std::pow(double{rows.n[3 * j + k]} - rows.n[3 * i + k], 2);
+      phi += std::max(0.0, 1 - gap2 / (def.epsilon * def.epsilon));
+    }
+    want.push_back(2 / phi);
+  }
+  h6::kernels::test::on_every_target([&](const std::string&) {
+    const Answer a(def, rows.arrays());
+    REQUIRE(a.code == 0);
+    for (std::size_t i = 0; i < 300; ++i) CHECK(a.weight[i] == near(want[i]).epsilon(1e-5));
+  });
 }
 
 TEST_CASE("series: the stiffness that comes back is bounded by c k and pushes only") {
