@@ -31,7 +31,8 @@ struct BandRuns {
 struct GaussBands {
   const float* column[3];  // as they came
   float width;
-  bool order_only;
+  bool geodesic;               // as of GaussWidths
+  bool order_only;             // only the order is wanted, no sums
   float *direction[3], *mass;  // of those that are one: the s_j over the largest s added up
   std::uint32_t* head;         // the first contact of each
   // In order of the bands, padded to whole blocks with copies of the last one that weigh nothing.

@@ -9,11 +9,11 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/weights/geodesic-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::CappedTag<float, kBandBlock>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
@@ -40,17 +40,21 @@ struct Sum {
 };
 
 // The hat of one contact at every lane.
+template <bool kGeodesic>
 HWY_INLINE VF hat_at(const Rows& rows, std::size_t p, VF width2, const float* at) {
   const DF d;
   const VF gx = hn::Sub(rows.x[0][p], hn::Set(d, at[0]));
   const VF gy = hn::Sub(rows.x[1][p], hn::Set(d, at[1]));
   const VF gz = hn::Sub(rows.x[2][p], hn::Set(d, at[2]));
-  const VF v = hn::NegMulAdd(gy, gy, hn::NegMulAdd(gx, gx, width2));
-  return hn::Max(hn::NegMulAdd(gz, gz, v), hn::Zero(d));
+  VF v = hn::NegMulAdd(gy, gy, hn::NegMulAdd(gx, gx, width2));
+  v = hn::NegMulAdd(gz, gz, v);
+  if constexpr (kGeodesic) return geodesic_hat(d, width2, v);
+  return hn::Max(v, hn::Zero(d));
 }
 
 // Contacts first .. end - 1, one by one. Several sums at a time: an addition takes longer than a
 // hat.
+template <bool kGeodesic>
 HWY_INLINE void add_contacts(const GaussBands& g, const Rows& rows, VF width2, std::size_t first,
                              std::size_t end, Sum& sum) {
   constexpr std::size_t kSums = 4;
@@ -66,11 +70,11 @@ HWY_INLINE void add_contacts(const GaussBands& g, const Rows& rows, VF width2, s
       for (; at + 4 * kSums <= behind; at += 4 * kSums) {
         HWY_UNROLL(4)
         for (std::size_t k = 0; k < kSums; ++k)
-          fresh[k] =
-              hn::MulAdd(hn::Set(d, at[4 * k + 3]), hat_at(rows, p, width2, at + 4 * k), fresh[k]);
+          fresh[k] = hn::MulAdd(hn::Set(d, at[4 * k + 3]),
+                                hat_at<kGeodesic>(rows, p, width2, at + 4 * k), fresh[k]);
       }
       for (; at < behind; at += 4)
-        fresh[0] = hn::MulAdd(hn::Set(d, at[3]), hat_at(rows, p, width2, at), fresh[0]);
+        fresh[0] = hn::MulAdd(hn::Set(d, at[3]), hat_at<kGeodesic>(rows, p, width2, at), fresh[0]);
       const VF two[2] = {hn::Add(fresh[0], fresh[1]), hn::Add(fresh[2], fresh[3])};
       sum.phi[p] = hn::Add(sum.phi[p], hn::Add(two[0], two[1]));
     }
@@ -78,7 +82,8 @@ HWY_INLINE void add_contacts(const GaussBands& g, const Rows& rows, VF width2, s
   }
 }
 
-void sum_simd(const GaussBands& g, std::size_t begin, std::size_t end) {
+template <bool kGeodesic>
+HWY_INLINE void sum_blocks(const GaussBands& g, std::size_t begin, std::size_t end) {
   const DF d;
   const VF width2 = hn::Set(d, g.width * g.width);
   const VF unit = hn::Set(d, 1 / (g.width * g.width));
@@ -89,10 +94,14 @@ void sum_simd(const GaussBands& g, std::size_t begin, std::size_t end) {
     Sum sum;
     for (VF& phi : sum.phi) phi = hn::Zero(d);
     for (std::uint32_t r = 0; r < runs.count; ++r)
-      add_contacts(g, rows, width2, runs.first[r], runs.end[r], sum);
+      add_contacts<kGeodesic>(g, rows, width2, runs.first[r], runs.end[r], sum);
     for (std::size_t p = 0; p < kParts; ++p)
       hn::Store(hn::Mul(sum.phi[p], unit), d, g.phi + block * kBandBlock + p * kLanes);
   }
+}
+
+void sum_simd(const GaussBands& g, std::size_t begin, std::size_t end) {
+  g.geodesic ? sum_blocks<true>(g, begin, end) : sum_blocks<false>(g, begin, end);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

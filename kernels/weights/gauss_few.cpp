@@ -14,6 +14,7 @@
 #include "hwy/highway.h"
 #include "kernels/fold-inl.h"
 #include "kernels/tail-inl.h"
+#include "kernels/weights/geodesic-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
@@ -32,7 +33,8 @@ struct Few {
   HWY_ALIGN float back[kGaussFew + kLanes];  // over rows that come after the column
 };
 
-// epsilon^2 - |V_j - V_i|^2, cut at 0, over one sphere.
+// epsilon^2 - |V_j - V_i|^2, cut at 0, over one sphere; or with the angle.
+template <bool kGeodesic>
 HWY_INLINE VF hat_of(const Few& f, int sphere, const VF* x, std::size_t i) {
   const DF d;
   VF v = hn::Set(d, f.width2[sphere]);
@@ -41,12 +43,13 @@ HWY_INLINE VF hat_of(const Few& f, int sphere, const VF* x, std::size_t i) {
     const VF gap = hn::Sub(x[k], hn::Set(d, f.column[3 * sphere + k][i]));
     v = hn::NegMulAdd(gap, gap, v);
   }
+  if constexpr (kGeodesic) return geodesic_hat(d, hn::Set(d, f.width2[sphere]), v);
   return hn::Max(v, hn::Zero(d));
 }
 
 // Rows i .. i + kCount - 1 with the columns of a vector from j on; kLast: with those of them that
 // come before the row.
-template <Hat kHat, std::size_t kCount, bool kLast>
+template <Hat kHat, bool kGeodesic, std::size_t kCount, bool kLast>
 HWY_INLINE void add_tile(Few& f, std::size_t count, std::size_t i, std::size_t j, VF* sum) {
   const DF d;
   constexpr int kAxes = kHat == Hat::normal ? 3 : 6;
@@ -57,10 +60,10 @@ HWY_INLINE void add_tile(Few& f, std::size_t count, std::size_t i, std::size_t j
   VF back = hn::Load(d, f.back + j);
   HWY_UNROLL(4)
   for (std::size_t r = 0; r < kCount; ++r) {
-    VF hat = hat_of(f, 0, x, i + r);
+    VF hat = hat_of<kGeodesic>(f, 0, x, i + r);
     if constexpr (kHat == Hat::sum)
-      hat = hn::MulAdd(hn::Set(d, f.ratio), hat, hat_of(f, 1, x + 3, i + r));
-    if constexpr (kHat == Hat::product) hat = hn::Mul(hat, hat_of(f, 1, x + 3, i + r));
+      hat = hn::MulAdd(hn::Set(d, f.ratio), hat, hat_of<kGeodesic>(f, 1, x + 3, i + r));
+    if constexpr (kHat == Hat::product) hat = hn::Mul(hat, hat_of<kGeodesic>(f, 1, x + 3, i + r));
     if constexpr (kLast) hat = hn::IfThenElseZero(hn::FirstN(d, i + r > j ? i + r - j : 0), hat);
     sum[r] = hn::MulAdd(share, hat, sum[r]);
     back = hn::MulAdd(hn::Set(d, f.share[i + r]), hat, back);
@@ -68,14 +71,16 @@ HWY_INLINE void add_tile(Few& f, std::size_t count, std::size_t i, std::size_t j
   hn::Store(back, d, f.back + j);
 }
 
-template <Hat kHat, std::size_t kCount>
+template <Hat kHat, bool kGeodesic, std::size_t kCount>
 HWY_INLINE void add_rows(Few& f, std::size_t count, std::size_t i) {
   const DF d;
   VF sum[kRows];
   for (VF& v : sum) v = hn::Zero(d);
   std::size_t j = 0;
-  for (; j + kLanes <= i; j += kLanes) add_tile<kHat, kCount, false>(f, count, i, j, sum);
-  for (; j < i + kCount - 1; j += kLanes) add_tile<kHat, kCount, true>(f, count, i, j, sum);
+  for (; j + kLanes <= i; j += kLanes)
+    add_tile<kHat, kGeodesic, kCount, false>(f, count, i, j, sum);
+  for (; j < i + kCount - 1; j += kLanes)
+    add_tile<kHat, kGeodesic, kCount, true>(f, count, i, j, sum);
   add_four_sums(d, sum, f.sum + i);
 }
 
@@ -100,7 +105,7 @@ HWY_INLINE void set_shares(const DirectionsView& c, Few& f) {
     hn::Store(hn::Div(hn::Load(d, f.share + j), per_share), d, f.share + j);
 }
 
-template <Hat kHat>
+template <Hat kHat, bool kGeodesic>
 HWY_INLINE void weigh(const DirectionsView& c, const GaussWidths& widths, float* weight) {
   const DF d;
   Few f;  // what is large stays uninitialised
@@ -112,8 +117,8 @@ HWY_INLINE void weigh(const DirectionsView& c, const GaussWidths& widths, float*
   f.ratio = f.width2[1] / f.width2[0];
   set_shares(c, f);
   std::size_t i = 0;
-  for (; i + kRows <= c.count; i += kRows) add_rows<kHat, kRows>(f, c.count, i);
-  for (; i < c.count; ++i) add_rows<kHat, 1>(f, c.count, i);
+  for (; i + kRows <= c.count; i += kRows) add_rows<kHat, kGeodesic, kRows>(f, c.count, i);
+  for (; i < c.count; ++i) add_rows<kHat, kGeodesic, 1>(f, c.count, i);
 
   const float unit = kHat == Hat::normal ? 1 / f.width2[0]
                      : kHat == Hat::sum  ? 1 / f.width2[1]
@@ -130,15 +135,22 @@ HWY_INLINE void weigh(const DirectionsView& c, const GaussWidths& widths, float*
   }
 }
 
-void weigh_few(const DirectionsView& c, Hat hat, const GaussWidths& widths, float* weight) {
+template <bool kGeodesic>
+HWY_INLINE void weigh_by(const DirectionsView& c, Hat hat, const GaussWidths& widths,
+                         float* weight) {
   switch (hat) {
     case Hat::normal:
-      return weigh<Hat::normal>(c, widths, weight);
+      return weigh<Hat::normal, kGeodesic>(c, widths, weight);
     case Hat::sum:
-      return weigh<Hat::sum>(c, widths, weight);
+      return weigh<Hat::sum, kGeodesic>(c, widths, weight);
     case Hat::product:
-      return weigh<Hat::product>(c, widths, weight);
+      return weigh<Hat::product, kGeodesic>(c, widths, weight);
   }
+}
+
+void weigh_few(const DirectionsView& c, Hat hat, const GaussWidths& widths, float* weight) {
+  widths.geodesic ? weigh_by<true>(c, hat, widths, weight)
+                  : weigh_by<false>(c, hat, widths, weight);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

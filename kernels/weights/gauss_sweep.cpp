@@ -15,6 +15,7 @@
 #include "hwy/highway.h"
 #include "kernels/fold-inl.h"
 #include "kernels/tail-inl.h"
+#include "kernels/weights/geodesic-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
@@ -61,7 +62,7 @@ struct Group {
   VF at[kRows][3], share[kRows], sum[kRows];
 };
 
-template <bool kMasked>
+template <bool kMasked, bool kGeodesic>
 HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
                          float* column, Group& rows) {
   const DF d;
@@ -77,6 +78,7 @@ HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, s
       const VF gap = hn::Sub(x[k], at);
       v = hn::NegMulAdd(gap, gap, v);
     }
+    if constexpr (kGeodesic) return geodesic_hat(d, width2[s], v);
     return hn::Max(v, zero);
   };
   HWY_UNROLL(4)
@@ -104,6 +106,7 @@ HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, s
 }
 
 // A group's rows from `i` on, with columns from `j` to `end`.
+template <bool kGeodesic>
 HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
                           std::size_t end, float* fresh, float* total) {
   const DF d;
@@ -114,12 +117,14 @@ HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, 
     rows.share[r] = hn::Set(d, g.share[i + r]);
     rows.sum[r] = hn::Zero(d);
   }
-  for (; j < HWY_MIN(i + kRows, end); j += kLanes) add_tile<true>(g, width2, i, j, fresh, rows);
-  for (; j < end; j += kLanes) add_tile<false>(g, width2, i, j, fresh, rows);
+  for (; j < HWY_MIN(i + kRows, end); j += kLanes)
+    add_tile<true, kGeodesic>(g, width2, i, j, fresh, rows);
+  for (; j < end; j += kLanes) add_tile<false, kGeodesic>(g, width2, i, j, fresh, rows);
   add_four_sums(d, rows.sum, total + i);
 }
 
-void sum_pairs(const GaussSweep& sweep, std::size_t part) {
+template <bool kGeodesic>
+HWY_INLINE void sum_part(const GaussSweep& sweep, std::size_t part) {
   const DF d;
   const GaussBands& g = sweep.bands[0];
   const GaussPairs& pairs = *sweep.product;
@@ -139,8 +144,8 @@ void sum_pairs(const GaussSweep& sweep, std::size_t part) {
         for (std::uint32_t from = runs.first[r]; from < runs.end[r]; from += kRun) {
           const std::uint32_t to = HWY_MIN(from + kRun, runs.end[r]);
           for (std::size_t i = b * kBandBlock; i < rows; i += kRows)
-            add_group(pairs, width2, i, HWY_MAX(std::size_t{from}, i / kLanes * kLanes), to, fresh,
-                      total);
+            add_group<kGeodesic>(pairs, width2, i, HWY_MAX(std::size_t{from}, i / kLanes * kLanes),
+                                 to, fresh, total);
         }
       }
       if (runs.count > 0) farthest = HWY_MAX(farthest, std::size_t{runs.end[runs.count - 1]});
@@ -150,6 +155,10 @@ void sum_pairs(const GaussSweep& sweep, std::size_t part) {
       hn::Store(hn::Zero(d), d, fresh + j);
     }
   }
+}
+
+void sum_pairs(const GaussSweep& sweep, std::size_t part) {
+  sweep.bands[0].geodesic ? sum_part<true>(sweep, part) : sum_part<false>(sweep, part);
 }
 
 // Adds up what the parts summed.
@@ -224,6 +233,7 @@ GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& wid
     g.order_only = hat == Hat::product;
     std::copy_n(normals + 3 * p, 3, g.column);
     g.width = width[p];
+    g.geodesic = widths.geodesic;
     lay_out_bands(g, c.count, columns);
   }
   if (hat != Hat::product) return sweep;

@@ -42,14 +42,18 @@ struct GaussSweep {
 // Bytes of `memory`, any alignment.
 std::size_t gauss_sweep_bytes(std::size_t count, Hat hat);
 
-// Arguments as of gauss_weights, geodesic excepted. weight (count).
+// Arguments as of gauss_weights_ref. weight (count).
 GaussSweep gauss_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
                        float* weight);
 std::size_t gauss_sweep_slices(const GaussSweep& sweep, int stage);
 void gauss_sweep_run(const GaussSweep& sweep, int stage, std::size_t slice);
 
-// After stage 0: whether its pairs cost less than gauss_tree does.
+// After stage 0: whether the pairs cost less than gauss_tree. The tree cannot do angles, which are no
+// quadratics.
 inline bool gauss_sweep_pays(const GaussSweep& sweep) {
+  if (sweep.bands[0].geodesic) return true;
+inline bool gauss_sweep_pays(const GaussSweep& sweep) {
+  if (sweep.bands[0].geodesic) return true;
   const std::uint64_t each = sweep.hat == Hat::product ? kGaussSweepPairs6 : kGaussSweepPairs3;
   std::uint64_t pairs = 0;
   for (int p = 0; p < sweep.densities; ++p) pairs += sweep.pairs[p];

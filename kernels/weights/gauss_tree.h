@@ -56,7 +56,7 @@ struct GaussTree {
 // Bytes of `memory`: at most 120 a contact and 20,000, any alignment.
 std::size_t gauss_tree_bytes(std::size_t count, Hat hat);
 
-// Arguments as of gauss_weights, geodesic excepted: that is not a quadratic. weight (count).
+// Arguments as of gauss_weights_ref, geodesic excepted: that is not a quadratic. weight (count).
 GaussTree gauss_tree(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
                      float* weight);
 std::size_t gauss_tree_slices(const GaussTree& tree, int stage);

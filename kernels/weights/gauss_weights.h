@@ -36,11 +36,10 @@ struct GaussWidths {
 //     phi_i   = sum_j s_j * hat_ij
 //     w_i     = facing_i * s_i * hat_self / phi_i               hat_self = 1, 2 (sum), 1
 //     w_i     = 0 where s_i = 0
-// Widths below kMinWidth count as kMinWidth: unit normals in float resolve little less.
-// The sum over j runs in a fixed order: the same bits for any split of begin..end on one target.
-// O(count) a row. `weight` is indexed by i and must not alias the view.
-void gauss_weights(const DirectionsView& c, Hat hat, const GaussWidths& widths, std::size_t begin,
-                   std::size_t end, float* weight);
+// Widths below kMinWidth count as kMinWidth: unit normals in float resolve little less. `weight` is
+// indexed by i and must not alias the view. This is the specification, O(count) a row; what a frame
+// runs is gauss_few.h for few contacts, gauss_sweep.h for some thousand and gauss_tree.h for more,
+// or where they crowd.
 void gauss_weights_ref(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                        std::size_t begin, std::size_t end, float* weight);
 

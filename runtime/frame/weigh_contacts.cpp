@@ -15,7 +15,6 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSlice = 128;  // rows of the density sum at a time
 // Contacts from which the helper is asked: 430 take 6.9 us alone and 5.5 with it, 1,000 16.7 and
 // 12.5; 64 0.9 and some 3.
 constexpr std::size_t kWorthSharing = 192;
@@ -100,10 +99,10 @@ void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sche
                [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); });
 }
 
-// False, and nothing weighed, where contacts crowd so that the tree is faster.
+// Where contacts crowd so that the tree is faster, returns false and weighs nothing.
 bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
                       void* scratch, float* weight) {
-  if (view.count > kernels::kGaussSweepMost) return false;
+  if (view.count > kernels::kGaussSweepMost && !rule.widths.geodesic) return false;
   const kernels::GaussSweep sweep =
       kernels::gauss_sweep(view, rule.hat, rule.widths, scratch, weight);
   int stage = 0;
@@ -136,18 +135,10 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
                                      rule.depth ? c.depth : nullptr,
                                      c.count};
   if (c.count < kWorthSharing) team = nullptr;
-  // The angle in the chord's place is no quadratic, and reaches farther.
-  if (c.count <= kWorthSorting && !rule.widths.geodesic) {
+  if (c.count <= kWorthSorting)
     kernels::gauss_weights_few(view, rule.hat, rule.widths, c.weight);
-  } else if (scratch && !rule.widths.geodesic) {
-    if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
-      weigh_with_tree(view, rule, team, scratch, c.weight);
-  } else {
-    for_slices((c.count + kSlice - 1) / kSlice, team, [&](std::size_t i) {
-      kernels::gauss_weights(view, rule.hat, rule.widths, i * kSlice,
-                             std::min((i + 1) * kSlice, c.count), c.weight);
-    });
-  }
+  else if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
+    weigh_with_tree(view, rule, team, scratch, c.weight);
   if (rule.printed) weigh_as_printed(c, rule);
 }
 
@@ -171,9 +162,9 @@ void merge_clusters(h6Session& s, std::size_t first_pair, std::size_t end_pair) 
 
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
   const Rule rule = rule_of(def, 1.0);
-  if (!rule.gauss || rule.widths.geodesic) return 0;
+  if (!rule.gauss) return 0;
   return std::max(kernels::gauss_tree_bytes(count, rule.hat),
-                  kernels::gauss_sweep_bytes(std::min(count, kernels::kGaussSweepMost), rule.hat));
+                  kernels::gauss_sweep_bytes(count, rule.hat));
 }
 
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,

@@ -12,10 +12,10 @@
 namespace h6 {
 
 // Fills facing, T, weight and load of all rows, for every rule but `series`. `lever`: the body's
-// radius [m]. `team` may be null. `scratch`: weigh_scratch_bytes of c.count or more, or null, which
-// is slower for many contacts.
+// radius [m]. `team` may be null. `scratch`: weigh_scratch_bytes of c.count or more; up to 120 rows
+// need none.
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
-                   sched::FrameTeam* team, void* scratch = nullptr);
+                   sched::FrameTeam* team, void* scratch);
 // The scratch that weigh_columns uses for up to `count` contacts; 0 where the rule needs none.
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
 

@@ -141,10 +141,10 @@ TEST_CASE("clusters keep k each; with Gauss weights on top, one direction keeps 
     return t;
   };
   Table alone = heaps();
-  weigh_columns(alone.c, method(H6_METHOD_CLUSTER), mm, 0.01, nullptr);
+  weigh_columns(alone.c, method(H6_METHOD_CLUSTER), mm, 0.01, nullptr, nullptr);
   CHECK(alone.net() == h6::test::near(2));
   Table gauss = heaps();
-  weigh_columns(gauss.c, method(H6_METHOD_GAUSS3, H6_PIECE_CLUSTER), mm, 0.01, nullptr);
+  weigh_columns(gauss.c, method(H6_METHOD_GAUSS3, H6_PIECE_CLUSTER), mm, 0.01, nullptr, nullptr);
   CHECK(gauss.net() == h6::test::near(1).epsilon(1e-5));
   CHECK(gauss.c.weight[0] == h6::test::near(0.5).epsilon(1e-5));  // heaps count, not their points
   CHECK(uses_clusters(method(H6_METHOD_ROBUST, H6_PIECE_CLUSTER)));
@@ -156,7 +156,7 @@ TEST_CASE("Eq. 8 as printed turns the weights round: the denser, the stiffer") {
     Table t(11);
     for (int i = 0; i < 10; ++i) t.add({0, 0, 0}, {0, 0, 1}, mm);
     t.add({mm, 0, 0}, {0, 1, 0}, mm);
-    weigh_columns(t.c, method(H6_METHOD_GAUSS3, pieces), mm, 0.01, nullptr);
+    weigh_columns(t.c, method(H6_METHOD_GAUSS3, pieces), mm, 0.01, nullptr, nullptr);
     return std::pair{t.c.weight[0], t.c.weight[10]};
   };
   const auto settled = weights(0), printed = weights(H6_PIECE_PRINTED);
@@ -173,7 +173,7 @@ TEST_CASE("geodesic distance is the angle: a hat of 1 rad ends at 1 rad, one ove
     t.add({0, 0, 0}, {0, std::sin(angle), std::cos(angle)}, mm);
     h6ContactDef def = method(m, pieces);
     def.epsilon = def.epsilon_normal = 1;
-    weigh_columns(t.c, def, mm, 0.01, nullptr);
+    weigh_columns(t.c, def, mm, 0.01, nullptr, nullptr);
     return double{t.c.weight[0]};
   };
   for (const h6Method m : {H6_METHOD_GAUSS3, H6_METHOD_ROBUST}) {
@@ -193,7 +193,7 @@ TEST_CASE("torque handles keep the length of the arm that directions throw away"
     t.add({9 * mm, 0, 0}, {0, 0, 1}, mm);
     h6ContactDef def = method(H6_METHOD_GAUSS6, pieces);
     def.epsilon = 0.5;
-    weigh_columns(t.c, def, mm, 10 * mm, nullptr);
+    weigh_columns(t.c, def, mm, 10 * mm, nullptr, nullptr);
     return t;
   };
   const Table directions = columns(0), handles = columns(H6_PIECE_HANDLES);
