@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// contact_columns_bench.cpp - what is done once a contact: sampling groups, making contacts of what
-// touches, torque directions.
+// contact_columns_bench.cpp - the work done once for each contact: sampling groups, making contacts
+// of the touching points, torque directions.
 #include "kernels/contact/contact_columns.h"
 
 #include <memory>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_tree_bench.cpp - density on the Gauss map by the tree, by the sweep and, for few contacts, by
-// every pair once.
+// gauss_tree_bench.cpp - density on the Gauss map by the tree, by the sweep and, for few contacts,
+// by every pair once.
 //
 // Sets: spread (directions everywhere), clump (as wide as the hats), walls (six, rough, wall by
 // wall, torque directions of arms on them), one-normal (a flat wall), equal.
@@ -93,7 +93,7 @@ struct Contacts {
 
 enum class Way { tree, sweep, few };
 
-// On the same contacts each, which says where one begins to pay.
+// All ways run on the same contacts, which shows where each begins to pay.
 Case make(const std::string& set, std::size_t n, const Rule& rule, Way way) {
   auto c = std::make_shared<Contacts>(set, n, rule);
   const DirectionsView view = c->view(rule.weighted);

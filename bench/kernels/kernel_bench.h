@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // kernel_bench.h - registers a kernel's benchmark for its reference and for every SIMD target.
 //
-// Names end in what ran: ".../ref", ".../SCALAR", ".../AVX3". ref is the specification, compiled
-// with the same flags and vectorisation off; it counts no cycles, and where the kernel is no
-// straight loop it is another algorithm. SCALAR is the kernel itself with one lane. A run whose
-// result is wrong reports no time.
+// The last part of a name tells what ran: ".../ref", ".../SCALAR", ".../AVX3". ref is the
+// specification, compiled with the same flags and vectorisation off; it may be another algorithm.
+// SCALAR is the kernel itself with one lane. A run whose result is wrong reports no time.
 #pragma once
 #include <benchmark/benchmark.h>
 
@@ -33,8 +32,8 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// What one benchmark does with its data: run the kernel or the reference; tell whether the result
-// of the last run is right.
+// One benchmark: runs the kernel or the reference on its data, and checks the result of the last
+// run.
 struct Case {
   std::function<void()> kernel, reference;
   std::function<bool()> correct;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_bands.cpp - sorting and runs of gauss_bands.h.
+// gauss_bands.cpp - the sorting and the runs of gauss_bands.h.
 #include "kernels/weights/gauss_bands.h"
 
 #include <algorithm>
@@ -23,8 +23,8 @@ using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 
-// No wall of a machine is square to the line, nor do two of its six directions meet on it; the
-// second stands across it.
+// The line on which bands lie. No wall of a machine is perpendicular to it, and the six directions
+// of axis-parallel walls fall on different places. The second direction is perpendicular to it.
 constexpr float kLine[3] = {0.6104f, -0.3702f, 0.7003f};
 constexpr float kAcross[3] = {-0.7690f, -0.0652f, 0.6359f};
 constexpr std::size_t kSorted = 48;       // contacts from which sorting pays
@@ -32,15 +32,16 @@ constexpr std::size_t kManyBands = 4096;  // contacts of a product from which se
 
 // ---- order
 
-constexpr std::size_t kWorthJoining = 16;  // contacts to one that is saved
+constexpr std::size_t kWorthJoining = 16;  // merge when at least one contact in 16 is saved
 
-// Which of the contacts from i on differ from the one before.
+// The contacts from i on that differ from the one before.
 HWY_INLINE hn::Mask<DF> differing(const GaussBands& g, std::size_t i, std::size_t live) {
   const DF d;
   auto same = hn::FirstN(d, live);
   for (const float* column : g.column) {
     if (HWY_UNLIKELY(i == 0)) {
-      HWY_ALIGN float before[kLanes] = {std::numeric_limits<float>::quiet_NaN()};  // follows none
+      HWY_ALIGN float before[kLanes] = {
+          std::numeric_limits<float>::quiet_NaN()};  // the first contact differs
       std::copy_n(column, HWY_MIN(live, kLanes) - 1, before + 1);
       same = hn::And(same, hn::Eq(load_n(d, column, live), hn::Load(d, before)));
     } else {
@@ -56,11 +57,11 @@ HWY_INLINE float share_of(const DirectionsView& c, std::size_t i, float per_shar
   return per_share;
 }
 
-// What is sorted: columns and weights of contacts, or of runs of equal ones where those are many.
+// The items that are sorted: contacts, or runs of equal contacts where there are many of these.
 struct Items {
   const float* v[3];
-  const float* mass;          // null: contacts as they came
-  const std::uint32_t* head;  // likewise
+  const float* mass;          // null: items are the contacts
+  const std::uint32_t* head;  // null: items are the contacts
   std::size_t count;
 };
 
@@ -69,7 +70,7 @@ HWY_INLINE Items items_of(const GaussBands& g, const DirectionsView& c, float pe
   const DI di;
   const Items all{{g.column[0], g.column[1], g.column[2]}, nullptr, nullptr, c.count};
   if (g.order_only) return all;
-  // A quarter of them tells whether it is worth it.
+  // A quarter of the contacts is looked at to decide whether merging pays.
   std::size_t seen = 0, left = 0;
   for (std::size_t i = 0; i < c.count; i += 4 * kLanes) {
     left += hn::CountTrue(d, differing(g, i, c.count - i));
@@ -102,13 +103,13 @@ struct Range {
   float low, extent;
 };
 
-// A product's contacts have few bands, its hat over the first sphere is wide: where contacts are
-// few a block would lie in several.
+// The first hat of a product is wide, so there are few bands; with few contacts a block would lie
+// in several of them.
 HWY_INLINE bool in_one_band(const GaussBands& g, std::size_t count) {
   return g.order_only && count < kManyBands;
 }
 
-// Places along both directions, and the longest axis of any vector.
+// Coordinates along both directions; returns the largest component of any vector.
 HWY_INLINE float project(const Items& items, float* const* along, Range* range) {
   const DF d;
   const std::size_t count = items.count;
@@ -139,7 +140,7 @@ HWY_INLINE float project(const Items& items, float* const* along, Range* range) 
 
 HWY_INLINE void choose_grid(const GaussBands& g, std::size_t count, const Range* range, float size,
                             float* scale) {
-  // A place is rounded by less than 1e-6 of the longest vector, a cell's number by less.
+  // A coordinate is rounded by less than 1e-6 of the longest vector, a cell number by less.
   const float reach = g.width * 1.001f + 4e-6f * size;
   const std::uint32_t most = band_cells(count) / (in_one_band(g, count) ? 4 : 1);
   GaussBands::Grid& grid = *g.grid;
@@ -161,12 +162,12 @@ HWY_INLINE hn::Vec<DI> cell_along(const float* along, const Range& range, float 
   const DF d;
   const DI di;
   const VF at = hn::Mul(hn::Sub(hn::LoadU(d, along), hn::Set(d, range.low)), hn::Set(d, scale));
-  // Whatever a NaN becomes, the cell stays in range.
+  // The cell is in range for a NaN too.
   return hn::Min(hn::Max(hn::ConvertTo(di, at), hn::Zero(di)),
                  hn::Set(di, static_cast<std::int32_t>(cells - 1)));
 }
 
-// Turns counts of each cell into the first of each.
+// Turns the counts of the cells into their first places.
 HWY_INLINE void place_cells(const GaussBands& g) {
   std::uint32_t sum = 0;
   for (std::uint32_t cell = 0; cell <= g.grid->cells; ++cell) {
@@ -228,7 +229,8 @@ HWY_INLINE BandRuns runs_of(const GaussBands& g, std::size_t block) {
     runs.end[0] = g.start[(high + 1) << grid.shift];
     return runs;
   }
-  // Cells as in even bands; a block in two bands lies around the end that they share.
+  // Cell numbers in the direction of even bands. A block in two bands lies around the end that they
+  // share.
   const std::uint32_t odd_a = band_a % 2 * along, odd_b = band_b % 2 * along;
   const std::uint32_t ca = (a & along) ^ odd_a, cb = (b & along) ^ odd_b;
   std::uint32_t from = HWY_MIN(ca, cb), to = HWY_MAX(ca, cb);
@@ -246,7 +248,7 @@ HWY_INLINE BandRuns runs_of(const GaussBands& g, std::size_t block) {
   return runs;
 }
 
-// Whole vectors, from the block itself on.
+// Keeps what lies in the block or behind it, in whole vectors.
 HWY_INLINE void keep_behind(std::size_t block, BandRuns& runs) {
   constexpr std::uint32_t kLane = kLanes;
   std::uint32_t next = static_cast<std::uint32_t>(block * kBandBlock), count = 0;
@@ -284,7 +286,7 @@ std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_
     float scale[2];
     const float size = project(items, along, range);
     std::uint32_t* const cell = reinterpret_cast<std::uint32_t*>(g.phi);
-    // Places are filled from the first on, where items are no contacts: ranks must stand apart.
+    // `place` is overwritten while merged items are put, so their ranks need a column of their own.
     std::uint32_t* const rank = items.head != nullptr ? g.rank : g.place;
     if (in_one_band(g, count)) along[1] = along[0], range[1] = range[0];
     choose_grid(g, count, range, size, scale);
@@ -293,7 +295,7 @@ std::uint64_t sort_simd(const GaussBands& g, const DirectionsView& c, float per_
     for (std::size_t j = 0; j < count; j += kLanes) {
       const auto band = cell_along(along[0] + j, range[0], scale[0], grid.bands);
       const auto q = cell_along(along[1] + j, range[1], scale[1], cells);
-      // Back and forth: where a band ends, the next one begins.
+      // Odd bands run backwards: where a band ends, the next one begins.
       const auto odd = hn::Ne(hn::And(band, hn::Set(di, 1)), hn::Zero(di));
       const auto turned = hn::Xor(q, hn::IfThenElseZero(odd, last));
       hn::StoreU(hn::Or(hn::ShiftLeftSame(band, static_cast<int>(grid.shift)), turned), di,

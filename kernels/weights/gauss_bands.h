@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_bands.h - contacts in bands over one sphere, for gauss_sweep.h: who meets whom, and the
+// gauss_bands.h - sorts contacts into bands over one sphere, for gauss_sweep.h, and sums the
 // density of one hat over it.
 //
-// Contacts are sorted by band across a fixed line, as wide as a hat reaches, and by cell along it,
-// back and forth. What a contact meets then lies in a few runs: of its own band and of those next
-// to it. Sixteen contacts in a row, a lane each, sum the hats of everything in their runs: no sum
-// is shared, so any split gives the same bits. Contacts that follow each other with the same
-// direction, as on a flat wall, go through all of it as one.
+// Bands lie across a fixed line and are as wide as a hat reaches. Within a band contacts are sorted
+// by cell, in alternating direction from band to band. The neighbours of a contact then lie in a
+// few runs: of its own band and of the two next to it. Sixteen contacts in a row, a lane each, sum
+// the hats of everything in their runs. No sum is shared, so any split gives the same bits.
+// Consecutive contacts of the same direction, as on a flat wall, are merged into one item.
 //
-// Of the product of two hats only the order over the first sphere comes from here, and runs.
+// For the product of two hats only the order over the first sphere and the runs come from here.
 #pragma once
 #include "kernels/weights/gauss_memory.h"
 #include "kernels/weights/gauss_weights.h"
@@ -16,14 +16,14 @@
 namespace h6::kernels {
 
 inline constexpr std::size_t kBandBlock = 16;
-// Cells that n contacts are sorted into, at most.
+// The most cells that n contacts are sorted into.
 inline std::uint32_t band_cells(std::size_t n) {
   std::uint32_t cells = 256;
   while (cells < 16384 && cells < 2 * n) cells *= 2;
   return cells;
 }
 
-// Contacts that a block meets, itself among them: places in order and apart.
+// The runs of items within reach of a block, itself included: in order, without overlap.
 struct BandRuns {
   std::uint32_t first[4], end[4], count;
 };
@@ -33,19 +33,19 @@ struct GaussBands {
   float width;
   bool geodesic;               // as of GaussWidths
   bool order_only;             // only the order is wanted, no sums
-  float *direction[3], *mass;  // of those that are one: the s_j over the largest s added up
-  std::uint32_t* head;         // the first contact of each
-  // In order of the bands, padded to whole blocks with copies of the last one that weigh nothing.
-  float* at;               // x y z and mass, one by one
-  float* phi;              // what is summed
+  float *direction[3], *mass;  // of merged items; mass: sum of s_j / largest s
+  std::uint32_t* head;         // first contact of each merged item
+  // In order of the bands, padded to whole blocks with copies of the last item of mass 0.
+  float* at;               // x y z mass, item by item
+  float* phi;              // density of each item
   std::uint32_t* place;    // (count) where each contact went
-  std::uint32_t* rank;     // of each in its cell
-  std::uint32_t* start;    // first of each cell, and the count
-  std::uint32_t* cell_at;  // the cell of what is at a place
-  std::uint32_t* source;   // (order_only) what is at a place, padded with 0
-  BandRuns* runs;          // of each block; order_only: from itself on, whole vectors
+  std::uint32_t* rank;     // rank of each item in its cell
+  std::uint32_t* start;    // first place of each cell, then the count
+  std::uint32_t* cell_at;  // cell of the item at a place
+  std::uint32_t* source;   // (order_only) contact at a place, padded with 0
+  BandRuns* runs;          // of each block; order_only: from the block itself on, in whole vectors
   struct Grid {
-    std::uint32_t count;                // of what is sorted
+    std::uint32_t count;                // items that are sorted
     std::uint32_t bands, cells, shift;  // cells of a band: 2^shift
     std::uint32_t reach;                // cells that a hat spans
   } * grid;
@@ -55,7 +55,7 @@ void lay_out_bands(GaussBands& g, std::size_t count, GaussColumns& columns);
 // Sorts; returns how many pairs the runs hold.
 std::uint64_t sort_bands(const GaussBands& g, const DirectionsView& c, float per_share);
 inline std::size_t band_blocks(std::size_t count) { return (count + kBandBlock - 1) / kBandBlock; }
-// Fills phi of blocks begin .. end - 1; there may be fewer.
+// Fills phi of blocks begin .. end - 1, as far as they exist.
 void sum_bands(const GaussBands& g, std::size_t begin, std::size_t end);
 
 }  // namespace h6::kernels

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_bands_sum.cpp - sums of gauss_bands.h: hats over one sphere, contact by contact.
+// gauss_bands_sum.cpp - the sums of gauss_bands.h: hats over one sphere, item by item.
 #include "kernels/weights/gauss_bands.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -19,10 +19,11 @@ using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kParts = kBandBlock / kLanes;  // vectors that hold a block
 
-// Hats that are summed before they join the total: rounding grows with the number of sums.
+// Hats that are summed before they join the total, so that rounding grows with the number of such
+// sums and not of hats.
 constexpr std::size_t kFresh = 128;
 
-// A block, a lane each.
+// A block, a lane for each item.
 struct Rows {
   VF x[3][kParts];
 };
@@ -52,7 +53,7 @@ HWY_INLINE VF hat_at(const Rows& rows, std::size_t p, VF width2, const float* at
   return hn::Max(v, hn::Zero(d));
 }
 
-// Contacts first .. end - 1, one by one. Several sums at a time: an addition takes longer than a
+// Adds items first .. end - 1. Several sums run side by side, since an addition takes longer than a
 // hat.
 template <bool kGeodesic>
 HWY_INLINE void add_contacts(const GaussBands& g, const Rows& rows, VF width2, std::size_t first,

@@ -22,12 +22,12 @@ namespace h6::kernels::HWY_NAMESPACE {
 using DF = hn::CappedTag<float, 16>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
-constexpr std::size_t kRows = 4;  // that share loads of columns
+constexpr std::size_t kRows = 4;  // rows that share loads of columns
 
 struct Few {
   const float* column[6];
   float width2[2];
-  float ratio;  // of Hat::sum: what turns a hat over N, times its width squared, into that of T
+  float ratio;  // Hat::sum: scales a hat over N, times its width squared, to the units of T
   HWY_ALIGN float share[kGaussFew + kLanes];
   HWY_ALIGN float sum[kGaussFew + kLanes];   // over columns that come before the row
   HWY_ALIGN float back[kGaussFew + kLanes];  // over rows that come after the column
@@ -47,8 +47,8 @@ HWY_INLINE VF hat_of(const Few& f, int sphere, const VF* x, std::size_t i) {
   return hn::Max(v, hn::Zero(d));
 }
 
-// Rows i .. i + kCount - 1 with the columns of a vector from j on; kLast: with those of them that
-// come before the row.
+// Adds the pairs of rows i .. i + kCount - 1 with a vector of columns from j on; kLast: only with
+// the columns before the row.
 template <Hat kHat, bool kGeodesic, std::size_t kCount, bool kLast>
 HWY_INLINE void add_tile(Few& f, std::size_t count, std::size_t i, std::size_t j, VF* sum) {
   const DF d;
@@ -98,7 +98,7 @@ HWY_INLINE void set_shares(const DirectionsView& c, Few& f) {
     most = hn::Max(most, share);
   }
   if (c.depth == nullptr && c.facing == nullptr) return;
-  // Depths may be so small that their sum is no float of full precision.
+  // Depths may be so small that their sum would be a denormal float.
   const float largest = hn::GetLane(hn::MaxOfLanes(d, most));
   const VF per_share = hn::Set(d, largest > 0 ? largest : 1.0f);
   for (std::size_t j = 0; j < c.count; j += kLanes)
@@ -108,7 +108,7 @@ HWY_INLINE void set_shares(const DirectionsView& c, Few& f) {
 template <Hat kHat, bool kGeodesic>
 HWY_INLINE void weigh(const DirectionsView& c, const GaussWidths& widths, float* weight) {
   const DF d;
-  Few f;  // what is large stays uninitialised
+  Few f;  // not initialised: large
   const float* const columns[6] = {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz};
   for (int k = 0; k < 6; ++k) f.column[k] = columns[k];
   const float n = HWY_MAX(widths.normal, kMinWidth), t = HWY_MAX(widths.torque, kMinWidth);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_memory.h - columns of gauss_tree.h and gauss_sweep.h in one block of the caller's.
+// gauss_memory.h - lays out the columns of gauss_tree.h and gauss_sweep.h in one block.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -8,12 +8,12 @@ namespace h6::kernels {
 
 inline constexpr std::size_t kGaussAlign = 64;
 
-// Hands out columns of a block, or only counts.
+// Hands out columns of a block, or, without a block, only counts their bytes.
 struct GaussColumns {
   char* at;
   std::size_t used = 0;
 
-  // A block at any address; block_bytes has room for its alignment.
+  // A block at any address; block_bytes includes room for alignment.
   static GaussColumns in(void* memory) {
     const auto address = reinterpret_cast<std::uintptr_t>(memory);
     return {static_cast<char*>(memory) + (kGaussAlign - address % kGaussAlign) % kGaussAlign};

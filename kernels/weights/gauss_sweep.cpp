@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_sweep.cpp - stages, pairs and weights of gauss_sweep.h.
+// gauss_sweep.cpp - the stages, pairs and weights of gauss_sweep.h.
 #include "kernels/weights/gauss_sweep.h"
 
 #include <algorithm>
@@ -26,15 +26,15 @@ using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kRows = 4;  // a group: rows that share loads of columns
 
-// Rows whose hats a column sums before they join the total: rounding grows with the number of
-// sums, not of contacts.
+// Rows whose hats a column sums before they join the total, so that rounding grows with the number
+// of such sums and not of contacts.
 constexpr std::size_t kFresh = 128;
-constexpr std::uint32_t kRun = 64 * kLanes;  // columns whose hats a row sums before, likewise
+constexpr std::uint32_t kRun = 64 * kLanes;  // columns of a row's sum, likewise
 
-// Farther than any hat reaches; its square is still a float.
+// Coordinate beyond the reach of any hat whose square is still a float.
 constexpr float kNowhere = 1e15f;
 
-// Columns in the order of the bands, with their padding.
+// Gathers the columns in the order of the bands, with padding.
 void gather_rows(const GaussSweep& sweep) {
   const DF d;
   const DI di;
@@ -73,7 +73,7 @@ HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, s
     VF v = width2[s];
     HWY_UNROLL(3)
     for (int k = 3 * s; k < 3 * s + 3; ++k) {
-      // Registers hold one sphere's; the other's come with the subtraction.
+      // Registers hold the first sphere; the second is broadcast from memory.
       const VF at = s == 0 ? rows.at[r][k] : hn::Set(d, g.at[k][i + r]);
       const VF gap = hn::Sub(x[k], at);
       v = hn::NegMulAdd(gap, gap, v);
@@ -105,7 +105,7 @@ HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, s
   hn::Store(sum, d, column + j);
 }
 
-// A group's rows from `i` on, with columns from `j` to `end`.
+// Adds the pairs of a group's rows from `i` on with columns `j` to `end`.
 template <bool kGeodesic>
 HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
                           std::size_t end, float* fresh, float* total) {
@@ -161,7 +161,7 @@ void sum_pairs(const GaussSweep& sweep, std::size_t part) {
   sweep.bands[0].geodesic ? sum_part<true>(sweep, part) : sum_part<false>(sweep, part);
 }
 
-// Adds up what the parts summed.
+// Adds up the sums of the parts.
 void join_parts(const GaussSweep& sweep) {
   const DF d;
   const GaussBands& g = sweep.bands[0];
@@ -195,7 +195,7 @@ void weigh_rows(const GaussSweep& sweep, std::size_t begin, std::size_t end) {
     VF share = hn::Set(d, *sweep.per_share);
     if (c.depth != nullptr) share = hn::Mul(share, load_n(d, c.depth + i, live));
     if (c.facing != nullptr) share = hn::Mul(share, facing);
-    // A contact's own share is in its density, whatever rounding takes from a light one.
+    // A density is at least the contact's own share, in spite of rounding.
     const VF own = hn::Mul(share, self);
     const VF weight = hn::Div(hn::Mul(facing, own), hn::Max(phi, own));
     store_n(hn::IfThenElseZero(hn::Gt(own, zero), weight), d, sweep.weight + i, live);
@@ -215,8 +215,8 @@ HWY_EXPORT(weigh_rows);
 
 namespace {
 
-constexpr std::size_t kBlocksASlice = 16;  // summed, of 16 contacts each
-constexpr std::size_t kRowsASlice = 2048;  // weighed
+constexpr std::size_t kBlocksASlice = 16;  // of 16 contacts each, stage 1
+constexpr std::size_t kRowsASlice = 2048;  // stage 2
 
 GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                         GaussColumns& columns) {
@@ -224,7 +224,7 @@ GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& wid
   sweep.contacts = c;
   sweep.hat = hat;
   sweep.densities = hat == Hat::sum ? 2 : 1;
-  columns.take(sweep.per_share, 2);  // one for each density that sorts
+  columns.take(sweep.per_share, 2);  // one for each density
   columns.take(sweep.pairs, 2);
   const float* const normals[6] = {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz};
   const float width[2] = {std::max(widths.normal, kMinWidth), std::max(widths.torque, kMinWidth)};
@@ -254,7 +254,7 @@ GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& wid
 
 std::size_t slices_of(std::size_t rows, std::size_t size) { return (rows + size - 1) / size; }
 
-// Half of the pairs to each part.
+// Gives half of the pairs to each part.
 void split_pairs(const GaussSweep& sweep) {
   const GaussBands& g = sweep.bands[0];
   const std::size_t blocks = band_blocks(g.grid->count);

@@ -1,23 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // gauss_sweep.h - the weights of gauss_weights.h for some thousand contacts: sorted, so that each
-// meets only those of a window.
+// is compared only with those in a window.
 //
-// gauss_bands.h sorts them, and sums hats over one sphere. Of a product of two, which costs more, a
-// pair is evaluated once: by a sum over lanes for one contact and a sum over rows for the others.
+// gauss_bands.h sorts the contacts and sums hats over one sphere. A product of two hats costs more,
+// so each pair is evaluated once: it joins a sum over lanes for one contact and a sum over rows for
+// the other.
 //
 //     columns -> bands, runs -> sums of rows and of columns, part by part -> weights
 //
-// Stages and slices are those of gauss_tree.h. Parts have their own sums, which are added in
-// order, so which thread runs what changes no bit.
+// Stages and slices work as in gauss_tree.h. Each part has its own sums, which are added in order,
+// so the bits do not depend on which thread runs a slice.
 #pragma once
 #include "kernels/weights/gauss_bands.h"
 
 namespace h6::kernels {
 
 inline constexpr int kGaussSweepStages = 3;
-inline constexpr std::size_t kGaussSweepParts = 2;     // slices of a product's pairs
-inline constexpr std::size_t kGaussSweepMost = 32768;  // contacts; from there on gauss_tree
-inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536;  // a contact
+inline constexpr std::size_t kGaussSweepParts = 2;  // slices of the pairs of a product
+// The tree is faster above this number of contacts, or of pairs per contact (one sphere, product).
+inline constexpr std::size_t kGaussSweepMost = 32768;
+inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536;
 
 // The pairs of a product of two hats.
 struct GaussPairs {
@@ -35,7 +37,7 @@ struct GaussSweep {
   GaussBands bands[2];
   GaussPairs* product;   // of Hat::product
   float* per_share;      // 1 / the largest s
-  std::uint64_t* pairs;  // (densities) that runs hold
+  std::uint64_t* pairs;  // (densities) pairs that the runs hold
   float* weight;
 };
 
@@ -48,10 +50,8 @@ GaussSweep gauss_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widt
 std::size_t gauss_sweep_slices(const GaussSweep& sweep, int stage);
 void gauss_sweep_run(const GaussSweep& sweep, int stage, std::size_t slice);
 
-// After stage 0: whether the pairs cost less than gauss_tree. The tree cannot do angles, which are no
-// quadratics.
-inline bool gauss_sweep_pays(const GaussSweep& sweep) {
-  if (sweep.bands[0].geodesic) return true;
+// After stage 0: whether the pairs cost less than gauss_tree. The tree cannot do angles, which are
+// no quadratics.
 inline bool gauss_sweep_pays(const GaussSweep& sweep) {
   if (sweep.bands[0].geodesic) return true;
   const std::uint64_t each = sweep.hat == Hat::product ? kGaussSweepPairs6 : kGaussSweepPairs3;
@@ -60,7 +60,7 @@ inline bool gauss_sweep_pays(const GaussSweep& sweep) {
   return pairs <= each * static_cast<std::uint64_t>(sweep.densities) * sweep.contacts.count;
 }
 
-// All of it, on the caller. The specification is gauss_weights_ref.
+// All stages on the caller's thread. The specification is gauss_weights_ref.
 inline void gauss_weights_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                                 void* memory, float* weight) {
   const GaussSweep sweep = gauss_sweep(c, hat, widths, memory, weight);

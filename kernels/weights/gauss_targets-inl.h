@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_targets-inl.h - targets of gauss_tree_sum.cpp: what is listed pair by pair, and the
-// polynomial of what lies inside all supports.
+// gauss_targets-inl.h - the targets of gauss_tree_sum.cpp: their list of contacts that are summed
+// pair by pair, and the polynomial of the nodes that lie inside all supports.
 //
 // Included once for each SIMD target.
 #include <cstring>
@@ -25,39 +25,39 @@ using DF = hn::CappedTag<float, kGaussLeaf>;
 using VF = hn::Vec<DF>;
 using MF = hn::Mask<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
-constexpr std::size_t kListed = 512;    // contacts before a list is worked off
-constexpr std::size_t kMostLeaves = 2;  // of targets
-constexpr float kTogether = 0.1f;       // of a width: leaves that share a walk, and how far apart
-constexpr std::size_t kOpened = 256;    // leaves before they are opened
+constexpr std::size_t kListed = 512;    // contacts on the list before it is summed
+constexpr std::size_t kMostLeaves = 2;  // leaves of targets in one walk
+constexpr float kTogether = 0.1f;       // widths: size and distance of leaves that share a walk
+constexpr std::size_t kOpened = 256;    // leaves collected before they are opened
 
-// Pairs in the form c + 2 t.x, with x and t from the targets' centre: exact enough while targets
-// are no farther from it than a width. Else by differences.
+// How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre, which
+// is precise enough while targets are within a width of it. Otherwise by differences.
 enum class Form { products, differences };
 
-// Columns of listed contacts. Over each sphere, form products: 2 x and e^2 - |x|^2, the first
-// sphere's times the share; form differences: x, the share first. Where all shares are 1, form
-// products has no share, and x in the place of 2 x.
+// Columns of listed contacts. Form products: 2 x and e^2 - |x|^2 over each sphere, the first sphere
+// times the share; where all shares are 1, no share and x in place of 2 x. Form differences: the
+// share, then x.
 template <int kAxes>
 struct List {
-  static constexpr int kShare = 0, kFirst = 1;  // then 4 a sphere: x y z, rest
+  static constexpr int kShare = 0, kFirst = 1;  // then 4 columns a sphere: x y z, rest
   HWY_ALIGN float column[1 + 4 * kAxes / 3][kListed + 2 * kGaussLeaf];
   std::size_t count = 0;
 };
 
-// Targets of a leaf, or of two in a row.
+// The contacts of one leaf, or of two consecutive leaves, whose densities are computed together.
 template <int kAxes>
 struct Targets {
   static constexpr int kSpheres = kAxes / 3;
   static constexpr int kTerms = kAxes == 3 ? 5 : 25;
   const GaussDensity& g;
   std::size_t leaf, leaves;
-  // What is large stays uninitialised.
+  // Large members stay uninitialised.
   Targets(const GaussDensity& density, std::size_t first, std::size_t count)
       : g(density), leaf(first), leaves(count) {
     for (VF& v : term) v = hn::Zero(DF());
     std::memset(sum, 0, count * kGaussLeaf * sizeof *sum);
   }
-  // Target r of all, in column k.
+  // Column k of target r.
   const float* at(int k, std::size_t r) const {
     return leaf_column(g, leaf + r / kGaussLeaf, k) + r % kGaussLeaf;
   }
@@ -67,7 +67,7 @@ struct Targets {
   // Coefficients of 1, x, y, z, |x|^2 about the centre (products: of N's times T's), one sum a
   // lane.
   VF term[kTerms];
-  HWY_ALIGN float sum[kMostLeaves * kGaussLeaf][kGaussLeaf];  // of pairs, one sum a lane
+  HWY_ALIGN float sum[kMostLeaves * kGaussLeaf][kGaussLeaf];  // over pairs, one sum a lane
   std::uint32_t cut[kOpened + kGaussLeaf];                    // leaves to open
   std::size_t cuts = 0;
   List<kAxes> list;
@@ -149,7 +149,7 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
 
 template <int kAxes>
 HWY_NOINLINE void work_off(Targets<kAxes>& t) {
-  // Targets that share loads, as many as registers hold.
+  // Targets that share loads: as many as registers hold.
   constexpr std::size_t kCount = kLanes == 16 && kAxes == 3 ? 4 : 2;
   const DF d;
   if (t.list.count == 0) return;
@@ -166,7 +166,7 @@ HWY_NOINLINE void work_off(Targets<kAxes>& t) {
   t.list.count = 0;
 }
 
-// ---- what lies inside all supports
+// ---- nodes inside all supports
 
 // Adds nodes with first coefficients about their own centroids to the polynomial: `away` from the
 // targets' centre, gap = e^2 - |away|^2. Coefficients of x, y, z are left halved.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_tree.cpp - memory and stages of gauss_tree.h; the work is in gauss_tree_sort.cpp and
-// gauss_tree_sum.cpp.
+// gauss_tree.cpp - the memory and the stages of gauss_tree.h; the work is in gauss_tree_sort.cpp,
+// gauss_tree_build.cpp and gauss_tree_sum.cpp.
 #include "kernels/weights/gauss_tree.h"
 
 #include <algorithm>
@@ -11,9 +11,9 @@
 namespace h6::kernels {
 namespace {
 
-constexpr std::size_t kLeavesASlice = 64;   // built
-constexpr std::size_t kTargetsASlice = 16;  // leaves whose contacts are summed
-constexpr std::size_t kRowsASlice = 8192;   // weighed
+constexpr std::size_t kLeavesASlice = 64;   // stage 1
+constexpr std::size_t kTargetsASlice = 16;  // leaves, stage 3
+constexpr std::size_t kRowsASlice = 8192;   // stage 4
 
 std::size_t padded(std::size_t rows) { return (rows + kGaussLeaf - 1) / kGaussLeaf * kGaussLeaf; }
 int moments_of(int axes) { return axes == 3 ? 2 : kGaussMoments; }

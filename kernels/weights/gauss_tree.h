@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // gauss_tree.h - the weights of gauss_weights.h for many contacts, in nearly linear time.
 //
-// Contacts in the order of a space-filling curve over the Gauss map, 16 to a leaf, 16 leaves to a
-// node, and so on. A hat is a quadratic inside its support, so what a node wholly inside adds to a
-// density follows from its moments, and exactly so:
+// Contacts are sorted along a space-filling curve over the Gauss map, 16 to a leaf, 16 leaves to a
+// node, and so on. A hat is a quadratic inside its support, so the contribution of a node wholly
+// inside follows exactly from its moments:
 //     sum_j s_j (e^2 - |V_j - V|^2) = S (e^2 - |V - C|^2) - sum_j s_j |V_j - C|^2,  C the centroid
 // and the product of two hats needs the moments up to |N|^2 |T|^2. Nodes wholly outside add
-// nothing; what is left are contacts of leaves that a support's edge runs through, one by one.
+// nothing. Leaves that the edge of a support runs through are summed contact by contact.
 //
-// Work is cut into stages and slices. Slices of one stage write apart from each other and may run
-// at the same time, stages run in order; which thread runs what changes no bit:
-// (gauss_weights_tree below is the loop.)
+// Work is cut into stages and slices. Stages run in order; slices of one stage write to different
+// places and may run at the same time. The bits do not depend on which thread runs a slice.
+// gauss_weights_tree below is the loop.
 #pragma once
 #include "kernels/weights/gauss_weights.h"
 
@@ -24,8 +24,8 @@ inline constexpr int kGaussMoments = 19;       // of a product hat; the others h
 // Nodes of one level, columns of `count` rows padded to a multiple of 16 with rows of weight 0.
 struct GaussLevel {
   std::size_t count;
-  float *centre[6], *rest[6];  // weighted centroid, and what float cannot hold of it
-  float* radius[2];            // around it, over contacts that weigh anything
+  float *centre[6], *rest[6];  // weighted centroid, and its rounding error
+  float* radius[2];            // around it, over contacts of share > 0
   float* moment[kGaussMoments];
 };
 
@@ -62,7 +62,7 @@ GaussTree gauss_tree(const DirectionsView& c, Hat hat, const GaussWidths& widths
 std::size_t gauss_tree_slices(const GaussTree& tree, int stage);
 void gauss_tree_run(const GaussTree& tree, int stage, std::size_t slice);
 
-// All of it, on the caller. The specification is gauss_weights_ref.
+// All stages on the caller's thread. The specification is gauss_weights_ref.
 inline void gauss_weights_tree(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                                void* memory, float* weight) {
   const GaussTree tree = gauss_tree(c, hat, widths, memory, weight);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_tree_build.cpp - leaves and nodes of the tree: centroids, radii and moments about them.
+// gauss_tree_build.cpp - builds leaves and nodes of the tree: centroids, radii and moments about
+// them.
 //
-// Everything is a difference from a row nearby before it is squared or summed, and a centroid is
-// kept as two floats: moments about it have no first order left.
+// Only differences from a nearby row are squared or summed. A centroid is kept as two floats, so
+// that first moments about it vanish.
 #include "kernels/weights/gauss_tree_stages.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -22,9 +23,9 @@ using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kParts = kGaussLeaf / kLanes;  // vectors that hold 16 rows
 
-// Below, a centroid of the weights is no longer exact enough.
+// Below this total share a weighted centroid is not precise enough.
 constexpr float kLeastMass = 1e-34f;
-constexpr float kNowhere = 1e15f;  // radius of what is never taken as a whole
+constexpr float kNowhere = 1e15f;  // radius of a node that is always opened
 
 // Sixteen rows.
 struct Rows {
@@ -68,7 +69,7 @@ HWY_INLINE Rows norm2_of(const Rows* v) {
   });
 }
 
-// Turns v, differences from `origin`, into those from the centroid, and stores that.
+// Turns v, differences from `origin`, into differences from the centroid, and stores the centroid.
 HWY_INLINE void centre(const GaussLevel& level, std::size_t node, int axis, float origin,
                        const Rows& share, float per_mass, Rows& v) {
   const float mean = dot(share, v) * per_mass;
@@ -78,7 +79,7 @@ HWY_INLINE void centre(const GaussLevel& level, std::size_t node, int axis, floa
   v = each([&](std::size_t p) HWY_ATTR { return hn::Sub(v.part[p], hn::Set(DF(), mean)); });
 }
 
-// Radius of what weighs, a little more for rounding.
+// Radius over the rows of share > 0, enlarged for rounding.
 HWY_INLINE float radius_of(const Rows& share, const Rows& distance) {
   const float most = most_of(each([&](std::size_t p) HWY_ATTR {
     return hn::IfThenElseZero(hn::Gt(share.part[p], hn::Zero(DF())), distance.part[p]);
@@ -90,7 +91,7 @@ HWY_INLINE Rows root(const Rows& r) {
   return each([&](std::size_t p) HWY_ATTR { return hn::Sqrt(r.part[p]); });
 }
 
-// A node without weight: nothing is ever near it.
+// Makes a node without share, which is never near anything.
 HWY_INLINE void clear(const GaussDensity& g, const GaussLevel& level, std::size_t node) {
   for (int k = 0; k < g.axes; ++k) level.centre[k][node] = level.rest[k][node] = 0;
   for (int s = 0; s < g.axes / 3; ++s) level.radius[s][node] = 0;
@@ -102,7 +103,7 @@ HWY_INLINE void gather_leaf(const GaussTree& tree, const GaussDensity& g, std::s
   const std::size_t first = leaf * kGaussLeaf;
   const std::size_t live = HWY_MIN(kGaussLeaf, tree.contacts.count - first);
   HWY_ALIGN std::int32_t from[kGaussLeaf];
-  // Past the end: the last contact again, without weight.
+  // Rows past the end repeat the last contact with share 0.
   for (std::size_t r = 0; r < kGaussLeaf; ++r)
     from[r] = static_cast<std::int32_t>(g.source[first + HWY_MIN(r, live - 1)]);
   const float *const facing = tree.contacts.facing, *const depth = tree.contacts.depth;
@@ -211,7 +212,7 @@ HWY_INLINE void build_node(const GaussDensity& g, const GaussLevel& child, const
   const Rows mass = load_rows(child.moment[kMass] + first);
   const float sum = sum_of(mass);
   if (!(sum > 0)) return clear(g, level, node);
-  // The heaviest child is one that weighs.
+  // The heaviest child has a share.
   std::size_t from = first;
   for (std::size_t k = first; k < first + kGaussLeaf; ++k)
     if (child.moment[kMass][k] > child.moment[kMass][from]) from = k;

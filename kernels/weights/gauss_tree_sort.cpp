@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // gauss_tree_sort.cpp - contacts in the order of a space-filling curve over the Gauss map.
 //
-// A vector is laid flat by the octahedron's map: one face of it a quadrant, so that near directions
-// stay near, except across the edges of the lower half; the axis nearest to the mean looks up.
-// Order decides only how tight leaves are, never a sum: what is approximate here costs time alone.
+// The octahedral map lays directions flat, one face to a quadrant: near directions stay near,
+// except across the edges of the lower half. The axis nearest to the mean direction points up. The
+// order decides how tight leaves are, never a sum: approximations here cost time only.
 #include <algorithm>
 #include <cmath>
 
@@ -87,7 +87,7 @@ HWY_INLINE void flatten(const float* const* column, std::size_t count, Flat& fla
   }
 }
 
-// x below 2^16: its bits on the even places.
+// For x below 2^16: moves its bits to the even places.
 HWY_INLINE VU spread(VU x) {
   const DU d;
   x = hn::And(hn::Or(x, hn::ShiftLeft<8>(x)), hn::Set(d, 0x00ff00ffu));
@@ -98,7 +98,7 @@ HWY_INLINE VU spread(VU x) {
 
 HWY_INLINE VU interleave(VU x, VU y) { return hn::Or(spread(x), hn::ShiftLeft<1>(spread(y))); }
 
-// x below 2^16: its pairs of bits on every other pair of places.
+// For x below 2^16: moves its pairs of bits to every other pair of places.
 HWY_INLINE VU spread_pairs(VU x) {
   const DU d;
   x = hn::And(hn::Or(x, hn::ShiftLeft<8>(x)), hn::Set(d, 0x00ff00ffu));
@@ -110,7 +110,7 @@ HWY_INLINE VU cell(const float* column, float low, float scale, int bits) {
   const DF d;
   const VF at = hn::Mul(hn::Sub(hn::LoadU(d, column), hn::Set(d, low)), hn::Set(d, scale));
   const hn::RebindToSigned<DF> di;
-  // Whatever a NaN becomes, the key stays in range.
+  // The key is in range for a NaN too.
   return hn::And(hn::BitCast(DU(), hn::ConvertTo(di, at)), hn::Set(DU(), (1u << bits) - 1));
 }
 
@@ -153,16 +153,16 @@ HWY_INLINE int keys_of_sphere(const GaussDensity& g, std::size_t count, int budg
   return 2 * bits;
 }
 
-// Bits of an axis until its cells are no wider than `cell` widths.
+// The bits of an axis for which its cells are at most `cell` widths wide.
 HWY_INLINE int bits_to(float extent, float width, float cell, int most) {
   int bits = 0;
   for (float size = extent / width; size > cell && bits < most; size *= 0.5f) ++bits;
   return bits;
 }
 
-// N first, to cells that one support covers; within these T, to an eighth of its width; then both
-// by turns. Contacts on a wall share one cell of N, and arms on a wall have their torques on a
-// circle: there order by T alone makes the tightest leaves.
+// Keys have N first, down to cells that one support covers, then T down to an eighth of its width,
+// then both by turns. Contacts on a wall share one cell of N, and their torque directions lie on a
+// circle: there an order by T alone makes the tightest leaves.
 HWY_INLINE int keys_of_product(const GaussDensity& g, std::size_t count, int budget) {
   const DU d;
   const std::size_t rows = g.level[0].count * kGaussLeaf;  // the leaves are not filled yet
@@ -220,7 +220,7 @@ HWY_EXPORT(largest_share);
 namespace {
 
 constexpr int kMaxPasses = 3, kMaxDigit = 12;
-// One digit by counting, stable. `take(i)` is entry i of what is sorted: its key over its row.
+// Sorts by one digit: counting sort, stable. take(i) is entry i: its key above its row.
 template <class Take>
 void sort_digit(std::size_t count, int shift, std::uint32_t mask, std::uint32_t* place,
                 const Take& take, std::uint64_t* out) {

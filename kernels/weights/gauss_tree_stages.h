@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_tree_stages.h - what the files of gauss_tree.h call of each other.
+// gauss_tree_stages.h - functions shared by the files of gauss_tree.h.
 #pragma once
 #include "kernels/weights/gauss_tree.h"
 
 namespace h6::kernels {
 
-// Order of a moment among GaussLevel::moment. a, b: V - C over N and over T. One sphere has the
-// first two.
+// Index of a moment in GaussLevel::moment. a, b: V - C over N and over T. A density over one sphere
+// has the first two.
 enum GaussMoment {
   kMass = 0,  // sum s
   kA2,        // sum s |a|^2

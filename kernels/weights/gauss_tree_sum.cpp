@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // gauss_tree_sum.cpp - densities at the contacts of a leaf, from the nodes of the tree.
 //
-// For the 16 targets of a leaf, or of two that are near, the tree is walked once, 16 sibling nodes
-// at a time. Nodes that none of the targets reaches are dropped; those that all of them hold inside
-// their supports become one polynomial about the targets' centre; the rest is opened. So are
-// leaves: contacts in them are dropped, join the polynomial, or go to a list that every target sums
-// pair by pair.
+// The tree is walked once for the 16 targets of a leaf, or of two leaves that are near, 16 sibling
+// nodes at a time. A node that no target reaches is dropped. A node inside the supports of all
+// targets joins one polynomial about the targets' centre. Other nodes are opened. In an opened leaf
+// each contact is dropped, joins the polynomial, or goes to a list that every target sums pair by
+// pair.
 #include "kernels/weights/gauss_tree_stages.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -24,8 +24,8 @@ namespace h6::kernels::HWY_NAMESPACE {
 
 // ---- the walk
 
-// Opens leaves. Sums and counts stay in registers: a leaf takes less time than a store that the
-// next one has to wait for.
+// Opens the collected leaves. Sums and counts stay in registers: a leaf takes less time than a
+// store and load between it and the next.
 template <int kAxes, Form kForm, bool kUnit = false>
 HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
   constexpr int kSpheres = kAxes / 3;
@@ -100,7 +100,7 @@ HWY_INLINE void open(Targets<kAxes>& t) {
   }
 }
 
-// Sixteen siblings of a level; returns those to open, a bit each.
+// Handles sixteen siblings of a level and returns the ones to open, a bit each.
 template <int kAxes>
 HWY_INLINE unsigned look_at(Targets<kAxes>& t, const GaussLevel& level, std::size_t block,
                             VF* term) {
@@ -134,7 +134,7 @@ HWY_INLINE unsigned look_at(Targets<kAxes>& t, const GaussLevel& level, std::siz
   return open;
 }
 
-// Children of those nodes of `block`, a block of level l + 1, whose bits are set.
+// Visits the children of the nodes of `block`, a block of level l + 1, whose bits are set.
 template <int kAxes>
 void visit(Targets<kAxes>& t, int l, std::size_t block, unsigned nodes) {
   unsigned below[kGaussLeaf];
@@ -165,7 +165,7 @@ void visit(Targets<kAxes>& t, int l, std::size_t block, unsigned nodes) {
   }
 }
 
-// The polynomial and the sums of pairs at the targets of lanes p and up.
+// The polynomial at the targets of lanes p and up.
 template <int kAxes>
 HWY_INLINE VF density_of(const Targets<kAxes>& t, const float* term, std::size_t p) {
   const DF d;
@@ -185,7 +185,8 @@ HWY_INLINE VF density_of(const Targets<kAxes>& t, const float* term, std::size_t
   return sum;
 }
 
-// The middle of the box around those that weigh anything: nearer to the farthest than the centroid.
+// The centre of targets is the middle of their bounding box, without targets of share 0: the radius
+// about it is smaller than about the centroid.
 template <int kAxes>
 HWY_INLINE void centre_targets(Targets<kAxes>& t) {
   const DF d;
@@ -257,7 +258,7 @@ HWY_INLINE void sum_targets(const GaussDensity& g, std::size_t count, std::size_
     for (int k = 0; k < Targets<kAxes>::kTerms; ++k)
       term[k] = hn::GetLane(hn::SumOfLanes(d, t.term[k]));
     if constexpr (kAxes == 3)
-      for (int k = 1; k < 4; ++k) term[k] *= 2;  // join has left them halved
+      for (int k = 1; k < 4; ++k) term[k] *= 2;  // join leaves them halved
     for (std::size_t r = 0; r < rows; ++r) {
       VF sum = hn::Load(d, t.sum[r]);
       for (std::size_t p = kLanes; p < kGaussLeaf; p += kLanes)
@@ -299,7 +300,7 @@ void weigh_rows(const GaussTree& tree, std::size_t begin, std::size_t end) {
     auto share = hn::Set(d, *tree.per_share);
     if (c.depth != nullptr) share = hn::Mul(share, load_n(d, c.depth + i, live));
     if (c.facing != nullptr) share = hn::Mul(share, facing);
-    // A contact's own share is in its density, whatever rounding takes from a light one.
+    // A density is at least the contact's own share, in spite of rounding.
     const auto own = hn::Mul(share, self);
     const auto weight = hn::Div(hn::Mul(facing, own), hn::Max(phi, own));
     store_n(hn::IfThenElseZero(hn::Gt(own, zero), weight), d, tree.weight + i, live);

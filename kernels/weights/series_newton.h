@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// series_newton.h - Newton's method of series_solve, above whatever sums over the contacts.
+// series_newton.h - Newton's method of series_solve, for any implementation of the sums over
+// contacts.
 #pragma once
 #include <cmath>
 
@@ -10,7 +11,7 @@ namespace h6::kernels {
 inline constexpr int kUpper6 =
     21;  // entries of a symmetric 6 x 6 matrix, row by row from the diagonal
 
-// Sums over the contacts that are active at a y.
+// Sums over the contacts that are active at y.
 struct SeriesSums {
   double system[kUpper6] = {};  // sum kappa J J^T
   double pull[6] = {};          // sum kappa (e - J.y) J
@@ -48,14 +49,15 @@ inline double norm2(const double v[6]) {
   return sum;
 }
 
-// `now`: sums at y, which is finite; sums(y, system) are SeriesSums at y, without the system where
-// it is not asked for; max_e is the largest e, above 0. Every pass over the contacts counts against
-// a bound, so that no frame can stall here.
+// `now`: the sums at y, which is finite. sums(y, system) returns SeriesSums at y, with the system
+// only if `system` is set. max_e > 0 is the largest e. The number of passes over the contacts is
+// bounded, so that no frame can stall here.
 template <class Sums>
 SeriesResult newton(const SeriesParameters& p, double max_e, double y[6], SeriesSums now,
                     const Sums& sums) {
   constexpr int kHalvings = 6;
-  // Where no contact moves by much, few become active or cease to be: the step is likely the last.
+  // When no gap changes by much, few contacts change between active and inactive: the step is
+  // likely the last.
   const double last = 0.1 * max_e;
   const double scale = p.c * max_e;
   SeriesResult result{0, 0};
@@ -82,7 +84,7 @@ SeriesResult newton(const SeriesParameters& p, double max_e, double y[6], Series
   }
 }
 
-// A start that is not finite is none.
+// A start that is not finite is ignored.
 inline void check_start(double y[6]) {
   if (!std::isfinite(norm2(y)))
     for (int k = 0; k < 6; ++k) y[k] = 0;

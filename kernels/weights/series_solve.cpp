@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // series_solve.cpp - the SIMD twin of series_solve_ref.cpp.
 //
-// Lanes are doubles: what a dense patch carries is a small difference of e and J.y in every
-// contact. The first pass divides kappa out. A pass reads eight columns and adds to 28 sums, or to
-// 7 where the solution is likely reached: then it leaves the slack as well, and is the last. Most
-// contacts within the margin carry nothing: floats tell so first, with room for their rounding,
-// which changes no bit. Without a start, many contacts are first solved for some of them.
+// Lanes are doubles: the load of a dense patch is a small difference of e and J.y in every contact.
+// The first pass divides kappa out. A pass reads eight columns and adds to 28 sums, or to 7 when
+// the solution is likely reached: then it also writes the slack and is the last. Most contacts
+// within the margin carry no load; a test in float, with room for rounding, skips them and changes
+// no bit. Without a start, a sample of the contacts is solved first when there are many.
 #include "kernels/weights/series_solve.h"
 
 #include <cmath>
@@ -27,7 +27,7 @@ using DD = hn::ScalableTag<double>;
 using DF = hn::Rebind<float, DD>;
 using VD = hn::Vec<DD>;
 
-constexpr float kDoubt = 1e-5f;  // of a sum of some ten floats: a hundred times their rounding
+constexpr float kDoubt = 1e-5f;  // a hundred times the rounding of a sum of some ten floats
 constexpr std::size_t kManyToStart = 256;  // contacts from which a start is worth its time
 
 HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
@@ -56,7 +56,7 @@ HWY_INLINE VD slack_at(const SeriesColumns& c, const Axes& J, std::size_t i, con
   return u;
 }
 
-// What slack_at is in floats, for a quick look.
+// The slack in float, to skip contacts quickly.
 struct Glance {
   float y[6];  // those of the torque over the lever
   float doubt;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// kernel_test.h - what the kernel tests share: seeded numbers, every SIMD target, hostile columns.
+// kernel_test.h - shared by the kernel tests: seeded numbers, every SIMD target, columns with NaN
+// around them.
 #pragma once
 #include <doctest/doctest.h>
 
@@ -17,7 +18,7 @@
 
 namespace h6::kernels::test {
 
-// The engine's output is specified by the standard; distributions are not, so they are ours.
+// The standard specifies the output of the engine but not of distributions, so these are ours.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
@@ -47,7 +48,7 @@ inline std::vector<std::string> all_targets() {
   if (const char* forced = std::getenv("HAPSIX_SIMD"); forced && *forced) return {forced};
   const char* names[32];
   const std::size_t count = supported_targets(names, 32);
-  // What they share is the same in all of them.
+  // All targets share the same accesses, so the best and the least are enough here.
   if (h6::test::kThreadSanitized && count > 2) return {names[0], names[count - 1]};
   return {names, names + count};
 }

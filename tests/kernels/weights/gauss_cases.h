@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_cases.h - what any way of summing densities must keep to, for tests of each.
+// gauss_cases.h - checks that every way of summing densities must pass.
 //
-// A Way has bytes and all of its kernel, and kMost, the contacts that it is tried with at most; one
-// that works in stages also make, slices, run and kStages, and kMany contacts that lie in all ways.
+// A Way names `bytes` and `all` of its kernel, and kMost, the most contacts that it is tested with.
+// A way that works in stages also has make, slices, run, kStages and kMany, a number of contacts
+// for the tests of thousands.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -51,7 +52,7 @@ void check_thousands() {
         const DirectionsView view = c.view(n != 1000 || hat == Hat::product);
         const std::vector<float> want = reference_of(view, hat, width, n / 40);
         on_every_target([&](const std::string& target) {
-          // The scalar target computes what the others do, slowly.
+          // The scalar target is slow, and smaller counts test it.
           if (target == "SCALAR" && n > 1000) return;
           CAPTURE(static_cast<int>(set));
           CAPTURE(static_cast<int>(hat));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// gauss_sets.h - contacts in the ways that they lie on the Gauss map, for tests of the density.
+// gauss_sets.h - typical sets of contacts on the Gauss map, for tests of the density.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -113,7 +113,7 @@ inline Contacts contacts_of(Set set, std::size_t n, GaussWidths width, std::size
   return c;
 }
 
-// Every `step`th of the weights that the specification gives.
+// The weights of the specification, every `step`th of them.
 inline std::vector<float> reference_of(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                                        std::size_t step = 1) {
   std::vector<float> want(c.count);

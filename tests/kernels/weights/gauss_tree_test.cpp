@@ -64,7 +64,7 @@ TEST_CASE("gauss_tree: weights are right where contacts lie so dense that leaves
     const DirectionsView view = c.view(weighted);
     const std::vector<float> want = reference_of(view, Hat::normal, kPaper, 750);
     on_every_target([&](const std::string& target) {
-      if (target == "SCALAR") return;  // what the others do, slowly
+      if (target == "SCALAR") return;  // slow, and tested by smaller counts
       CHECK(worst_of(weights_of<Tree>(view, Hat::normal, kPaper), want, 750) <= kTolerance);
     });
   }
