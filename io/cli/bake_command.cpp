@@ -223,12 +223,7 @@ int bake_shell_command(const Console& console, ShellOptions& o) {
   return kOk;
 }
 
-}  // namespace
-
-void add_bake(CLI::App& app, Program& program) {
-  CLI::App* bake = app.add_subcommand("bake", "Bake a mesh into a field (.vdb) or a shell (.ply)");
-  bake->require_subcommand(1);
-
+void add_field(CLI::App* bake, Program& program) {
   CLI::App* field = bake->add_subcommand("field", "Signed distance in sparse bricks, as .vdb");
   auto f = std::make_shared<FieldOptions>();
   add_common(field, f->common, ".vdb");
@@ -264,7 +259,9 @@ void add_bake(CLI::App& app, Program& program) {
   field->callback([&program, f] {
     program.work = [&program, f] { return bake_field_command(program.console, *f); };
   });
+}
 
+void add_shell(CLI::App* bake, Program& program) {
   CLI::App* shell =
       bake->add_subcommand("shell", "Points with inward normals on nested levels, as .ply");
   auto s = std::make_shared<ShellOptions>();
@@ -320,6 +317,15 @@ void add_bake(CLI::App& app, Program& program) {
   shell->callback([&program, s] {
     program.work = [&program, s] { return bake_shell_command(program.console, *s); };
   });
+}
+
+}  // namespace
+
+void add_bake(CLI::App& app, Program& program) {
+  CLI::App* bake = app.add_subcommand("bake", "Bake a mesh into a field (.vdb) or a shell (.ply)");
+  bake->require_subcommand(1);
+  add_field(bake, program);
+  add_shell(bake, program);
 }
 
 }  // namespace h6::cli

@@ -11,7 +11,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kSide = kBayWidth / 2;
 
-void add_sheets(Assembly& a) {
+void add_firewall(Assembly& a) {
   // Firewall with its openings, pressed beads on it.
   Outline wall{rectangle(kBayWidth, 470, 60, 8, {0, 325}), {}};
   wall.holes = {circle(46, 48, {-290, 430}),   circle(24, 32, {-130, 300}),
@@ -27,58 +27,56 @@ void add_sheets(Assembly& a) {
                   return h6Vec3{-380 + 760 * u, 375 - 7 * c, z + 26 * (v - 0.5)};
                 }),
           {}, Kind::sheet);
-  for (const double side : {-1.0, 1.0}) {
-    // Fender apron with the wheel's arch, strut tower, rail of hat section.
-    a.add("fender apron",
-          sheet(60, 24,
-                [&](double u, double v) {
-                  const double y = -370 + 740 * u, z = 190 + 340 * v;
-                  const double arch =
-                      std::max(0.0, 1 - std::pow((y - 150) / 190, 2)) * std::max(0.0, 1 - v * 1.4);
-                  return h6Vec3{side * (kSide - 26 * v * v - 70 * arch), y, z};
-                }),
-          {}, Kind::sheet);
-    a.add("strut tower",
-          revolve({{96, 215},
-                   {94, 330},
-                   {90, 420},
-                   {84, 440},
-                   {74, 448},
-                   {62, 450},
-                   {60, 455},
-                   {26, 455}},
-                  72, Ends::open),
-          at(side * 350, 150, 0), Kind::sheet);
-    const Frame top = at(side * 350, 150, 455);
-    a.add("strut mount",
-          revolve({{0, -10}, {44, -10}, {46, 0}, {30, 8}, {16, 10}, {16, 16}, {0, 16}}, 56), top);
-    a.add("strut nut", nut(14), top * at(0, 0, 15));
-    a.add("strut rod", cylinder(7, -60, 40, 24), top);
-    for (int i = 0; i < 3; ++i) {
-      const Frame stud = rolled(top, 2 * kPi * i / 3) * at(52, 0, 0);
-      a.add("strut stud", hex_bolt(8, 24), stud * facing({0, 0, -2}, {0, 0, -1}));
-      a.add("strut stud nut", nut(9), stud * at(0, 0, 1));
-    }
-    a.add("coil spring", spring(62, 6.5, 34, 4.5), at(side * 350, 150, 240));
-    const Polygon hat = {{-70, 0}, {-38, 0}, {-32, 70}, {32, 70}, {38, 0}, {70, 0}};
-    a.add(
-        "frame rail",
-        sheet(
-            40, 5,
+}
+
+// Fender apron with the wheel's arch, strut tower, rail of hat section; side is -1 or 1.
+void add_side(Assembly& a, double side) {
+  a.add("fender apron",
+        sheet(60, 24,
+              [&](double u, double v) {
+                const double y = -370 + 740 * u, z = 190 + 340 * v;
+                const double arch =
+                    std::max(0.0, 1 - std::pow((y - 150) / 190, 2)) * std::max(0.0, 1 - v * 1.4);
+                return h6Vec3{side * (kSide - 26 * v * v - 70 * arch), y, z};
+              }),
+        {}, Kind::sheet);
+  a.add(
+      "strut tower",
+      revolve(
+          {{96, 215}, {94, 330}, {90, 420}, {84, 440}, {74, 448}, {62, 450}, {60, 455}, {26, 455}},
+          72, Ends::open),
+      at(side * 350, 150, 0), Kind::sheet);
+  const Frame top = at(side * 350, 150, 455);
+  a.add("strut mount",
+        revolve({{0, -10}, {44, -10}, {46, 0}, {30, 8}, {16, 10}, {16, 16}, {0, 16}}, 56), top);
+  a.add("strut nut", nut(14), top * at(0, 0, 15));
+  a.add("strut rod", cylinder(7, -60, 40, 24), top);
+  for (int i = 0; i < 3; ++i) {
+    const Frame stud = rolled(top, 2 * kPi * i / 3) * at(52, 0, 0);
+    a.add("strut stud", hex_bolt(8, 24), stud * facing({0, 0, -2}, {0, 0, -1}));
+    a.add("strut stud nut", nut(9), stud * at(0, 0, 1));
+  }
+  a.add("coil spring", spring(62, 6.5, 34, 4.5), at(side * 350, 150, 240));
+  const Polygon hat = {{-70, 0}, {-38, 0}, {-32, 70}, {32, 70}, {38, 0}, {70, 0}};
+  a.add(
+      "frame rail",
+      sheet(40, 5,
             [&](double u, double v) {
               const P2 p = hat[static_cast<std::size_t>(std::lround(5 * v))];
               const double rise = 40 * std::pow(std::max(0.0, u - 0.6) / 0.4, 2);
               return h6Vec3{side * (kSide - 2 - 0.9 * p.y), -372 + 745 * u, 185 - rise + 0.8 * p.x};
             }),
-        {}, Kind::sheet);
-    for (int i = 0; i < 26; ++i)
-      for (const double z : {-48.0, 48.0})
-        a.add("rail rivet", rivet(6),
-              facing({side * (kSide - 2), -355 + 27.5 * i,
-                      185 + z - 40 * std::pow(std::max(0.0, (i * 27.5 + 17) / 745 - 0.6) / 0.4, 2)},
-                     {-side, 0, 0}));
-  }
-  // Cross members: closed box sections; slotted brackets on the front one.
+      {}, Kind::sheet);
+  for (int i = 0; i < 26; ++i)
+    for (const double z : {-48.0, 48.0})
+      a.add("rail rivet", rivet(6),
+            facing({side * (kSide - 2), -355 + 27.5 * i,
+                    185 + z - 40 * std::pow(std::max(0.0, (i * 27.5 + 17) / 745 - 0.6) / 0.4, 2)},
+                   {-side, 0, 0}));
+}
+
+// Closed box sections, with slotted brackets on the front one.
+void add_cross_members(Assembly& a) {
   a.add("front cross member", block(820, 46, 44, 8, 3), at(0, -345, 18));
   a.add("upper cross member", block(760, 34, 26, 8, 3), at(0, -350, 500));
   a.add("rear cross member", block(780, 80, 34, 12, 4), at(0, 300, 62));
@@ -90,7 +88,10 @@ void add_sheets(Assembly& a) {
     for (const double dx : {-16.0, 16.0})
       add_bolt(a, "radiator bracket bolt", facing({x + dx, -322, 50}, {0, -1, 0}), 9, 22);
   }
-  // Engine mounts: rubber block between two slotted brackets, gusset.
+}
+
+// Rubber blocks between two slotted brackets, gussets.
+void add_engine_mounts(Assembly& a) {
   for (const double x : {-260.0, 330.0}) {
     a.add("engine mount", revolve({{0, 0}, {40, 0}, {34, 10}, {34, 34}, {40, 44}, {0, 44}}, 48),
           at(x, 110, 84));
@@ -221,7 +222,10 @@ void add_electrics(Assembly& a) {
 }  // namespace
 
 void add_body_shell(Assembly& a) {
-  add_sheets(a);
+  add_firewall(a);
+  for (const double side : {-1.0, 1.0}) add_side(a, side);
+  add_cross_members(a);
+  add_engine_mounts(a);
   add_tanks(a);
   add_electrics(a);
 }

@@ -96,7 +96,7 @@ void add_hose(Assembly& a, const std::string& name, const std::vector<h6Vec3>& t
     a.add("hose clamp", hose_clamp(r + 0.2), frame_on(way, s));
 }
 
-void add_hoses(Assembly& a) {
+void add_wide_hoses(Assembly& a) {
   add_hose(a, "upper radiator hose",
            {{-296, -340, 440},
             {-296, -300, 444},
@@ -128,6 +128,9 @@ void add_hoses(Assembly& a) {
            32, true);
   add_hose(a, "fresh air duct",
            {{-372, -318, 335}, {-372, -336, 336}, {-360, -352, 360}, {-340, -360, 420}}, 27, true);
+}
+
+void add_thin_hoses(Assembly& a) {
   add_hose(a, "heater hose",
            {{60, 372, 420},
             {60, 340, 424},
@@ -199,7 +202,8 @@ void add_hoses(Assembly& a) {
 void add_radiator(Assembly& a) {
   add_core(a);
   add_fans(a);
-  add_hoses(a);
+  add_wide_hoses(a);
+  add_thin_hoses(a);
 }
 
 }  // namespace h6::io::industrial

@@ -21,8 +21,8 @@ void add_fitting(Assembly& a, const h6Vec3& where, const h6Vec3& along, double d
   a.add("fitting", hex_bolt(0.8 * d, 1.2 * d), frame * at(0, 0, 0.8 * d));
 }
 
-void add_hydraulics(Assembly& a) {
-  // Six steel lines down the strut, in clamps; each ends in a hose that follows the piston.
+// Six steel lines down the strut, in clamps; each ends in a hose that follows the piston.
+void add_strut_lines(Assembly& a) {
   for (int i = 0; i < 6; ++i) {
     const double angle = kPi * (1.02 + 0.075 * i), r = 106;
     const double side = i < 3 ? -1 : 1;
@@ -63,7 +63,10 @@ void add_hydraulics(Assembly& a) {
       add_bolt(a, "clamp bolt", facing(beside(kPi * f, 99, z), beside(kPi * f, 1, 0), {0, 0, 1}), 8,
                20);
   }
-  // Manifold under the roof: ports, solenoid valves, an accumulator.
+}
+
+// Under the roof: ports, solenoid valves, an accumulator.
+void add_manifold(Assembly& a) {
   const Frame manifold = at(-190, -200, 1880);
   a.add("manifold", block(150, 110, 62, 8, 3), manifold);
   for (int i = 0; i < 4; ++i) {
@@ -90,7 +93,10 @@ void add_hydraulics(Assembly& a) {
   a.add("accumulator seam", revolve({{61, -5}, {68, -5}, {68, 5}, {61, 5}}, 80, Ends::joined),
         at(-190, 90, 1900));
   add_fitting(a, {-190, 90, 1838}, {0, 0, -1}, 18);
-  // Lines along the bay's roof, with bends.
+}
+
+// Lines along the bay's roof, with bends.
+void add_roof_lines(Assembly& a) {
   for (int i = 0; i < 8; ++i) {
     const double x = 180 + 16.0 * i, z = 1935 - 5.0 * (i % 3);
     a.add("roof line", rod(smooth({{x, -480, z},
@@ -120,11 +126,10 @@ void add_plug(Assembly& a, const h6Vec3& where, const h6Vec3& along) {
   a.add("connector ring", extrude({gear(24, 17, 18.5), {circle(15, 36)}}, -6, 8), plug);
 }
 
-void add_wires(Assembly& a) {
+h6Vec3 strut(double fraction, double z, double out = 108) { return beside(kPi * fraction, out, z); }
+
+void add_harnesses(Assembly& a) {
   const double r = kGearWire;
-  const auto strut = [](double fraction, double z, double out = 108) {
-    return beside(kPi * fraction, out, z);
-  };
   add_bundle(a, "strut harness",
              {{-60, -480, 1930},
               {-70, -380, 1920},
@@ -196,8 +201,11 @@ void add_wires(Assembly& a) {
               {210, -66, 1440},
               {180, -70, 1300}},
              7, r);
+}
+
+void add_single_wires(Assembly& a) {
   const auto lone = [&](const std::string& name, const std::vector<h6Vec3>& through) {
-    a.add_wire(name, smooth(through, 16), r);
+    a.add_wire(name, smooth(through, 16), kGearWire);
     add_plug(a, through.back(), through.back() - through[through.size() - 2]);
   };
   for (int i = 0; i < 4; ++i)
@@ -219,6 +227,9 @@ void add_wires(Assembly& a) {
                               {side * 128, -120, 400}});
     a.add("junction box", block(120, 70, 50, 6, 3), at(-120, side * 200 - 60, 1935));
   }
+}
+
+void add_harness_clamps(Assembly& a) {
   for (const double z : {1520.0, 1420.0, 1240.0, 1090.0, 1000.0})
     for (const double f : {1.62, 1.74}) {
       a.add("harness clamp", revolve({{11, -8}, {14, -8}, {14, 8}, {11, 8}}, 36, Ends::joined),
@@ -231,8 +242,12 @@ void add_wires(Assembly& a) {
 }  // namespace
 
 void add_gear_lines(Assembly& a) {
-  add_hydraulics(a);
-  add_wires(a);
+  add_strut_lines(a);
+  add_manifold(a);
+  add_roof_lines(a);
+  add_harnesses(a);
+  add_single_wires(a);
+  add_harness_clamps(a);
 }
 
 }  // namespace h6::io::industrial
