@@ -217,13 +217,13 @@ Result<ordered_json> ply_info(const Console& console, const std::string& file, i
 int info_command(const Console& console, const std::string& file, const std::string& units) {
   Result<io::Unit> unit = io::unit_from_name(units);
   if (!unit) return console.fail(unit.error(), kUsage);
-  if (Outcome there = check_input(file); !there) return console.fail(there.error());
+  if (Outcome there = check_recording(file); !there) return console.fail(there.error());
   const std::string ending = lower(std::filesystem::path(file).extension().string());
   const EndsAtOnce asked(console, file + ": cancelled");
   Result<ordered_json> facts = Failure{""};
   if (ending == ".vdb")
     facts = field_info(file);
-  else if (ending == ".h5")
+  else if (ending == ".h5" || ending == ".part")
     facts = recording_info(console, file);
   else if (ending == ".json")
     facts = scene_info(file);

@@ -245,7 +245,7 @@ int replay_command(const Console& console, const ReplayOptions& options) {
   if (options.verify && !options.method.empty())
     return console.fail("--verify compares bits with the recorded method: leave --method out",
                         kUsage);
-  if (Outcome there = check_input(options.file); !there) return console.fail(there.error());
+  if (Outcome there = check_recording(options.file); !there) return console.fail(there.error());
   Replay replay(console, options);
   const auto failed = [&](const std::string& sentence) {
     console.warn(replay.remarks);

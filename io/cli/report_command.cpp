@@ -149,7 +149,7 @@ class Reporter {
 int report_command(const Console& console, const ReportOptions& o) {
   if (io::view::report_page().empty()) return console.fail(io::view::no_page());
   for (const std::string& file : o.files)
-    if (Outcome there = check_input(file); !there) return console.fail(there.error());
+    if (Outcome there = check_recording(file); !there) return console.fail(there.error());
   if (Outcome place = check_output(o.output); !place) return console.fail(place.error());
   const Result<std::size_t> bytes = write_report(o.files, o.output, console);
   if (!bytes) return console.fail(bytes.error());

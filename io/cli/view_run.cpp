@@ -235,7 +235,9 @@ class Viewer : public RunObserver {
     int n = 1;
     do
       record_ = options_.folder + "/" + loaded_.scene.name + "-view-" + std::to_string(n++) + ".h5";
-    while (stat(record_.c_str(), &exists) == 0 && n < 10000);
+    while ((stat(record_.c_str(), &exists) == 0 ||
+            stat((record_ + ".part").c_str(), &exists) == 0) &&  // of a killed run
+           n < 10000);
     server_->say(io::view::LiveState::note("recording from the start: " + record_));
   }
   void act(const io::view::Slice& slice) {

@@ -111,6 +111,12 @@ inline Outcome check_input(const std::string& file) {
   return Done{};
 }
 
+// A recording, or the log that a killed run left beside its name.
+inline Outcome check_recording(const std::string& file) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(file + ".part", error) ? Done{} : check_input(file);
+}
+
 // A file can be made there. Commands check this before a bake of minutes, not after it.
 inline Outcome check_output(const std::string& file) {
   std::error_code error;

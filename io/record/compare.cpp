@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// compare.cpp - where two rows of a recording part.
+// compare.cpp - the first difference of two rows of a recording.
 #include <cstring>
 #include <sstream>
 

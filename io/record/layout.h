@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// layout.h - what stands where in a recording, and HDF5 made safe to use. Private.
+// layout.h - where each number is in a recording, and safe handles on HDF5. Private.
 //
 //   /config    attributes: version, json, asset_hashes, simd_target, program, run, rate, hands,
 //              stage_names, cause_names, state_names, units
 //   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns
 //   /events    t, what, detail
-//   /summary   attribute json; the group is there once the run has ended
+//   /summary   attribute json; the group exists once the run has ended
 //
-// Attributes are for people and their tools, in text of variable length. read_recording takes the
-// same from the datasets /config/whole and /summary/whole, see stored.cpp.
+// Attributes are for people and their tools, in text of variable length. read_recording reads the
+// same facts from the datasets /config/whole and /summary/whole; stored.cpp says why.
 #pragma once
 #include <hdf5.h>
 
@@ -20,24 +20,24 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
+#include "io/record/chunk.h"
 #include "io/record/recording.h"
 
 namespace h6::io::recording {
 
 constexpr std::uint32_t format_version = 1;
-constexpr std::size_t event_what_bytes = 64, event_detail_bytes = 512;
 
 enum class Cell { real, natural32, natural64 };
 
-// A dataset of /frames, and where its numbers stand in h6FrameRecord: `width` cells at `offset`,
-// for each hand `stride` bytes further; stride 0: once a frame.
+// A dataset of /frames and its place in h6FrameRecord: `width` cells at `offset`, and for each
+// further hand `stride` bytes later. Stride 0: once a frame.
 struct Column {
   const char* name;
   Cell cell;
   std::size_t width, offset, stride;
   const char* units;
   const char* labels;  // of the cells in a row, separated by blanks
-  bool later = false;  // older recordings do without: zeros then
+  bool later = false;  // older recordings lack it and get zeros
   bool per_hand() const { return stride != 0; }
 };
 
@@ -47,7 +47,7 @@ const std::vector<std::string>& cause_names();
 const std::vector<std::string>& state_names();
 
 std::size_t cell_bytes(Cell cell);
-hid_t cell_type(Cell cell);  // as on disk; not to be closed
+hid_t cell_type(Cell cell);  // as on disk; a constant of the library, do not close it
 // Dimensions of a dataset with `rows` frames: (n), (n, width), (n, hands) or (n, hands, width).
 std::vector<hsize_t> shape(const Column& column, hsize_t rows, std::size_t hands);
 std::size_t row_bytes(const Column& column, std::size_t hands);
@@ -57,6 +57,17 @@ void pack(const Column& column, std::size_t hands, const h6FrameRecord* from, st
           std::vector<std::byte>& out);
 void unpack(const Column& column, std::size_t hands, const std::byte* from, std::size_t count,
             h6FrameRecord* out);
+
+// The payload of a LogKind::rows record: the chunk of each column with `count` rows, filled up
+// with zeros to `chunk_rows`.
+std::vector<std::byte> pack_chunks(std::size_t hands, std::size_t chunk_rows,
+                                   const h6FrameRecord* from, std::size_t count);
+struct Span {
+  const std::byte* from;
+  std::size_t bytes;
+};
+// And back: the compressed chunks, in the order of columns(). False when the sizes do not add up.
+bool find_chunks(const std::vector<std::byte>& payload, std::vector<Span>& chunks);
 
 // Any HDF5 object, released at the end of the scope.
 class Handle {
@@ -79,8 +90,8 @@ class Handle {
   hid_t id_;
 };
 
-// Hold one around every use of the library: Debian's build is not for several threads at once, and
-// it prints its errors unless told not to.
+// Hold one around every use of the library: Debian's build serves one thread at a time, and it
+// prints its errors unless told not to.
 class LibraryLock {
  public:
   LibraryLock();
@@ -89,7 +100,7 @@ class LibraryLock {
   std::lock_guard<std::mutex> lock_;
 };
 
-// The innermost reason for the library's last failure, as it says it.
+// The library's own words for the innermost reason of its last failure.
 std::string library_reason();
 
 // Variable-length UTF-8 text in memory and on disk.
@@ -97,7 +108,13 @@ Handle text_type();
 // Texts of `bytes` bytes (0: 1), filled with NULs.
 Handle fixed_text_type(std::size_t bytes);
 
-// read_recording without the lock and without looking at copies beside the file.
-Result<Recording> read_one(const std::filesystem::path& file, FrameRange range);
+// Access properties for every file: locked where the file system can, closed with all its objects.
+Handle file_access();
+
+// read_recording of one HDF5 file, without the lock.
+Result<Recording> read_hdf5(const std::filesystem::path& file, FrameRange range);
+
+// The head from the JSON text of /config/whole.
+Result<RecordingHead> parse_head(const std::string& text);
 
 }  // namespace h6::io::recording

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// read.cpp - recordings from disk; nothing that a file says about itself is believed.
+// read.cpp - recordings from HDF5 files; no size or number in a file is trusted.
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <system_error>
-#include <thread>
 
 #include "io/record/layout.h"
 #include "io/record/stored.h"
@@ -33,28 +31,13 @@ Failure not_opened(const fs::path& file) {
   return {cannot + library_reason() + "; it is damaged or cut off, use another copy"};
 }
 
-Handle try_open(const fs::path& file) {
-  std::error_code failed;
-  if (!fs::is_regular_file(file, failed)) return {};
-  const Handle access = H5Pcreate(H5P_FILE_ACCESS);
-  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-  H5Pset_file_locking(access, true, true);  // where the file system cannot lock, go without
-  return H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
-}
-
-// While a run goes on, the file can become its spare copy between open and lock: try again.
 Result<Source> open_source(const fs::path& file) {
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    std::error_code failed;
-    Handle h5 = try_open(file);
-    const std::uint64_t bytes = fs::file_size(file, failed);
-    if (h5.ok() && !failed) return Source{file, bytes, std::move(h5)};
-    fs::path part = file;
-    part += ".part";
-    if (!fs::exists(part, failed)) break;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  return not_opened(file);
+  std::error_code failed;
+  if (!fs::is_regular_file(file, failed)) return not_opened(file);
+  const std::uint64_t bytes = fs::file_size(file, failed);
+  Handle h5 = H5Fopen(file.c_str(), H5F_ACC_RDONLY, file_access());
+  if (failed || !h5.ok()) return not_opened(file);
+  return Source{file, bytes, std::move(h5)};
 }
 
 Result<Handle> open_group(const Source& source, const char* name) {
@@ -83,33 +66,7 @@ Result<std::string> read_whole_text(const Source& source, const char* folder) {
   return text_at(bytes.data(), bytes.size());
 }
 
-Outcome read_head(const Source& source, RecordingHead& head) {
-  const Result<std::string> text = read_whole_text(source, "/config");
-  if (!text) return text.failure();
-  try {
-    const json all = json::parse(*text);
-    if (all.at("version").get<double>() != format_version)
-      return source.wrong("its version is not " + std::to_string(format_version) +
-                          "; use the program that made it");
-    head.scene_json = all.at("json").get<std::string>();
-    head.asset_hashes = all.at("asset_hashes").get<std::vector<std::string>>();
-    head.simd_target = all.at("simd_target").get<std::string>();
-    head.program = all.at("program").get<std::string>();
-    head.run_json = all.value("run", std::string());  // older files do without
-    head.rate = all.at("rate").get<double>();
-    const double hands = all.at("hands").get<double>();
-    if (!(head.rate > 0 && head.rate <= 1e6))
-      return source.wrong("the rate is not in 0 to 1000000 Hz");
-    if (!(hands >= 1 && hands <= H6_MAX_HANDS && hands == std::floor(hands)))
-      return source.wrong("the number of hands is not 1 to " + std::to_string(H6_MAX_HANDS));
-    head.hands = static_cast<std::size_t>(hands);
-  } catch (const json::exception& problem) {
-    return source.wrong(std::string("/config/whole: ") + problem.what());
-  }
-  return Done{};
-}
-
-// Names are checked before they become enumerations, bits before anybody looks for their names.
+// Whether every number of a packed column is one of its enumerators or sets of bits.
 bool means_something(const char* column, const std::vector<std::byte>& packed) {
   const std::string_view name = column;
   const std::uint32_t most = name == "cause"          ? H6_CAUSE_COUNT - 1
@@ -145,11 +102,14 @@ Outcome read_column(const Source& source, const Column& column, const Stored& st
   return Done{};
 }
 
-// Memory that is promised and not there ends the program much later, without a sentence.
-hsize_t most_frames_in_memory() {
+// Linux promises more memory than there is, and ends the program much later without a word.
+Outcome check_memory(const fs::path& file, std::uint64_t frames) {
   const long pages = ::sysconf(_SC_PHYS_PAGES), bytes = ::sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || bytes <= 0) return UINT32_MAX;
-  return static_cast<hsize_t>(pages) / 2 * static_cast<hsize_t>(bytes) / sizeof(h6FrameRecord);
+  if (pages <= 0 || bytes <= 0) return Done{};
+  const auto half = static_cast<std::uint64_t>(pages) / 2 * static_cast<std::uint64_t>(bytes);
+  if (frames <= half / sizeof(h6FrameRecord)) return Done{};
+  return Failure{file.string() + ": " + std::to_string(frames) +
+                 " frames are more than fit into half of this machine's memory: read it in pieces"};
 }
 
 // In the order of columns(); without a dataset where an older file has none.
@@ -181,9 +141,7 @@ Outcome read_frames(const Source& source, FrameRange range, Recording& out) {
   if (!open) return open.failure();
   const hsize_t rows = (*open)[0].dims[0], first = std::min<hsize_t>(range.first, rows);
   const hsize_t wanted = std::min<hsize_t>(range.count, rows - first);
-  if (wanted > most_frames_in_memory())
-    return Failure{source.file.string() + " has " + std::to_string(rows) +
-                   " frames, more than fit into half of this machine's memory: read it in pieces"};
+  if (Outcome room = check_memory(source.file, wanted); !room) return room;
   out.frame_count = rows;
   out.frames.resize(wanted, h6FrameRecord{});
   for (std::size_t i = 0; i < open->size(); ++i) {
@@ -235,11 +193,39 @@ Outcome read_summary(const Source& source, Recording& out) {
 
 }  // namespace
 
-Result<Recording> read_one(const fs::path& file, FrameRange range) {
+Result<RecordingHead> parse_head(const std::string& text) {
+  RecordingHead head;
+  try {
+    const json all = json::parse(text);
+    if (all.at("version").get<double>() != format_version)
+      return Failure{"its version is not " + std::to_string(format_version) +
+                     "; use the program that made it"};
+    head.scene_json = all.at("json").get<std::string>();
+    head.asset_hashes = all.at("asset_hashes").get<std::vector<std::string>>();
+    head.simd_target = all.at("simd_target").get<std::string>();
+    head.program = all.at("program").get<std::string>();
+    head.run_json = all.value("run", std::string());  // older files lack it
+    head.rate = all.at("rate").get<double>();
+    const double hands = all.at("hands").get<double>();
+    if (!(head.rate > 0 && head.rate <= 1e6)) return Failure{"the rate is not in 0 to 1000000 Hz"};
+    if (!(hands >= 1 && hands <= H6_MAX_HANDS && hands == std::floor(hands)))
+      return Failure{"the number of hands is not 1 to " + std::to_string(H6_MAX_HANDS)};
+    head.hands = static_cast<std::size_t>(hands);
+  } catch (const json::exception& problem) {
+    return Failure{std::string("its head: ") + problem.what()};
+  }
+  return head;
+}
+
+Result<Recording> read_hdf5(const fs::path& file, FrameRange range) {
   Result<Source> source = open_source(file);
   if (!source) return source.failure();
   Recording out;
-  if (Outcome read = read_head(*source, out.head); !read) return read.failure();
+  const Result<std::string> text = read_whole_text(*source, "/config");
+  if (!text) return text.failure();
+  Result<RecordingHead> head = parse_head(*text);
+  if (!head) return source->wrong(head.error());
+  out.head = std::move(*head);
   if (Outcome read = read_frames(*source, range, out); !read) return read.failure();
   if (Outcome read = read_events(*source, out.events); !read) return read.failure();
   if (Outcome read = read_summary(*source, out); !read) return read.failure();

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // recording.h - runs as HDF5, for h5py and MATLAB; a killed run loses at most its last half second.
 //
-// OUT.h5 is a complete, closed HDF5 file at every instant of the run: what is new goes to a second
-// copy, OUT.h5.part, which then swaps names with it. After a kill it opens as it is, in any tool.
-// A file that was there before stays as OUT.h5.before until the new recording is finished; it is
-// then replaced. A run that is killed, fails or records nothing never costs an older file.
+// While a run goes on, its frames are appended to OUT.h5.part, a log of our own. At the end the log
+// becomes OUT.h5, written aside and renamed, and is removed. A run that was killed leaves its log:
+// read_recording and repair_recording then make OUT.h5 of it. A file that is there already stays as
+// it is until the new recording is finished, which then replaces it. A run that is killed, fails or
+// records nothing never costs an older file. A kill is meant, not a power cut: the log is not
+// synced to the disk.
 //
 // /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, net_stiffness,
 // stage_us, frame_us, wakeup_us, settings} (n) or (n, width), /frames/{hand_pose, hand_velocity,
 // hand_wrench, buttons, sequence, body_pose, body_velocity, wrench, command_pose, cause, causes,
 // state, safety_asked, overdue} (n, hands) or (n, hands, width), with units and column names as
-// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit. The
-// gravest cause and all of them, the device's state, and what its safety chain was told from
-// outside are there for every frame; an event is there when one of them comes up. /config and
-// /summary keep their attributes a second time, as the text that read_recording takes.
+// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit. Every
+// frame has the gravest cause and all causes, the device's state, and the inputs of its safety
+// chain; an event marks the first frame of each. /config and /summary hold their attributes a
+// second time, as the text that read_recording reads.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -27,7 +29,7 @@
 
 namespace h6::io {
 
-// Everything but frames: kept as JSON and attributes under /config.
+// The facts about a run that do not change with the frames: JSON and attributes under /config.
 struct RecordingHead {
   std::string scene_json;                 // the scene, as one JSON object; may be empty
   std::vector<std::string> asset_hashes;  // of fields and shells
@@ -35,7 +37,7 @@ struct RecordingHead {
   double rate = 1000;                     // [Hz]
   std::size_t hands = 1;
   std::string program;   // name and version
-  std::string run_json;  // how it was run, recorded_run.h; may be empty
+  std::string run_json;  // how it was run, see recorded_run.h; may be empty
 };
 
 struct RecordingEvent {
@@ -44,23 +46,24 @@ struct RecordingEvent {
   std::string detail;  // cut after 512 bytes
 };
 
-// Used from one thread, never the haptic one. Frames are buffered and written in flushed segments
-// at least every half second of recorded or wall time, whichever comes first: a quarter second of
-// frames at once, or what has waited for 0.3 s. It has no thread of its own, so call frames() at
-// least every 50 ms, with count 0 when there is nothing new. Memory does not grow with the run.
+// Used from one thread, never the haptic one. Rows are compressed and appended a quarter of a
+// second at a time, and after 0.3 s of recorded or wall time at the latest; events are appended at
+// once. The recorder has no thread of its own, so call frames() at least every 50 ms, with count 0
+// when there is nothing new. Its memory does not grow with the run.
 class Recorder {
  public:
-  // Fails when `file` is something else than a recording or an empty file: that is not replaced.
+  // Fails when `file` is neither a recording nor empty, and while another run records to it. A log
+  // that a killed run left becomes `file` first.
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& file,
                                                   const RecordingHead& head);
-  // Writes what was handed over; without finish() the recording says that the run did not end.
-  // With no frame and no event at all, the older file is back as if nothing had been.
+  // Without finish() the recording says that the run did not end, and an older file is kept as
+  // FILE.before. With no frame and no event nothing is written, and the older file stays.
   ~Recorder();
-  // After a failure (a full disk) nothing more is written, each call gives the same sentence, and
-  // the frames up to then stay readable.
+  // After a failure (a full disk) nothing more is written and each call gives the same sentence;
+  // the frames before it stay in the log and can be read.
   Outcome frames(const h6FrameRecord* records, std::size_t count);
   Outcome event(const RecordingEvent& event);
-  // Key and value pairs for /summary, as JSON text; then closes the file.
+  // `summary_json` is one JSON object, for /summary. Makes the HDF5 file: some 2 s for an hour.
   Outcome finish(const std::string& summary_json);
 
  private:
@@ -74,10 +77,10 @@ struct Recording {
   std::vector<h6FrameRecord> frames;
   std::vector<RecordingEvent> events;
   std::string summary_json;       // empty: the run did not end
-  bool whole = true;              // false: the run was killed; frames up to the last flush are here
-  std::string remark;             // what was repaired or is missing, one sentence; empty: nothing
+  bool whole = true;              // false: the run did not end; the frames up to then are here
+  std::string remark;             // what was repaired or is missing, one sentence; may be empty
   std::uint64_t frame_count = 0;  // in the file; `frames` has those of the range asked for
-  // Of /frames that the file has: older ones lack some, and `frames` has zeros there.
+  // Of /frames in the file. Older files lack some; `frames` has zeros there.
   std::vector<std::string> columns;
 };
 
@@ -86,25 +89,26 @@ struct FrameRange {
   std::uint64_t first = 0;
   std::uint64_t count = UINT64_MAX;  // cut at the end
 };
-// Also while the run goes on, best from another process: HDF5 serves one thread at a time, and a
-// recorder in this one waits for it. Where `file` is damaged or gone, the copy beside it is read.
+// `file` is OUT.h5 or OUT.h5.part. A log that a killed run left is turned into OUT.h5 first, see
+// repair_recording. While the run goes on, and where OUT.h5 cannot be written, each call converts
+// the log into a temporary file and reads that.
 Result<Recording> read_recording(const std::filesystem::path& file, FrameRange range = {});
 
-// The first number in which two rows of one frame differ, in the order a frame makes them:
-// contacts, depths, bodies, what hands are told, the hash. Times and status are not looked at.
+// The first number in which two rows of one frame differ, in the order in which a frame computes
+// them: contacts, depths, bodies, commands to the hands, the hash. Times and status are left out.
 struct RowDifference {
   std::string column, cell;  // "body_pose", "qz"
   std::size_t hand = 0;      // of columns with one row a hand
   double a = 0, b = 0;       // as numbers; of hashes only the leading digits
 };
-// `commands` false: what hands are told is not looked at; it depends on deadlines too.
+// `commands` false leaves out the commands to the hands, which depend on deadlines too.
 std::optional<RowDifference> first_difference(const h6FrameRecord& a, const h6FrameRecord& b,
                                               std::size_t hands, bool commands);
 
-// Makes `file` the newest whole copy of a run that was killed and removes what else that run left
-// beside it. Changes nothing where there is nothing to do, or where a run may still be going on
-// (files younger than five seconds). A damaged file is kept as FILE.damaged. Says what it did;
-// empty: nothing.
+// Turns the log that a killed run left beside `file` into `file`; an older file there is kept as
+// FILE.before (.before-2, ...). A log that is cut off or damaged gives the frames before that
+// place. Returns what was done in one sentence, or nothing when there is no log or a run still
+// writes it.
 Result<std::string> repair_recording(const std::filesystem::path& file);
 
 }  // namespace h6::io

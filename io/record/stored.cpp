@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// stored.cpp - see stored.h.
 //
-// The library takes the size of a chunk and what its filters made of it on trust and reads past its
-// buffers where a damaged file lies. So it only finds the bytes here; they are inflated and put in
-// order by this file, into memory of the size they must have. For the same reason no text is read
-// that stands in HDF5's global heap (of variable length).
+// The library trusts the sizes that a file states, and reads past its buffers where a damaged file
+// lies. So the library only finds the bytes of a chunk; chunk.h inflates them into memory of the
+// size that they must have. For the same reason this file reads no text of variable length, which
+// stands in HDF5's global heap.
 #include "io/record/stored.h"
-
-#include <zlib.h>
 
 #include <algorithm>
 #include <cstring>
@@ -36,7 +33,7 @@ bool known_filters(hid_t how, Stored& stored) {
   return count >= 0 && count <= 2;
 }
 
-// All rows are there, and reading a few takes little memory.
+// Refuses datasets that lack rows, and chunks so large that reading a few rows takes much memory.
 Outcome check_chunks(const Source& source, Stored& stored, hid_t how, hid_t space) {
   hsize_t chunk[H5S_MAX_RANK] = {}, found = 0;
   const std::size_t rank = stored.dims.size();
@@ -69,7 +66,7 @@ Outcome check_storage(const Source& source, Stored& stored, hid_t space) {
   return Done{};
 }
 
-// The dataset, its dimensions and row size; `type` negative: text of one length.
+// The dataset, its dimensions and row size. A negative `wanted` means text of fixed length.
 Result<Stored> open_any(const Source& source, hid_t group, const char* folder, const char* name,
                         hid_t wanted) {
   Stored stored;
@@ -97,22 +94,7 @@ Result<Stored> open_any(const Source& source, hid_t group, const char* folder, c
   return stored;
 }
 
-// Byte k of every cell stands together when shuffled.
-void unshuffle(const std::vector<std::byte>& from, std::size_t cell, std::vector<std::byte>& to) {
-  const std::size_t cells = from.size() / cell;
-  for (std::size_t k = 0; k < cell; ++k)
-    for (std::size_t i = 0; i < cells; ++i) to[i * cell + k] = from[k * cells + i];
-}
-
-bool inflate_exactly(const std::vector<std::byte>& from, std::vector<std::byte>& to) {
-  uLongf size = static_cast<uLongf>(to.size());
-  return uncompress(reinterpret_cast<Bytef*>(to.data()), &size,
-                    reinterpret_cast<const Bytef*>(from.data()),
-                    static_cast<uLong>(from.size())) == Z_OK &&
-         size == to.size();
-}
-
-// One chunk as it was before its filters; `mask` has a bit for each filter that was left out.
+// One chunk with its filters undone; `mask` has a bit for each filter that was left out.
 bool read_chunk(const Stored& stored, hsize_t number, std::vector<std::byte>& out) {
   std::vector<hsize_t> at(stored.dims.size(), 0);
   at[0] = number * stored.chunk_rows;
@@ -126,7 +108,7 @@ bool read_chunk(const Stored& stored, hsize_t number, std::vector<std::byte>& ou
   if (H5Dread_chunk(stored.dataset, H5P_DEFAULT, at.data(), &mask, raw.data()) < 0) return false;
   const std::uint32_t deflate_bit = stored.shuffled ? 2 : 1;
   if (stored.deflated && (mask & deflate_bit) == 0) {
-    if (!inflate_exactly(raw, out)) return false;
+    if (!inflate(raw.data(), raw.size(), out)) return false;
     raw = out;
   }
   if (raw.size() != out.size()) return false;

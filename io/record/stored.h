@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// stored.h - rows of a dataset from a file that may lie about itself. Private.
+// stored.h - rows of a dataset, from a file that may be damaged or forged. Private.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace h6::io::recording {
 
-// The file being read: its name for sentences, its size against lies.
+// The file being read. Its name is for sentences; its size bounds what a dataset can claim.
 struct Source {
   std::filesystem::path file;
   std::uint64_t bytes;
@@ -21,7 +21,7 @@ struct Source {
   }
 };
 
-// A group or dataset that stands in the file itself; links to elsewhere are not followed.
+// Whether the file itself has this group or dataset; links to elsewhere do not count.
 bool has(hid_t at, const char* name, H5O_type_t type);
 
 // A dataset whose rows are all in the file.
@@ -30,13 +30,13 @@ struct Stored {
   std::string name;
   std::vector<hsize_t> dims;  // rows first
   std::size_t row_bytes = 0, cell_bytes = 0;
-  hsize_t chunk_rows = 0;  // 0: in one piece
+  hsize_t chunk_rows = 0;  // 0: contiguous
   bool shuffled = false, deflated = false;
 };
-// With numbers of this type.
+// Opens a dataset of numbers of this type.
 Result<Stored> open_stored(const Source& source, hid_t group, const char* folder, const char* name,
                            hid_t type);
-// Texts of one length, which is in cell_bytes.
+// Opens a dataset of texts of one length, which is in cell_bytes.
 Result<Stored> open_stored_texts(const Source& source, hid_t group, const char* folder,
                                  const char* name);
 

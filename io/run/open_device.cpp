@@ -204,7 +204,7 @@ Result<OpenedDevice> open_replay(const DeviceSpec& spec) {
   OptionReader read(spec);
   read.whole("hand", H6_MAX_HANDS - 1, hand);
   if (Outcome good = read.finish(); !good) return good.failure();
-  if (Outcome there = check_input(spec.target); !there) return there.failure();
+  if (Outcome there = check_recording(spec.target); !there) return there.failure();
   std::vector<h6DeviceSample> samples;
   for (io::FrameRange range{0, 5000};; range.first += range.count) {
     Result<io::Recording> piece = io::read_recording(spec.target, range);

@@ -154,7 +154,7 @@ TEST_CASE("the process behind a plug-in is killed in a run: no more force, lost,
   ArmProcess arm;
   Process process(box, {"run", "box-on-wall", "--device", arm.device(), "--duration", "2.5",
                         "--record", "run.h5", "--json"});
-  REQUIRE(soon([&] { return fs::exists(box.file("run.h5")); }));
+  REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   arm.end();
   const Ended ended = process.wait();

@@ -73,10 +73,11 @@ TEST_CASE("a recording that outgrows the disk ends the run with a sentence, and 
   CHECK(ended.code == 1);
   CHECK(lines(ended.err, "hapsix: ") == 1);
   CHECK(ended.err.find("run.h5") != std::string::npos);
-  CHECK(box.files() == std::set<std::string>{"run.h5"});  // what was recorded is worth keeping
+  CHECK(box.files() == std::set<std::string>{"run.h5.part"});  // no room for more than its log
   const Json info = result_of(box, {"info", "run.h5"});
   CHECK(info["kind"] == "recording");
   CHECK(info["whole"] == false);
+  CHECK(box.files() == std::set<std::string>{"run.h5"});
 }
 
 // A file system of its own, as small as a disk with nothing left. In a mount namespace: it is gone

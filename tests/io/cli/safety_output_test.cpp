@@ -96,7 +96,7 @@ TEST_CASE("a terminal that hangs up ends a run like Ctrl-C; a crash stays a cras
     CAPTURE(number);
     Sandbox box;
     Process process(box, {"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"});
-    REQUIRE(soon([&] { return fs::exists(box.file("run.h5")); }));
+    REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
     process.send(number);
     const Ended ended = process.wait(10);
     CHECK(ended.in_time);

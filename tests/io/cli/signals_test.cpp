@@ -67,7 +67,7 @@ TEST_CASE("Ctrl-C ends a real-time run at once: devices stopped, recording finis
       Args args{"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"};
       if (json) args.push_back("--json");
       Process process(box, args);
-      REQUIRE(soon([&] { return fs::exists(box.file("run.h5")); }));
+      REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
       pause_seconds(0.5 * kPatience);
       const auto asked = std::chrono::steady_clock::now();
       process.send(number);
@@ -98,7 +98,7 @@ TEST_CASE("Ctrl-C ends a real-time run at once: devices stopped, recording finis
 TEST_CASE("a killed run leaves a recording that opens and lacks half a second at most") {
   Sandbox box;
   Process process(box, {"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"});
-  REQUIRE(soon([&] { return fs::exists(box.file("run.h5")); }));
+  REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
   pause_seconds(1.5 * kPatience);
   process.send(SIGKILL);
   CHECK(process.wait().code == -SIGKILL);

@@ -39,7 +39,7 @@ struct Folder {
   }
 };
 
-// Bits that depend on nothing but these two numbers (splitmix64).
+// Bits that depend only on these two numbers (splitmix64).
 inline std::uint64_t bits(std::uint64_t frame, std::uint64_t cell) {
   std::uint64_t z = frame * 1000 + cell + 0x9E3779B97F4A7C15u;
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -47,7 +47,7 @@ inline std::uint64_t bits(std::uint64_t frame, std::uint64_t cell) {
   return z ^ (z >> 31);
 }
 
-// Frame i of every run in this file: each number has its own arbitrary bits, NaN and all.
+// Frame i of every run: each number has its own arbitrary bits, NaN included.
 inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate = 1000) {
   h6FrameRecord r;
   std::memset(static_cast<void*>(&r), 0, sizeof r);
@@ -190,7 +190,7 @@ inline void write_bytes(const fs::path& file, const std::vector<char>& bytes, st
   std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(count));
 }
 
-// What any tool on top of the HDF5 library sees; empty: it does not open.
+// The shape of a dataset as any HDF5 tool sees it; empty when the file does not open.
 inline std::vector<hsize_t> plain_shape(const fs::path& file, const char* dataset) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);

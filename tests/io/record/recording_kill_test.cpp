@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // recording_kill_test.cpp - recordings survive kills at random instants, full disks and readers,
-// and cost no older file.
+// and no run destroys an older file.
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/record/copies.h"
+#include "io/record/log.h"
 #include "io/record/recording.h"
 #include "tests/io/record/recorded_frames.h"
 
@@ -40,7 +40,8 @@ struct Victim {
   int reports;
 };
 
-// Real time: what is due, every 10 ms, at 1 kHz. Otherwise `at_once` frames without a pause.
+// In real time every 10 ms the frames that are due at 1 kHz; otherwise `at_once` frames without a
+// pause.
 Victim record_until_killed(const fs::path& file, bool real_time, std::size_t at_once) {
   int ends[2];
   REQUIRE(::pipe(ends) == 0);
@@ -75,28 +76,34 @@ std::vector<Report> kill_and_listen(const Victim& victim) {
   return all;
 }
 
+std::uint64_t rows_on_disk(const fs::path& file) {
+  const auto index = recording::index_log(recording::open_log(recording::part_of(file)));
+  return index ? index->row_count : 0;
+}
+
 }  // namespace
 
-TEST_CASE("what was handed over is on disk soon, at any rate of frames") {
+TEST_CASE("frames are on disk within half a second, at any rate") {
   const Folder folder;
   const fs::path file = folder / "run.h5";
   auto recorder = start(file);
-  CHECK(plain_shape(file, "/frames/t") == std::vector<hsize_t>{0});
+  CHECK(read(file).frames.empty());
   REQUIRE(add(*recorder, frames(0, 10)));
   REQUIRE(recorder->event({0.01, "late", ""}));
   std::this_thread::sleep_for(std::chrono::milliseconds(310));
-  REQUIRE(recorder->frames(nullptr, 0));  // wall time: the ten have waited long enough
+  REQUIRE(recorder->frames(nullptr, 0));  // wall time: the ten rows have waited long enough
   CHECK(read(file).frames.size() == 10);
   CHECK(read(file).events.size() == 1);
   CHECK_FALSE(read(file).whole);
   CHECK_FALSE(read(file).remark.empty());
 
-  // Recorded time: never more than half a second behind, however fast frames come.
+  // Recorded time: the log is at most half a second behind, however fast frames come.
   for (std::uint64_t done = 10; done < 5000; done += 70) {
     REQUIRE(add(*recorder, frames(done, 70)));
-    REQUIRE(plain_shape(file, "/frames/t").at(0) + 500 >= done + 70);
+    REQUIRE(rows_on_disk(file) + 500 >= done + 70);
   }
-  // Frames that were lost on the way do not hold back the others.
+  CHECK(is_prefix(read(file)));
+  // A gap in the frames does not delay the rows after it.
   REQUIRE(add(*recorder, frames(20000, 1)));
   REQUIRE(add(*recorder, frames(20900, 1)));
   CHECK(read(file).frames.back().report.frame == 20900);
@@ -131,7 +138,7 @@ TEST_CASE(
       CHECK(plain_shape(file, "/frames/wrench").at(0) == r.frames.size());
       if (reports.empty()) continue;
       CHECK(r.frames.size() + 500 >= reports.back().handed_over);
-      // A loaded machine may not let the process run at all: that time is not held against it.
+      // A loaded machine may not schedule the process; that time does not count as lost.
       Clock::duration withheld{};
       for (std::size_t k = 1; k < reports.size(); ++k)
         withheld = std::max(withheld,
@@ -149,7 +156,7 @@ TEST_CASE(
   CHECK(kills == 50);
 }
 
-TEST_CASE("kills in the midst of writing leave a whole file and the older one") {
+TEST_CASE("kills in the midst of writing leave a log that can be read, and the older file") {
   const Folder folder;
   std::mt19937_64 random(21);
   for (int i = 0; i < 40; ++i) {
@@ -160,29 +167,24 @@ TEST_CASE("kills in the midst of writing leave a whole file and the older one") 
     const Victim victim = record_until_killed(file, false, 1 + random() % 600);
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 60000));
     const std::vector<Report> reports = kill_and_listen(victim);
+    CHECK(bytes_of(file) == older);  // a run leaves it alone until it ends
+
+    // After repair nothing of the killed run is left but its recording, and the next run works.
+    const bool left = fs::exists(place / "run.h5.part");
+    const auto repaired = repair_recording(file);
+    REQUIRE(repaired);
+    CHECK(repaired->empty() != left);
+    CHECK_FALSE(fs::exists(place / "run.h5.part"));
     const Recording r = read(file);
     REQUIRE(is_prefix(r));
     if (!reports.empty()) CHECK(r.frames.size() + 500 >= reports.back().handed_over);
     const fs::path before = place / "run.h5.before";
     const bool replaced = !r.whole;
     CHECK(bytes_of(replaced ? before : file) == older);
-
-    // After repair nothing of the killed run is left but its recording, and the next run works.
-    for (const char* other : {"run.h5.part", "run.h5.swap"})
-      if (fs::exists(place / other))
-        fs::last_write_time(place / other,
-                            fs::file_time_type::clock::now() - std::chrono::seconds(60));
-    const bool left = fs::exists(place / "run.h5.part") || fs::exists(place / "run.h5.swap");
-    const auto repaired = repair_recording(file);
-    REQUIRE(repaired);
-    CHECK(repaired->empty() != left);
-    CHECK_FALSE(fs::exists(place / "run.h5.part"));
     CHECK(plain_shape(file, "/frames/t").at(0) == r.frames.size());
     record(file, 7);
     CHECK(read(file).frames.size() == 7);
-    // Killed after the older file got its second name and before the new one took its place, both
-    // names hold it: one file too many, nothing lost.
-    if (replaced) CHECK(fs::exists(before));
+    CHECK(fs::exists(before) == replaced);
     if (fs::exists(before)) CHECK(bytes_of(before) == older);
   }
 }
@@ -240,77 +242,114 @@ TEST_CASE("a full disk is one sentence, and the frames before it are kept") {
   CHECK(folder.files() == 1);
 }
 
-TEST_CASE("a reader that keeps the file open sees one state of it while the run goes on") {
+TEST_CASE("a run can be read while it goes on, and a reader of the older file keeps that") {
   const Folder folder;
   const fs::path file = folder / "run.h5";
-  auto recorder = start(file);
-  REQUIRE(add(*recorder, frames(0, 1000)));
+  record(file, 1000);
   const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   REQUIRE(h5 >= 0);
-  for (std::uint64_t i = 1000; i < 4000; i += 250) REQUIRE(add(*recorder, frames(i, 250)));
+  auto recorder = start(file);
+  for (std::uint64_t i = 0; i < 4000; i += 250) {
+    REQUIRE(add(*recorder, frames(i, 250)));
+    if (i % 1000 == 0) CHECK(read(file).frames.size() == i + 250);
+  }
+  CHECK(read(folder / "run.h5.part").frames.size() == 4000);
+  CHECK_FALSE(read(file).whole);
+  CHECK(mentions(read(file).remark, "still going on"));
+  CHECK(repair_recording(file)->empty());  // not while the run goes on
+  REQUIRE(recorder->finish("{}"));
   const hid_t data = H5Dopen2(h5, "/frames/hash", H5P_DEFAULT);
   std::vector<std::uint64_t> hashes(1000);
   CHECK(H5Dread(data, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, hashes.data()) >= 0);
   for (std::uint64_t i = 0; i < 1000; ++i) CHECK(hashes[i] == frame(i).report.state_hash);
   H5Dclose(data);
   H5Fclose(h5);
-  REQUIRE(recorder->finish("{}"));
   CHECK(read(file).frames.size() == 4000);
   CHECK(is_prefix(read(file)));
 }
 
-TEST_CASE("a second run on the same file is told apart, and removed files are made again") {
+TEST_CASE("a second run on the same file is refused, and a removed log costs nothing") {
   const Folder folder;
   const fs::path file = folder / "run.h5";
   auto first = start(file);
   REQUIRE(add(*first, frames(0, 500)));
+  const auto second = Recorder::create(file, head());
+  REQUIRE_FALSE(second);
+  CHECK(mentions(second.error(), "another run"));
   fs::remove(folder / "run.h5.part");
-  REQUIRE(add(*first, frames(500, 500)));
-  fs::remove(file);
-  REQUIRE(add(*first, frames(1000, 500)));
-  REQUIRE(add(*first, frames(1500, 500)));
+  REQUIRE(add(*first, frames(500, 1500)));
+  REQUIRE(first->finish("{}"));
   CHECK(read(file).frames.size() == 2000);
   CHECK(is_prefix(read(file)));
-  auto second = start(file);
-  REQUIRE(add(*second, frames(0, 250)));
-  const auto more = frames(2000, 250);
-  const Outcome stopped = first->frames(more.data(), more.size());
-  REQUIRE_FALSE(stopped);
-  CHECK(mentions(stopped.error(), "another program"));
-  REQUIRE(second->finish("{}"));
-  CHECK(read(file).frames.size() == 250);
+  CHECK(folder.files() == 1);
 }
 
-TEST_CASE("names swap in one step or in three, and a kill between the three is repaired") {
+TEST_CASE("a log that is cut off or damaged anywhere gives the frames before that place") {
   const Folder folder;
-  const fs::path a = folder / "a.h5", b = recording::part_of(a), c = recording::swap_of(a);
-  for (const bool one_step : {true, false}) {
-    record(a, 10);
-    record(b, 20);
-    REQUIRE(recording::swap_names(a, b, c, one_step));
-    CHECK(read(a).frames.size() == 20);
-    CHECK(read(b).frames.size() == 10);
-    CHECK_FALSE(fs::exists(c));
+  std::vector<char> log;
+  {
+    auto recorder = start(folder / "run.h5");
+    REQUIRE(add(*recorder, frames(0, 250)));
+    REQUIRE(recorder->event({0.25, "late", "own computation"}));
+    REQUIRE(add(*recorder, frames(250, 300)));
+    log = bytes_of(folder / "run.h5.part");
   }
-  fs::rename(a, c);  // no file at the place, the older copy in .part, the newer in .swap
-  CHECK(read(a).frames.size() == 20);
-  CHECK(mentions(read(a).remark, "swap"));
-  const auto repaired = repair_recording(a);
-  REQUIRE(repaired);
-  CHECK(mentions(*repaired, "a.h5.swap with 20 frames"));
-  CHECK(mentions(*repaired, "a.h5.part, an older copy, was removed"));
-  CHECK(repair_recording(a)->empty());  // nothing is left to do
-  CHECK(plain_shape(a, "/frames/t") == std::vector<hsize_t>{20});
-  CHECK(folder.files() == 1);
+  const fs::path file = folder / "left.h5", part = folder / "left.h5.part";
+  std::size_t sizes[3] = {};  // how many logs gave 0, 250, 500 frames
+  const auto judge = [&](const std::vector<char>& bytes, std::size_t count) {
+    fs::remove(file);
+    write_bytes(part, bytes, count);
+    const auto repaired = repair_recording(file);
+    REQUIRE(repaired);
+    CHECK_FALSE(fs::exists(part));
+    if (!fs::exists(file)) {
+      CHECK(mentions(*repaired, "was removed"));
+      return;
+    }
+    const Recording r = read(file);
+    CHECK(mentions(*repaired, ("left.h5.part with " + std::to_string(r.frames.size())).c_str()));
+    CHECK(is_prefix(r));
+    CHECK_FALSE(r.whole);
+    REQUIRE(r.frames.size() % 250 == 0);
+    REQUIRE(r.frames.size() <= 500);
+    ++sizes[r.frames.size() / 250];
+  };
+  for (std::size_t size = 0; size < log.size(); size += 1 + log.size() / 97) judge(log, size);
+  judge(log, log.size());
+  for (std::size_t at = 0; at < log.size(); at += 1 + log.size() / 97) {
+    std::vector<char> bytes = log;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x40);
+    judge(bytes, bytes.size());
+  }
+  for (const std::size_t count : sizes) CHECK(count > 0);
+}
 
-  // A damaged file with a copy beside it: the copy takes its place, the damaged one is kept.
-  fs::copy_file(a, b);
-  fs::resize_file(a, fs::file_size(a) / 2);
-  CHECK(read(a).frames.size() == 20);
-  const auto replaced = repair_recording(a);
+TEST_CASE("a killed run's log becomes the file, and the older file is kept") {
+  const Folder folder;
+  const fs::path file = folder / "a.h5", part = folder / "a.h5.part";
+  CHECK(repair_recording(file)->empty());
+  auto recorder = start(folder / "run.h5");
+  REQUIRE(add(*recorder, frames(0, 250)));
+  fs::copy_file(folder / "run.h5.part", part);  // nobody holds a lock on the copy
+  CHECK(mentions(read(file).remark, "a.h5.part with 250 frames"));
+  CHECK_FALSE(read(file).whole);
+  CHECK_FALSE(fs::exists(part));
+  CHECK(repair_recording(file)->empty());  // nothing is left to do
+  CHECK(plain_shape(file, "/frames/t") == std::vector<hsize_t>{250});
+
+  record(file, 20);
+  const std::vector<char> older = bytes_of(file);
+  fs::copy_file(folder / "run.h5.part", part);
+  const auto replaced = repair_recording(part);
   REQUIRE(replaced);
-  CHECK(mentions(*replaced, "kept as a.h5.damaged"));
-  CHECK(plain_shape(a, "/frames/t") == std::vector<hsize_t>{20});
-  CHECK(fs::exists(folder / "a.h5.damaged"));
-  CHECK_FALSE(repair_recording(folder / "none.h5"));
+  CHECK(mentions(*replaced, "kept as a.h5.before"));
+  CHECK(plain_shape(file, "/frames/t") == std::vector<hsize_t>{250});
+  CHECK(bytes_of(folder / "a.h5.before") == older);
+
+  // The next run begins all the same, and only its own file is replaced.
+  fs::copy_file(folder / "run.h5.part", part);
+  record(file, 7);
+  CHECK(read(file).frames.size() == 7);
+  CHECK(bytes_of(folder / "a.h5.before") == older);
+  CHECK(plain_shape(folder / "a.h5.before-2", "/frames/t") == std::vector<hsize_t>{250});
 }

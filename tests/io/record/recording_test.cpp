@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // recording_test.cpp - recordings come back to the bit, open in any HDF5 tool, and damaged, foreign
-// or lying files are refused with a sentence.
+// or forged files are refused with a sentence.
 #include "io/record/recording.h"
 
 #include <doctest/doctest.h>
@@ -86,7 +86,7 @@ TEST_CASE("the HDF5 library alone sees the documented datasets") {
   CHECK(plain_shape(file, "/frames/hash") == Shape{600});
   CHECK(plain_shape(file, "/events/t") == Shape{0});
 
-  // The order inside a row: position, then the quaternion with w first; and units are said.
+  // The order inside a row is position, then the quaternion with w first. Units are attributes.
   const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   const hid_t data = H5Dopen2(h5, "/frames/hand_pose", H5P_DEFAULT);
   std::vector<double> poses(600 * 2 * 7);
@@ -131,7 +131,7 @@ TEST_CASE("a recording from before a column was added opens, with zeros in its p
   }
 }
 
-TEST_CASE("what is not a recording is not replaced, and impossible heads are refused") {
+TEST_CASE("a file that is not a recording is not replaced, and impossible heads are refused") {
   const Folder folder;
   const fs::path text = folder / "part.stl";
   write_bytes(text, std::vector<char>(100, 's'), 100);
@@ -170,11 +170,11 @@ TEST_CASE("files that are missing, foreign, cut off or damaged are refused with 
   for (std::size_t size = 0; size < good.size(); size += 1 + good.size() / 97) {
     write_bytes(cut, good, size);
     CHECK_FALSE(refusal(cut).empty());
-    CHECK_FALSE(repair_recording(cut));
+    CHECK(repair_recording(cut)->empty());  // it repairs logs, and changes nothing else
   }
 }
 
-TEST_CASE("lying sizes and wrong shapes and types are refused before memory is taken") {
+TEST_CASE("false sizes and wrong shapes and types are refused before memory is taken") {
   const Folder folder;
   record(folder / "run.h5", 300);
   const auto change = [&](auto&& edit) {
@@ -222,7 +222,7 @@ TEST_CASE("lying sizes and wrong shapes and types are refused before memory is t
   CHECK(mentions(change([&](hid_t h5) { replace(h5, "/frames/t", H5T_IEEE_F64LE, {}); }), "shape"));
   CHECK(mentions(change([&](hid_t h5) { replace(h5, "/frames/t", H5T_IEEE_F64LE, {300}); }),
                  "than are stored"));
-  // Chunks that are not what their filters say: too short, not deflated at all, too long.
+  // Chunks that do not fit their filters: too short, not deflated, too long.
   for (const std::uint32_t mask : {0u, 1u, 2u, 3u})
     for (const std::size_t size : {1, 10, 2000, 2001}) {
       CAPTURE(mask);

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/record/layout.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace h6::io::recording {
+
+// Poses, velocities and wrenches are recorded as the doubles they consist of.
+static_assert(sizeof(h6Pose) == 7 * sizeof(double) && offsetof(h6Pose, q) == 3 * sizeof(double));
+static_assert(sizeof(h6Velocity) == 6 * sizeof(double) && sizeof(h6Wrench) == 6 * sizeof(double));
+static_assert(sizeof(h6Cause) == 4 && sizeof(h6Status) == 4 && sizeof(h6DeviceState) == 4);
+static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 20, "names below, format version");
+static_assert(offsetof(h6FrameReport, net_stiffness_max) ==
+              offsetof(h6FrameReport, net_stiffness_min) + sizeof(double));
+
+const std::vector<Column>& columns() {
+  using R = h6FrameRecord;
+  constexpr auto report = offsetof(R, report), hand = offsetof(R, hand), body = offsetof(R, body),
+                 command = offsetof(R, command), input = offsetof(R, safety_input);
+  constexpr auto hands = sizeof(h6DeviceSample), bodies = sizeof(h6BodyState),
+                 commands = sizeof(h6DeviceCommand);
+  const auto real = Cell::real;
+  const auto n32 = Cell::natural32, n64 = Cell::natural64;
+  const char* pose = "x y z qw qx qy qz";
+  const char* speed = "vx vy vz wx wy wz";
+  const char* wrench = "fx fy fz tx ty tz";
+  static const std::vector<Column> all = {
+      {"t", real, 1, offsetof(R, time), 0, "s", "t"},
+      {"hand_pose", real, 7, hand + offsetof(h6DeviceSample, pose), hands, "m, 1", pose},
+      {"hand_velocity", real, 6, hand + offsetof(h6DeviceSample, velocity), hands, "m/s, rad/s",
+       speed},
+      {"buttons", n32, 1, hand + offsetof(h6DeviceSample, buttons), hands, "bits", "buttons"},
+      {"hand_wrench", real, 6, hand + offsetof(h6DeviceSample, wrench), hands, "N, N m", wrench,
+       true},
+      {"body_pose", real, 7, body + offsetof(h6BodyState, pose), bodies, "m, 1", pose},
+      {"body_velocity", real, 6, body + offsetof(h6BodyState, velocity), bodies, "m/s, rad/s",
+       speed},
+      {"wrench", real, 6, command + offsetof(h6DeviceCommand, wrench), commands, "N, N m", wrench},
+      {"command_pose", real, 7, command + offsetof(h6DeviceCommand, pose), commands, "m, 1", pose,
+       true},
+      {"cause", n32, 1, command + offsetof(h6DeviceCommand, cause), commands,
+       "index into /config cause_names", "cause"},
+      {"causes", n32, 1, command + offsetof(h6DeviceCommand, causes), commands,
+       "bits: 1 << index into /config cause_names", "causes", true},
+      {"state", n32, 1, offsetof(R, state), sizeof(h6DeviceState), "index into /config state_names",
+       "state", true},
+      {"sequence", n32, 1, hand + offsetof(h6DeviceSample, sequence), hands, "1", "sequence", true},
+      {"safety_asked", n32, 1, input + offsetof(h6SafetyInput, asked), sizeof(h6SafetyInput),
+       "bits: 1 arm, 2 disarm, 4 lost, 8 from a fault, 16 from disarmed; fault << 8",
+       "safety_asked", true},
+      {"overdue", real, 1, input + offsetof(h6SafetyInput, overdue), sizeof(h6SafetyInput), "s",
+       "overdue", true},
+      {"settings", n32, 1, offsetof(R, settings), 0, "changes so far", "settings", true},
+      {"contacts", n32, 1, report + offsetof(h6FrameReport, contacts), 0, "1", "contacts"},
+      {"max_depth", real, 1, report + offsetof(h6FrameReport, max_depth), 0, "m", "max_depth"},
+      {"max_depth_voxels", real, 1, report + offsetof(h6FrameReport, max_depth_voxels), 0, "voxel",
+       "max_depth_voxels"},
+      {"net_stiffness", real, 2, report + offsetof(h6FrameReport, net_stiffness_min), 0, "N/m",
+       "min max", true},
+      {"stage_us", real, H6_STAGE_COUNT, report + offsetof(h6FrameReport, stage_us), 0, "us",
+       "traverse contacts weights wrench coupling integrate output"},
+      {"frame_us", real, 1, report + offsetof(h6FrameReport, frame_us), 0, "us", "frame_us"},
+      {"wakeup_us", real, 1, offsetof(R, wakeup_us), 0, "us", "wakeup_us"},
+      {"late", n32, 1, offsetof(R, late), 0, "bits: 1 compute, 2 wakeup, 4 stolen", "late"},
+      {"late_us", real, 1, offsetof(R, late_us), 0, "us", "late_us", true},
+      {"cpu_us", real, 1, offsetof(R, cpu_us), 0, "us", "cpu_us", true},
+      {"coarse_pairs", n32, 1, report + offsetof(h6FrameReport, coarse_pairs), 0, "1",
+       "coarse_pairs", true},
+      {"coarse_points", n32, 1, report + offsetof(h6FrameReport, coarse_points), 0, "of sixteen",
+       "coarse_points", true},
+      {"missed_depth_voxels", real, 1, report + offsetof(h6FrameReport, missed_depth_voxels), 0,
+       "voxel", "missed_depth_voxels", true},
+      {"status", n32, 1, report + offsetof(h6FrameReport, status), 0, "bits of h6Status", "status"},
+      {"hash", n64, 1, report + offsetof(h6FrameReport, state_hash), 0, "1", "hash"},
+      {"frame", n64, 1, report + offsetof(h6FrameReport, frame), 0, "1", "frame"},
+  };
+  return all;
+}
+
+const std::vector<std::string>& stage_names() {
+  static const std::vector<std::string> names = {"traverse", "contacts",  "weights", "wrench",
+                                                 "coupling", "integrate", "output"};
+  return names;
+}
+
+const std::vector<std::string>& cause_names() {
+  static const std::vector<std::string> names = {
+      "none",     "clamped",  "slewed",    "not finite", "late",    "device lost", "stopped",
+      "speed",    "clutched", "passivity", "power",      "derated", "overspeed",   "soft start",
+      "dead man", "disarmed", "pose jump", "bad sample", "frozen",  "watchdog"};
+  return names;
+}
+
+const std::vector<std::string>& state_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (int i = 0; i < H6_DEVICE_STATE_COUNT; ++i)
+      all.emplace_back(h6DeviceStateName(static_cast<h6DeviceState>(i)));
+    return all;
+  }();
+  return names;
+}
+
+std::size_t cell_bytes(Cell cell) { return cell == Cell::natural32 ? 4 : 8; }
+
+hid_t cell_type(Cell cell) {
+  if (cell == Cell::real) return H5T_IEEE_F64LE;
+  return cell == Cell::natural32 ? H5T_STD_U32LE : H5T_STD_U64LE;
+}
+
+std::vector<hsize_t> shape(const Column& column, hsize_t rows, std::size_t hands) {
+  std::vector<hsize_t> dims = {rows};
+  if (column.per_hand()) dims.push_back(hands);
+  if (column.width > 1) dims.push_back(column.width);
+  return dims;
+}
+
+std::size_t row_bytes(const Column& column, std::size_t hands) {
+  return column.width * cell_bytes(column.cell) * (column.per_hand() ? hands : 1);
+}
+
+void pack(const Column& column, std::size_t hands, const h6FrameRecord* from, std::size_t count,
+          std::vector<std::byte>& out) {
+  const std::size_t bytes = column.width * cell_bytes(column.cell);
+  const std::size_t times = column.per_hand() ? hands : 1;
+  out.resize(count * times * bytes);
+  std::byte* to = out.data();
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t h = 0; h < times; ++h, to += bytes)
+      std::memcpy(to,
+                  reinterpret_cast<const std::byte*>(from + i) + column.offset + h * column.stride,
+                  bytes);
+}
+
+void unpack(const Column& column, std::size_t hands, const std::byte* from, std::size_t count,
+            h6FrameRecord* out) {
+  const std::size_t bytes = column.width * cell_bytes(column.cell);
+  const std::size_t times = column.per_hand() ? hands : 1;
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t h = 0; h < times; ++h, from += bytes)
+      std::memcpy(reinterpret_cast<std::byte*>(out + i) + column.offset + h * column.stride, from,
+                  bytes);
+}
+
+std::vector<std::byte> pack_chunks(std::size_t hands, std::size_t chunk_rows,
+                                   const h6FrameRecord* from, std::size_t count) {
+  std::vector<std::byte> out(columns().size() * sizeof(std::uint32_t)), rows, shuffled;
+  for (std::size_t i = 0; i < columns().size(); ++i) {
+    const Column& column = columns()[i];
+    pack(column, hands, from, count, rows);
+    rows.resize(chunk_rows * row_bytes(column, hands));  // zeros where rows are still to come
+    shuffle(rows, cell_bytes(column.cell), shuffled);
+    const auto bytes = static_cast<std::uint32_t>(deflate(shuffled, out));
+    std::memcpy(out.data() + i * sizeof bytes, &bytes, sizeof bytes);
+  }
+  return out;
+}
+
+bool find_chunks(const std::vector<std::byte>& payload, std::vector<Span>& chunks) {
+  const std::size_t count = columns().size();
+  std::size_t at = count * sizeof(std::uint32_t);
+  chunks.clear();
+  if (payload.size() < at) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t bytes = 0;
+    std::memcpy(&bytes, payload.data() + i * sizeof bytes, sizeof bytes);
+    if (bytes > payload.size() - at) return false;
+    chunks.push_back({payload.data() + at, bytes});
+    at += bytes;
+  }
+  return at == payload.size();
+}
+
+namespace {
+std::mutex& library_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+}  // namespace
+
+LibraryLock::LibraryLock() : lock_(library_mutex()) { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+std::string library_reason() {
+  std::string reason;
+  const auto first = [](unsigned, const H5E_error2_t* entry, void* out) -> herr_t {
+    if (entry->desc != nullptr) *static_cast<std::string*>(out) = entry->desc;
+    return 1;  // only the innermost entry is wanted
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &reason);
+  return reason.empty() ? "the HDF5 library gives no reason" : reason;
+}
+
+Handle text_type() {
+  Handle type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, H5T_VARIABLE);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  return type;
+}
+
+Handle fixed_text_type(std::size_t bytes) {
+  Handle type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(1, bytes));
+  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  return type;
+}
+
+Handle file_access() {
+  Handle access = H5Pcreate(H5P_FILE_ACCESS);
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  H5Pset_file_locking(access, true, true);  // no lock where the file system has none
+  return access;
+}
+
+}  // namespace h6::io::recording

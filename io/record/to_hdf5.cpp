@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/record/to_hdf5.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <system_error>
+
+#include "io/file/write_aside.h"
+#include "io/record/layout.h"
+
+namespace h6::io::recording {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t event_chunk = 64;  // rows
+constexpr std::size_t events_at_once = 1024;
+
+// ---- attributes and texts; each function returns false when the library fails
+
+bool put_text(hid_t at, const char* name, const std::string& text) {
+  const Handle type = text_type(), space = H5Screate(H5S_SCALAR);
+  const Handle made = H5Acreate2(at, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+  const char* chars = text.c_str();
+  return made.ok() && H5Awrite(made, type, &chars) >= 0;
+}
+
+bool put_texts(hid_t at, const char* name, const std::vector<std::string>& texts) {
+  const hsize_t count = texts.size();
+  const Handle type = text_type(), space = H5Screate_simple(1, &count, nullptr);
+  const Handle made = H5Acreate2(at, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+  std::vector<const char*> chars;
+  for (const std::string& text : texts) chars.push_back(text.c_str());
+  return made.ok() && (chars.empty() || H5Awrite(made, type, chars.data()) >= 0);
+}
+
+bool put_number(hid_t at, const char* name, hid_t disk, hid_t memory, const void* number) {
+  const Handle space = H5Screate(H5S_SCALAR);
+  const Handle made = H5Acreate2(at, name, disk, space, H5P_DEFAULT, H5P_DEFAULT);
+  return made.ok() && H5Awrite(made, memory, number) >= 0;
+}
+
+// One text of fixed length as the dataset `whole`: what read_recording reads.
+bool put_whole(hid_t group, const std::string& text) {
+  const hsize_t one = 1;
+  const Handle type = fixed_text_type(text.size()), space = H5Screate_simple(1, &one, nullptr);
+  const Handle made =
+      H5Dcreate2(group, "whole", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  return made.ok() && H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()) >= 0;
+}
+
+bool put_head(hid_t file, const RecordingHead& head, const std::string& whole) {
+  const Handle config = H5Gcreate2(file, "config", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const auto hands = static_cast<std::uint32_t>(head.hands);
+  return config.ok() && put_whole(config, whole) &&
+         put_number(config, "version", H5T_STD_U32LE, H5T_NATIVE_UINT32, &format_version) &&
+         put_text(config, "json", head.scene_json) &&
+         put_texts(config, "asset_hashes", head.asset_hashes) &&
+         put_text(config, "simd_target", head.simd_target) &&
+         put_text(config, "program", head.program) && put_text(config, "run", head.run_json) &&
+         put_number(config, "rate", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &head.rate) &&
+         put_number(config, "hands", H5T_STD_U32LE, H5T_NATIVE_UINT32, &hands) &&
+         put_texts(config, "stage_names", stage_names()) &&
+         put_texts(config, "cause_names", cause_names()) &&
+         put_texts(config, "state_names", state_names()) &&
+         put_text(config, "units",
+                  "SI: m, s, N, N m, rad; times of stages in us; quaternions w x y z; world frame; "
+                  "poses of the mesh frame, torque about the body's centre of mass");
+}
+
+// A dataset of `rows` rows, in chunks of `chunk` (rows first), shuffled and deflated.
+Handle make_dataset(hid_t group, const char* name, hid_t type, hsize_t rows,
+                    const std::vector<hsize_t>& chunk) {
+  std::vector<hsize_t> now = chunk, most = chunk;
+  now[0] = rows, most[0] = H5S_UNLIMITED;
+  const Handle space = H5Screate_simple(static_cast<int>(now.size()), now.data(), most.data());
+  const Handle how = H5Pcreate(H5P_DATASET_CREATE);
+  if (H5Pset_chunk(how, static_cast<int>(chunk.size()), chunk.data()) < 0 ||
+      H5Pset_shuffle(how) < 0 || H5Pset_deflate(how, deflate_level) < 0)
+    return {};
+  return H5Dcreate2(group, name, type, space, H5P_DEFAULT, how, H5P_DEFAULT);
+}
+
+bool write_rows(hid_t dataset, hid_t type, hsize_t first, hsize_t count, const void* rows) {
+  const Handle memory = H5Screate_simple(1, &count, nullptr), disk = H5Dget_space(dataset);
+  return H5Sselect_hyperslab(disk, H5S_SELECT_SET, &first, nullptr, &count, nullptr) >= 0 &&
+         H5Dwrite(dataset, type, memory, disk, H5P_DEFAULT, rows) >= 0;
+}
+
+// ---- the parts of a recording
+
+struct Source {
+  const File& log;
+  LogIndex index;
+  RecordingHead head;
+};
+
+// The chunks are in the log as HDF5 stores them, so nothing is compressed again.
+bool put_frames(hid_t file, const Source& from) {
+  const Handle group = H5Gcreate2(file, "frames", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  std::vector<Handle> datasets;
+  for (const Column& column : columns()) {
+    datasets.push_back(make_dataset(group, column.name, cell_type(column.cell),
+                                    from.index.row_count,
+                                    shape(column, from.index.chunk_rows, from.head.hands)));
+    const hid_t made = datasets.back();
+    if (made < 0 || !put_text(made, "units", column.units) ||
+        !put_text(made, "columns", column.labels))
+      return false;
+  }
+  std::vector<std::byte> payload;
+  for (const Payload& rows : from.index.rows) {
+    std::vector<Span> chunks;
+    if (!read_payload(from.log, rows, payload) || !find_chunks(payload, chunks)) return false;
+    for (std::size_t i = 0; i < datasets.size(); ++i) {
+      const hsize_t at[3] = {rows.record.first, 0, 0};
+      if (H5Dwrite_chunk(datasets[i], H5P_DEFAULT, 0, at, chunks[i].bytes, chunks[i].from) < 0)
+        return false;
+    }
+  }
+  return true;
+}
+
+bool put_events(hid_t file, const Source& from) {
+  const Handle group = H5Gcreate2(file, "events", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const Handle what_type = fixed_text_type(event_what_bytes);
+  const Handle detail_type = fixed_text_type(event_detail_bytes);
+  const hsize_t count = from.index.events.size();
+  const Handle t = make_dataset(group, "t", H5T_IEEE_F64LE, count, {event_chunk});
+  const Handle what = make_dataset(group, "what", what_type, count, {event_chunk});
+  const Handle detail = make_dataset(group, "detail", detail_type, count, {event_chunk});
+  if (!t.ok() || !what.ok() || !detail.ok() || !put_text(t, "units", "s")) return false;
+  std::vector<std::byte> payload;
+  for (hsize_t first = 0; first < count; first += events_at_once) {
+    const hsize_t here = std::min<hsize_t>(events_at_once, count - first);
+    std::vector<double> times;
+    std::string whats, details;
+    for (hsize_t i = first; i < first + here; ++i) {
+      EventRow row;
+      if (!read_payload(from.log, from.index.events[i], payload)) return false;
+      std::memcpy(&row, payload.data(), sizeof row);
+      times.push_back(row.t);
+      whats.append(row.what, sizeof row.what);
+      details.append(row.detail, sizeof row.detail);
+    }
+    if (!write_rows(t, H5T_NATIVE_DOUBLE, first, here, times.data()) ||
+        !write_rows(what, what_type, first, here, whats.data()) ||
+        !write_rows(detail, detail_type, first, here, details.data()))
+      return false;
+  }
+  return true;
+}
+
+bool put_summary(hid_t file, const Source& from) {
+  if (!from.index.summary) return true;
+  std::vector<std::byte> payload;
+  if (!read_payload(from.log, *from.index.summary, payload)) return false;
+  const std::string text(reinterpret_cast<const char*>(payload.data()), payload.size());
+  const Handle group = H5Gcreate2(file, "summary", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  return group.ok() && put_whole(group, text) && put_text(group, "json", text);
+}
+
+// HDF5 cannot close a file whose last pages do not fit on the disk: ask before.
+Outcome check_room(const fs::path& out, const LogIndex& index) {
+  const std::uint64_t chunks = (index.rows.size() + 1) * columns().size();
+  const std::uint64_t needed = index.end + chunks * 128 + (256 << 10);
+  rlimit limit{};
+  std::error_code failed;
+  const fs::space_info space = fs::space(out.parent_path(), failed);
+  if ((getrlimit(RLIMIT_FSIZE, &limit) == 0 && needed > limit.rlim_cur) ||
+      (!failed && space.available < needed))
+    return Failure{"no room for " + std::to_string((needed >> 20) + 1) + " MiB more on the disk"};
+  return Done{};
+}
+
+fs::path free_name(const fs::path& file) {
+  fs::path name = file;
+  std::error_code ignored;
+  for (int i = 1; name == file || fs::exists(fs::symlink_status(name, ignored)); ++i)
+    name = file.string() + ".before" + (i > 1 ? "-" + std::to_string(i) : "");
+  return name;
+}
+
+}  // namespace
+
+Outcome write_hdf5(const File& log, const fs::path& out) {
+  std::optional<LogIndex> index = index_log(log);
+  if (!index) return Failure{"its log is damaged at the start"};
+  Result<RecordingHead> head = parse_head(index->head);
+  if (!head) return head.failure();
+  const Source from{log, std::move(*index), std::move(*head)};
+  if (Outcome room = check_room(out, from.index); !room) return room;
+  const LibraryLock lock;
+  // The library's oldest file format, which is its default: MATLAB reads it.
+  const Handle h5 = H5Fcreate(out.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, file_access());
+  if (!h5.ok() || !put_head(h5, from.head, from.index.head) || !put_frames(h5, from) ||
+      !put_events(h5, from) || !put_summary(h5, from) || H5Fflush(h5, H5F_SCOPE_GLOBAL) < 0)
+    return Failure{library_reason()};
+  return Done{};
+}
+
+Outcome publish(const File& log, const fs::path& file, bool keep_older, fs::path* kept) {
+  const Outcome written = write_aside(file, [&](const fs::path& out) -> Outcome {
+    if (Outcome made = write_hdf5(log, out); !made) return made;
+    std::error_code failed;
+    if (!keep_older || !fs::exists(file, failed)) return Done{};
+    const fs::path name = free_name(file);
+    fs::rename(file, name);
+    if (kept) *kept = name;
+    return Done{};
+  });
+  const fs::path log_name = part_of(file);
+  if (!written)
+    return Failure{"the run is in " + log_name.string() + " and not yet in " +
+                   file.filename().string() + " (" + written.error() +
+                   "): mend that, then `hapsix info " + file.string() + "` finishes it"};
+  if (log.named(log_name)) ::unlink(log_name.c_str());
+  return Done{};
+}
+
+}  // namespace h6::io::recording
