@@ -41,8 +41,8 @@ void chain_seeds_ref(const float* u, const std::uint64_t* mask, const ChainSeeds
 // where a chain is far.
 struct ChainSides {
   std::uint64_t in_sight[8];  // length < u + offset
-  std::uint64_t dented[8];    // of those: (length - slack) / crooked > max(offset - u, 0)
-  std::uint64_t close[8];     // of the others: u <= close
+  std::uint64_t dented[8];    // and (length - slack) / crooked > max(offset - u, 0)
+  std::uint64_t close[8];     // not in sight, and u <= close
 };
 struct ChainLimits {
   float offset, slack, crooked, close;  // [voxel]; crooked: a ratio

@@ -58,7 +58,7 @@ HWY_INLINE VD slack_at(const SeriesColumns& c, const Axes& J, std::size_t i, con
 
 // The slack in float, to skip contacts quickly.
 struct Glance {
-  float y[6];  // those of the torque over the lever
+  float y[6];  // torque components divided by the lever
   float doubt;
   Glance(const double* at, double lever) {
     double size = 0;
@@ -70,8 +70,8 @@ struct Glance {
   }
 };
 
-// False: no contact from `i` on has slack, by more than what floats round off. An axis is at most
-// (1, |r| / L) long and |r| at most L: the sum of what is rounded is below 2 |y|.
+// False when no contact of the vector at `i` has slack, by more than the rounding of float. An axis
+// is at most (1, |r| / L) long and |r| at most L, so the rounded terms sum to less than 2 |y|.
 HWY_INLINE bool may_carry(const SeriesColumns& c, const Glance& g, std::size_t i) {
   const DF d;
   const std::size_t live = c.count - i;
@@ -85,11 +85,11 @@ HWY_INLINE bool may_carry(const SeriesColumns& c, const Glance& g, std::size_t i
   const auto sz = hn::NegMulAdd(y(4), rx, hn::MulAdd(y(3), ry, y(2)));
   auto u = hn::NegMulAdd(nx, sx, hn::MulAdd(hn::Abs(e), hn::Set(d, kDoubt), e));
   u = hn::NegMulAdd(nz, sz, hn::NegMulAdd(ny, sy, u));
-  // Whatever is not a number stays in.
+  // A NaN counts as slack.
   return !hn::AllTrue(d, hn::Lt(u, hn::Set(d, -g.doubt)));
 }
 
-// kappa_i of contacts whose axes are J.
+// kappa_i from the axes J.
 HWY_INLINE hn::Vec<DF> stiffness_at(const SeriesColumns& c, VD per_c, const Axes& J,
                                     std::size_t i) {
   const DD d;
@@ -100,14 +100,14 @@ HWY_INLINE hn::Vec<DF> stiffness_at(const SeriesColumns& c, VD per_c, const Axes
   return hn::DemoteTo(DF(), hn::Div(facing, soft));
 }
 
-// What a pass over the contacts does besides pull and energy.
+// Options of a pass over the contacts, which always sums pull and energy.
 enum Pass : int {
   kStiffen = 1,  // fills kappa, and finds the largest e of a contact that can carry load, or 0
   kSystem = 2,
   kSlack = 4,  // fills slack
 };
 
-// Of the contacts one vector in `stride`.
+// One pass over one vector in `stride` of the contacts.
 template <int kPass>
 HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const double* y,
                        float* kappa, float* slack, SeriesSums& out, std::size_t stride = 1) {
@@ -161,8 +161,8 @@ HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const 
   return hn::GetLane(hn::MaxOfLanes(d, max_e));
 }
 
-// A start from a part of the contacts, each for as many as it stands for: instead of heavier
-// contacts a softer spring.
+// A start from a sample of the contacts. Each stands for several, so the spring is made softer
+// instead of the contacts stiffer.
 HWY_NOINLINE void start_from_some(const SeriesColumns& c, const SeriesParameters& p, double* y,
                                   float* kappa, std::size_t stride) {
   SeriesParameters softer = p;
@@ -188,7 +188,7 @@ void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double
   }
   SeriesSums first;
   const double max_e = pass<kStiffen | kSystem>(c, p, y, kappa, slack, first);
-  bool filled = false;  // slack, at y
+  bool filled = false;  // slack is that of y
   if (max_e > 0) {
     const bool apart = slack != c.e;
     result = newton(p, max_e, y, first, [&](const double* at, bool system) HWY_ATTR {
@@ -204,7 +204,7 @@ void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double
       return sums;
     });
   } else {
-    for (int k = 0; k < 6; ++k) y[k] = 0;  // nothing to hold
+    for (int k = 0; k < 6; ++k) y[k] = 0;  // no contact has load
   }
   if (filled) return;
   SeriesSums unused;

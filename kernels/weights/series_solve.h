@@ -7,8 +7,8 @@
 // the spring's extension y (m, scaled like J) is
 //     y = argmin  c/2 |y|^2 + 1/2 sum_i kappa_i max(0, e_i - J_i.y)^2                  convex, C1
 // and the loads are lambda_i = kappa_i max(0, e_i - J_i.y) >= 0, with sum_i lambda_i J_i = c y.
-// kappa is what makes a lone contact carry exactly e. Newton from the given y on the piecewise
-// quadratic, halving a step while the sum rises:
+// With this kappa a lone contact carries exactly e. Newton's method runs from the given y on the
+// piecewise quadratic and halves a step while the sum rises:
 //     A = c I + sum_active kappa J J^T,   dy = A^-1 (sum_active kappa (e - J.y) J - c y)
 // Residual: |gradient| / (c max e), which bounds the error of y (and of the wrench c y) relative to
 // the largest e. METHOD.md, Sec. 3; ours.
@@ -21,7 +21,7 @@ template <class T>
 struct SeriesColumnsT {
   const T *nx, *ny, *nz;  // inward unit normal
   const T *rx, *ry, *rz;  // arm from the centre of mass                                     [m]
-  const T* e;             // -d less what damping takes; below 0 for contacts about to touch [m]
+  const T* e;             // -d minus the damping term; below 0 for contacts about to touch  [m]
   const T* facing;        // 0..1, or null: all 1
   std::size_t count;
 };
@@ -36,7 +36,7 @@ struct SeriesParameters {
 
 struct SeriesResult {
   int iterations;   // Newton steps taken
-  double residual;  // at the y that was returned; 0 where nothing is active
+  double residual;  // at the returned y; 0 when no contact is active
 };
 
 // y: the start, and then the solution. kappa, slack (count): kappa_i and max(0, e_i - J_i.y); slack

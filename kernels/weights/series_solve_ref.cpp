@@ -67,7 +67,7 @@ SeriesResult series_solve_ref(const SeriesColumnsT<T>& c, const SeriesParameters
     };
     result = newton(p, max_e, y, sums_at(y, true), sums_at);
   } else {
-    std::fill_n(y, 6, 0.0);  // nothing to hold
+    std::fill_n(y, 6, 0.0);  // no contact has load
   }
   for (std::size_t i = 0; i < c.count; ++i) {
     double J[6];

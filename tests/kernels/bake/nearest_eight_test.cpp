@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One point against eight boxes and triangles: never more than the truth, and hardly less.
+// One point against eight boxes and triangles: the bounds are never above the distance, and tight.
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples of a brick: SIMD against the reference, and what they promise.
+// Samples of a brick: SIMD against the reference, and the contract of the samples.
 #include <doctest/doctest.h>
 
 #include <cstdint>

@@ -42,7 +42,7 @@ Spheres random_spheres(std::size_t n, std::size_t shift, std::uint64_t seed) {
   return s;
 }
 
-// Survivors, and whether nothing past `count` was written.
+// The survivors, and whether nothing past `count` was written.
 std::vector<std::uint32_t> cull(const AnalyticField& field, Spheres& s, float scale, bool wide,
                                 float margin, const std::uint32_t* rows, std::uint32_t first,
                                 std::size_t count, std::vector<float>* clearance = nullptr) {
@@ -58,7 +58,8 @@ std::vector<std::uint32_t> cull(const AnalyticField& field, Spheres& s, float sc
   return out;
 }
 
-// Contacts sought in spheres, most of them so near the limit that a smaller reach would lose some.
+// Looks for contacts inside spheres, most of which are so near the limit that a smaller reach would
+// lose some.
 struct Hunt {
   int contacts = 0, lost = 0;
   double worst_use =
@@ -87,7 +88,7 @@ Hunt hunt(const AnalyticField& field, double low, double high, bool wide, float 
                  nullptr, nullptr);
     if (!(dq <= margin)) continue;
     ++h.contacts;
-    // A sphere that just holds it, its centre as far from the obstacle as a few tries find.
+    // A sphere that just contains it, with its centre as far from the obstacle as a few tries find.
     const double s = random.uniform(low, high);
     float centre[3] = {}, distance = -1e9f;
     for (int t = 0; t < 12; ++t) {

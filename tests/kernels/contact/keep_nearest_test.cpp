@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest of many points: SIMD against the reference, and what is promised of ties and order.
+// The nearest of many points: SIMD against the reference, and the contract for ties and order.
 #include <doctest/doctest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// touch_groups_test.cpp - traversal's kernels say what their specifications say, on every target.
+// touch_groups_test.cpp - the kernels of traversal agree with their specifications on every target.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -94,7 +94,7 @@ TEST_CASE("touch_groups: SIMD finds the same points as the reference, and writes
         const std::size_t n =
             touch_groups_ref(field.view(), kIdentity, points, list.data(), list.size(), limit,
                              false, look_want, want.columns());
-        const bool cold = count % 2 == 1;  // changes nothing but when memory is asked for
+        const bool cold = count % 2 == 1;  // changes only the prefetches
         REQUIRE(touch_groups(field.view(), kIdentity, points, list.data(), list.size(), limit, cold,
                              look, got.columns()) == n);
         for (std::size_t i = 0; i < n; ++i) {

@@ -28,7 +28,7 @@ struct Gap {
   int points = 0, inside = 0;
 };
 
-// How far below the truth bounds are; excess > 0 would be a bound that is none.
+// How far the bounds are below the distance; excess > 0 means that a bound is wrong.
 Gap measure_bounds(const AnalyticField& field, int samples, std::uint64_t seed) {
   Random random(seed);
   Gap gap;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// series_solve_test.cpp - what the rule `series` promises, at any sampling of any shape.
+// series_solve_test.cpp - the guarantees of the rule `series`, at any sampling of any shape.
 #include "kernels/weights/series_solve.h"
 
 #include <Eigen/Dense>
@@ -185,7 +185,7 @@ TEST_CASE(
     const auto& c = exact.column;
     ball.add({c[3][i], c[4][i], c[5][i]}, {c[0][i], c[1][i], c[2][i]}, c[6][i]);
   }
-  // One deep contact after a thousand that are about to touch: no sample of them knows of it.
+  // One deep contact after a thousand that are about to touch: no sample of them contains it.
   Patch<float> hidden;
   for (int i = 0; i < 1000; ++i) hidden.add({0.01, 1e-5 * i, 0}, {0, 0, 1}, -1e-4);
   hidden.add({0.005, 0, 0}, {0, 1, 0}, 4e-4);
