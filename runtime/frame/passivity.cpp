@@ -9,12 +9,12 @@
 namespace h6 {
 namespace {
 
-// The hand's damper is at most the one that reaches the coupling's bound at this speed [m/s]: at
+// The hand's damper is at most the one that reaches the coupling's bound at this speed [m/s]. At
 // the speeds of an encoder's noise the deficit over the motion would be any number.
 constexpr double kFullSpeed = 0.05;
 constexpr double kStill = 1e-9;  // motion in a frame below which there is no direction [m]
-constexpr double kMemory =
-    0.02;  // the share rises again in this time; changes are held as long [s]
+// The share rises from 0 to 1 in this time, and changes of the motion are held as long [s].
+constexpr double kMemory = 0.02;
 
 void shorten(Vec3& v, double most) {
   const double n = v.norm();
@@ -31,8 +31,9 @@ Vec6 accelerated_by(const Body& body, const Vec6& f) {
   return a;
 }
 
-// Mean velocity in the coming step: of an explicit one as it will be, but for gyroscopic terms; of
-// an implicit one as if velocities stayed, which is more than it will let the contacts give out.
+// Mean velocity in the coming step. For an explicit step it is exact except for gyroscopic terms.
+// For an implicit step it is the present velocity, which overestimates what the contacts will give
+// out.
 Vec6 mean_velocity(const h6Session& s, const Body& body) {
   Vec6 u = velocity(body);
   if (s.integrator == H6_EXPLICIT && free_mass(body))
@@ -40,7 +41,7 @@ Vec6 mean_velocity(const h6Session& s, const Body& body) {
   return u;
 }
 
-// Adds what the wrench F - alpha c of the contacts does to one body in the coming step.
+// Adds the power of the contacts' wrench F - alpha c on one body in the coming step.
 void add_power(const h6Session& s, const Body& body, const Vec6& F, const Vec6& c,
                ReliefPower& power) {
   const Vec6 u = mean_velocity(s, body);
@@ -52,7 +53,7 @@ void add_power(const h6Session& s, const Body& body, const Vec6& F, const Vec6& 
   power.w2 += c.dot(g);
 }
 
-// What the contacts of a frame hold in their springs.
+// Elastic energy of the contacts of a frame [J].
 double elastic_energy(const Contacts& c, double stiffness) {
   double sum = 0;
   for (std::size_t i = 0; i < c.count; ++i)
@@ -60,7 +61,7 @@ double elastic_energy(const Contacts& c, double stiffness) {
   return 0.5 * stiffness * sum;
 }
 
-// u_a - S^T u_b, from whichever velocities.
+// u_a - S^T u_b.
 Vec6 relative(const Pair& pair, const Vec6& ua, const Vec6& ub) {
   Vec6 u = ua - ub;
   u.head<3>() -= ub.tail<3>().cross(pair.arm);
@@ -73,7 +74,7 @@ void take_away(h6Session& s, Pair& pair, const Vec6& f) {
   pair.f -= f;
   if (!a.fixed) a.f -= f;
   if (!b.fixed) b.f += on_b;
-  // A hand that holds a body carries all that acts on it.
+  // A hand with direct coupling feels everything that acts on its body.
   for (std::size_t h = 0; h < s.hand_count; ++h) {
     Hand& hand = s.hands[h];
     if (s.bodies[hand.body].motion != Motion::held || hand.mode != H6_IMPEDANCE) continue;
@@ -94,8 +95,9 @@ void add_damping(h6Session& s, Pair& pair, double alpha) {
 
 enum class Relief { damping, scaling };
 
-// Takes from the contacts of one shell body as little as lets them give out `most` [W]: by damping
-// along their motion, or as a share of all of them. What they then give out.
+// Reduces the wrenches of one shell body's contacts as little as possible, so that they give out at
+// most `most` [W]: by damping along their motion, or by a common share. Returns the power that is
+// left [W].
 double relieve(h6Session& s, std::size_t first, std::size_t end, double most, Relief by) {
   Body& body = s.bodies[s.pairs[first].a];
   const Vec6 ua = mean_velocity(s, body);
@@ -116,7 +118,8 @@ double relieve(h6Session& s, std::size_t first, std::size_t end, double most, Re
   }
   add_power(s, body, F, c, power);
   if (power.w0 <= most) return power.w0;
-  // Contacts that give out may stop doing so, no more: together they never pull.
+  // Contacts that give out power are brought to zero power and no further: together they never
+  // pull.
   const double alpha = relief_for(power, power.w0 > 0 ? std::max(most, 0.0) : most);
   if (!(alpha > 0)) return power.w0;
   for (std::size_t p = first; p < end; ++p) {
@@ -129,13 +132,13 @@ double relieve(h6Session& s, std::size_t first, std::size_t end, double most, Re
   return power.w0 - alpha * power.w1 + alpha * alpha * power.w2;
 }
 
-// Potential of a spring that pulls with at most `most`.
+// Energy of a spring of stiffness k whose force is at most `most` [J].
 double spring_energy(double k, double stretch, double most) {
   const double knee = most / k;
   return stretch <= knee ? 0.5 * k * stretch * stretch : most * (stretch - 0.5 * knee);
 }
 
-// What a hand's coupling and body hold while the body touches nothing [J].
+// Energy of a hand's coupling and body while the body touches nothing [J].
 double stored_energy(const Hand& hand, const Body& body) {
   if (body.motion == Motion::held) return 0;
   const h6CouplingDef& c = hand.coupling;
@@ -176,13 +179,13 @@ void HandPort::move(const h6Pose& pose, const h6Wrench& wrench) {
 // Takes energy from the hand along its motion. True when it changed the wrench.
 bool HandPort::add_damper(Vec3& force, Vec3& torque, double max_force, double max_torque,
                           double dt) const {
-  // What is felt acts on the hand, so it is energy that leaves.
+  // The felt wrench acts on the hand, so its work leaves the engine.
   const double deficit = force.dot(moved_) + torque.dot(turned_) - energy_;
-  // Force and torque are made one by the lever that their bounds have.
+  // The ratio of the bounds is the lever that makes force and torque comparable.
   const double lever = max_torque / max_force;
   const double way = moved_.squaredNorm() + lever * lever * turned_.squaredNorm();
   if (!(deficit > 0) || !(way > kStill * kStill)) return false;
-  const double damper = std::min(deficit / way, max_force / (kFullSpeed * dt));  // [N/m], a frame's
+  const double damper = std::min(deficit / way, max_force / (kFullSpeed * dt));  // [N/m] in a frame
   const double force_bound = std::max(max_force, force.norm()),
                torque_bound = std::max(max_torque, torque.norm());
   force -= damper * moved_;
@@ -272,7 +275,7 @@ void damp_contacts(h6Session& s) {
       touching = touching || !pair.f.isZero(0);
     }
     if (!touching) {
-      // A surplus was spent in the contacts' damping: it must not finance what they do later.
+      // The contacts' damping dissipated any surplus: it must not pay for a later contact.
       port.energy = std::min(port.energy, 0.0);
       port.known = true;
       continue;
@@ -282,7 +285,7 @@ void damp_contacts(h6Session& s) {
     port.known = true;
     const double most = port.energy / s.dt;
     const double left = relieve(s, first, end, most, Relief::damping);
-    // One step may take a body in and throw it out: no damping along its motion undoes that.
+    // One step may take a body in and throw it out; damping along its motion cannot undo that.
     if (s.integrator == H6_EXPLICIT && left > std::max(most, 0.0) + 1e-9 * std::abs(left))
       relieve(s, first, end, most, Relief::scaling);
   }
@@ -296,7 +299,7 @@ void observe_contacts(h6Session& s) {
     ContactPort& port = s.bodies[pair.a].contact_port;
     const Vec6 u = relative(pair, velocity(a), velocity(b));
     Vec6 f = pair.f;
-    // What a hand holds is moved by the hand, under the wrench as it is.
+    // A body that a hand holds moves with the hand, under the unchanged wrench.
     if (s.integrator == H6_IMPLICIT && (free_mass(a) || free_mass(b)))
       f -= s.dt * (pair.B * u) + (s.contact.damping + port.alpha) * (pair.B * (u - pair.u));
     port.energy -= 0.5 * s.dt * f.dot(u + pair.u);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// passivity.h - energy that nobody put in is not given out: a time-domain passivity observer and
-// controller (Hannaford & Ryu 2002) in six dimensions. METHOD.md, Sec. 4.
+// passivity.h - keeps ports from giving out more energy than was put in: a time-domain passivity
+// observer and controller (Hannaford & Ryu 2002) in six dimensions. METHOD.md, Sec. 4, "Passivity".
 //
-// Two kinds of ports, each an option of its own: a hand at its device, and the contacts of a shell
-// body. Both keep E, the energy that went in less what came out [J].
+// There are two kinds of ports, each with its own option: a hand at its device, and the contacts of
+// a shell body. Each keeps E, the energy that went in less the energy that came out [J].
 #pragma once
 #include <algorithm>
 
@@ -12,21 +12,21 @@
 
 namespace h6 {
 
-// The port between a device and the engine. All in the device's units and poses.
+// The port between a device and the engine, in the device's units and poses.
 class HandPort {
  public:
-  void set(const Vec3& com) { com_ = com; }  // mesh frame [m]
-  // The mesh frame is at `pose` now; `wrench` acted on the engine all the way from the last pose:
+  void set(const Vec3& com) { com_ = com; }  // centre of mass, mesh frame [m]
+  // The mesh frame is at `pose` now, and `wrench` acted on the engine since the last pose:
   // E += wrench . (x - x', log(q q'^-1)), exact for a wrench that is held between samples.
   void move(const h6Pose& pose, const h6Wrench& wrench);
-  // Observing starts, and the engine holds `stored` [J], which nobody has to put in first.
+  // Starts to observe with E = `stored`, the energy that the engine holds already [J].
   void start(double stored) {
     energy_ = stored;
     known_ = true;
     share_ = 1;
   }
-  // The engine holds no more than `stored` [J]: what was put in beyond that is spent and finances
-  // nothing later.
+  // The engine holds no more than `stored` [J]. Energy put in beyond that was dissipated and must
+  // not pay for anything later.
   void spend(double stored) { energy_ = std::min(energy_, stored); }
   // Once a frame of `dt` seconds, after move. Changes the wrench that the hand is about to feel so
   // that E stays at 0 or above if the next motion is like the last one, and within one frame's work
@@ -51,35 +51,35 @@ class HandPort {
 };
 
 struct Hand;
-// Impedance: the device's new pose, under the wrench that it was told in the last frame.
+// Impedance: observes the device's new pose under the wrench of the last command.
 void observe_hand(h6Session& s, Hand& hand);
-// Impedance: the same limits as the coupling's; true when it changed the wrench.
+// Impedance: HandPort::damp with the coupling's bounds. True when it changed the wrench.
 bool damp_hand(h6Session& s, Hand& hand, h6Wrench& felt);
-// What the device is told in the end. In the admittance modes the port is observed here: the
-// wrench that came in, over the motion that goes out; nothing is changed, for neither is ours.
+// Notes the command after the safety chain. In the admittance modes it observes the port: the
+// wrench that came in, over the motion that goes out. It changes neither.
 void note_command(h6Session& s, Hand& hand, const h6DeviceCommand& command);
 
-// E of the contacts of one shell body with whatever they touch.
+// E of the contacts of one shell body with all fields that it touches.
 struct ContactPort {
   double energy = 0;
   bool known = false;
-  double alpha = 0;  // the controller's damping in this frame, on top of beta [s]
+  double alpha = 0;  // the controller's damping in this frame, in addition to beta [s]
 };
 
-// Power of the contacts when alpha of something is taken from them: w0 - w1 alpha + w2 alpha^2.
+// Power of the contacts when alpha times a wrench is taken from theirs: w0 - w1 alpha + w2 alpha^2.
 struct ReliefPower {
   double w0 = 0, w1 = 0, w2 = 0;
 };
-// The least alpha >= 0 that keeps that power at `most`; where none does, the one of least power.
+// The least alpha >= 0 with a power of at most `most`; without any, the alpha of least power.
 double relief_for(const ReliefPower& power, double most);
 
-// Before the step, when all wrenches are known: damps contacts that would give out more than E.
+// Before the step, with all wrenches known: damps contacts that would give out more than E.
 void damp_contacts(h6Session& s);
-// After it: what the contacts did to the bodies that moved.
+// After the step: subtracts the contacts' work on the bodies from E.
 void observe_contacts(h6Session& s);
-// A body was put somewhere else: what its contacts and couplings hold there counts as put in.
+// For a body that was moved by h6SetBody: energy held at its new place counts as put in.
 void forget_energy(h6Session& s, std::int32_t body);
-// The least E of all ports that are observed, or 0.
+// The least E of all observed ports; 0 without any.
 double least_energy(const h6Session& s);
 
 }  // namespace h6

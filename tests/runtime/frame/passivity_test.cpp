@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Energy that nobody put in is not given out.
+// passivity_test.cpp - ports do not give out more energy than was put in.
 #include "runtime/frame/passivity.h"
 
 #include <doctest/doctest.h>
@@ -164,7 +164,7 @@ TEST_CASE("two bodies without a third never have more energy after they met than
     CHECK(touched);
     CHECK(h6GetFrame(s).contacts == 0);
     gain[passivity] = std::max(gain[passivity], energy() / first);
-    // Whatever is taken from one is taken from the other.
+    // Momentum is kept: the controller acts on both bodies.
     Vec3 momentum = Vec3::Zero();
     for (int i = 0; i < 2; ++i) momentum += bodies[i].mass * from(h6GetBody(s, i).velocity.linear);
     CHECK((momentum - Vec3(0, 0.002, -0.02)).norm() < 1e-9);
@@ -201,7 +201,7 @@ TEST_CASE("a body put into a wall may leave it: what the contacts hold there was
 
 namespace {
 
-// A box and a hand that moves up and down through a floor's surface, whatever it feels.
+// A box and a hand that moves up and down through a floor's surface, whatever force it feels.
 struct Pumping {
   FieldArrays field = sample_analytic([](double, double, double z) { return z; },
                                       {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
@@ -222,8 +222,8 @@ struct Pumping {
     def.contact.damping = 0;
   }
   struct Run {
-    double energy = 0;          // our own sum over what the device was told and did
-    double least = 0;           // the least of it
+    double energy = 0;          // the test's own sum: work of the commands over the device's motion
+    double least = 0;           // the least value of that sum
     double least_reported = 0;  // E
     double most_force = 0;
     bool acted = false, explained = false;
@@ -290,8 +290,8 @@ TEST_CASE("an undamped coupling in explicit steps gives the hand nothing that it
   MESSAGE("energy of the port: ", without.energy, " J, least ", without.least, " J, controlled ",
           with.energy, " J, least ", with.least, " J");
   CHECK(without.least < -0.02);
-  // What one frame at the bound can be: the controller looks one frame ahead, the slew limit is
-  // one.
+  // One frame's work at the bound: the controller predicts one frame, and the slew limit allows the
+  // whole force in one.
   CHECK(with.least > -20 * 3 * mm * 2 * M_PI * 3 * 1e-3);
   CHECK(with.most_force <= 20 * (1 + 1e-9));
 }
@@ -421,7 +421,7 @@ TEST_CASE("a hand in a passive scene feels the same with and without") {
   CHECK_FALSE(with.acted);
 }
 
-TEST_CASE("what damping ate in one contact is not there for the next") {
+TEST_CASE("energy that damping absorbed in one contact does not pay for the next") {
   BouncingBox box;
   box.def.integrator = H6_IMPLICIT;
   box.def.contact.damping = 5e-3;
@@ -482,7 +482,7 @@ TEST_CASE("E of a port is the work over its motion, turns included, and a jump i
   port.start(0);
   const h6Wrench wrench{{2, 0, 0}, {0, 0, 3}};
   port.move({{0, 0, 0}, {1, 0, 0, 0}}, wrench);
-  CHECK(port.energy() == 0);  // where it begins no way was made
+  CHECK(port.energy() == 0);  // the first pose is no motion
   port.move({{0.01, 0, 0}, to(exp_rotation({0, 0, 0.2}))}, wrench);
   CHECK(port.energy() == near(2 * 0.01 + 3 * 0.2).epsilon(1e-12));
   // A turn about another axis moves the centre of mass, and that counts.
