@@ -242,6 +242,31 @@ TEST_CASE("a full disk is one sentence, and the frames before it are kept") {
   CHECK(folder.files() == 1);
 }
 
+TEST_CASE("a disk with room for the log only: finish says so, and the whole run is kept") {
+  const Folder folder;
+  const fs::path file = folder / "run.h5";
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    const rlimit limit{400'000, 400'000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    auto recorder = start(file);
+    const bool fits = add(*recorder, frames(0, 300));
+    const Outcome end = recorder->finish("{}");
+    recorder.reset();
+    ::_exit(fits && !end && end.error().find("`hapsix info ") != std::string::npos ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  REQUIRE(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 0);
+  CHECK(fs::exists(folder / "run.h5.part"));
+  CHECK(folder.files() == 1);
+  const Recording r = read(file);
+  CHECK(r.frames.size() == 300);
+  CHECK(r.whole);
+  CHECK(is_prefix(r));
+}
+
 TEST_CASE("a run can be read while it goes on, and a reader of the older file keeps that") {
   const Folder folder;
   const fs::path file = folder / "run.h5";
