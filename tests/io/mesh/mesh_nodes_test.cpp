@@ -290,9 +290,15 @@ TEST_CASE("a file that is wrong is refused with a sentence that names the place"
   refuses({"a.dae", with(xml, "</COLLADA>", "")}, "truncated");
   refuses({"a.dae", with(xml, "</COLLADA>", "</b>")}, "closes what is not open");
   refuses({"a.dae", with(kPlainDae, "node", "html")}, "closes");
-  std::string deep;
-  for (int i = 0; i < 100000; ++i) deep += "<a>";
-  refuses({"a.dae", deep}, "nested too deeply");
+  std::string deep, ends;
+  for (int i = 0; i < 100000; ++i) {
+    deep += "<a>";
+    ends += "</a>";
+  }
+  refuses({"a.dae", deep + ends}, "nested too deeply");
+  refuses({"a.dae", deep}, "truncated");
+  refuses({"a.dae", xml + "<b/>"}, "a second root");
+  refuses({"a.dae", with(xml, "<node", "<node name=b")}, "a tag is damaged");
 }
 
 TEST_CASE("nodes in a ring, and repetitions without bound, end with a sentence at once") {
