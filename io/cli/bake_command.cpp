@@ -13,7 +13,6 @@
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
-#include "io/mesh/single_precision.h"
 #include "io/scene/cache.h"
 #include "io/shell/bake_shell.h"
 #include "io/shell/shell_file.h"

@@ -16,7 +16,6 @@
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
-#include "io/mesh/single_precision.h"
 #include "io/scene/load_scene.h"
 #include "io/scene/scene_file.h"
 

@@ -11,7 +11,6 @@
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
-#include "io/mesh/single_precision.h"
 #include "io/record/recording.h"
 #include "io/run/recorded_run.h"
 #include "io/scene/scene_file.h"

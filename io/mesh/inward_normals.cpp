@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// inward_normals.cpp - weld, pair up edges, spread one winding over each piece, then settle each
-// piece's sign by its volume.
+// inward_normals.cpp - welds, pairs the edges, gives each piece one winding, and then settles the
+// sign of each piece by its volume.
 #include "io/mesh/inward_normals.h"
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 #include "io/file/mix.h"
 #include "io/file/radix_sort.h"
+#include "io/mesh/weld.h"
 
 namespace h6::io {
 namespace {
@@ -17,42 +17,28 @@ namespace {
 using Triangle = std::array<std::uint32_t, 3>;
 constexpr std::uint32_t none = UINT32_MAX;
 
-// For each vertex the first one with the same place.
-std::vector<std::uint32_t> weld(const std::vector<Vec3>& vertices, Pulse* pulse) {
-  KeyedIndices order(vertices.size()), spare;
-  const auto bits = [](double v) { return std::bit_cast<std::uint64_t>(v + 0.0); };  // -0 is 0
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const Vec3& v = vertices[i];
-    order[i] = {mix(mix(bits(v.x), bits(v.y)), bits(v.z)), std::uint32_t(i)};
-  }
-  radix_sort(order, spare, 0, pulse);
-  std::vector<std::uint32_t> same(vertices.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (i % 65536 == 0 && !alive(pulse)) return same;
-    same[order[i].index] = order[i].index;
-    // Equal keys are almost always equal places; another place with the same key is stepped over.
-    for (std::size_t k = i; k-- > 0 && order[k].key == order[i].key;) {
-      const Vec3 &a = vertices[order[k].index], &b = vertices[order[i].index];
-      if (a.x == b.x && a.y == b.y && a.z == b.z) {
-        same[order[i].index] = same[order[k].index];
-        break;
-      }
-    }
-  }
-  return same;
+// For each vertex the first one at the same place.
+std::vector<std::uint32_t> first_at_place(const std::vector<Vec3>& vertices) {
+  const Welded welded = weld_points(vertices.size(), vertices.size(),
+                                    [&](std::size_t i) { return without_minus_zero(vertices[i]); });
+  std::vector<std::uint32_t> first(welded.vertices.size()), out(vertices.size());
+  for (std::size_t i = vertices.size(); i-- > 0;) first[welded.index[i]] = std::uint32_t(i);
+  for (std::size_t i = 0; i < vertices.size(); ++i) out[i] = first[welded.index[i]];
+  return out;
 }
 
-struct Piece {  // triangles joined by edges that exactly two of them share
+// Triangles joined by edges that exactly two of them share.
+struct Piece {
   std::vector<std::uint32_t> triangles;
   bool closed = true;
-  bool turned = false;             // its winding as read is not one winding
-  bool twisted = false;            // it has no two sides
-  double volume = 0;               // with one winding [m^3]
-  double area = 0, area_kept = 0;  // [m^2]; the part whose winding is as read
+  bool turned = false;             // its windings were mixed
+  bool twisted = false;            // it has one side only, like a Moebius strip
+  double volume = 0;               // [m^3] of its one winding
+  double area = 0, area_kept = 0;  // [m^2] all of it; what kept its winding
   Vec3 low{}, high{};
-  bool flip = false;  // of its one winding, so that normals point out
-  double lid = 0;     // open: area of a flat lid over it [m^2]
-  bool bowl = false;  // open, but it holds a volume
+  bool flip = false;  // whether its one winding points inwards
+  double lid = 0;     // area of a flat lid over an open piece [m^2]
+  bool bowl = false;  // open, but it nearly encloses a volume
 };
 
 class Orientation {
@@ -76,16 +62,16 @@ class Orientation {
   Pulse* pulse_;
   FaceTable table_;
   std::vector<Triangle> faces_;        // welded
-  std::vector<std::uint32_t> across_;  // (3 x triangles) half edge 3t+k's other half, or none
-  KeyedIndices edges_;                 // half edges by edge
-  std::vector<char> reversed_;         // against the piece's one winding
+  std::vector<std::uint32_t> across_;  // (3 x triangles) the twin of half edge 3t+k, or none
+  KeyedIndices edges_;                 // half edges, sorted by edge
+  std::vector<char> reversed_;         // (triangles) 1 when wound against the piece's one winding
   std::vector<std::uint32_t> piece_of_;
   std::vector<Piece> pieces_;
   std::size_t duplicates_ = 0, inside_out_ = 0, hollows_ = 0;
 };
 
 void Orientation::measure() {
-  const std::vector<std::uint32_t> same = weld(mesh_.vertices, pulse_);
+  const std::vector<std::uint32_t> same = first_at_place(mesh_.vertices);
   faces_.resize(mesh_.triangles.size());
   table_.area.assign(faces_.size(), 0);
   table_.inward.assign(faces_.size(), Vec3{0, 0, 0});
@@ -99,8 +85,8 @@ void Orientation::measure() {
   }
 }
 
-// The same three corners in any order: one surface, sampled once. Degenerate triangles stay in the
-// edge table: they may carry the edge between two others.
+// Triangles with the same three corners, in any order, are one surface, which is sampled once.
+// Degenerate triangles stay in the edge table, since they may carry the edge between two others.
 void Orientation::drop_duplicates() {
   KeyedIndices order, spare;
   order.reserve(faces_.size());
@@ -155,7 +141,7 @@ void Orientation::pair_edges() {
   }
 }
 
-// One piece, from one of its triangles over all edges of exactly two faces.
+// Collects the piece of one triangle over all edges of exactly two faces.
 void Orientation::spread(std::uint32_t start) {
   const auto id = std::uint32_t(pieces_.size());
   Piece piece;
@@ -169,7 +155,7 @@ void Orientation::spread(std::uint32_t start) {
       const std::uint32_t other = across_[3 * t + k];
       if (other == none) continue;
       const std::uint32_t u = other / 3;
-      // Neighbours of one winding run opposite ways along their edge.
+      // Neighbours of one winding run along their edge in opposite directions.
       const bool opposed = faces_[t][k] != faces_[u][other % 3];
       const char reversed = char(opposed ? reversed_[t] : !reversed_[t]);
       if (piece_of_[u] == none) {
@@ -181,7 +167,7 @@ void Orientation::spread(std::uint32_t start) {
       }
     }
   }
-  const Vec3 origin = corner(start, 0);  // near: volumes of small pieces far out stay exact
+  const Vec3 origin = corner(start, 0);  // nearby, for the precision of small volumes far out
   for (const std::uint32_t t : piece.triangles) {
     const double six =
         dot(corner(t, 0) - origin, cross(corner(t, 1) - origin, corner(t, 2) - origin));
@@ -217,12 +203,13 @@ void Orientation::find_open_pieces() {
     }
     i = end;
   }
-  for (Piece& piece : pieces_) {  // volume about the origin of its own middle means something only
-    if (piece.closed) continue;   // when the surface nearly closes; take the middle of its box
+  // The volume of an open piece depends on the point it is measured from: the middle of its box.
+  for (Piece& piece : pieces_) {
+    if (piece.closed) continue;
     const Vec3 middle{(piece.low.x + piece.high.x) / 2, (piece.low.y + piece.high.y) / 2,
                       (piece.low.z + piece.high.z) / 2};
     piece.volume = 0;
-    Vec3 across{};  // of all vector areas, twice: that of the lids that are missing
+    Vec3 across{};  // twice the sum of all vector areas, which is that of the missing lids
     for (const std::uint32_t t : piece.triangles) {
       const double six =
           dot(corner(t, 0) - middle, cross(corner(t, 1) - middle, corner(t, 2) - middle));
@@ -250,10 +237,10 @@ int Orientation::crossings(const Piece& piece, const Vec3& from, const Vec3& alo
   return count;
 }
 
-// Whether there is a body around the piece and none in it. Windings of closed pieces tell where
-// bodies are: where as many are entered as left there is none. A piece wound like the one around it
-// is a part inside a part, not a hollow; one more within the hollow is a body again. Where a
-// winding was mixed it tells nothing: hollow is then what an odd number of pieces is around.
+// Whether a body is around the piece and none inside it. The windings of closed pieces tell where
+// bodies are: none is where a ray enters as many as it leaves. A piece with the winding of the one
+// around it is a part inside a part, not a hollow; a piece inside a hollow is a body again. A mixed
+// winding tells nothing: then a piece is hollow when an odd number of pieces is around it.
 bool Orientation::hollow(std::size_t c) const {
   const Piece& piece = pieces_[c];
   std::vector<std::size_t> maybe;
@@ -297,11 +284,11 @@ void Orientation::settle_signs() {
       inside_out_ += !piece.turned && !inside && piece.volume < 0;
       continue;
     }
-    // A sphere of this area holds area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5; with a twentieth of it
-    // the volume tells the sides, with less it is a sheet.
+    // A sphere of this area encloses area^1.5 / (6 sqrt(pi)) = 0.094 area^1.5. A twentieth of that
+    // suffices to tell the sides; a piece with less is a sheet.
     const bool holds = std::abs(piece.volume) > 0.05 * 0.094 * std::pow(piece.area, 1.5);
     piece.flip = holds ? piece.volume < 0 : 2 * piece.area_kept < piece.area;
-    piece.bowl = holds && piece.lid < 0.35 * piece.area;  // a box without a lid: 0.2
+    piece.bowl = holds && piece.lid < 0.35 * piece.area;  // 0.2 for a box without a lid
   }
 }
 

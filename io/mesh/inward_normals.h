@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// inward_normals.h - for every triangle of a mesh the unit normal that points into the body,
-// however the mesh is wound.
+// inward_normals.h - the normals of a mesh that point into the body, whatever its winding.
 #pragma once
 #include <string>
 #include <vector>
@@ -12,17 +11,18 @@ namespace h6::io {
 
 struct FaceTable {
   std::vector<Vec3> inward;  // (triangles) unit; zero where area is 0
-  std::vector<double> area;  // (triangles) [m^2]; 0: degenerate, or again a triangle seen before
-  std::vector<char> sheet;   // (triangles) of a piece that does not close: it has two outer sides
-  std::vector<char> bowl;    // (triangles) of such a piece that nearly closes around a volume
-  std::size_t pieces = 0, sheets = 0;  // with area; those of them that do not close
-  std::vector<std::string> warnings;   // a sentence each: what was repaired or is not certain
+  std::vector<double> area;  // (triangles) [m^2]; 0 when degenerate or a duplicate
+  std::vector<char> sheet;   // (triangles) 1 in an open piece, which has two outer sides
+  std::vector<char> bowl;    // (triangles) 1 in an open piece that nearly encloses a volume
+  std::size_t pieces = 0;    // those with area
+  std::size_t sheets = 0;    // the open ones of them
+  std::vector<std::string> warnings;  // sentences about what was repaired or is uncertain
 };
 
-// Indices must be in range and vertices finite. Closed pieces are oriented by their volume, hollows
-// inside them by their winding against the piece around them. Open pieces: by the volume they
-// nearly enclose; sheets that enclose none keep the winding most of their area has.
-// After the pulse stopped the table is of no use.
+// Indices must be in range and vertices finite. Closed pieces are oriented by their volume, and
+// hollows inside them by their winding against the piece around them. Open pieces are oriented by
+// the volume that they nearly enclose; sheets without one keep the winding of most of their area.
+// When the pulse stops, the table is incomplete.
 FaceTable face_table(const Mesh& mesh, Pulse* pulse = nullptr);
 
 }  // namespace h6::io

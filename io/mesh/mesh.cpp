@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/mesh/mesh.h"
 
+#include <cmath>
+#include <cstdio>
+
 #include "io/mesh/weld.h"
 
 namespace h6::io {
@@ -10,8 +13,8 @@ Mesh weld(const Mesh& mesh) {
     return without_minus_zero(mesh.vertices[i]);
   });
 
-  // Numbered anew by first use: the order is then that of the triangles, whatever the file's vertex
-  // list looked like, and unused vertices fall out.
+  // Vertices are numbered by first use, so that the result does not depend on the file's vertex
+  // list.
   constexpr std::uint32_t kUnused = ~std::uint32_t{0};
   std::vector<std::uint32_t> number(welded.vertices.size(), kUnused);
   Mesh out;
@@ -45,6 +48,27 @@ MeshBounds bounds_of(const Mesh& mesh) {
   MeshBounds b{mesh.vertices.front(), mesh.vertices.front()};
   for (const Vec3& p : mesh.vertices) b.low = min(b.low, p), b.high = max(b.high, p);
   return b;
+}
+
+std::string too_far_for_floats(const Vec3& low, const Vec3& high) {
+  const double far = std::max({std::abs(low.x), std::abs(low.y), std::abs(low.z), std::abs(high.x),
+                               std::abs(high.y), std::abs(high.z)});
+  const double side = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  if (!(far > 0) || !std::isfinite(far)) return "";
+  const double step = std::ldexp(1.0, std::ilogb(far) - 23);  // to the next float
+  if (step <= 2e-4 * side) return "";
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the mesh lies %.4g m from its origin, where numbers of single precision (of an "
+                "STL file, of a shell) are %.3g mm apart; move it nearer to its origin",
+                far, 1e3 * step);
+  return text;
+}
+
+std::string too_far_for_floats(const Mesh& mesh) {
+  if (mesh.vertices.empty()) return "";
+  const MeshBounds box = bounds_of(mesh);
+  return too_far_for_floats(box.low, box.high);
 }
 
 }  // namespace h6::io

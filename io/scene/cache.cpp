@@ -8,7 +8,6 @@
 #include <system_error>
 
 #include "io/field/field_file.h"
-#include "io/mesh/single_precision.h"
 #include "io/shell/shell_file.h"
 
 namespace h6::io {
