@@ -13,7 +13,7 @@
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
-#include "io/scene/cache.h"
+#include "io/scene/asset_key.h"
 #include "io/shell/bake_shell.h"
 #include "io/shell/shell_file.h"
 
@@ -130,7 +130,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   if (const std::string name = o.common.mesh;
       name.ends_with("stl") || name.ends_with("STL") || name.ends_with("stl.gz"))
     add_unless_empty(report.warnings, io::too_far_for_floats(input->audit.low, input->audit.high));
-  field->input_hash = io::content_hash(input->mesh, o.bake);
+  field->input_hash = io::asset_key(io::HashedMesh(input->mesh), o.bake);
   const double baked = since(start);
   start = Clock::now();
   const auto compression = o.no_compression ? io::Compression::none : io::Compression::blosc;
@@ -193,7 +193,7 @@ int bake_shell_command(const Console& console, ShellOptions& o) {
   Result<io::ShellData> shell = io::bake_shell(input->mesh, o.bake, &warnings, console.progress());
   if (!shell) return bake_failed(console, o.common, *input, shell.error());
   add_unless_empty(warnings, io::too_far_for_floats(input->audit.low, input->audit.high));
-  shell->input_hash = io::content_hash(input->mesh, o.bake);
+  shell->input_hash = io::asset_key(io::HashedMesh(input->mesh), o.bake);
   const double baked = since(start);
   start = Clock::now();
   if (Outcome done = io::write_shell(o.common.out, *shell); !done)

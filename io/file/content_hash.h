@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// content_hash.h - a 128-bit fingerprint of bytes.
+// content_hash.h - a 128-bit fingerprint of bytes: XXH3 with seed 0.
 //
-// MurmurHash3, x64, 128 bits (A. Appleby), from its description: no package of ours has a fast
-// 128-bit hash, it runs at gigabytes a second, and two different meshes meet by chance once in
-// 2^64. It does not resist an attacker; a cache on one's own disk need not.
+// Two different meshes collide by chance once in 2^64 pairs. The hash does not resist an attacker;
+// a cache on the user's own disk need not.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -17,6 +16,6 @@ struct Hash128 {
 };
 
 Hash128 hash_bytes(const void* bytes, std::size_t size);
-std::string hex(const Hash128& hash);  // 32 digits
+std::string hex(const Hash128& hash);  // 32 digits, the most significant first, as xxh128sum
 
 }  // namespace h6::io

@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// asset_key.cpp - the key of a cached asset: a hash of the mesh and of everything that shapes the
-// bake.
+#include "io/scene/asset_key.h"
+
 #include <cstdint>
 #include <type_traits>
 #include <vector>
 
-#include "io/file/content_hash.h"
-#include "io/scene/cache.h"
-
 namespace h6::io {
 namespace {
 
-// Change these when the baked result of the same input changes: old files are then baked again.
+// Change these when a bake of the same input gives another result, so that it is baked again.
 constexpr std::uint32_t field_bake_version = 4, shell_bake_version = 2;
 
-// A key is the hash of a list: every entry with its own length, so that no two lists run together.
-class KeyWriter {
+// Hashes a list. Each text and each column enters as its length and hash, so that no two lists give
+// the same bytes.
+class ListHash {
  public:
   void text(const std::string& value) { array(value.data(), value.size()); }
   template <class T>
@@ -28,7 +26,7 @@ class KeyWriter {
     static_assert(std::has_unique_object_representations_v<T> || std::is_same_v<T, Vec3>);
     array(values.data(), values.size() * sizeof(T));
   }
-  std::string key() const { return hex(hash_bytes(list_.data(), list_.size())); }
+  Hash128 hash() const { return hash_bytes(list_.data(), list_.size()); }
 
  private:
   void array(const void* bytes, std::size_t size) {
@@ -43,51 +41,60 @@ class KeyWriter {
   std::string list_;
 };
 
-void add_mesh(KeyWriter& key, const Mesh& mesh) {
+Hash128 hash_mesh(const Mesh& mesh) {
   static_assert(sizeof(Vec3) == 3 * sizeof(double));
-  key.column(mesh.vertices);
-  key.column(mesh.triangles);
-  key.column(mesh.part);
-  key.value(std::uint64_t(mesh.part_names.size()));
-  for (const std::string& name : mesh.part_names) key.text(name);
+  ListHash list;
+  list.column(mesh.vertices);
+  list.column(mesh.triangles);
+  list.column(mesh.part);
+  list.value(std::uint64_t(mesh.part_names.size()));
+  for (const std::string& name : mesh.part_names) list.text(name);
+  return list.hash();
 }
 
-// `threads` is left out, here and below: it does not change the result.
-void add_options(KeyWriter& key, const FieldBake& options) {
-  key.value(options.voxels);
-  key.value(options.voxel_size);
-  key.value(options.offset);
-  key.value(options.sign);
-  key.value(options.cavities);
-  key.value(options.seal);
-  key.value(options.band_voxels);
-  key.value(options.padding_voxels);
+void add_mesh(ListHash& list, const HashedMesh& mesh) {
+  list.value(mesh.hash.low);
+  list.value(mesh.hash.high);
+}
+
+// `threads` is left out, here and below, because it does not change the result.
+void add_options(ListHash& list, const FieldBake& options) {
+  list.value(options.voxels);
+  list.value(options.voxel_size);
+  list.value(options.offset);
+  list.value(options.sign);
+  list.value(options.cavities);
+  list.value(options.seal);
+  list.value(options.band_voxels);
+  list.value(options.padding_voxels);
 }
 
 }  // namespace
 
-std::string content_hash(const Mesh& mesh, const FieldBake& options) {
-  KeyWriter key;
-  key.text("field");
-  key.value(field_bake_version);
-  add_mesh(key, mesh);
-  add_options(key, options);
-  return key.key();
+HashedMesh::HashedMesh(const Mesh& of) : mesh(of), hash(hash_mesh(of)) {}
+
+std::string asset_key(const HashedMesh& mesh, const FieldBake& options) {
+  ListHash list;
+  list.text("field");
+  list.value(field_bake_version);
+  add_mesh(list, mesh);
+  add_options(list, options);
+  return hex(list.hash());
 }
 
-std::string content_hash(const Mesh& mesh, const ShellBake& options) {
-  KeyWriter key;
-  key.text("shell");
-  key.value(shell_bake_version);
-  add_mesh(key, mesh);
-  key.value(std::uint64_t(options.points));
-  key.value(options.spacing);
-  key.value(options.levels);
-  key.value(options.seed);
-  key.value(options.surface);
-  key.value(options.normals);
-  add_options(key, options.field);
-  return key.key();
+std::string asset_key(const HashedMesh& mesh, const ShellBake& options) {
+  ListHash list;
+  list.text("shell");
+  list.value(shell_bake_version);
+  add_mesh(list, mesh);
+  list.value(std::uint64_t(options.points));
+  list.value(options.spacing);
+  list.value(options.levels);
+  list.value(options.seed);
+  list.value(options.surface);
+  list.value(options.normals);
+  add_options(list, options.field);
+  return hex(list.hash());
 }
 
 }  // namespace h6::io

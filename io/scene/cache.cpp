@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// cache.cpp - see the header. The key is in the file's name and again inside the file: what a file
-// holds is believed only when both agree. Files are written aside and renamed, so two programs that
-// bake the same asset at once both succeed, and the last one's file (the same) stays.
+// cache.cpp - the key is in the file's name and again inside the file: a file is used only when
+// both agree. Files are written aside and renamed, so two programs that bake the same asset at once
+// both succeed, and the file of the last one stays, which is the same.
 #include "io/scene/cache.h"
 
 #include <cstdlib>
@@ -20,7 +20,7 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-// The file of a key; empty when there is no place for a cache.
+// The file of a key; empty without a folder for the cache.
 fs::path cached_file(const std::string& key, const char* ending, Cached& cached) {
   const fs::path folder = cache_folder();
   if (folder.empty()) {
@@ -50,7 +50,7 @@ void keep(const fs::path& file, Cached& cached, const Write& write) {
   }
 }
 
-// The one way through the cache; read, bake and write are the asset's own.
+// Takes an asset from the cache, or bakes it and puts it there.
 template <class Data, class Read, class Bake, class Write>
 Result<Data> through_cache(const std::string& key, const char* ending, Cached* report,
                            const Read& read, const Bake& bake, const Write& write) {
@@ -86,30 +86,29 @@ std::filesystem::path cache_folder() {
   return home.empty() ? fs::path{} : fs::path(home) / ".cache" / "hapsix";
 }
 
-Result<FieldData> cached_field(const Mesh& mesh, const FieldBake& options, Cached* cached,
+Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options, Cached* cached,
                                const Progress& progress) {
   return through_cache<FieldData>(
-      content_hash(mesh, options), ".vdb", cached,
+      asset_key(mesh, options), ".vdb", cached,
       [](const fs::path& file) { return read_field(file); },
       [&](Cached& told) {
         FieldBakeReport report;
-        Result<FieldData> field = bake_field(mesh, options, &report, progress);
+        Result<FieldData> field = bake_field(mesh.mesh, options, &report, progress);
         told.warnings.insert(told.warnings.end(), report.warnings.begin(), report.warnings.end());
         return field;
       },
-      [](const fs::path& file, const FieldData& field) {
-        return write_field(file, field, Compression::none);
-      });
+      [](const fs::path& file, const FieldData& field) { return write_field(file, field, Compression::none); });
 }
 
-Result<ShellData> cached_shell(const Mesh& mesh, const ShellBake& options, Cached* cached,
+Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options, Cached* cached,
                                const Progress& progress) {
   return through_cache<ShellData>(
-      content_hash(mesh, options), ".ply", cached,
+      asset_key(mesh, options), ".ply", cached,
       [](const fs::path& file) { return read_shell(file); },
       [&](Cached& told) {
-        if (std::string far = too_far_for_floats(mesh); !far.empty()) told.warnings.push_back(far);
-        return bake_shell(mesh, options, &told.warnings, progress);
+        if (std::string far = too_far_for_floats(mesh.mesh); !far.empty())
+          told.warnings.push_back(far);
+        return bake_shell(mesh.mesh, options, &told.warnings, progress);
       },
       [](const fs::path& file, const ShellData& shell) { return write_shell(file, shell); });
 }

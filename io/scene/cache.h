@@ -1,36 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-// cache.h - baked assets by content: the same mesh and parameters are never baked twice.
+// cache.h - the cache of baked assets: equal meshes and options are baked once.
 #pragma once
 #include <filesystem>
 #include <string>
 
 #include "hapsix/result.h"
-#include "io/bake/bake_field.h"
-#include "io/shell/bake_shell.h"
+#include "io/scene/asset_key.h"
 
 namespace h6::io {
 
-// $HAPSIX_CACHE, else $XDG_CACHE_HOME/hapsix, else ~/.cache/hapsix; empty when none is set.
-// Assets are KEY.vdb and KEY.ply there.
+// $HAPSIX_CACHE, else $XDG_CACHE_HOME/hapsix, else ~/.cache/hapsix; empty when none is set. It
+// holds KEY.vdb and KEY.ply.
 std::filesystem::path cache_folder();
 
-// 128-bit hash as 32 hex digits of content and parameters: the key of a cached asset. The same
-// bytes of mesh and options (threads aside) give the same key; a change of the bakers themselves
-// changes all keys by a version number (asset_key.cpp).
-std::string content_hash(const Mesh& mesh, const FieldBake& options);
-std::string content_hash(const Mesh& mesh, const ShellBake& options);
-
-// From the cache, or baked and put there. A damaged or foreign file there is rebuilt, saying so in
-// `warnings`; a cache that cannot be written is a warning, not an error.
+// How an asset was obtained.
 struct Cached {
   bool hit = false;
-  bool rebuilt = false;  // a file was there, but of no use
+  bool rebuilt = false;  // its file was damaged or of something else
   std::filesystem::path file;
   std::vector<std::string> warnings;
 };
-Result<FieldData> cached_field(const Mesh& mesh, const FieldBake& options, Cached* cached,
+
+// From the cache, or baked and put there. A file of no use is replaced, with a warning. A cache
+// that cannot be written gives a warning, not an error. `cached` may be null.
+Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options, Cached* cached,
                                const Progress& progress = {});
-Result<ShellData> cached_shell(const Mesh& mesh, const ShellBake& options, Cached* cached,
+Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options, Cached* cached,
                                const Progress& progress = {});
 
 }  // namespace h6::io

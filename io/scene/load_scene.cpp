@@ -60,7 +60,7 @@ class Loader {
     return Done{};
   }
 
-  // Meshes are read once, however many bodies and bakes use them.
+  // Each mesh file is read once.
   template <class Source>
   Result<const Mesh*> mesh_of(const Source& source) {
     if (source.mesh_data) return &*source.mesh_data;
@@ -76,28 +76,28 @@ class Loader {
     return static_cast<const Mesh*>(found->second.get());
   }
 
-  // All fields, or all shells: what is there, found by its content.
+  // All fields or all shells, and where each stands, by its key.
   template <class Data>
   struct Kept {
     std::map<std::string, int> index;
     std::vector<Data> all;
   };
 
-  // Read from a baked file, or baked from a mesh through the cache; content that another body has
-  // loaded already is shared.
+  // The index of a body's field or shell: one that another body has loaded, or a baked file, or a
+  // mesh baked through the cache.
   template <class Data, class Source, class Read, class Bake, class Describe>
   Result<int> obtain(const SceneBody& body, const Source& source, Kept<Data>& kept, Read read,
                      Bake bake, Describe describe) {
     const auto start = Clock::now();
     LoadedAsset asset;
     asset.body = body.name;
-    const Mesh* mesh = nullptr;
+    const HashedMesh* mesh = nullptr;
     std::string key = "file " + source.file.string();
     if (source.file.empty()) {
       Result<const Mesh*> found = mesh_of(source);
       if (!found) return found.failure();
-      mesh = *found;
-      key = content_hash(*mesh, source.bake);
+      mesh = &hashes_.try_emplace(*found, **found).first->second;
+      key = asset_key(*mesh, source.bake);
     }
     if (const auto known = kept.index.find(key); known != kept.index.end()) return known->second;
     Cached cached;
@@ -150,7 +150,8 @@ class Loader {
     return keep(shells_, "points of " + body.name, std::move(*built));
   }
 
-  // What the scene states; else a uniform solid where there is one, else the shell's points.
+  // Mass properties are those that the scene states, else those of the mesh as a uniform solid if
+  // it is closed, else those of the shell's points.
   Outcome mass(const SceneBody& body, h6BodyDef& def) {
     if (body.fixed) return Done{};
     std::optional<MassProperties> found;
@@ -174,7 +175,7 @@ class Loader {
     }
     def.com = body.com ? *body.com : found->com;
     std::array<double, 6> inertia = body.inertia ? *body.inertia : found->inertia;
-    if (body.com && !body.inertia) {  // derived about its own centre: move it to the stated one
+    if (body.com && !body.inertia) {  // from the derived centre to the stated one
       const double x = def.com.x - found->com.x, y = def.com.y - found->com.y,
                    z = def.com.z - found->com.z, m = body.mass;
       const double more[6] = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y),
@@ -211,6 +212,7 @@ class Loader {
   LoadedScene& out_;
   const Progress& progress_;
   std::map<std::string, std::unique_ptr<Mesh>> meshes_;
+  std::map<const Mesh*, HashedMesh> hashes_;
   Kept<FieldData> fields_;
   Kept<ShellData> shells_;
 };
