@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // field_file_bench.cpp - baked fields to files and back: bake/file/MESH/voxels:N/WHAT, where WHAT
 // is
-//   write       as the cache writes it: uncompressed, to the disk (fsync), renamed
-//   load/warm   the file is in the page cache
-//   load/cold   it is not: dropped by posix_fadvise before every load
-//   write/blosc, load/blosc   the same of an export, by OpenVDB, warm
-// All with every thread of the machine. What is read is compared with what was written, to the bit,
-// before a time is told. Files lie in $HAPSIX_BENCH_FOLDER, else where temporary files do: what
-// that disk can do bounds these times. The engine bay only with HAPSIX_BENCH_SOUPS=1.
+//   write       a file of the cache, to the disk (fsync), renamed
+//   load/warm   it, from the page cache
+//   load/cold   it, dropped from the page cache by posix_fadvise before every load
+//   write/blosc, load/blosc   an exported .vdb, compressed by OpenVDB; warm
+//   write/none, load/none     an exported .vdb, uncompressed; warm
+// All use every thread of the machine. Each field that is read is compared, to the bit, with the
+// one that was written. Files lie in $HAPSIX_BENCH_FOLDER, else in the folder of temporary files;
+// its disk bounds these times. The engine bay runs only with HAPSIX_BENCH_SOUPS=1.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>
 #include <unistd.h>
@@ -23,6 +24,7 @@
 
 #include "io/bake/bake_field.h"
 #include "io/field/field_file.h"
+#include "io/field/raw_field.h"
 #include "io/scenes/industrial/industrial.h"
 #include "io/scenes/scenes.h"
 
@@ -31,7 +33,7 @@ namespace {
 using namespace h6;
 namespace fs = std::filesystem;
 
-// A field that is baked when it is first asked for, and then kept.
+// A field that is baked on first use.
 class Baked {
  public:
   Baked(std::function<io::Mesh()> mesh, int voxels) : mesh_(std::move(mesh)), voxels_(voxels) {}
@@ -101,39 +103,51 @@ double seconds(const Body& body) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// The formats under test.
+struct Format {
+  std::function<Outcome(const fs::path&, const io::FieldData&)> write;
+  std::function<Result<io::FieldData>(const fs::path&)> read;
+};
+Format exported(io::Compression compression) {
+  return {[=](const fs::path& file, const io::FieldData& field) {
+            return io::write_field(file, field, compression);
+          },
+          io::read_field};
+}
+const Format cached{io::write_raw_field, io::read_raw_field};
+
 void tell(benchmark::State& state, const io::FieldData& field, const fs::path& file) {
   state.counters["bricks"] = double(field.brick_count());
   state.counters["file_MB"] = double(fs::file_size(file)) / 1e6;
 }
 
-void write_file(benchmark::State& state, const BakedPtr& baked, io::Compression compression) {
+void write_file(benchmark::State& state, const BakedPtr& baked, const Format& format) {
   const io::FieldData* field = baked->get(state);
   if (!field) return;
   const TemporaryFile file;
   for (auto _ : state) {
     file.remove();
     state.SetIterationTime(seconds([&] {
-      if (const Outcome written = io::write_field(file.path, *field, compression); !written)
+      if (const Outcome written = format.write(file.path, *field); !written)
         state.SkipWithError(written.error().c_str());
     }));
   }
-  const auto back = io::read_field(file.path);
+  const auto back = format.read(file.path);
   if (!back) return state.SkipWithError(back.error().c_str());
   if (!same_field(*field, *back)) return state.SkipWithError("another field came back");
   tell(state, *field, file.path);
 }
 
-void load_file(benchmark::State& state, const BakedPtr& baked, io::Compression compression,
-               bool warm) {
+void load_file(benchmark::State& state, const BakedPtr& baked, const Format& format, bool warm) {
   const io::FieldData* field = baked->get(state);
   if (!field) return;
   const TemporaryFile file;
-  if (const Outcome written = io::write_field(file.path, *field, compression); !written)
+  if (const Outcome written = format.write(file.path, *field); !written)
     return state.SkipWithError(written.error().c_str());
   for (auto _ : state) {
     warm ? warm_up(file.path) : cool_down(file.path);
     Result<io::FieldData> back = Failure{"nothing was read"};
-    const double time = seconds([&] { back = io::read_field(file.path); });
+    const double time = seconds([&] { back = format.read(file.path); });
     if (!back) return state.SkipWithError(back.error().c_str());
     if (!same_field(*field, *back)) return state.SkipWithError("another field came back");
     state.SetIterationTime(time);
@@ -151,11 +165,13 @@ void add(const std::string& name, int voxels, std::function<io::Mesh()> mesh) {
         ->UseManualTime()
         ->Iterations(3);
   };
-  row("write", write_file, io::Compression::none);
-  row("load/warm", load_file, io::Compression::none, true);
-  row("load/cold", load_file, io::Compression::none, false);
-  row("write/blosc", write_file, io::Compression::blosc);
-  row("load/blosc", load_file, io::Compression::blosc, true);
+  row("write", write_file, cached);
+  row("load/warm", load_file, cached, true);
+  row("load/cold", load_file, cached, false);
+  row("write/blosc", write_file, exported(io::Compression::blosc));
+  row("load/blosc", load_file, exported(io::Compression::blosc), true);
+  row("write/none", write_file, exported(io::Compression::none));
+  row("load/none", load_file, exported(io::Compression::none), true);
 }
 
 [[maybe_unused]] const bool registered = [] {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// field_data.cpp - the view of a baked field that the engine takes.
 #include "io/field/field_data.h"
 
 namespace h6::io {
@@ -17,6 +16,23 @@ h6FieldDef FieldData::def() const {
   d.part = part.empty() ? nullptr : part.data();
   d.triangle = triangle.empty() ? nullptr : triangle.data();
   return d;
+}
+
+bool consistent(const FieldData& f) {
+  std::size_t cells = 1, nodes = 1, used = 0;
+  for (const std::int32_t n : f.bricks) {
+    if (n < 1 || n > kMaxBricksOnSide) return false;
+    cells *= std::size_t(n);
+    nodes *= std::size_t(n) + 1;
+  }
+  for (const std::int32_t row : f.brick_index) {
+    if (row >= 0 && std::size_t(row) >= f.brick_count()) return false;
+    used += row >= 0;
+  }
+  return f.brick_index.size() == cells && f.far_grid.size() == nodes &&
+         f.samples.size() % 512 == 0 && used == f.brick_count() &&
+         (f.part.empty() || f.part.size() == f.brick_count()) &&
+         (f.triangle.empty() || f.triangle.size() == f.brick_count());
 }
 
 }  // namespace h6::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// field_data.h - a baked field in memory: what h6FieldDef points at, with its history.
+// field_data.h - a baked field in memory: the arrays behind h6FieldDef, with its history.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,26 +12,32 @@
 
 namespace h6::io {
 
+inline constexpr std::int32_t kMaxBricksOnSide = 256;
+
 struct FieldData {
   Vec3 origin{};                          // node (0,0,0), mesh frame [m]
   double voxel_size = 0;                  // [m]
   std::array<std::int32_t, 3> bricks{};   // along x, y, z
-  std::vector<std::int32_t> brick_index;  // rows rise with the cells
+  std::vector<std::int32_t> brick_index;  // (bz x by x bx) row in samples, rising; -1: none
   Samples samples;                        // (brick_count x 512) [m]
   std::vector<float> far_grid;            // ((bz+1) x (by+1) x (bx+1)) signed [m]
   double band = 0;                        // [m]
   std::vector<std::int32_t> part;         // (brick_count) or empty
   std::vector<std::string> part_names;
-  std::vector<std::int32_t> triangle;  // (brick_count) or empty: of the mesh as it was given,
-                                       // nearest to the brick's middle; -1: a sealed hole is
-  // How it was made; kept in the file's metadata.
+  // (brick_count) or empty: the mesh's triangle nearest to the middle of the brick; -1 when a
+  // sealed hole is nearer.
+  std::vector<std::int32_t> triangle;
+  // How it was made.
   double offset = 0;       // sigma [m]; 0 on closed meshes
-  std::string sign_mode;   // "closed" or "flood"; "given": from another program
-  std::string input_hash;  // of the mesh's content and the bake parameters
+  std::string sign_mode;   // "closed" or "flood"; "given" by another program
+  std::string input_hash;  // of the mesh and the options of the bake
   std::size_t triangles = 0;
 
   std::size_t brick_count() const { return samples.size() / 512; }
   h6FieldDef def() const;  // points into this object
 };
+
+// Whether the sizes and indices of the arrays fit each other. Files hold consistent fields only.
+bool consistent(const FieldData& field);
 
 }  // namespace h6::io

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// field_file.h - fields as OpenVDB files: grids `distance`, `far`, `part` and `triangle`, history
-// as metadata.
+// field_file.h - fields as OpenVDB files: grids `distance`, `far`, `part` and `triangle`, with the
+// history of the bake as metadata.
 #pragma once
 #include <filesystem>
 
@@ -9,14 +9,15 @@
 
 namespace h6::io {
 
-enum class Compression { none, blosc };  // none: the cache; blosc: exports
+enum class Compression { none, blosc };
 
-// Written aside, then renamed. Rows are put in the order of cells, as bake_field has them.
+// Written aside, then renamed. The rows must be in the order of cells, as bake_field makes them:
+// a file does not keep another order.
 Outcome write_field(const std::filesystem::path& file, const FieldData& field,
                     Compression compression = Compression::blosc);
-// Fields of this program come back to the bit. Any other .vdb with one float level set grid is
-// taken
-// too: narrow band, background and all; its far grid is then derived, safely.
+// Fields of this program come back to the bit; those of another version are refused. A .vdb of
+// another program is read when it has one level set of floats: a far grid of safe bounds is derived
+// from its narrow band and background.
 Result<FieldData> read_field(const std::filesystem::path& file);
 
 }  // namespace h6::io

@@ -9,17 +9,20 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <span>
 #include <string_view>
+#include <vector>
 
+#include "io/file/content_hash.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
 namespace {
 
 constexpr std::string_view kMark = "hapsix-file-checksum:";
-constexpr std::size_t kDigits = 32, kHead = 65536;
+constexpr std::size_t kDigits = 32, kHead = 65536, kBlock = std::size_t{4} << 20;
 
-// A file's bytes, mapped; not copied.
+// The bytes of a file, mapped into memory.
 class Mapped {
  public:
   explicit Mapped(const std::filesystem::path& file)
@@ -42,74 +45,42 @@ class Mapped {
   std::span<const char> bytes_;
 };
 
-std::string_view head_of(std::span<const char> first) {
-  return {first.data(), std::min(first.size(), kHead)};
+std::string_view head_of(std::span<const char> file) {
+  return {file.data(), std::min(file.size(), kHead)};
 }
 
-std::size_t digits_at(std::span<const char> first) {
-  const std::size_t mark = head_of(first).find(kMark);
-  if (mark == std::string_view::npos || mark + kMark.size() + kDigits > first.size())
+// Where the digits stand; npos without a mark.
+std::size_t digits_at(std::span<const char> file) {
+  const std::size_t mark = head_of(file).find(kMark);
+  if (mark == std::string_view::npos || mark + kMark.size() + kDigits > file.size())
     return std::string_view::npos;
   return mark + kMark.size();
 }
 
-// What stands before and behind the digits.
-Hash128 hash_first(std::span<const char> first) {
-  const std::size_t at = digits_at(first);
-  if (at == std::string_view::npos) return {};
-  const auto behind = first.subspan(at + kDigits);
-  const Hash128 both[2] = {hash_bytes(first.data(), at), hash_bytes(behind.data(), behind.size())};
-  return hash_bytes(both, sizeof both);
-}
-
-BlockSeals seals_of(std::span<const char> bytes) {
-  BlockSeals seals(bytes.size());
-  sched::parallel_for(seals.blocks(), 0, [&](std::size_t i) {
-    const std::size_t begin = i * kSealBlock;
-    seals.add(i, bytes.subspan(begin, std::min(kSealBlock, bytes.size() - begin)));
+// A hash of the hashes of blocks, so that all threads share the work.
+std::string digits_of(std::span<const char> file) {
+  const std::size_t at = digits_at(file);
+  const auto before = file.first(at), behind = file.subspan(at + kDigits);
+  std::vector<Hash128> hashes(1 + (behind.size() + kBlock - 1) / kBlock);
+  hashes[0] = hash_bytes(before.data(), before.size());
+  sched::parallel_for(hashes.size() - 1, 0, [&](std::size_t i) {
+    const auto rest = behind.subspan(i * kBlock);
+    hashes[i + 1] = hash_bytes(rest.data(), std::min(kBlock, rest.size()));
   });
-  return seals;
+  return hex(hash_bytes(hashes.data(), hashes.size() * sizeof(Hash128)));
 }
 
 }  // namespace
 
 std::string seal_text() { return std::string(kMark) + std::string(kDigits, '0'); }
 
-void BlockSeals::add(std::size_t i, std::span<const char> bytes) {
-  hashes_[i] = i == 0 ? hash_first(bytes) : hash_bytes(bytes.data(), bytes.size());
-}
-
-bool BlockSeals::put_digits(std::span<char> first) const {
-  const std::size_t at = digits_at(first);
-  if (at == std::string_view::npos) return false;
-  const std::string digits = hex(hash_bytes(hashes_.data(), hashes_.size() * sizeof(Hash128)));
-  std::memcpy(first.data() + at, digits.data(), kDigits);
-  return true;
-}
-
-Seal BlockSeals::check(std::span<const char> first) const {
-  const std::size_t at = digits_at(first);
-  if (at == std::string_view::npos) {
-    // Our name without our mark: the mark itself is what was damaged.
-    return head_of(first).find("hapsix") != std::string_view::npos ? Seal::broken : Seal::none;
-  }
-  const std::string digits = hex(hash_bytes(hashes_.data(), hashes_.size() * sizeof(Hash128)));
-  return std::memcmp(first.data() + at, digits.data(), kDigits) == 0 ? Seal::whole : Seal::broken;
-}
-
 Outcome seal_file(const std::filesystem::path& file) {
-  std::vector<char> first;
-  {
-    const Mapped mapped(file);
-    const auto bytes = mapped.bytes().first(std::min(kSealBlock, mapped.bytes().size()));
-    first.assign(bytes.begin(), bytes.end());
-    if (!seals_of(mapped.bytes()).put_digits(first))
-      return Failure{file.string() + " has no place for a checksum"};
-  }
-  const std::size_t at = digits_at(first);
+  const Mapped mapped(file);
+  const std::size_t at = digits_at(mapped.bytes());
+  if (at == std::string_view::npos) return Failure{file.string() + " has no place for a checksum"};
+  const std::string digits = digits_of(mapped.bytes());
   const int fd = open(file.c_str(), O_WRONLY | O_CLOEXEC);
-  const bool written =
-      fd >= 0 && pwrite(fd, first.data() + at, kDigits, off_t(at)) == ssize_t(kDigits);
+  const bool written = fd >= 0 && pwrite(fd, digits.data(), kDigits, off_t(at)) == ssize_t(kDigits);
   const int why = errno;
   if (fd >= 0) close(fd);
   if (!written) return Failure{"cannot write " + file.string() + ": " + std::strerror(why)};
@@ -118,9 +89,13 @@ Outcome seal_file(const std::filesystem::path& file) {
 
 Result<Seal> check_seal(const std::filesystem::path& file) {
   const Mapped mapped(file);
-  if (mapped.bytes().empty()) return Failure{file.string() + " is empty or cannot be read"};
-  return seals_of(mapped.bytes())
-      .check(mapped.bytes().first(std::min(kSealBlock, mapped.bytes().size())));
+  const auto bytes = mapped.bytes();
+  if (bytes.empty()) return Failure{file.string() + " is empty or cannot be read"};
+  const std::size_t at = digits_at(bytes);
+  // Our name without our mark: the mark itself is damaged.
+  if (at == std::string_view::npos)
+    return head_of(bytes).find("hapsix") == std::string_view::npos ? Seal::none : Seal::broken;
+  return digits_of(bytes) == std::string_view(&bytes[at], kDigits) ? Seal::whole : Seal::broken;
 }
 
 }  // namespace h6::io

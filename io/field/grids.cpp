@@ -1,9 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// grids.cpp - fields to and from grids: all but the samples.
+// grids.cpp - fields of hapsix to and from grids:
+//
+//   distance  FloatGrid, level set [m]; a leaf of 8^3 voxels is a brick, all of it active
+//   far       FloatGrid, one voxel for every 8: the far grid, as it stands
+//   part      Int32Grid, one voxel for a brick; only where the mesh has parts
+//   triangle  Int32Grid, one voxel for a brick; -1 where a sealed hole is nearest
+//
+// The rest of FieldData is metadata of `distance`, named hapsix_*. Leaves run z fastest, bricks x.
 #include "io/field/grids.h"
 
+#include <openvdb/tools/SignedFloodFill.h>
+
+#include <algorithm>
 #include <cmath>
-#include <exception>
 #include <limits>
 
 #include "sched/parallel_for.h"
@@ -13,12 +22,14 @@ namespace {
 
 using openvdb::FloatGrid;
 using openvdb::Int32Grid;
+using FloatLeaf = FloatGrid::TreeType::LeafNodeType;
+using Leaves = std::vector<FloatLeaf*>;
 
 std::string key(const char* name) { return std::string("hapsix_") + name; }
 
 // How many of the file's units make a metre: 1, unless voxels are so small that OpenVDB takes their
-// volume for zero (it refuses transforms below 3e-15). hapsix_units_per_metre says so in the file;
-// our own size and place come from metadata in metres.
+// volume for zero (it refuses transforms below 3e-15). hapsix_units_per_metre tells other programs;
+// we read size and place from metadata in metres.
 double units_per_metre(const FieldData& field) {
   double units = 1;
   while (field.voxel_size * units < 2e-5) units *= 1000;
@@ -48,7 +59,7 @@ FloatGrid::Ptr far_grid(const FieldData& field) {
   return grid;
 }
 
-// One voxel a brick.
+// A grid with one voxel for each brick.
 Int32Grid::Ptr brick_grid(const FieldData& field, const char* name,
                           const std::vector<std::int32_t>& value) {
   auto grid = Int32Grid::create(-1);
@@ -65,19 +76,55 @@ Int32Grid::Ptr brick_grid(const FieldData& field, const char* name,
   return grid;
 }
 
-// Three things at once; an exception of one of them comes out here.
-template <class Body>
-void three_at_once(const Body& body) {
-  std::exception_ptr thrown[3];
-  sched::parallel_for(3, 0, [&](std::size_t i) {
-    try {
-      body(i);
-    } catch (...) {
-      thrown[i] = std::current_exception();
-    }
+// `distance` with its metadata and without leaves.
+FloatGrid::Ptr empty_distance_grid(const FieldData& field) {
+  auto grid = FloatGrid::create(float(field.band));
+  grid->setName("distance");
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->setTransform(make_transform(field, field.voxel_size));
+  grid->insertMeta(key("format"), openvdb::Int32Metadata(kFieldFormat));
+  grid->insertMeta(key("bricks"), openvdb::Vec3IMetadata(openvdb::Vec3i(field.bricks.data())));
+  grid->insertMeta(key("origin"), openvdb::Vec3DMetadata(openvdb::Vec3d(
+                                      field.origin.x, field.origin.y, field.origin.z)));
+  grid->insertMeta(key("voxel_size"), openvdb::DoubleMetadata(field.voxel_size));
+  grid->insertMeta(key("band"), openvdb::DoubleMetadata(field.band));
+  grid->insertMeta(key("offset"), openvdb::DoubleMetadata(field.offset));
+  grid->insertMeta(key("sign_mode"), openvdb::StringMetadata(field.sign_mode));
+  grid->insertMeta(key("units_per_metre"), openvdb::DoubleMetadata(units_per_metre(field)));
+  grid->insertMeta(key("input_hash"), openvdb::StringMetadata(field.input_hash));
+  grid->insertMeta(key("triangles"),
+                   openvdb::Int64Metadata(static_cast<openvdb::Int64>(field.triangles)));
+  grid->insertMeta(key("parts"), openvdb::Int32Metadata(std::int32_t(field.part_names.size())));
+  for (std::size_t i = 0; i < field.part_names.size(); ++i)
+    grid->insertMeta(key("part_") + std::to_string(i),
+                     openvdb::StringMetadata(field.part_names[i]));
+  return grid;
+}
+
+void samples_to_leaf(const float* samples, FloatLeaf& leaf) {
+  float* out = leaf.buffer().data();
+  for (std::size_t z = 0; z < 8; ++z)
+    for (std::size_t y = 0; y < 8; ++y)
+      for (std::size_t x = 0; x < 8; ++x) out[x * 64 + y * 8 + z] = samples[z * 64 + y * 8 + x];
+}
+
+FloatGrid::Ptr distance_grid(const FieldData& field) {
+  const FloatGrid::Ptr grid = empty_distance_grid(field);
+  const Place cells{field.bricks};
+  std::vector<std::size_t> used;
+  for (std::size_t c = 0; c < field.brick_index.size(); ++c)
+    if (field.brick_index[c] >= 0) used.push_back(c);
+  Leaves leaves(used.size());
+  sched::parallel_for(used.size(), 0, [&](std::size_t i) {
+    const auto at = cells.at(used[i]);
+    leaves[i] = new FloatLeaf(openvdb::Coord(8 * at[0], 8 * at[1], 8 * at[2]), 0.0f, true);
+    samples_to_leaf(&field.samples[std::size_t(field.brick_index[used[i]]) * 512], *leaves[i]);
   });
-  for (const std::exception_ptr& e : thrown)
-    if (e) std::rethrow_exception(e);
+  for (FloatLeaf* leaf : leaves) grid->tree().addLeaf(leaf);
+  // So that other programs see the inside of a solid as inside. It changes no leaf, as all are
+  // active.
+  openvdb::tools::signedFloodFill(grid->tree());
+  return grid;
 }
 
 template <class T>
@@ -108,7 +155,7 @@ bool take_far(const FloatGrid& grid, FieldData& f) {
   return true;
 }
 
-// Values of all bricks, each in low..high.
+// The values of all bricks; false unless each is in low..high.
 bool take_bricks(const Int32Grid* grid, const FieldData& f, std::int64_t low, std::int64_t high,
                  std::vector<std::int32_t>& value) {
   if (grid == nullptr) return true;
@@ -125,41 +172,18 @@ bool take_bricks(const Int32Grid* grid, const FieldData& f, std::int64_t low, st
   return true;
 }
 
-}  // namespace
-
-FloatGrid::Ptr bare_distance_grid(const FieldData& field) {
-  auto grid = FloatGrid::create(float(field.band));
-  grid->setName("distance");
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  grid->setTransform(make_transform(field, field.voxel_size));
-  grid->insertMeta(key("format"), openvdb::Int32Metadata(kFieldFormat));
-  grid->insertMeta(key("bricks"), openvdb::Vec3IMetadata(openvdb::Vec3i(field.bricks.data())));
-  grid->insertMeta(key("origin"), openvdb::Vec3DMetadata(openvdb::Vec3d(
-                                      field.origin.x, field.origin.y, field.origin.z)));
-  grid->insertMeta(key("voxel_size"), openvdb::DoubleMetadata(field.voxel_size));
-  grid->insertMeta(key("band"), openvdb::DoubleMetadata(field.band));
-  grid->insertMeta(key("offset"), openvdb::DoubleMetadata(field.offset));
-  grid->insertMeta(key("sign_mode"), openvdb::StringMetadata(field.sign_mode));
-  grid->insertMeta(key("units_per_metre"), openvdb::DoubleMetadata(units_per_metre(field)));
-  grid->insertMeta(key("input_hash"), openvdb::StringMetadata(field.input_hash));
-  grid->insertMeta(key("triangles"),
-                   openvdb::Int64Metadata(static_cast<openvdb::Int64>(field.triangles)));
-  grid->insertMeta(key("parts"), openvdb::Int32Metadata(std::int32_t(field.part_names.size())));
-  for (std::size_t i = 0; i < field.part_names.size(); ++i)
-    grid->insertMeta(key("part_") + std::to_string(i),
-                     openvdb::StringMetadata(field.part_names[i]));
-  return grid;
-}
-
-openvdb::GridPtrVec small_grids(const FieldData& field) {
-  openvdb::GridPtrVec grids(3);
-  three_at_once([&](std::size_t i) {
-    if (i == 0) grids[0] = far_grid(field);
-    if (i == 1 && !field.part.empty()) grids[1] = brick_grid(field, "part", field.part);
-    if (i == 2 && !field.triangle.empty()) grids[2] = brick_grid(field, "triangle", field.triangle);
-  });
-  std::erase(grids, nullptr);
-  return grids;
+// False where a value is not finite.
+bool leaf_to_samples(const FloatLeaf& leaf, float* samples) {
+  const float* in = leaf.buffer().data();
+  bool finite = true;
+  for (std::size_t z = 0; z < 8; ++z)
+    for (std::size_t y = 0; y < 8; ++y)
+      for (std::size_t x = 0; x < 8; ++x) {
+        const float v = in[x * 64 + y * 8 + z];
+        finite &= std::isfinite(v);
+        samples[z * 64 + y * 8 + x] = v;
+      }
+  return finite;
 }
 
 bool take_head(const FloatGrid& grid, FieldData& f) {
@@ -190,26 +214,61 @@ bool take_head(const FloatGrid& grid, FieldData& f) {
          f.voxel_size > 0 && std::isfinite(f.band) && f.band > 0 && std::isfinite(f.offset);
 }
 
-bool take_small(const openvdb::GridPtrVec& grids, FieldData& f) {
-  const auto far = find<FloatGrid>(grids, "far");
-  if (!far) return false;
-  const auto part = find<Int32Grid>(grids, "part"), triangle = find<Int32Grid>(grids, "triangle");
-  const std::int64_t any = std::numeric_limits<std::int32_t>::max();
-  const std::int64_t parts = f.part_names.empty() ? any : std::int64_t(f.part_names.size()) - 1;
-  bool good[3] = {};
-  three_at_once([&](std::size_t i) {
-    if (i == 0) good[0] = take_far(*far, f);
-    if (i == 1) good[1] = take_bricks(part.get(), f, 0, parts, f.part);
-    if (i == 2)
-      good[2] = take_bricks(triangle.get(), f, -1, std::int64_t(f.triangles) - 1, f.triangle);
+bool take_leaves(FloatGrid& grid, FieldData& f) {
+  const Place cells{f.bricks};
+  f.brick_index.assign(cells.count(), -1);
+  Leaves leaves;
+  grid.tree().getNodes(leaves);
+  std::vector<FloatLeaf*> leaf_of(cells.count(), nullptr);
+  for (FloatLeaf* leaf : leaves) {
+    const openvdb::Coord o = leaf->origin();
+    for (int k = 0; k < 3; ++k)
+      if (o[k] < 0 || o[k] >= 8 * f.bricks[std::size_t(k)]) return false;
+    leaf_of[cells.index(o[0] / 8, o[1] / 8, o[2] / 8)] = leaf;
+  }
+  std::vector<const FloatLeaf*> rows;
+  for (std::size_t c = 0; c < leaf_of.size(); ++c) {
+    if (leaf_of[c] == nullptr) continue;
+    f.brick_index[c] = std::int32_t(rows.size());
+    rows.push_back(leaf_of[c]);
+  }
+  f.samples.resize(rows.size() * 512);
+  std::vector<std::uint8_t> finite(rows.size());
+  sched::parallel_for(rows.size(), 0, [&](std::size_t r) {
+    finite[r] = leaf_to_samples(*rows[r], &f.samples[r * 512]);
   });
-  return good[0] && good[1] && good[2];
+  return std::find(finite.begin(), finite.end(), 0) == finite.end();
 }
 
 FloatGrid::Ptr own_distance(const openvdb::GridPtrVec& grids) {
   const auto distance = find<FloatGrid>(grids, "distance");
   return distance && distance->getMetadata<openvdb::Int32Metadata>(key("format")) ? distance
                                                                                   : nullptr;
+}
+
+}  // namespace
+
+openvdb::GridPtrVec grids_of(const FieldData& field) {
+  openvdb::GridPtrVec grids{distance_grid(field), far_grid(field)};
+  if (!field.part.empty()) grids.push_back(brick_grid(field, "part", field.part));
+  if (!field.triangle.empty()) grids.push_back(brick_grid(field, "triangle", field.triangle));
+  return grids;
+}
+
+bool are_ours(const openvdb::GridPtrVec& grids) { return own_distance(grids) != nullptr; }
+
+std::optional<FieldData> field_of(const openvdb::GridPtrVec& grids) {
+  const auto distance = own_distance(grids);
+  const auto far = find<FloatGrid>(grids, "far");
+  const auto part = find<Int32Grid>(grids, "part"), triangle = find<Int32Grid>(grids, "triangle");
+  FieldData f;
+  if (!distance || !far || !take_head(*distance, f) || !take_leaves(*distance, f)) return {};
+  const std::int64_t any = std::numeric_limits<std::int32_t>::max();
+  const std::int64_t parts = f.part_names.empty() ? any : std::int64_t(f.part_names.size()) - 1;
+  if (!take_far(*far, f) || !take_bricks(part.get(), f, 0, parts, f.part) ||
+      !take_bricks(triangle.get(), f, -1, std::int64_t(f.triangles) - 1, f.triangle))
+    return {};
+  return f;
 }
 
 }  // namespace h6::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// grids.h - what the ways to read and write .vdb files share. Private to field_*.cpp.
+// grids.h - a field as OpenVDB grids. Inside io/field only.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -17,10 +17,9 @@
 
 namespace h6::io {
 
-inline constexpr int kMaxBricksOnSide = 256;
-inline constexpr std::int32_t kFieldFormat = 2;  // hapsix_format; 2 has `triangle`
+inline constexpr std::int32_t kFieldFormat = 3;  // hapsix_format; 3: sealed by XXH3
 
-// Cells of a box of bricks, or nodes of its far grid, x fastest.
+// Numbers the cells of a box of bricks, or the nodes of its far grid, x fastest.
 struct Place {
   std::array<std::int32_t, 3> size;
   std::array<std::int32_t, 3> at(std::size_t i) const {
@@ -36,60 +35,23 @@ struct Place {
   }
 };
 
-// ---- grids.cpp: all of a field but its samples --------------------------------------------
+// ---- grids.cpp: fields of hapsix ------------------------------------------------------------
 
-// `distance` without a leaf: its name, place and metadata.
-openvdb::FloatGrid::Ptr bare_distance_grid(const FieldData& field);
-// `far`, and where there are such `part` and `triangle`.
-openvdb::GridPtrVec small_grids(const FieldData& field);
+// `distance` and `far`, and `part` and `triangle` where the field has them.
+openvdb::GridPtrVec grids_of(const FieldData& field);
+// Back again. Nothing when the grids are no whole field of this format.
+std::optional<FieldData> field_of(const openvdb::GridPtrVec& grids);
+// Whether a field of ours is among them, of whatever format.
+bool are_ours(const openvdb::GridPtrVec& grids);
 
-// Back again; false where it is no whole field of this format. The bricks and samples must be there
-// before take_small.
-bool take_head(const openvdb::FloatGrid& distance, FieldData& field);
-bool take_small(const openvdb::GridPtrVec& grids, FieldData& field);
-// The distance grid of a file of ours, whatever its format; else null.
-openvdb::FloatGrid::Ptr own_distance(const openvdb::GridPtrVec& grids);
+// ---- scan.cpp: checks a file before OpenVDB allocates by its lengths ------------------------
 
-// ---- scan.cpp: a look at a file before OpenVDB allocates by what it says ------------------
+// Fails unless every length in the heads of the file and of its grids fits into the file, and the
+// grids' places rise. Returns hapsix_format of the first grid, if it has one.
+Result<std::optional<std::int32_t>> scan_vdb(const std::filesystem::path& file);
 
-struct VdbGrid {
-  std::string name, type;
-  std::uint32_t compression = 0;
-  std::uint64_t tree = 0;   // where its topology begins; 0: behind a transform not known here
-  std::uint64_t block = 0;  // where its buffers begin
-  std::uint64_t end = 0;
-};
-struct VdbLayout {
-  std::uint64_t size = 0;              // of the file
-  std::vector<VdbGrid> grids;          // all of them, where the file tells their places
-  std::optional<std::int32_t> format;  // hapsix_format, where the first grid has one
-};
-// Every length in the head of the file and of its grids fits into the file, and places rise.
-Result<VdbLayout> scan_vdb(const std::filesystem::path& file);
-
-// ---- field_file.cpp -----------------------------------------------------------------------------
-
-// All grids of a stream, which goes on with zeros behind its end (see there); `name` stands in the
-// sentence.
-Result<openvdb::GridPtrVec> read_grids(std::streambuf& bytes, const std::string& name);
-inline Failure damaged_field(const std::string& name) {
-  return {name + " is a damaged field: bake it again"};
-}
-inline Failure broken_seal(const std::string& name) {
-  return {name + " is a damaged field (its checksum differs): bake it again"};
-}
-
-// ---- foreign.cpp: a level set somebody else made ------------------------------------------
+// ---- foreign.cpp: a level set of another program --------------------------------------------
 
 Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::string& name);
-
-// ---- stored.cpp: uncompressed fields, at the speed of the disk ----------------------------
-
-Outcome write_stored(const std::filesystem::path& file, const FieldData& field);
-// True for files that write_stored made, as far as the head tells.
-bool is_stored(const VdbLayout& layout);
-// Nothing: not laid out as write_stored does it, OpenVDB may know more. `file` stands in sentences.
-Result<std::optional<FieldData>> read_stored(const std::filesystem::path& file,
-                                             const VdbLayout& layout);
 
 }  // namespace h6::io

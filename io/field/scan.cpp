@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// scan.cpp - a look at a .vdb file before OpenVDB allocates by what it says.
+// scan.cpp - checks the lengths in a .vdb file before OpenVDB allocates by them.
 //
-// What it walks (format of OpenVDB 4 and later, little endian; strings are a 32-bit length and
-// bytes):
+// It walks this (OpenVDB 4 and later, little endian; a string is a 32-bit length and bytes):
 //   "VDB " as 64 bits, file version, library version (2), 1 byte: has offsets, 36 characters uuid
 //   metadata; number of grids; then each grid: name, type, parent, 3 x 64-bit offsets,
 //   compression, metadata, transform type ... tree
 //   metadata: count, then (name, type, length, bytes) each
-// Tree nodes need no look: each of them takes more bytes of the file than a small multiple of what
-// it allocates.
+// It skips the trees: what OpenVDB allocates for a node is a small multiple of the node's bytes in
+// the file.
 #include <cstring>
 #include <fstream>
 
@@ -34,7 +33,7 @@ class Scan {
     at_ += sizeof value;
     return bool(in_);
   }
-  // What is longer than any name here is skipped: then `text` is empty.
+  // `text` stays empty when the string is longer than any that matters here.
   bool string(std::string* text = nullptr) {
     std::uint32_t length = 0;
     if (!take(length)) return false;
@@ -45,7 +44,7 @@ class Scan {
     at_ += length;
     return bool(in_);
   }
-  // The 32-bit number of one name is taken, where it is there.
+  // Takes the 32-bit number of that name, if there is one.
   bool metadata(const char* wanted = "", std::optional<std::int32_t>* number = nullptr) {
     std::uint32_t count = 0;
     if (!take(count)) return false;
@@ -70,35 +69,28 @@ class Scan {
   std::uint64_t size_, at_ = 0;
 };
 
-bool grids_fit(Scan& scan, bool offsets, VdbLayout& layout) {
+bool grids_fit(Scan& scan, bool offsets, std::optional<std::int32_t>& format) {
   std::uint32_t count = 0;
   if (!scan.take(count)) return false;
   for (std::uint32_t i = 0; i < count; ++i) {
-    VdbGrid grid;
     std::int64_t place[3] = {};
-    if (!scan.string(&grid.name) || !scan.string(&grid.type) || !scan.string()) return false;
+    std::uint32_t compression = 0;
+    if (!scan.string() || !scan.string() || !scan.string()) return false;
     for (std::int64_t& p : place)
       if (!scan.take(p)) return false;
-    std::string transform;
-    if (!scan.take(grid.compression) ||
-        !scan.metadata("hapsix_format", i == 0 ? &layout.format : nullptr) ||
-        !scan.string(&transform))
+    if (!scan.take(compression) || !scan.metadata("hapsix_format", i == 0 ? &format : nullptr) ||
+        !scan.string())
       return false;
     // Without offsets the next grid begins where this one's tree ends: OpenVDB alone knows.
     if (!offsets) return true;
-    // Six vectors of three doubles.
-    if (transform == "UniformScaleTranslateMap") grid.tree = scan.at() + 6 * 3 * sizeof(double);
     if (place[2] < 0 || !scan.to(std::uint64_t(place[2]))) return false;
-    grid.block = place[1] < 0 ? 0 : std::uint64_t(place[1]);
-    grid.end = std::uint64_t(place[2]);
-    layout.grids.push_back(std::move(grid));
   }
   return true;
 }
 
 }  // namespace
 
-Result<VdbLayout> scan_vdb(const std::filesystem::path& file) {
+Result<std::optional<std::int32_t>> scan_vdb(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     return Failure{"there is no file " + file.string()};
@@ -106,8 +98,7 @@ Result<VdbLayout> scan_vdb(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (error || !in) return Failure{"cannot open " + file.string() + ": check its permissions"};
   Scan scan(in, size);
-  VdbLayout layout;
-  layout.size = size;
+  std::optional<std::int32_t> format;
   char magic[8];
   std::uint32_t version = 0;
   char offsets = 0;
@@ -117,9 +108,9 @@ Result<VdbLayout> scan_vdb(const std::filesystem::path& file) {
   if (!scan.take(version) || version < 222 || version > 1000)
     return Failure{file.string() + " is an OpenVDB file of a version that cannot be read"};
   if (!scan.skip(8) || !scan.take(offsets) || !scan.skip(36) || !scan.metadata() ||
-      !grids_fit(scan, offsets != 0, layout))
+      !grids_fit(scan, offsets != 0, format))
     return Failure{file.string() + " ends too early or is damaged: it is no whole OpenVDB file"};
-  return layout;
+  return format;
 }
 
 }  // namespace h6::io

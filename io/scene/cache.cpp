@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "io/field/field_file.h"
+#include "io/field/raw_field.h"
 #include "io/shell/shell_file.h"
 
 namespace h6::io {
@@ -89,15 +89,15 @@ std::filesystem::path cache_folder() {
 Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options, Cached* cached,
                                const Progress& progress) {
   return through_cache<FieldData>(
-      asset_key(mesh, options), ".vdb", cached,
-      [](const fs::path& file) { return read_field(file); },
+      asset_key(mesh, options), ".field", cached,
+      [](const fs::path& file) { return read_raw_field(file); },
       [&](Cached& told) {
         FieldBakeReport report;
         Result<FieldData> field = bake_field(mesh.mesh, options, &report, progress);
         told.warnings.insert(told.warnings.end(), report.warnings.begin(), report.warnings.end());
         return field;
       },
-      [](const fs::path& file, const FieldData& field) { return write_field(file, field, Compression::none); });
+      [](const fs::path& file, const FieldData& field) { return write_raw_field(file, field); });
 }
 
 Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options, Cached* cached,

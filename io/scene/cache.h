@@ -10,7 +10,7 @@
 namespace h6::io {
 
 // $HAPSIX_CACHE, else $XDG_CACHE_HOME/hapsix, else ~/.cache/hapsix; empty when none is set. It
-// holds KEY.vdb and KEY.ply.
+// holds KEY.field and KEY.ply.
 std::filesystem::path cache_folder();
 
 // How an asset was obtained.

@@ -195,7 +195,7 @@ TEST_CASE("what was baked once is found again, to the bit") {
   CHECK_FALSE(field_run(&field).hit);
   const Cached found = field_run(&again);
   CHECK(found.hit);
-  CHECK(found.file.extension() == ".vdb");
+  CHECK(found.file.extension() == ".field");
   CHECK(field.samples == again.samples);
   CHECK(field.brick_index == again.brick_index);
   CHECK(field.far_grid == again.far_grid);
