@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+// anytime.cpp - costs, and the tier that fits.
 #include "runtime/frame/anytime.h"
 
 #include <algorithm>
 #include <bit>
-
-#include "runtime/frame/session.h"
 
 namespace h6 {
 namespace {
@@ -14,19 +13,17 @@ void learn(double& cost, double seen) {
   cost = seen > cost ? std::min(seen, 2 * cost) : cost + 0.005 * (seen - cost);
 }
 
-// Fewer say nothing about the cost of one.
-constexpr std::size_t kTelling = 32;
-constexpr double kUnknown = 200;        // ns a contact
-constexpr double kSpare = 0.85;         // of the budget: what a finer tier may take
+constexpr std::size_t kTelling = 32;    // fewer contacts say nothing about the cost of one
+constexpr double kUnknown = 200;        // ns a contact, before any was seen
+constexpr double kSpare = 0.85;         // share of the budget that a finer tier may take
 constexpr std::uint32_t kCalm = 20;     // frames until a finer tier is allowed
-constexpr std::uint32_t kStrikes = 3;   // until it is not any more
+constexpr std::uint32_t kStrikes = 3;   // frames until the finest tier is no longer allowed
 constexpr std::uint64_t kFresh = 1000;  // frames for which a cost is believed as it is
-// A contact costs more where there are more: at least by so much of the proportion, and 1.25 times
-// what it did so far. In a socket with 9,627 contacts `robust` takes 99 ns for one, with 616 of
-// them 50.
+// The cost of a contact is extrapolated to more contacts with 1.25 times the slope seen so far, but
+// at least a quarter of the proportion: `robust` takes 50 ns each for 616 contacts, 99 for 9,627.
 constexpr double kLeastGrowth = 0.25, kGrowth = 1.25;
-constexpr std::uint32_t kLookEvery = 16;  // frames: how many groups are near
-constexpr double kLookNs = 60;            // a group, when nothing of them is in the caches
+constexpr std::uint32_t kLookEvery = 16;  // frames between two counts of near groups
+constexpr double kLookNs = 60;            // to test a group that is in no cache
 
 double middle_of(const double (&seen)[3], std::uint32_t count) {
   if (count < 3) return *std::min_element(seen, seen + std::max(count, 1u));
@@ -38,7 +35,7 @@ int size_of(double contacts) {
   return static_cast<int>(std::bit_width(n)) - 1;
 }
 
-// Of one of `contacts`, at most [ns].
+// An upper bound on the cost of one contact in a frame of `contacts` [ns].
 double contact_ns(const Anytime& a, double contacts) {
   const int size = size_of(contacts);
   const auto below = [&](int i) {
@@ -71,29 +68,33 @@ double contact_ns(const Anytime& a, double contacts) {
   return kUnknown;
 }
 
-// Of a frame that cannot keep its budget any more: halfway from there to being late.
-double latest_ns(const h6Session& s) { return 0.5 * (s.anytime.budget_ns + 1e9 * s.dt); }
+// A frame that cannot keep its budget may end halfway between the budget and the deadline.
+double latest_ns(const Anytime& a) { return 0.5 * (a.budget_ns + a.period_ns); }
 
 double elapsed_ns(const Anytime& a) { return static_cast<double>(a.clock() - a.start); }
 
-// What a frame takes from its beginning when this pair and all that follow (as they were last) are
-// traversed in `tier`.
+std::size_t number_of(const Anytime& a, const PairSearch& pair) {
+  return static_cast<std::size_t>(&pair - a.pairs.data());
+}
+
+// Work so far, and work that remains in this pair and in all that follow, if these are as they were
+// in their last frame.
 struct Ahead {
   double elapsed, used;
   double blocks = 0, groups = 0;
 };
 
-Ahead look_ahead(const h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks,
+Ahead look_ahead(const Anytime& a, const PairSearch& pair, std::size_t used, std::size_t blocks,
                  double groups) {
-  Ahead ahead{elapsed_ns(s.anytime), static_cast<double>(used), static_cast<double>(blocks),
-              groups};
-  for (std::size_t p = pair + 1; p < s.pair_count; ++p) {
-    ahead.blocks += static_cast<double>(s.pairs[p].open_blocks);
-    ahead.groups += static_cast<double>(s.pairs[p].open_groups);
+  Ahead ahead{elapsed_ns(a), static_cast<double>(used), static_cast<double>(blocks), groups};
+  for (const PairSearch& next : a.pairs.subspan(number_of(a, pair) + 1)) {
+    ahead.blocks += static_cast<double>(next.open_blocks);
+    ahead.groups += static_cast<double>(next.open_groups);
   }
   return ahead;
 }
 
+// What the whole frame takes when the rest is traversed in `tier` [ns].
 double foresee(const Anytime& a, const Ahead& ahead, int tier) {
   const double share = static_cast<double>(1 << tier) / 16;
   const double sampled = tier == Anytime::kAll ? ahead.groups : 16 * share * ahead.blocks;
@@ -103,7 +104,8 @@ double foresee(const Anytime& a, const Ahead& ahead, int tier) {
 
 // The finest tier for the rest of the frame.
 int choose(Anytime& a, const Ahead& ahead) {
-  // Where nothing is known, from below: on the way up each size's cost is seen.
+  // Where nothing is known it begins with the coarsest: on the way up it sees the cost of each
+  // size.
   if (!a.begun && ahead.groups > 0) {
     a.begun = true;
     if (foresee(a, ahead, Anytime::kAll) > kSpare * a.budget_ns) a.finest = 0;
@@ -116,18 +118,16 @@ int choose(Anytime& a, const Ahead& ahead) {
   return tier;
 }
 
-void become_coarse(h6Session& s, std::size_t pair, int tier) {
-  s.anytime.coarse = true;
-  s.anytime.tier = tier;
-  s.report.coarse_pairs = static_cast<std::uint32_t>(s.pair_count - pair);
-  s.report.coarse_points = 1u << tier;
-  s.report.status |= H6_COARSE;
+void become_coarse(Anytime& a, std::size_t pair, int tier) {
+  a.coarse = true;
+  a.tier = tier;
+  a.coarse_pairs = static_cast<std::uint32_t>(a.pairs.size() - pair);
 }
 
-bool decide(h6Session& s, const Ahead& ahead, std::size_t pair) {
-  const int tier = choose(s.anytime, ahead);
-  if (tier < Anytime::kAll) become_coarse(s, pair, tier);
-  return s.anytime.coarse;
+bool decide(Anytime& a, const Ahead& ahead, const PairSearch& pair) {
+  const int tier = choose(a, ahead);
+  if (tier < Anytime::kAll) become_coarse(a, number_of(a, pair), tier);
+  return a.coarse;
 }
 
 void learn_contacts(Anytime& a, double contacts, double spent) {
@@ -148,57 +148,51 @@ void learn_contacts(Anytime& a, double contacts, double spent) {
 
 }  // namespace
 
-void begin_anytime(h6Session& s, std::int64_t start) {
-  Anytime& a = s.anytime;
+void begin_anytime(Anytime& a, std::int64_t start) {
   a.start = start;
   a.coarse = false;
+  a.coarse_pairs = 0;
   a.few = false;
   a.fitting = Anytime::kAll;
   a.by_clock = a.forced == Anytime::kByClock && a.budget_ns > 0 && !a.no_clock;
   if (a.forced == Anytime::kByClock) return;
-  const std::size_t pairs = std::min<std::size_t>(a.forced, s.pair_count);
-  const std::uint32_t points = std::max(a.forced_points, 1u);
-  if (pairs > 0) become_coarse(s, s.pair_count - pairs, std::bit_width(points) - 1);
-  a.coarse = false;  // pair by pair
-  a.few = pairs > 0 && a.forced_points == 0;
-  if (a.few) s.report.coarse_points = 0;
+  a.coarse_pairs = static_cast<std::uint32_t>(std::min<std::size_t>(a.forced, a.pairs.size()));
+  a.tier = std::bit_width(std::max(a.forced_points, 1u)) - 1;
+  a.few = a.coarse_pairs > 0 && a.forced_points == 0;
   a.forced = Anytime::kByClock;
 }
 
-bool is_coarse_anyway(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks) {
-  const Anytime& a = s.anytime;
-  if (!a.by_clock) return pair + s.report.coarse_pairs >= s.pair_count;
+bool is_coarse_anyway(Anytime& a, const PairSearch& pair, std::size_t used, std::size_t blocks) {
+  if (!a.by_clock) return number_of(a, pair) + a.coarse_pairs >= a.pairs.size();
   if (a.coarse) return true;
-  const Pair& p = s.pairs[pair];
   const double n = static_cast<double>(blocks), look = 16 * n * kLookNs;
-  const double each = p.open_blocks == 0
-                          ? 16
-                          : static_cast<double>(p.open_groups) / static_cast<double>(p.open_blocks);
-  const Ahead ahead = look_ahead(s, pair, used, blocks, each * n);
-  // To look at the groups is itself some of the work; to do it now and then is enough.
+  const double each = pair.open_blocks == 0 ? 16
+                                            : static_cast<double>(pair.open_groups) /
+                                                  static_cast<double>(pair.open_blocks);
+  const Ahead ahead = look_ahead(a, pair, used, blocks, each * n);
+  // To test the groups is itself a part of the work; now and then is enough.
   const bool room = look + foresee(a, ahead, 0) <= kSpare * a.budget_ns;
   if (!a.begun ? look <= 0.5 * a.budget_ns
                : a.finest == Anytime::kAll || (room && a.frames % kLookEvery == 0))
     return false;
-  return decide(s, ahead, pair);
+  return decide(a, ahead, pair);
 }
 
-bool must_be_coarse(h6Session& s, std::size_t pair, std::size_t used, std::size_t blocks,
+bool must_be_coarse(Anytime& a, PairSearch& pair, std::size_t used, std::size_t blocks,
                     std::size_t groups) {
-  Pair& p = s.pairs[pair];
-  p.open_blocks = blocks, p.open_groups = groups;
-  if (!s.anytime.by_clock) return false;
-  return decide(s, look_ahead(s, pair, used, blocks, static_cast<double>(groups)), pair);
+  pair.open_blocks = blocks, pair.open_groups = groups;
+  if (!a.by_clock) return false;
+  return decide(a, look_ahead(a, pair, used, blocks, static_cast<double>(groups)), pair);
 }
 
-bool must_be_coarser(h6Session& s, std::size_t pair, std::size_t used, std::size_t found,
+bool must_be_coarser(Anytime& a, const PairSearch& pair, std::size_t used, std::size_t found,
                      std::size_t blocks) {
-  Anytime& a = s.anytime;
   const int tier = a.coarse ? a.tier : Anytime::kAll;
-  // All coarse pairs of a frame are so in the same tier.
-  if (!a.by_clock || tier == 0 || (a.coarse && pair + s.report.coarse_pairs != s.pair_count))
+  // All coarse pairs of a frame are in one tier, so only the first of them may change it.
+  if (!a.by_clock || tier == 0 ||
+      (a.coarse && number_of(a, pair) + a.coarse_pairs != a.pairs.size()))
     return false;
-  const double most = latest_ns(s), n = static_cast<double>(used + found);
+  const double most = latest_ns(a), n = static_cast<double>(used + found);
   const double elapsed = elapsed_ns(a);
   if (elapsed + n * contact_ns(a, n) + a.rest_ns <= most) return false;
   int coarser = tier;
@@ -210,29 +204,33 @@ bool must_be_coarser(h6Session& s, std::size_t pair, std::size_t used, std::size
     ahead = elapsed + (1 << coarser) * static_cast<double>(blocks) * a.group_ns +
             left * contact_ns(a, left) + a.rest_ns;
   } while (coarser > 0 && ahead > most);
-  become_coarse(s, pair, coarser);
+  become_coarse(a, number_of(a, pair), coarser);
   return true;
 }
 
-bool must_be_few(h6Session& s, std::size_t first, std::size_t found) {
-  Anytime& a = s.anytime;
+bool must_be_few(Anytime& a, const PairSearch& first, std::size_t found) {
   if (!a.by_clock || a.few) return a.few;
-  // What was coarse in shell bodies before this one has its contacts by now.
-  if (!a.coarse || a.tier > 0 || s.report.coarse_pairs + first > s.pair_count) return false;
-  // What so many cost is to be seen now and then, or few would follow few for ever.
-  // The first frame has everything from memory.
+  // The coarse pairs of earlier shell bodies have their contacts already.
+  if (!a.coarse || a.tier > 0 || a.coarse_pairs + number_of(a, first) > a.pairs.size())
+    return false;
+  // The cost of so many contacts must be seen now and then, or frames would keep few for ever. The
+  // first frame reads everything from memory and tells nothing.
   const double n = static_cast<double>(found);
   const Anytime::Cost& seen = a.contact[size_of(n)];
   if (a.frames > 0 && (seen.times == 0 || a.frames - seen.when >= kFresh)) return false;
-  if (elapsed_ns(a) + n * contact_ns(a, n) + a.rest_ns <= latest_ns(s)) return false;
+  if (elapsed_ns(a) + n * contact_ns(a, n) + a.rest_ns <= latest_ns(a)) return false;
   a.few = true;
-  s.report.coarse_points = 0;
   return true;
 }
 
-void learn_sampling(h6Session& s, std::size_t groups, std::size_t near, std::size_t found,
+std::size_t coarse_pairs_of(const Anytime& a, std::span<const PairSearch> pairs) {
+  const std::size_t first = a.pairs.size() - std::min<std::size_t>(a.coarse_pairs, a.pairs.size());
+  const std::size_t end = number_of(a, pairs[0]) + pairs.size();
+  return end > first ? std::min(end - first, pairs.size()) : 0;
+}
+
+void learn_sampling(Anytime& a, std::size_t groups, std::size_t near, std::size_t found,
                     std::int64_t since) {
-  Anytime& a = s.anytime;
   if (!a.by_clock || groups < kTelling || near < kTelling) return;
   learn(a.group_ns, static_cast<double>(a.clock() - since) / static_cast<double>(groups));
   const double all = a.coarse ? static_cast<double>(found << (Anytime::kAll - a.tier))
@@ -240,14 +238,13 @@ void learn_sampling(h6Session& s, std::size_t groups, std::size_t near, std::siz
   learn(a.contacts_per_group, all / static_cast<double>(near));
 }
 
-void learn_frame(h6Session& s) {
-  Anytime& a = s.anytime;
+void learn_frame(Anytime& a, const h6FrameReport& report) {
   if (!a.by_clock) return;
   ++a.frames;
-  const double* us = s.report.stage_us;
+  const double* us = report.stage_us;
   learn(a.rest_ns, 1e3 * (us[H6_STAGE_COUPLING] + us[H6_STAGE_INTEGRATE] + us[H6_STAGE_OUTPUT]));
   std::size_t contacts = 0;
-  for (std::size_t p = 0; p < s.pair_count; ++p) contacts += s.pairs[p].candidates;
+  for (const PairSearch& pair : a.pairs) contacts += pair.candidates;
   if (!a.few)
     learn_contacts(a, static_cast<double>(contacts),
                    1e3 * (us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH]));
@@ -256,6 +253,13 @@ void learn_frame(h6Session& s) {
   a.strikes = tier < a.finest ? a.strikes + 1 : 0;
   if (a.strikes >= kStrikes) a.finest = tier, a.strikes = 0;
   if (a.calm >= kCalm) ++a.finest, a.calm = 0;
+}
+
+void report_anytime(const Anytime& a, h6FrameReport& report) {
+  if (a.coarse_pairs == 0) return;
+  report.status |= H6_COARSE;
+  report.coarse_pairs = a.coarse_pairs;
+  report.coarse_points = a.few ? 0 : 1u << a.tier;
 }
 
 }  // namespace h6

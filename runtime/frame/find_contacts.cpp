@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// find_contacts.cpp - the points of a shell body that are inside fields, pair by pair, and what
-// their contacts are.
+// find_contacts.cpp - finds the points of a shell body that are inside fields, pair by pair, and
+// makes contacts of them.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "kernels/contact/keep_nearest.h"
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
 #include "runtime/frame/traverse_pair.h"
 #include "sched/clock.h"
 
@@ -14,14 +14,15 @@ namespace h6 {
 namespace {
 
 constexpr std::size_t kContactSlice = 512;  // contacts made at a time: some 1.5 us
-// Contacts from which making them is shared: what the other core made has to come over. 1,000 take
-// 3.1 us alone and 6.2 with it, 10,000 46 and 26.
+// Contacts from which two threads make them. Fewer do not pay for the way from the other core's
+// cache: 1,000 take 3.1 us on one thread and 6.2 on two, 10,000 take 46 and 26.
 constexpr std::size_t kManyContacts = 4096;
-constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which pairs are shared out
+constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which threads share the pairs
 constexpr std::size_t kPairSlices = 32;
 
-// The same for arms: from a's centre of mass, along the axes of the world.
-kernels::Affine arms_to_field(const Body& a, const Body& b, const Field& field) {
+// Contact arms [m], from a's centre of mass along the axes of the world, to voxels of b's field.
+kernels::Affine arms_to_field(const Body& a, const Body& b) {
+  const Field& field = *b.field;
   const Mat3 m = b.R.transpose() / field.voxel;
   const Vec3 t = m * (a.x - (b.x - b.R * b.com)) - field.origin / field.voxel;
   kernels::Affine affine;
@@ -32,101 +33,105 @@ kernels::Affine arms_to_field(const Body& a, const Body& b, const Field& field) 
   return affine;
 }
 
-// Keeps the `most` deepest of the candidates of these pairs, up to `count`, in their order. Ties go
-// to the first.
-std::size_t keep_deepest(h6Session& s, std::size_t count, std::size_t most, Pair* pairs,
-                         std::size_t pair_count) {
+// Keeps the `most` deepest of the candidates of `pairs`, rows up to `count`, in their order. Of
+// equal depths the first ones stay. Returns the row behind the last.
+std::size_t keep_deepest(const TraverseScratch& t, std::size_t count, std::size_t most,
+                         std::span<PairSearch> pairs) {
   std::size_t n = pairs[0].first;
-  const kernels::Touching all = candidates_from(s.traversal[0], 0);
+  const kernels::Touching all = candidates_from(t, 0);
   const kernels::NearestLimit at = kernels::nearest_limit(all.distance + n, count - n, most);
   std::size_t ties = most - at.below;
-  for (std::size_t p = 0; p < pair_count; ++p) {
-    const std::size_t begin = pairs[p].first, end = begin + pairs[p].candidates;
-    pairs[p].first = n;
-    pairs[p].candidates = kernels::keep_nearest(all, begin, end, at.limit, ties, n);
-    n += pairs[p].candidates;
+  for (PairSearch& pair : pairs) {
+    const std::size_t begin = pair.first, end = begin + pair.candidates;
+    pair.first = n;
+    pair.candidates = kernels::keep_nearest(all, begin, end, at.limit, ties, n);
+    n += pair.candidates;
   }
   return n;
 }
 
-// Where there is no time for the contacts of coarse pairs: the few deepest of them. Returns how
+// Keeps only a few of the coarse pairs' candidates where there is no time for more. Returns how
 // many candidates there are then.
-std::size_t keep_few(h6Session& s, std::size_t first_pair, std::size_t end_pair, std::size_t used) {
-  const std::size_t first = std::max(
-      first_pair, s.pair_count - std::min<std::size_t>(s.report.coarse_pairs, s.pair_count));
-  if (first >= end_pair) return used;
-  const std::size_t coarse = used - s.pairs[first].first;
-  if (coarse <= Anytime::kFew || !must_be_few(s, first_pair, used)) return used;
-  used = keep_deepest(s, used, Anytime::kFew, s.pairs + first, end_pair - first);
-  float least = -HUGE_VALF;  // of the distances that are kept: what goes is no deeper
-  for (std::size_t i = s.pairs[first].first; i < used; ++i)
-    least = std::max(least, s.traversal[0].candidate_distance[i]);
-  for (std::size_t p = first; p < end_pair; ++p)
-    s.pairs[p].missed = std::max(s.pairs[p].missed, -least);
+std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, std::span<PairSearch> all,
+                     std::size_t used) {
+  const std::span<PairSearch> pairs = all.last(coarse_pairs_of(anytime, all));
+  if (pairs.empty()) return used;
+  const std::size_t coarse = used - pairs[0].first;
+  if (coarse <= Anytime::kFew || !must_be_few(anytime, all[0], used)) return used;
+  used = keep_deepest(t, used, Anytime::kFew, pairs);
+  float least = -HUGE_VALF;  // largest distance that was kept: all others are no deeper
+  for (std::size_t i = pairs[0].first; i < used; ++i)
+    least = std::max(least, t.candidate_distance[i]);
+  for (PairSearch& pair : pairs) pair.missed = std::max(pair.missed, -least);
   return used;
 }
 
-std::size_t traverse_in_order(h6Session& s, std::size_t first_pair, std::size_t end_pair,
-                              std::size_t most) {
+std::size_t traverse_in_order(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                              Lane& lane) {
+  TraverseScratch& t = lane.scratch->traverse;
+  const std::size_t most = shell.contacts.capacity;
   std::size_t used = 0;
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    Pair& pair = s.pairs[p];
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    PairSearch& pair = shell.searches[p];
     pair.first = used;
-    pair.candidates = traverse_pair(s, s.traversal[0], pair, used, false);
+    pair.candidates = traverse_pair(set, bodies[shell.body], bodies[shell.pairs[p].b], pair, t,
+                                    lane, used, false);
     used += pair.candidates;
     if (used > most) {
-      used = keep_deepest(s, used, most, s.pairs + first_pair, p + 1 - first_pair);
-      s.report.status |= H6_CONTACTS_DROPPED;
+      used = keep_deepest(t, used, most, shell.searches.first(p + 1));
+      lane.report.status |= H6_CONTACTS_DROPPED;
     }
   }
   return used;
 }
 
-// Is there enough for two, and enough pairs? One that has most of the work is shared within. With a
-// budget the clock decides pair after pair, in order.
-bool worth_sharing(const h6Session& s, const Body& a, std::size_t first_pair,
-                   std::size_t end_pair) {
-  if (!s.traversal[1].candidate || end_pair - first_pair < 2 || s.anytime.by_clock) return false;
-  if (a.traverse_ns < (a.pairs_shared ? 0.5 * kPairsWorthSharing : kPairsWorthSharing))
+// Is there enough work for two threads, and in enough pairs? A pair that has most of the work is
+// shared within. With a budget the clock decides pair after pair, in order.
+bool worth_sharing(const ShellBody& shell, const Lane& lane) {
+  if (!lane.helper || shell.pairs.size() < 2 || lane.anytime->by_clock) return false;
+  if (shell.traverse_ns < (shell.pairs_shared ? 0.5 * kPairsWorthSharing : kPairsWorthSharing))
     return false;
   std::size_t all = 0, most = 0;
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    all += s.pairs[p].sampled;
-    most = std::max(most, s.pairs[p].sampled);
+  for (const PairSearch& pair : shell.searches) {
+    all += pair.sampled;
+    most = std::max(most, pair.sampled);
   }
   return most < kWorthSharing || 2 * most <= all;
 }
 
-// Every thread fills its own scratch; joined in the order of pairs. False: there is no room, as
-// only where contacts will be dropped. Nothing is lost by then doing it again: expiries stay true.
-bool traverse_shared(h6Session& s, std::size_t first_pair, std::size_t end_pair,
-                     std::size_t* used) {
-  TraverseScratch &mine = s.traversal[0], &helpers = s.traversal[1];
+// Each thread fills its own scratch; the results are joined in the order of pairs. False where the
+// scratch is too small, which happens only where contacts will be dropped. The traversal can then
+// simply be repeated, because expiries stay true.
+bool traverse_shared(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                     Lane& lane, std::size_t* used) {
+  TraverseScratch &mine = lane.scratch->traverse, &helpers = *lane.helper;
   mine.used = helpers.used = 0;
-  const std::size_t pairs = end_pair - first_pair, slice = (pairs + kPairSlices - 1) / kPairSlices;
+  const Body& a = bodies[shell.body];
+  const std::size_t pairs = shell.pairs.size(), slice = (pairs + kPairSlices - 1) / kPairSlices;
+  const std::size_t room = kBlockRows * a.shell->blocks.count;
   std::atomic<bool> full{false};
-  s.team->for_slices((pairs + slice - 1) / slice, [&](std::size_t i) {
+  lane.team->for_slices((pairs + slice - 1) / slice, [&](std::size_t i) {
     const int here = sched::FrameTeam::here();
-    TraverseScratch& t = s.traversal[here];
-    const std::size_t end = std::min(first_pair + (i + 1) * slice, end_pair);
-    for (std::size_t p = first_pair + i * slice; p < end; ++p) {
-      Pair& pair = s.pairs[p];
-      const std::size_t room = kBlockRows * s.model->shells[s.bodies[pair.a].shell].blocks.count;
-      if (t.used + room > s.candidate_capacity) return full.store(true, std::memory_order_relaxed);
+    TraverseScratch& t = here == 0 ? mine : helpers;
+    const std::size_t end = std::min((i + 1) * slice, pairs);
+    for (std::size_t p = i * slice; p < end; ++p) {
+      if (t.used + room > t.capacity) return full.store(true, std::memory_order_relaxed);
+      PairSearch& pair = shell.searches[p];
       pair.found_by = here;
       pair.first = t.used;
-      pair.candidates = traverse_pair(s, t, pair, t.used, true);
+      pair.candidates =
+          traverse_pair(set, a, bodies[shell.pairs[p].b], pair, t, lane, t.used, true);
       t.used += pair.candidates;
     }
   });
   std::size_t end = mine.used + helpers.used;
-  if (full.load(std::memory_order_relaxed) || end > s.candidate_capacity) return false;
+  if (full.load(std::memory_order_relaxed) || end > mine.capacity) return false;
   *used = end;
-  // From the last one on: what is the caller's own only ever moves up.
-  for (std::size_t p = end_pair; p-- > first_pair;) {
-    Pair& pair = s.pairs[p];
+  // From the last one on: the caller's own candidates then only ever move up.
+  for (std::size_t p = pairs; p-- > 0;) {
+    PairSearch& pair = shell.searches[p];
     end -= pair.candidates;
-    move_candidates(mine, end, s.traversal[pair.found_by], pair.first, pair.candidates);
+    move_candidates(mine, end, pair.found_by == 0 ? mine : helpers, pair.first, pair.candidates);
     pair.first = end;
   }
   return true;
@@ -134,60 +139,61 @@ bool traverse_shared(h6Session& s, std::size_t first_pair, std::size_t end_pair,
 
 }  // namespace
 
-void traverse(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  Body& a = s.bodies[s.pairs[first_pair].a];
-  const std::size_t most = s.contacts[s.pairs[first_pair].a].capacity;
-  const bool timed = s.traversal[1].candidate && end_pair - first_pair > 1;
+void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  const TraverseScratch& t = lane.scratch->traverse;
+  const std::size_t most = shell.contacts.capacity;
+  const bool timed = lane.helper && shell.pairs.size() > 1;
   const std::int64_t since = timed ? sched::now_ns() : 0;
   std::size_t used = 0;
-  a.pairs_shared =
-      worth_sharing(s, a, first_pair, end_pair) && traverse_shared(s, first_pair, end_pair, &used);
-  if (!a.pairs_shared) used = traverse_in_order(s, first_pair, end_pair, most);
-  used = keep_few(s, first_pair, end_pair, used);
+  shell.pairs_shared =
+      worth_sharing(shell, lane) && traverse_shared(set, bodies, shell, lane, &used);
+  if (!shell.pairs_shared) used = traverse_in_order(set, bodies, shell, lane);
+  used = keep_few(*lane.anytime, t, shell.searches, used);
   if (used > most) {
-    keep_deepest(s, used, most, s.pairs + first_pair, end_pair - first_pair);
-    s.report.status |= H6_CONTACTS_DROPPED;
+    keep_deepest(t, used, most, shell.searches);
+    lane.report.status |= H6_CONTACTS_DROPPED;
   }
-  if (timed) a.traverse_ns = static_cast<double>(sched::now_ns() - since);
-  for (std::size_t p = first_pair; p < end_pair; ++p)
-    s.report.missed_depth_voxels =
-        std::max<double>(s.report.missed_depth_voxels, s.pairs[p].missed);
+  if (timed) shell.traverse_ns = static_cast<double>(sched::now_ns() - since);
+  for (const PairSearch& pair : shell.searches)
+    lane.report.missed_depth_voxels =
+        std::max<double>(lane.report.missed_depth_voxels, pair.missed);
 }
 
-void gather_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  Contacts& c = s.contacts[s.pairs[first_pair].a];
+void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  Contacts& c = shell.contacts;
   c.count = 0;
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    Pair& pair = s.pairs[p];
-    const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-    const Shell& shell = s.model->shells[a.shell];
-    const Field& field = s.model->fields[b.field];
+  const Body& a = bodies[shell.body];
+  const Shell& points = *a.shell;
+  const kernels::ShellColumns columns{points.x.data,    points.y.data,  points.z.data,
+                                      points.nx.data,   points.ny.data, points.nz.data,
+                                      points.point.data};
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    Pair& pair = shell.pairs[p];
+    PairSearch& found = shell.searches[p];
+    const Body& b = bodies[pair.b];
     const std::size_t first = c.count;
     kernels::ContactFrame frame;
-    const Vec3 arm = a.R * (shell.centre - a.com);
+    const Vec3 arm = a.R * (points.centre - a.com);
     for (int k = 0; k < 9; ++k) {
       frame.Ra[k] = static_cast<float>(a.R(k / 3, k % 3));
       frame.Rb[k] = static_cast<float>(b.R(k / 3, k % 3));
     }
     for (int k = 0; k < 3; ++k) frame.arm[k] = static_cast<float>(arm[k]);
-    frame.voxel = static_cast<float>(field.voxel);
-    const kernels::ShellColumns columns{shell.x.data,    shell.y.data,  shell.z.data,
-                                        shell.nx.data,   shell.ny.data, shell.nz.data,
-                                        shell.point.data};
-    const bool many = pair.candidates >= kManyContacts;
-    const std::size_t size = many ? kContactSlice : pair.candidates;
+    frame.voxel = static_cast<float>(b.field->voxel);
+    const bool many = found.candidates >= kManyContacts;
+    const std::size_t size = many ? kContactSlice : found.candidates;
     const auto make = [&](std::size_t slice) {
       const std::size_t at = slice * size, to = first + at;
-      kernels::make_contacts(columns, candidates_from(s.traversal[0], pair.first + at),
-                             std::min(size, pair.candidates - at), frame,
+      kernels::make_contacts(columns, candidates_from(lane.scratch->traverse, found.first + at),
+                             std::min(size, found.candidates - at), frame,
                              {c.depth + to, c.nx + to, c.ny + to, c.nz + to, c.gx + to, c.gy + to,
                               c.gz + to, c.rx + to, c.ry + to, c.rz + to, c.point + to});
     };
-    s.team->for_slices(many ? (pair.candidates + size - 1) / size : 1, make);
-    c.count += pair.candidates;
-    if (pair.candidates > 0) pair.arms = arms_to_field(a, b, field);
+    lane.team->for_slices(many ? (found.candidates + size - 1) / size : 1, make);
+    c.count += found.candidates;
+    if (found.candidates > 0) found.arms = arms_to_field(a, b);
+    std::fill_n(c.field_body + first, found.candidates, pair.b);
     pair.begin = first;
-    std::fill_n(c.field_body + first, pair.candidates, pair.b);
     pair.end = c.count;
   }
 }

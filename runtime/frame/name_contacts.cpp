@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// name_contacts.cpp - the part and the triangle that each contact is with, for those who ask.
+// name_contacts.cpp - names the part and the triangle that each contact is with, on request.
 //
-// Fields keep them by brick. A contact's brick is found again from its arm, at the place that the
-// last traversal saw: so the frame itself pays one matrix a pair, and nothing a contact.
+// A field keeps them by brick. A contact's brick is found again from its arm and the place of the
+// last traversal. So the frame itself pays one matrix a pair, and nothing a contact.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +11,7 @@
 namespace h6 {
 namespace {
 
-// The row of the brick that a point [voxel] is in; -1: in none.
+// The row of the brick that holds a point [voxel], or -1.
 std::int32_t brick_of(const kernels::FieldView& field, const float (&at)[3]) {
   std::int32_t brick[3];
   for (int k = 0; k < 3; ++k) {
@@ -22,13 +22,12 @@ std::int32_t brick_of(const kernels::FieldView& field, const float (&at)[3]) {
                   field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]]);
 }
 
-void name_rows(const h6Session& s, const Pair& pair, std::int32_t* part, std::int32_t* triangle) {
-  const Contacts& c = s.contacts[pair.a];
-  const Field& field = s.model->fields[s.bodies[pair.b].field];
+void name_rows(const Contacts& c, const Field& field, const Pair& pair, const kernels::Affine& arms,
+               std::int32_t* part, std::int32_t* triangle) {
   for (std::size_t i = pair.begin; i < pair.end; ++i) {
     float at[3];
     for (int k = 0; k < 3; ++k) {
-      const float* m = pair.arms.m[k];
+      const float* m = arms.m[k];
       at[k] = m[0] * c.rx[i] + (m[1] * c.ry[i] + (m[2] * c.rz[i] + m[3]));
     }
     const std::int32_t row = brick_of(field.view, at);
@@ -44,7 +43,13 @@ using namespace h6;
 
 extern "C" void h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
                                int32_t* triangle) {
-  H6_ASSERT(shell_body >= 0 && static_cast<std::size_t>(shell_body) < session->body_count);
-  for (std::size_t p = 0; p < session->pair_count; ++p)
-    if (session->pairs[p].a == shell_body) name_rows(*session, session->pairs[p], part, triangle);
+  const h6Session& s = *session;
+  H6_ASSERT(shell_body >= 0 && static_cast<std::size_t>(shell_body) < s.bodies.size());
+  const ShellBody* shell = find_shell(s, shell_body);
+  if (!shell) return;
+  for (std::size_t p = 0; p < shell->pairs.size(); ++p) {
+    const Pair& pair = shell->pairs[p];
+    name_rows(shell->contacts, *s.bodies[pair.b].field, pair, shell->searches[p].arms, part,
+              triangle);
+  }
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+// net_stiffness.cpp - the extreme eigenvalues of a shell body's contact stiffness.
 #include "runtime/frame/net_stiffness.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "runtime/frame/stages.h"
 #include "runtime/frame/weighing.h"
 
 namespace h6 {
@@ -17,19 +17,19 @@ StiffnessRange stiffness_range(const Mat6& B, double lever) {
   return {solver.eigenvalues()[0], solver.eigenvalues()[5]};
 }
 
-void report_net_stiffness(h6Session& s) {
-  bool first_body = true;
-  for (std::size_t first = 0, end; first < s.pair_count; first = end) {
-    end = pairs_of_shell(s, first);
+void report_net_stiffness(std::span<const Body> bodies, std::span<const ShellBody> shells,
+                          h6FrameReport& report) {
+  bool first = true;
+  for (const ShellBody& shell : shells) {
     Mat6 B = Mat6::Zero();
-    for (std::size_t p = first; p < end; ++p) B += s.pairs[p].B;
+    for (const Pair& pair : shell.pairs) B += pair.B;
     if (B.isZero(0)) continue;
-    const Body& body = s.bodies[s.pairs[first].a];
+    const Body& body = bodies[shell.body];
     const StiffnessRange range = stiffness_range(B, series_lever(body.radius, body.voxel));
-    double &least = s.report.net_stiffness_min, &most = s.report.net_stiffness_max;
-    least = first_body ? range.least : std::min(least, range.least);
-    most = first_body ? range.most : std::max(most, range.most);
-    first_body = false;
+    double &least = report.net_stiffness_min, &most = report.net_stiffness_max;
+    least = first ? range.least : std::min(least, range.least);
+    most = first ? range.most : std::max(most, range.most);
+    first = false;
   }
 }
 

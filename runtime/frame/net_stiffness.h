@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// net_stiffness.h - how stiff a shell body's contacts are together, whatever their number.
-// METHOD.md, Sec. 3.
+// net_stiffness.h - how stiff all contacts of a shell body are together. METHOD.md, Sec. 3.
 #pragma once
-#include "runtime/frame/session.h"
+#include "runtime/frame/pair.h"
 
 namespace h6 {
 
@@ -12,7 +11,8 @@ struct StiffnessRange {
 // Extreme eigenvalues of S B S, S = diag(1, 1, 1, 1/lever, ...): B = sum w k J J^T, symmetric.
 StiffnessRange stiffness_range(const Mat6& B, double lever);
 
-// Into the report, from what the sums of this frame left in the pairs.
-void report_net_stiffness(h6Session& s);
+// The range over all shell bodies that touch something, from the pairs' B of this frame.
+void report_net_stiffness(std::span<const Body> bodies, std::span<const ShellBody> shells,
+                          h6FrameReport& report);
 
 }  // namespace h6

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// passivity.cpp - the energy of hands and contacts, and what keeps it from going below zero.
 #include "runtime/frame/passivity.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
+#include "runtime/frame/motion_stages.h"
 
 namespace h6 {
 namespace {
@@ -31,29 +33,28 @@ Vec6 accelerated_by(const Body& body, const Vec6& f) {
   return a;
 }
 
-// Mean velocity in the coming step. For an explicit step it is exact except for gyroscopic terms.
-// For an implicit step it is the present velocity, which overestimates what the contacts will give
-// out.
-Vec6 mean_velocity(const h6Session& s, const Body& body) {
+// The mean velocity in the coming step. Of an explicit step it is exact but for gyroscopic terms;
+// of an implicit step it is the velocity now, which overestimates what the contacts will give out.
+Vec6 mean_velocity(const Settings& set, const Body& body, const LinearWrench& acting) {
   Vec6 u = velocity(body);
-  if (s.integrator == H6_EXPLICIT && free_mass(body))
-    u += 0.5 * s.dt * accelerated_by(body, body.f);
+  if (set.integrator == H6_EXPLICIT && free_mass(body))
+    u += 0.5 * set.dt * accelerated_by(body, acting.f);
   return u;
 }
 
-// Adds the power of the contacts' wrench F - alpha c on one body in the coming step.
-void add_power(const h6Session& s, const Body& body, const Vec6& F, const Vec6& c,
+// Adds the power that the wrench F - alpha c of the contacts gives one body in the coming step.
+// `u`: the body's mean velocity.
+void add_power(const Settings& set, const Body& body, const Vec6& u, const Vec6& F, const Vec6& c,
                ReliefPower& power) {
-  const Vec6 u = mean_velocity(s, body);
   power.w0 += F.dot(u);
   power.w1 += c.dot(u);
-  if (s.integrator != H6_EXPLICIT || !free_mass(body)) return;
-  const Vec6 g = 0.5 * s.dt * accelerated_by(body, c);
+  if (set.integrator != H6_EXPLICIT || !free_mass(body)) return;
+  const Vec6 g = 0.5 * set.dt * accelerated_by(body, c);
   power.w1 += F.dot(g);
   power.w2 += c.dot(g);
 }
 
-// Elastic energy of the contacts of a frame [J].
+// The energy in the springs of a frame's contacts [J].
 double elastic_energy(const Contacts& c, double stiffness) {
   double sum = 0;
   for (std::size_t i = 0; i < c.count; ++i)
@@ -68,67 +69,63 @@ Vec6 relative(const Pair& pair, const Vec6& ua, const Vec6& ub) {
   return u;
 }
 
-void take_away(h6Session& s, Pair& pair, const Vec6& f) {
-  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-  const Vec6 on_b = arm_shift(s, pair) * f;
+// Takes f from the pair's wrench on a. A hand that holds a body carries all that acts on it.
+void take_away(std::span<const Body> bodies, const Sides& sides, Pair& pair, const Vec6& f,
+               std::span<Hand> hands) {
+  const Vec6 on_b = arm_shift(sides.a, sides.b) * f;
   pair.f -= f;
-  if (!a.fixed) a.f -= f;
-  if (!b.fixed) b.f += on_b;
-  // A hand with direct coupling feels everything that acts on its body.
-  for (std::size_t h = 0; h < s.hand_count; ++h) {
-    Hand& hand = s.hands[h];
-    if (s.bodies[hand.body].motion != Motion::held || hand.mode != H6_IMPEDANCE) continue;
+  if (!sides.a.fixed) sides.on_a.f -= f;
+  if (!sides.b.fixed) sides.on_b.f += on_b;
+  for (Hand& hand : hands) {
+    if (bodies[hand.body].motion != Motion::held || hand.mode != H6_IMPEDANCE) continue;
     if (hand.body == pair.a) hand.wrench += f;
     if (hand.body == pair.b) hand.wrench -= on_b;
   }
 }
 
-void add_damping(h6Session& s, Pair& pair, double alpha) {
-  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-  const Mat6 S = arm_shift(s, pair), D = alpha * pair.B;
-  if (!a.fixed) a.D -= D;
-  if (!b.fixed) b.D -= S * D * S.transpose();
-  if (a.fixed || b.fixed) return;
-  pair.Dab += D * S.transpose();
-  pair.Dba += S * D;
+void add_damping(const Sides& sides, Pair& pair, double alpha) {
+  const Mat6 S = arm_shift(sides.a, sides.b), D = alpha * pair.B;
+  if (!sides.a.fixed) sides.on_a.D -= D;
+  if (!sides.b.fixed) sides.on_b.D -= S * D * S.transpose();
+  if (!pair.between) return;
+  pair.between->Dab += D * S.transpose();
+  pair.between->Dba += S * D;
 }
 
 enum class Relief { damping, scaling };
 
-// Reduces the wrenches of one shell body's contacts as little as possible, so that they give out at
-// most `most` [W]: by damping along their motion, or by a common share. Returns the power that is
-// left [W].
-double relieve(h6Session& s, std::size_t first, std::size_t end, double most, Relief by) {
-  Body& body = s.bodies[s.pairs[first].a];
-  const Vec6 ua = mean_velocity(s, body);
-  const auto part = [&](const Pair& pair) -> Vec6 {
-    if (by == Relief::scaling) return pair.f;
-    return pair.B * relative(pair, ua, mean_velocity(s, s.bodies[pair.b]));
-  };
+// Takes as little as possible from the contacts of one shell body so that they give out `most` [W]:
+// by damping along their motion, or as a share of all of them. Returns what they then give out.
+double relieve(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+               std::span<LinearWrench> acting, std::span<Hand> hands, double most, Relief by,
+               h6Status& status) {
+  const Body& a = bodies[shell.body];
+  const Vec6 ua = mean_velocity(set, a, acting[shell.body]);
   Vec6 F = Vec6::Zero(), c = Vec6::Zero();
   ReliefPower power;
-  for (std::size_t p = first; p < end; ++p) {
-    Pair& pair = s.pairs[p];
+  for (Pair& pair : shell.pairs) {
     if (pair.f.isZero(0)) continue;
-    pair.relief = part(pair);
+    const Body& b = bodies[pair.b];
+    const Vec6 ub = mean_velocity(set, b, acting[pair.b]);
+    pair.relief = by == Relief::scaling ? pair.f : Vec6(pair.B * relative(pair, ua, ub));
     F += pair.f;
     c += pair.relief;
-    const Mat6 S = arm_shift(s, pair);
-    add_power(s, s.bodies[pair.b], -S * pair.f, -S * pair.relief, power);
+    const Mat6 S = arm_shift(a, b);
+    add_power(set, b, ub, -S * pair.f, -S * pair.relief, power);
   }
-  add_power(s, body, F, c, power);
+  add_power(set, a, ua, F, c, power);
   if (power.w0 <= most) return power.w0;
-  // Contacts that give out power are brought to zero power and no further: together they never
-  // pull.
+  // Contacts that give out energy may be stopped from it, no more: together they never pull.
   const double alpha = relief_for(power, power.w0 > 0 ? std::max(most, 0.0) : most);
   if (!(alpha > 0)) return power.w0;
-  for (std::size_t p = first; p < end; ++p) {
-    if (s.pairs[p].f.isZero(0)) continue;
-    take_away(s, s.pairs[p], alpha * s.pairs[p].relief);
-    if (by == Relief::damping) add_damping(s, s.pairs[p], alpha);
+  for (Pair& pair : shell.pairs) {
+    if (pair.f.isZero(0)) continue;
+    const Sides sides = sides_of(pair, bodies, acting);
+    take_away(bodies, sides, pair, alpha * pair.relief, hands);
+    if (by == Relief::damping) add_damping(sides, pair, alpha);
   }
-  if (by == Relief::damping) body.contact_port.alpha = alpha;
-  s.report.status |= H6_PASSIVITY;
+  if (by == Relief::damping) shell.port.alpha = alpha;
+  status |= H6_PASSIVITY;
   return power.w0 - alpha * power.w1 + alpha * alpha * power.w2;
 }
 
@@ -138,7 +135,7 @@ double spring_energy(double k, double stretch, double most) {
   return stretch <= knee ? 0.5 * k * stretch * stretch : most * (stretch - 0.5 * knee);
 }
 
-// Energy of a hand's coupling and body while the body touches nothing [J].
+// The energy that a hand's coupling and body hold while the body touches nothing [J].
 double stored_energy(const Hand& hand, const Body& body) {
   if (body.motion == Motion::held) return 0;
   const h6CouplingDef& c = hand.coupling;
@@ -152,9 +149,10 @@ double stored_energy(const Hand& hand, const Body& body) {
   return sum + 0.5 * body.mass * body.v.squaredNorm() + 0.5 * w.dot(body.inertia * w);
 }
 
-bool touches(const h6Session& s, std::int32_t body) {
-  for (std::size_t p = 0; p < s.pair_count; ++p)
-    if ((s.pairs[p].a == body || s.pairs[p].b == body) && !s.pairs[p].f.isZero(0)) return true;
+bool touches(std::span<const ShellBody> shells, std::int32_t body) {
+  for (const ShellBody& shell : shells)
+    for (const Pair& pair : shell.pairs)
+      if ((pair.a == body || pair.b == body) && !pair.f.isZero(0)) return true;
   return false;
 }
 
@@ -225,32 +223,31 @@ bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double 
   return changed;
 }
 
-void observe_hand(h6Session& s, Hand& hand) {
-  if (!hand.passivity || !hand.seen || hand.mode != H6_IMPEDANCE) return;
-  const h6Wrench& f = hand.told;
-  hand.port.move(hand.filter.device().pose,
-                 {{-f.force.x, -f.force.y, -f.force.z}, {-f.torque.x, -f.torque.y, -f.torque.z}});
-  const bool touching = touches(s, hand.body);
-  if (hand.port.known() && (touching || !s.gravity.isZero(0))) return;
-  const double stored = hand.filter.power_scale() * stored_energy(hand, s.bodies[hand.body]);
-  hand.port.known() ? hand.port.spend(stored) : hand.port.start(stored);
+void observe_hand(const Settings& set, std::span<const Body> bodies,
+                  std::span<const ShellBody> shells, const Hand& hand, HandDevice& device) {
+  if (!device.passivity || !hand.seen || hand.mode != H6_IMPEDANCE) return;
+  const h6Wrench& f = device.told;
+  HandPort& port = device.port;
+  port.move(device.filter.device().pose,
+            {{-f.force.x, -f.force.y, -f.force.z}, {-f.torque.x, -f.torque.y, -f.torque.z}});
+  const bool touching = touches(shells, hand.body);
+  if (port.known() && (touching || !set.gravity.isZero(0))) return;
+  const double stored = device.filter.power_scale() * stored_energy(hand, bodies[hand.body]);
+  port.known() ? port.spend(stored) : port.start(stored);
 }
 
-bool damp_hand(h6Session& s, Hand& hand, h6Wrench& felt) {
-  if (!hand.passivity || hand.clutched) return false;
-  const double scale = hand.filter.force_scale();
-  if (!hand.port.damp(felt, scale * hand.coupling.max_force, scale * hand.coupling.max_torque,
-                      s.dt))
-    return false;
-  s.report.status |= H6_PASSIVITY;
-  return true;
+bool damp_hand(HandDevice& device, const Hand& hand, h6Wrench& felt, double dt) {
+  if (!device.passivity || hand.clutched) return false;
+  const double scale = device.filter.force_scale();
+  return device.port.damp(felt, scale * hand.coupling.max_force, scale * hand.coupling.max_torque,
+                          dt);
 }
 
-void note_command(h6Session&, Hand& hand, const h6DeviceCommand& command) {
-  hand.told = command.wrench;
-  if (!hand.passivity || hand.mode == H6_IMPEDANCE) return;
-  if (!hand.port.known()) hand.port.start(0);
-  hand.port.move(command.pose, hand.clutched ? h6Wrench{} : hand.filter.device().wrench);
+void note_command(HandDevice& device, const Hand& hand, const h6DeviceCommand& command) {
+  device.told = command.wrench;
+  if (!device.passivity || hand.mode == H6_IMPEDANCE) return;
+  if (!device.port.known()) device.port.start(0);
+  device.port.move(command.pose, hand.clutched ? h6Wrench{} : device.filter.device().wrench);
 }
 
 double relief_for(const ReliefPower& power, double most) {
@@ -261,66 +258,62 @@ double relief_for(const ReliefPower& power, double most) {
   return 2 * excess / (power.w1 + std::sqrt(root));
 }
 
-void damp_contacts(h6Session& s) {
-  for (std::size_t first = 0, end; first < s.pair_count; first = end) {
-    end = pairs_of_shell(s, first);
-    Body& body = s.bodies[s.pairs[first].a];
-    ContactPort& port = body.contact_port;
+void damp_contacts(const Settings& set, std::span<const Body> bodies, std::span<ShellBody> shells,
+                   std::span<LinearWrench> acting, std::span<Hand> hands, h6Status& status) {
+  for (ShellBody& shell : shells) {
+    const Body& a = bodies[shell.body];
+    ContactPort& port = shell.port;
     port.alpha = 0;
     bool touching = false;
-    for (std::size_t p = first; p < end; ++p) {
-      Pair& pair = s.pairs[p];
-      pair.arm = body.x - s.bodies[pair.b].x;
-      pair.u = relative(pair, velocity(body), velocity(s.bodies[pair.b]));
+    for (Pair& pair : shell.pairs) {
+      const Body& b = bodies[pair.b];
+      pair.arm = a.x - b.x;
+      pair.u = relative(pair, velocity(a), velocity(b));
       touching = touching || !pair.f.isZero(0);
     }
     if (!touching) {
-      // The contacts' damping dissipated any surplus: it must not pay for a later contact.
+      // Energy left over from one contact must not pay for a later one.
       port.energy = std::min(port.energy, 0.0);
       port.known = true;
       continue;
     }
-    if (!port.known)
-      port.energy = elastic_energy(s.contacts[s.pairs[first].a], s.contact.stiffness);
+    if (!port.known) port.energy = elastic_energy(shell.contacts, set.contact.stiffness);
     port.known = true;
-    const double most = port.energy / s.dt;
-    const double left = relieve(s, first, end, most, Relief::damping);
-    // One step may take a body in and throw it out; damping along its motion cannot undo that.
-    if (s.integrator == H6_EXPLICIT && left > std::max(most, 0.0) + 1e-9 * std::abs(left))
-      relieve(s, first, end, most, Relief::scaling);
+    const double most = port.energy / set.dt;
+    const double left = relieve(set, bodies, shell, acting, hands, most, Relief::damping, status);
+    // An explicit step may take a body in and throw it out; no damping along its motion undoes
+    // that.
+    if (set.integrator == H6_EXPLICIT && left > std::max(most, 0.0) + 1e-9 * std::abs(left))
+      relieve(set, bodies, shell, acting, hands, most, Relief::scaling, status);
   }
 }
 
-void observe_contacts(h6Session& s) {
-  for (std::size_t p = 0; p < s.pair_count; ++p) {
-    const Pair& pair = s.pairs[p];
-    if (pair.f.isZero(0)) continue;
-    const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-    ContactPort& port = s.bodies[pair.a].contact_port;
-    const Vec6 u = relative(pair, velocity(a), velocity(b));
-    Vec6 f = pair.f;
-    // A body that a hand holds moves with the hand, under the unchanged wrench.
-    if (s.integrator == H6_IMPLICIT && (free_mass(a) || free_mass(b)))
-      f -= s.dt * (pair.B * u) + (s.contact.damping + port.alpha) * (pair.B * (u - pair.u));
-    port.energy -= 0.5 * s.dt * f.dot(u + pair.u);
-    if (!std::isfinite(port.energy)) port.energy = 0;
+void observe_contacts(const Settings& set, std::span<const Body> bodies,
+                      std::span<ShellBody> shells) {
+  for (ShellBody& shell : shells) {
+    const Body& a = bodies[shell.body];
+    ContactPort& port = shell.port;
+    for (const Pair& pair : shell.pairs) {
+      if (pair.f.isZero(0)) continue;
+      const Body& b = bodies[pair.b];
+      const Vec6 u = relative(pair, velocity(a), velocity(b));
+      Vec6 f = pair.f;
+      // A body that a hand holds is moved by the hand, under the wrench as it is.
+      if (set.integrator == H6_IMPLICIT && (free_mass(a) || free_mass(b)))
+        f -= set.dt * (pair.B * u) + (set.contact.damping + port.alpha) * (pair.B * (u - pair.u));
+      port.energy -= 0.5 * set.dt * f.dot(u + pair.u);
+      if (!std::isfinite(port.energy)) port.energy = 0;
+    }
   }
 }
 
-void forget_energy(h6Session& s, std::int32_t body) {
-  for (std::size_t p = 0; p < s.pair_count; ++p)
-    if (s.pairs[p].a == body || s.pairs[p].b == body)
-      s.bodies[s.pairs[p].a].contact_port.known = false;
-  for (std::size_t h = 0; h < s.hand_count; ++h)
-    if (s.hands[h].body == body) s.hands[h].port.forget();
-}
-
-double least_energy(const h6Session& s) {
+double least_energy(const Settings& set, std::span<const ShellBody> shells,
+                    std::span<const HandDevice> devices) {
   double least = HUGE_VAL;
-  for (std::size_t h = 0; h < s.hand_count; ++h)
-    if (s.hands[h].passivity) least = std::min(least, s.hands[h].port.energy());
-  for (std::size_t p = 0; s.contact.passivity && p < s.pair_count; ++p)
-    least = std::min(least, s.bodies[s.pairs[p].a].contact_port.energy);
+  for (const HandDevice& device : devices)
+    if (device.passivity) least = std::min(least, device.port.energy());
+  if (set.contact.passivity)
+    for (const ShellBody& shell : shells) least = std::min(least, shell.port.energy);
   return least < HUGE_VAL ? least : 0;
 }
 

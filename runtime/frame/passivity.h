@@ -9,6 +9,9 @@
 
 #include "hapsix/hapsix.h"
 #include "runtime/base/math.h"
+#include "runtime/frame/body.h"
+#include "runtime/frame/pair.h"
+#include "runtime/frame/settings.h"
 
 namespace h6 {
 
@@ -51,20 +54,15 @@ class HandPort {
 };
 
 struct Hand;
-// Impedance: observes the device's new pose under the wrench of the last command.
-void observe_hand(h6Session& s, Hand& hand);
-// Impedance: HandPort::damp with the coupling's bounds. True when it changed the wrench.
-bool damp_hand(h6Session& s, Hand& hand, h6Wrench& felt);
-// Notes the command after the safety chain. In the admittance modes it observes the port: the
-// wrench that came in, over the motion that goes out. It changes neither.
-void note_command(h6Session& s, Hand& hand, const h6DeviceCommand& command);
-
-// E of the contacts of one shell body with all fields that it touches.
-struct ContactPort {
-  double energy = 0;
-  bool known = false;
-  double alpha = 0;  // the controller's damping in this frame, in addition to beta [s]
-};
+struct HandDevice;
+// Impedance: notes the device's new pose, under the wrench of the last command.
+void observe_hand(const Settings& set, std::span<const Body> bodies,
+                  std::span<const ShellBody> shells, const Hand& hand, HandDevice& device);
+// Impedance: keeps within the coupling's limits; true when it changed the wrench.
+bool damp_hand(HandDevice& device, const Hand& hand, h6Wrench& felt, double dt);
+// Notes the command. In the admittance modes this observes the port: the wrench that came in, over
+// the motion that goes out. Nothing is changed there, for neither is ours.
+void note_command(HandDevice& device, const Hand& hand, const h6DeviceCommand& command);
 
 // Power of the contacts when alpha times a wrench is taken from theirs: w0 - w1 alpha + w2 alpha^2.
 struct ReliefPower {
@@ -73,13 +71,14 @@ struct ReliefPower {
 // The least alpha >= 0 with a power of at most `most`; without any, the alpha of least power.
 double relief_for(const ReliefPower& power, double most);
 
-// Before the step, with all wrenches known: damps contacts that would give out more than E.
-void damp_contacts(h6Session& s);
-// After the step: subtracts the contacts' work on the bodies from E.
-void observe_contacts(h6Session& s);
-// For a body that was moved by h6SetBody: energy held at its new place counts as put in.
-void forget_energy(h6Session& s, std::int32_t body);
-// The least E of all observed ports; 0 without any.
-double least_energy(const h6Session& s);
+// Before the step, when all wrenches are known: damps contacts that would give out more than E.
+void damp_contacts(const Settings& set, std::span<const Body> bodies, std::span<ShellBody> shells,
+                   std::span<LinearWrench> acting, std::span<Hand> hands, h6Status& status);
+// After the step: counts the work that the contacts did on the bodies that moved.
+void observe_contacts(const Settings& set, std::span<const Body> bodies,
+                      std::span<ShellBody> shells);
+// The least E of all ports that are observed, or 0 [J].
+double least_energy(const Settings& set, std::span<const ShellBody> shells,
+                    std::span<const HandDevice> devices);
 
 }  // namespace h6

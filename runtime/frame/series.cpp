@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// series.cpp - the rule `series` in a frame: loads of all contacts of a shell body from one solve,
-// then wrenches and derivatives pair by pair. METHOD.md, Sec. 3.
+// series.cpp - the rule `series` in a frame: one solve gives the loads of all contacts of a shell
+// body; wrenches and derivatives follow pair by pair. METHOD.md, Sec. 3.
 //
 // With C_p = sum kappa J J^T and B_p = sum kappa J J_g^T over the loaded contacts of pair p (J
 // about a's centre of mass, unscaled), G = c S^-2 and A = G + sum_p C_p, relative motion q of pair
@@ -11,7 +11,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
 #include "runtime/frame/weighing.h"
 
 namespace h6 {
@@ -45,72 +45,63 @@ Mat6 series_spring(const h6ContactDef& def, double lever) {
   return G;
 }
 
-void weigh_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  Body& body = s.bodies[s.pairs[first_pair].a];
-  Contacts& c = s.contacts[s.pairs[first_pair].a];
-  for (std::size_t p = first_pair; p < end_pair; ++p)
-    fill_series_gap(c, s.contact.damping, pair_velocity(s, s.pairs[p]), s.pairs[p].begin,
-                    s.pairs[p].end);
+void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  const Body& a = bodies[shell.body];
+  Contacts& c = shell.contacts;
+  for (const Pair& pair : shell.pairs)
+    fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin, pair.end);
   const kernels::SeriesResult result =
-      solve_series(c, s.contact, series_lever(body.radius, body.voxel), body.series_y);
-  s.report.series_iterations =
-      std::max(s.report.series_iterations, static_cast<std::uint32_t>(result.iterations));
-  s.report.series_residual = std::max(s.report.series_residual, result.residual);
+      solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y);
+  h6FrameReport& report = lane.report;
+  report.series_iterations =
+      std::max(report.series_iterations, static_cast<std::uint32_t>(result.iterations));
+  report.series_residual = std::max(report.series_residual, result.residual);
 }
 
-void spread_series(h6Session& s, Pair& pair, const kernels::WrenchSum& sum) {
-  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-  const Vec6 f = s.contact.stiffness * Vec6::Map(sum.force);
+void spread_series(const Settings& set, const Sides& sides, Pair& pair,
+                   const kernels::WrenchSum& sum) {
+  const Vec6 f = set.contact.stiffness * Vec6::Map(sum.force);
   pair.f = f;
-  pair.right = row_major(sum.stiffness);  // B_p and C_p, until A is known
-  pair.right_d = row_major(sum.damping);
-  pair.Kab.setZero(), pair.Kba.setZero();
-  if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, f);
-  if (!a.fixed) a.f += f;
-  if (!b.fixed) b.f -= arm_shift(s, pair) * f;
+  if (pair.between) pair.between->Kab.setZero(), pair.between->Kba.setZero();
+  if (set.gradient == H6_EXACT) add_geometric_terms(sides, pair, f);
+  if (!sides.a.fixed) sides.on_a.f += f;
+  if (!sides.b.fixed) sides.on_b.f -= arm_shift(sides.a, sides.b) * f;
 }
 
-void join_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  Body& a = s.bodies[s.pairs[first_pair].a];
-  const double k = s.contact.stiffness, beta = s.contact.damping;
-  const Mat6 G = series_spring(s.contact, series_lever(a.radius, a.voxel));
+void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                 std::span<LinearWrench> acting) {
+  const Body& a = bodies[shell.body];
+  const double k = set.contact.stiffness, beta = set.contact.damping;
+  const Mat6 G = series_spring(set.contact, series_lever(a.radius, a.voxel));
   Mat6 B = Mat6::Zero(), C = Mat6::Zero();
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    B += s.pairs[p].right;
-    C += s.pairs[p].right_d;
+  for (const kernels::WrenchSum& sum : shell.sums) {
+    B += row_major(sum.stiffness);
+    C += row_major(sum.damping);
   }
   const Mat6 inverse = (G + C).inverse();
   if (!a.fixed) {
-    a.K -= k * G * inverse * B;
-    a.D -= k * beta * G * inverse * C;
+    acting[shell.body].K -= k * G * inverse * B;
+    acting[shell.body].D -= k * beta * G * inverse * C;
   }
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    Pair& pair = s.pairs[p];
-    Body& b = s.bodies[pair.b];
-    pair.B = k * (pair.right_d - pair.right_d * inverse * C);
-    pair.Dab.setZero(), pair.Dba.setZero();
-    if (b.fixed) continue;
-    const Mat6 S = arm_shift(s, pair), Bp = pair.right, Cp = pair.right_d;
-    pair.left = k * S * Cp * inverse;
-    pair.right = Bp * S.transpose();
-    pair.right_d = Cp * S.transpose();
-    b.K -= (k * S * Bp - pair.left * Bp) * S.transpose();
-    b.D -= beta * (k * S * Cp - pair.left * Cp) * S.transpose();
-    if (a.fixed) continue;
-    pair.Kab += k * G * inverse * pair.right;
-    pair.Kba += k * S * Bp - pair.left * B;
-    pair.Dab = k * beta * G * inverse * pair.right_d;
-    pair.Dba = beta * (k * S * Cp - pair.left * C);
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    Pair& pair = shell.pairs[p];
+    const Mat6 Bp = row_major(shell.sums[p].stiffness), Cp = row_major(shell.sums[p].damping);
+    pair.B = k * (Cp - Cp * inverse * C);
+    if (!pair.of_fields) continue;
+    BetweenFields& to = *pair.of_fields;
+    LinearWrench& on_b = acting[pair.b];
+    const Mat6 S = arm_shift(a, bodies[pair.b]);
+    to.left = k * S * Cp * inverse;
+    to.right = Bp * S.transpose();
+    to.right_d = Cp * S.transpose();
+    on_b.K -= (k * S * Bp - to.left * Bp) * S.transpose();
+    on_b.D -= beta * (k * S * Cp - to.left * Cp) * S.transpose();
+    if (!pair.between) continue;
+    pair.between->Kab += k * G * inverse * to.right;
+    pair.between->Kba += k * S * Bp - to.left * B;
+    pair.between->Dab = k * beta * G * inverse * to.right_d;
+    pair.between->Dba = beta * (k * S * Cp - to.left * C);
   }
-}
-
-void sum_series(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    Pair& pair = s.pairs[p];
-    spread_series(
-        s, pair, sum_series_rows(s.contacts[pair.a], s.gradient == H6_EXACT, pair.begin, pair.end));
-  }
-  join_series(s, first_pair, end_pair);
 }
 
 }  // namespace h6

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// session.cpp - from a definition to a session: everything is derived, sized and reserved here, so
+// session.cpp - makes a session from its definition: derives, sizes and reserves everything, so
 // that a frame has nothing left to decide.
 #include "runtime/frame/session.h"
 
@@ -8,8 +8,9 @@
 #include <new>
 #include <vector>
 
+#include "runtime/frame/contact_stages.h"
 #include "runtime/frame/session_checks.h"
-#include "runtime/frame/stages.h"
+#include "runtime/frame/traverse_pair.h"
 #include "runtime/frame/weighing.h"
 
 namespace h6 {
@@ -23,21 +24,22 @@ std::vector<h6PairDef> pairs_of(const h6SessionDef& def) {
       for (std::int32_t b = 0; b < count; ++b) {
         if (a == b || def.bodies[a].fixed || def.bodies[a].shell < 0 || def.bodies[b].field < 0)
           continue;
-        // Two moving bodies that have both touch once, not twice.
+        // Two moving bodies that both have a shell and a field make one pair, not two.
         const bool both =
             !def.bodies[b].fixed && def.bodies[b].shell >= 0 && def.bodies[a].field >= 0;
         if (both && b < a) continue;
         pairs.push_back({a, b});
       }
   }
-  // Those of one shell body stand together: their contacts are weighed together.
+  // Pairs of one shell body stand together, because their contacts are weighed together.
   std::stable_sort(pairs.begin(), pairs.end(), [](const h6PairDef& l, const h6PairDef& r) {
     return l.shell_body < r.shell_body;
   });
   return pairs;
 }
 
-// Each point an equal share of the mass; a little is added where points lie on a line or a spot.
+// Each point has an equal share of the mass. A ball of one voxel is added where the points lie on a
+// line or in a spot.
 Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) {
   Mat3 I = Mat3::Zero();
   for (std::size_t r = 0; r < shell.points; ++r) {
@@ -45,38 +47,37 @@ Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) 
     I += mass / static_cast<double>(shell.points) *
          (p.squaredNorm() * Mat3::Identity() - p * p.transpose());
   }
-  const double least = 0.4 * mass * voxel * voxel;  // a ball of one voxel
+  const double least = 0.4 * mass * voxel * voxel;
   if (Eigen::SelfAdjointEigenSolver<Mat3>(I, Eigen::EigenvaluesOnly).eigenvalues()[0] < least)
     I += least * Mat3::Identity();
   return I;
 }
 
-void set_body(h6Session& s, std::size_t i, const h6BodyDef& def,
-              const std::vector<h6PairDef>& pairs) {
-  Body& body = s.bodies[i];
+// The smallest voxel of the fields that body i can touch, or of its own where others touch it [m].
+double voxel_of(std::span<const Body> bodies, std::int32_t i, std::span<const h6PairDef> pairs) {
+  double voxel = HUGE_VAL;
+  for (const h6PairDef& p : pairs)
+    if (p.shell_body == i || p.field_body == i)
+      voxel = std::min(voxel, bodies[p.field_body].field->voxel);
+  return voxel < HUGE_VAL ? voxel : 1e-3;
+}
+
+void set_body(Body& body, const h6BodyDef& def, double voxel) {
   body.fixed = def.fixed;
   body.mass = def.mass;
   body.com = from(def.com);
-  body.shell = def.shell;
-  body.field = def.field;
-  double voxel = HUGE_VAL;
-  for (const h6PairDef& p : pairs)
-    if (p.shell_body == static_cast<std::int32_t>(i) ||
-        p.field_body == static_cast<std::int32_t>(i))
-      voxel = std::min(voxel, s.model->fields[s.bodies[p.field_body].field].voxel);
-  body.voxel = voxel < HUGE_VAL ? voxel : 1e-3;
-  if (body.shell >= 0) {
-    const Shell& shell = s.model->shells[body.shell];
-    for (std::size_t r = 0; r < shell.points; ++r)
-      body.radius = std::max(
-          body.radius, (Vec3(shell.x[r], shell.y[r], shell.z[r]) + shell.centre - body.com).norm());
-  }
+  body.voxel = voxel;
+  if (const Shell* shell = body.shell)
+    for (std::size_t r = 0; r < shell->points; ++r)
+      body.radius =
+          std::max(body.radius,
+                   (Vec3(shell->x[r], shell->y[r], shell->z[r]) + shell->centre - body.com).norm());
   const double* v = def.inertia;
   body.inertia << v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2];
   body.translation_only = def.translation_only;
   if (!body.fixed && body.inertia.isZero(0))
-    body.inertia = body.shell >= 0  // without a shell it never turns: any will do
-                       ? inertia_of(s.model->shells[body.shell], body.com, body.mass, body.voxel)
+    body.inertia = body.shell  // without a shell the body never turns, and any inertia will do
+                       ? inertia_of(*body.shell, body.com, body.mass, body.voxel)
                        : Mat3(body.mass * body.voxel * body.voxel * Mat3::Identity());
   set_mesh_pose(body, def.pose);
   body.v = from(def.velocity.linear);
@@ -85,36 +86,35 @@ void set_body(h6Session& s, std::size_t i, const h6BodyDef& def,
   if (body.translation_only) body.w.setZero();
 }
 
-// Of a free body that a person pushes, where the definition leaves it open (METHOD.md, Sec. 4): a
-// grip of 1500 N/m behind 5 ms of delay takes 7.5 N s/m of damping away.
+// The damping of a free body that a person pushes, where the definition leaves it open (METHOD.md,
+// Sec. 4): a grip of 1500 N/m behind 5 ms of delay takes 7.5 N s/m away.
 double admittance_damping(const h6HandDef& def, double mass) {
   return def.admittance_damping > 0 ? def.admittance_damping : std::max(mass / 0.02, 10.0);
 }
 
-void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
-  Hand& hand = s.hands[i];
-  Body& body = s.bodies[def.body];
+void set_hand(Hand& hand, HandDevice& device, Body& body, const h6HandDef& def,
+              double contact_stiffness) {
   hand.body = def.body;
   hand.mode = def.mode;
   hand.manipulandum_mass = def.manipulandum_mass;
   hand.driver_stiffness = def.driver_stiffness;
   hand.driver_damping = def.driver_damping;
-  hand.motion_scale = def.filter.motion_scale;
-  hand.rotation_scale = def.filter.rotation_scale;
+  device.motion_scale = def.filter.motion_scale;
+  device.rotation_scale = def.filter.rotation_scale;
   // A body that never turns hangs on the origin of its mesh frame.
   const Vec3 com = body.translation_only ? Vec3(Vec3::Zero()) : body.com;
-  hand.filter.set(def.filter, com, def.mode != H6_IMPEDANCE);
-  hand.safety = def.safety;
+  device.filter.set(def.filter, com, def.mode != H6_IMPEDANCE);
+  device.safety = def.safety;
   h6DeviceCapabilities unknown{};
   unknown.max_force = SafetyLimits{}.force, unknown.max_torque = SafetyLimits{}.torque;
   unknown.frame_time = true;
-  set_rating(hand, unknown);
-  hand.passivity = def.passivity;
-  hand.port.set(com);
+  set_rating(device, unknown);
+  device.passivity = def.passivity;
+  device.port.set(com);
   h6CouplingDef& c = hand.coupling = def.coupling;
   if (c.rotational_stiffness == 0)
     c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
-  if (c.max_force == 0) c.max_force = s.contact.stiffness * c.max_depth_voxels * body.voxel;
+  if (c.max_force == 0) c.max_force = contact_stiffness * c.max_depth_voxels * body.voxel;
   if (c.max_torque == 0)
     c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
   if (hand.mode == H6_ADMITTANCE) body.drag += admittance_damping(def, body.mass);
@@ -125,14 +125,14 @@ void set_hand(h6Session& s, std::size_t i, const h6HandDef& def) {
   hand.manipulandum = body;
 }
 
-// Moving bodies that pairs connect, in groups of at most four; a larger group falls into single
-// bodies, each then treating its neighbours as if they stood still within the step. Bodies without
-// mass of their own, quasi-static or held, are nobody's unknowns.
-std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>& pairs) {
+// Moving bodies that pairs connect, in groups of at most four. A larger group falls into single
+// bodies; within a step each treats its neighbours as if they stood still. Quasi-static and held
+// bodies have no mass of their own and are in no island.
+std::vector<Island> islands_of(std::span<const Body> bodies, std::span<const h6PairDef> pairs) {
   const auto dynamic = [&](std::int32_t i) {
-    return !s.bodies[i].fixed && s.bodies[i].motion == Motion::dynamic;
+    return !bodies[i].fixed && bodies[i].motion == Motion::dynamic;
   };
-  std::vector<std::int32_t> root(s.body_count);
+  std::vector<std::int32_t> root(bodies.size());
   for (std::size_t i = 0; i < root.size(); ++i) root[i] = static_cast<std::int32_t>(i);
   const auto find = [&](std::int32_t i) {
     while (root[i] != i) i = root[i];
@@ -158,90 +158,150 @@ std::vector<Island> islands_of(const h6Session& s, const std::vector<h6PairDef>&
 }
 
 struct Sizes {
-  std::size_t bodies, pairs, hands;
-  std::size_t groups, blocks;  // of the largest shell, and (all) of all pairs together
-  std::size_t all_groups, all_blocks;
-  std::size_t shells = 0;     // bodies that are the shell of a pair
-  bool shares = false;        // pairs between two threads
-  bool lanes = false;         // shell bodies between two threads
-  std::vector<bool> touches;  // (bodies) the body is the shell of a pair
+  std::size_t bodies = 0, pairs = 0, hands = 0;
+  std::size_t shells = 0;                      // bodies that are the shell of a pair
+  std::size_t groups = 16, blocks = 16;        // of the largest shell
+  std::size_t all_groups = 0, all_blocks = 0;  // of all pairs together
+  std::size_t between = 0, of_fields = 0;      // pairs with these columns
+  bool shares = false;                         // two threads share the pairs of a shell body
+  bool lanes = false;                          // two threads share the shell bodies
 };
 
-// Called twice: with an empty arena to count, then to take.
-void lay_out(h6Session& s, Arena& arena, const Sizes& n) {
-  s.bodies = arena.take<Body>(n.bodies);
-  s.pairs = arena.take<Pair>(n.pairs);
-  s.hands = arena.take<Hand>(n.hands);
-  s.islands = arena.take<Island>(n.bodies);
-  s.contacts = arena.take<Contacts>(n.bodies);
-  // Counting has no memory to put headers in.
-  for (std::size_t i = 0; i < n.bodies; ++i) {
-    Contacts columns{};
-    if (n.touches[i]) take_columns(columns, arena, s.max_contacts);
-    if (s.contacts) s.contacts[i] = columns;
-  }
-  s.candidate_capacity = s.max_contacts + kGroupRows * n.groups;
-  for (std::size_t i = 0; i < (n.shares || n.lanes ? 2u : 1u); ++i) {
-    TraverseScratch& t = s.traversal[i];
-    t.frontier = arena.take<std::uint32_t>(n.groups);
-    t.survivors = arena.take<std::uint32_t>(n.groups);
-    t.far = arena.take<std::uint32_t>(n.groups);
-    t.far_survivors = arena.take<std::uint32_t>(n.groups);
-    t.open_blocks = arena.take<std::uint32_t>(n.blocks);
-    t.clearance = arena.take<float>(n.groups);
-    t.rest = arena.take<float>(n.groups);
-    t.rows = arena.take<std::uint16_t>(n.groups);
-    t.near_rows = arena.take<std::uint16_t>(n.groups);
-    t.candidate = arena.take<std::uint32_t>(s.candidate_capacity);
-    for (float** column : {&t.candidate_distance, &t.gradient_x, &t.gradient_y, &t.gradient_z})
-      *column = arena.take<float>(s.candidate_capacity);
-  }
-  s.group_expiry = arena.take<float>(n.all_groups);
-  s.block_expiry = arena.take<float>(n.all_blocks);
-  s.rest_expiry = arena.take<float>(n.all_groups);
-  s.near_rows = arena.take<std::uint16_t>(n.all_groups);
-  const std::size_t merged = uses_clusters(s.contact) ? s.max_contacts : 0;
-  s.cluster_order = arena.take<std::uint32_t>(merged);
-  s.cluster_root = arena.take<std::uint32_t>(merged);
-  s.cluster_cell = arena.take<std::uint64_t>(merged);
-  const std::size_t weighing = weigh_scratch_bytes(s.contact, s.max_contacts);
-  s.weigh_scratch = weighing ? arena.take<char>(weighing) : nullptr;
-  s.slice_count = arena.take<std::size_t>(n.groups / kTouchSlice + 1);
-  s.slice_sum = arena.take<kernels::WrenchSum>(s.max_contacts / kSumSlice + 1);
-  s.shell_pairs = arena.take<std::uint32_t>(n.shells + 1);
-  if (!n.lanes) return;
-  s.lanes = arena.take<h6Session>(2);
-  s.lane_scratch = {arena.take<std::uint32_t>(merged), arena.take<std::uint32_t>(merged),
-                    arena.take<std::uint64_t>(merged),
-                    weighing ? arena.take<char>(weighing) : nullptr};
+bool both_move(const h6SessionDef& def, const h6PairDef& p) {
+  return !def.bodies[p.shell_body].fixed && !def.bodies[p.field_body].fixed;
+}
+bool couples_fields(const h6SessionDef& def, const h6PairDef& p) {
+  return def.contact.method == H6_METHOD_SERIES && !def.bodies[p.field_body].fixed;
 }
 
-bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
-  const std::vector<h6PairDef> pairs = pairs_of(def);
-  Sizes n{def.body_count,
-          pairs.size(),
-          def.hand_count,
-          16,
-          16,
-          0,
-          0,
-          0,
-          false,
-          false,
-          std::vector<bool>(def.body_count)};
-  for (const h6PairDef& p : pairs) {
-    const Shell& shell = s.model->shells[def.bodies[p.shell_body].shell];
+Sizes sizes_of(const h6Model& model, const h6SessionDef& def, std::span<const h6PairDef> pairs) {
+  Sizes n;
+  n.bodies = def.body_count, n.pairs = pairs.size(), n.hands = def.hand_count;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Shell& shell = model.shells[def.bodies[pairs[i].shell_body].shell];
     n.groups = std::max(n.groups, 16 * shell.blocks.count);
     n.blocks = std::max(n.blocks, shell.blocks.x.count);
     n.all_groups += 16 * shell.blocks.count;
     n.all_blocks += shell.blocks.x.count;
-    n.shares = n.shares || (def.threads > 1 && n.touches[p.shell_body]);
-    n.shells += !n.touches[p.shell_body];
-    n.touches[p.shell_body] = true;
+    n.between += both_move(def, pairs[i]);
+    n.of_fields += couples_fields(def, pairs[i]);
+    const bool another = i > 0 && pairs[i - 1].shell_body == pairs[i].shell_body;
+    n.shells += !another;
+    n.shares = n.shares || (def.threads > 1 && another);
   }
   n.lanes = def.threads > 1 && n.shells > 1;
+  return n;
+}
+
+// Columns that pairs point into.
+struct PairColumns {
+  PairSearch* searches;
+  kernels::WrenchSum* sums;
+  BetweenBodies* between;
+  BetweenFields* of_fields;
+  float *group_expiry, *block_expiry, *rest_expiry;
+  std::uint16_t* near_rows;
+};
+
+template <class T>
+std::span<T> take(Arena& arena, std::size_t n) {
+  return {arena.take<T>(n), n};
+}
+
+void take_traversal(TraverseScratch& t, Arena& arena, const Sizes& n, std::size_t max_contacts) {
+  t.capacity = max_contacts + kGroupRows * n.groups;
+  t.frontier = arena.take<std::uint32_t>(n.groups);
+  t.survivors = arena.take<std::uint32_t>(n.groups);
+  t.far = arena.take<std::uint32_t>(n.groups);
+  t.far_survivors = arena.take<std::uint32_t>(n.groups);
+  t.open_blocks = arena.take<std::uint32_t>(n.blocks);
+  t.clearance = arena.take<float>(n.groups);
+  t.rest = arena.take<float>(n.groups);
+  t.rows = arena.take<std::uint16_t>(n.groups);
+  t.near_rows = arena.take<std::uint16_t>(n.groups);
+  t.candidate = arena.take<std::uint32_t>(t.capacity);
+  for (float** column : {&t.candidate_distance, &t.gradient_x, &t.gradient_y, &t.gradient_z})
+    *column = arena.take<float>(t.capacity);
+}
+
+void take_scratch(Scratch& scratch, Arena& arena, const Sizes& n, const Settings& set) {
+  const std::size_t merged = uses_clusters(set.contact) ? set.max_contacts : 0;
+  scratch.cluster = {arena.take<std::uint32_t>(merged), arena.take<std::uint32_t>(merged),
+                     arena.take<std::uint64_t>(merged)};
+  const std::size_t weighing = weigh_scratch_bytes(set.contact, set.max_contacts);
+  scratch.weigh = weighing ? arena.take<char>(weighing) : nullptr;
+  scratch.slice_count = arena.take<std::size_t>(n.groups / kTouchSlice + 1);
+  scratch.slice_sum = arena.take<kernels::WrenchSum>(set.max_contacts / kSumSlice + 1);
+}
+
+// Called twice: with an empty arena to count, then to take.
+void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
+  s.bodies = take<Body>(arena, n.bodies);
+  s.acting = take<LinearWrench>(arena, n.bodies);
+  s.pairs = take<Pair>(arena, n.pairs);
+  s.shells = take<ShellBody>(arena, n.shells);
+  s.hands = take<Hand>(arena, n.hands);
+  s.devices = take<HandDevice>(arena, n.hands);
+  s.islands = take<Island>(arena, n.bodies);
+  columns = {arena.take<PairSearch>(n.pairs),      arena.take<kernels::WrenchSum>(n.pairs),
+             arena.take<BetweenBodies>(n.between), arena.take<BetweenFields>(n.of_fields),
+             arena.take<float>(n.all_groups),      arena.take<float>(n.all_blocks),
+             arena.take<float>(n.all_groups),      arena.take<std::uint16_t>(n.all_groups)};
+  for (std::size_t i = 0; i < n.shells; ++i) {
+    Contacts contacts{};
+    take_columns(contacts, arena, s.settings.max_contacts);
+    // Counting has no memory to put headers in.
+    if (s.shells.data()) new (&s.shells[i]) ShellBody{.contacts = contacts};
+  }
+  for (int i = 0; i < (n.shares || n.lanes ? 2 : 1); ++i)
+    take_traversal(s.lanes.scratch[i].traverse, arena, n, s.settings.max_contacts);
+  for (int i = 0; i < (n.lanes ? 2 : 1); ++i)
+    take_scratch(s.lanes.scratch[i], arena, n, s.settings);
+}
+
+// Sets all pairs and shell bodies; bodies are laid out already.
+void set_pairs(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef> pairs,
+               PairColumns to) {
+  PairSearch* const searches = to.searches;
+  kernels::WrenchSum* const sums = to.sums;
+  ShellBody* shell = nullptr;
+  std::size_t shells = 0, first = 0;  // first pair of the shell body
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    Pair& pair = *new (&s.pairs[i]) Pair();
+    PairSearch& search = *new (&searches[i]) PairSearch();
+    new (&sums[i]) kernels::WrenchSum();
+    pair.a = pairs[i].shell_body;
+    pair.b = pairs[i].field_body;
+    if (both_move(def, pairs[i])) pair.between = new (to.between++) BetweenBodies();
+    if (couples_fields(def, pairs[i])) pair.of_fields = new (to.of_fields++) BetweenFields();
+    search.group_expiry = to.group_expiry;
+    search.block_expiry = to.block_expiry;
+    search.rest_expiry = to.rest_expiry;
+    search.near_rows = to.near_rows;
+    const Tier& blocks = s.bodies[pair.a].shell->blocks;
+    to.group_expiry += 16 * blocks.count;
+    to.block_expiry += blocks.x.count;
+    to.rest_expiry += 16 * blocks.count;
+    to.near_rows += 16 * blocks.count;
+    if (i == 0 || pairs[i - 1].shell_body != pairs[i].shell_body) {
+      shell = &s.shells[shells++];
+      shell->body = pair.a;
+      first = i;
+    }
+    const std::size_t count = i + 1 - first;
+    shell->pairs = s.pairs.subspan(first, count);
+    shell->searches = {searches + first, count};
+    shell->sums = {sums + first, count};
+  }
+  s.anytime.pairs = {searches, pairs.size()};
+}
+
+bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
+  const std::vector<h6PairDef> pairs = pairs_of(def);
+  const Sizes n = sizes_of(*s.model, def, pairs);
+  PairColumns columns;
   Arena count;
-  lay_out(s, count, n);
+  lay_out(s, columns, count, n);
   s.memory_bytes = count.used();
   s.memory = allocate(def.allocator, s.memory_bytes);
   if (!s.memory)
@@ -250,42 +310,27 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   // Pages are touched now, not in the first frames.
   std::fill_n(static_cast<char*>(s.memory), s.memory_bytes, char{0});
   Arena arena(s.memory, s.memory_bytes);
-  lay_out(s, arena, n);
+  lay_out(s, columns, arena, n);
 
-  s.body_count = n.bodies;
   for (std::size_t i = 0; i < n.bodies; ++i) {
-    new (&s.bodies[i]) Body();
-    s.bodies[i].field = def.bodies[i].field;  // voxels of pairs are read before every body is set
+    Body& body = *new (&s.bodies[i]) Body();
+    if (const std::int32_t shell = def.bodies[i].shell; shell >= 0)
+      body.shell = &s.model->shells[shell];
+    if (const std::int32_t field = def.bodies[i].field; field >= 0)
+      body.field = &s.model->fields[field];
   }
-  for (std::size_t i = 0; i < n.bodies; ++i) set_body(s, i, def.bodies[i], pairs);
-  s.pair_count = n.pairs;
-  float *group_expiry = s.group_expiry, *block_expiry = s.block_expiry;
-  for (std::size_t i = 0; i < n.pairs; ++i) {
-    new (&s.pairs[i]) Pair();
-    s.pairs[i].a = pairs[i].shell_body;
-    s.pairs[i].b = pairs[i].field_body;
-    s.pairs[i].group_expiry = group_expiry;
-    s.pairs[i].block_expiry = block_expiry;
-    s.pairs[i].rest_expiry = s.rest_expiry + (group_expiry - s.group_expiry);
-    s.pairs[i].near_rows = s.near_rows + (group_expiry - s.group_expiry);
-    const Shell& shell = s.model->shells[s.bodies[s.pairs[i].a].shell];
-    group_expiry += 16 * shell.blocks.count;
-    block_expiry += shell.blocks.x.count;
-    if (i == 0 || pairs[i - 1].shell_body != pairs[i].shell_body)
-      s.shell_pairs[s.shell_count++] = static_cast<std::uint32_t>(i);
-  }
-  s.shell_pairs[s.shell_count] = static_cast<std::uint32_t>(n.pairs);
-  s.hand_count = n.hands;
-  for (std::size_t i = 0; i < n.hands; ++i) {
-    new (&s.hands[i]) Hand();
-    set_hand(s, i, def.hands[i]);
-  }
-  const std::vector<Island> islands = islands_of(s, pairs);
-  s.island_count = islands.size();
-  std::copy(islands.begin(), islands.end(), s.islands);
+  for (std::size_t i = 0; i < n.bodies; ++i)
+    set_body(s.bodies[i], def.bodies[i], voxel_of(s.bodies, static_cast<std::int32_t>(i), pairs));
+  set_pairs(s, def, pairs, columns);
+  for (std::size_t i = 0; i < n.hands; ++i)
+    set_hand(*new (&s.hands[i]) Hand(), *new (&s.devices[i]) HandDevice(),
+             s.bodies[def.hands[i].body], def.hands[i], s.settings.contact.stiffness);
+  const std::vector<Island> islands = islands_of(s.bodies, pairs);
+  s.islands = s.islands.first(islands.size());
+  std::copy(islands.begin(), islands.end(), s.islands.begin());
   s.team = new sched::FrameTeam(def.threads);
   if (n.lanes) s.alone = new sched::FrameTeam(1);
-  open_lanes(s);
+  open_lanes(s.lanes, s.team, s.alone, &s.anytime);
   return true;
 }
 
@@ -303,14 +348,15 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   if (!s) return fail(error, "no memory for a session"), nullptr;
   s->model = model;
   s->allocator = def->allocator;
-  s->contact = def->contact;
-  s->integrator = def->integrator;
-  s->gradient = def->gradient;
-  s->dt = 1 / def->rate;
-  s->gravity = from(def->gravity);
-  s->net_stiffness = def->net_stiffness;
-  s->max_contacts = def->max_contacts;
+  s->settings = {.contact = def->contact,
+                 .integrator = def->integrator,
+                 .gradient = def->gradient,
+                 .dt = 1 / def->rate,
+                 .gravity = from(def->gravity),
+                 .net_stiffness = def->net_stiffness,
+                 .max_contacts = def->max_contacts};
   s->anytime.budget_ns = 1e3 * def->frame_budget_us;
+  s->anytime.period_ns = 1e9 * s->settings.dt;
   bool ready = false;
   try {
     ready = fill(*s, *def, error);

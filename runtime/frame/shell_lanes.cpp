@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+// shell_lanes.cpp - shell bodies one after the other, or two at a time.
 #include "runtime/frame/shell_lanes.h"
 
 #include <algorithm>
-#include <new>
 
-#include "runtime/frame/session.h"
 #include "sched/clock.h"
 
 namespace h6 {
@@ -14,18 +13,16 @@ constexpr double kWorthSharing = 6000;  // ns that the other thread could take o
 // One shell body with more than this share of the work is better shared within.
 constexpr double kLopsided = 0.7;
 
-h6Session& lane_of(h6Session& s, int thread) { return s.lanes[thread]; }
-
-// How long both took for what: times of stages are those of the wall, in the proportion of the
-// work.
-void join_times(h6Session& s, double wall_us) {
-  double work = 0;
-  for (int i = 0; i < 2; ++i)
-    for (const double us : lane_of(s, i).report.stage_us) work += us;
-  for (int stage = 0; work > 0 && stage < H6_STAGE_COUNT; ++stage)
-    s.report.stage_us[stage] +=
-        wall_us / work *
-        (lane_of(s, 0).report.stage_us[stage] + lane_of(s, 1).report.stage_us[stage]);
+// Is there enough work for two threads, in several shell bodies?
+bool worth_two(const Lanes& lanes, std::span<const ShellBody> shells) {
+  // With a budget the clock decides pair after pair, in order.
+  if (!lanes.two || lanes.whole.anytime->by_clock) return false;
+  double all = 0, most = 0;
+  for (const ShellBody& shell : shells) {
+    all += shell.all_ns;
+    most = std::max(most, shell.all_ns);
+  }
+  return all - most > (lanes.side_by_side ? 0.5 : 1.0) * kWorthSharing && most <= kLopsided * all;
 }
 
 void join(h6FrameReport& to, const h6FrameReport& from) {
@@ -38,57 +35,66 @@ void join(h6FrameReport& to, const h6FrameReport& from) {
   to.series_residual = std::max(to.series_residual, from.series_residual);
 }
 
+// Stages of two lanes overlap. Each gets the part of the wall time that it had of the work, so that
+// the stages of a frame add up to no more than the frame.
+void join_times(const Lanes& lanes, double wall_us, h6FrameReport& report) {
+  double work = 0;
+  for (const Lane& lane : lanes.single)
+    for (const double us : lane.report.stage_us) work += us;
+  for (int stage = 0; work > 0 && stage < H6_STAGE_COUNT; ++stage)
+    report.stage_us[stage] +=
+        wall_us / work *
+        (lanes.single[0].report.stage_us[stage] + lanes.single[1].report.stage_us[stage]);
+}
+
+void run_side_by_side(Lanes& lanes, const Settings& set, std::span<const Body> bodies,
+                      std::span<ShellBody> shells, WeighShell weigh, h6FrameReport& report) {
+  const std::int64_t start = sched::ticks();
+  lanes.whole.team->for_slices(shells.size(), [&](std::size_t i) {
+    const std::int64_t since = sched::now_ns();
+    weigh(set, bodies, shells[i], lanes.single[sched::FrameTeam::here()]);
+    shells[i].all_ns = static_cast<double>(sched::now_ns() - since);
+  });
+  for (const Lane& lane : lanes.single) join(report, lane.report);
+  const double took = lanes.whole.tick_ns * static_cast<double>(sched::ticks() - start);
+  join_times(lanes, 1e-3 * took, report);
+}
+
 }  // namespace
 
-void open_lanes(h6Session& s) {
-  if (!s.lanes) return;
+void open_lanes(Lanes& lanes, sched::FrameTeam* team, sched::FrameTeam* alone, Anytime* anytime) {
+  lanes.whole.scratch = &lanes.scratch[0];
+  if (lanes.scratch[1].traverse.candidate) lanes.whole.helper = &lanes.scratch[1].traverse;
+  lanes.whole.team = team;
+  lanes.whole.anytime = anytime;
+  lanes.two = alone != nullptr;
   for (int i = 0; i < 2; ++i) {
-    h6Session& lane = *new (&s.lanes[i]) h6Session(s);
-    lane.lanes = nullptr;
-    lane.team = s.alone;
-    lane.traversal[0] = s.traversal[i];
-    lane.traversal[1] = {};
+    lanes.single[i].scratch = &lanes.scratch[i];
+    lanes.single[i].team = alone;
+    lanes.single[i].anytime = anytime;
   }
-  h6Session& second = s.lanes[1];
-  second.cluster_order = s.lane_scratch.cluster_order;
-  second.cluster_root = s.lane_scratch.cluster_root;
-  second.cluster_cell = s.lane_scratch.cluster_cell;
-  second.weigh_scratch = s.lane_scratch.weigh;
-  second.slice_count = nullptr;
-  second.slice_sum = nullptr;
 }
 
-bool worth_lanes(const h6Session& s) {
-  // With a budget the clock decides pair after pair, in order.
-  if (!s.lanes || s.anytime.by_clock) return false;
-  double all = 0, most = 0;
-  for (std::size_t i = 0; i < s.shell_count; ++i) {
-    const double ns = s.bodies[s.pairs[s.shell_pairs[i]].a].shell_ns;
-    all += ns;
-    most = std::max(most, ns);
+void begin_lanes(Lanes& lanes, bool cold, double tick_ns) {
+  for (Lane* lane : {&lanes.whole, &lanes.single[0], &lanes.single[1]}) {
+    lane->cold = cold;
+    lane->tick_ns = tick_ns;
+    lane->report = {};
   }
-  return all - most > (s.in_lanes ? 0.5 : 1.0) * kWorthSharing && most <= kLopsided * all;
 }
 
-void run_lanes(h6Session& s, ShellJob job) {
-  const std::int64_t start = sched::ticks();
-  for (int i = 0; i < 2; ++i) {
-    h6Session& lane = lane_of(s, i);
-    lane.report = {};
-    lane.report.coarse_pairs = s.report.coarse_pairs;
-    lane.anytime = s.anytime;
-    lane.rested = s.rested;
-    lane.tick_length = s.tick_length;
+void run_lanes(Lanes& lanes, const Settings& set, std::span<const Body> bodies,
+               std::span<ShellBody> shells, WeighShell weigh, h6FrameReport& report) {
+  lanes.side_by_side = worth_two(lanes, shells);
+  if (lanes.side_by_side) return run_side_by_side(lanes, set, bodies, shells, weigh, report);
+  for (ShellBody& shell : shells) {
+    const std::int64_t since = lanes.two ? sched::now_ns() : 0;
+    weigh(set, bodies, shell, lanes.whole);
+    if (lanes.two) shell.all_ns = static_cast<double>(sched::now_ns() - since);
   }
-  s.team->for_slices(s.shell_count, [&](std::size_t i) {
-    const std::size_t first = s.shell_pairs[i], end = s.shell_pairs[i + 1];
-    const std::int64_t since = sched::now_ns();
-    job(lane_of(s, sched::FrameTeam::here()), first, end);
-    s.bodies[s.pairs[first].a].shell_ns = static_cast<double>(sched::now_ns() - since);
-  });
-  for (int i = 0; i < 2; ++i) join(s.report, lane_of(s, i).report);
-  // As the frame is timed: stages add up to no more.
-  join_times(s, 1e-3 * s.tick_length.ns() * static_cast<double>(sched::ticks() - start));
+  join(report, lanes.whole.report);
+  for (int stage = 0; stage < H6_STAGE_COUNT; ++stage)
+    report.stage_us[stage] += lanes.whole.report.stage_us[stage];
 }
 
 }  // namespace h6

@@ -1,32 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_lanes.h - shell bodies side by side on the two threads: two hands, each with its own part.
+// shell_lanes.h - who weighs the shell bodies of a frame: both threads one after the other, or each
+// thread its own.
 //
-// Traversal, contacts and weights of one shell body are nobody else's business until the wrenches
-// are summed. Each thread works on a lane: the session itself, with scratch and report of its own
-// and nobody to share slices with. Wrenches are then summed in order, so bits do not depend on it.
+// Two hands usually hold two parts. Traversal, contacts and weights of one shell body touch nothing
+// of another, so two shell bodies can be weighed side by side, each in a lane with scratch and a
+// report of its own. Wrenches are added afterwards, in order: the bits are those of one thread.
 #pragma once
-#include <cstddef>
-
-#include "runtime/base/arena.h"
-
-struct h6Session;
+#include "runtime/frame/lane.h"
+#include "runtime/frame/pair.h"
+#include "runtime/frame/settings.h"
 
 namespace h6 {
 
-// Scratch of the second lane; the first one has the session's. What a session gets in scratch that
-// traversal, contacts or weights write to, it gets here too.
-struct LaneScratch {
-  std::uint32_t *cluster_order = nullptr, *cluster_root = nullptr;
-  std::uint64_t* cluster_cell = nullptr;
-  char* weigh = nullptr;
+struct Lanes {
+  Scratch scratch[2];         // of each thread
+  Lane whole;                 // both threads share the slices and pairs of one shell body
+  Lane single[2];             // one thread each
+  bool two = false;           // the single lanes can be used
+  bool side_by_side = false;  // they were, in this frame
 };
 
-// After all else of the session is laid out and set.
-void open_lanes(h6Session& s);
-// Is there enough for two, in several shell bodies?
-bool worth_lanes(const h6Session& s);
-// `job(lane, first pair, end)` for every shell body, on either thread; then the reports are joined.
-using ShellJob = void (*)(h6Session& lane, std::size_t first_pair, std::size_t end_pair);
-void run_lanes(h6Session& s, ShellJob job);
+// `scratch` is laid out. `alone` is a team of one thread, or null where there is one shell body.
+void open_lanes(Lanes& lanes, sched::FrameTeam* team, sched::FrameTeam* alone, Anytime* anytime);
+void begin_lanes(Lanes& lanes, bool cold, double tick_ns);
+
+using WeighShell = void (*)(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                            Lane& lane);
+// Calls `weigh` once for every shell body; the lanes' reports go into `report`.
+void run_lanes(Lanes& lanes, const Settings& set, std::span<const Body> bodies,
+               std::span<ShellBody> shells, WeighShell weigh, h6FrameReport& report);
 
 }  // namespace h6

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// static_step.cpp - a body without mass goes straight to where all that acts on it balances.
+// static_step.cpp - a quasi-static body goes straight to where all that acts on it balances.
 //
 // Wan & McNeely 2003: dq = -(K_c + K_VC)^-1 (f_c + f_VC), one solve a frame. METHOD.md, Sec. 4.
+#include "runtime/frame/motion_stages.h"
 #include "runtime/frame/solve.h"
-#include "runtime/frame/stages.h"
 
 namespace h6 {
 namespace {
@@ -15,20 +15,20 @@ double reach(const Body& body, const Vec6& dq) {
 
 }  // namespace
 
-void step_static(h6Session& s, Body& body) {
-  Mat6 A = -body.K;
-  Vec6 f = body.f, dq;
+void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6Status& status) {
+  Mat6 A = -acting.K;
+  Vec6 f = acting.f, dq;
   if (body.translation_only) hold_rotation(A, f, 0);
-  if (!solve_system(s.gradient, A, f, dq)) {
-    s.report.status |= H6_SOLVE_FAILED;
+  if (!solve_system(gradient, A, f, dq)) {
+    status |= H6_SOLVE_FAILED;
     return;
   }
   const double far = reach(body, dq);
   if (far > body.max_step) dq *= body.max_step / far;
-  // A step is a velocity for one second: the body has none before and none after.
+  // dq is moved as a velocity for one second; the body has no velocity before or after.
   body.v.setZero();
   body.w.setZero();
-  if (!move_or_rest(body, dq, 1, body.translation_only)) s.report.status |= H6_STATE_NOT_FINITE;
+  if (!move_or_rest(body, dq, 1, body.translation_only)) status |= H6_STATE_NOT_FINITE;
   body.v.setZero();
   body.w.setZero();
 }

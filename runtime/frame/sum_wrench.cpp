@@ -6,15 +6,15 @@
 // shell body's own sums, and no contact is touched twice. METHOD.md, Sec. 2.
 #include <algorithm>
 
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
 #include "runtime/frame/weighing.h"
 #include "sched/clock.h"
 
 namespace h6 {
 namespace {
 
-// Into pair.sum.
-void sum_slices(h6Session& s, const Contacts& c, Pair& pair, const kernels::WrenchParameters& p) {
+void sum_slices(const Contacts& c, const Pair& pair, const kernels::WrenchParameters& p, Lane& lane,
+                kernels::WrenchSum& out) {
   const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
                                        c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
   const std::size_t count = pair.end - pair.begin, slices = (count + kSumSlice - 1) / kSumSlice;
@@ -22,94 +22,122 @@ void sum_slices(h6Session& s, const Contacts& c, Pair& pair, const kernels::Wren
     kernels::contact_wrench(columns, p, pair.begin + i * kSumSlice,
                             std::min(pair.begin + (i + 1) * kSumSlice, pair.end), sum);
   };
-  if (slices <= 1 || s.team->threads() == 1) {
-    sum_slice(0, pair.sum);
+  if (slices <= 1 || lane.team->threads() == 1) {
+    sum_slice(0, out);
     for (std::size_t i = 1; i < slices; ++i) {
       kernels::WrenchSum next;
       sum_slice(i, next);
-      pair.sum.add(next);
+      out.add(next);
     }
     return;
   }
+  kernels::WrenchSum* const sums = lane.scratch->slice_sum;
   const std::int64_t since = sched::now_ns();
-  const auto keep = [&](std::size_t i) { sum_slice(i, s.slice_sum[i]); };
-  if (s.summing.share(count))
-    s.team->for_slices(slices, keep);
+  const auto keep = [&](std::size_t i) { sum_slice(i, sums[i]); };
+  if (lane.summing.share(count))
+    lane.team->for_slices(slices, keep);
   else
     for (std::size_t i = 0; i < slices; ++i) keep(i);
-  s.summing.took(static_cast<double>(sched::now_ns() - since));
-  pair.sum = s.slice_sum[0];
-  for (std::size_t i = 1; i < slices; ++i) pair.sum.add(s.slice_sum[i]);
+  lane.summing.took(static_cast<double>(sched::now_ns() - since));
+  out = sums[0];
+  for (std::size_t i = 1; i < slices; ++i) out.add(sums[i]);
+}
+
+void add_wrench(const Settings& set, const Sides& sides, Pair& pair,
+                const kernels::WrenchSum& sum) {
+  if (pair.begin != pair.end) return spread_wrench(set, sides, pair, sum);
+  pair.f.setZero();
+  pair.B.setZero();
+  if (pair.between)
+    for (Mat6* block :
+         {&pair.between->Kab, &pair.between->Kba, &pair.between->Dab, &pair.between->Dba})
+      block->setZero();
 }
 
 }  // namespace
 
-Mat6 arm_shift(const h6Session& s, const Pair& pair) {
+Mat6 arm_shift(const Body& a, const Body& b) {
   Mat6 S = Mat6::Identity();
-  S.bottomLeftCorner<3, 3>() = cross_matrix(s.bodies[pair.a].x - s.bodies[pair.b].x);
+  S.bottomLeftCorner<3, 3>() = cross_matrix(a.x - b.x);
   return S;
 }
 
-Vec6 pair_velocity(const h6Session& s, const Pair& pair) {
-  const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+Vec6 pair_velocity(const Body& a, const Body& b) {
   Vec6 ua, ub;
   ua << a.v, a.w;
   ub << b.v, b.w;
-  return ua - arm_shift(s, pair).transpose() * ub;
+  return ua - arm_shift(a, b).transpose() * ub;
 }
 
-void add_geometric_terms(h6Session& s, Pair& pair, const Vec6& f) {
-  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+void add_geometric_terms(const Sides& sides, Pair& pair, const Vec6& f) {
+  const Body &a = sides.a, &b = sides.b;
   const Mat3 F = cross_matrix(f.head<3>()), T = cross_matrix(f.tail<3>());
   if (!a.fixed) {
-    a.K.topRightCorner<3, 3>() -= F;
-    a.K.bottomRightCorner<3, 3>() -= T;
+    sides.on_a.K.topRightCorner<3, 3>() -= F;
+    sides.on_a.K.bottomRightCorner<3, 3>() -= T;
   }
   // The arms from b grow as a and b part, and turn as a turns.
-  if (!b.fixed) b.K.bottomLeftCorner<3, 3>() -= F;
-  if (a.fixed || b.fixed) return;
-  pair.Kba.topRightCorner<3, 3>() += F;
-  pair.Kba.bottomLeftCorner<3, 3>() += F;
-  pair.Kba.bottomRightCorner<3, 3>() += T + cross_matrix(a.x - b.x) * F;
+  if (!b.fixed) sides.on_b.K.bottomLeftCorner<3, 3>() -= F;
+  if (!pair.between) return;
+  Mat6& Kba = pair.between->Kba;
+  Kba.topRightCorner<3, 3>() += F;
+  Kba.bottomLeftCorner<3, 3>() += F;
+  Kba.bottomRightCorner<3, 3>() += T + cross_matrix(a.x - b.x) * F;
 }
 
-void spread_wrench(h6Session& s, Pair& pair, const kernels::WrenchSum& sum) {
-  Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-  const Mat6 S = arm_shift(s, pair);
+void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
+                   const kernels::WrenchSum& sum) {
+  const Body &a = sides.a, &b = sides.b;
+  const Mat6 S = arm_shift(a, b);
   const Vec6 f = Vec6::Map(sum.force);
   pair.f = f;
   pair.B = row_major(sum.damping);
-  const Mat6 K = row_major(sum.stiffness), D = s.contact.damping * pair.B;
+  const Mat6 K = row_major(sum.stiffness), D = set.contact.damping * pair.B;
   if (!a.fixed) {
-    a.f += f;
-    a.K -= K;
-    a.D -= D;
+    sides.on_a.f += f;
+    sides.on_a.K -= K;
+    sides.on_a.D -= D;
   }
   if (!b.fixed) {
-    b.f -= S * f;
-    b.K -= S * K * S.transpose();
-    b.D -= S * D * S.transpose();
+    sides.on_b.f -= S * f;
+    sides.on_b.K -= S * K * S.transpose();
+    sides.on_b.D -= S * D * S.transpose();
   }
-  if (!a.fixed && !b.fixed) {
-    pair.Kab = K * S.transpose();
-    pair.Kba = S * K;
-    pair.Dab = D * S.transpose();
-    pair.Dba = S * D;
+  if (pair.between) {
+    pair.between->Kab = K * S.transpose();
+    pair.between->Kba = S * K;
+    pair.between->Dab = D * S.transpose();
+    pair.between->Dba = S * D;
   }
-  if (s.gradient == H6_EXACT) add_geometric_terms(s, pair, Vec6::Map(sum.elastic));
+  if (set.gradient == H6_EXACT) add_geometric_terms(sides, pair, Vec6::Map(sum.elastic));
 }
 
-void sum_contacts(h6Session& s, Pair& pair) {
-  if (pair.begin == pair.end) return;
-  kernels::WrenchParameters p{s.contact.stiffness, s.contact.damping, {}, s.gradient == H6_EXACT};
-  Vec6::Map(p.velocity) = pair_velocity(s, pair);
-  sum_slices(s, s.contacts[pair.a], pair, p);
+void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  kernels::WrenchParameters p{
+      set.contact.stiffness, set.contact.damping, {}, set.gradient == H6_EXACT};
+  for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
+    const Pair& pair = shell.pairs[i];
+    if (pair.begin == pair.end) continue;
+    Vec6::Map(p.velocity) = pair_velocity(bodies[pair.a], bodies[pair.b]);
+    sum_slices(shell.contacts, pair, p, lane, shell.sums[i]);
+  }
 }
 
-void add_wrench(h6Session& s, Pair& pair) {
-  if (pair.begin != pair.end) return spread_wrench(s, pair, pair.sum);
-  for (Mat6* block : {&pair.Kab, &pair.Kba, &pair.Dab, &pair.Dba, &pair.B}) block->setZero();
-  pair.f.setZero();
+void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                  std::span<LinearWrench> acting) {
+  const bool series = set.contact.method == H6_METHOD_SERIES;
+  for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
+    Pair& pair = shell.pairs[i];
+    const Sides sides = sides_of(pair, bodies, acting);
+    if (series) {
+      shell.sums[i] =
+          sum_series_rows(shell.contacts, set.gradient == H6_EXACT, pair.begin, pair.end);
+      spread_series(set, sides, pair, shell.sums[i]);
+    } else {
+      add_wrench(set, sides, pair, shell.sums[i]);
+    }
+  }
+  if (series) join_series(set, bodies, shell, acting);
 }
 
 }  // namespace h6

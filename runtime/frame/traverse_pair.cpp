@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// traverse_pair.cpp - which points of a shell are inside a field.
+// traverse_pair.cpp - finds the points of a shell that are inside a field.
 //
 // Xu & Barbic 2016, Sec. 3 after McNeely 1999: a sphere whose signed distance exceeds its radius is
-// dropped with all its points. Here in flat tiers, and a sphere that was dropped stays so until the
-// shell has moved as far as it was clear; so does a point that was not near. METHOD.md, Sec. 6.
+// dropped with all its points. Ours are flat tiers of spheres, and a dropped sphere is not tested
+// again until the shell has moved as far as the sphere was clear. The same holds for single points.
+// METHOD.md, Sec. 6.
 #include "runtime/frame/traverse_pair.h"
 
 #include <algorithm>
@@ -12,8 +13,6 @@
 
 #include "kernels/contact/cull_spheres.h"
 #include "kernels/contact/expiry.h"
-#include "runtime/frame/anytime.h"
-#include "runtime/frame/stages.h"
 #include "sched/clock.h"
 
 namespace h6 {
@@ -36,9 +35,10 @@ void move_candidates(const TraverseScratch& to, std::size_t to_row, const Traver
 
 namespace {
 
-// Shell coordinates (relative to its centre, metres) to voxels of the field: made in double.
-kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
-                               const Field& field) {
+// Shell coordinates [m], relative to the shell's centre, to voxels of the field.
+kernels::Affine shell_to_field(const Body& a, const Body& b) {
+  const Shell& shell = *a.shell;
+  const Field& field = *b.field;
   const Mat3 m = b.R.transpose() * a.R / field.voxel;
   const Vec3 b_mesh = b.x - b.R * b.com;  // origin of b's mesh frame in the world
   const Vec3 centre = a.x + a.R * (shell.centre - a.com);
@@ -52,33 +52,34 @@ kernels::Affine shell_to_field(const Body& a, const Shell& shell, const Body& b,
 }
 
 // `series` needs the points that are about to touch. [voxel]
-float margin_of(const h6Session& s) {
-  return s.contact.method == H6_METHOD_SERIES ? static_cast<float>(s.contact.margin_voxels) : 0.0f;
+float margin_of(const h6ContactDef& contact) {
+  return contact.method == H6_METHOD_SERIES ? static_cast<float>(contact.margin_voxels) : 0.0f;
 }
 
-constexpr float kSlack = 1e-3f;        // [voxel]
-constexpr std::size_t kFewGroups = 4;  // of a block: looked at sooner than the block's sphere
-constexpr double kLongestWay = 256;    // [voxel] float has 3e-5 left there
-constexpr double kStays = 0.04;        // [voxel] from its anchor, for a shell that moves to and fro
-// Points of a group that are looked at by themselves: nearer than kNearest and what so many steps
-// like the last one take.
+constexpr float kSlack = 1e-3f;  // [voxel]
+constexpr std::size_t kFewGroups =
+    4;                               // of a block: testing them is cheaper than the block's sphere
+constexpr double kLongestWay = 256;  // float resolves 3e-5 there [voxel]
+constexpr double kStays = 0.04;      // distance to the anchor of a shell that stays [voxel]
+// A slow shell has single points of a group sampled: those nearer than kNearest and the way of
+// kStepsNear steps like the last one.
 constexpr float kNearest = 0.05f;  // [voxel]
 constexpr double kStepsNear = 16;
-constexpr double kSlowStep = 1 / kStepsNear;  // [voxel] farther, and all are looked at
-// A group all of whose points are farther is no nearer than its sphere says for long.
-constexpr float kFarGroup = 1;  // [voxel]
+constexpr double kSlowStep = 1 / kStepsNear;  // [voxel]
+// The sphere of a group says soon enough when one of its points comes near, where all points are
+// farther than this [voxel].
+constexpr float kFarGroup = 1;
 
-// What one traversal needs of a pair.
+// The constants of one traversal.
 struct Search {
   const kernels::FieldView& field;
   const Shell& shell;
   kernels::Affine place;
   float scale;  // voxels a metre
   bool wide;
-  float margin;  // [voxel]
-  bool cold;     // after a pause others have had the caches
-  // Of points that are looked at by themselves in the frames to come; 0: all are, always. [voxel]
-  float near = 0;
+  float margin;    // [voxel]
+  bool cold;       // other programs have used the caches
+  float near = 0;  // single points are sampled up to this distance; 0: always all points [voxel]
 
   std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
                    std::uint32_t* survivors, float* clearance) const {
@@ -86,7 +87,7 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
-  // Samples that stand in `vectors`; `out` names rows of the shell as ever.
+  // Takes the samples in `vectors`; rows in `out` are rows of the shell.
   std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
                             const kernels::Touching& out, float* least) const {
     const Samples& samples = shell.samples;
@@ -105,7 +106,7 @@ struct Search {
     }
     return kept;
   }
-  // Some of t.survivors.
+  // Samples t.survivors from `first` on.
   std::size_t touch(const TraverseScratch& t, std::size_t first, std::size_t count,
                     const kernels::Touching& out) const {
     return kernels::touch_groups(field, place,
@@ -117,33 +118,34 @@ struct Search {
   }
 };
 
-// Points of `groups` that touch, in order, whatever runs the slices. Behind `used`. `alone`: this
-// is a slice itself.
-std::size_t touch(h6Session& s, TraverseScratch& t, const Search& search, std::size_t count,
-                  std::size_t used, bool alone) {
+// Samples `count` groups and puts the points that touch behind `used`, in order, whichever thread
+// runs a slice.
+std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::size_t count,
+                  std::size_t used, bool shared) {
   const auto by_myself = [&] { return search.touch(t, 0, count, candidates_from(t, used)); };
-  if (alone || count < kWorthSharing || s.team->threads() == 1) return by_myself();
+  if (shared || count < kWorthSharing || lane.team->threads() == 1) return by_myself();
   const std::int64_t since = sched::now_ns();
   const auto timed = [&](std::size_t found) {
-    s.touching.took(static_cast<double>(sched::now_ns() - since));
+    lane.touching.took(static_cast<double>(sched::now_ns() - since));
     return found;
   };
-  if (!s.touching.share(count)) return timed(by_myself());
+  if (!lane.touching.share(count)) return timed(by_myself());
   const std::size_t slices = (count + kTouchSlice - 1) / kTouchSlice;
-  s.team->for_slices(slices, [&](std::size_t i) {
+  std::size_t* const found = lane.scratch->slice_count;
+  lane.team->for_slices(slices, [&](std::size_t i) {
     const std::size_t at = i * kTouchSlice, n = std::min(kTouchSlice, count - at);
-    s.slice_count[i] = search.touch(t, at, n, candidates_from(t, used + at * kGroupRows));
+    found[i] = search.touch(t, at, n, candidates_from(t, used + at * kGroupRows));
   });
-  std::size_t kept = s.slice_count[0];
+  std::size_t kept = found[0];
   for (std::size_t i = 1; i < slices; ++i) {
-    move_candidates(t, used + kept, t, used + i * kTouchSlice * kGroupRows, s.slice_count[i]);
-    kept += s.slice_count[i];
+    move_candidates(t, used + kept, t, used + i * kTouchSlice * kGroupRows, found[i]);
+    kept += found[i];
   }
   return timed(kept);
 }
 
-// How far [voxel] any point within `radius` of the shell's centre moved between two places: never
-// less.
+// An upper bound on how far a point within `radius` of the shell's centre moved between two places
+// [voxel].
 double motion_bound(const kernels::Affine& from, const kernels::Affine& to, double radius) {
   double turn = 0, shift = 0;
   for (int r = 0; r < 3; ++r) {
@@ -157,19 +159,20 @@ double motion_bound(const kernels::Affine& from, const kernels::Affine& to, doub
   return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
 }
 
-// Where the shell is on its way, which does not grow while it moves to and fro. [voxel]
+// The shell's way through the field so far, in voxels. It does not grow while the shell moves to
+// and fro around its anchor.
 struct Way {
-  float now;   // to the anchor, and on from there
-  float from;  // to the anchor, less from there: what is clear here counts from this
+  float now;   // the way to the anchor plus the distance from there
+  float from;  // the way to the anchor less that distance: clearances found here count from it
 };
 
-// When what is clear by this much may touch. kSlack takes up the rounding of both to float.
+// The way at which something with this clearance may touch. kSlack covers the rounding to float.
 float expiry_of(const Way& way, float clearance) {
   return way.from + std::max(clearance - kSlack, 0.0f);
 }
 
-// The way starts anew when it becomes too long for float, or nothing is known.
-Way travel(Pair& pair, Search& search) {
+// The way starts anew when it is too long for float, or when nothing is known.
+Way travel(PairSearch& pair, Search& search) {
   const Shell& shell = search.shell;
   double away = 0;
   if (pair.travelled >= 0) {
@@ -199,37 +202,36 @@ Way travel(Pair& pair, Search& search) {
   return {static_cast<float>(pair.travelled + away), static_cast<float>(pair.travelled - away)};
 }
 
-// Some points of each group of `blocks` blocks, and how deep any of the others may be. Again, with
-// fewer, where they are more contacts than there is time for.
-std::size_t touch_coarsely(h6Session& s, Pair& pair, TraverseScratch& t, const Search& search,
-                           std::size_t blocks, std::size_t used) {
-  const auto number = static_cast<std::size_t>(&pair - s.pairs);
+// Samples some points of each group of `blocks` blocks, and bounds how deep the others may be.
+// Where that gives more contacts than there is time for, it is done again with fewer points.
+std::size_t touch_coarsely(const Search& search, PairSearch& pair, TraverseScratch& t,
+                           Anytime& anytime, std::size_t blocks, std::size_t used) {
   const Samples& samples = search.shell.samples;
   std::size_t found;
   do {
-    const int tier = s.anytime.tier;
+    const int tier = anytime.tier;
     const std::size_t each = std::size_t{1} << tier;
     for (std::size_t k = 0; k < blocks; ++k)
       for (std::size_t j = 0; j < each; ++j)
         t.frontier[k * each + j] =
             static_cast<std::uint32_t>(t.open_blocks[k] * Samples::kOfGroup + j);
-    const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
+    const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
     found = search.touch_samples(t.frontier, blocks * each, candidates_from(t, used), t.clearance);
-    learn_sampling(s, blocks * each, pair.open_groups, found, since);
+    learn_sampling(anytime, blocks * each, pair.open_groups, found, since);
     pair.missed = 0;
     for (std::size_t k = 0; k < blocks; ++k) {
       const float reach = search.scale * samples.reach[tier][t.open_blocks[k]];
       const float least = *std::min_element(t.clearance + k * each, t.clearance + (k + 1) * each);
-      // The long form: cells far inside hold no samples.
+      // The long form, because cells far inside hold no samples.
       pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - least);
     }
-  } while (must_be_coarser(s, number, used, found, blocks));
+  } while (must_be_coarser(anytime, pair, used, found, blocks));
   return found;
 }
 
-// Groups to sample of `count` in t.frontier, in t.survivors. Those that were near when last looked
-// at are so still, or nearly; of the others only what their spheres let through.
-std::size_t find_near_groups(Pair& pair, TraverseScratch& t, const Search& search,
+// Puts those of `count` groups in t.frontier that are to be sampled into t.survivors. Groups that
+// were near when last sampled still are, or nearly; of the others the spheres decide.
+std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search& search,
                              std::size_t count, const Way& way) {
   std::size_t near = 0, far = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -251,9 +253,9 @@ std::size_t find_near_groups(Pair& pair, TraverseScratch& t, const Search& searc
   return near + left;
 }
 
-// Of each group the points that may touch by now.
-void choose_rows(const Pair& pair, TraverseScratch& t, const Search& search, std::size_t groups,
-                 float now) {
+// Chooses the points of each group that may touch by now.
+void choose_rows(const PairSearch& pair, TraverseScratch& t, const Search& search,
+                 std::size_t groups, float now) {
   if (!(search.near > 0)) return;
   for (std::size_t k = 0; k < groups; ++k) {
     const std::uint32_t g = t.survivors[k];
@@ -262,7 +264,7 @@ void choose_rows(const Pair& pair, TraverseScratch& t, const Search& search, std
   }
 }
 
-// A call to the library, where the processor is not known to have an instruction for it.
+// How many bits are set. std::popcount is a library call where the target has no instruction.
 std::size_t bits_of(unsigned rows) {
   rows -= rows >> 1 & 0x5555u;
   rows = (rows & 0x3333u) + (rows >> 2 & 0x3333u);
@@ -270,9 +272,9 @@ std::size_t bits_of(unsigned rows) {
   return (rows + (rows >> 8)) & 0x1fu;
 }
 
-// When groups that were sampled may touch again, and which of their points are near.
-void note_groups(Pair& pair, const TraverseScratch& t, const Search& search, std::size_t groups,
-                 const Way& way) {
+// Notes when the sampled groups may touch again, and which of their points are near.
+void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& search,
+                 std::size_t groups, const Way& way) {
   const auto until = [&](float distance) {
     return expiry_of(way, kernels::cull_clearance(distance - search.margin, search.wide));
   };
@@ -297,25 +299,38 @@ void note_groups(Pair& pair, const TraverseScratch& t, const Search& search, std
     near += bits_of(pair.near_rows[g]);
     pair.group_expiry[g] = std::min(until(t.clearance[k]), pair.rest_expiry[g]);
   }
-  pair.look_at_rows.learn(kGroupRows * groups, near);
+  pair.pick_rows.learn(kGroupRows * groups, near);
+}
+
+// Each group would wait for memory by itself otherwise.
+void prefetch_groups(const Shell& shell, const TraverseScratch& t, std::size_t groups, bool cold) {
+  for (std::size_t k = 0; k < groups; ++k)
+    for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
+      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+  if (!cold) return;  // else also what contacts are made of
+  for (std::size_t k = 0; k < groups; ++k) {
+    for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
+      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+    __builtin_prefetch(shell.point.data + kGroupRows * t.survivors[k]);
+  }
 }
 
 }  // namespace
 
-std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::size_t used,
-                          bool alone) {
-  const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
-  const Shell& shell = s.model->shells[a.shell];
-  const Field& field = s.model->fields[b.field];
-  const float margin = margin_of(s);
+std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                          TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
+  const Shell& shell = *a.shell;
+  const Field& field = *b.field;
+  Anytime& anytime = *lane.anytime;
+  const float margin = margin_of(set.contact);
   // The short form of culling is proved up to half a voxel of margin.
   Search search{field.view,
                 shell,
-                shell_to_field(a, shell, b, field),
+                shell_to_field(a, b),
                 static_cast<float>(1.0 / field.voxel),
                 field.wide || margin > 0.5f,
                 margin,
-                s.rested};
+                lane.cold};
   const Way way = travel(pair, search);
   pair.sampled = 0;
   pair.missed = 0;
@@ -338,37 +353,30 @@ std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::siz
     if (blocks == 0) return 0;
     count = expired_groups();
   }
-  const auto number = static_cast<std::size_t>(&pair - s.pairs);
-  if (is_coarse_anyway(s, number, used, blocks))
-    return touch_coarsely(s, pair, t, search, blocks, used);
+  const auto note_blocks = [&] {
+    kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
+  };
+  if (is_coarse_anyway(anytime, pair, used, blocks))
+    return touch_coarsely(search, pair, t, anytime, blocks, used);
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
-  // Each group waits for memory by itself otherwise.
-  for (std::size_t k = 0; k < groups; ++k)
-    for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
-      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
-  if (search.cold)  // what their contacts will be made of
-    for (std::size_t k = 0; k < groups; ++k) {
-      for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
-        __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
-      __builtin_prefetch(shell.point.data + kGroupRows * t.survivors[k]);
-    }
-  if (must_be_coarse(s, number, used, blocks, groups)) {
+  prefetch_groups(shell, t, groups, search.cold);
+  if (must_be_coarse(anytime, pair, used, blocks, groups)) {
     pair.cull_groups.left_out = 0;
-    kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
-    return touch_coarsely(s, pair, t, search, blocks, used);
+    note_blocks();
+    return touch_coarsely(search, pair, t, anytime, blocks, used);
   }
-  if (search.near > 0 && !pair.look_at_rows.worth(kGroupRows * groups)) search.near = 0;
+  if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
   choose_rows(pair, t, search, groups, way.now);
-  const std::int64_t since = s.anytime.by_clock ? sched::now_ns() : 0;
-  const std::size_t found = touch(s, t, search, groups, used, alone);
-  learn_sampling(s, groups, groups, found, since);
-  if (must_be_coarser(s, number, used, found, blocks)) {
-    kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
-    return touch_coarsely(s, pair, t, search, blocks, used);
+  const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
+  const std::size_t found = touch(search, t, lane, groups, used, shared);
+  learn_sampling(anytime, groups, groups, found, since);
+  if (must_be_coarser(anytime, pair, used, found, blocks)) {
+    note_blocks();
+    return touch_coarsely(search, pair, t, anytime, blocks, used);
   }
   pair.sampled = groups;
   note_groups(pair, t, search, groups, way);
-  kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
+  note_blocks();
   return found;
 }
 

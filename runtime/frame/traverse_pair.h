@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// traverse_pair.h - the points of one shell that touch one field; find_contacts.cpp makes contacts
-// of them.
+// traverse_pair.h - finds the points of one shell that touch one field.
 #pragma once
 #include "kernels/contact/touch_groups.h"
-#include "runtime/frame/session.h"
+#include "runtime/frame/lane.h"
+#include "runtime/frame/pair.h"
+#include "runtime/frame/settings.h"
 
 namespace h6 {
 
-inline constexpr std::size_t kWorthSharing =
-    80;  // groups from which the helper is asked: some 6 us
+inline constexpr std::size_t kTouchSlice = 32;  // groups sampled at a time: some 2 us
+// Groups from which the helper takes slices: some 6 us of work.
+inline constexpr std::size_t kWorthSharing = 80;
 
-// Candidates of one pair go behind `used`; returns how many there are. Two tiers of spheres, then
-// points; of each only what may have come within reach since it was last looked at. Where time is
-// short it ends with the deepest tier that is complete: what was not looked at stays expired.
-// `alone`: the other thread has work of its own.
-std::size_t traverse_pair(h6Session& s, TraverseScratch& t, Pair& pair, std::size_t used,
-                          bool alone);
+// Puts the candidates of shell body a against field body b behind `used` in the scratch, and
+// returns how many there are. Two tiers of spheres are tested, then points; of each only those that
+// may have come within reach since they were last tested. Where time is short the traversal ends
+// with the finest tier that is complete; what it leaves out stays expired. `shared`: the pair is
+// itself a slice, so the other thread has work of its own.
+std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                          TraverseScratch& t, Lane& lane, std::size_t used, bool shared);
 
 kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);
-// From one's scratch to another's, or within one; the two may overlap.
+// From one scratch to another, or within one; the two ranges may overlap.
 void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
                      std::size_t from_row, std::size_t count);
 

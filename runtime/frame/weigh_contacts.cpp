@@ -2,27 +2,27 @@
 // weigh_contacts.cpp - how the contact stiffness is shared among a shell body's contacts.
 //
 // Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3,
-// says which of the paper's ambiguities are settled how: w_i = phi_self / phi_i.
+// settles the paper's ambiguities: w_i = phi_self / phi_i.
 #include <algorithm>
 #include <cmath>
 
 #include "kernels/weights/gauss_few.h"
 #include "kernels/weights/gauss_sweep.h"
 #include "kernels/weights/gauss_tree.h"
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
 #include "runtime/frame/weighing.h"
 
 namespace h6 {
 namespace {
 
-// Contacts from which the helper is asked: 430 take 6.9 us alone and 5.5 with it, 1,000 16.7 and
-// 12.5; 64 0.9 and some 3.
-constexpr std::size_t kWorthSharing = 192;
-// Contacts from which a density is cut into slices. Below, a thread has one of two to itself, from
-// the sorting on: what it wrote is in its own cache, and it waits once.
+// Contacts from which two threads weigh them: 430 take 6.9 us on one thread and 5.5 on two, 64 take
+// 0.9 and some 3.
+constexpr std::size_t kTwoThreads = 192;
+// Contacts from which a density is cut into slices. With fewer, each thread has one of two
+// densities to itself, from the sorting on: its data are in its own cache, and it waits once.
 constexpr std::size_t kWorthSlicing = 4096;
-// Contacts up to which every pair is looked at once: 50 take 0.43 us, sorted 1.0 to 1.3; 120 1.7
-// and 1.9 to 3.3.
+// Contacts up to which all pairs of contacts are compared without sorting: 50 take 0.43 us, sorted
+// 1.0 to 1.3; 120 take 1.7, sorted 1.9 to 3.3.
 constexpr std::size_t kWorthSorting = 120;
 constexpr float kFacingEdge = 0.25f;  // N.g from which a contact counts in full
 
@@ -63,7 +63,7 @@ Rule rule_of(const h6ContactDef& def, double voxel) {
   return rule;
 }
 
-// Eq. (8) as it is printed: phi_i over the largest phi. phi is what a weight was divided by.
+// Eq. (8) as it is printed: phi_i over the largest phi. A weight was divided by its phi.
 void weigh_as_printed(Contacts& c, const Rule& rule) {
   const float self = rule.hat == kernels::Hat::sum ? 2.0f : 1.0f;
   float most = 0;
@@ -134,7 +134,7 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
                                      rule.facing ? c.facing : nullptr,
                                      rule.depth ? c.depth : nullptr,
                                      c.count};
-  if (c.count < kWorthSharing) team = nullptr;
+  if (c.count < kTwoThreads) team = nullptr;
   if (c.count <= kWorthSorting)
     kernels::gauss_weights_few(view, rule.hat, rule.widths, c.weight);
   else if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
@@ -143,15 +143,13 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
 }
 
 // Clusters never mix fields: a merged contact belongs to one pair.
-void merge_clusters(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  Contacts& c = s.contacts[s.pairs[first_pair].a];
-  const ClusterScratch scratch{s.cluster_order, s.cluster_root, s.cluster_cell};
+void merge_clusters(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                    const ClusterScratch& scratch) {
+  Contacts& c = shell.contacts;
   std::size_t out = 0;
-  for (std::size_t p = first_pair; p < end_pair; ++p) {
-    Pair& pair = s.pairs[p];
-    const double voxel = s.model->fields[s.bodies[pair.b].field].voxel;
-    const std::size_t end =
-        cluster_contacts(c, pair.begin, pair.end, out, s.contact.cluster_voxels * voxel, scratch);
+  for (Pair& pair : shell.pairs) {
+    const double distance = set.contact.cluster_voxels * bodies[pair.b].field->voxel;
+    const std::size_t end = cluster_contacts(c, pair.begin, pair.end, out, distance, scratch);
     pair.begin = out;
     pair.end = out = end;
   }
@@ -185,16 +183,17 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
   for (std::size_t i = 0; i < c.count; ++i) c.load[i] = c.weight[i] * c.depth[i];
 }
 
-void weigh_contacts(h6Session& s, std::size_t first_pair, std::size_t end_pair) {
-  const std::int32_t a = s.pairs[first_pair].a;
-  if (s.contact.method == H6_METHOD_SERIES) return weigh_series(s, first_pair, end_pair);
-  if (s.contacts[a].count == 0) return;
-  if (uses_clusters(s.contact)) merge_clusters(s, first_pair, end_pair);
-  const Body& body = s.bodies[a];
-  const bool ask = s.contacts[a].count >= kWorthSharing && s.team->threads() > 1 &&
-                   s.weighing.share(s.contacts[a].count);
-  weigh_columns(s.contacts[a], s.contact, body.voxel, series_lever(body.radius, body.voxel),
-                ask ? s.team : nullptr, s.weigh_scratch);
+void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                    Lane& lane) {
+  if (set.contact.method == H6_METHOD_SERIES) return weigh_series(set, bodies, shell, lane);
+  Contacts& c = shell.contacts;
+  if (c.count == 0) return;
+  if (uses_clusters(set.contact)) merge_clusters(set, bodies, shell, lane.scratch->cluster);
+  const Body& body = bodies[shell.body];
+  const bool two =
+      c.count >= kTwoThreads && lane.team->threads() > 1 && lane.weighing.share(c.count);
+  weigh_columns(c, set.contact, body.voxel, series_lever(body.radius, body.voxel),
+                two ? lane.team : nullptr, lane.scratch->weigh);
 }
 
 }  // namespace h6

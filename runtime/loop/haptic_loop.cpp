@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// haptic_loop.cpp - devices, session and clock joined: what runs on the haptic thread.
+// haptic_loop.cpp - the haptic thread: devices, session and clock together.
 //
-//   deadline -> what was asked meanwhile -> read every device -> frame -> write every device,
+//   deadline -> requests of other threads -> read every device -> frame -> write every device,
 //   unless they were stopped -> sign of life to the watchdog -> record into the ring
 //
 // Between two frames the loop hands poses and contacts to a viewer, and takes another session when
@@ -13,7 +13,6 @@
 #include <memory>
 
 #include "runtime/frame/session.h"
-#include "runtime/frame/stages.h"
 #include "runtime/loop/device_gate.h"
 #include "runtime/loop/loop_view.h"
 #include "sched/clock.h"
@@ -32,25 +31,25 @@ struct h6Loop {
   h6Device devices[H6_MAX_HANDS] = {};
   h6DeviceSample samples[H6_MAX_HANDS] = {};
   h6DeviceCommand commands[H6_MAX_HANDS] = {};
-  std::uint64_t frames = 0;  // to run; 0: no end
+  std::uint64_t frames = 0;  // how many to run; 0: no end
   std::uint64_t begun = 0;   // frames so far
-  double due = 1;            // of the next frame; it runs when this reaches 1
+  double due = 1;            // the next frame runs when this reaches 1
   std::unique_ptr<h6::sched::SpscRing<h6FrameRecord>> ring;
   h6FrameRecord record{};
-  h6LoopReport report{};  // the haptic thread's until it has ended
+  h6LoopReport report{};  // belongs to the haptic thread until that has ended
   std::atomic<bool> stop{false};
   std::atomic<int> request{kNothing};
   h6::DeviceGate gate;
-  std::int64_t sent_at = 0;                       // the last commands, 0: none yet [ns]
-  std::uint64_t trips = 0;                        // of the watchdog, that are known here
+  std::int64_t sent_at = 0;                       // time of the last commands, 0: none yet [ns]
+  std::uint64_t trips = 0;                        // trips of the watchdog that were handled
   bool stepped = false;                           // this tick was a frame
-  std::unique_ptr<h6::sched::Watchdog> watchdog;  // stops devices: goes before the gate
+  std::unique_ptr<h6::sched::Watchdog> watchdog;  // uses the gate, so it is destroyed before it
   std::atomic<double> pace{1};
   std::unique_ptr<h6::LoopView> view;
-  std::uint64_t view_step = 1;  // the viewer sees every so-many-th frame
-  // Another session on its way in, and the one before on its way out.
+  std::uint64_t view_step = 1;  // the viewer gets one of so many frames
+  // The next session, and the previous one on its way back.
   std::atomic<h6Session*> offered{nullptr}, given_back{nullptr};
-  // The haptic thread's core, which a helper keeps off, and the helper's priority (0: none).
+  // The haptic thread's core, which the helper avoids, and the helper's priority (0: none).
   std::atomic<int> core{-1}, helper_priority{0};
   std::unique_ptr<h6::sched::PeriodicThread> thread;
 };
@@ -58,24 +57,25 @@ struct h6Loop {
 namespace h6 {
 namespace {
 
-constexpr double kViewRate = 125;  // of what a viewer is given, at most [Hz]
+constexpr double kViewRate = 125;  // most frames a viewer gets [Hz]
 
-// The device first: what it still refuses must not pile up behind it.
+// The device is armed before its output. Otherwise the output would rise behind a device that still
+// refuses it.
 void arm_hands(h6Loop& loop) {
   h6Session& s = *loop.session;
-  for (std::size_t h = 0; h < s.hand_count; ++h) {
+  for (std::size_t h = 0; h < s.hands.size(); ++h) {
     const h6Device& device = loop.devices[h];
-    OutputGuard& guard = s.hands[h].guard;
+    OutputGuard& guard = s.devices[h].guard;
     if (guard.can_arm() && (!device.arm || device.arm(device.self) == 0)) guard.arm();
   }
 }
 
-// A session begins armed, and so do its devices; what is latched stays so.
+// A session begins armed, and so do its devices; a latched fault stays.
 void begin_output(h6Loop& loop) {
   h6Session& s = *loop.session;
-  for (std::size_t h = 0; h < s.hand_count; ++h) {
+  for (std::size_t h = 0; h < s.hands.size(); ++h) {
     const h6Device& device = loop.devices[h];
-    OutputGuard& guard = s.hands[h].guard;
+    OutputGuard& guard = s.devices[h].guard;
     guard.restart();
     if (loop.def.disarmed || guard.fault() != H6_CAUSE_NONE) continue;
     if (!device.arm || device.arm(device.self) == 0) guard.arm();
@@ -88,8 +88,8 @@ void end_output(h6Loop& loop) {
   if (loop.watchdog) loop.watchdog->rest();
 }
 
-// What other threads did or want since the last frame. A fault comes after a wish to arm: nobody
-// who asked could know of it.
+// Handles requests and faults of other threads since the last frame. Faults come after a request to
+// arm, because its caller could not know of them.
 void take_requests(h6Loop& loop) {
   const int request = loop.request.exchange(kNothing);
   if (request == kArm) arm_hands(loop);
@@ -101,7 +101,7 @@ void take_requests(h6Loop& loop) {
   if (loop.gate.halted()) h6Fault(loop.session, H6_CAUSE_STOPPED);
 }
 
-// A device that cannot be read or written is lost: all outputs go to zero and stay there.
+// A device that cannot be read or written is lost. All outputs go to zero and stay there.
 void lose(h6Loop& loop, std::size_t hand) {
   loop.session->report.status |= H6_DEVICE_LOST;
   h6LoseDevice(loop.session, static_cast<std::int32_t>(hand));
@@ -109,22 +109,22 @@ void lose(h6Loop& loop, std::size_t hand) {
 
 void read_devices(h6Loop& loop, double time) {
   h6Session& s = *loop.session;
-  for (std::size_t h = 0; h < s.hand_count; ++h)
+  for (std::size_t h = 0; h < s.hands.size(); ++h)
     if (loop.devices[h].read(loop.devices[h].self, time, &loop.samples[h]) != 0) lose(loop, h);
   if (loop.def.virtual_time || loop.sent_at == 0) return;
-  // To a device that lives on the frames' time no command comes late.
+  // No command is late for a device that lives in the time of frames.
   const double since = 1e-9 * static_cast<double>(sched::now_ns() - loop.sent_at);
-  for (std::size_t h = 0; h < s.hand_count; ++h)
-    if (!loop.devices[h].capabilities.frame_time) note_interval(s.hands[h], s.dt, since);
+  for (std::size_t h = 0; h < s.hands.size(); ++h)
+    if (!loop.devices[h].capabilities.frame_time) note_interval(s.devices[h], s.settings.dt, since);
 }
 
-// In place of commands that were made before the devices were stopped.
+// Replaces commands that were computed before the devices were stopped.
 void hold_back(h6Loop& loop, const h6DeviceCommand* before, h6Cause why) {
-  for (std::size_t h = 0; h < loop.session->hand_count; ++h) {
+  for (std::size_t h = 0; h < loop.session->hands.size(); ++h) {
     h6DeviceCommand& command = loop.commands[h];
     command.wrench = {};
     command.velocity = {};
-    // A motion stays where it was last sent; before that, where the device is.
+    // A motion stays at the last pose that was sent, or where the device is.
     const bool moves = loop.session->hands[h].mode != H6_IMPEDANCE;
     if (moves && loop.sent_at != 0) command.pose = before[h].pose;
     command.cause = why;
@@ -134,16 +134,16 @@ void hold_back(h6Loop& loop, const h6DeviceCommand* before, h6Cause why) {
 
 bool tripped(const h6Loop& loop) { return loop.watchdog && loop.watchdog->trips() != loop.trips; }
 
-// false: nothing is sent any more.
+// False: the devices were halted, and nothing may be sent any more.
 bool write_devices(h6Loop& loop, double time, const h6DeviceCommand* before) {
   if (!loop.gate.enter()) {
     hold_back(loop, before, H6_CAUSE_STOPPED);
     return false;
   }
   if (tripped(loop)) hold_back(loop, before, H6_CAUSE_WATCHDOG);
-  for (std::size_t h = 0; h < loop.session->hand_count; ++h)
+  for (std::size_t h = 0; h < loop.session->hands.size(); ++h)
     if (loop.devices[h].write(loop.devices[h].self, time, &loop.commands[h]) != 0) lose(loop, h);
-  if (tripped(loop)) loop.gate.stop_real();  // while we wrote: once more
+  if (tripped(loop)) loop.gate.stop_real();  // the watchdog tripped during the writes
   loop.sent_at = sched::now_ns();
   if (loop.watchdog) loop.watchdog->beat(loop.sent_at);
   return loop.gate.leave();
@@ -152,14 +152,14 @@ bool write_devices(h6Loop& loop, double time, const h6DeviceCommand* before) {
 void change_session(h6Loop& loop) {
   if (!loop.offered.load(std::memory_order_relaxed)) return;
   h6Session* next = loop.offered.exchange(nullptr, std::memory_order_acquire);
-  if (!next) return;  // it was withdrawn
+  if (!next) return;  // the offer was withdrawn
   take_over(*next, *loop.session);
   loop.given_back.store(loop.session, std::memory_order_release);
   loop.session = next;
   ++loop.record.settings;
 }
 
-// Slow motion: a frame every so many periods. Whoever lives on the frames' time sees no difference.
+// Slow motion: a frame only every few periods. In the time of frames nothing changes.
 bool frame_due(h6Loop& loop) {
   loop.due += loop.pace.load(std::memory_order_relaxed);
   if (loop.due < 1) return false;
@@ -174,9 +174,9 @@ bool tick(h6Loop& loop, const sched::TickTiming& before, double wakeup_us) {
   if (!loop.stepped) return true;
   const std::uint64_t number = loop.begun++;
   h6Session& s = *loop.session;
-  const double time = static_cast<double>(number) * s.dt;
+  const double time = static_cast<double>(number) * s.settings.dt;
   h6DeviceCommand last[H6_MAX_HANDS];
-  for (std::size_t h = 0; h < s.hand_count; ++h) last[h] = loop.commands[h];
+  for (std::size_t h = 0; h < s.hands.size(); ++h) last[h] = loop.commands[h];
   take_requests(loop);
   read_devices(loop, time);
   frame(s, loop.samples, loop.commands);
@@ -211,7 +211,7 @@ void count_late(h6LoopReport& report, const sched::TickTiming& timing) {
   ++histogram->frames[bin];
 }
 
-// After the frame, before the next deadline: nothing here is timed as the frame's.
+// Runs after the frame and before the next deadline, outside the measured time.
 void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   if (!loop.stepped) return;
   h6Session& s = *loop.session;
@@ -230,15 +230,15 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   row.late = late_bit(timing.late);
   row.late_us = timing.late_us;
   row.cpu_us = timing.cpu_us;
-  for (std::size_t h = 0; h < s.hand_count; ++h) {
+  for (std::size_t h = 0; h < s.hands.size(); ++h) {
     row.hand[h] = loop.samples[h];
     row.command[h] = loop.commands[h];
-    row.state[h] = s.hands[h].guard.state();
-    row.safety_input[h] = s.hands[h].guard.input();
+    row.state[h] = s.devices[h].guard.state();
+    row.safety_input[h] = s.devices[h].guard.input();
     const Body& body = s.bodies[s.hands[h].body];
     row.body[h] = {mesh_pose(body), {to(body.v), to(body.w)}};
   }
-  // Virtual time has no deadline: it waits for its reader instead of losing rows.
+  // Virtual time has no deadline, so it waits for its reader and loses no rows.
   if (loop.def.virtual_time)
     while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed) && !loop.gate.halted())
       sched::sleep_until_ns(sched::now_ns() + 200000);
@@ -262,15 +262,15 @@ const char* mode_name(std::uint32_t mode) {
   return mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance" : "impedance";
 }
 
-// As long as a full output may take to nothing.
+// The shortest time in which a full output may decay to zero [s].
 double shortest_decay(const h6Session& s) {
   double shortest = SafetyLimits{}.decay_time;
-  for (std::size_t h = 0; h < s.hand_count; ++h)
-    shortest = std::min(shortest, s.hands[h].guard.limits().decay_time);
+  for (std::size_t h = 0; h < s.hands.size(); ++h)
+    shortest = std::min(shortest, s.devices[h].guard.limits().decay_time);
   return shortest;
 }
 
-// A device that does not say is an impedance device.
+// A device that names no modes is an impedance device.
 bool speaks(const h6Device& device, std::uint32_t mode) {
   const std::uint32_t modes = device.capabilities.modes;
   return ((modes ? modes : std::uint32_t{H6_IMPEDANCE}) & mode) != 0;
@@ -279,19 +279,19 @@ bool speaks(const h6Device& device, std::uint32_t mode) {
 bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& def,
            h6Error* error) {
   if (!session) return fail(error, "a loop needs a session");
-  if (session->hand_count && !devices)
-    return fail(error, "a loop needs one device for each of %zu hands", session->hand_count);
-  for (std::size_t h = 0; h < session->hand_count; ++h)
+  if (!session->hands.empty() && !devices)
+    return fail(error, "a loop needs one device for each of %zu hands", session->hands.size());
+  for (std::size_t h = 0; h < session->hands.size(); ++h)
     if (!devices[h].read || !devices[h].write)
       return fail(error, "device %zu has no read or no write", h);
-  for (std::size_t h = 0; h < session->hand_count; ++h)
+  for (std::size_t h = 0; h < session->hands.size(); ++h)
     if (!speaks(devices[h], session->hands[h].mode))
       return fail(error,
                   "hand %zu works in %s mode, which device %zu does not offer: choose another mode "
                   "for the hand or another device",
                   h, mode_name(session->hands[h].mode), h);
-  for (std::size_t h = 0; h < session->hand_count; ++h)
-    if (const AboveRating above = above_rating(devices[h].capabilities, session->hands[h].safety);
+  for (std::size_t h = 0; h < session->hands.size(); ++h)
+    if (const AboveRating above = above_rating(devices[h].capabilities, session->devices[h].safety);
         above.key)
       return fail(error,
                   "hand %zu: safety %s, %g %s, is above what device %zu is rated for, %g %s: leave "
@@ -323,38 +323,39 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     auto loop = std::make_unique<h6Loop>();
     loop->session = session;
     loop->def = used;
-    for (std::size_t h = 0; h < session->hand_count; ++h) {
+    for (std::size_t h = 0; h < session->hands.size(); ++h) {
       loop->devices[h] = devices[h];
       loop->samples[h].pose.q.w = 1;
       h6SetRating(session, static_cast<std::int32_t>(h), &devices[h].capabilities);
     }
     session->anytime.no_clock = used.virtual_time;
     loop->report.grant.core = -1;
-    loop->frames = static_cast<std::uint64_t>(used.duration / session->dt + 0.5);
+    loop->frames = static_cast<std::uint64_t>(used.duration / session->settings.dt + 0.5);
     if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
     if (used.ring_frames)
       loop->ring = std::make_unique<sched::SpscRing<h6FrameRecord>>(used.ring_frames);
     if (used.view_contacts) {
-      loop->view = std::make_unique<LoopView>(session->body_count, used.view_contacts);
-      loop->view_step = static_cast<std::uint64_t>(std::max(1.0, 1 / (kViewRate * session->dt)));
+      loop->view = std::make_unique<LoopView>(session->bodies.size(), used.view_contacts);
+      loop->view_step =
+          static_cast<std::uint64_t>(std::max(1.0, 1 / (kViewRate * session->settings.dt)));
     }
     sched::PeriodicThreadOptions options;
-    options.rate = 1 / session->dt;
+    options.rate = 1 / session->settings.dt;
     options.spin_us = used.spin_us;
     options.virtual_time = used.virtual_time;
     options.realtime = used.realtime;
     options.request.core = used.core;
     bool real = false;
-    for (std::size_t h = 0; h < session->hand_count; ++h)
+    for (std::size_t h = 0; h < session->hands.size(); ++h)
       real = real || !devices[h].capabilities.frame_time;
-    if (!loop->gate.open(loop->devices, session->hand_count)) {
+    if (!loop->gate.open(loop->devices, session->hands.size())) {
       fail(error, "more than %zu loops at a time: end one first", sched::kMostToHalt);
       return nullptr;
     }
     h6Loop* raw = loop.get();
     if (real && !used.virtual_time)
       loop->watchdog = std::make_unique<sched::Watchdog>(
-          static_cast<std::int64_t>(1e9 * (session->dt + shortest_decay(*session))),
+          static_cast<std::int64_t>(1e9 * (session->settings.dt + shortest_decay(*session))),
           used.realtime ? options.request.priority + 1 : 0, [raw] { raw->gate.stop_real(); });
     loop->thread = std::make_unique<sched::PeriodicThread>(
         options,
@@ -419,8 +420,8 @@ h6LoopReport h6JoinLoop(h6Loop* loop) {
   loop->session->team->set_realtime(0, -1);
   h6LoopReport report = loop->report;
   report.fault = H6_CAUSE_NONE;
-  for (std::size_t h = 0; h < loop->session->hand_count; ++h) {
-    OutputGuard& guard = loop->session->hands[h].guard;
+  for (std::size_t h = 0; h < loop->session->hands.size(); ++h) {
+    OutputGuard& guard = loop->session->devices[h].guard;
     if (loop->gate.halted()) guard.fault(H6_CAUSE_STOPPED);
     report.hand[h] = guard.report();
     if (report.fault == H6_CAUSE_NONE) report.fault = guard.fault();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+// loop_view.cpp - poses and contacts for a viewer, and one session taking over from another.
 #include "runtime/loop/loop_view.h"
 
 #include "runtime/frame/session.h"
-#include "runtime/frame/stages.h"
 
 namespace h6 {
 
@@ -36,20 +36,19 @@ void LoopView::write(const h6Session& s, double time) {
   slot.frame = s.report.frame;
   slot.time = time;
   slot.contacts = 0;
-  for (std::size_t b = 0; b < s.body_count; ++b) {
-    slot.body[b] = mesh_pose(s.bodies[b]);
-    slot.contacts += s.contacts[b].count;
-  }
-  // Where there are more than the viewer has room for: every n-th, so that all regions are there.
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) slot.body[b] = mesh_pose(s.bodies[b]);
+  for (const ShellBody& shell : s.shells) slot.contacts += shell.contacts.count;
+  // Where the viewer has no room for all contacts it gets every n-th, so that no region is missing.
   const std::size_t room = slot.contact.size();
   const std::size_t step = room ? (slot.contacts + room - 1) / room : 0;
   slot.rows = 0;
   std::size_t skip = 0;
-  for (std::size_t b = 0; b < s.body_count && step; ++b) {
-    const Contacts& c = s.contacts[b];
+  for (const ShellBody& shell : s.shells) {
+    if (step == 0) break;
+    const Contacts& c = shell.contacts;
     std::size_t i = skip;
     for (; i < c.count; i += step)
-      slot.contact[slot.rows++] = row_of(c, i, s.bodies[b].x, static_cast<std::int32_t>(b));
+      slot.contact[slot.rows++] = row_of(c, i, s.bodies[shell.body].x, shell.body);
     skip = i - c.count;
   }
   slots_.publish();
@@ -64,19 +63,21 @@ bool LoopView::read(h6LoopView* out) {
 }
 
 void take_over(h6Session& next, const h6Session& before) {
-  H6_ASSERT(next.body_count == before.body_count && next.hand_count == before.hand_count);
-  for (std::size_t i = 0; i < next.body_count; ++i)
+  H6_ASSERT(next.bodies.size() == before.bodies.size() && next.hands.size() == before.hands.size());
+  for (std::size_t i = 0; i < next.bodies.size(); ++i)
     static_cast<RigidState&>(next.bodies[i]) = before.bodies[i];
-  for (std::size_t i = 0; i < next.hand_count; ++i) {
-    Hand hand = before.hands[i];
-    const Hand& set = next.hands[i];
+  for (std::size_t i = 0; i < next.hands.size(); ++i) {
+    const Hand set = next.hands[i];
+    Hand& hand = next.hands[i] = before.hands[i];
     hand.coupling = set.coupling;
     hand.manipulandum_mass = set.manipulandum_mass;
     hand.driver_stiffness = set.driver_stiffness;
     hand.driver_damping = set.driver_damping;
-    hand.passivity = set.passivity;
-    if (!set.passivity) hand.port.forget();
-    next.hands[i] = hand;
+    HandDevice& device = next.devices[i];
+    const bool passivity = device.passivity;
+    device = before.devices[i];
+    device.passivity = passivity;
+    if (!passivity) device.port.forget();
   }
   next.anytime.no_clock = before.anytime.no_clock;
   next.report = before.report;
@@ -84,10 +85,10 @@ void take_over(h6Session& next, const h6Session& before) {
 }
 
 bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error) {
-  if (!next || next->model != before.model || next->body_count != before.body_count ||
-      next->hand_count != before.hand_count || next->dt != before.dt)
+  if (!next || next->model != before.model || next->bodies.size() != before.bodies.size() ||
+      next->hands.size() != before.hands.size() || next->settings.dt != before.settings.dt)
     return fail(error, "a loop goes on with a session of the same model, bodies, hands and rate");
-  for (std::size_t h = 0; h < next->hand_count; ++h)
+  for (std::size_t h = 0; h < next->hands.size(); ++h)
     if (next->hands[h].body != before.hands[h].body || next->hands[h].mode != before.hands[h].mode)
       return fail(error, "a loop goes on with hands on the same bodies, in the same modes");
   return true;

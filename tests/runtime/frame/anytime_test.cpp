@@ -265,46 +265,48 @@ struct Decided {
 };
 
 struct Clocked {
-  h6Session s;
-  h6::Pair pair;
+  h6::Anytime a;
+  h6::PairSearch pair;
   int frame = 0;
   static inline std::int64_t now = 0;
   Clocked() {
-    s.pairs = &pair, s.pair_count = 1;
-    s.anytime.clock = [] { return now; };
+    a.pairs = {&pair, 1};
+    a.clock = [] { return now; };
   }
 
   Decided decide(const Costs& c, int frames) {
     constexpr double kGroupNs = 20;
     Decided out;
-    h6::Anytime& a = s.anytime;
     const auto groups = static_cast<std::size_t>(c.contacts / 4), blocks = groups / 16;
-    const double period_us = 1e6 * s.dt;
+    const double period_us = 1e-3 * a.period_ns;
+    const auto reported = [&] {
+      h6FrameReport report{};
+      h6::report_anytime(a, report);
+      return report.coarse_points ? report.coarse_points : 16;
+    };
     for (int i = 0; i < frames; ++i, ++frame) {
-      s.report = {};
-      a.budget_ns = 0.8e9 * s.dt;
+      a.budget_ns = 0.8 * a.period_ns;
       double us = 0;  // that passed in this frame
       const auto pass = [&](double more_us) {
         us += more_us;
         now += static_cast<std::int64_t>(1e3 * more_us);
       };
-      h6::begin_anytime(s, now);
-      bool coarse = h6::is_coarse_anyway(s, 0, 0, blocks);
-      if (!coarse) pass(10), coarse = h6::must_be_coarse(s, 0, 0, blocks, groups);
+      h6::begin_anytime(a, now);
+      bool coarse = h6::is_coarse_anyway(a, pair, 0, blocks);
+      if (!coarse) pass(10), coarse = h6::must_be_coarse(a, pair, 0, blocks, groups);
       double found = 0;
       do {
-        const double points = s.report.coarse_points ? s.report.coarse_points : 16;
-        const double sampled =
-            points * static_cast<double>(s.report.coarse_points ? blocks : groups / 16);
+        const double points = reported();
+        const double sampled = points * static_cast<double>(points < 16 ? blocks : groups / 16);
         found = c.contacts * points / 16;
         pass(1e-3 * sampled * kGroupNs);
         if (frame % 100 == 99 && points < 16) pass(c.held_up_us);
-        h6::learn_sampling(s, static_cast<std::size_t>(sampled), groups,
+        h6::learn_sampling(a, static_cast<std::size_t>(sampled), groups,
                            static_cast<std::size_t>(found),
                            now - static_cast<std::int64_t>(sampled * kGroupNs));
-      } while (h6::must_be_coarser(s, 0, 0, static_cast<std::size_t>(found), blocks));
+      } while (h6::must_be_coarser(a, pair, 0, static_cast<std::size_t>(found), blocks));
       const auto candidates = static_cast<std::size_t>(found);
-      const bool cut = candidates > h6::Anytime::kFew && h6::must_be_few(s, 0, candidates);
+      const bool cut = candidates > h6::Anytime::kFew && h6::must_be_few(a, pair, candidates);
       if (cut) found = h6::Anytime::kFew, ++out.few;
       const double few = c.contacts / 16;
       const double each = c.few_ns + (c.full_ns - c.few_ns) * (found - few) / (c.contacts - few);
@@ -313,9 +315,10 @@ struct Clocked {
       out.late += us + weighing > period_us;
       if (robbed) weighing += 1000;
       pair.candidates = static_cast<std::size_t>(found);
-      s.report.stage_us[H6_STAGE_WEIGHTS] = weighing;
-      h6::learn_frame(s);
-      ++out.frames[s.report.coarse_points ? s.report.coarse_points : 16];
+      h6FrameReport report{};
+      report.stage_us[H6_STAGE_WEIGHTS] = weighing;
+      h6::learn_frame(a, report);
+      ++out.frames[reported()];
     }
     return out;
   }

@@ -65,7 +65,7 @@ struct Found {
 };
 
 bool is_sample(const h6Session* s, const h6::Shell& shell, std::size_t r) {
-  const h6::kernels::Affine& place = s->pairs[0].last_place;
+  const h6::kernels::Affine& place = s->shells[0].searches[0].last_place;
   const h6::Field& field = s->model->fields[0];
   h6::Vec3 at = field.origin;
   for (int k = 0; k < 3; ++k)
@@ -79,17 +79,18 @@ bool is_sample(const h6Session* s, const h6::Shell& shell, std::size_t r) {
 
 // All rows of the shell at the place that the last frame used.
 void compare(const h6Session* s, Found& found, double* least, std::uint32_t* deepest) {
-  const h6::Pair& pair = s->pairs[0];
+  const h6::PairSearch& pair = s->shells[0].searches[0];
   const h6::Shell& shell = s->model->shells[0];
   std::vector<float> d(shell.points);
   h6::kernels::sample_field(s->model->fields[0].view, pair.last_place,
                             {shell.x.data, shell.y.data, shell.z.data, shell.points}, nullptr,
                             shell.points, d.data(), nullptr, nullptr, nullptr);
   std::vector<int> touching(shell.points);
-  const h6::Contacts& c = s->contacts[pair.a];
+  const h6::Contacts& c = s->shells[0].contacts;
   for (std::size_t i = 0; i < c.count; ++i) ++touching[c.point[i]];
-  const float margin =
-      s->contact.method == H6_METHOD_SERIES ? float(s->contact.margin_voxels) : 0.0f;
+  const float margin = s->settings.contact.method == H6_METHOD_SERIES
+                           ? float(s->settings.contact.margin_voxels)
+                           : 0.0f;
   *least = 1e9;
   for (std::size_t r = 0; r < shell.points; ++r) {
     const int got = touching[shell.point[r]];
@@ -319,7 +320,7 @@ TEST_CASE("what is clear of a field is not looked at again while the shell tremb
     state.pose = pose(0.03 * mm * (i % 2), 0, 0);
     h6SetBody(s, 1, &state);
     h6Step(s, nullptr, nullptr);
-    if (i > 1) looked += s->pairs[0].sampled;
+    if (i > 1) looked += s->shells[0].searches[0].sampled;
     CHECK(h6GetFrame(s).contacts == 0);
   }
   CHECK(looked == 0);

@@ -16,7 +16,8 @@
 #include "hapsix/hapsix.h"
 #include "kernels/contact/contact_wrench.h"
 #include "kernels/weights/series_solve.h"
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
+#include "runtime/frame/session.h"
 #include "runtime/frame/weighing.h"
 #include "tests/support/analytic.h"
 
@@ -154,13 +155,19 @@ struct Columns {
   }
 };
 
-// As much of a session as the assembly reads.
+// As much of a session as the assembly reads: one shell body against all others.
 struct Assembly {
   std::array<Body, kBodies> bodies;
+  std::array<LinearWrench, kBodies> acting;
   std::array<Pair, kBodies - 1> pairs;
-  h6Session s;
+  std::array<BetweenBodies, kBodies - 1> between;
+  std::array<BetweenFields, kBodies - 1> of_fields;
+  std::array<kernels::WrenchSum, kBodies - 1> sums;
+  ShellBody shell;
+  Settings set;
   explicit Assembly(const Scene& scene) {
     for (int b = 0; b < kBodies; ++b) {
+      acting[b].set_zero();
       bodies[b].fixed = false;
       bodies[b].x = scene.at.x[b];
       bodies[b].q = scene.at.q[b];
@@ -171,25 +178,31 @@ struct Assembly {
     for (int b = 1; b < kBodies; ++b) {
       pairs[b - 1].a = 0, pairs[b - 1].b = b;
       pairs[b - 1].begin = scene.first[b], pairs[b - 1].end = scene.end[b];
+      pairs[b - 1].between = &between[b - 1], pairs[b - 1].of_fields = &of_fields[b - 1];
     }
-    s.bodies = bodies.data(), s.body_count = kBodies;
-    s.pairs = pairs.data(), s.pair_count = pairs.size();
-    s.gradient = H6_EXACT;
-    s.contact = h6DefaultContactDef();
-    s.contact.stiffness = scene.k, s.contact.damping = scene.beta, s.contact.series_c = scene.c;
+    shell.body = 0;
+    shell.pairs = pairs, shell.sums = sums;
+    set.gradient = H6_EXACT;
+    set.contact = h6DefaultContactDef();
+    set.contact.stiffness = scene.k, set.contact.damping = scene.beta;
+    set.contact.series_c = scene.c;
   }
   // How the wrench on body `on` changes with the motion, or velocity, of body `by`.
   Mat6 K(int on, int by) const {
-    if (on == by) return bodies[on].K;
-    if (on == 0) return pairs[by - 1].Kab;
-    if (by == 0) return pairs[on - 1].Kba;
-    return pairs[on - 1].left * pairs[by - 1].right;
+    if (on == by) return acting[on].K;
+    if (on == 0) return between[by - 1].Kab;
+    if (by == 0) return between[on - 1].Kba;
+    return of_fields[on - 1].left * of_fields[by - 1].right;
   }
   Mat6 D(int on, int by) const {
-    if (on == by) return bodies[on].D;
-    if (on == 0) return pairs[by - 1].Dab;
-    if (by == 0) return pairs[on - 1].Dba;
-    return s.contact.damping * pairs[on - 1].left * pairs[by - 1].right_d;
+    if (on == by) return acting[on].D;
+    if (on == 0) return between[by - 1].Dab;
+    if (by == 0) return between[on - 1].Dba;
+    return set.contact.damping * of_fields[on - 1].left * of_fields[by - 1].right_d;
+  }
+  Vec6 velocity(const Pair& pair) const { return pair_velocity(bodies[pair.a], bodies[pair.b]); }
+  void spread(Pair& pair, const kernels::WrenchSum& sum) {
+    spread_wrench(set, sides_of(pair, bodies, acting), pair, sum);
   }
 };
 
@@ -244,10 +257,9 @@ TEST_CASE(
   Assembly engine(scene);
   for (Pair& pair : engine.pairs) {
     kernels::WrenchParameters p{scene.k, scene.beta, {}, true};
-    Vec6::Map(p.velocity) = pair_velocity(engine.s, pair);
-    spread_wrench(engine.s, pair,
-                  kernels::contact_wrench_ref(columns.with(columns.depth, columns.weight), p,
-                                              pair.begin, pair.end));
+    Vec6::Map(p.velocity) = engine.velocity(pair);
+    engine.spread(pair, kernels::contact_wrench_ref(columns.with(columns.depth, columns.weight), p,
+                                                    pair.begin, pair.end));
   }
   const auto wrenches = [&](const State& s, double beta) {
     std::vector<double> load(scene.point.size());
@@ -259,7 +271,7 @@ TEST_CASE(
     return scene.wrenches(s, load);
   };
   const Wrenches w = wrenches(scene.at, scene.beta);
-  for (int b = 0; b < kBodies; ++b) CHECK((engine.bodies[b].f - w[b]).norm() < 1e-12 * w[b].norm());
+  for (int b = 0; b < kBodies; ++b) CHECK((engine.acting[b].f - w[b]).norm() < 1e-12 * w[b].norm());
 
   // METHOD.md keeps damping's own geometry out of K: the elastic wrench alone.
   const Blocks K = differences(1e-5, 1e-4, [&](int body, const Vec6& dq) {
@@ -269,7 +281,7 @@ TEST_CASE(
     return wrenches(Scene::faster(scene.at, body, du), scene.beta);
   });
   // Fields feel one another only through the shell body: no blocks between them.
-  for (Pair& pair : engine.pairs) pair.left.setZero();
+  for (BetweenFields& of : engine.of_fields) of.left.setZero();
   check_blocks([&](int on, int by) { return engine.K(on, by); }, K, 1e-6);
   check_blocks([&](int on, int by) { return engine.D(on, by); }, D, 1e-6);
 }
@@ -279,7 +291,7 @@ TEST_CASE("the frame's own stage, with contacts in float, gives these gradients 
   const Columns<double> fine(scene, scene.at);
   Columns<float> columns(scene, scene.at);
   Assembly engine(scene), exact(scene);
-  Contacts contacts{};
+  Contacts& contacts = engine.shell.contacts;
   contacts.depth = columns.depth.data(), contacts.weight = columns.weight.data();
   contacts.nx = columns.n[0].data(), contacts.ny = columns.n[1].data(),
   contacts.nz = columns.n[2].data();
@@ -288,20 +300,22 @@ TEST_CASE("the frame's own stage, with contacts in float, gives these gradients 
   contacts.rx = columns.r[0].data(), contacts.ry = columns.r[1].data(),
   contacts.rz = columns.r[2].data();
   contacts.count = contacts.capacity = columns.depth.size();
-  engine.s.contacts = &contacts;
+  sched::FrameTeam team(1);
+  Lane lane;
+  lane.team = &team;
+  sum_contacts(engine.set, engine.bodies, engine.shell, lane);
+  add_wrenches(engine.set, engine.bodies, engine.shell, engine.acting);
   for (std::size_t i = 0; i < engine.pairs.size(); ++i) {
-    sum_contacts(engine.s, engine.pairs[i]), add_wrench(engine.s, engine.pairs[i]);
     kernels::WrenchParameters p{scene.k, scene.beta, {}, true};
-    Vec6::Map(p.velocity) = pair_velocity(exact.s, exact.pairs[i]);
-    spread_wrench(exact.s, exact.pairs[i],
-                  kernels::contact_wrench_ref(fine.with(fine.depth, fine.weight), p,
-                                              scene.first[i + 1], scene.end[i + 1]));
+    Vec6::Map(p.velocity) = exact.velocity(exact.pairs[i]);
+    exact.spread(exact.pairs[i], kernels::contact_wrench_ref(fine.with(fine.depth, fine.weight), p,
+                                                             scene.first[i + 1], scene.end[i + 1]));
   }
   Blocks K, D;
   for (int on = 0; on < kBodies; ++on)
     for (int by = 0; by < kBodies; ++by) K[on][by] = exact.K(on, by), D[on][by] = exact.D(on, by);
   for (int b = 0; b < kBodies; ++b)
-    CHECK((engine.bodies[b].f - exact.bodies[b].f).norm() < 2e-5 * exact.bodies[b].f.norm());
+    CHECK((engine.acting[b].f - exact.acting[b].f).norm() < 2e-5 * exact.acting[b].f.norm());
   check_blocks([&](int on, int by) { return engine.K(on, by); }, K, 2e-5);
   check_blocks([&](int on, int by) { return engine.D(on, by); }, D, 2e-5);
 }
@@ -337,14 +351,16 @@ TEST_CASE("series: the exact gradients, between the fields too, are derivatives 
 
   const Columns<double> columns(scene, scene.at);
   Assembly engine(scene);
-  for (Pair& pair : engine.pairs)
-    spread_series(engine.s, pair,
-                  kernels::contact_wrench_ref(columns.with(loads.slack, loads.kappa),
-                                              {1.0, 0.0, {}, true}, pair.begin, pair.end));
-  join_series(engine.s, 0, engine.pairs.size());
+  for (std::size_t i = 0; i < engine.pairs.size(); ++i) {
+    Pair& pair = engine.pairs[i];
+    engine.sums[i] = kernels::contact_wrench_ref(columns.with(loads.slack, loads.kappa),
+                                                 {1.0, 0.0, {}, true}, pair.begin, pair.end);
+    spread_series(engine.set, sides_of(pair, engine.bodies, engine.acting), pair, engine.sums[i]);
+  }
+  join_series(engine.set, engine.bodies, engine.shell, engine.acting);
 
   const Wrenches w = scene.wrenches(scene.at, loads.load);
-  for (int b = 0; b < kBodies; ++b) CHECK((engine.bodies[b].f - w[b]).norm() < 1e-12 * w[b].norm());
+  for (int b = 0; b < kBodies; ++b) CHECK((engine.acting[b].f - w[b]).norm() < 1e-12 * w[b].norm());
   const auto wrenches = [&](const State& s, const std::vector<double>& rate) {
     const Loads l = solve(s, rate);
     REQUIRE(l.active == loads.active);
@@ -404,22 +420,21 @@ TEST_CASE(
     body.q = q0, body.R = q0.toRotationMatrix();
     body.v = {0.02, -0.01, 0.03};
     body.w = {0.1, 0.2, 0.05};
-    const auto clear = [&] { body.K.setZero(), body.D.setZero(), body.f.setZero(); };
-    clear();
-    s->report.status = 0;
-    couple(*s, h);
-    CHECK(((s->report.status & H6_COUPLING_SATURATED) != 0) == at.cut);
-    const Mat6 K = body.K, D = body.D;
-    CHECK((body.f - h.wrench).norm() == 0);
+    LinearWrench acting;
+    acting.set_zero();
+    h6Status status = 0;
+    couple(s->settings, h, body, acting, status);
+    CHECK(((status & H6_COUPLING_SATURATED) != 0) == at.cut);
+    const Mat6 K = acting.K, D = acting.D;
+    CHECK((acting.f - h.wrench).norm() == 0);
     const Body start = body;
     const auto wrench = [&](const Vec6& dq, const Vec6& du) -> Vec6 {
       body = start;
-      clear();
       body.x += dq.head<3>();
       body.q = exp_rotation(dq.tail<3>()) * body.q;
       body.R = body.q.toRotationMatrix();
       body.v += du.head<3>(), body.w += du.tail<3>();
-      couple(*s, h);
+      couple(s->settings, h, body, acting, status);
       return h.wrench;
     };
     Mat6 numeric_k, numeric_d;

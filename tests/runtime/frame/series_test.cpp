@@ -11,7 +11,8 @@
 
 #include "hapsix/hapsix.h"
 #include "kernels/weights/series_solve.h"
-#include "runtime/frame/stages.h"
+#include "runtime/frame/contact_stages.h"
+#include "runtime/frame/session.h"
 #include "runtime/frame/weighing.h"
 #include "tests/support/analytic.h"
 #include "tests/support/near.h"
@@ -123,10 +124,11 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
   h6Error error;
   h6Session* s = h6CreateSession(model.handle, &def, &error);
   REQUIRE_MESSAGE(s, error.message);
-  REQUIRE(s->pair_count == 2);
+  REQUIRE(s->pairs.size() == 2);
   s->bodies[0].radius = world.lever;
   for (int b = 0; b < 3; ++b) s->bodies[b].x = state.x[b];
-  Contacts& c = s->contacts[0];
+  ShellBody& touching = s->shells[0];
+  Contacts& c = touching.contacts;
   c.count = world.point.size();
   int inside = 0;
   for (std::size_t i = 0; i < c.count; ++i) {
@@ -140,22 +142,26 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
   }
   REQUIRE(inside > 20);
   s->pairs[0].begin = 0, s->pairs[0].end = s->pairs[1].begin = 30, s->pairs[1].end = 50;
-  weigh_series(*s, 0, 2);
-  CHECK(s->report.series_residual <= 1e-6);
-  sum_series(*s, 0, 2);
+  Lane lane;
+  weigh_series(s->settings, s->bodies, touching, lane);
+  CHECK(lane.report.series_residual <= 1e-6);
+  for (LinearWrench& acting : s->acting) acting.set_zero();
+  add_wrenches(s->settings, s->bodies, touching, s->acting);
 
   const auto w = world.wrenches(state);
   for (int b = 0; b < 3; ++b) {
     REQUIRE(w[b].norm() > 0.1);
-    CHECK((s->bodies[b].f - w[b]).norm() < 1e-4 * w[b].norm());
+    CHECK((s->acting[b].f - w[b]).norm() < 1e-4 * w[b].norm());
   }
-  const Pair *p = s->pairs, *q = s->pairs + 1;
-  const Mat6 K[3][3] = {{s->bodies[0].K, p->Kab, q->Kab},
-                        {p->Kba, s->bodies[1].K, p->left * q->right},
-                        {q->Kba, q->left * p->right, s->bodies[2].K}};
-  const Mat6 D[3][3] = {{s->bodies[0].D, p->Dab, q->Dab},
-                        {p->Dba, s->bodies[1].D, world.beta * p->left * q->right_d},
-                        {q->Dba, world.beta * q->left * p->right_d, s->bodies[2].D}};
+  const std::span<LinearWrench> on = s->acting;
+  const BetweenBodies &ap = *s->pairs[0].between, &aq = *s->pairs[1].between;
+  const BetweenFields &p = *s->pairs[0].of_fields, &q = *s->pairs[1].of_fields;
+  const Mat6 K[3][3] = {{on[0].K, ap.Kab, aq.Kab},
+                        {ap.Kba, on[1].K, p.left * q.right},
+                        {aq.Kba, q.left * p.right, on[2].K}};
+  const Mat6 D[3][3] = {{on[0].D, ap.Dab, aq.Dab},
+                        {ap.Dba, on[1].D, world.beta * p.left * q.right_d},
+                        {aq.Dba, world.beta * q.left * p.right_d, on[2].D}};
   for (int by = 0; by < 3; ++by) {
     Mat6 numeric[3], numeric_d[3];
     for (int i = 0; i < 6; ++i) {

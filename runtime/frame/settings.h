@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// settings.h - what a session is told when it is made; every stage may read it, none changes it.
+#pragma once
+#include <cstddef>
+
+#include "hapsix/hapsix.h"
+#include "runtime/base/math.h"
+
+namespace h6 {
+
+struct Settings {
+  h6ContactDef contact{};
+  h6Integrator integrator = H6_IMPLICIT;
+  h6Gradient gradient = H6_SYMMETRIC;
+  double dt = 1e-3;              // of a frame [s]
+  Vec3 gravity = Vec3::Zero();   // world frame [m/s^2]
+  bool net_stiffness = false;    // report it
+  std::size_t max_contacts = 0;  // of one shell body
+};
+
+}  // namespace h6
