@@ -11,8 +11,8 @@
 #include <algorithm>
 
 #include "kernels/contact/contact_columns.h"
-#include "runtime/frame/contact_stages.h"
-#include "runtime/frame/net_stiffness.h"
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/net_stiffness.h"
 #include "runtime/frame/session.h"
 #include "sched/clock.h"
 #include "sched/realtime.h"

@@ -39,12 +39,14 @@ const Rooms& below() {
     room("runtime/base", {"contract"});
     room("runtime/model", {"contract", "kernels", "kernels/field", "sched", "runtime/base"});
     room("runtime/hand", {"contract", "runtime/base"});
-    room("runtime/frame",
-         {"contract", "kernels", "kernels/field", "kernels/contact", "kernels/weights", "sched",
-          "runtime/base", "runtime/model", "runtime/hand"});
+    room("runtime/contact", {"contract", "kernels", "kernels/contact", "kernels/weights", "sched",
+                             "runtime/base", "runtime/model"});
+    room("runtime/motion", {"contract", "runtime/base", "runtime/hand", "runtime/contact"});
+    room("runtime/frame", {"contract", "sched", "runtime/base", "runtime/model", "runtime/contact",
+                           "runtime/motion"});
     room("runtime/loop", {"contract", "sched", "runtime/base", "runtime/hand", "runtime/frame"});
-    room("runtime", {"contract", "kernels", "kernels/contact", "sched", "runtime/base",
-                     "runtime/model", "runtime/hand", "runtime/frame"});
+    room("runtime",
+         {"contract", "kernels", "kernels/contact", "sched", "runtime/contact", "runtime/frame"});
 
     room("device", {"contract", "sched"});
 

@@ -8,10 +8,10 @@
 #include <new>
 #include <vector>
 
-#include "runtime/frame/contact_stages.h"
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/traverse_pair.h"
+#include "runtime/contact/weighing.h"
 #include "runtime/frame/session_checks.h"
-#include "runtime/frame/traverse_pair.h"
-#include "runtime/frame/weighing.h"
 
 namespace h6 {
 namespace {

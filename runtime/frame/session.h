@@ -4,13 +4,13 @@
 #include <span>
 
 #include "hapsix/hapsix.h"
-#include "runtime/frame/anytime.h"
-#include "runtime/frame/hand.h"
-#include "runtime/frame/motion_stages.h"
-#include "runtime/frame/pair.h"
-#include "runtime/frame/settings.h"
+#include "runtime/contact/anytime.h"
+#include "runtime/contact/pair.h"
+#include "runtime/contact/settings.h"
 #include "runtime/frame/shell_lanes.h"
 #include "runtime/model/model.h"
+#include "runtime/motion/hand.h"
+#include "runtime/motion/motion_stages.h"
 #include "sched/clock.h"
 #include "sched/frame_team.h"
 

@@ -6,9 +6,9 @@
 // of another, so two shell bodies can be weighed side by side, each in a lane with scratch and a
 // report of its own. Wrenches are added afterwards, in order: the bits are those of one thread.
 #pragma once
-#include "runtime/frame/lane.h"
-#include "runtime/frame/pair.h"
-#include "runtime/frame/settings.h"
+#include "runtime/contact/lane.h"
+#include "runtime/contact/pair.h"
+#include "runtime/contact/settings.h"
 
 namespace h6 {
 

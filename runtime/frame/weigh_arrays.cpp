@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "hapsix/hapsix.h"
+#include "runtime/contact/weighing.h"
 #include "runtime/frame/session_checks.h"
-#include "runtime/frame/weighing.h"
 
 namespace h6 {
 namespace {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// contact_stages.h - the stages that find the contacts of one shell body, weigh them and sum them.
+#pragma once
+#include "runtime/contact/lane.h"
+#include "runtime/contact/pair.h"
+#include "runtime/contact/settings.h"
+
+namespace h6 {
+
+inline constexpr std::size_t kSumSlice = 1024;  // contacts summed at a time; slices added in order
+
+// ---- side by side for several shell bodies: each writes its shell body and its lane only
+
+// Finds the shell points that touch a field: rows of the last level with a distance below zero, or
+// (series) below the margin. Keeps the deepest where there are too many.
+void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
+// Fills depth, normal, gradient and arm of each.
+void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane);
+// Shares the stiffness among all contacts of the shell body, all fields pooled. METHOD.md, Sec. 3.
+void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                    Lane& lane);
+void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
+// Sums each pair's contacts into shell.sums.
+void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
+
+// ---- one shell body after the other, in order
+
+// Adds the sums to the wrenches on both bodies of each pair, and to the blocks between them.
+void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                  std::span<LinearWrench> acting);
+
+// ---- the parts of add_wrenches, for sums from anywhere
+
+// A pair's two bodies, and what acts on each.
+struct Sides {
+  const Body &a, &b;
+  LinearWrench &on_a, &on_b;
+};
+inline Sides sides_of(const Pair& pair, std::span<const Body> bodies,
+                      std::span<LinearWrench> acting) {
+  return {bodies[pair.a], bodies[pair.b], acting[pair.a], acting[pair.b]};
+}
+void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
+                   const kernels::WrenchSum& sum);
+// `series`: first each pair of a shell body, then join_series once, which reads shell.sums.
+void spread_series(const Settings& set, const Sides& sides, Pair& pair,
+                   const kernels::WrenchSum& sum);
+void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                 std::span<LinearWrench> acting);
+// Adds what turning the arms and normals does to an elastic wrench f on a.
+void add_geometric_terms(const Sides& sides, Pair& pair, const Vec6& f);
+
+// S = [I 0; [x_a - x_b]x I]: carries a wrench about a's centre of mass to b's.
+Mat6 arm_shift(const Body& a, const Body& b);
+// The velocity of a against b at a's centre of mass: u_a - S^T u_b.
+Vec6 pair_velocity(const Body& a, const Body& b);
+
+}  // namespace h6

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// find_contacts.cpp - finds the points of a shell body that are inside fields, pair by pair, and
+// makes contacts of them.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "kernels/contact/keep_nearest.h"
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/traverse_pair.h"
+#include "sched/clock.h"
+
+namespace h6 {
+namespace {
+
+constexpr std::size_t kContactSlice = 512;  // contacts made at a time: some 1.5 us
+// Contacts from which two threads make them. Fewer do not pay for the way from the other core's
+// cache: 1,000 take 3.1 us on one thread and 6.2 on two, 10,000 take 46 and 26.
+constexpr std::size_t kManyContacts = 4096;
+constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which threads share the pairs
+constexpr std::size_t kPairSlices = 32;
+
+// Contact arms [m], from a's centre of mass along the axes of the world, to voxels of b's field.
+kernels::Affine arms_to_field(const Body& a, const Body& b) {
+  const Field& field = *b.field;
+  const Mat3 m = b.R.transpose() / field.voxel;
+  const Vec3 t = m * (a.x - (b.x - b.R * b.com)) - field.origin / field.voxel;
+  kernels::Affine affine;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
+    affine.m[r][3] = static_cast<float>(t[r]);
+  }
+  return affine;
+}
+
+// Keeps the `most` deepest of the candidates of `pairs`, rows up to `count`, in their order. Of
+// equal depths the first ones stay. Returns the row behind the last.
+std::size_t keep_deepest(const TraverseScratch& t, std::size_t count, std::size_t most,
+                         std::span<PairSearch> pairs) {
+  std::size_t n = pairs[0].first;
+  const kernels::Touching all = candidates_from(t, 0);
+  const kernels::NearestLimit at = kernels::nearest_limit(all.distance + n, count - n, most);
+  std::size_t ties = most - at.below;
+  for (PairSearch& pair : pairs) {
+    const std::size_t begin = pair.first, end = begin + pair.candidates;
+    pair.first = n;
+    pair.candidates = kernels::keep_nearest(all, begin, end, at.limit, ties, n);
+    n += pair.candidates;
+  }
+  return n;
+}
+
+// Keeps only a few of the coarse pairs' candidates where there is no time for more. Returns how
+// many candidates there are then.
+std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, std::span<PairSearch> all,
+                     std::size_t used) {
+  const std::span<PairSearch> pairs = all.last(coarse_pairs_of(anytime, all));
+  if (pairs.empty()) return used;
+  const std::size_t coarse = used - pairs[0].first;
+  if (coarse <= Anytime::kFew || !must_be_few(anytime, all[0], used)) return used;
+  used = keep_deepest(t, used, Anytime::kFew, pairs);
+  float least = -HUGE_VALF;  // largest distance that was kept: all others are no deeper
+  for (std::size_t i = pairs[0].first; i < used; ++i)
+    least = std::max(least, t.candidate_distance[i]);
+  for (PairSearch& pair : pairs) pair.missed = std::max(pair.missed, -least);
+  return used;
+}
+
+std::size_t traverse_in_order(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                              Lane& lane) {
+  TraverseScratch& t = lane.scratch->traverse;
+  const std::size_t most = shell.contacts.capacity;
+  std::size_t used = 0;
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    PairSearch& pair = shell.searches[p];
+    pair.first = used;
+    pair.candidates = traverse_pair(set, bodies[shell.body], bodies[shell.pairs[p].b], pair, t,
+                                    lane, used, false);
+    used += pair.candidates;
+    if (used > most) {
+      used = keep_deepest(t, used, most, shell.searches.first(p + 1));
+      lane.report.status |= H6_CONTACTS_DROPPED;
+    }
+  }
+  return used;
+}
+
+// Is there enough work for two threads, and in enough pairs? A pair that has most of the work is
+// shared within. With a budget the clock decides pair after pair, in order.
+bool worth_sharing(const ShellBody& shell, const Lane& lane) {
+  if (!lane.helper || shell.pairs.size() < 2 || lane.anytime->by_clock) return false;
+  if (shell.traverse_ns < (shell.pairs_shared ? 0.5 * kPairsWorthSharing : kPairsWorthSharing))
+    return false;
+  std::size_t all = 0, most = 0;
+  for (const PairSearch& pair : shell.searches) {
+    all += pair.sampled;
+    most = std::max(most, pair.sampled);
+  }
+  return most < kWorthSharing || 2 * most <= all;
+}
+
+// Each thread fills its own scratch; the results are joined in the order of pairs. False where the
+// scratch is too small, which happens only where contacts will be dropped. The traversal can then
+// simply be repeated, because expiries stay true.
+bool traverse_shared(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                     Lane& lane, std::size_t* used) {
+  TraverseScratch &mine = lane.scratch->traverse, &helpers = *lane.helper;
+  mine.used = helpers.used = 0;
+  const Body& a = bodies[shell.body];
+  const std::size_t pairs = shell.pairs.size(), slice = (pairs + kPairSlices - 1) / kPairSlices;
+  const std::size_t room = kBlockRows * a.shell->blocks.count;
+  std::atomic<bool> full{false};
+  lane.team->for_slices((pairs + slice - 1) / slice, [&](std::size_t i) {
+    const int here = sched::FrameTeam::here();
+    TraverseScratch& t = here == 0 ? mine : helpers;
+    const std::size_t end = std::min((i + 1) * slice, pairs);
+    for (std::size_t p = i * slice; p < end; ++p) {
+      if (t.used + room > t.capacity) return full.store(true, std::memory_order_relaxed);
+      PairSearch& pair = shell.searches[p];
+      pair.found_by = here;
+      pair.first = t.used;
+      pair.candidates =
+          traverse_pair(set, a, bodies[shell.pairs[p].b], pair, t, lane, t.used, true);
+      t.used += pair.candidates;
+    }
+  });
+  std::size_t end = mine.used + helpers.used;
+  if (full.load(std::memory_order_relaxed) || end > mine.capacity) return false;
+  *used = end;
+  // From the last one on: the caller's own candidates then only ever move up.
+  for (std::size_t p = pairs; p-- > 0;) {
+    PairSearch& pair = shell.searches[p];
+    end -= pair.candidates;
+    move_candidates(mine, end, pair.found_by == 0 ? mine : helpers, pair.first, pair.candidates);
+    pair.first = end;
+  }
+  return true;
+}
+
+}  // namespace
+
+void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  const TraverseScratch& t = lane.scratch->traverse;
+  const std::size_t most = shell.contacts.capacity;
+  const bool timed = lane.helper && shell.pairs.size() > 1;
+  const std::int64_t since = timed ? sched::now_ns() : 0;
+  std::size_t used = 0;
+  shell.pairs_shared =
+      worth_sharing(shell, lane) && traverse_shared(set, bodies, shell, lane, &used);
+  if (!shell.pairs_shared) used = traverse_in_order(set, bodies, shell, lane);
+  used = keep_few(*lane.anytime, t, shell.searches, used);
+  if (used > most) {
+    keep_deepest(t, used, most, shell.searches);
+    lane.report.status |= H6_CONTACTS_DROPPED;
+  }
+  if (timed) shell.traverse_ns = static_cast<double>(sched::now_ns() - since);
+  for (const PairSearch& pair : shell.searches)
+    lane.report.missed_depth_voxels =
+        std::max<double>(lane.report.missed_depth_voxels, pair.missed);
+}
+
+void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  Contacts& c = shell.contacts;
+  c.count = 0;
+  const Body& a = bodies[shell.body];
+  const Shell& points = *a.shell;
+  const kernels::ShellColumns columns{points.x.data,    points.y.data,  points.z.data,
+                                      points.nx.data,   points.ny.data, points.nz.data,
+                                      points.point.data};
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    Pair& pair = shell.pairs[p];
+    PairSearch& found = shell.searches[p];
+    const Body& b = bodies[pair.b];
+    const std::size_t first = c.count;
+    kernels::ContactFrame frame;
+    const Vec3 arm = a.R * (points.centre - a.com);
+    for (int k = 0; k < 9; ++k) {
+      frame.Ra[k] = static_cast<float>(a.R(k / 3, k % 3));
+      frame.Rb[k] = static_cast<float>(b.R(k / 3, k % 3));
+    }
+    for (int k = 0; k < 3; ++k) frame.arm[k] = static_cast<float>(arm[k]);
+    frame.voxel = static_cast<float>(b.field->voxel);
+    const bool many = found.candidates >= kManyContacts;
+    const std::size_t size = many ? kContactSlice : found.candidates;
+    const auto make = [&](std::size_t slice) {
+      const std::size_t at = slice * size, to = first + at;
+      kernels::make_contacts(columns, candidates_from(lane.scratch->traverse, found.first + at),
+                             std::min(size, found.candidates - at), frame,
+                             {c.depth + to, c.nx + to, c.ny + to, c.nz + to, c.gx + to, c.gy + to,
+                              c.gz + to, c.rx + to, c.ry + to, c.rz + to, c.point + to});
+    };
+    lane.team->for_slices(many ? (found.candidates + size - 1) / size : 1, make);
+    c.count += found.candidates;
+    if (found.candidates > 0) found.arms = arms_to_field(a, b);
+    std::fill_n(c.field_body + first, found.candidates, pair.b);
+    pair.begin = first;
+    pair.end = c.count;
+  }
+}
+
+}  // namespace h6

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// lane.h - what a worker needs to weigh one shell body's contacts: scratch, threads, a report.
+#pragma once
+#include "hapsix/hapsix.h"
+#include "kernels/contact/contact_wrench.h"
+#include "runtime/contact/anytime.h"
+#include "runtime/contact/share_gate.h"
+#include "runtime/contact/weighing.h"
+#include "sched/frame_team.h"
+
+namespace h6 {
+
+// Lists and candidates of one traversal. Sizes are those of the largest shell.
+struct TraverseScratch {
+  std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (groups)
+  std::uint32_t *far = nullptr, *far_survivors = nullptr;   // (groups)
+  std::uint32_t* open_blocks = nullptr;                     // (blocks)
+  float* clearance = nullptr;                               // (groups) [voxel]
+  std::uint16_t *rows = nullptr, *near_rows = nullptr;      // (groups)
+  float* rest = nullptr;                                    // (groups) [voxel]
+  std::uint32_t* candidate = nullptr;                       // (capacity) rows of the shell
+  float* candidate_distance = nullptr;                      // (capacity) [voxel]
+  float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;  // (capacity)
+  std::size_t used = 0, capacity = 0;                                         // candidates
+};
+
+struct Scratch {
+  TraverseScratch traverse;
+  ClusterScratch cluster{};
+  char* weigh = nullptr;                    // weigh_scratch_bytes of max_contacts, or null
+  std::size_t* slice_count = nullptr;       // (slices of groups) points that touch
+  kernels::WrenchSum* slice_sum = nullptr;  // (slices of contacts)
+};
+
+struct Lane {
+  Scratch* scratch = nullptr;
+  TraverseScratch* helper = nullptr;  // for the team's second thread; null: pairs are not shared
+  sched::FrameTeam* team = nullptr;
+  ShareGate touching, weighing, summing;  // whether groups, contacts, contacts go to the team
+  Anytime* anytime = nullptr;             // the frame's; only read where lanes run side by side
+  bool cold = false;       // other programs have used the caches since the last frame
+  double tick_ns = 1;      // of sched::ticks
+  h6FrameReport report{};  // of this lane alone
+};
+
+}  // namespace h6

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// series.cpp - the rule `series` in a frame: one solve gives the loads of all contacts of a shell
+// body; wrenches and derivatives follow pair by pair. METHOD.md, Sec. 3.
+//
+// With C_p = sum kappa J J^T and B_p = sum kappa J J_g^T over the loaded contacts of pair p (J
+// about a's centre of mass, unscaled), G = c S^-2 and A = G + sum_p C_p, relative motion q of pair
+// q gives
+//     d f_p / d q = -k (delta_pq B_p - C_p A^-1 B_q),     summed over p: -k G A^-1 B_q
+// and each block of the system follows as in sum_wrench.cpp, S_p carrying wrenches to b_p. In
+// symmetric form B_p = C_p.
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/weighing.h"
+
+namespace h6 {
+
+void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end) {
+  kernels::series_gap(kernel_columns(c, begin, end), c.depth + begin, beta, u.data(),
+                      c.load + begin);
+}
+
+kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever,
+                                   double y[6]) {
+  fill_facing(c, true);
+  const kernels::SeriesColumns columns{c.nx, c.ny,   c.nz,     c.rx,   c.ry,
+                                       c.rz, c.load, c.facing, c.count};
+  const kernels::SeriesResult result =
+      kernels::series_solve(columns, {def.series_c, lever}, y, c.kappa, c.slack);
+  kernels::series_loads(c.kappa, c.slack, c.depth, c.count, c.load, c.weight);
+  return result;
+}
+
+kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,
+                                   std::size_t end) {
+  const kernels::WrenchColumns columns{c.slack, c.kappa, c.nx, c.ny, c.nz, c.gx,
+                                       c.gy,    c.gz,    c.rx, c.ry, c.rz, c.count};
+  return kernels::contact_wrench(columns, {1.0, 0.0, {}, exact}, begin, end);
+}
+
+Mat6 series_spring(const h6ContactDef& def, double lever) {
+  Mat6 G = def.series_c * Mat6::Identity();
+  G.bottomRightCorner<3, 3>() *= lever * lever;
+  return G;
+}
+
+void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  const Body& a = bodies[shell.body];
+  Contacts& c = shell.contacts;
+  for (const Pair& pair : shell.pairs)
+    fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin, pair.end);
+  const kernels::SeriesResult result =
+      solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y);
+  h6FrameReport& report = lane.report;
+  report.series_iterations =
+      std::max(report.series_iterations, static_cast<std::uint32_t>(result.iterations));
+  report.series_residual = std::max(report.series_residual, result.residual);
+}
+
+void spread_series(const Settings& set, const Sides& sides, Pair& pair,
+                   const kernels::WrenchSum& sum) {
+  const Vec6 f = set.contact.stiffness * Vec6::Map(sum.force);
+  pair.f = f;
+  if (pair.between) pair.between->Kab.setZero(), pair.between->Kba.setZero();
+  if (set.gradient == H6_EXACT) add_geometric_terms(sides, pair, f);
+  if (!sides.a.fixed) sides.on_a.f += f;
+  if (!sides.b.fixed) sides.on_b.f -= arm_shift(sides.a, sides.b) * f;
+}
+
+void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                 std::span<LinearWrench> acting) {
+  const Body& a = bodies[shell.body];
+  const double k = set.contact.stiffness, beta = set.contact.damping;
+  const Mat6 G = series_spring(set.contact, series_lever(a.radius, a.voxel));
+  Mat6 B = Mat6::Zero(), C = Mat6::Zero();
+  for (const kernels::WrenchSum& sum : shell.sums) {
+    B += row_major(sum.stiffness);
+    C += row_major(sum.damping);
+  }
+  const Mat6 inverse = (G + C).inverse();
+  if (!a.fixed) {
+    acting[shell.body].K -= k * G * inverse * B;
+    acting[shell.body].D -= k * beta * G * inverse * C;
+  }
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    Pair& pair = shell.pairs[p];
+    const Mat6 Bp = row_major(shell.sums[p].stiffness), Cp = row_major(shell.sums[p].damping);
+    pair.B = k * (Cp - Cp * inverse * C);
+    if (!pair.of_fields) continue;
+    BetweenFields& to = *pair.of_fields;
+    LinearWrench& on_b = acting[pair.b];
+    const Mat6 S = arm_shift(a, bodies[pair.b]);
+    to.left = k * S * Cp * inverse;
+    to.right = Bp * S.transpose();
+    to.right_d = Cp * S.transpose();
+    on_b.K -= (k * S * Bp - to.left * Bp) * S.transpose();
+    on_b.D -= beta * (k * S * Cp - to.left * Cp) * S.transpose();
+    if (!pair.between) continue;
+    pair.between->Kab += k * G * inverse * to.right;
+    pair.between->Kba += k * S * Bp - to.left * B;
+    pair.between->Dab = k * beta * G * inverse * to.right_d;
+    pair.between->Dba = beta * (k * S * Cp - to.left * C);
+  }
+}
+
+}  // namespace h6

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// sum_wrench.cpp - a pair's wrench on both of its bodies, and how it changes as they move.
+//
+// The kernel sums over the shell body's arms. The field body's Jacobian is J_b = -[N; r_b x N] with
+// r_b = r_a + c, c = x_a - x_b: J_b = -S J_a, S = [I 0; [c]x I]. So every block follows from the
+// shell body's own sums, and no contact is touched twice. METHOD.md, Sec. 2.
+#include <algorithm>
+
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/weighing.h"
+#include "sched/clock.h"
+
+namespace h6 {
+namespace {
+
+void sum_slices(const Contacts& c, const Pair& pair, const kernels::WrenchParameters& p, Lane& lane,
+                kernels::WrenchSum& out) {
+  const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
+                                       c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
+  const std::size_t count = pair.end - pair.begin, slices = (count + kSumSlice - 1) / kSumSlice;
+  const auto sum_slice = [&](std::size_t i, kernels::WrenchSum& sum) {
+    kernels::contact_wrench(columns, p, pair.begin + i * kSumSlice,
+                            std::min(pair.begin + (i + 1) * kSumSlice, pair.end), sum);
+  };
+  if (slices <= 1 || lane.team->threads() == 1) {
+    sum_slice(0, out);
+    for (std::size_t i = 1; i < slices; ++i) {
+      kernels::WrenchSum next;
+      sum_slice(i, next);
+      out.add(next);
+    }
+    return;
+  }
+  kernels::WrenchSum* const sums = lane.scratch->slice_sum;
+  const std::int64_t since = sched::now_ns();
+  const auto keep = [&](std::size_t i) { sum_slice(i, sums[i]); };
+  if (lane.summing.share(count))
+    lane.team->for_slices(slices, keep);
+  else
+    for (std::size_t i = 0; i < slices; ++i) keep(i);
+  lane.summing.took(static_cast<double>(sched::now_ns() - since));
+  out = sums[0];
+  for (std::size_t i = 1; i < slices; ++i) out.add(sums[i]);
+}
+
+void add_wrench(const Settings& set, const Sides& sides, Pair& pair,
+                const kernels::WrenchSum& sum) {
+  if (pair.begin != pair.end) return spread_wrench(set, sides, pair, sum);
+  pair.f.setZero();
+  pair.B.setZero();
+  if (pair.between)
+    for (Mat6* block :
+         {&pair.between->Kab, &pair.between->Kba, &pair.between->Dab, &pair.between->Dba})
+      block->setZero();
+}
+
+}  // namespace
+
+Mat6 arm_shift(const Body& a, const Body& b) {
+  Mat6 S = Mat6::Identity();
+  S.bottomLeftCorner<3, 3>() = cross_matrix(a.x - b.x);
+  return S;
+}
+
+Vec6 pair_velocity(const Body& a, const Body& b) {
+  Vec6 ua, ub;
+  ua << a.v, a.w;
+  ub << b.v, b.w;
+  return ua - arm_shift(a, b).transpose() * ub;
+}
+
+void add_geometric_terms(const Sides& sides, Pair& pair, const Vec6& f) {
+  const Body &a = sides.a, &b = sides.b;
+  const Mat3 F = cross_matrix(f.head<3>()), T = cross_matrix(f.tail<3>());
+  if (!a.fixed) {
+    sides.on_a.K.topRightCorner<3, 3>() -= F;
+    sides.on_a.K.bottomRightCorner<3, 3>() -= T;
+  }
+  // The arms from b grow as a and b part, and turn as a turns.
+  if (!b.fixed) sides.on_b.K.bottomLeftCorner<3, 3>() -= F;
+  if (!pair.between) return;
+  Mat6& Kba = pair.between->Kba;
+  Kba.topRightCorner<3, 3>() += F;
+  Kba.bottomLeftCorner<3, 3>() += F;
+  Kba.bottomRightCorner<3, 3>() += T + cross_matrix(a.x - b.x) * F;
+}
+
+void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
+                   const kernels::WrenchSum& sum) {
+  const Body &a = sides.a, &b = sides.b;
+  const Mat6 S = arm_shift(a, b);
+  const Vec6 f = Vec6::Map(sum.force);
+  pair.f = f;
+  pair.B = row_major(sum.damping);
+  const Mat6 K = row_major(sum.stiffness), D = set.contact.damping * pair.B;
+  if (!a.fixed) {
+    sides.on_a.f += f;
+    sides.on_a.K -= K;
+    sides.on_a.D -= D;
+  }
+  if (!b.fixed) {
+    sides.on_b.f -= S * f;
+    sides.on_b.K -= S * K * S.transpose();
+    sides.on_b.D -= S * D * S.transpose();
+  }
+  if (pair.between) {
+    pair.between->Kab = K * S.transpose();
+    pair.between->Kba = S * K;
+    pair.between->Dab = D * S.transpose();
+    pair.between->Dba = S * D;
+  }
+  if (set.gradient == H6_EXACT) add_geometric_terms(sides, pair, Vec6::Map(sum.elastic));
+}
+
+void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  kernels::WrenchParameters p{
+      set.contact.stiffness, set.contact.damping, {}, set.gradient == H6_EXACT};
+  for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
+    const Pair& pair = shell.pairs[i];
+    if (pair.begin == pair.end) continue;
+    Vec6::Map(p.velocity) = pair_velocity(bodies[pair.a], bodies[pair.b]);
+    sum_slices(shell.contacts, pair, p, lane, shell.sums[i]);
+  }
+}
+
+void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                  std::span<LinearWrench> acting) {
+  const bool series = set.contact.method == H6_METHOD_SERIES;
+  for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
+    Pair& pair = shell.pairs[i];
+    const Sides sides = sides_of(pair, bodies, acting);
+    if (series) {
+      shell.sums[i] =
+          sum_series_rows(shell.contacts, set.gradient == H6_EXACT, pair.begin, pair.end);
+      spread_series(set, sides, pair, shell.sums[i]);
+    } else {
+      add_wrench(set, sides, pair, shell.sums[i]);
+    }
+  }
+  if (series) join_series(set, bodies, shell, acting);
+}
+
+}  // namespace h6

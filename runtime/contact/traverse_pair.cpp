@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: Apache-2.0
+// traverse_pair.cpp - finds the points of a shell that are inside a field.
+//
+// Xu & Barbic 2016, Sec. 3 after McNeely 1999: a sphere whose signed distance exceeds its radius is
+// dropped with all its points. Ours are flat tiers of spheres, and a dropped sphere is not tested
+// again until the shell has moved as far as the sphere was clear. The same holds for single points.
+// METHOD.md, Sec. 6.
+#include "runtime/contact/traverse_pair.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "kernels/contact/cull_spheres.h"
+#include "kernels/contact/expiry.h"
+#include "sched/clock.h"
+
+namespace h6 {
+
+kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at) {
+  return {t.candidate + at, t.candidate_distance + at, t.gradient_x + at, t.gradient_y + at,
+          t.gradient_z + at};
+}
+
+void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
+                     std::size_t from_row, std::size_t count) {
+  const kernels::Touching a = candidates_from(to, to_row), b = candidates_from(from, from_row);
+  if (a.row == b.row || count == 0) return;
+  std::memmove(a.row, b.row, count * sizeof *a.row);
+  std::memmove(a.distance, b.distance, count * sizeof *a.distance);
+  std::memmove(a.gx, b.gx, count * sizeof *a.gx);
+  std::memmove(a.gy, b.gy, count * sizeof *a.gy);
+  std::memmove(a.gz, b.gz, count * sizeof *a.gz);
+}
+
+namespace {
+
+// Shell coordinates [m], relative to the shell's centre, to voxels of the field.
+kernels::Affine shell_to_field(const Body& a, const Body& b) {
+  const Shell& shell = *a.shell;
+  const Field& field = *b.field;
+  const Mat3 m = b.R.transpose() * a.R / field.voxel;
+  const Vec3 b_mesh = b.x - b.R * b.com;  // origin of b's mesh frame in the world
+  const Vec3 centre = a.x + a.R * (shell.centre - a.com);
+  const Vec3 t = (b.R.transpose() * (centre - b_mesh) - field.origin) / field.voxel;
+  kernels::Affine affine;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
+    affine.m[r][3] = static_cast<float>(t[r]);
+  }
+  return affine;
+}
+
+// `series` needs the points that are about to touch. [voxel]
+float margin_of(const h6ContactDef& contact) {
+  return contact.method == H6_METHOD_SERIES ? static_cast<float>(contact.margin_voxels) : 0.0f;
+}
+
+constexpr float kSlack = 1e-3f;  // [voxel]
+constexpr std::size_t kFewGroups =
+    4;                               // of a block: testing them is cheaper than the block's sphere
+constexpr double kLongestWay = 256;  // float resolves 3e-5 there [voxel]
+constexpr double kStays = 0.04;      // distance to the anchor of a shell that stays [voxel]
+// A slow shell has single points of a group sampled: those nearer than kNearest and the way of
+// kStepsNear steps like the last one.
+constexpr float kNearest = 0.05f;  // [voxel]
+constexpr double kStepsNear = 16;
+constexpr double kSlowStep = 1 / kStepsNear;  // [voxel]
+// The sphere of a group says soon enough when one of its points comes near, where all points are
+// farther than this [voxel].
+constexpr float kFarGroup = 1;
+
+// The constants of one traversal.
+struct Search {
+  const kernels::FieldView& field;
+  const Shell& shell;
+  kernels::Affine place;
+  float scale;  // voxels a metre
+  bool wide;
+  float margin;    // [voxel]
+  bool cold;       // other programs have used the caches
+  float near = 0;  // single points are sampled up to this distance; 0: always all points [voxel]
+
+  std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
+                   std::uint32_t* survivors, float* clearance) const {
+    return kernels::cull_spheres(
+        field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
+        wide, margin, rows, 0, count, survivors, clearance);
+  }
+  // Takes the samples in `vectors`; rows in `out` are rows of the shell.
+  std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
+                            const kernels::Touching& out, float* least) const {
+    const Samples& samples = shell.samples;
+    const std::size_t found = kernels::touch_groups(
+        field, place, {samples.x.data, samples.y.data, samples.z.data, samples.x.count}, vectors,
+        count, margin, cold, {nullptr, least, nullptr, nullptr, 0}, out);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < found; ++k) {
+      const std::uint32_t row = samples.row[out.row[k]];
+      if (row == Samples::kNoRow) continue;
+      if (kept != k) {
+        out.distance[kept] = out.distance[k];
+        out.gx[kept] = out.gx[k], out.gy[kept] = out.gy[k], out.gz[kept] = out.gz[k];
+      }
+      out.row[kept++] = row;
+    }
+    return kept;
+  }
+  // Samples t.survivors from `first` on.
+  std::size_t touch(const TraverseScratch& t, std::size_t first, std::size_t count,
+                    const kernels::Touching& out) const {
+    return kernels::touch_groups(field, place,
+                                 {shell.x.data, shell.y.data, shell.z.data, shell.points},
+                                 t.survivors + first, count, margin, cold,
+                                 {near > 0 ? t.rows + first : nullptr, t.clearance + first,
+                                  t.near_rows + first, t.rest + first, near},
+                                 out);
+  }
+};
+
+// Samples `count` groups and puts the points that touch behind `used`, in order, whichever thread
+// runs a slice.
+std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::size_t count,
+                  std::size_t used, bool shared) {
+  const auto by_myself = [&] { return search.touch(t, 0, count, candidates_from(t, used)); };
+  if (shared || count < kWorthSharing || lane.team->threads() == 1) return by_myself();
+  const std::int64_t since = sched::now_ns();
+  const auto timed = [&](std::size_t found) {
+    lane.touching.took(static_cast<double>(sched::now_ns() - since));
+    return found;
+  };
+  if (!lane.touching.share(count)) return timed(by_myself());
+  const std::size_t slices = (count + kTouchSlice - 1) / kTouchSlice;
+  std::size_t* const found = lane.scratch->slice_count;
+  lane.team->for_slices(slices, [&](std::size_t i) {
+    const std::size_t at = i * kTouchSlice, n = std::min(kTouchSlice, count - at);
+    found[i] = search.touch(t, at, n, candidates_from(t, used + at * kGroupRows));
+  });
+  std::size_t kept = found[0];
+  for (std::size_t i = 1; i < slices; ++i) {
+    move_candidates(t, used + kept, t, used + i * kTouchSlice * kGroupRows, found[i]);
+    kept += found[i];
+  }
+  return timed(kept);
+}
+
+// An upper bound on how far a point within `radius` of the shell's centre moved between two places
+// [voxel].
+double motion_bound(const kernels::Affine& from, const kernels::Affine& to, double radius) {
+  double turn = 0, shift = 0;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      const double d = double(to.m[r][c]) - from.m[r][c];
+      turn += d * d;
+    }
+    const double d = double(to.m[r][3]) - from.m[r][3];
+    shift += d * d;
+  }
+  return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
+}
+
+// The shell's way through the field so far, in voxels. It does not grow while the shell moves to
+// and fro around its anchor.
+struct Way {
+  float now;   // the way to the anchor plus the distance from there
+  float from;  // the way to the anchor less that distance: clearances found here count from it
+};
+
+// The way at which something with this clearance may touch. kSlack covers the rounding to float.
+float expiry_of(const Way& way, float clearance) {
+  return way.from + std::max(clearance - kSlack, 0.0f);
+}
+
+// The way starts anew when it is too long for float, or when nothing is known.
+Way travel(PairSearch& pair, Search& search) {
+  const Shell& shell = search.shell;
+  double away = 0;
+  if (pair.travelled >= 0) {
+    const double radius = shell.radius * (1 + 1e-6);
+    const double step = motion_bound(pair.last_place, search.place, radius);
+    if (step < kSlowStep)
+      search.near = search.margin + kNearest + static_cast<float>(kStepsNear * step);
+    away = motion_bound(pair.anchor, search.place, radius);
+    if (!(away < kStays)) {
+      pair.travelled += away;
+      pair.anchor = search.place;
+      away = 0;
+    }
+  }
+  if (!(pair.travelled >= 0 && pair.travelled < kLongestWay)) {
+    pair.travelled = away = 0;
+    pair.anchor = search.place;
+    std::fill_n(pair.group_expiry, shell.groups.count, 0.0f);
+    std::fill_n(pair.near_rows, shell.groups.count, std::uint16_t{0});
+    std::fill(pair.group_expiry + shell.groups.count, pair.group_expiry + 16 * shell.blocks.count,
+              HUGE_VALF);
+    std::fill_n(pair.block_expiry, shell.blocks.count, 0.0f);
+    std::fill(pair.block_expiry + shell.blocks.count, pair.block_expiry + shell.blocks.x.count,
+              HUGE_VALF);
+  }
+  pair.last_place = search.place;
+  return {static_cast<float>(pair.travelled + away), static_cast<float>(pair.travelled - away)};
+}
+
+// Samples some points of each group of `blocks` blocks, and bounds how deep the others may be.
+// Where that gives more contacts than there is time for, it is done again with fewer points.
+std::size_t touch_coarsely(const Search& search, PairSearch& pair, TraverseScratch& t,
+                           Anytime& anytime, std::size_t blocks, std::size_t used) {
+  const Samples& samples = search.shell.samples;
+  std::size_t found;
+  do {
+    const int tier = anytime.tier;
+    const std::size_t each = std::size_t{1} << tier;
+    for (std::size_t k = 0; k < blocks; ++k)
+      for (std::size_t j = 0; j < each; ++j)
+        t.frontier[k * each + j] =
+            static_cast<std::uint32_t>(t.open_blocks[k] * Samples::kOfGroup + j);
+    const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
+    found = search.touch_samples(t.frontier, blocks * each, candidates_from(t, used), t.clearance);
+    learn_sampling(anytime, blocks * each, pair.open_groups, found, since);
+    pair.missed = 0;
+    for (std::size_t k = 0; k < blocks; ++k) {
+      const float reach = search.scale * samples.reach[tier][t.open_blocks[k]];
+      const float least = *std::min_element(t.clearance + k * each, t.clearance + (k + 1) * each);
+      // The long form, because cells far inside hold no samples.
+      pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - least);
+    }
+  } while (must_be_coarser(anytime, pair, used, found, blocks));
+  return found;
+}
+
+// Puts those of `count` groups in t.frontier that are to be sampled into t.survivors. Groups that
+// were near when last sampled still are, or nearly; of the others the spheres decide.
+std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search& search,
+                             std::size_t count, const Way& way) {
+  std::size_t near = 0, far = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t g = t.frontier[k];
+    const bool is_near = pair.near_rows[g] != 0;
+    t.frontier[near] = t.far[far] = g;
+    near += is_near, far += !is_near;
+  }
+  std::size_t left = far;
+  std::uint32_t* others = t.far;
+  if (far > 0 && pair.cull_groups.worth(far)) {
+    left = search.cull(search.shell.groups, t.far, far, t.far_survivors, t.clearance);
+    for (std::size_t k = 0; k < far; ++k)
+      pair.group_expiry[t.far[k]] = expiry_of(way, t.clearance[k]);
+    pair.cull_groups.learn(far, left);
+    others = t.far_survivors;
+  }
+  std::merge(t.frontier, t.frontier + near, others, others + left, t.survivors);
+  return near + left;
+}
+
+// Chooses the points of each group that may touch by now.
+void choose_rows(const PairSearch& pair, TraverseScratch& t, const Search& search,
+                 std::size_t groups, float now) {
+  if (!(search.near > 0)) return;
+  for (std::size_t k = 0; k < groups; ++k) {
+    const std::uint32_t g = t.survivors[k];
+    const bool some = pair.near_rows[g] != 0 && pair.rest_expiry[g] > now;
+    t.rows[k] = some ? pair.near_rows[g] : kernels::kAllRows;
+  }
+}
+
+// How many bits are set. std::popcount is a library call where the target has no instruction.
+std::size_t bits_of(unsigned rows) {
+  rows -= rows >> 1 & 0x5555u;
+  rows = (rows & 0x3333u) + (rows >> 2 & 0x3333u);
+  rows = (rows + (rows >> 4)) & 0x0f0fu;
+  return (rows + (rows >> 8)) & 0x1fu;
+}
+
+// Notes when the sampled groups may touch again, and which of their points are near.
+void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& search,
+                 std::size_t groups, const Way& way) {
+  const auto until = [&](float distance) {
+    return expiry_of(way, kernels::cull_clearance(distance - search.margin, search.wide));
+  };
+  if (!(search.near > 0)) {
+    for (std::size_t k = 0; k < groups; ++k) {
+      const std::uint32_t g = t.survivors[k];
+      pair.group_expiry[g] = until(t.clearance[k]);
+      if (!(t.clearance[k] < kFarGroup))
+        pair.near_rows[g] = 0;
+      else if (pair.near_rows[g] == 0)
+        pair.near_rows[g] = kernels::kAllRows, pair.rest_expiry[g] = 0;
+    }
+    return;
+  }
+  std::size_t near = 0;
+  for (std::size_t k = 0; k < groups; ++k) {
+    const std::uint32_t g = t.survivors[k];
+    if (t.rows[k] == kernels::kAllRows) {
+      pair.near_rows[g] = t.clearance[k] < kFarGroup ? t.near_rows[k] : 0;
+      pair.rest_expiry[g] = until(t.rest[k]);
+    }
+    near += bits_of(pair.near_rows[g]);
+    pair.group_expiry[g] = std::min(until(t.clearance[k]), pair.rest_expiry[g]);
+  }
+  pair.pick_rows.learn(kGroupRows * groups, near);
+}
+
+// Each group would wait for memory by itself otherwise.
+void prefetch_groups(const Shell& shell, const TraverseScratch& t, std::size_t groups, bool cold) {
+  for (std::size_t k = 0; k < groups; ++k)
+    for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
+      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+  if (!cold) return;  // else also what contacts are made of
+  for (std::size_t k = 0; k < groups; ++k) {
+    for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
+      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
+    __builtin_prefetch(shell.point.data + kGroupRows * t.survivors[k]);
+  }
+}
+
+}  // namespace
+
+std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                          TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
+  const Shell& shell = *a.shell;
+  const Field& field = *b.field;
+  Anytime& anytime = *lane.anytime;
+  const float margin = margin_of(set.contact);
+  // The short form of culling is proved up to half a voxel of margin.
+  Search search{field.view,
+                shell,
+                shell_to_field(a, b),
+                static_cast<float>(1.0 / field.voxel),
+                field.wide || margin > 0.5f,
+                margin,
+                lane.cold};
+  const Way way = travel(pair, search);
+  pair.sampled = 0;
+  pair.missed = 0;
+
+  std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16,
+                                        way.now, t.open_blocks);
+  if (blocks == 0) return 0;
+  const auto expired_groups = [&] {
+    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, way.now, t.frontier);
+  };
+  std::size_t count = expired_groups();
+  if (count > kFewGroups * blocks && pair.cull_blocks.worth(blocks)) {
+    const std::size_t left =
+        search.cull(shell.blocks, t.open_blocks, blocks, t.survivors, t.clearance);
+    pair.cull_blocks.learn(blocks, left);
+    for (std::size_t k = 0; k < blocks; ++k)
+      pair.block_expiry[t.open_blocks[k]] = expiry_of(way, t.clearance[k]);
+    std::copy_n(t.survivors, left, t.open_blocks);
+    blocks = left;
+    if (blocks == 0) return 0;
+    count = expired_groups();
+  }
+  const auto note_blocks = [&] {
+    kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
+  };
+  if (is_coarse_anyway(anytime, pair, used, blocks))
+    return touch_coarsely(search, pair, t, anytime, blocks, used);
+  const std::size_t groups = find_near_groups(pair, t, search, count, way);
+  prefetch_groups(shell, t, groups, search.cold);
+  if (must_be_coarse(anytime, pair, used, blocks, groups)) {
+    pair.cull_groups.left_out = 0;
+    note_blocks();
+    return touch_coarsely(search, pair, t, anytime, blocks, used);
+  }
+  if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
+  choose_rows(pair, t, search, groups, way.now);
+  const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
+  const std::size_t found = touch(search, t, lane, groups, used, shared);
+  learn_sampling(anytime, groups, groups, found, since);
+  if (must_be_coarser(anytime, pair, used, found, blocks)) {
+    note_blocks();
+    return touch_coarsely(search, pair, t, anytime, blocks, used);
+  }
+  pair.sampled = groups;
+  note_groups(pair, t, search, groups, way);
+  note_blocks();
+  return found;
+}
+
+}  // namespace h6

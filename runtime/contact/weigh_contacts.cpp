@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// weigh_contacts.cpp - how the contact stiffness is shared among a shell body's contacts.
+//
+// Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3,
+// settles the paper's ambiguities: w_i = phi_self / phi_i.
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/weights/gauss_few.h"
+#include "kernels/weights/gauss_sweep.h"
+#include "kernels/weights/gauss_tree.h"
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/weighing.h"
+
+namespace h6 {
+namespace {
+
+// Contacts from which two threads weigh them: 430 take 6.9 us on one thread and 5.5 on two, 64 take
+// 0.9 and some 3.
+constexpr std::size_t kTwoThreads = 192;
+// Contacts from which a density is cut into slices. With fewer, each thread has one of two
+// densities to itself, from the sorting on: its data are in its own cache, and it waits once.
+constexpr std::size_t kWorthSlicing = 4096;
+// Contacts up to which all pairs of contacts are compared without sorting: 50 take 0.43 us, sorted
+// 1.0 to 1.3; 120 take 1.7, sorted 1.9 to 3.3.
+constexpr std::size_t kWorthSorting = 120;
+constexpr float kFacingEdge = 0.25f;  // N.g from which a contact counts in full
+
+struct Rule {
+  bool gauss = false, facing = false, depth = false, handles = false, printed = false;
+  kernels::Hat hat = kernels::Hat::normal;
+  kernels::GaussWidths widths{};
+  float l0 = 0;
+};
+
+Rule rule_of(const h6ContactDef& def, double voxel) {
+  Rule rule;
+  rule.facing = def.pieces & H6_PIECE_FACING;
+  rule.depth = def.pieces & H6_PIECE_DEPTH;
+  rule.l0 = static_cast<float>(def.torque_length);
+  rule.widths = {static_cast<float>(def.epsilon), static_cast<float>(def.epsilon)};
+  rule.handles = def.pieces & H6_PIECE_HANDLES;
+  rule.printed = def.pieces & H6_PIECE_PRINTED;
+  switch (def.method) {
+    case H6_METHOD_GAUSS3:
+      rule.gauss = true;
+      break;
+    case H6_METHOD_GAUSS6:
+      rule.gauss = true;
+      rule.hat = def.pieces & H6_PIECE_PRODUCT ? kernels::Hat::product : kernels::Hat::sum;
+      break;
+    case H6_METHOD_ROBUST:
+      rule.gauss = rule.facing = rule.depth = true;
+      rule.hat = kernels::Hat::product;
+      rule.widths = {static_cast<float>(def.epsilon_normal),
+                     static_cast<float>(def.epsilon_torque)};
+      rule.l0 = static_cast<float>(def.torque_length > 0 ? def.torque_length : voxel);
+      break;
+    default:
+      break;
+  }
+  rule.widths.geodesic = def.pieces & H6_PIECE_GEODESIC;
+  return rule;
+}
+
+// Eq. (8) as it is printed: phi_i over the largest phi. A weight was divided by its phi.
+void weigh_as_printed(Contacts& c, const Rule& rule) {
+  const float self = rule.hat == kernels::Hat::sum ? 2.0f : 1.0f;
+  float most = 0;
+  for (std::size_t i = 0; i < c.count; ++i) {
+    if (!(c.weight[i] > 0)) continue;
+    c.load[i] = c.facing[i] * c.facing[i] * (rule.depth ? c.depth[i] : 1.0f) * self / c.weight[i];
+    most = std::max(most, c.load[i]);
+  }
+  for (std::size_t i = 0; i < c.count; ++i)
+    if (c.weight[i] > 0) c.weight[i] = c.facing[i] * c.load[i] / most;
+}
+
+}  // namespace
+
+void fill_facing(Contacts& c, bool filter) {
+  if (filter) return kernels::contact_facing(kernel_columns(c, 0, c.count), kFacingEdge, c.facing);
+  std::fill_n(c.facing, c.count, 1.0f);
+}
+
+namespace {
+
+template <class Run>
+void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
+  if (team) return team->for_slices(slices, run);
+  for (std::size_t i = 0; i < slices; ++i) run(i);
+}
+
+void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
+                     void* scratch, float* weight) {
+  const kernels::GaussTree tree = kernels::gauss_tree(view, rule.hat, rule.widths, scratch, weight);
+  for (int stage = 0; stage < kernels::kGaussStages; ++stage)
+    for_slices(kernels::gauss_tree_slices(tree, stage), team,
+               [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); });
+}
+
+// Where contacts crowd so that the tree is faster, returns false and weighs nothing.
+bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
+                      void* scratch, float* weight) {
+  if (view.count > kernels::kGaussSweepMost && !rule.widths.geodesic) return false;
+  const kernels::GaussSweep sweep =
+      kernels::gauss_sweep(view, rule.hat, rule.widths, scratch, weight);
+  int stage = 0;
+  if (sweep.densities == 2 && view.count < kWorthSlicing) {
+    const std::size_t slices = kernels::gauss_sweep_slices(sweep, 1) / 2;
+    for_slices(2, team, [&](std::size_t density) {
+      kernels::gauss_sweep_run(sweep, 0, density);
+      for (std::size_t i = 0; i < slices; ++i)
+        kernels::gauss_sweep_run(sweep, 1, density * slices + i);
+    });
+    if (!kernels::gauss_sweep_pays(sweep)) return false;
+    stage = 2;
+  }
+  for (; stage < kernels::kGaussSweepStages; ++stage) {
+    if (stage == 1 && !kernels::gauss_sweep_pays(sweep)) return false;
+    for_slices(kernels::gauss_sweep_slices(sweep, stage), team,
+               [&](std::size_t i) { kernels::gauss_sweep_run(sweep, stage, i); });
+  }
+  return true;
+}
+
+void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
+  const kernels::DirectionsView view{c.nx,
+                                     c.ny,
+                                     c.nz,
+                                     c.tx,
+                                     c.ty,
+                                     c.tz,
+                                     rule.facing ? c.facing : nullptr,
+                                     rule.depth ? c.depth : nullptr,
+                                     c.count};
+  if (c.count < kTwoThreads) team = nullptr;
+  if (c.count <= kWorthSorting)
+    kernels::gauss_weights_few(view, rule.hat, rule.widths, c.weight);
+  else if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
+    weigh_with_tree(view, rule, team, scratch, c.weight);
+  if (rule.printed) weigh_as_printed(c, rule);
+}
+
+// Clusters never mix fields: a merged contact belongs to one pair.
+void merge_clusters(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                    const ClusterScratch& scratch) {
+  Contacts& c = shell.contacts;
+  std::size_t out = 0;
+  for (Pair& pair : shell.pairs) {
+    const double distance = set.contact.cluster_voxels * bodies[pair.b].field->voxel;
+    const std::size_t end = cluster_contacts(c, pair.begin, pair.end, out, distance, scratch);
+    pair.begin = out;
+    pair.end = out = end;
+  }
+  c.count = out;
+}
+
+}  // namespace
+
+std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
+  const Rule rule = rule_of(def, 1.0);
+  if (!rule.gauss) return 0;
+  return std::max(kernels::gauss_tree_bytes(count, rule.hat),
+                  kernels::gauss_sweep_bytes(count, rule.hat));
+}
+
+void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
+                   sched::FrameTeam* team, void* scratch) {
+  const Rule rule = rule_of(def, voxel);
+  fill_facing(c, rule.facing);
+  kernels::torque_directions(kernel_columns(c, 0, c.count), rule.l0,
+                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx, c.ty, c.tz);
+  if (rule.gauss) {
+    weigh_gauss(c, rule, team, scratch);
+  } else {
+    const double n = static_cast<double>(c.count);
+    const float w = def.method == H6_METHOD_GLOBAL && n > def.global_n0
+                        ? static_cast<float>(def.global_n0 / n)
+                        : 1.0f;
+    for (std::size_t i = 0; i < c.count; ++i) c.weight[i] = w * c.facing[i];
+  }
+  for (std::size_t i = 0; i < c.count; ++i) c.load[i] = c.weight[i] * c.depth[i];
+}
+
+void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                    Lane& lane) {
+  if (set.contact.method == H6_METHOD_SERIES) return weigh_series(set, bodies, shell, lane);
+  Contacts& c = shell.contacts;
+  if (c.count == 0) return;
+  if (uses_clusters(set.contact)) merge_clusters(set, bodies, shell, lane.scratch->cluster);
+  const Body& body = bodies[shell.body];
+  const bool two =
+      c.count >= kTwoThreads && lane.team->threads() > 1 && lane.weighing.share(c.count);
+  weigh_columns(c, set.contact, body.voxel, series_lever(body.radius, body.voxel),
+                two ? lane.team : nullptr, lane.scratch->weigh);
+}
+
+}  // namespace h6

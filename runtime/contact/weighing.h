@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// weighing.h - the weight rules of METHOD.md, Sec. 3, on columns of contacts. A frame and
+// h6WeighContacts share them.
+#pragma once
+#include "kernels/contact/contact_columns.h"
+#include "kernels/contact/contact_wrench.h"
+#include "kernels/weights/series_solve.h"
+#include "runtime/base/math.h"
+#include "runtime/contact/contacts.h"
+#include "sched/frame_team.h"
+
+namespace h6 {
+
+// Fills facing, T, weight and load of all rows, for every rule but `series`. `lever`: the body's
+// radius [m]. `team` may be null. `scratch`: weigh_scratch_bytes of c.count or more; up to 120 rows
+// need none.
+void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
+                   sched::FrameTeam* team, void* scratch);
+// The scratch that weigh_columns uses for up to `count` contacts; 0 where the rule needs none.
+std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
+
+// Rows begin..end-1.
+inline kernels::ContactColumns kernel_columns(const Contacts& c, std::size_t begin,
+                                              std::size_t end) {
+  return {c.nx + begin, c.ny + begin, c.nz + begin, c.gx + begin, c.gy + begin,
+          c.gz + begin, c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
+}
+
+// Fills facing: clamp(N.g / 0.25, 0, 1), or 1 without the filter.
+void fill_facing(Contacts& c, bool filter);
+
+// ---- clusters
+// ------------------------------------------------------------------------------------
+
+inline bool uses_clusters(const h6ContactDef& def) {
+  const bool gauss = def.method == H6_METHOD_GAUSS3 || def.method == H6_METHOD_GAUSS6 ||
+                     def.method == H6_METHOD_ROBUST;
+  return def.method == H6_METHOD_CLUSTER || (gauss && (def.pieces & H6_PIECE_CLUSTER));
+}
+
+struct ClusterScratch {
+  std::uint32_t *order, *root;  // (rows)
+  std::uint64_t* cell;          // (rows)
+};
+inline constexpr std::uint32_t kNoCluster = UINT32_MAX;
+
+// Single linkage: two rows of begin..end-1 nearer than `distance` [m] are in one cluster. Every
+// cluster becomes one row, written from `out` (<= begin) on: depth, N, g and r are means weighted
+// by depth, `point` is that of the deepest row. A cluster whose normals cancel has no direction and
+// is left out. Returns the row behind the last. root[i] is then the row that row begin + i went to,
+// or kNoCluster. Depths must be above 0.
+std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, std::size_t out,
+                             double distance, const ClusterScratch& scratch);
+
+// ---- series
+// --------------------------------------------------------------------------------------
+
+// L, an upper bound on the arms of the body's contacts [m].
+inline double series_lever(double radius, double voxel) { return radius > voxel ? radius : voxel; }
+
+// Writes e of rows begin..end-1 to load: the depth less the damping at the relative velocity u.
+void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end);
+// Fills facing, kappa, slack, load (from e) and weight. y holds the start and then the extension.
+kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6]);
+// sum lambda J, sum kappa J J_g^T and sum kappa J J^T over rows that carry load.
+kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,
+                                   std::size_t end);
+// c S^-2: the spring in unscaled coordinates, in units of k.
+Mat6 series_spring(const h6ContactDef& def, double lever);
+
+inline Mat6 row_major(const double m[36]) {
+  return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(m);
+}
+
+}  // namespace h6

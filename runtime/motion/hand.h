@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// hand.h - a hand: its coupling to a body, and, in a column of its own, its side towards the
+// device.
+#pragma once
+#include "runtime/contact/body.h"
+#include "runtime/hand/hand_filter.h"
+#include "runtime/hand/safety.h"
+#include "runtime/motion/passivity.h"
+
+namespace h6 {
+
+struct Hand {
+  std::int32_t body = -1;
+  std::uint32_t mode = H6_IMPEDANCE;
+  bool seen = false;      // a good sample has come
+  bool clutched = false;  // the device moves alone
+  bool cut_off = false;   // the safety chain lets nothing out: the device's wrench counts for none
+  h6CouplingDef coupling{};                         // with no zeros left
+  double manipulandum_mass = 0.1;                   // [kg]
+  double driver_stiffness = 0, driver_damping = 0;  // [N/m], [N s/m]
+  h6DeviceSample sample{};                          // the last good one, in the scene
+  RigidState manipulandum;     // where the hand holds the body's centre of mass; pseudo-admittance:
+                               // a body of its own
+  Vec6 wrench = Vec6::Zero();  // of the hand on the body
+};
+
+struct HandDevice {
+  HandFilter filter;
+  double motion_scale = 1, rotation_scale = 1;  // from the device to the scene
+  h6SafetyDef safety{};
+  DeviceWatch watch;
+  OutputGuard guard;
+  // Set from outside for the next frame.
+  bool lost = false;   // the device could not be read or written
+  double overdue = 0;  // the next command comes so much too late [s]
+  h6Wrench told{};     // the last command's wrench
+  bool passivity = false;
+  HandPort port;
+};
+
+void set_rating(HandDevice& device, const h6DeviceCapabilities& capabilities);
+// `seconds` lie between the last command and the next one. It is late when a frame is missing.
+void note_interval(HandDevice& device, double dt, double seconds);
+
+}  // namespace h6

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// passivity.h - keeps ports from giving out more energy than was put in: a time-domain passivity
+// observer and controller (Hannaford & Ryu 2002) in six dimensions. METHOD.md, Sec. 4, "Passivity".
+//
+// There are two kinds of ports, each with its own option: a hand at its device, and the contacts of
+// a shell body. Each keeps E, the energy that went in less the energy that came out [J].
+#pragma once
+#include <algorithm>
+
+#include "hapsix/hapsix.h"
+#include "runtime/base/math.h"
+#include "runtime/contact/body.h"
+#include "runtime/contact/pair.h"
+#include "runtime/contact/settings.h"
+
+namespace h6 {
+
+// The port between a device and the engine, in the device's units and poses.
+class HandPort {
+ public:
+  void set(const Vec3& com) { com_ = com; }  // centre of mass, mesh frame [m]
+  // The mesh frame is at `pose` now, and `wrench` acted on the engine since the last pose:
+  // E += wrench . (x - x', log(q q'^-1)), exact for a wrench that is held between samples.
+  void move(const h6Pose& pose, const h6Wrench& wrench);
+  // Starts to observe with E = `stored`, the energy that the engine holds already [J].
+  void start(double stored) {
+    energy_ = stored;
+    known_ = true;
+    share_ = 1;
+  }
+  // The engine holds no more than `stored` [J]. Energy put in beyond that was dissipated and must
+  // not pay for anything later.
+  void spend(double stored) { energy_ = std::min(energy_, stored); }
+  // Once a frame of `dt` seconds, after move. Changes the wrench that the hand is about to feel so
+  // that E stays at 0 or above if the next motion is like the last one, and within one frame's work
+  // of 0 if it is not; true when it did. Neither force [N] nor torque [N m] exceeds the larger of
+  // its bound and what it was.
+  bool damp(h6Wrench& felt, double max_force, double max_torque, double dt);
+  void forget() { known_ = false; }  // E is not known until the next start
+  bool known() const { return known_; }
+  double energy() const { return energy_; }
+
+ private:
+  bool add_damper(Vec3& force, Vec3& torque, double max_force, double max_torque, double dt) const;
+  double share_for(const Vec3& force, const Vec3& torque) const;
+
+  Vec3 com_ = Vec3::Zero();
+  double energy_ = 0;
+  bool known_ = false, placed_ = false;
+  h6Pose pose_{{0, 0, 0}, {1, 0, 0, 0}};
+  Vec3 moved_ = Vec3::Zero(), turned_ = Vec3::Zero();  // since the sample before [m], [rad]
+  double move_change_ = 0, turn_change_ = 0;  // how much that changed from frame to frame, held
+  double share_ = 1;                          // of the wrench, in the last frame
+};
+
+struct Hand;
+struct HandDevice;
+// Impedance: notes the device's new pose, under the wrench of the last command.
+void observe_hand(const Settings& set, std::span<const Body> bodies,
+                  std::span<const ShellBody> shells, const Hand& hand, HandDevice& device);
+// Impedance: keeps within the coupling's limits; true when it changed the wrench.
+bool damp_hand(HandDevice& device, const Hand& hand, h6Wrench& felt, double dt);
+// Notes the command. In the admittance modes this observes the port: the wrench that came in, over
+// the motion that goes out. Nothing is changed there, for neither is ours.
+void note_command(HandDevice& device, const Hand& hand, const h6DeviceCommand& command);
+
+// Power of the contacts when alpha times a wrench is taken from theirs: w0 - w1 alpha + w2 alpha^2.
+struct ReliefPower {
+  double w0 = 0, w1 = 0, w2 = 0;
+};
+// The least alpha >= 0 with a power of at most `most`; without any, the alpha of least power.
+double relief_for(const ReliefPower& power, double most);
+
+// Before the step, when all wrenches are known: damps contacts that would give out more than E.
+void damp_contacts(const Settings& set, std::span<const Body> bodies, std::span<ShellBody> shells,
+                   std::span<LinearWrench> acting, std::span<Hand> hands, h6Status& status);
+// After the step: counts the work that the contacts did on the bodies that moved.
+void observe_contacts(const Settings& set, std::span<const Body> bodies,
+                      std::span<ShellBody> shells);
+// The least E of all ports that are observed, or 0 [J].
+double least_energy(const Settings& set, std::span<const ShellBody> shells,
+                    std::span<const HandDevice> devices);
+
+}  // namespace h6

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// static_step.cpp - a quasi-static body goes straight to where all that acts on it balances.
+//
+// Wan & McNeely 2003: dq = -(K_c + K_VC)^-1 (f_c + f_VC), one solve a frame. METHOD.md, Sec. 4.
+#include "runtime/motion/motion_stages.h"
+#include "runtime/motion/solve.h"
+
+namespace h6 {
+namespace {
+
+// No point of the body moves farther than this.
+double reach(const Body& body, const Vec6& dq) {
+  return dq.head<3>().norm() + dq.tail<3>().norm() * body.radius;
+}
+
+}  // namespace
+
+void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6Status& status) {
+  Mat6 A = -acting.K;
+  Vec6 f = acting.f, dq;
+  if (body.translation_only) hold_rotation(A, f, 0);
+  if (!solve_system(gradient, A, f, dq)) {
+    status |= H6_SOLVE_FAILED;
+    return;
+  }
+  const double far = reach(body, dq);
+  if (far > body.max_step) dq *= body.max_step / far;
+  // dq is moved as a velocity for one second; the body has no velocity before or after.
+  body.v.setZero();
+  body.w.setZero();
+  if (!move_or_rest(body, dq, 1, body.translation_only)) status |= H6_STATE_NOT_FINITE;
+  body.v.setZero();
+  body.w.setZero();
+}
+
+}  // namespace h6
