@@ -21,15 +21,13 @@ Study study_pushes(const std::vector<MethodColumn>& columns, const Console& cons
   Study out;
   out.title = "Fig. 8: the alpha pushed in 20 ways";
   out.about =
-      "The tool is led into the gap of alpha-shortcut and then pulled away in 20 directions, "
-      "spread "
-      "at random over a cone of 30° around the strand's, while the hand turns it by up to 0.6 rad "
-      "about random axes, six times; with the scene's 20 N, and with k times half a voxel. How "
-      "many "
-      "of 20 get through; least, median and greatest depth of the deepest contact of each, in "
-      "voxels. Through: a point of the tool was where none can be while the loops are linked, "
-      "which holds for every direction; a way out that were legitimate would show as a pass that "
-      "is not deep.";
+      "The hand leads the tool into the gap of alpha-shortcut and then pulls it away in 20 "
+      "directions, spread at random over a cone of 30° around the strand's direction. Meanwhile "
+      "it turns the tool six times by up to 0.6 rad about random axes. Forces: the scene's 20 "
+      "N, and k times half a voxel. The table gives how many of the 20 pushes get through, and "
+      "the least, median and greatest depth of their deepest contacts in voxels. \"Through\" "
+      "means that a point of the tool was where it cannot be while the loops are linked, "
+      "whatever the direction. A legitimate way out would show as a pass without deep contact.";
   const io::Scene scene = io::alpha_pushes();
   auto loaded = io::load_scene(scene);
   if (!loaded) return out;

@@ -80,12 +80,13 @@ Study study_energy(const std::vector<MethodColumn>& columns, const Console& cons
   Study out;
   out.title = "Energy";
   out.about =
-      "A box with 400 points on a plane. Cycle: net work of the contacts over a closed cycle (down "
-      "tilted, flat, up; and reversed), in peaks of the work stored; prototype: ±0.14 to ±0.76 for "
-      "all scaled methods. Bounce: highest kinetic and potential energy of a free box that falls 3 "
-      "mm and bounces for 2 s, in its first; above 1 energy was made. The passivity controller "
-      "damps what it has seen made, so it is at most a frame late. Contacts of equal net stiffness "
-      "on the flat (`none` and `cluster` k/400, `global` k/n0).";
+      "A box with 400 points on a plane. Cycle: the net work of the contacts over a closed "
+      "cycle (down tilted, flat, up; and reversed), relative to the peak of the stored work; "
+      "prototype: ±0.14 to ±0.76 for all scaled methods. Bounce: a free box falls 3 mm and "
+      "bounces for 2 s; the table gives its highest kinetic and potential energy relative to "
+      "the energy at the start. Above 1 the contacts made energy. The passivity controller "
+      "damps energy only after it has seen it, so it is at most a frame late. All methods have "
+      "the same net stiffness on the flat (`none` and `cluster` k/400, `global` k/n0).";
   auto flat = io::load_scene(posed_scene("flat", plate(-40 * kMm, 40 * kMm), bottom(20, 20)));
   out.table = head("path", columns);
   if (!flat) return out;

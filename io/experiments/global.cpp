@@ -51,10 +51,11 @@ Study study_global(const std::vector<MethodColumn>&, const Console& console) {
   Study out;
   out.title = "Where the paper says global scaling fails";
   out.about =
-      "Verdict and deepest contact in voxels of global scaling with n0 = 10, as McNeely's, and "
-      "less: on a flat wall its net stiffness is n0 k, that of the paper's weights k (study of net "
-      "stiffness). Then n0 = 10 with the hand's force and stiffness multiplied. **Bold** is a "
-      "failure: not held, or deeper than half a voxel. Last, `robust` as the scene is.";
+      "Verdict and deepest contact in voxels of global scaling, with n0 = 10 as McNeely's, and "
+      "with less: on a flat wall its net stiffness is n0 k, and that of the paper's weights is "
+      "k (see the study of net stiffness). Then n0 = 10 with the hand's force and stiffness "
+      "multiplied. **Bold** marks a failure: not held, or deeper than half a voxel. The last "
+      "column is `robust` in the unchanged scene.";
   constexpr std::size_t kCount = std::size(kVariants);
   std::vector<io::Scene> scenes;
   for (const Claim& claim : kClaims) {

@@ -95,16 +95,15 @@ Study study_modes(const std::vector<MethodColumn>& columns, const Console& conso
   Study out;
   out.title = "Fig. 13: device modes and delay";
   out.about =
-      "The peg of Fig. 10 in the hand of a person who holds a simulated arm (mass, friction, "
-      "encoder steps, filtered velocity, 1 kHz sample and hold, drive at 10 kHz), whose commands "
-      "come 0, 1 or 2 frames late. First with the default gains: verdict, deepest contact in "
-      "voxels, RMS speed of the peg in the last 0.2 s. Then how far a gain can rise, to a factor "
-      "of "
-      "√2, before the peg moves by more than 2 mm/s where the hand rests, its depth swings by more "
-      "than 0.1 voxel, or the run is unstable (smaller gains assumed no worse): in the modes with "
-      "a "
-      "virtual coupling its k_VC (default 1000 N/m), in admittance mode the stiffness of the grip "
-      "(default 1500 N/m), which is what closes the loop through the force sensor.";
+      "The peg of Fig. 10 in a simulated arm (mass, friction, encoder steps, filtered velocity, "
+      "1 kHz sample and hold, drive at 10 kHz) that a person holds. The arm gets its commands "
+      "0, 1 or 2 frames late. First, with the default gains: verdict, deepest contact in "
+      "voxels, and the RMS speed of the peg in the last 0.2 s. Then the largest stable gain, to "
+      "a factor of √2. A gain is unstable when the peg moves by more than 2 mm/s while the hand "
+      "rests, when its depth swings by more than 0.1 voxel, or when the run is unstable; "
+      "smaller gains are assumed no worse. In the modes with a virtual coupling the gain is "
+      "k_VC (default 1000 N/m). In admittance mode it is the stiffness of the grip (default "
+      "1500 N/m), which closes the loop through the force sensor.";
   Result<io::Scene> scene = io::make_scene("peg-in-hole");
   if (!scene) return out;
   auto loaded = io::load_scene(std::move(*scene));

@@ -141,19 +141,19 @@ std::string markdown_report(const std::vector<SceneRow>& rows,
       "# The paper's experiments, measured with the engine\n\n"
       "Made by `hapsix experiments -o DIR` in " +
       number(seconds, 0) +
-      " s; run it again for your own machine's frame times, everything else is the same to the "
-      "bit. H. Xu, J. Barbič, *Adaptive 6-DoF Haptic Contact Stiffness Using the Gauss Map*, IEEE "
-      "Trans. Haptics, 2016, is \"the paper\"; \"the prototype\" is a throw-away program with "
-      "analytic distance functions, whose coupling damped outside its bound and whose contacts "
-      "could pull: its verdicts are expected here, its figures only roughly.\n\n";
+      " s. Run it again for the frame times of your own machine; everything else is the same to"
+      " the bit. H. Xu, J. Barbič, *Adaptive 6-DoF Haptic Contact Stiffness Using the Gauss "
+      "Map*, IEEE Trans. Haptics, 2016, is \"the paper\". \"The prototype\" is a throw-away "
+      "program with analytic distance functions; its coupling damped outside its bound and its "
+      "contacts could pull. Its verdicts are expected here, its figures only roughly.\n\n";
   if (!rows.empty()) {
     out +=
         "## Scenes\n\n"
-        "Each cell: the verdict, from the motion alone, and the deepest contact in voxels. "
-        "`through` is \"slides in\", \"pops\" or \"squeezes through\". `global/1` is global "
-        "scaling with n0 = 1. Common values: voxel 1 mm, m = 0.1 kg, h = 1 ms, k = 1e4 N/m, "
-        "k_VC = 1e3 N/m critically damped, bound at half a voxel (5 N), 0.9 N·m/rad, contact "
-        "damping 1 ms, implicit, unless the scene says otherwise.\n\n" +
+        "Each cell gives the verdict, which follows from the motion alone, and the deepest "
+        "contact in voxels. `through` is \"slides in\", \"pops\" or \"squeezes through\". "
+        "`global/1` is global scaling with n0 = 1. Common values: voxel 1 mm, m = 0.1 kg, h = 1 "
+        "ms, k = 1e4 N/m, k_VC = 1e3 N/m critically damped, bound at half a voxel (5 N), 0.9 "
+        "N·m/rad, contact damping 1 ms, implicit, unless the scene says otherwise.\n\n" +
         markdown(scene_table(rows, columns)) + "\n";
     for (const SceneRow& row : rows) out += scene_section(row, columns);
   }

@@ -13,11 +13,11 @@ Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& 
   Study out;
   out.title = "Force smoothness";
   out.about =
-      "Largest change of the contact force between two frames, in k·voxel, at h = 1 ms and 0.1 ms, "
-      "on paths given in time: a box (400 points) that tilts from 0.05 rad to flat in 1 s, and one "
-      "that slides off a plate's edge at 50 mm/s, 0.4 voxel deep. What is continuous shrinks "
-      "tenfold, a jump does not. Prototype, slide-off: gauss3 .129 → .031, with depth weighting "
-      ".021 → .0003.";
+      "Largest change of the contact force between two frames, in k·voxel, at h = 1 ms and 0.1 "
+      "ms, on paths given in time: a box (400 points) that tilts from 0.05 rad to flat in 1 s, "
+      "and one that slides off a plate's edge at 50 mm/s, 0.4 voxel deep. A continuous force "
+      "changes a tenth as much in a tenth of the time; a jump stays as large. Prototype, "
+      "slide-off: gauss3 .129 → .031, with depth weighting .021 → .0003.";
   auto flat = io::load_scene(posed_scene("flat", plate(-40 * kMm, 40 * kMm), bottom(20, 20)));
   auto edge = io::load_scene(posed_scene("edge", plate(-40 * kMm, 0), bottom(20, 20)));
   out.table = head("path", columns);
@@ -178,17 +178,17 @@ Study study_ripple(const std::vector<MethodColumn>& columns, const Console& cons
   Study out;
   out.title = "Ripple on baked fields";
   out.about =
-      "A body moved at constant depth over surfaces along which nothing changes but the field's "
-      "samples, which are turned by 0.75 rad against the surface: a box of 20 mm (400 points) 0.4 "
-      "voxel deep over a plane and along a ridge of 4 mm radius, a peg of 6 mm (760 points) "
-      "pressed "
-      "0.4 voxel aside in a hole of its size and slid along it, and a ball of 10 mm (500 points) "
-      "sunk 0.2 voxel into a bowl of its size and spun there. Root mean square of force and torque "
-      "around their means, in k·voxel and k·voxel·L (L the body's radius), then the torque's in "
-      "thousandths of the mean force times L. The last column says how noisy the field is: RMS of "
-      "the interpolated distance of the touching points around each one's mean, in voxels. "
-      "Trilinear interpolation is exact on a plane at any angle: there only rounding is left; and "
-      "contacts of a ball have no arms.";
+      "A body moves at constant depth over surfaces that do not change along its way; only the "
+      "field's samples do, because they are turned by 0.75 rad against the surface. A box of 20 "
+      "mm (400 points) moves 0.4 voxel deep over a plane and along a ridge of 4 mm radius. A "
+      "peg of 6 mm (760 points) is pressed 0.4 voxel sideways in a hole of its size and slides "
+      "along it. A ball of 10 mm (500 points) spins 0.2 voxel deep in a bowl of its size. The "
+      "table gives the root mean square of force and torque around their means, in k·voxel and "
+      "k·voxel·L (L is the body's radius), then that of the torque in thousandths of the mean "
+      "force times L. The last column is the noise of the field: the RMS, in voxels, of the "
+      "interpolated distance of each touching point around its mean. Trilinear interpolation is "
+      "exact on a plane at any angle, so only rounding remains there; contacts of a ball have "
+      "no lever arm.";
   struct Way {
     const char* name;
     io::Scene scene;

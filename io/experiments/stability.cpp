@@ -68,26 +68,27 @@ Study study_stability(const std::vector<MethodColumn>& columns, const Console& c
   Study out;
   out.title = "Largest stable stiffness";
   out.about =
-      "k in N/m, to a factor of two, at which the run is neither unstable nor chatters when the "
-      "hand rests, over doublings from 500 N/m to 1.3e8 N/m (largest tried, smaller ones assumed "
-      "no worse). Box pressed 3 mm to 4 mm on a wall and rocked, n points under it; peg of Fig. "
-      "10; "
-      "cone of Fig. 3 pulled 5 mm against the ceiling's edge. Coupling never saturated. The "
-      "prototype, explicit, box with 25 / 100 / 400 points: none 8e3 / 2e3 / 5e2, global 1.6e4, "
-      "gauss3 1.3e5, gauss6 6.4e4; its limit is 4m/h² = 4e5 N/m for the net stiffness of a "
-      "translation. Implicit it holds 1.6e7 or more with box and peg (a tube without a floor); "
-      "with its cone, run again on its exact distances, only 2.6e5 (`none`) and 1e6 (`gauss3`, "
-      "`robust`), less than the engine below, and no more with the engine's path and criterion. "
-      "What begins there is no growing mode but a cycle of impacts: where k h² exceeds m by much, "
-      "a step throws a contact out at depth/h in one frame, onto the opposite surface. So it goes "
-      "with the frame time: at 2 kHz the undamped cone holds four times as much, at 10 kHz every "
-      "k. `series` holds the peg alone in its tube at every k; in the corner of wall and floor, "
-      "which samples 1 mm apart round off (N·g = 0.72), it ends at 2e6, with a field of 0.5 mm at "
-      "3.3e7, of 0.25 mm not at all; such cycles have windows, at 1 mm it holds again from 8e6 to "
-      "3.3e7. The exact gradient is no remedy: peg `none` and `robust` then hold at every k, "
-      "`series` to 8e6, but the cone, touching an edge where N·g = 0.63, is unstable from 5e5 on. "
-      "Damping of 1 ms lowers a limit because it may not pull: the prototype's `gauss3` holds 2e6 "
-      "with it on the cone, and 5e5, as here, once its contacts do not pull either.";
+      "The largest stable k in N/m, to a factor of two: the run is not unstable and does not "
+      "chatter while the hand rests. Tried are doublings from 500 N/m to 1.3e8 N/m; smaller "
+      "ones are assumed no worse. The scenes: a box pressed 3 mm to 4 mm onto a wall and "
+      "rocked, with n points under it; the peg of Fig. 10; the cone of Fig. 3 pulled 5 mm "
+      "against the ceiling's edge. The coupling is never saturated. The prototype, explicit, "
+      "box with 25 / 100 / 400 points: none 8e3 / 2e3 / 5e2, global 1.6e4, gauss3 1.3e5, gauss6 "
+      "6.4e4; its limit is 4m/h² = 4e5 N/m for the net stiffness of a translation. Implicitly "
+      "it holds 1.6e7 or more with box and peg (a tube without a floor). With its cone, on "
+      "exact distances, it holds only 2.6e5 (`none`) and 1e6 (`gauss3`, `robust`): less than "
+      "the engine below, and no more with the engine's path and criterion. The instability is "
+      "not a growing mode but a cycle of impacts: where k h² is much larger than m, a step "
+      "throws a contact out at the speed depth/h in one frame, onto the opposite surface. The "
+      "limit therefore depends on the frame time: at 2 kHz the undamped cone holds four times "
+      "as much, at 10 kHz every k. `series` holds the peg alone in its tube at every k. In the "
+      "corner of wall and floor, which samples 1 mm apart round off (N·g = 0.72), its limit is "
+      "2e6; with a field of 0.5 mm it is 3.3e7, and with 0.25 mm there is none. Such cycles "
+      "have windows: at 1 mm it holds again from 8e6 to 3.3e7. The exact gradient does not "
+      "help: peg `none` and `robust` then hold at every k, `series` to 8e6, but the cone, which "
+      "touches an edge where N·g = 0.63, is unstable from 5e5 on. Contact damping of 1 ms "
+      "lowers a limit because it may not pull: with it the prototype's `gauss3` holds 2e6 on "
+      "the cone, but 5e5, as here, once its contacts do not pull either.";
   std::vector<io::Scene> scenes;
   std::vector<std::string> names;
   for (const int side : {5, 10, 20}) {

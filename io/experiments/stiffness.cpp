@@ -118,23 +118,20 @@ Study study_net_stiffness(const std::vector<MethodColumn>& columns, const Consol
   Study out;
   out.title = "Net stiffness against sampling";
   out.about =
-      "How much stiffer than one contact a whole patch is in translation, in k, all points about "
-      "0.2 "
-      "voxel deep. First the largest eigenvalue of Σ w N Nᵀ with the engine's shares w, then that "
-      "of "
-      "the force's true derivative, by central differences. For `series`, whose shares are secants "
-      "of a joint solve, only the second says what the step uses, and its bound is c = 4. "
-      "Prototype, "
-      "by shares: hemisphere gauss3 100 / 1000, robust 100 / 662; tight cylinder 139 / 229 and 83 "
-      "/ "
-      "100; series at most 4 everywhere. "
-      "`series` shows 4.06 on the hemisphere with 3000 points: the bound is on Σ κ J Jᵀ, which is "
-      "what the symmetric step uses (3.95 there); the force's true derivative has the field's "
-      "slope in the place of the second J, and at the bowl's rim, which samples 1 mm apart round "
-      "off, that is neither along N (N·g down to 0.33) nor of length 1 (0.56 to 1.22). Without "
-      "the points within half a voxel of the rim it is 3.67, on exact distances 3.96, on a whole "
-      "ball sampled at 1 mm 3.95. Neither the differences nor contacts that come and go make it: "
-      "over 0.01, 0.001 and 0.0001 voxel, in double, they agree to 0.1 %.";
+      "The translational stiffness of a whole patch in units of k, the stiffness of one "
+      "contact, with all points about 0.2 voxel deep. First the largest eigenvalue of Σ w N Nᵀ "
+      "with the engine's shares w, then that of the force's true derivative, by central "
+      "differences. The shares of `series` are secants of a joint solve, so only the second "
+      "shows the stiffness that the step uses; its bound is c = 4. Prototype, by shares: "
+      "hemisphere gauss3 100 / 1000, robust 100 / 662; tight cylinder 139 / 229 and 83 / 100; "
+      "series at most 4 everywhere. `series` shows 4.06 on the hemisphere with 3000 points, "
+      "because the bound is on Σ κ J Jᵀ, which the symmetric step uses (3.95 there). The "
+      "force's true derivative has the field's slope in the place of the second J. At the "
+      "bowl's rim, which samples 1 mm apart round off, that slope is neither along N (N·g down "
+      "to 0.33) nor of length 1 (0.56 to 1.22). Without the points within half a voxel of the "
+      "rim it is 3.67, on exact distances 3.96, on a whole ball sampled at 1 mm 3.95. Neither "
+      "the step of the differences nor contacts that come and go are the cause: over 0.01, "
+      "0.001 and 0.0001 voxel, in double, the results agree to 0.1 %.";
   struct Patch {
     const char* name;
     io::Scene scene;
@@ -242,13 +239,12 @@ Study study_two_planes(const std::vector<MethodColumn>& columns, const Console& 
   Study out;
   out.title = "Fig. 4: two inclined planes";
   out.about =
-      "A block on two planes that rise at α to either side, 64 points on each, all 0.2 voxel deep: "
-      "eigenvalues of the translational stiffness in k, along x / along z, from the force's true "
-      "derivative by central differences. With s the stiffness that one plane's contacts have "
-      "together they should be 2 s sin²α and 2 s cos²α; the paper's s is 1. Below: s, the mean "
-      "over "
-      "α, and the largest deviation of any eigenvalue from 2 s sin²α, 2 s cos²α or 0 with the s of "
-      "its α, in shares of 2 s.";
+      "A block on two planes that rise at α to either side, with 64 points on each, all 0.2 "
+      "voxel deep. The table gives the eigenvalues of the translational stiffness in k, along x "
+      "/ along z, from the force's true derivative by central differences. If the contacts of "
+      "one plane together have the stiffness s, they should be 2 s sin²α and 2 s cos²α; in the "
+      "paper s is 1. The last rows give the mean of s over α, and the largest deviation of any "
+      "eigenvalue from 2 s sin²α, 2 s cos²α or 0 with the s of its α, in shares of 2 s.";
   const std::vector<int> angles = {5, 15, 25, 35, 45, 55, 65, 75, 85};
   std::vector<std::vector<Eigenvalues>> found(angles.size(),
                                               std::vector<Eigenvalues>(columns.size()));
@@ -290,13 +286,12 @@ Study study_two_planes(const std::vector<MethodColumn>& columns, const Console& 
     out.json["deviation"][columns[m].name] = off[m];
   }
   out.after =
-      "Every rule that shares by density keeps the shape of the paper's formula. `robust` has an s "
-      "of about 1 but near 76°, where the planes' normals pass through the centre of mass: torque "
-      "directions then point all ways round, and a product of hats takes what differs in them for "
-      "different contacts, as on a wall (4.5 in the study of net stiffness). `series` is bounded "
-      "in "
-      "each direction by itself, at 4, so that its weaker direction is stiffer than the formula "
-      "says.";
+      "Every rule that shares by density keeps the shape of the paper's formula. `robust` has "
+      "an s of about 1 except near 76°, where the planes' normals pass through the centre of "
+      "mass: the torque directions there point all ways round, and a product of hats takes "
+      "contacts that differ in them for different contacts, as on a wall (4.5 in the study of "
+      "net stiffness). `series` bounds each direction by itself, at 4, so its weaker direction "
+      "is stiffer than the formula says.";
   return out;
 }
 

@@ -10,10 +10,10 @@ Study study_time(const std::vector<MethodColumn>& columns, const Console& consol
   Study out;
   out.title = "Fig. 6: time against the number of contacts";
   out.about =
-      "A flat patch of n points, all in contact, one thread: median time of finding them, of their "
-      "weights, and of wrench, coupling and solve, in µs (collision / weights / system). –: the "
-      "weights alone would take more than 2 s a frame. The paper: weights 25.6 % of the frame at "
-      "n = 200, system 20 µs to 30 µs.";
+      "A flat patch of n points, all in contact, on one thread: the median time in µs for "
+      "finding the contacts, for their weights, and for wrench, coupling and solve (collision / "
+      "weights / system). – means that the weights alone would take more than 2 s a frame. The "
+      "paper: weights 25.6 % of the frame at n = 200, system 20 µs to 30 µs.";
   out.table = head("n", columns);
   const int sides[][2] = {{2, 5}, {10, 10}, {25, 40}, {100, 100}, {250, 400}};
   const io::Progress progress = console.progress();

@@ -15,9 +15,10 @@ Study study_sampling(const std::vector<MethodColumn>& columns, const Console& co
   out.title = "Other samplings of the shell";
   out.about =
       "Each scene with its shell at half, once and twice the points, on a regular grid and with "
-      "every point moved inside its cell: failures (any verdict but held) of six, and the range of "
-      "the deepest contact in voxels. Prototype, scenes of six in which a method fails at least "
-      "once: global 5, gauss3 4, gauss6 1, robust 0, series 0.";
+      "every point moved at random inside its cell. The table gives the failures (any verdict "
+      "but held) of these six runs, and the range of the deepest contact in voxels. Prototype, "
+      "scenes of six in which a method fails at least once: global 5, gauss3 4, gauss6 1, "
+      "robust 0, series 0.";
   std::vector<const TableScene*> kinds;
   for (const TableScene& s : table_scenes())
     if (s.thin) kinds.push_back(&s);
@@ -70,13 +71,11 @@ Study study_force(const std::vector<MethodColumn>& columns, const Console& conso
   out.title = "Pushed harder";
   out.about =
       "The highest multiple of the scene's force, of 1, 1.5, 2, 3, 4 and 6, up to which the "
-      "verdict "
-      "stays held; 0: not even once. Stiffness and bounds of the coupling grow together. "
-      "Prototype: "
-      "robust 2 in Fig. 3, 2 and 3 (post) in Fig. 12, 4 in Fig. 8; series 3, 4 and 6, 3. At 1 mm "
-      "the "
-      "fields of wire and post are never deeper than 0.29 voxel, so that they yield earlier; hence "
-      "the two last rows, with fields of 0.25 mm.";
+      "verdict stays held; 0: it does not hold even the scene's own force. Stiffness and bounds "
+      "of the coupling grow together. Prototype: robust 2 in Fig. 3, 2 and 3 (post) in Fig. 12, "
+      "4 in Fig. 8; series 3, 4 and 6, 3. At 1 mm the fields of wire and post are never deeper "
+      "than 0.29 voxel, so these yield earlier; the last two rows therefore use fields of 0.25 "
+      "mm.";
   std::vector<std::string> kinds;
   std::vector<io::Scene> scenes;
   for (const TableScene& s : table_scenes()) {
@@ -124,10 +123,9 @@ Study study_voxel(const std::vector<MethodColumn>& columns, const Console& conso
   Study out;
   out.title = "Finer fields around thin parts";
   out.about =
-      "Fig. 12's scenes with fields of 1, 0.5 and 0.25 mm and the same force of 5 N: verdict and "
-      "deepest contact in mm. What changes with the voxel is the baked field's doing, what stays "
-      "is "
-      "the method's.";
+      "Fig. 12's scenes with fields of 1, 0.5 and 0.25 mm and the same force of 5 N: verdict "
+      "and deepest contact in mm. Results that change with the voxel come from the baked field; "
+      "results that stay come from the method.";
   const std::vector<const char*> names = {"box-over-wire", "box-over-fused-wire", "box-over-post"};
   const std::vector<double> voxels = {1, 0.5, 0.25};  // [mm]
   std::vector<io::Scene> scenes;

@@ -198,21 +198,21 @@ std::string verdict(const Weighing& w) {
                     std::to_string(w.losses().size()) + ".";
   if (w.losses().empty()) return out + " Nothing gets worse: it can be the default.";
   return out + " Worse: " + listed(w.losses()) +
-         ".\n\nWhat speaks for `series`: its net stiffness has a bound that no sampling breaks; "
-         "its "
+         ".\n\n"
+         "What speaks for `series`: its net stiffness has a bound that no sampling breaks; its "
          "derivatives are those of its force; it makes next to no energy in a closed cycle; its "
-         "cost grows with the contacts and not with their square; thin parts, few contacts and the "
-         "alpha's gap push back sooner, so that most scenes hold more force. What speaks against "
-         "it: it is a joint solve, so noise in one depth moves load between points, which a hand "
-         "feels as torque; where contacts conform all around, or face each other across a narrow "
-         "gap, it goes deeper than a rule that stiffens with every new direction; in some scenes "
-         "its depth varies more with the sampling; its force changes faster as contacts come and "
-         "go; and at its bound of c k it leaves an explicit integrator less room on a flat "
-         "contact, "
-         "and an implicit one in a tight fit. All of that is small: it holds what `robust` holds, "
-         "stays under half a voxel in the same scenes, and its implicit limits are fifty times the "
-         "stiffness in use or more. But the default is to move only when nothing gets worse, and "
-         "something does: it stays `robust`, with `series` one word away in a scene.";
+         "cost grows with the contacts and not with their square; thin parts, few contacts and the"
+         " alpha's gap push back at less depth, so most scenes hold more force. What speaks "
+         "against it: it is a joint solve, so noise in one depth moves load between points, which "
+         "a hand feels as torque; where contacts conform all around, or face each other across a "
+         "narrow gap, it goes deeper than a rule that stiffens with every new direction; in some "
+         "scenes its depth varies more with the sampling; its force changes faster as contacts "
+         "come and go; and at its bound of c k it leaves an explicit integrator less room on a "
+         "flat contact, and an implicit one in a tight fit. All of these are small: `series` holds"
+         " what `robust` holds, stays under half a voxel in the same scenes, and its implicit "
+         "limits are at least fifty times the stiffness in use. But the default should change only"
+         " when nothing gets worse, and something does. The default stays `robust`; one word in a "
+         "scene selects `series`.";
 }
 
 }  // namespace
@@ -240,11 +240,9 @@ Study weigh_series(const std::vector<SceneRow>& rows, const std::vector<MethodCo
   out.name = "series-beside-robust";
   out.title = "`series` beside `robust`";
   out.about =
-      "Every figure above that tells the two apart, and which of them is better; figures within 2 "
-      "% "
-      "of each other, or that print alike, are the same. Depths in voxels (Fig. 7's shares in mm), "
-      "forces as in the "
-      "studies.";
+      "Every figure above that differs between the two, and which of them is better. Figures "
+      "within 2 % of each other, or that print alike, count as the same. Depths are in voxels "
+      "(Fig. 7's shares in mm), forces in the units of the studies.";
   w.into(out);
   if (out.table.size() > 1) out.after = verdict(w);
   return out;
