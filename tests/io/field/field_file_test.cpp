@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields as files: to the bit and back, for other programs, and through every kind of damage.
+// field_file_test.cpp - .vdb files: to the bit and back, for other programs, and with every kind of
+// damage.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -21,8 +22,8 @@
 #include "tests/io/field/field_samples.h"
 #include "tests/support/sanitized.h"
 
-// OpenVDB allocates by the length of a compressed block; a damaged one is a bad_alloc that
-// read_field catches, but this sanitizer ends the program instead of throwing.
+// OpenVDB allocates by the length of a compressed block. read_field catches the bad_alloc of a
+// damaged length, but AddressSanitizer ends the program instead of throwing.
 constexpr bool kHugeAllocationsThrow = !h6::test::kAddressSanitized;
 
 using namespace field_samples;
@@ -80,7 +81,7 @@ TEST_CASE("field_file: a field of another version of the format is refused, and 
       CHECK(error_of(file).find("another version of hapsix: bake it again") != std::string::npos);
     }
   }
-  // As a program would write it that knows nothing of the checksum.
+  // The same file as written by a program that does not know the checksum.
   REQUIRE(write_field(file, baked(), Compression::none));
   const openvdb::GridPtrVec grids = read_with_openvdb(file);
   for (const auto& grid : grids)
@@ -132,8 +133,8 @@ TEST_CASE("field_file: OpenVDB's own reader sees a level set in world units") {
   CHECK(grid->transform().isLinear());
   CHECK(grid->voxelSize().x() == h6::test::near(field.voxel_size));  // [m]
   CHECK(grid->voxelSize().z() == h6::test::near(field.voxel_size));
-  // Outside of all leaves is as far as the band reaches, so that programs that clip at the
-  // background, as OpenVDB's own tools do, draw the surface and nothing else.
+  // The background is the half width of the band, so that programs that clip at the background, as
+  // OpenVDB's own tools do, draw the surface and nothing else.
   CHECK(grid->background() == h6::test::near(field.band).epsilon(1e-6));
   std::size_t band = 0, missing = 0;
   for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// field_samples.h - fields to write and read, and a folder to do it in.
+// field_samples.h - fields and a folder for the tests of field files.
 #pragma once
 #include <doctest/doctest.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// raw_field_test.cpp - fields of the cache: to the bit and back, and through every kind of damage.
+// raw_field_test.cpp - fields of the cache: to the bit and back, and with every kind of damage.
 #include <doctest/doctest.h>
 #include <sys/resource.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_aside_test.cpp - a file is whole or not there, whatever happens to its writer.
+// write_aside_test.cpp - a file is whole or absent, whatever happens to its writer.
 #include <doctest/doctest.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -54,7 +54,7 @@ void says(const Outcome& outcome, const std::string& words) {
   CHECK(outcome.error().ends_with("."));
 }
 
-// Runs in a child; a child that is still there after ten seconds hangs.
+// Runs in a child process; one that still runs after ten seconds hangs.
 template <class Work>
 pid_t in_a_child(const Work& work) {
   const pid_t child = fork();
@@ -180,8 +180,7 @@ TEST_CASE("many threads write aside at once, even the same file, even more than 
   for (int t = 0; t < 40; ++t) CHECK(content(folder.path / std::to_string(t)).size() == 1000);
 }
 
-// In a child of several threads ThreadSanitizer keeps back whatever signal is not the program's own
-// fault, for ever.
+// In a child with several threads, ThreadSanitizer never delivers signals from outside.
 constexpr int kInterrupt = h6::test::kThreadSanitized ? SIGABRT : SIGINT;
 
 TEST_CASE("interrupted, the program removes what it had begun and the old file is untouched") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which way normals point: into the body, whatever its winding, and away from its hollows.
+// inward_normals_test.cpp - normals point into the body, whatever its winding, and out of hollows.
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ Mesh mixed(Mesh mesh) {
   return mesh;
 }
 
-// Concentric balls, the largest first; for each whether it is wound outward.
+// Concentric balls, the largest first; each is wound outward or not.
 Mesh balls(const std::vector<bool>& outward) {
   Mesh mesh;
   for (std::size_t i = 0; i < outward.size(); ++i) {
@@ -36,7 +36,7 @@ Mesh balls(const std::vector<bool>& outward) {
   return mesh;
 }
 
-// For each ball: 1 where all normals point at its middle, -1 where all point away, else 0.
+// For each ball 1 when all normals point to its middle, -1 when all point away, else 0.
 std::vector<int> pointing(const Mesh& mesh) {
   const FaceTable faces = face_table(mesh);
   const std::size_t each = sphere({0, 0, 0}, 1, 8).triangles.size();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mesh_audit_test.cpp - what the audit counts, on shapes whose answer is known and on real meshes.
+// mesh_audit_test.cpp - the counts of the audit, on shapes of known answer and on real meshes.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -37,7 +37,7 @@ bool same_counts(const MeshAudit& a, const MeshAudit& b) {
          a.flipped_edges == b.flipped_edges && a.components == b.components && a.closed == b.closed;
 }
 
-// Every corner its own vertex, as an STL has it.
+// The same mesh with a vertex for every corner, as in an STL.
 Mesh unwelded(const Mesh& mesh) {
   Mesh out;
   for (const auto& t : mesh.triangles) {
@@ -170,7 +170,7 @@ TEST_CASE("triangles without area are counted: collapsed ones have no edges, fla
   CHECK(a.closed);
   CHECK(a.components == 1);
 
-  // A side split at its middle on one face only, the gap closed by a triangle in a line.
+  // A side is split at its middle on one face only; a triangle without area closes the gap.
   mesh = box();
   mesh.vertices.push_back({0, -0.5, 0});  // between vertices 0 and 1
   const auto side = std::find(mesh.triangles.begin(), mesh.triangles.end(),
@@ -188,7 +188,7 @@ TEST_CASE("triangles without area are counted: collapsed ones have no edges, fla
     return b;
   }());
 
-  // Nothing but such triangles is no body.
+  // A mesh of only such triangles is not closed.
   mesh.triangles = {{0, 0, 1}};
   CHECK_FALSE(audit(mesh).closed);
 }
@@ -282,7 +282,7 @@ TEST_CASE("real meshes: the counts known from elsewhere") {
     const char* file;
     std::size_t triangles, open, components;  // components 0: not known
   };
-  // Found with other tools. No duplicates in any of these; 0 open means clean.
+  // These counts come from other tools. None of the meshes has duplicates.
   static const Known kKnown[] = {
       {"nut-bolt/factory_nut_m16_loose_subdiv_3x.obj", 15080, 108, 0},
       {"nut-bolt/factory_bolt_m16_tight.obj", 25672, 0, 0},
@@ -315,8 +315,8 @@ TEST_CASE("real meshes: the counts known from elsewhere") {
     if (known.components) CHECK(a.components == known.components);
   }
 
-  // The soups. Others count edges with the duplicates kept: dropping them opens what a pair of
-  // equal faces had closed, so both ways of counting stand here.
+  // The soups. Other tools count edges with the duplicates kept. Dropping these opens edges that a
+  // pair of equal faces had closed, so both counts are checked.
   struct Soup {
     const char* file;
     std::size_t triangles, duplicates, components, open, nonmanifold;  // 0: not known

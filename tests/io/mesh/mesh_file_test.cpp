@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mesh_file_test.cpp - meshes out of files: the right ones whole, the wrong ones with a sentence.
+// mesh_file_test.cpp - good mesh files are read whole; bad ones are refused with a sentence.
 #include <doctest/doctest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -37,7 +37,7 @@ struct Folder {
   }
 };
 
-// One sentence about `file` that has all of the words.
+// Checks for one sentence about `file` that contains all of the words.
 void refuses(const File& file, std::initializer_list<const char*> words) {
   CAPTURE(file.name);
   const auto mesh = parse_mesh(file.bytes, file.name);
@@ -100,7 +100,7 @@ TEST_CASE("equal corners are one vertex, in order of appearance, and minus zero 
 TEST_CASE("a written STL reads back with the same vertices, in every unit") {
   const Folder folder;
   for (const Unit unit : {Unit::m, Unit::mm, Unit::cm, Unit::in}) {
-    // What a float in this unit can hold survives: reading gives these very doubles.
+    // Coordinates that are floats in this unit come back as the same doubles.
     samples::Mesh drawn;
     for (int i = 0; i < 12; ++i)
       drawn.vertices.push_back({static_cast<float>(std::sin(i) * 37.3) * metres(unit),
@@ -182,7 +182,7 @@ TEST_CASE("text STL: each solid is a part, words may stand on any line, normals 
 }
 
 TEST_CASE("polygons are cut into triangles that cover them once, whichever way they lie") {
-  // An L, a comb and a dart: none is convex. The area tells gaps and overlaps alike.
+  // An L, a comb and a dart: none is convex. The area shows both gaps and overlaps.
   struct Shape {
     std::vector<std::array<double, 2>> outline;
     double area;
@@ -276,7 +276,7 @@ TEST_CASE("wrong files get one sentence that names file and place") {
     fs::permissions(secret, fs::perms::none);
     says(secret, "ermission");
   }
-  // 200 GB that take no room on the disk: the header or the size is refused, nothing is read.
+  // A sparse file of 200 GB is refused by its header or its size, without being read.
   const fs::path sparse = folder.put("sparse.stl", std::string(80, 'x') + "\xff\xff\xff\xff");
   fs::resize_file(sparse, 200'000'000'000);
   says(sparse, "4294967295");
@@ -371,7 +371,7 @@ TEST_CASE("wrong PLY gets a sentence with byte, line or row") {
     refuses({"a.ply", header(form, "0", "4000000000") + points}, {"4000000000", "room"});
     refuses({"a.ply", header(form, "-3", "1") + points}, {"line 3", "-3"});
     refuses({"a.ply", header(form, "99999999999999999999", "1") + points}, {"line 3", "too large"});
-    // An element without columns takes no bytes a row: its count must not be looped over.
+    // An element without columns takes no bytes, so its count must not drive a loop.
     const std::string air = "element air 9223372036854775807\nelement";
     refuses({"a.ply", with(header(form, "0", "0"), "element", air)}, {"no faces"});
   }

@@ -23,7 +23,7 @@ struct Tally {
   int accepted = 0, refused = 0;
 };
 
-// What mesh.h promises of every mesh that was read; a sentence otherwise.
+// Checks what mesh.h promises of every mesh that was read, or that a sentence refuses it.
 void try_reading(const File& file, Tally& tally) {
   const auto mesh = parse_mesh(file.bytes, file.name);
   if (!mesh) {
@@ -63,9 +63,9 @@ TEST_CASE("a file cut at any byte is refused or a mesh") {
     Tally tally;
     for (std::size_t length = 0; length < file.bytes.size(); ++length)
       try_reading({file.name, file.bytes.substr(0, length)}, tally);
-    // OBJ has no count and no end: cut behind a face, it is a smaller mesh, as any reader has it.
+    // An OBJ has neither a count nor an end mark: cut after a face, it is a smaller mesh.
     if (file.name == "mesh.obj") CHECK(tally.accepted > 0);
-    // Elsewhere only the last bytes may be missed: the line end, or a piece of the last number.
+    // In other formats only the last bytes may be missing unnoticed: a line end, or a digit.
     else
       CHECK(tally.accepted <= 1);
   }
@@ -123,7 +123,7 @@ TEST_CASE("a file with bytes changed, doubled, dropped or moved is refused or a 
       try_reading({file.name, bytes}, tally);
     }
   }
-  CHECK(tally.accepted > 100);  // both ways were taken, or this tests nothing
+  CHECK(tally.accepted > 100);  // else the test covers one outcome only
   CHECK(tally.refused > 100);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// mesh_nodes_test.cpp - glTF and COLLADA: every node where its transforms put it, the right way
-// out, under its name; and nothing a hostile file can say does harm.
+// mesh_nodes_test.cpp - glTF and COLLADA: every node is where its transforms put it, with outward
+// triangles and its name; and no hostile file does harm.
 #include <doctest/doctest.h>
 #include <unistd.h>
 

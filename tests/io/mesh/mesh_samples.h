@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mesh_samples.h - small meshes, and every format they can be written in, for the tests of reading.
+// mesh_samples.h - small meshes in every format, for the tests of the readers.
 #pragma once
 #include <zlib.h>
 
@@ -86,7 +86,7 @@ inline std::string obj(const Mesh& mesh) {
   return out;
 }
 
-// With columns and elements a reader must step over.
+// With columns and elements that a reader must skip.
 inline std::string ply(const Mesh& mesh, const std::string& form) {
   std::string out = "ply\nformat " + form + " 1.0\ncomment made by a test\n";
   out += "element camera 1\nproperty list uchar float lens\nproperty short id\n";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// node_files.h - small glTF and COLLADA files, put together by the tests that read them.
+// node_files.h - small glTF and COLLADA files for the tests of their readers.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -37,8 +37,8 @@ inline std::string data_uri(const std::string& bytes) {
   return "data:application/octet-stream;base64," + base64(bytes);
 }
 
-// One mesh "drawn". `nodes` is the JSON list; the scene shows node 0. `uri` empty: the .glb's
-// chunk.
+// One mesh "drawn". `nodes` is the JSON list; the scene shows node 0. An empty `uri` means the
+// chunk of a .glb.
 inline std::string gltf(const samples::Mesh& mesh, const std::string& nodes, const std::string& uri,
                         const std::string& more = "") {
   const std::size_t points = 12 * mesh.vertices.size(), corners = 3 * mesh.triangles.size();

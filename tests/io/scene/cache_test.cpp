@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cache of baked assets: found again, never believed blindly, never in the way.
+// cache_test.cpp - the cache finds baked assets again, checks what it reads, and never stops a run.
 #include <doctest/doctest.h>
 
 #include <unistd.h>
@@ -23,7 +23,7 @@ using namespace h6::io;
 
 namespace {
 
-// HAPSIX_CACHE names a folder that is not there yet, for one test.
+// Sets HAPSIX_CACHE to a folder that does not exist yet, for one test.
 struct CacheFolder {
   fs::path root = fs::temp_directory_path() / ("hapsix-cache-test-" + std::to_string(getpid()));
   fs::path path = root / "not" / "yet";
@@ -93,7 +93,7 @@ TEST_CASE("the folder is HAPSIX_CACHE, else that of XDG, else the home's") {
   setenv("HOME", "/h", 1);
   setenv("XDG_CACHE_HOME", "/x", 1);
   CHECK(cache_folder() == "/x/hapsix");
-  setenv("XDG_CACHE_HOME", "relative", 1);  // such a value does not count, says XDG
+  setenv("XDG_CACHE_HOME", "relative", 1);  // XDG ignores relative paths
   CHECK(cache_folder() == "/h/.cache/hapsix");
   unsetenv("XDG_CACHE_HOME");
   CHECK(cache_folder() == "/h/.cache/hapsix");
@@ -216,7 +216,7 @@ TEST_CASE("a damaged or foreign file is baked again, says so, and is then good")
     CHECK(cached.warnings.size() == 1);
     CHECK(shell_run().hit);
   }
-  // A sound shell of something else under this name.
+  // A sound shell of other options under this name.
   ShellBake other = shell_options();
   other.seed = 77;
   const auto foreign = bake_shell(box_mesh, other, nullptr);
