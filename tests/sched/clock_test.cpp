@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// clock_test.cpp - how long a tick is, whatever happens to the counter or the clock.
+// clock_test.cpp - the length of a tick, also after jumps of the counter or the clock.
 #include "sched/clock.h"
 #include <doctest/doctest.h>
 
 using namespace h6::sched;
 
-TEST_CASE("a tick is as long as the clock went on per tick, from the second look on") {
+TEST_CASE("a tick is as long as the clock advanced per tick, from the second reading on") {
   TickLength length;
   length.see(1000, 7000);
   length.see(1500, 8000);
   CHECK(length.ns() == 0.5);
-  // A longer span says more, until it is a second.
+  // A longer span is more accurate, up to a second.
   length.see(3000, 12000);
   CHECK(length.ns() == 0.4);
 }
@@ -23,7 +23,7 @@ TEST_CASE("after a second the length of a tick stays for a second, then follows 
   CHECK(length.ns() == 2);
   length.see(2 * kSecond + 1000, 5 * kSecond);
   CHECK(length.ns() == 2);
-  // What jumped is forgotten.
+  // A jump is forgotten.
   length.see(4 * kSecond + 10, 9 * kSecond + 20);
   length.see(6 * kSecond + 10, 10 * kSecond + 20);
   CHECK(length.ns() == 2);

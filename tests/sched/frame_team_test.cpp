@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The resident helper takes slices, each once, and never holds the haptic thread up.
+// The resident helper takes slices, each once, and never delays the haptic thread.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 
 using namespace h6::sched;
 
-TEST_CASE("every slice runs exactly once, whoever takes it, job after job") {
+TEST_CASE("every slice runs exactly once, on either thread, job after job") {
   for (const unsigned threads : {1u, 2u}) {
     FrameTeam team(threads);
     CHECK(team.threads() == threads);
@@ -39,7 +39,7 @@ TEST_CASE("every slice runs exactly once, whoever takes it, job after job") {
   }
 }
 
-TEST_CASE("the helper does help") {
+TEST_CASE("the helper takes slices") {
   FrameTeam team(2);
   std::set<std::thread::id> seen;
   std::mutex mutex;
@@ -73,7 +73,7 @@ TEST_CASE("a host's own TBB work never runs on the haptic thread or its helper")
       team.end_frame(now_ns() + 100000);
     }
   };
-  frames(500, 300000, [&] { return ours.size() == 2; });  // until the helper is at work
+  frames(500, 300000, [&] { return ours.size() == 2; });  // until the helper works
   CHECK(ours.size() == 2);
 
   std::atomic<bool> stop{false};
@@ -97,7 +97,7 @@ TEST_CASE("a host's own TBB work never runs on the haptic thread or its helper")
   while (tasks < before + 100) std::this_thread::yield();
   stop = true;
   for (std::thread& host : hosts) host.join();
-  CHECK(ours.size() == 2);  // nobody else's thread took a slice either
+  CHECK(ours.size() == 2);  // no other thread took a slice
   for (const std::thread::id id : ours) CHECK(foreign.count(id) == 0);
 }
 
@@ -109,7 +109,7 @@ TEST_CASE("a helper that is held up keeps its one slice, and the haptic thread t
     by_helper = by_haptic = 0;
     team.begin_frame(now_ns());
     team.for_slices(40, [&](std::size_t) {
-      // The helper is off its core, as it were, until there is nothing else left to do.
+      // The helper acts as if it were off its core until nothing else is left to do.
       if (std::this_thread::get_id() != haptic) {
         ++by_helper;
         for (const std::int64_t end = now_ns() + 5000000000; by_haptic < 39 && now_ns() < end;) {
@@ -145,10 +145,10 @@ TEST_CASE("the helper has the last slices of every job, the haptic thread the fi
   CHECK(shared == 5);
 }
 
-TEST_CASE("whoever steps without a pause has the helper in most frames all the same") {
+TEST_CASE("a caller that steps without a pause still gets the helper in most frames") {
   FrameTeam team(2);
   int helped = 0, frames = 0;
-  // Each says that the next one is due in ten milliseconds, and comes at once.
+  // Each frame announces the next one in ten milliseconds, but it comes at once.
   const std::int64_t give_up = now_ns() + 20'000'000'000;
   for (; helped < 200 && now_ns() < give_up; ++frames) {
     team.begin_frame(now_ns());
@@ -163,7 +163,7 @@ TEST_CASE("whoever steps without a pause has the helper in most frames all the s
   MESSAGE(frames << " frames for 200 with help");
 }
 
-TEST_CASE("a team that nobody steps can be destroyed at once") {
+TEST_CASE("a team without frames can be destroyed at once") {
   const auto start = std::chrono::steady_clock::now();
   for (int i = 0; i < 5; ++i) {
     FrameTeam team(2);

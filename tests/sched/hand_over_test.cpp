@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values cross from a thread that must not wait to one that may be slow.
+// Values pass from a thread that must not wait to a thread that may be slow.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -28,7 +28,7 @@ struct Wide {
 };
 }  // namespace
 
-TEST_CASE("a ring keeps order, refuses when full and counts what it refused") {
+TEST_CASE("a ring keeps order, refuses values when full and counts them") {
   SpscRing<int> ring(4);
   for (int i = 0; i < 6; ++i) CHECK(ring.push(i) == (i < 4));
   CHECK(ring.dropped() == 2);
@@ -61,7 +61,7 @@ TEST_CASE("a ring between two threads loses, repeats and tears nothing") {
   CHECK(good);
 }
 
-TEST_CASE("the latest value is the newest one, whole, and only once") {
+TEST_CASE("the latest value is the newest one, complete, and given only once") {
   LatestValue<int> box;
   int out = -1;
   CHECK(!box.take(out));

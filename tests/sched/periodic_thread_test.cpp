@@ -58,7 +58,7 @@ TEST_CASE(
     "sleep ends early by what the machine takes to wake a sleeper, as far as the spin is long") {
   std::mt19937 random(1);
   for (const double usual : {20e3, 45e3, 94e3, 300e3}) {
-    // Every hundredth is 5 ms late: stolen.
+    // Every hundredth sleep ends 5 ms late, as if the time were stolen.
     std::lognormal_distribution<double> late(std::log(usual), 0.3);
     WakeAhead ahead(1000000, 100000);
     std::int64_t deadline = 0;
@@ -82,7 +82,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("deadlines are a period apart, and what may be a tick comes before their spin") {
+TEST_CASE("deadlines are a period apart, and the kernel's tick comes before their spin") {
   for (const std::int64_t period : {100000, 250000, 500000, 1000000, 10000000})
     for (const std::int64_t spin : {0, 50000, 100000, 180000}) {
       const WakeAhead ahead(period, spin);
@@ -97,7 +97,7 @@ TEST_CASE("deadlines are a period apart, and what may be a tick comes before the
     }
 }
 
-TEST_CASE("who polls before every deadline sleeps nevertheless, and never into the spin") {
+TEST_CASE("a thread that polls before its deadlines also sleeps, but never into the spin") {
   WakeAhead ahead(250000, 100000);
   for (int i = 0; i < 1000; ++i) ahead.learn(0, 200000);
   for (std::int64_t now = 0; now < 250000; now += 1000) {
@@ -105,7 +105,7 @@ TEST_CASE("who polls before every deadline sleeps nevertheless, and never into t
     CHECK(aim <= std::max<std::int64_t>(now, 150000));
     if (now < 130000) CHECK(aim >= now + 250000 / 16);
   }
-  // Without a spin it sleeps until the deadline, however late it is woken.
+  // Without a spin the sleep ends at the deadline, however late the thread is woken.
   WakeAhead plain(250000, 0);
   for (int i = 0; i < 1000; ++i) plain.learn(0, 200000);
   CHECK(plain.aim(0, 250000) == 250000);
@@ -115,23 +115,23 @@ TEST_CASE("a frame that computes too long is late by its own computation; one th
   int compute = 0, stolen = 0;
   PeriodicThreadOptions options;
   options.rate = 200;  // 5 ms
-  PeriodicThread thread(
-      options, {nullptr,
-                [&](std::uint64_t n, const TickTiming&, double) {
-                  const std::int64_t until = now_ns() + 8000000;
-                  if (n == 3) {
-                    const std::int64_t cpu = thread_cpu_ns() + 7000000;
-                    while (thread_cpu_ns() < cpu) {
-                    }
-                  }
-                  if (n == 6)
-                    sleep_until_ns(until);  // what a machine that runs something else looks like
-                  return n < 9;
-                },
-                [&](std::uint64_t n, const TickTiming& t) {
-                  if (n == 3) compute += t.late == Late::compute;
-                  if (n == 6) stolen += t.late == Late::stolen;
-                }});
+  PeriodicThread thread(options,
+                        {nullptr,
+                         [&](std::uint64_t n, const TickTiming&, double) {
+                           const std::int64_t until = now_ns() + 8000000;
+                           if (n == 3) {
+                             const std::int64_t cpu = thread_cpu_ns() + 7000000;
+                             while (thread_cpu_ns() < cpu) {
+                             }
+                           }
+                           if (n == 6)
+                             sleep_until_ns(until);  // as if the machine ran something else
+                           return n < 9;
+                         },
+                         [&](std::uint64_t n, const TickTiming& t) {
+                           if (n == 3) compute += t.late == Late::compute;
+                           if (n == 6) stolen += t.late == Late::stolen;
+                         }});
   thread.join();
   CHECK(compute == 1);
   CHECK(stolen == 1);
@@ -179,11 +179,11 @@ TEST_CASE("after a long stall the schedule moves on instead of catching up") {
                                   },
                                   nullptr});
   thread.join();
-  // 14 frames follow the stall: at their own rate, not in one burst.
+  // 14 frames follow the stall, at their own rate and not in one burst.
   CHECK(starts[20] - starts[6] > 10 * 1000000);
 }
 
-TEST_CASE("what real-time support was granted is said in words") {
+TEST_CASE("the granted real-time support is described in words") {
   RealtimeGrant grant;
   PeriodicThreadOptions options;
   PeriodicThread thread(options,
@@ -197,7 +197,7 @@ TEST_CASE("what real-time support was granted is said in words") {
   if (!grant.fifo) CHECK(text.find("limits.conf") != std::string::npos);
 }
 
-TEST_CASE("denormals are zero in scope and back after it") {
+TEST_CASE("denormals are zero in scope and unchanged after it") {
   volatile double tiny = std::numeric_limits<double>::min();
   {
     const FlushDenormals flush;

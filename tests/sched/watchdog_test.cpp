@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A watchdog speaks when, and only when, nothing is heard of whom it watches.
+// A watchdog acts if and only if the watched thread gives no sign of life.
 #include <doctest/doctest.h>
 
 #include <sys/wait.h>
@@ -24,7 +24,7 @@ constexpr std::int64_t kMillisecond = 1000000;
 
 void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
 
-// Until it holds, or far too long has passed.
+// Waits until the condition holds, or far too long has passed.
 template <class F>
 bool soon(F&& holds) {
   for (int i = 0; i < 5000 && !holds(); ++i) pause_ms(1);
@@ -33,7 +33,7 @@ bool soon(F&& holds) {
 
 }  // namespace
 
-TEST_CASE("without a beat nothing expires; after one that none follows it does, again and again") {
+TEST_CASE("without a beat nothing expires; when beats stop it expires again and again") {
   std::atomic<int> expired{0};
   Watchdog dog(5 * kMillisecond, 0, [&] { ++expired; });
   pause_ms(50);
@@ -45,13 +45,13 @@ TEST_CASE("without a beat nothing expires; after one that none follows it does, 
   dog.beat(now_ns());
   CHECK(soon([&] { return dog.trips() == 2; }));
   dog.rest();
-  pause_ms(20);  // one may be on its way
+  pause_ms(20);  // one call may be running
   const int then = expired;
   pause_ms(50);
   CHECK(expired == then);
 }
 
-TEST_CASE("beats that come in time keep it quiet") {
+TEST_CASE("beats in time keep the watchdog quiet") {
   std::atomic<int> expired{0};
   Watchdog dog(2000 * kMillisecond, 0, [&] { ++expired; });
   for (int i = 0; i < 100; ++i) {
@@ -69,7 +69,7 @@ TEST_CASE("a watchdog that sleeps ends at once") {
   CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(10));
 }
 
-TEST_CASE("all of a list are halted, what has left it is not, and a full one says so") {
+TEST_CASE("a list halts all its entries, none that was removed, and refuses more when full") {
   std::atomic<int> halts[kMostToHalt + 1] = {};
   const auto halt = [](void* self) { ++*static_cast<std::atomic<int>*>(self); };
   for (std::size_t i = 0; i < kMostToHalt; ++i) CHECK(add_to_halt_list(halt, &halts[i]));
@@ -84,7 +84,7 @@ TEST_CASE("all of a list are halted, what has left it is not, and a full one say
   CHECK(halts[0] == 2);
 }
 
-TEST_CASE("exit halts what the process put there, and nothing of its parent's") {
+TEST_CASE("exit halts the entries of the process, and none of its parent's") {
   int pipe_ends[2];
   REQUIRE(pipe(pipe_ends) == 0);
   struct Voice {
@@ -96,7 +96,7 @@ TEST_CASE("exit halts what the process put there, and nothing of its parent's") 
     if (write(v.to, &v.word, 1) != 1) std::abort();
   };
   REQUIRE(add_to_halt_list(speak, &parent));
-  std::fflush(nullptr);  // else the child says it again
+  std::fflush(nullptr);  // otherwise the child prints it again
   const pid_t pid = fork();
   REQUIRE(pid >= 0);
   if (pid == 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a hand's samples, lateness and buttons do to its output: states, trouble, decay, latching.
+// How samples, lateness and buttons change a hand's output: states, trouble, decay, latching.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -48,7 +48,7 @@ struct Chain {
   double force() const { return command.wrench.force.x; }
   h6DeviceState state() const { return guard.state(); }
   bool says(h6Cause cause) const { return (command.causes >> cause & 1u) != 0; }
-  // Steps on as long as the trouble lasts: held one frame, at zero within 20 ms, then latched.
+  // Steps while the trouble lasts: the output is held one frame, zero within 20 ms, then latched.
   void decays(
       h6Cause cause, const std::function<void()>& each = [] {}) {
     double last = force();
@@ -108,7 +108,9 @@ TEST_CASE("a few bad samples are survived, and the force comes back softly") {
   CHECK(chain.force() == kForce);
 }
 
-TEST_CASE("a counter that stands still is a frozen device; equal poses alone are a hand at rest") {
+TEST_CASE(
+    "a sample count that stands still means a frozen device; equal poses alone mean a hand at "
+    "rest") {
   Chain chain;
   for (int i = 0; i < 500; ++i) CHECK(chain.step() == kForce);
   for (int i = 0; i < 100; ++i) {
@@ -124,7 +126,7 @@ TEST_CASE("a counter that stands still is a frozen device; equal poses alone are
   CHECK(chain.state() == H6_READY);
 }
 
-TEST_CASE("a device whose samples never repeat is frozen when they do for the time it says") {
+TEST_CASE("a device with a freeze time is frozen when its samples repeat for that long") {
   Chain chain(0, 0.1);
   for (int i = 0; i < 300; ++i) {
     chain.sample.pose.p.x += 1e-9;
@@ -134,7 +136,7 @@ TEST_CASE("a device whose samples never repeat is frozen when they do for the ti
   chain.decays(H6_CAUSE_FROZEN);
 }
 
-TEST_CASE("a pose that stands still while it says that it moves is frozen") {
+TEST_CASE("a pose that stands still with a velocity is frozen") {
   Chain chain;
   chain.sample.velocity.linear.x = 0.5;
   int frames = 0;
@@ -144,7 +146,7 @@ TEST_CASE("a pose that stands still while it says that it moves is frozen") {
   CHECK(chain.says(H6_CAUSE_FROZEN));
 }
 
-TEST_CASE("a pose that jumps by 50 mm, or half round, gives zero at once and then a soft start") {
+TEST_CASE("a pose that jumps by 50 mm or half a turn gives zero at once and then a soft start") {
   for (const bool turns : {false, true}) {
     Chain chain;
     if (turns)
@@ -233,7 +235,7 @@ TEST_CASE(
   CHECK(chain.guard.fault() == H6_CAUSE_LATE);
 }
 
-TEST_CASE("before the first sample a device is absent, and what comes then is not armed") {
+TEST_CASE("before the first sample a device is absent, and the first sample finds it not armed") {
   OutputGuard guard;
   DeviceWatch watch;
   h6SafetyDef def = h6DefaultSafetyDef();

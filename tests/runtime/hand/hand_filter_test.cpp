@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Indexing and scaling: nothing is lost, nothing jumps, nothing winds up.
+// Indexing and scaling: no motion is lost, no pose jumps, no error accumulates.
 #include "runtime/hand/hand_filter.h"
 
 #include <doctest/doctest.h>
@@ -89,7 +89,7 @@ TEST_CASE("a turn of the device about the centre of mass turns the body about it
   }
 }
 
-TEST_CASE("a way of the device is a way of the body times the scale, whatever the turn") {
+TEST_CASE("a displacement of the device moves the body by its scale, whatever the turn") {
   Hand hand(scales(2.5, 0.7));
   hand(sample_at({0, 0, 0}, Quat::Identity()));
   const Vec3 start = kCom;
@@ -109,7 +109,7 @@ TEST_CASE("three turns of the device are one and a half of the body at scale a h
     };
     const h6DeviceSample first = turned_to(0);
     const int steps = 3000;
-    double turned = 0;  // the body's, added up
+    double turned = 0;  // sum of the body's turns
     h6Quat last = first.pose.q;
     h6DeviceSample out{};
     for (int i = 1; i <= steps; ++i) {
@@ -126,8 +126,8 @@ TEST_CASE("three turns of the device are one and a half of the body at scale a h
   }
 }
 
-TEST_CASE("a hand that wobbles about for a long time finds the body where it was") {
-  // A sum of small scaled turns would have wandered off: closed ways enclose an area.
+TEST_CASE("after a long wobble of the hand the body is where it was") {
+  // A sum of small scaled turns would drift, because closed paths enclose an area.
   Hand hand(scales(1, 0.5));
   const h6DeviceSample first = hand(sample_at({0, 0, 0}, Quat::Identity()));
   for (int i = 1; i <= 100000; ++i) {
@@ -156,7 +156,7 @@ TEST_CASE("a body never turns faster than the scale allows, however the hand tum
   }
 }
 
-TEST_CASE("velocities are those of the poses that come out") {
+TEST_CASE("velocities are the derivatives of the mapped poses") {
   const double h = 1e-5;
   for (const auto& [motion, rotation] : {std::pair{2.0, 0.5}, {0.3, 2.0}, {1.0, 0.4}}) {
     Hand hand(scales(motion, rotation));
@@ -189,7 +189,7 @@ TEST_CASE("force scaled like motion and rotation keeps power") {
   std::mt19937_64 random(8);
   Hand hand(scales(0.4, 0.4, 0.4));
   hand(sample_at({0, 0, 0}, Quat::Identity()));
-  // At the anchor a turn's rate is scaled as it is; away from it only its part along the turn.
+  // At the anchor the whole angular velocity is scaled; away from it only its part along the turn.
   const Quat q = Quat::Identity();
   h6DeviceSample s = sample_at({0.01, 0.02, 0}, q);
   s.velocity = {to(vector(random)), to(vector(random))};
@@ -203,7 +203,7 @@ TEST_CASE("force scaled like motion and rotation keeps power") {
   CHECK(power(sent, s) == h6::test::near(power(felt, out)).epsilon(1e-12));
 }
 
-TEST_CASE("the clutch holds the manipulandum, and its release moves nothing, to the bit") {
+TEST_CASE("the clutch holds the manipulandum, and its release changes no bit of the pose") {
   std::mt19937_64 random(3);
   for (const auto& [motion, rotation] : {std::pair{1.0, 1.0}, {2.0, 0.5}}) {
     Hand hand(scales(motion, rotation));
@@ -230,13 +230,13 @@ TEST_CASE("the clutch holds the manipulandum, and its release moves nothing, to 
       CHECK_FALSE(hand.clutched);
       CHECK(same_bits(&released.pose, &before.pose, sizeof released.pose));
     }
-    // From there on it follows.
+    // Then it follows.
     s.pose.p.x += 0.01;
     CHECK(hand(s).pose.p.x == h6::test::near(before.pose.p.x + motion * 0.01).epsilon(1e-9));
   }
 }
 
-TEST_CASE("a relative hand takes the body where it is, another one brings it") {
+TEST_CASE("a relative hand holds the body where it is; an absolute one moves it to the hand") {
   h6HandFilterDef def = scales(2, 2);
   def.relative = true;
   const h6DeviceSample s = sample_at({1, 2, 3}, exp_rotation({1, 0, 0}));
@@ -250,7 +250,7 @@ TEST_CASE("a relative hand takes the body where it is, another one brings it") {
   CHECK(same_bits(&brought.pose, &s.pose, sizeof s.pose));
 }
 
-TEST_CASE("what goes to an admittance device and back is the pose it was") {
+TEST_CASE("a pose mapped to an admittance device and back is the same pose") {
   std::mt19937_64 random(4);
   h6HandFilterDef def = scales(0.5, 2, 4);
   def.relative = true;
@@ -311,7 +311,7 @@ struct Pressing {
     bodies[1].shell = 0;
     bodies[1].pose = test::pose(0, 0, 5 * mm);
     hand.body = 1;
-    hand.safety.soft_start = 0;  // has tests of its own
+    hand.safety.soft_start = 0;  // other tests cover it
     def.bodies = bodies, def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;
   }
@@ -330,7 +330,8 @@ struct Pressing {
 
 }  // namespace
 
-TEST_CASE("under the clutch the hand feels nothing, the part stays pressed, and both come back") {
+TEST_CASE(
+    "under the clutch the hand feels nothing and the part stays pressed; then the force returns") {
   Pressing scene;
   scene.hand.filter.clutch_buttons = 2;
   scene.open();
@@ -372,7 +373,7 @@ TEST_CASE("a relative hand begins without a pull, wherever its device is") {
   }
 }
 
-TEST_CASE("a scaled hand is scaled in a session: ways in, force out") {
+TEST_CASE("a session scales a hand's motion on the way in and its force on the way out") {
   Pressing scene;
   scene.hand.filter = scales(0.1, 1, 3);
   scene.hand.filter.relative = true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whatever is asked for, what reaches a device is finite, inside the rating, slow enough,
+// Whatever is requested, the output to a device is finite, inside the rating, slow enough and
 // explained.
 #include <doctest/doctest.h>
 #include "hapsix/vector.h"
@@ -29,14 +29,14 @@ h6DeviceCapabilities rating(double force, double torque) {
 constexpr double kFrame = 1e-3;
 const h6Velocity kStill{};
 
-// No soft start, unless it is asked for: the limits alone.
+// Only the limits: no soft start unless a test requests it.
 h6SafetyDef at_once() {
   h6SafetyDef def = h6DefaultSafetyDef();
   def.soft_start = 0;
   return def;
 }
 
-// The chain of one hand, with a device that stands still where it is put.
+// The chain of one hand, with a device that rests where the test puts it.
 struct Chain {
   OutputGuard guard;
   DeviceWatch watch;
@@ -128,7 +128,7 @@ TEST_CASE(
   for (int i = 0; i < 10; ++i) chain.force(10);
   CHECK(chain.force(10) == h6::test::near(10));
   chain.guard.fault(H6_CAUSE_DEVICE_LOST);
-  chain.guard.fault(H6_CAUSE_STOPPED);  // the first cause is the one that is kept
+  chain.guard.fault(H6_CAUSE_STOPPED);  // the first cause is kept
   for (int i = 0; i < 5; ++i) {
     const h6DeviceCommand out = chain.step({{10, 0, 0}, {}});
     CHECK(out.wrench.force.x == 0);
@@ -141,7 +141,7 @@ TEST_CASE(
   CHECK(chain.force(10) == h6::test::near(4));
 }
 
-TEST_CASE("no rating raises the engine's own ceiling, and a senseless one renders nothing") {
+TEST_CASE("no rating raises the engine's own ceiling, and an invalid one renders nothing") {
   const SafetyLimits ceiling;
   CHECK(limits_of(rating(1e9, 1e9)).force == ceiling.force);
   CHECK(limits_of(rating(1e9, 1e9)).torque_rate == ceiling.torque_rate);
@@ -224,7 +224,7 @@ TEST_CASE("nothing but safe motion comes out of any stream of poses") {
   CHECK(faults > 1000);
 }
 
-TEST_CASE("a motion inside the limits passes to the bit") {
+TEST_CASE("a motion inside the limits passes bit for bit") {
   Chain chain(mover(1, 0.5));
   const h6BodyState wanted{{{0.0105, 0, 0}, {1, 0, 0, 0}}, {{0.5, 0, 0}, {0, 1, 0}}};
   const h6DeviceCommand out = chain.move(wanted);
@@ -247,7 +247,7 @@ TEST_CASE("motion starts where the device is, after re-arming too, and a fault f
   out = chain.move(wanted);
   CHECK(out.pose.p.x == h6::test::near(0.012));
   chain.guard.fault(H6_CAUSE_STOPPED);
-  chain.sample.pose.p.x = 0.005;  // sagged
+  chain.sample.pose.p.x = 0.005;  // the device sagged
   for (int i = 0; i < 5; ++i) {
     out = chain.move(wanted);
     CHECK(out.pose.p.x == h6::test::near(0.012));
@@ -279,7 +279,7 @@ TEST_CASE("a workspace is never left, and a device outside is only led back") {
   CHECK(x == 0.05);
 }
 
-TEST_CASE("without any pose of the device nothing moves") {
+TEST_CASE("without a pose of the device nothing moves") {
   Chain chain(mover(1, 0));
   chain.sample.pose.p.x = NAN;
   const h6DeviceCommand out = chain.move({kHome, {}});
@@ -295,7 +295,7 @@ TEST_CASE("no device is moved faster than the engine's own ceiling") {
   CHECK(limits_of(mover(0.4, 0)).angular_speed == h6::test::near(2));
 }
 
-TEST_CASE("after arming the output rises softly, and says so as long as it does") {
+TEST_CASE("after arming the output rises softly, with that cause as long as it rises") {
   h6SafetyDef def = at_once();
   def.soft_start = 0.05;
   Chain chain(rating(10, 1), def);
@@ -314,7 +314,7 @@ TEST_CASE("the force falls linearly with the hand's speed, is cut at the limit a
   h6SafetyDef def = at_once();
   def.derate_speed = 1, def.cut_speed = 2;
   Chain chain(rating(10, 1), def);
-  // In steps of 1 mm/s: nobody gets there in one.
+  // In steps of 1 mm/s, because no hand gets there at once.
   for (int i = 0; i < 2000; ++i) {
     chain.sample.velocity.linear.x = 1e-3 * i;
     chain.sample.pose.p.x += 1e-6 * i;
@@ -332,7 +332,7 @@ TEST_CASE("the force falls linearly with the hand's speed, is cut at the limit a
   CHECK(chain.guard.fault() == H6_CAUSE_OVERSPEED);
 }
 
-TEST_CASE("a device that says it rests while its poses run is as fast as its poses") {
+TEST_CASE("a device without velocity whose poses move is as fast as its poses") {
   Chain chain(rating(10, 1));
   for (int i = 0; i < 100 && chain.guard.fault() == H6_CAUSE_NONE; ++i) {
     chain.sample.pose.p.x += 6e-3;  // 6 m/s
@@ -341,7 +341,7 @@ TEST_CASE("a device that says it rests while its poses run is as fast as its pos
   CHECK(chain.guard.fault() == H6_CAUSE_OVERSPEED);
 }
 
-TEST_CASE("a hand is given no more than the power it may get, and may give any") {
+TEST_CASE("a hand gets no more than its allowed power, and may give any") {
   h6SafetyDef def = at_once();
   def.max_power = 2;
   Chain chain(rating(10, 1), def);
@@ -357,7 +357,7 @@ TEST_CASE("a hand is given no more than the power it may get, and may give any")
   CHECK(out.causes == 0);
 }
 
-TEST_CASE("a definition only tightens, and what is above the rating is told") {
+TEST_CASE("a definition only tightens limits, and a value above the rating is reported") {
   h6SafetyDef def = h6DefaultSafetyDef();
   CHECK(above_rating(rating(10, 1), def).key == nullptr);
   def.max_force = 11;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thousand random scripts of everything that can go wrong with a device, in virtual time:
-// whatever happens in whatever order, no frame breaks a limit, and trouble ends at zero and stays
-// there.
+// A thousand random scripts of all that can go wrong with a device, in virtual time: in any order
+// of events no frame breaks a limit, and trouble ends at zero and stays there.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -24,15 +23,15 @@ constexpr std::uint32_t kDeadMan = 1;
 
 enum Fault { kNone, kFreeze, kNaN, kJump, kUnplug, kStall, kLetGo, kRush, kSenseless, kFaults };
 
-// How far `now` is from the nearest point between nothing and `last`: towards nothing any step may
-// be made, all else is slew.
+// The distance from `now` to the nearest point between zero and `last`: any step towards zero is
+// allowed, the rest is slew.
 double slewed(const h6Vec3& now, const h6Vec3& last) {
   const double l2 = dot(last, last);
   const double s = l2 > 0 ? std::clamp(dot(now, last) / l2, 0.0, 1.0) : 0;
   return norm(now - s * last);
 }
 
-// A hand that leans on the floor, wanders about and meets faults.
+// A hand that leans on the floor, moves about and meets faults.
 class Script {
  public:
   Script(BoxOnFloor& scene, unsigned seed) : random_(seed), scene_(scene) {
@@ -53,7 +52,7 @@ class Script {
     for (int i = 0; i < frames; ++i) frame(i);
   }
   std::uint64_t seen[H6_CAUSE_COUNT] = {};
-  int pushing = 0, quiet = 0;  // frames with a force, and with none though one was asked for
+  int pushing = 0, quiet = 0;  // frames with a force, and frames that suppressed a force
 
  private:
   double uniform(double low, double high) {
@@ -67,7 +66,7 @@ class Script {
     if (fault_ == kJump) left_ = 1;
   }
 
-  // What the device says, and what is done to the session, in this frame.
+  // The device's sample, and the calls of the session, in this frame.
   h6DeviceSample next(int i) {
     lost_ = fault_ == kUnplug;
     late_ = fault_ == kStall ? uniform(2, 40) * kFrame : kFrame;
@@ -102,15 +101,15 @@ class Script {
     h6Step(scene_.session, &said, &out);
     const h6HandSafety after = h6GetSafety(scene_.session, 0);
     limits(out, said);
-    // Nothing but arming leads back.
+    // Only arming leads back.
     if (before.fault != H6_CAUSE_NONE && !armed_now) REQUIRE(after.fault == before.fault);
     if (after.fault != H6_CAUSE_NONE) {
       REQUIRE(norm(out.wrench.force) == 0);
       REQUIRE(norm(out.wrench.torque) == 0);
       REQUIRE(out.cause == after.fault);
     }
-    // Of a late command the first frame is none, and one is held; then nothing is left within
-    // decay_time.
+    // The first frame of a late command does not count and the next is held; then the output is
+    // zero within decay_time.
     trouble_ = after.state == H6_ACTIVE ? 0 : trouble_ + std::max(late_, kFrame);
     if (trouble_ > kDecay + 2.5 * kFrame) {
       REQUIRE(norm(out.wrench.force) == 0);
@@ -136,7 +135,7 @@ class Script {
   }
 
   std::mt19937_64 random_;
-  BoxOnFloor& scene_;  // one for all: a session is made new, its field is not
+  BoxOnFloor& scene_;  // shared: each script has a new session but the same field
   h6DeviceSample sample_{};
   h6Wrench last_{};
   Fault fault_ = kNone;
@@ -159,7 +158,7 @@ TEST_CASE("in random fault scripts, a thousand of them, no frame is above clamp 
     for (int c = 1; c < H6_CAUSE_COUNT; ++c) seen[c] += script.seen[c];
     pushing += script.pushing, quiet += script.quiet;
   }
-  CHECK(pushing > 20 * scripts);  // it was not quiet all the time
+  CHECK(pushing > 20 * scripts);  // the output was not always zero
   CHECK(quiet > 20 * scripts);
   for (const h6Cause cause :
        {H6_CAUSE_CLAMPED, H6_CAUSE_SLEWED, H6_CAUSE_LATE, H6_CAUSE_DEVICE_LOST, H6_CAUSE_STOPPED,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The loop joins devices, session and clock: what it runs, counts and hands over.
+// The loop of devices, session and clock: what it runs, counts and hands over.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -135,7 +135,7 @@ TEST_CASE("real time and virtual time give the same bits") {
     REQUIRE(r.report.state_hash == virt.records[r.report.frame].report.state_hash);
 }
 
-TEST_CASE("real time takes the time it says, and tells what it was granted") {
+TEST_CASE("a run in real time takes its duration, and reports what was granted") {
   Scene scene;
   const auto start = std::chrono::steady_clock::now();
   const Scene::Run run = scene.run(0.3, false);
@@ -149,7 +149,7 @@ TEST_CASE("real time takes the time it says, and tells what it was granted") {
         run.report.frames);
 }
 
-TEST_CASE("a device that fails is told zero force ever after, with the cause") {
+TEST_CASE("a device that fails gets zero force from then on, with the cause") {
   for (const bool reading : {true, false}) {
     Scene scene;
     (reading ? scene.pusher.fail_read_at : scene.pusher.fail_write_at) = 500;
@@ -165,7 +165,7 @@ TEST_CASE("a device that fails is told zero force ever after, with the cause") {
   }
 }
 
-TEST_CASE("one NaN from a hand is survived: the last good pose stands in") {
+TEST_CASE("after one NaN from a hand the last good pose is used") {
   Scene scene;
   scene.pusher.nan_at = 400;
   const Scene::Run run = scene.run(1, true);
@@ -224,7 +224,7 @@ void wait_for_writes(const Pusher& pusher, int more) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
-// In real time, on the frames' own: however slow the machine is, nothing is late.
+// In real time with devices in the time of frames: on a slow machine nothing is late either.
 struct Live {
   Scene scene;
   h6Device device;
@@ -247,7 +247,7 @@ struct Live {
 
 }  // namespace
 
-TEST_CASE("a loop arms its devices when it starts, and again when it is asked to") {
+TEST_CASE("a loop arms its devices when it starts, and again on request") {
   Live live;
   wait_for_writes(live.scene.pusher, 300);
   CHECK(live.scene.pusher.arms == 1);
@@ -261,7 +261,7 @@ TEST_CASE("a loop arms its devices when it starts, and again when it is asked to
   CHECK(report.watchdog_trips == 0);
 }
 
-TEST_CASE("a loop that starts disarmed says nothing but zero until it is armed, softly") {
+TEST_CASE("a loop that starts disarmed sends zero until it is armed, then rises softly") {
   Live live(true);
   wait_for_writes(live.scene.pusher, 300);
   CHECK(live.scene.pusher.arms == 0);
@@ -292,7 +292,9 @@ TEST_CASE("a device that refuses to be armed gets nothing") {
   CHECK(most_force(live.scene.pusher) == 0);
 }
 
-TEST_CASE("halted: stopped at once, nothing is written after, the loop ends, the cause is kept") {
+TEST_CASE(
+    "halting stops the devices at once; nothing is written later, the loop ends, the cause is "
+    "kept") {
   for (const bool all : {false, true}) {
     Live live;
     wait_for_writes(live.scene.pusher, 200);
@@ -308,7 +310,7 @@ TEST_CASE("halted: stopped at once, nothing is written after, the loop ends, the
   }
 }
 
-TEST_CASE("limits above a device's rating are refused, below it they hold") {
+TEST_CASE("limits above a device's rating are refused; limits below it hold") {
   Scene scene;
   h6SessionDef def = h6DefaultSessionDef();
   std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a viewer sees of a running loop, and what it may change: settings, pace.
+// What a viewer sees of a running loop, and what it may change: settings and pace.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -49,7 +49,7 @@ struct Running {
     REQUIRE(loop);
   }
   ~Running() { h6DestroyLoop(loop); }
-  // The newest view at or after `time`; what it points at stays until the next call.
+  // The newest view at or after `time`; valid until the next call.
   h6LoopView view_after(double time) const {
     h6LoopView view{};
     for (int i = 0; i < 30000; ++i) {
@@ -59,7 +59,7 @@ struct Running {
     FAIL("no view within 30 s");
     return view;
   }
-  // By its records: the time of the last frame, `time` or later.
+  // The time of the last recorded frame, `time` or later.
   double goes_on_until(double time) const {
     h6FrameRecord row{};
     for (int i = 0; i < 30000 && row.time < time; ++i) {
@@ -94,7 +94,7 @@ TEST_CASE("a viewer sees the poses and contacts of a frame") {
   }
 }
 
-TEST_CASE("where there are more contacts than rows, rows are picked from all over") {
+TEST_CASE("where there are more contacts than rows, rows come from all regions") {
   Scene scene;
   const Running run(scene, 20);
   const h6LoopView view = run.view_after(0.4);
@@ -109,7 +109,7 @@ TEST_CASE("where there are more contacts than rows, rows are picked from all ove
   CHECK(high - low > 10 * mm);
 }
 
-TEST_CASE("a viewer that stands still costs the loop no frame, and sees the newest then") {
+TEST_CASE("a viewer that stands still costs the loop no frame, and then sees the newest one") {
   Scene scene;
   const Running run(scene);
   (void)run.view_after(0.05);
@@ -129,7 +129,7 @@ TEST_CASE("without room for contacts there is nothing to see") {
   CHECK(!h6ReadView(run.loop, &view));
 }
 
-TEST_CASE("another session goes on where the one before was, with its own settings") {
+TEST_CASE("another session goes on where the previous one was, with its own settings") {
   Scene scene;
   Running run(scene);
   const double before = run.view_after(0.5).bodies[1].p.z;
@@ -156,7 +156,7 @@ TEST_CASE("another session goes on where the one before was, with its own settin
   }
 }
 
-TEST_CASE("a session of something else is refused, and nothing changes") {
+TEST_CASE("a session of another model is refused, and nothing changes") {
   Scene scene, other;
   Running run(scene);
   h6Error error{};
@@ -181,7 +181,7 @@ TEST_CASE("a loop that has ended takes no session") {
   h6DestroySession(next);
 }
 
-TEST_CASE("paused, time stands still; slow, devices see the time of the frames") {
+TEST_CASE("in a pause time stands still; in slow motion devices see the time of the frames") {
   Scene scene;
   Running run(scene);
   (void)run.view_after(0.1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Definitions that cannot be run are refused with a sentence; those that can are kept exactly.
+// Invalid definitions are refused with a sentence; valid ones are kept exactly.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ FieldArrays ball_field() {
       {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
 }
 
-// What creating a model of this one field and shell says; empty when it works.
+// The error of creating a model of this field and shell; empty when it works.
 std::string complaint(const h6FieldDef* field, const h6ShellDef* shell) {
   h6ModelDef def = h6DefaultModelDef();
   def.fields = field, def.field_count = field ? 1 : 0;
@@ -44,7 +44,7 @@ bool says(const std::string& text, const char* word) {
 
 }  // namespace
 
-TEST_CASE("a field comes back as it was given") {
+TEST_CASE("sampling a field gives back its samples") {
   FieldArrays field = ball_field();
   Model model({def_of(field)}, {});
   REQUIRE(model.handle);
@@ -87,7 +87,7 @@ TEST_CASE("far from the surface the answer is a bound with the right sign") {
   CHECK(h6SampleField(model.handle, 1, points, 1, d, nullptr, nullptr) == -1);
 }
 
-TEST_CASE("a field that cannot be is refused with a sentence that names the entry") {
+TEST_CASE("an invalid field is refused with a sentence that names the entry") {
   const auto refused = [](const std::function<void(FieldArrays&, h6FieldDef&)>& spoil,
                           const char* word) {
     FieldArrays arrays = ball_field();
@@ -134,7 +134,7 @@ TEST_CASE("a shell that would lose contacts is refused") {
   refused([](auto&, auto& d) { d.nx = nullptr; }, "nx ny nz");
 }
 
-TEST_CASE("a session that cannot run is refused with a sentence that names the value") {
+TEST_CASE("an invalid session is refused with a sentence that names the value") {
   FieldArrays field = ball_field();
   ShellArrays shell = sphere_points(5 * mm, 100);
   Model model({def_of(field)}, {shell.def()});
