@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Anytime mode: what a frame leaves out when time is short, what it says of it, and that a run can
-// be repeated.
+// Anytime mode: what a frame leaves out when time is short, what it reports, and that such a run
+// can be repeated.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ std::map<std::uint32_t, float> depths(const h6Session* session) {
   return out;
 }
 
-// Somewhere in the bowl, pressed in by 0 to 1.5 mm, turned any way.
+// A pose in the bowl, pressed in by 0 to 1.5 mm, with any rotation.
 h6BodyState somewhere(int i) {
   const double a = 0.7 * i, b = 1.3 * i, d = (0.2 + 0.0875 * (i % 16)) * mm;
   h6BodyState state{};
@@ -62,7 +62,7 @@ struct ThreeBowls : BallInBowl {
 TEST_CASE("a coarse frame has some of the full frame's contacts and bounds all it left out") {
   BallInBowl full(1);
   full.open();
-  std::map<int, double> bound;  // of what is left out, over the deepest there is [voxel]
+  std::map<int, double> bound;  // on points left out, less the deepest one [voxel]
   std::map<std::uint32_t, std::uint32_t> fewer[60];
   for (const std::uint32_t points : {1u, 2u, 4u, 8u}) {
     BallInBowl coarse(1);
@@ -90,7 +90,7 @@ TEST_CASE("a coarse frame has some of the full frame's contacts and bounds all i
         REQUIRE(all.count(point) == 1);
         CHECK(all.at(point) == depth);
       }
-      // What fewer points found is found by more.
+      // More points find all that fewer points find.
       for (const auto& [point, count] : fewer[i]) REQUIRE(some.count(point) == 1);
       fewer[i].clear();
       for (const auto& [point, depth] : some) fewer[i][point] = 1;
@@ -105,7 +105,7 @@ TEST_CASE("a coarse frame has some of the full frame's contacts and bounds all i
   CHECK(bound[8] < bound[4]);
 }
 
-TEST_CASE("of a frame that has no time even for these, the few deepest contacts are left") {
+TEST_CASE("a frame without time even for these keeps the few deepest contacts") {
   BallInBowl coarse(1), few(1);
   coarse.open(), few.open();
   int cut = 0;
@@ -135,7 +135,7 @@ TEST_CASE("of a frame that has no time even for these, the few deepest contacts 
   CHECK(cut > 20);
 }
 
-TEST_CASE("shells of any number of points are sampled without one that is not there") {
+TEST_CASE("sampling finds only points that the shell has, for any number of points") {
   for (const int points : {1, 5, 16, 17, 100, 255, 257, 300}) {
     CAPTURE(points);
     BallInBowl full(1, points), coarse(1, points);
@@ -157,7 +157,7 @@ TEST_CASE("shells of any number of points are sampled without one that is not th
   }
 }
 
-TEST_CASE("nothing of a coarse frame stays: the next full one is as if it had not been") {
+TEST_CASE("a coarse frame leaves no trace: the next full one is as if it had not happened") {
   for (const h6Method method : {H6_METHOD_ROBUST, H6_METHOD_SERIES}) {
     BallInBowl full(1, 6000), mixed(1, 6000);
     for (BallInBowl* scene : {&full, &mixed}) {
@@ -176,7 +176,7 @@ TEST_CASE("nothing of a coarse frame stays: the next full one is as if it had no
   }
 }
 
-TEST_CASE("a frame without time is coarse, one with enough never") {
+TEST_CASE("a frame without time is coarse, a frame with enough never is") {
   for (const double budget : {1e-3, 1e6}) {
     BallInBowl scene(1, 6000);
     scene.def.frame_budget_us = budget;
@@ -196,9 +196,10 @@ TEST_CASE("a frame without time is coarse, one with enough never") {
   }
 }
 
-TEST_CASE("what the clock left out is repeated to the bit, on one thread and on two") {
+TEST_CASE("a replay leaves out what the clock left out, bit for bit, on one thread and on two") {
   ThreeBowls live(1), again(2);
-  live.def.frame_budget_us = 60;  // about what a frame takes: what happens is the machine's affair
+  live.def.frame_budget_us =
+      60;  // about what a frame takes, so that the clock may decide either way
   live.open();
   again.open();
   std::array<int, 4> seen{};
@@ -251,16 +252,16 @@ TEST_CASE("virtual time has no deadline, and leaves nothing out") {
 
 namespace {
 
-// What the clock decides in a scene of `contacts`, each of which costs full_ns when all are there,
-// few_ns when a sixteenth is. `stolen`: every so-many-th frame takes a millisecond more.
+// What the clock decides in a scene of `contacts`. Each costs full_ns when all are present, few_ns
+// when a sixteenth is. `stolen`: one of so many frames takes a millisecond more.
 struct Costs {
   double contacts, full_ns, few_ns;
   int stolen = 0;
-  double held_up_us = 0;  // every hundredth frame, while it samples
+  double held_up_us = 0;  // delay of every hundredth frame while it samples
 };
 struct Decided {
   int late = 0, few = 0;
-  std::map<std::uint32_t, int> frames;  // that looked at so many points of sixteen
+  std::map<std::uint32_t, int> frames;  // by how many points of sixteen they sampled
   int full() { return frames[16]; }
 };
 
@@ -286,7 +287,7 @@ struct Clocked {
     };
     for (int i = 0; i < frames; ++i, ++frame) {
       a.budget_ns = 0.8 * a.period_ns;
-      double us = 0;  // that passed in this frame
+      double us = 0;  // time in this frame
       const auto pass = [&](double more_us) {
         us += more_us;
         now += static_cast<std::int64_t>(1e3 * more_us);
@@ -326,11 +327,11 @@ struct Clocked {
 
 }  // namespace
 
-TEST_CASE("what does not fit is not tried, from the first frame on; the finest that does is used") {
+TEST_CASE("a tier that does not fit is never tried; the finest tier that fits is used") {
   // Of a period of 1 ms, a full frame takes 1.3 to 6 ms.
   struct {
     double full_ns, few_ns;
-    std::uint32_t points;  // that fit into 0.8 ms for certain
+    std::uint32_t points;  // of sixteen; they surely fit into 0.8 ms
   } const scenes[] = {{130, 65, 8}, {130, 120, 4}, {200, 100, 4}, {600, 300, 1}, {600, 40, 4}};
   for (const auto& scene : scenes) {
     CAPTURE(scene.full_ns);
@@ -341,14 +342,14 @@ TEST_CASE("what does not fit is not tried, from the first frame on; the finest t
     CHECK(all.full() == 0);
     CHECK(all.frames[scene.points] + all.frames[2 * scene.points] > 19000);
   }
-  // Where it was full before and there is more of it now: what is known of one contact is enough.
+  // A full frame that gets more contacts: the known cost of one contact is enough to decide.
   Clocked c;
   CHECK(c.decide({2000, 150, 120}, 500).full() > 400);
   CHECK(c.decide({10000, 150, 120}, 20000).late == 0);
   CHECK(c.decide({2000, 150, 120}, 500).full() > 350);
 }
 
-TEST_CASE("a coarse frame that the machine held up in the meantime is in time with few contacts") {
+TEST_CASE("a coarse frame that the machine delayed is in time with few contacts") {
   // One point of sixteen takes 330 of 800 us; the machine takes 800 more, and only then.
   const Costs usual{10000, 600, 500};
   Costs disturbed = usual;
@@ -359,7 +360,7 @@ TEST_CASE("a coarse frame that the machine held up in the meantime is in time wi
   CHECK(all.late == 0);
   CHECK(all.few > 150);
   CHECK(all.few <= 200);
-  // Where one point of sixteen is always too much, that is tried now and then, and mended at once.
+  // Where one point of sixteen is always too much it is tried now and then, and cut at once.
   Clocked slow;
   all = slow.decide({10000, 2600, 2500}, 20000);
   CHECK(all.few > 19900);
@@ -367,14 +368,14 @@ TEST_CASE("a coarse frame that the machine held up in the meantime is in time wi
   CHECK(slow.decide(usual, 20000).few < 1100);
 }
 
-TEST_CASE("what fits is full, at once or soon") {
+TEST_CASE("a frame that fits is full, at once or soon") {
   Clocked small;
   CHECK(small.decide({1000, 80, 60}, 1000).full() > 950);
   Clocked fits;
   Decided all = fits.decide({10000, 55, 35}, 20000);
   CHECK(all.late == 0);
   CHECK(all.full() > 15000);
-  // Over the budget, and within the period: half of it is looked at.
+  // Over the budget and within the period: half of the points are sampled.
   Clocked close;
   Decided some = close.decide({10000, 90, 75}, 20000);
   CHECK(some.late == 0);
@@ -389,7 +390,7 @@ TEST_CASE("a stolen millisecond now and then does not make all frames coarse") {
   CHECK(all.late == 0);
 }
 
-TEST_CASE("a machine that becomes faster is noticed in coarse frames; a bad day is forgotten") {
+TEST_CASE("coarse frames notice a machine that becomes faster; a slow hour is forgotten") {
   Clocked c;
   CHECK(c.decide({10000, 160, 130}, 2000).full() == 0);
   CHECK(c.decide({10000, 50, 30}, 6000).full() > 3000);

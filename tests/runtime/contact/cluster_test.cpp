@@ -64,7 +64,7 @@ h6ContactDef method(h6Method m, std::uint32_t pieces = 0) {
 
 }  // namespace
 
-TEST_CASE("clusters are what hangs together by links shorter than the threshold") {
+TEST_CASE("clusters are connected by links shorter than the threshold") {
   std::mt19937_64 random(5);
   for (const double spread : {1.0, 5.0, 20.0, 1000.0})
     for (const std::size_t n : {1u, 2u, 50u, 400u}) {
@@ -73,7 +73,7 @@ TEST_CASE("clusters are what hangs together by links shorter than the threshold"
         r.push_back(spread * mm * Vec3(unit(random), unit(random), unit(random) * 0.1));
       Table t(n);
       for (const Vec3& p : r) t.add(p, {0, 0, 1}, mm);
-      // In the floats that the table holds.
+      // In float, as the columns hold them.
       for (std::size_t i = 0; i < n; ++i) r[i] = Vec3(t.c.rx[i], t.c.ry[i], t.c.rz[i]);
       t.merge(0.5 * mm);
       std::vector<std::size_t> label(n);
@@ -101,7 +101,7 @@ TEST_CASE("a cluster is one contact: means weighted by depth, the deepest point"
   t.add({0, 0, 0}, {0, 0, 1}, 1 * mm);
   t.add({9 * mm, 0, 0}, {0, 1, 0}, 0.5 * mm);
   t.add({0.4 * mm, 0, 0}, {0, 0.6, 0.8}, 3 * mm);
-  t.add({0.8 * mm, 0, 0}, {0, 0, 1}, 1 * mm);  // hangs on the one between
+  t.add({0.8 * mm, 0, 0}, {0, 0, 1}, 1 * mm);  // linked by the one between
   REQUIRE(t.merge(0.5 * mm) == 2);
   CHECK(t.c.depth[0] == h6::test::near((1 + 9 + 1) / 5.0 * mm).epsilon(1e-5));
   CHECK(t.c.rx[0] == h6::test::near((1.2 + 0.8) / 5 * mm).epsilon(1e-5));
@@ -132,7 +132,7 @@ TEST_CASE("coincident contacts by the thousand are one cluster, quickly") {
   CHECK(t.c.nz[0] == h6::test::near(1));
 }
 
-TEST_CASE("clusters keep k each; with Gauss weights on top, one direction keeps k in all") {
+TEST_CASE("each cluster keeps k; with Gauss weights on top, all of one direction keep k together") {
   const auto heaps = [] {
     Table t(100);
     for (int i = 0; i < 90; ++i) t.add({0.001 * mm * i, 0, 0}, {0, 0, 1}, mm);
@@ -146,12 +146,13 @@ TEST_CASE("clusters keep k each; with Gauss weights on top, one direction keeps 
   Table gauss = heaps();
   weigh_columns(gauss.c, method(H6_METHOD_GAUSS3, H6_PIECE_CLUSTER), mm, 0.01, nullptr, nullptr);
   CHECK(gauss.net() == h6::test::near(1).epsilon(1e-5));
-  CHECK(gauss.c.weight[0] == h6::test::near(0.5).epsilon(1e-5));  // heaps count, not their points
+  CHECK(gauss.c.weight[0] ==
+        h6::test::near(0.5).epsilon(1e-5));  // clusters count, not their points
   CHECK(uses_clusters(method(H6_METHOD_ROBUST, H6_PIECE_CLUSTER)));
   CHECK_FALSE(uses_clusters(method(H6_METHOD_SERIES, H6_PIECE_CLUSTER)));
 }
 
-TEST_CASE("Eq. 8 as printed turns the weights round: the denser, the stiffer") {
+TEST_CASE("Eq. 8 as printed inverts the weights: the denser, the stiffer") {
   const auto weights = [](std::uint32_t pieces) {
     Table t(11);
     for (int i = 0; i < 10; ++i) t.add({0, 0, 0}, {0, 0, 1}, mm);
@@ -185,7 +186,7 @@ TEST_CASE("geodesic distance is the angle: a hat of 1 rad ends at 1 rad, one ove
   }
 }
 
-TEST_CASE("torque handles keep the length of the arm that directions throw away") {
+TEST_CASE("torque handles keep the length of the arm, which directions lose") {
   // Equal normals, torques of one direction, arms of 1 and 9 mm on a body of 10 mm radius.
   const auto columns = [](std::uint32_t pieces) {
     Table t(2);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// contacts_test.cpp - contacts are those of a test of every point, whatever moved before.
+// contacts_test.cpp - traversal finds the contacts that a test of every point finds.
 //
-// Traversal remembers from frame to frame what cannot touch yet. Here sessions walk, slowly and
-// fast, and in every frame their contacts are compared with a sample of all points at the very
-// place: no miss, none extra, not by one rounding.
+// Traversal remembers from frame to frame which points cannot touch yet. Here sessions walk, slowly
+// and fast, and in every frame their contacts are compared with samples of all points at the same
+// place: none missing, none extra, not by one rounding.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -51,7 +51,7 @@ struct Walk {
   std::string name;
   h6Method method;
   double voxel, radius;  // of the field, of the shell [m]
-  double room;           // how far from the middle it walks [m]
+  double room;           // largest distance of the walk from the middle [m]
   bool moving_field = false;
   int jump = 0;  // frames from one jump of some voxels to the next; 0: none
 };
@@ -126,7 +126,7 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
   h6::Vec3 p(0, 0, 0), base(0, 0, 0);
   h6::Quat q = h6::Quat::Identity();
   for (int i = 0; i < frames; ++i) {
-    // Stands still now and then; turns by as much as it shifts.
+    // Rests now and then; turns by as much as it shifts.
     if (i % 17 != 0) {
       for (int k = 0; k < 3; ++k) p[k] += step_voxels * w.voxel * uniform(random);
       if (w.jump > 0 && i % w.jump == 1)
@@ -136,7 +136,7 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
       q = h6::exp_rotation(turn * h6::Vec3(uniform(random), uniform(random), uniform(random))) * q;
       q.normalize();
     }
-    // The field moves too: only how one stands to the other counts.
+    // The field moves too: only their relative pose counts.
     h6BodyState state{};
     h6::Quat turned = h6::Quat::Identity();
     if (w.moving_field) {
@@ -257,7 +257,7 @@ TEST_CASE("contacts in the scenes of the benches are all points that touch and n
 
 namespace {
 
-// A ball of many points among things.
+// A ball of many points among obstacles.
 struct BallInClutter {
   FieldArrays field = field_of(clutter);
   ShellArrays shell = sphere_points(kRadius, 9000);
@@ -279,7 +279,7 @@ struct BallInClutter {
 
 }  // namespace
 
-TEST_CASE("contacts do not depend on what the session saw before, nor on the helper") {
+TEST_CASE("contacts depend neither on earlier frames nor on the helper") {
   BallInClutter scene;
   scene.def.contact.method = H6_METHOD_GAUSS6;
   h6Session *one = scene.open(1), *two = scene.open(2);
@@ -310,11 +310,11 @@ TEST_CASE("contacts do not depend on what the session saw before, nor on the hel
   h6DestroySession(two);
 }
 
-TEST_CASE("what is clear of a field is not looked at again while the shell trembles") {
+TEST_CASE("points clear of a field are not sampled again while the shell trembles") {
   BallInClutter scene;
   h6Session* s = scene.open(1);
   std::size_t looked = 0;
-  // 60 voxels in all, more than anything is clear by.
+  // 60 voxels in all, more than any clearance.
   for (int i = 0; i < 2000; ++i) {
     h6BodyState state{};
     state.pose = pose(0.03 * mm * (i % 2), 0, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The certificate of a frame: how stiff its contacts are together.
+// The reported net stiffness of a frame's contacts.
 #include "runtime/contact/net_stiffness.h"
 
 #include <doctest/doctest.h>
@@ -56,7 +56,7 @@ ShellArrays one_point(double x) {
 
 }  // namespace
 
-TEST_CASE("a lone contact through the centre of mass has stiffness k in one direction, none else") {
+TEST_CASE("a lone contact through the centre of mass has stiffness k in one direction only") {
   for (const h6Method method :
        {H6_METHOD_NONE, H6_METHOD_GAUSS3, H6_METHOD_ROBUST, H6_METHOD_SERIES})
     for (const double beta : {0.0, 1e-3}) {
@@ -92,7 +92,7 @@ TEST_CASE("a wall of n contacts is n k stiff unscaled and k stiff under gauss3")
   }
 }
 
-TEST_CASE("series never exceeds c k, at any sampling, where others grow with it") {
+TEST_CASE("series never exceeds c k at any sampling; other rules grow with it") {
   double none = 0;
   for (const int n : {100, 1000, 4000}) {
     Touching scene(sphere_points(10 * mm, n));
@@ -109,7 +109,7 @@ TEST_CASE("series never exceeds c k, at any sampling, where others grow with it"
   }
 }
 
-TEST_CASE("the exact form reports the same figure, and without the option there is none") {
+TEST_CASE("the exact form reports the same value; without the option there is none") {
   Touching scene(bottom_face(10 * mm, 10 * mm, 5 * mm, 6, 6));
   const h6FrameReport symmetric = scene.report();
   scene.def.gradient = H6_EXACT;
@@ -120,7 +120,7 @@ TEST_CASE("the exact form reports the same figure, and without the option there 
   CHECK(scene.report(20 * mm).net_stiffness_max == 0);  // nothing touches
 }
 
-TEST_CASE("what it costs is printed") {
+TEST_CASE("the cost of the report is printed") {
   Mat6 B = Mat6::Random();
   B = B * B.transpose();
   double sum = 0;

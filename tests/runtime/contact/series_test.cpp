@@ -261,7 +261,7 @@ TEST_CASE("series: points within the margin take part but are not reported as to
 }
 
 TEST_CASE("series: beyond the band distances are bounds, and no contact is made of them") {
-  // A band of under a voxel, a shell 1.5 voxels away, the largest margin.
+  // A band of less than a voxel, a shell 1.5 voxels away, the largest margin.
   test::FieldArrays field = test::sample_analytic([](double, double, double z) { return z; },
                                                   {-32 * mm, -32 * mm, -24 * mm}, mm, 8, 8, 6, 0.5);
   for (float& bound : field.far) bound *= 0.01f;  // poor ones, as they may be
@@ -286,7 +286,7 @@ TEST_CASE("series: beyond the band distances are bounds, and no contact is made 
   }
 }
 
-TEST_CASE("series: loads never pull and every frame says how well it converged") {
+TEST_CASE("series: loads never pull and every frame reports how well the solve converged") {
   test::FieldArrays bowl = test::sample_analytic(
       [](double x, double y, double z) { return 20.2 * mm - std::sqrt(x * x + y * y + z * z); },
       {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work goes the way that takes less time, on whatever machine.
+// Work is shared exactly where that takes less time.
 #include <doctest/doctest.h>
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace {
 
-// How many of `times` were shared where that takes `shared` ns an item and not `alone`.
+// How many of `times` jobs are shared when an item takes `shared` ns shared and `alone` ns alone.
 int shared_of(h6::ShareGate& gate, int times, std::size_t size, double alone, double shared,
               int stolen = 0) {
   int count = 0;
@@ -42,7 +42,7 @@ TEST_CASE("each size is judged for itself") {
   CHECK(large > 4800);
 }
 
-TEST_CASE("a machine that changes is noticed within some thousand times") {
+TEST_CASE("a change of the machine is noticed within some thousand jobs") {
   h6::ShareGate gate;
   shared_of(gate, 5000, 1000, 25, 17);
   shared_of(gate, 5000, 1000, 18, 27);
@@ -58,7 +58,7 @@ TEST_CASE("a stolen millisecond now and then does not decide") {
   CHECK(shared_of(other, 20000, 1000, 14, 20, 333) < 1500);
 }
 
-TEST_CASE("what was not asked teaches nothing") {
+TEST_CASE("a time without a question teaches nothing") {
   h6::ShareGate gate;
   for (int i = 0; i < 100; ++i) gate.took(1e9);
   CHECK(shared_of(gate, 10000, 1000, 20, 25) < 300);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each rule promises about shared stiffness, seen through whole frames. METHOD.md, Sec. 3.
+// How each rule shares stiffness, seen in whole frames. METHOD.md, Sec. 3.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-// One frame of a shell at a pose against a field; contacts and weights as they came out.
+// One frame of a shell at a pose against a field, with its contacts and weights.
 struct Frame {
   h6Session* session = nullptr;
   h6Contacts contacts{};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A frame never allocates, locks or calls the system, and says the same with any number of threads.
+// A frame never allocates, locks or calls the system, and has the same bits on any number of
+// threads.
 #include <doctest/doctest.h>
 
 #include <dlfcn.h>
@@ -31,7 +32,7 @@
 #include "tests/support/sanitized.h"
 
 namespace {
-// Counted on the stepping thread only, the test runner may do as it likes; or on all of them.
+// Counted on the stepping thread only, because the test runner may allocate; or on all threads.
 thread_local bool watching = false;
 std::atomic<bool> watching_all{false};
 std::atomic<long> allocations{0}, locks{0}, calls{0};
@@ -85,7 +86,7 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-// Every rule, and every option of the Gauss ones.
+// Every rule, and every option of the Gauss rules.
 struct Rule {
   h6Method method;
   std::uint32_t pieces;
@@ -99,13 +100,13 @@ constexpr Rule kRules[] = {{H6_METHOD_GLOBAL, 0},
                            {H6_METHOD_ROBUST, 0},
                            {H6_METHOD_ROBUST, H6_PIECE_CLUSTER},
                            {H6_METHOD_SERIES, 0}};
-// Some are so soft here that the ball sinks in with a third of its points, each against each.
+// Some rules are so soft here that the ball sinks in with a third of its points.
 int points_for(const Rule& rule) {
   const bool soft = rule.pieces || rule.method == H6_METHOD_CLUSTER;
   return soft || rule.method == H6_METHOD_GAUSS3 ? 6000 : 30000;
 }
 
-// Everything else that a frame can be asked for.
+// All other options of a frame.
 struct Mode {
   const char* name;
   void (*set)(BallInBowl&);
@@ -221,8 +222,8 @@ bool forbid_calls() {
          prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
 }
 
-// A process of its own, which this ends: destroying things would call the system. `break_it`: the
-// counters are shown to count.
+// Runs in a process of its own and ends it, because destructors would call the system. `break_it`:
+// shows that the counters count.
 [[noreturn]] void run_forbidden(int result, unsigned threads, long frames, bool break_it) {
   BallInBowl scene(threads, 24000);
   scene.hand.passivity = scene.def.contact.passivity = true;
@@ -230,7 +231,7 @@ bool forbid_calls() {
   std::vector<h6DeviceSample> samples;
   for (int i = 0; i < 1000; ++i) samples.push_back(scene.sample(i));
   std::vector<h6DeviceCommand> commands(1);
-  // A helper comes when its thread has been made; a busy machine may let it wait.
+  // The helper comes once its thread has started, which may take long on a busy machine.
   bool helper_came = threads == 1;
   for (int i = 0; i < 50 || (!helper_came && i < 20000); ++i) {
     h6Step(scene.session, &samples[0], commands.data());
@@ -241,7 +242,7 @@ bool forbid_calls() {
   watching_all = true;
   for (long i = 0; i < frames; ++i) {
     const auto k = static_cast<std::size_t>(i % 1000);
-    // Every tenth with a budget's decision, so that both ways of traversal are walked.
+    // Every tenth frame is coarse, so that both kinds of traversal run.
     if (i % 10 == 9) h6SetCoarse(scene.session, 1, 1u << i / 10 % 5 & 15u);
     h6Step(scene.session, &samples[k], commands.data());
     const h6FrameReport report = h6GetFrame(scene.session);
@@ -263,8 +264,8 @@ bool forbid_calls() {
 
 constexpr const char* kForbidden = "--frames-without-calls";
 
-// This program again, from its beginning: a fork alone would have TBB's state without its threads,
-// and wait for them.
+// Starts this program again: a mere fork would have TBB's state without its threads, and wait for
+// them.
 Counts in_a_process(unsigned threads, long frames, bool break_it) {
   int ends[2];
   REQUIRE(pipe(ends) == 0);
@@ -342,7 +343,7 @@ TEST_CASE("one thread and two give the same bits, frame by frame") {
     }
     CAPTURE(std::string(h6MethodName(rule.method)));
     CAPTURE(rule.pieces);
-    // Contacts enough that the helper is asked: 256, where weights are sums over all pairs.
+    // Enough contacts for the helper: 256, where weights are sums over all pairs.
     const bool pairs = rule.method == H6_METHOD_GAUSS6 || rule.method == H6_METHOD_ROBUST;
     check_same_bits(one, two, kFrames, pairs && !rule.pieces ? 300 : 200);
   }
@@ -351,7 +352,7 @@ TEST_CASE("one thread and two give the same bits, frame by frame") {
     mode.set(one);
     mode.set(two);
     CAPTURE(std::string(mode.name));
-    check_same_bits(one, two, std::max(kFrames, 40), 100);  // some modes take longer to get there
+    check_same_bits(one, two, std::max(kFrames, 40), 100);  // some modes take longer to touch
   }
 }
 
@@ -421,7 +422,7 @@ TEST_CASE("a changed input changes the hash") {
   }
 }
 
-TEST_CASE("too many contacts: the deepest are kept, the frame says so") {
+TEST_CASE("too many contacts: the deepest are kept, and the frame reports it") {
   BallInBowl all(1);
   BallInBowl few(1);
   few.def.max_contacts = 100;

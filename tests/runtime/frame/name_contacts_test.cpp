@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a contact is with: the names that its field has for the brick the contact is in.
+// Contacts get the names that their field has for the brick they are in.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -104,7 +104,7 @@ struct Scene {
 
 }  // namespace
 
-TEST_CASE("contacts are named after the bricks they are in, whichever fields they are with") {
+TEST_CASE("contacts are named after the bricks they are in, in any of several fields") {
   for (const h6Method method : {H6_METHOD_ROBUST, H6_METHOD_SERIES, H6_METHOD_CLUSTER}) {
     CAPTURE(method);
     Scene scene(method);
@@ -137,7 +137,7 @@ TEST_CASE("contacts are named after the bricks they are in, whichever fields the
   }
 }
 
-TEST_CASE("a field that names nothing gives -1, and either array may be left out") {
+TEST_CASE("a field without names gives -1, and either array may be left out") {
   Scene scene(H6_METHOD_ROBUST, true, false);
   h6Step(scene.session, nullptr, nullptr);
   const h6Contacts c = h6GetContacts(scene.session, 2);

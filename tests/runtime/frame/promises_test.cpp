@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What holds in every frame, whatever is pushed against whatever: nothing pulls, nothing jumps,
-// nothing breaks a bound, and nonsense from a hand does no harm.
+// What holds in every frame of any scene: no contact pulls, no force jumps, no bound breaks, and
+// invalid samples do no harm.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -134,7 +134,7 @@ TEST_CASE("no contact ever pulls: forces point out of the obstacle in robust and
     CHECK(loaded > 1000);
   }
   int loaded = 0;
-  CHECK(contacts_that_pull(H6_METHOD_GAUSS3, 0, &loaded) > 100);  // what the filter is for
+  CHECK(contacts_that_pull(H6_METHOD_GAUSS3, 0, &loaded) > 100);  // the filter prevents this
   CHECK(contacts_that_pull(H6_METHOD_GAUSS3, H6_PIECE_FACING, &loaded) == 0);
 }
 
@@ -203,7 +203,7 @@ TEST_CASE("a hand too weak to lift a part holds it still and says that it is sat
     }
 }
 
-TEST_CASE("whatever a hand says, the body stays in the numbers and the last good pose counts") {
+TEST_CASE("under any samples the body stays finite and the last good pose counts") {
   const double nan = std::nan(""), huge = HUGE_VAL;
   const h6DeviceSample good = hand_at(pose(2 * mm, 0, 20 * mm));
   std::vector<h6DeviceSample> bad(9, good);
@@ -222,7 +222,7 @@ TEST_CASE("whatever a hand says, the body stays in the numbers and the last good
     scene.hold();
     scene.open();
     h6DeviceCommand felt;
-    // Before any good one: no hand.
+    // Before the first good sample there is no hand.
     CHECK((h6Step(scene.session, &sample, &felt) & H6_HAND_NOT_FINITE) != 0);
     CHECK(felt.wrench.force.x == 0);
     CHECK(h6GetBody(scene.session, 1).pose.p.x == 0);
@@ -237,7 +237,7 @@ TEST_CASE("whatever a hand says, the body stays in the numbers and the last good
   }
 }
 
-TEST_CASE("poses and velocities at the edge of the numbers are survived") {
+TEST_CASE("poses and velocities near the largest numbers leave the state finite") {
   for (const double far : {1e6, 1e150, 1e300}) {
     Scene scene(floor_field(), bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12));
     scene.bodies[1].pose = pose(0, 0, 20 * mm);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a loop did is stepped again to the bit from its rows: deadlines that were missed, faults,
-// requests and changed settings included, also where the safety chain's output moves the body.
+// A loop's records repeat its run bit for bit: missed deadlines, faults, requests and changed
+// settings included, also where the safety chain's output moves the body.
 #include <doctest/doctest.h>
 
 #include <atomic>
@@ -17,7 +17,7 @@ using namespace h6::test;
 
 namespace {
 
-// An arm that somebody pushes about and that lives on the clock. What goes wrong is written down.
+// An arm in real time that a person pushes about. Everything that goes wrong is recorded.
 struct Arm {
   std::uint32_t mode = H6_ADMITTANCE;
   int stall_at = -1, stall_ms = 0, lost_at = -1, hangs_from = 1 << 30, nan_at = -1;
@@ -74,7 +74,7 @@ Run run(BoxOnFloor& box, const h6Device& device, double seconds,
   return run;
 }
 
-// The first row that is not what it was; rows.size(): none.
+// The first row that differs; rows.size() where none does.
 std::size_t parts_at(
     BoxOnFloor& box, const h6Device& device, const std::vector<h6FrameRecord>& rows,
     bool with_inputs, const std::function<void(std::uint32_t)>& change = [](std::uint32_t) {}) {
@@ -91,7 +91,7 @@ std::size_t parts_at(
     if (h6GetFrame(box.session).state_hash != row.report.state_hash ||
         h6GetSafety(box.session, 0).state != row.state[0])
       return i;
-    // After a stop or a trip of the watchdog the loop sends something else than was computed.
+    // After a stop or a trip of the watchdog the loop does not send the computed command.
     const std::uint32_t outside = 1u << H6_CAUSE_STOPPED | 1u << H6_CAUSE_WATCHDOG;
     if (((row.command[0].causes ^ command.causes) & ~outside) != 0) return i;
     if ((row.command[0].causes & outside) == 0 &&
@@ -128,7 +128,7 @@ TEST_CASE("an arm that was late, was disarmed and armed again moves the body the
     REQUIRE(ever(first.rows, H6_CAUSE_LATE));
     REQUIRE(ever(first.rows, H6_CAUSE_DISARMED));
     CHECK(parts_at(box, device, first.rows, true) == first.rows.size());
-    // It is what came from outside that makes the difference.
+    // Without the events from outside the run differs.
     CHECK(parts_at(box, device, first.rows, false) < first.rows.size());
   }
 }
@@ -146,7 +146,7 @@ TEST_CASE(
         Trouble{0, -1, never, 120, H6_CAUSE_BAD_SAMPLE}}) {
     CAPTURE(std::string(h6CauseName(t.cause)));
     bool seen = false;
-    // A machine that stands still latches the output for that; what came after it is not seen then.
+    // A machine that stalls latches the output; later events then have no effect.
     for (int attempt = 0; attempt < 8 && !seen; ++attempt) {
       BoxOnFloor box;
       box.hand.mode = H6_ADMITTANCE;
@@ -167,7 +167,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("settings that were changed while it ran are changed again before the same frame") {
+TEST_CASE("a replay changes settings before the same frame as the run") {
   BoxOnFloor box;
   box.open();
   Arm arm;
@@ -199,7 +199,7 @@ TEST_CASE("settings that were changed while it ran are changed again before the 
   CHECK(parts_at(box, device, first.rows, true) < first.rows.size());
 }
 
-TEST_CASE("a session goes on only where one of the same bodies stands") {
+TEST_CASE("a session takes over only from one of the same bodies") {
   BoxOnFloor box, other;
   box.open(), other.open();
   h6Error error{};

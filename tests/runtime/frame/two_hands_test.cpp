@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several hands, each with a part of its own: traversed and weighed side by side, with the same
+// Several hands, each with its own part: their shell bodies are weighed side by side, with the same
 // bits.
 #include <doctest/doctest.h>
 
@@ -18,8 +18,8 @@ namespace {
 constexpr std::size_t kHands = 3;
 constexpr std::uint64_t kHelped = 3;  // frames
 
-// Three balls in one bowl, held by three hands. `fields` false: they touch the bowl alone; true:
-// one another as well, so that all pairs share bodies that move.
+// Three balls in one bowl, held by three hands. Without `fields` they touch only the bowl, with it
+// also one another, so that pairs share moving bodies.
 struct ThreeBalls : BallInBowl {
   FieldArrays round = sample_analytic(
       [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 20 * kMm; },
@@ -51,12 +51,12 @@ struct ThreeBalls : BallInBowl {
 };
 
 struct Seen {
-  std::uint64_t helped = 0;  // frames in which the other thread did something
+  std::uint64_t helped = 0;  // frames in which the other thread worked
   std::uint32_t contacts = 0;
 };
 
-// So many frames, and more until the other thread has had a hand in some of them: on a machine that
-// has much else to do that takes a while.
+// Runs so many frames, and more until the other thread has worked in some of them, which takes a
+// while on a busy machine.
 Seen check_same(ThreeBalls& one, ThreeBalls& two, int frames, bool coarse = false) {
   one.open_both(), two.open_both();
   Seen seen;
@@ -105,7 +105,7 @@ TEST_CASE("hands side by side on two threads: the same bits as one after the oth
   CHECK(helped >= kHelped);
 }
 
-TEST_CASE("many contacts each, contacts dropped, coarse pairs: the same bits still") {
+TEST_CASE("many contacts each, dropped contacts, coarse pairs: the same bits") {
   ThreeBalls one(1, 20000, true), two(2, 20000, true);
   const Seen seen = check_same(one, two, 60, true);
   CHECK(seen.contacts > 1000);

@@ -333,7 +333,7 @@ TEST_CASE("a clustered contact has its share of its cluster's weight, by depth")
   CHECK(a.wrench.force.z == near(1e4 * (0.01 + 0.09) / 0.4 * mm).epsilon(1e-5));
 }
 
-TEST_CASE("given scratch of any alignment serves as well as the heap; too little is refused") {
+TEST_CASE("scratch of any alignment gives the same as the heap; too little is refused") {
   const Rows rows = cap(500);
   h6ContactArrays in = rows.arrays();
   std::vector<char> block(h6WeighScratchBytes(in.count) + 3);
@@ -352,7 +352,7 @@ TEST_CASE("given scratch of any alignment serves as well as the heap; too little
   CHECK(std::strstr(refused.error.message, "scratch") != nullptr);
 }
 
-TEST_CASE("each contact twenty times over: the copies share what one had, in tens and thousands") {
+TEST_CASE("twenty copies of each contact share the weight of one, in tens and thousands") {
   const Rows once = cap(100);
   Rows many;
   for (std::size_t i = 0; i < 2000; ++i) {
@@ -372,7 +372,7 @@ TEST_CASE("each contact twenty times over: the copies share what one had, in ten
   }
 }
 
-TEST_CASE("nothing is nothing, every output may be left out, and wrong input is refused") {
+TEST_CASE("no contacts give no wrench, every output may be left out, and wrong input is refused") {
   const Answer none(method(H6_METHOD_ROBUST), h6ContactArrays{});
   CHECK(none.code == 0);
   CHECK(none.K.norm() == 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands between hand and body: dynamic, quasi-static or nothing.
+// The coupling between hand and body: dynamic, quasi-static or direct.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -114,7 +114,7 @@ TEST_CASE("within one step of the hand a free quasi-static body is there after o
   CHECK(norm(scene.body().pose.p - h6Vec3{0.1 * mm, 0.2 * mm, 5.5 * mm}) < 1e-12);
 }
 
-TEST_CASE("a quasi-static body does not feel how fast it came") {
+TEST_CASE("the wrench on a quasi-static body does not depend on its speed") {
   // The same pose, reached at two speeds of the hand: the same wrench to the bit.
   const auto felt_at = [](double speed) {
     BoxOnFloor scene;
@@ -155,7 +155,7 @@ TEST_CASE("a direct body is where the hand is, and moves as it moves") {
     const h6BodyState state = scene.body();
     CHECK(norm(state.pose.p - sample.pose.p) < 1e-16);
     CHECK(angle_between(state.pose.q, sample.pose.q) < 1e-14);
-    // Of the centre of mass: what the origin has, and what turning adds.
+    // The velocity of the centre of mass: the origin's, and the part of the rotation.
     const h6Vec3 lever = place(sample.pose, {0, 0, 1 * mm}) - sample.pose.p;
     const h6Vec3 turning = cross(sample.velocity.angular, lever);
     CHECK(norm(state.velocity.linear - sample.velocity.linear - turning) < 1e-14);
@@ -253,7 +253,7 @@ TEST_CASE("a body that other hands push feels a direct one as a moving wall") {
   }
 }
 
-TEST_CASE("a teleported body stays without velocity where it has none of its own") {
+TEST_CASE("a quasi-static or direct body has no velocity after a teleport") {
   for (const h6CouplingMode mode : {H6_COUPLING_STATIC, H6_COUPLING_DIRECT}) {
     BoxOnFloor scene;
     scene.hand.coupling.mode = mode;
@@ -273,7 +273,7 @@ TEST_CASE("a teleported body stays without velocity where it has none of its own
   CHECK(norm(scene.body().velocity.angular) == 0);
 }
 
-TEST_CASE("coupling modes that cannot be are refused with a sentence that names the value") {
+TEST_CASE("invalid coupling modes are refused with a sentence that names the value") {
   const auto complaint_of = [](const std::function<void(BoxOnFloor&)>& spoil) {
     BoxOnFloor scene;
     spoil(scene);
@@ -321,9 +321,9 @@ TEST_CASE("coupling modes that cannot be are refused with a sentence that names 
 }
 
 TEST_CASE("dragged along a hollow from afar, a quasi-static body stays within half a voxel") {
-  // A ball of 5 mm in a hollow of 15 mm. The hand jumps to the other side, far beyond saturation:
-  // nearly all of each step is along the wall, and what the bound leaves of it must still keep the
-  // body out of the wall.
+  // A ball of 5 mm in a hollow of 15 mm. The hand jumps to the other side, far beyond saturation.
+  // Nearly all of each step is along the wall, and the bounded step must still keep the body out of
+  // the wall.
   FieldArrays hollow = sample_analytic(
       [](double x, double y, double z) { return 15 * mm - std::sqrt(x * x + y * y + z * z); },
       {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
@@ -354,7 +354,7 @@ TEST_CASE("dragged along a hollow from afar, a quasi-static body stays within ha
       CAPTURE(h6MethodName(method));
       CHECK(at_rest > 0.1 * mm);
       CHECK(dragged < 0.5 * mm);
-      CHECK(h6GetBody(s, 1).pose.p.x < -7 * mm);  // it did come round
+      CHECK(h6GetBody(s, 1).pose.p.x < -7 * mm);  // it reached the other side
       h6DestroySession(s);
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices that say how hard they are pushed and are told where to be: admittance and
-// pseudo-admittance, alone and in a closed loop with a person and a delay.
+// Devices that measure a wrench and follow a pose: admittance and pseudo-admittance, alone and in a
+// closed loop with a person and a delay.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ struct PushedBox : BoxOnFloor {
     BoxOnFloor::open();
     told.pose = bodies[1].pose;
   }
-  // The device is where it was told to be, and is pushed.
+  // The device is at its commanded pose and is pushed.
   h6Status push(const h6Wrench& wrench, int frames) {
     h6DeviceSample sample{told.pose, told.velocity, 0, wrench, 0};
     for (int i = 0; i < frames; ++i) {
@@ -106,7 +106,7 @@ TEST_CASE("admittance: a free body goes at the speed F/b, and stops when let go"
     }
 }
 
-TEST_CASE("admittance: what the device is told is the motion of the mesh frame") {
+TEST_CASE("admittance: the command is the motion of the mesh frame") {
   PushedBox scene(H6_ADMITTANCE, 100 * mm);
   scene.bodies[1].com = {3 * mm, 0, 4 * mm};
   scene.open();
@@ -126,7 +126,7 @@ TEST_CASE("admittance: what the device is told is the motion of the mesh frame")
   CHECK(worst < 0.02 * fastest);
 }
 
-TEST_CASE("a wrench without numbers counts as none, and the frame says so") {
+TEST_CASE("a wrench that is not finite counts as none, and the frame reports it") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE})
     for (const double wrong : {static_cast<double>(NAN), HUGE_VAL}) {
       PushedBox scene(mode);
@@ -138,13 +138,13 @@ TEST_CASE("a wrench without numbers counts as none, and the frame says so") {
       CHECK((scene.push(force(0.5, 0, 0), 50) & H6_HAND_NOT_FINITE) == 0);
       CHECK(scene.told.pose.p.x > 0.1 * mm);
     }
-  // Nobody reads it in impedance mode.
+  // Impedance mode does not read it.
   PushedBox scene(H6_IMPEDANCE);
   scene.open();
   CHECK(scene.push(force(NAN, 0, 0), 5) == H6_OK);
 }
 
-TEST_CASE("a few poses without numbers do not make the admittance hand deaf, many do") {
+TEST_CASE("a few poses that are not finite do not stop an admittance hand, many do") {
   PushedBox scene(H6_ADMITTANCE, 100 * mm);
   scene.open();
   scene.push({}, 1);
@@ -222,7 +222,7 @@ TEST_CASE("admittance: a body of translations alone feels no twist") {
   CHECK(same_bits(scene.body().pose.q, q));
 }
 
-TEST_CASE("a device in fault pushes no more: its last wrench does not carry the body away") {
+TEST_CASE("a device in fault no longer pushes: its last wrench does not carry the body away") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE}) {
     PushedBox scene(mode, 100 * mm);
     scene.open();
@@ -277,8 +277,8 @@ TEST_CASE("pseudo-admittance: manipulandum and body start together, and stay whe
 
 namespace {
 
-// A device with mass, held by a person's spring and damper, that its driver ties to the
-// manipulandum. The driver knows of the engine what it was told `delay` frames ago.
+// A device with mass, held by a person's spring and damper and coupled by its driver to the
+// manipulandum. The driver knows the command of `delay` frames ago.
 struct HeldDevice {
   double mass = 0.2, person_k = 300, person_b = 5;
   double k_dd = 1e3, b_dd = 4;
@@ -410,7 +410,7 @@ TEST_CASE(
   }
   CHECK(saturated);
   CHECK(scene.depth() == h6::test::near(0.5 * mm).epsilon(0.01));
-  CHECK(felt == h6::test::near(5).epsilon(0.01));  // and that is what the person feels
+  CHECK(felt == h6::test::near(5).epsilon(0.01));  // and so does the person
 }
 
 TEST_CASE(
@@ -438,7 +438,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows it") {
+TEST_CASE("a teleport takes the manipulandum along, and the state hash contains it") {
   PushedBox scene(H6_PSEUDO_ADMITTANCE, 100 * mm);
   scene.open();
   scene.push(force(0.5, 0, 0), 30);
@@ -464,7 +464,7 @@ TEST_CASE("a teleport takes the manipulandum along, and the state's hash knows i
   CHECK(hash_after(0.1) != hash_after(0.2));
 }
 
-TEST_CASE("no stream of wrenches takes body or manipulandum out of the numbers") {
+TEST_CASE("under any stream of wrenches body and manipulandum stay finite") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE}) {
     PushedBox scene(mode);
     scene.open();
@@ -481,7 +481,7 @@ TEST_CASE("no stream of wrenches takes body or manipulandum out of the numbers")
   }
 }
 
-TEST_CASE("device modes that cannot be are refused with a sentence that names the value") {
+TEST_CASE("invalid device modes are refused with a sentence that names the value") {
   const auto complaint_of = [](std::uint32_t mode, const std::function<void(PushedBox&)>& spoil) {
     PushedBox scene(mode);
     spoil(scene);
@@ -520,7 +520,7 @@ TEST_CASE("device modes that cannot be are refused with a sentence that names th
     }
 }
 
-TEST_CASE("a loop refuses a device that does not work the way the hand does") {
+TEST_CASE("a loop refuses a device that does not offer the hand's mode") {
   for (const std::uint32_t mode : {H6_IMPEDANCE, H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE})
     for (const std::uint32_t offered :
          {std::uint32_t{0}, std::uint32_t{H6_IMPEDANCE}, std::uint32_t{H6_ADMITTANCE},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body pushed against a field must do, whatever the code looks like.
+// What a body that is pushed against a field must do by physics.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -38,7 +38,7 @@ TEST_CASE("a box held into the floor comes to rest, with every method") {
     const h6FrameReport frame = h6GetFrame(scene.session);
     CHECK(frame.contacts == 144);
     CHECK(frame.max_depth_voxels < 1.0);
-    // At rest the hand feels what the floor pushes back: k_VC times how far the body lags.
+    // At rest the hand feels the floor's force: k_VC times the lag of the body.
     CHECK(felt.wrench.force.z == h6::test::near(1e3 * (state.pose.p.z - 2 * mm)).epsilon(1e-3));
   }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// solve_test.cpp - the step's system: answers satisfy it, and what is not positive is refused.
+// solve_test.cpp - the system of a step: solutions satisfy it, and a matrix that is not positive is
+// refused.
 #include <doctest/doctest.h>
 
 #include <random>

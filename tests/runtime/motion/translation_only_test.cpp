@@ -54,7 +54,7 @@ TEST_CASE("a body of translations alone keeps its orientation to the bit and giv
       if (way.mode == H6_COUPLING_DIRECT) CHECK(norm(scene.body().pose.p - sample.pose.p) < 1e-15);
     }
     CHECK(touched > 0);
-    // No hand is so fast: what it felt on the way was cut to nothing.
+    // The hand was too fast on the way, so the safety chain cut its force to zero.
     CHECK(h6GetSafety(scene.session, 0).fault == H6_CAUSE_OVERSPEED);
     last.velocity = {};
     scene.hold(last, 100);
@@ -74,7 +74,7 @@ TEST_CASE("without torques a body of translations alone moves as one of six degr
         scene.open();
         std::vector<h6Vec3> path;
         for (int i = 0; i < 500; ++i) {
-          // Along the box's own middle: the floor pushes through the centre of mass.
+          // Along the middle of the box, where the floor pushes through the centre of mass.
           scene.hold(pose(0, 0, (5 - 3 * std::sin(0.01 * i)) * mm), 1);
           path.push_back(scene.body().pose.p);
         }
@@ -86,12 +86,12 @@ TEST_CASE("without torques a body of translations alone moves as one of six degr
         worst = std::max(worst, norm(three[i] - six[i]));
         lowest = std::min(lowest, three[i].z);
       }
-      CHECK(lowest < 4.95 * mm);  // it did touch
+      CHECK(lowest < 4.95 * mm);  // it touched
       CHECK(worst < 1e-9);
     }
 }
 
-TEST_CASE("where its mass sits and how it is spread is nothing to a body of translations alone") {
+TEST_CASE("centre of mass and inertia do not matter to a body of translations alone") {
   struct Way {
     h6CouplingMode mode;
     h6Integrator integrator;
