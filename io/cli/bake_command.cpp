@@ -242,7 +242,7 @@ void add_field(CLI::App* bake, Program& program) {
       ->check(number_within(0, 1e6));
   field
       ->add_option("--sign", f->sign,
-                   "How inside is found: flood (whatever the outside cannot reach) or auto "
+                   "How the inside is found: flood (all that the outside cannot reach) or auto "
                    "(default; flood only where the mesh is open)")
       ->option_text("MODE")
       ->check(one_of({"auto", "flood"}));
@@ -286,17 +286,16 @@ void add_shell(CLI::App* bake, Program& program) {
       ->check(one_of({"auto", "triangles", "field"}));
   shell
       ->add_option("--normals", s->normals,
-                   "Of the triangles, of the field (they turn evenly over edges) or auto (default; "
-                   "as the points)")
+                   "Normals of the triangles, of the field (they turn evenly over edges) or auto "
+                   "(default; as the points)")
       ->option_text("MODE")
       ->check(one_of({"auto", "triangles", "field"}));
-  auto* outside =
-      shell
-          ->add_option("--voxels", s->bake.field.voxels,
-                       "Of the field that tells what the outside reaches, on the longest "
-                       "padded side, 16 to 2048; default 256")
-          ->option_text("N")
-          ->check(whole_within(16, 2048));
+  auto* outside = shell
+                      ->add_option("--voxels", s->bake.field.voxels,
+                                   "Cells of the field that tells what the outside reaches, on the "
+                                   "longest padded side, 16 to 2048; default 256")
+                      ->option_text("N")
+                      ->check(whole_within(16, 2048));
   shell
       ->add_option("--voxel-size", s->bake.field.voxel_size, "Edge of a voxel, instead of --voxels")
       ->option_text("S")

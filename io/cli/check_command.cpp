@@ -345,7 +345,7 @@ void add_check(CLI::App& app, Program& program) {
   auto* voxels =
       check
           ->add_option("--voxels", o->bake.voxels,
-                       "Of the field they are meant for, on the longest padded side; default 256")
+                       "Cells of the intended field, on the longest padded side; default 256")
           ->option_text("N")
           ->check(whole_within(16, 2048));
   check->add_option("--voxel-size", o->bake.voxel_size, "Edge of a voxel, instead of --voxels")
@@ -355,7 +355,9 @@ void add_check(CLI::App& app, Program& program) {
   check->add_option("--offset", o->bake.offset, "As for 'hapsix bake field'")
       ->option_text("S")
       ->check(number_within(0, 1e6));
-  check->add_option("--seal", o->bake.seal, "Likewise; samples nearer than the mesh are then fine")
+  check
+      ->add_option("--seal", o->bake.seal,
+                   "As for 'hapsix bake field'; samples may then be nearer than the mesh")
       ->option_text("WIDTH")
       ->check(number_within(0, 1e6));
   check

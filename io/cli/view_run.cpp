@@ -274,7 +274,7 @@ void add_view_options(CLI::App& command, ViewOptions& view) {
   command.add_flag("--view", view.on,
                    "Show it live in a browser, where the part can be taken in hand; ends with "
                    "Ctrl-C, or after --duration");
-  command.add_option("--port", view.port, "Of the view, on 127.0.0.1; default: any free one")
+  command.add_option("--port", view.port, "Port of the view on 127.0.0.1; default: any free one")
       ->option_text("NUMBER")
       ->check(whole_within(0, 65535));
   command.add_flag("--no-browser{false}", view.open, "Only print the view's address");

@@ -9,7 +9,8 @@
 namespace h6::cli {
 
 // The prototype damped the coupling outside its bound and let contact damping pull; its Gauss
-// columns all had the facing filter. Its figures are not targets.
+// columns all had the facing filter. Its figures are not targets. The table is data, so it may be
+// longer than a screen.
 const std::vector<TableScene>& table_scenes() {
   static const std::vector<TableScene> scenes = {
       {"box-on-wall-explicit",
@@ -40,11 +41,11 @@ const std::vector<TableScene>& table_scenes() {
        "Fig. 7",
        "The 6-DoF weights keep few contacts from being outvoted by many with the same normal.",
        "The small plate is one and a half voxels wide: only one row of samples lies inside it, "
-       "half "
-       "a voxel deep, so its interpolated depth ends at 0.50 where the true one goes to 0.75. "
-       "`cluster` is at its threshold: points stand half a voxel apart up to rounding, and what it "
-       "merges is chance. In the prototype that chattered; here little is merged and it stays near "
-       "the unscaled penalty, depth and force jumps included.",
+       "half a voxel deep, so its interpolated depth ends at 0.50 where the true one goes to "
+       "0.75. `cluster` is at its threshold: points stand half a voxel apart up to rounding, "
+       "so chance decides which of them it merges. In the prototype it chattered; here it "
+       "merges little and stays near the unscaled penalty, with the same depth and force "
+       "jumps.",
        io::box_on_plates,
        true,
        {{"none", "held .01"},
@@ -70,10 +71,9 @@ const std::vector<TableScene>& table_scenes() {
       {"peg-in-hole",
        "Fig. 10",
        "In a tight fit the penetration stays below half a voxel with adaptive weights.",
-       "Deeper than in the prototype where the rule is stiff: along the wall `none` is "
-       "0.01 voxel deep and `robust` 0.04, but where the peg's edge comes into the corner "
-       "between wall and floor, which samples one voxel apart round off, single contacts "
-       "go to 0.1 and 0.16.",
+       "Stiff rules go deeper than in the prototype: along the wall `none` is 0.01 voxel deep "
+       "and `robust` 0.04, but where the peg's edge comes into the corner between wall and "
+       "floor, which samples one voxel apart round off, single contacts go to 0.1 and 0.16.",
        io::peg_in_hole,
        true,
        {{"none", "held .04"},
@@ -86,13 +86,12 @@ const std::vector<TableScene>& table_scenes() {
       {"box-over-wire",
        "Fig. 12",
        "A thin wire stops the box although hundreds of contacts carry it on the plate.",
-       "A wire of one voxel's radius is at the limit of what a field can hold: its axis "
-       "lies midway between samples, so the interpolated depth never exceeds 1 - √½ = 0.29 "
-       "voxel, whatever the true depth is. A rule that would balance the pull deeper than "
-       "that has nothing left to push with and chatters or pops. The study of finer fields "
-       "shows it: from 0.5 mm on `gauss6+facing` holds as in the prototype, and "
-       "`gauss3+facing`, which at 1 mm pops as the prototype's does, needs 0.65 mm to 0.8 "
-       "mm.",
+       "A wire of one voxel's radius is at the limit of what a field can hold: its axis lies "
+       "midway between samples, so the interpolated depth never exceeds 1 - √½ = 0.29 voxel, "
+       "whatever the true depth is. A rule that balances the pull only at a greater depth runs "
+       "out of force, and chatters or pops. The study of finer fields shows it: from 0.5 mm on "
+       "`gauss6+facing` holds as in the prototype, and `gauss3+facing`, which at 1 mm pops as "
+       "the prototype's does, needs 0.65 mm to 0.8 mm.",
        io::box_over_wire,
        true,
        {{"none", "held .04"},
@@ -105,33 +104,33 @@ const std::vector<TableScene>& table_scenes() {
       {"box-over-fused-wire",
        "Fig. 12, one field",
        "As box-over-wire.",
-       "Samples one voxel apart round off the corner between plate and wire. The box's "
-       "front edge comes to lie on that fillet and is lifted: in the recording of `robust` "
-       "the box rises by 0.5 mm within 60 ms of touching the wire with its full pull, and "
-       "then rides over it without ever being more than 0.3 voxel deep. It is the field, "
-       "not the rule: at 0.5 mm (study of finer fields) `robust` holds, and so it does at "
-       "1 mm with a field for each part. "
-       "Tried with the exact distance of plate and wire together, sampled at 1 mm: the lowest row "
-       "of points at the box's edge stands 0.16 mm deep by interpolation where the exact depth is "
-       "0.08 mm, and its gradient leans back by 22°. Without the bottom's points within 0.5 mm of "
-       "the edge `robust` and `series` hold (0.26 and 0.14 mm deep), with the wire 0.2 mm higher "
-       "too, and with plate and wire as two fields of the same samples as well; moving the grid "
-       "by a quarter or half of a voxel makes of the same scene held, chatters or through.",
+       "Samples one voxel apart round off the corner between plate and wire. The box's front "
+       "edge comes to lie on that fillet and is lifted: in the recording of `robust` the box "
+       "rises by 0.5 mm within 60 ms of touching the wire with its full pull, and then rides "
+       "over it without ever being more than 0.3 voxel deep. The cause is the field, not the "
+       "rule: at 0.5 mm (study of finer fields) `robust` holds, and at 1 mm it holds with a "
+       "field for each part. A test with the exact distance of plate and wire together, "
+       "sampled at 1 mm: the lowest row of points at the box's edge stands 0.16 mm deep by "
+       "interpolation where the exact depth is 0.08 mm, and its gradient leans back by 22°. "
+       "Without the bottom's points within 0.5 mm of the edge, `robust` and `series` hold "
+       "(0.26 and 0.14 mm deep). They also hold with the wire 0.2 mm higher, and with plate "
+       "and wire as two fields of the same samples. If the grid moves by a quarter or half of "
+       "a voxel, the same scene is held, chatters or goes through.",
        nullptr,
        false,
        {}},
       {"box-over-post",
        "Fig. 12, upright",
        "The same with the wire as a post.",
-       "As in box-over-wire, the field of a post of one voxel's radius is never deeper "
-       "than 0.29 voxel; the prototype's `gauss3+facing` held only 0.97 deep, its "
-       "`gauss6+facing` 0.54. From 0.5 mm on `gauss6+facing` holds here too. What `global` "
-       "does does not change with the field. "
-       "`gauss3+facing` chatters even at 0.25 mm: it needs points 0.85 mm deep to balance 5 N, "
-       "and interpolation clips the field's ridge at 0.82 mm. On the ridge 100 contacts make 4.7 "
-       "N; a row that crosses it faces away, its share goes to the others, and the force jumps to "
-       "5.5 N from one frame to the next, around the 5 N it should be. Pulled with 4.75 N it is "
-       "calm, with a field of 0.125 mm it holds.",
+       "As in box-over-wire, the field of a post of one voxel's radius is never deeper than "
+       "0.29 voxel; the prototype's `gauss3+facing` held only 0.97 deep, its `gauss6+facing` "
+       "0.54. From 0.5 mm on `gauss6+facing` holds here too. `global` does the same in every "
+       "field. `gauss3+facing` chatters even at 0.25 mm: it needs points 0.85 mm deep to "
+       "balance 5 N, and interpolation clips the field's ridge at 0.82 mm. On the ridge 100 "
+       "contacts make 4.7 N. A row of points that crosses the ridge faces away and its share "
+       "goes to the others, so the force jumps to 5.5 N from one frame to the next, around the "
+       "5 N that it should be. With a pull of 4.75 N the box is calm, and with a field of "
+       "0.125 mm it holds.",
        io::box_over_post,
        true,
        {{"none", "held .04"},
