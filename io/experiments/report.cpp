@@ -49,7 +49,7 @@ std::string scene_section(const SceneRow& row, const std::vector<MethodColumn>& 
   for (std::size_t m = 0; m < columns.size(); ++m) {
     const RunFigures& r = row.runs[m];
     table.push_back({columns[m].name, cell(r), prototype_cell(scene, columns[m].name),
-                     std::to_string(r.contacts_max) + ", " + number(r.contacts_mean, 0),
+                     std::to_string(r.contacts_max) + ", " + number(r.touching_contacts_mean, 0),
                      number(r.force_jump, 2), number(1e3 * r.late_speed, 2),
                      number(r.late_depth_swing, 3),
                      number(r.frame_us_p50, 0) + ", " + number(r.frame_us_p99, 0),
@@ -119,7 +119,7 @@ nlohmann::ordered_json to_json(const SceneRow& row, const std::vector<MethodColu
                                {"max_depth_voxels", r.max_depth_voxels},
                                {"final_depth_voxels", r.final_depth_voxels},
                                {"contacts_max", r.contacts_max},
-                               {"contacts_mean", r.contacts_mean},
+                               {"contacts_mean", r.touching_contacts_mean},
                                {"force_jump", r.force_jump},
                                {"late_speed", r.late_speed},
                                {"late_depth_swing_voxels", r.late_depth_swing},

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -16,57 +15,6 @@
 
 namespace h6::cli {
 namespace {
-
-constexpr double kLate = 0.2;  // the verdict's own window [s]
-
-// Sums a run up, row by row.
-class Tally {
- public:
-  Tally(const io::LoadedScene& loaded, double rate, double duration, RunFigures& out)
-      : out_(out),
-        late_from_(duration - kLate),
-        verdict_(loaded.scene.verdict, loaded.watched_points,
-                 loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com, rate) {}
-
-  void frame(const h6FrameRecord& r, const h6Vec3& force) {
-    const h6FrameReport& f = r.report;
-    out_.status |= f.status;
-    out_.contacts_max = std::max(out_.contacts_max, f.contacts);
-    if (f.contacts) contacts_ += f.contacts, ++touching_;
-    out_.max_depth_voxels = std::max(out_.max_depth_voxels, f.max_depth_voxels);
-    out_.final_depth_voxels = f.max_depth_voxels;
-    out_.force_jump = std::max(out_.force_jump, norm(force - force_));
-    force_ = force;
-    if (r.time >= late_from_) {
-      const double v = norm(r.body[0].velocity.linear);
-      speed2_ += v * v, ++late_;
-      low_ = std::min(low_, f.max_depth_voxels), high_ = std::max(high_, f.max_depth_voxels);
-    }
-    frame_us_.add(f.frame_us);
-    verdict_.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
-                   (f.status & H6_STATE_NOT_FINITE) == 0);
-  }
-
-  void finish() {
-    out_.verdict = verdict_.verdict();
-    if (touching_) out_.contacts_mean = contacts_ / static_cast<double>(touching_);
-    if (late_) {
-      out_.late_speed = std::sqrt(speed2_ / static_cast<double>(late_));
-      out_.late_depth_swing = high_ - low_;
-    }
-    out_.frame_us_p50 = frame_us_.percentile(50);
-    out_.frame_us_p99 = frame_us_.percentile(99);
-  }
-
- private:
-  RunFigures& out_;
-  double late_from_;
-  io::VerdictWatch verdict_;
-  Histogram frame_us_;
-  h6Vec3 force_{};
-  double contacts_ = 0, speed2_ = 0, low_ = 1e9, high_ = 0;
-  std::size_t touching_ = 0, late_ = 0;
-};
 
 // The definitions of a run: the scene's, with the changes applied.
 Outcome open(const RunChange& change, RunSetup& run) {
@@ -135,7 +83,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
   const bool has_shell = loaded.bodies[static_cast<std::size_t>(first.body)].shell >= 0;
 
   const double duration = change.path ? change.path->back().t : loaded.duration();
-  Tally tally(loaded, def.rate, duration, out);
+  RunTally tally(loaded, def.rate, duration);
   const auto frames = static_cast<std::uint64_t>(duration * def.rate + 0.5);
   std::vector<h6FrameRecord> rows;
   for (std::uint64_t i = 0; i < frames && !interrupted.load(); ++i) {
@@ -148,7 +96,6 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
                                          .force
                                    : h6Vec3{};
     tally.frame(r, force);
-    out.final_pose = r.body[0].pose;
     if (!recorder)
       rows.clear();
     else if (rows.size() == 100) {
@@ -157,7 +104,9 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
       rows.clear();
     }
   }
-  tally.finish();
+  static_cast<RunTotals&>(out) = tally.totals();
+  out.frame_us_p50 = tally.times().frame_us.percentile(50);
+  out.frame_us_p99 = tally.times().frame_us.percentile(99);
   if (recorder) {
     Outcome done = recorder->frames(rows.data(), rows.size());
     const nlohmann::ordered_json summary{{"method", change.method.name},

@@ -8,10 +8,9 @@
 #include <vector>
 
 #include "io/console/console.h"
-#include "io/run/histogram.h"
 #include "io/run/run_setup.h"
+#include "io/run/run_tally.h"
 #include "io/scene/load_scene.h"
-#include "io/scene/verdict.h"
 
 namespace h6::cli {
 
@@ -42,18 +41,8 @@ struct RunChange {
   std::string record;  // .h5 file, empty: none
 };
 
-struct RunFigures {
-  io::Verdict verdict = io::Verdict::held;
-  double max_depth_voxels = 0;
-  double final_depth_voxels = 0;
-  std::uint32_t contacts_max = 0;
-  double contacts_mean = 0;     // over frames with a contact
-  double force_jump = 0;        // largest change of the elastic contact force between frames [N]
-  double late_speed = 0;        // RMS of the body's centre over the last 0.2 s [m/s]
-  double late_depth_swing = 0;  // peak to peak over the last 0.2 s [voxel]
+struct RunFigures : RunTotals {
   double frame_us_p50 = 0, frame_us_p99 = 0;
-  h6Pose final_pose{};  // of the first hand's body
-  h6Status status = 0;
   std::string error;       // why the run failed; empty when it did not
   bool moved_on() const {  // what a scene of the paper calls held
     return error.empty() && (verdict == io::Verdict::held || verdict == io::Verdict::arrived);

@@ -8,7 +8,7 @@
 
 namespace h6::cli {
 
-// Bins grow by 1 % from 0.01 us to 100 s: a percentile is right to 1 %, the maximum exactly.
+// Bins grow by 1 % from 0.01 us to 100 s: percentiles are right to 1 %, the maximum is exact.
 class Histogram {
  public:
   void add(double us) {

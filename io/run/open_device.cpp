@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// open_device.cpp - every device that the program knows, by name.
 #include "io/run/open_device.h"
 
 #include <algorithm>
@@ -36,7 +37,7 @@ Result<OpenedDevice> keep(Result<std::unique_ptr<Device>> made) {
   return out;
 }
 
-// A device that stands before another, which lives as long as it does.
+// A device in front of another one, which it keeps alive.
 template <class Device>
 OpenedDevice in_front(OpenedDevice behind, Device device) {
   struct Both {
@@ -50,7 +51,7 @@ OpenedDevice in_front(OpenedDevice behind, Device device) {
   return out;
 }
 
-// The person who follows the path, or the path itself.
+// A simulated person who follows the path, or the path itself.
 Result<OpenedDevice> hand_by_name(const std::string& name, device::HandPath path,
                                   const h6Vec3& grip) {
   if (name == "path") return keep(device::PathDevice::open(std::move(path)));
@@ -59,8 +60,7 @@ Result<OpenedDevice> hand_by_name(const std::string& name, device::HandPath path
   return keep(device::SimulatedHand::open(std::move(path), person));
 }
 
-// --- a SpaceMouse
-// ---------------------------------------------------------------------------------
+// ---- a SpaceMouse ------------------------------------------------------------------------------
 
 Outcome read_spacemouse(const DeviceSpec& spec, device::SpaceMouseOptions& o) {
   OptionReader read(spec);
@@ -119,8 +119,7 @@ Result<OpenedDevice> open_spacemouse(const DeviceSpec& spec, const DevicePlace& 
   return out;
 }
 
-// --- a plug-in
-// ------------------------------------------------------------------------------------
+// ---- a plug-in ---------------------------------------------------------------------------------
 
 Result<OpenedDevice> open_plugin(const DeviceSpec& spec, const DevicePlace& place) {
   auto made = device::PluginDevice::open({spec.target, spec.options}, place.home, place.grip);
@@ -131,8 +130,7 @@ Result<OpenedDevice> open_plugin(const DeviceSpec& spec, const DevicePlace& plac
   return out;
 }
 
-// --- hands without hardware
-// -----------------------------------------------------------------------
+// ---- hands without hardware --------------------------------------------------------------------
 
 struct BadOptions {
   device::BadOperatorFigures figures;

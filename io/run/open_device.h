@@ -13,30 +13,30 @@ namespace h6::cli {
 
 struct DeviceKind {
   const char* name;
-  const char* form;     // as it is typed
+  const char* form;     // how the name is typed
   const char* about;    // one line
   const char* options;  // each with its meaning; empty: none
-  bool real_time;       // lives on the machine's clock, not on that of the frames
+  bool real_time;       // follows the machine's clock, not the frames'
 };
 const std::vector<DeviceKind>& device_kinds();
 
 // Whether `text` names a device and its options can be read; nothing is opened.
 Outcome check_device(const std::string& text);
 
-// What a device needs to know of the scene and of the body in hand.
+// What a device needs to know about the scene and the body that it holds.
 struct DevicePlace {
   device::HandPath path{};               // at least one row
-  h6Pose home{{0, 0, 0}, {1, 0, 0, 0}};  // where the mesh frame begins
+  h6Pose home{{0, 0, 0}, {1, 0, 0, 0}};  // of the mesh frame at the start
   h6Vec3 grip{};                         // the body's centre of mass, mesh frame [m]
   double unit = 1;                       // metres in one unit of the scene
 };
 
 struct OpenedDevice {
   h6Device device{};
-  std::shared_ptr<void> alive;  // what it lives in
+  std::shared_ptr<void> alive;  // owns the device
   bool real_time = false;
-  std::string about;                  // of a plug-in; else empty
-  std::function<std::string()> live;  // what it shows of itself beside its pose; may be empty
+  std::string about;                  // what a plug-in says about itself; else empty
+  std::function<std::string()> live;  // its state beside its pose, for people; may be empty
 };
 
 Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& place);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// recorded_run.cpp - what a recording holds about its run, to JSON and back.
 #include "io/run/recorded_run.h"
 
 #include <algorithm>
@@ -84,7 +85,7 @@ h6DeviceCapabilities rating(const Json& o) {
   return c;
 }
 
-// Where a part of the scene is now; empty: nowhere.
+// The file of a part of the scene as it can be found now; empty: it cannot.
 fs::path find_part(const fs::path& was, const fs::path& recording) {
   const fs::path beside = recording.parent_path() / was.filename();
   for (const fs::path& place : {was, beside}) {
@@ -216,7 +217,7 @@ Outcome take_settings(const std::string& text, h6ContactDef& contact, h6Coupling
 std::string recorded_scene_text(Scene scene) {
   const auto settle = [&](auto& source) {
     if (!source) return;
-    if (!source->unit) source->unit = scene.unit;  // of the mesh, whatever the scene's becomes
+    if (!source->unit) source->unit = scene.unit;  // the scene's own changes below
     for (fs::path* file : {&source->mesh, &source->file}) {
       std::error_code failed;
       if (!file->empty()) *file = fs::absolute(*file, failed);
@@ -269,7 +270,7 @@ Result<std::unique_ptr<LoadedScene>> load_recorded(const RecordingHead& head,
   Result<std::unique_ptr<LoadedScene>> loaded = load_scene(std::move(*scene), progress);
   if (!loaded) return loaded;
   if (Outcome same = same_assets(**loaded, head); !same) return same.failure();
-  (*loaded)->scene.unit = run.unit;  // in which people read it
+  (*loaded)->scene.unit = run.unit;  // for people
   for (std::size_t i = 0; i < run.bodies.size(); ++i) {
     h6BodyDef& body = (*loaded)->bodies[i];
     const std::int32_t shell = body.shell, field = body.field;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_run.h - what a recording says of its run beside the scene, so that it can be run again
-// to the bit.
+// recorded_run.h - what a recording holds about its run beside the scene, so that it can be run
+// again to the bit.
 //
-// The scene of a recording is in metres: so its numbers come back as they were. What is derived
-// when a scene is loaded (centres of mass, inertias) stands here as it was used.
+// The scene of a recording is in metres, so that its numbers come back as they were. What loading a
+// scene derives (centres of mass, inertias) is recorded as it was used.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -29,21 +29,21 @@ struct RecordedRun {
   std::vector<h6DeviceCapabilities> ratings;  // of each hand's device
 };
 
-// What a person changed while it ran: the detail of a "settings" event, for people and, in braces
-// at its end, to the bit. Back into definitions that hold what was before; a sentence where it
-// cannot be read. Column `settings` says from which frame on.
+// Settings that a person changed during a run: the detail of a "settings" event, first in words,
+// then in braces to the bit. take_settings reads it into the definitions as they were before, and
+// fails where it cannot. The column `settings` says from which frame on they hold.
 std::string settings_text(const h6ContactDef& contact, const h6CouplingDef& coupling);
 Outcome take_settings(const std::string& text, h6ContactDef& contact, h6CouplingDef& coupling);
 
-// The two texts of a recording's head. `scene` with the settings it is run with.
+// The two texts of a recording's head. `scene` has the settings that it is run with.
 std::string run_text(const RecordedRun& run);
 std::string recorded_scene_text(Scene scene);
 
-// And back. A sentence where the recording was made without.
+// Reads run_text. Fails where a recording has none.
 Result<RecordedRun> recorded_run(const RecordingHead& head);
 
-// The scene, loaded again. Parts are looked for where they were and beside `recording`; one that is
-// gone or is not what was recorded is a sentence that names it.
+// Loads the scene again. Parts are looked for where they were and beside `recording`. Fails, naming
+// the part, where one is gone or has changed.
 Result<std::unique_ptr<LoadedScene>> load_recorded(const RecordingHead& head,
                                                    const RecordedRun& run,
                                                    const std::filesystem::path& recording,

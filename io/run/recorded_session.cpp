@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// recorded_session.cpp - runs a recording again.
 #include "io/run/recorded_session.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 namespace h6::cli {
 namespace {
 
-// The instruction set decides about bits: that of the recording where this machine has it.
+// Bits depend on the SIMD target: takes the recording's where this machine has it.
 void take_target(const std::string& recorded, std::vector<std::string>& remarks) {
   if (recorded == kernels::target_name()) return;
   if (kernels::force_target(recorded.c_str()))
@@ -69,14 +70,14 @@ Result<std::unique_ptr<RecordedSession>> RecordedSession::open(const std::filesy
   return s;
 }
 
-// What came to the safety chains from outside the frame: from devices, deadlines, the program.
+// Gives the safety chains what devices, deadlines and the program told them then.
 void RecordedSession::set_faults(const h6FrameRecord& recorded) {
   if (has_inputs_) {
     for (std::size_t h = 0; h < hands_; ++h)
       h6SetSafetyInput(session_.get(), static_cast<std::int32_t>(h), &recorded.safety_input[h]);
     return;
   }
-  // Older recordings say only what became of it.
+  // Older recordings hold only the outcome.
   const bool latched = recorded.report.status & H6_OUTPUT_FAULT;
   if (latched_ && !latched) h6Rearm(session_.get());
   latched_ = latched;
@@ -87,7 +88,7 @@ void RecordedSession::set_faults(const h6FrameRecord& recorded) {
   }
 }
 
-// A person changed the method, the stiffness, ... in the live view.
+// Applies settings that a person changed in the live view before this frame.
 Outcome RecordedSession::follow_settings(const h6FrameRecord& recorded) {
   const std::string at = "frame " + std::to_string(recorded.report.frame) + ": ";
   if (!says_when_) {
@@ -125,7 +126,7 @@ Result<const h6FrameRecord*> RecordedSession::step(const h6FrameRecord& recorded
   now_.time = recorded.time;
   now_.settings = recorded.settings;
   std::copy(std::begin(recorded.hand), std::end(recorded.hand), now_.hand);
-  // What the clock decided then.
+  // The clock decided then how much was left out.
   h6SetCoarse(session_.get(), recorded.report.coarse_pairs, recorded.report.coarse_points);
   h6Step(session_.get(), now_.hand, now_.command);
   now_.report = h6GetFrame(session_.get());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_session.h - a recording's run again: its scene, settings and SIMD target, its hand's
-// samples in, the same frames out.
+// recorded_session.h - runs a recording again: with its scene, settings and SIMD target, the
+// recorded samples of the hands give the same frames.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -18,21 +18,22 @@ namespace h6::cli {
 
 class RecordedSession {
  public:
-  // Changes of what was recorded; empty or 0: none.
+  // What is to differ from the recording; empty or 0: nothing.
   struct Changes {
     std::string method;
     unsigned threads = 0;
   };
-  // `recording`: its head, events and columns are read, not its frames. A sentence where it does
-  // not say how it was run, or its parts are gone or changed. `remarks` gets what a person should
-  // know all the same.
+  // Reads head, events and columns of `recording`, not its frames. Fails where the recording does
+  // not say how it was run, or where parts of its scene are gone or changed. `remarks` gets what a
+  // person should know in any case.
   static Result<std::unique_ptr<RecordedSession>> open(const std::filesystem::path& file,
                                                        const io::Recording& recording,
                                                        const Changes& changes,
                                                        const io::Progress& progress,
                                                        std::vector<std::string>& remarks);
-  // The recorded frame once more; rows in order, from the first on. The new row stays until the
-  // next call. A sentence where settings were changed and the recording does not say how or when.
+  // Computes a recorded frame again; rows must come in order, from the first on. The result is
+  // valid until the next call. Fails where settings were changed and the recording does not say how
+  // or when.
   Result<const h6FrameRecord*> step(const h6FrameRecord& recorded);
 
   const io::LoadedScene& loaded() const { return *loaded_; }
@@ -52,8 +53,8 @@ class RecordedSession {
   h6SessionDef def_{};
   std::vector<h6HandDef> hand_defs_;
   std::vector<io::RecordingEvent> settings_;  // events, in order
-  std::uint32_t changed_ = 0;                 // so many of them are behind us
-  bool own_method_ = false;                   // another than was recorded
+  std::uint32_t changed_ = 0;                 // how many of them are done
+  bool own_method_ = false;                   // the method is not the recorded one
   bool has_inputs_ = false, says_when_ = false;
   SessionPtr session_;
   std::size_t hands_ = 0;

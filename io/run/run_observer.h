@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_observer.h - somebody who looks at a run while it goes, and may change it.
+// run_observer.h - interface of what watches a live run and may change it.
 #pragma once
 #include <cstddef>
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace h6::cli {
 
-// All on the program's thread.
+// All calls come on the program's main thread.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// run_setup.cpp - how every run of a loaded scene begins.
 #include "io/run/run_setup.h"
 
 #include "io/run/recorded_run.h"
@@ -38,7 +39,7 @@ Outcome RunSetup::step(h6FrameRecord& r) {
   return good ? Outcome(Done{}) : Outcome(Failure{"a device was lost"});
 }
 
-// With the scene as it is run, not as it was loaded.
+// The recording holds the scene as it is run, which may differ from what was loaded.
 Outcome RunSetup::open_recording() {
   io::Scene scene = loaded.scene;
   scene.contact = def.contact;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_setup.h - what every run of a loaded scene begins with, in real time or not: a session, the
-// devices of its hands, a recording.
+// run_setup.h - how every run of a loaded scene begins, in real time or not: with a session, the
+// devices of its hands and a recording.
 #pragma once
 #include <memory>
 #include <string>
@@ -19,7 +19,7 @@ struct SessionRelease {
 };
 using SessionPtr = std::unique_ptr<h6Session, SessionRelease>;
 
-// A run in the making: change `def`, `hand_defs` and `hands` at will, then open.
+// A run being prepared: change `def`, `hand_defs` and `hands` as needed, then open.
 struct RunSetup {
   explicit RunSetup(const io::LoadedScene& scene);
   RunSetup(const RunSetup&) = delete;  // def points at hand_defs
@@ -30,14 +30,15 @@ struct RunSetup {
   std::vector<h6HandDef> hand_defs;
   std::vector<io::SceneHand> hands;  // device, path and figures; `def` is taken from hand_defs
   std::string record;                // .h5 file, empty: none
-  std::shared_ptr<device::Steering> steering;  // who may take the first hand off its path
-  bool virtual_time = true;                    // what the recording says; whoever steps knows
+  std::shared_ptr<device::Steering> steering;  // may take the first hand off its path
+  bool virtual_time = true;                    // for the recording's head
 
   SessionPtr session;
   Hands devices;
   std::unique_ptr<io::Recorder> recorder;
   Outcome open();
-  // One frame at r.time, on this thread, as the haptic loop does it; fills the rest of the row.
+  // Steps one frame at r.time on this thread, as the haptic loop does, and fills the rest of the
+  // row.
   Outcome step(h6FrameRecord& r);
 
  private:

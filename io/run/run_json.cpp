@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// run_json.cpp - the object that `run --json` prints.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "io/mesh/mesh_file.h"
+#include "io/run/run_scene.h"
+#include "kernels/targets.h"
+
+namespace h6::cli {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+// How late frames were, by cause: how many within each power of ten.
+ordered_json late_json(const h6LoopReport& report) {
+  const auto bins = [](const h6LateHistogram& h) {
+    static const char* const names[H6_LATE_BINS] = {"10",    "100",    "1000",
+                                                    "10000", "100000", "longer"};
+    ordered_json out = ordered_json::object();
+    for (int i = 0; i < H6_LATE_BINS; ++i) out[names[i]] = h.frames[i];
+    return out;
+  };
+  return {{"compute", bins(report.late_us_compute)},
+          {"wakeup", bins(report.late_us_wakeup)},
+          {"stolen", bins(report.late_us_stolen)}};
+}
+
+ordered_json grant_json(const h6Granted& g) {
+  return {{"core", g.core < 0 ? ordered_json() : ordered_json(g.core)},
+          {"fifo", g.fifo},
+          {"locked", g.locked},
+          {"isolated", g.isolated},
+          {"governor", g.governor[0] ? ordered_json(g.governor) : ordered_json()}};
+}
+
+// What the safety chain did for each hand: the causes that came up.
+ordered_json safety_json(const h6LoopReport& loop, std::size_t hands) {
+  ordered_json all = ordered_json::array();
+  for (std::size_t h = 0; h < hands; ++h) {
+    const h6HandSafety& s = loop.hand[h];
+    ordered_json causes = ordered_json::object();
+    for (int c = 1; c < H6_CAUSE_COUNT; ++c)
+      if (s.times[c] > 0)
+        causes[h6CauseName(static_cast<h6Cause>(c))] = {{"times", s.times[c]},
+                                                        {"frames", s.frames[c]}};
+    all.push_back({{"state", h6DeviceStateName(s.state)},
+                   {"fault", h6CauseName(s.fault)},
+                   {"causes", causes}});
+  }
+  return all;
+}
+
+ordered_json spread(const Histogram& h) {
+  return {{"p50", h.percentile(50)},
+          {"p99", h.percentile(99)},
+          {"p999", h.percentile(99.9)},
+          {"max", h.max()}};
+}
+
+ordered_json pose_json(const h6Pose& p, double scale) {
+  return {{"p", {p.p.x * scale, p.p.y * scale, p.p.z * scale}},
+          {"q", {p.q.w, p.q.x, p.q.y, p.q.z}}};
+}
+
+ordered_json stages_json(const RunSummary& s) {
+  ordered_json stages = ordered_json::object();
+  for (int i = 0; i < H6_STAGE_COUNT; ++i)
+    stages[h6StageName(static_cast<h6Stage>(i))] = spread(s.stage_us[static_cast<std::size_t>(i)]);
+  return stages;
+}
+
+ordered_json events_json(const RunSummary& s) {
+  ordered_json events = ordered_json::array();
+  for (const io::RecordingEvent& e : s.events)
+    events.push_back({{"t", e.time}, {"what", e.what}, {"detail", e.detail}});
+  return events;
+}
+
+ordered_json status_json(h6Status bits) {
+  ordered_json status = ordered_json::array();
+  for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
+    if (bits & bit) status.push_back(h6StatusName(bit));
+  return status;
+}
+
+ordered_json assets_json(const io::LoadedScene& loaded) {
+  ordered_json assets = ordered_json::array();
+  for (const io::LoadedAsset& a : loaded.assets) {
+    ordered_json asset{{"body", a.body},
+                       {"kind", a.is_field ? "field" : "shell"},
+                       {"from_cache", a.from_cache},
+                       {"rebuilt", a.rebuilt},
+                       {"seconds", a.seconds},
+                       {"hash", a.hash}};
+    if (a.is_field)
+      asset.update({{"voxel_size", a.voxel_size}, {"dims", a.nodes}, {"bricks", a.bricks}});
+    else
+      asset.update({{"points", a.points}, {"levels", a.levels}});
+    assets.push_back(asset);
+  }
+  return assets;
+}
+
+}  // namespace
+
+ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool virtual_time) {
+  const double scale = 1 / io::metres(loaded.scene.unit);
+  char hash[20];
+  std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(s.state_hash));
+  ordered_json json{
+      {"scene", loaded.scene.name},
+      {"method", s.method},
+      {"units", io::unit_name(loaded.scene.unit)},
+      {"virtual_time", virtual_time},
+      {"frames", s.loop.frames},
+      {"contacts", {{"mean", s.contacts_mean}, {"max", s.contacts_max}}},
+      {"max_depth_voxels", s.max_depth_voxels},
+      {"verdict", io::verdict_name(s.verdict)},
+      {"frame_us", spread(s.frame_us)},
+      {"stage_us", stages_json(s)},
+      {"wakeup_us", spread(s.wakeup_us)},
+      {"deadline",
+       {{"missed_compute", s.loop.late_compute},
+        {"missed_wakeup", s.loop.late_wakeup},
+        {"missed_stolen", s.loop.late_stolen},
+        {"late_us", late_json(s.loop)}}},
+      {"coarse",
+       {{"frames", s.loop.coarse_frames}, {"missed_depth_voxels", s.missed_depth_voxels}}},
+      {"final_pose", pose_json(s.final_pose, scale)},
+      {"hand_pose", pose_json(s.hand_pose, scale)},
+      {"max_force", s.max_force},
+      {"max_torque", s.max_torque},
+      {"status_bits", s.loop.status},
+      {"status", status_json(s.loop.status)},
+      {"fault", h6CauseName(s.loop.fault)},
+      {"safety", safety_json(s.loop, loaded.hands.size())},
+      {"watchdog_trips", s.loop.watchdog_trips},
+      {"state_hash", hash},
+      {"records_lost", s.loop.ring_overruns},
+      {"simd_target", kernels::target_name()},
+      {"realtime", s.loop.granted},
+      {"granted", grant_json(s.loop.grant)},
+      {"assets", assets_json(loaded)},
+      {"events", events_json(s)},
+      {"events_dropped", s.events_dropped},
+      {"interrupted", s.interrupted}};
+  if (loaded.scene.net_stiffness) json["net_stiffness"] = {{"max", s.net_stiffness_max}};
+  if (!s.recording.empty()) json["recording"] = s.recording;
+  return json;
+}
+
+}  // namespace h6::cli

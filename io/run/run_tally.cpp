@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// run_tally.cpp - sums a run up, frame by frame.
+#include "io/run/run_tally.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "hapsix/vector.h"
+
+namespace h6::cli {
+namespace {
+
+constexpr double kLate = 0.2;  // the verdict's own window [s]
+
+// The centre of mass of the body that the first hand holds.
+h6Vec3 watched_com(const io::LoadedScene& loaded) {
+  return loaded.hands.empty() ? h6Vec3{}
+                              : loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com;
+}
+
+}  // namespace
+
+RunTally::RunTally(const io::LoadedScene& loaded, double rate, double duration)
+    : verdict_(loaded.scene.verdict, loaded.watched_points, watched_com(loaded), rate),
+      late_from_(duration - kLate) {}
+
+void RunTally::frame(const h6FrameRecord& r, const h6Vec3& contact_force) {
+  const h6FrameReport& f = r.report;
+  const auto most = [](auto& value, auto candidate) { value = std::max(value, candidate); };
+  ++out_.frames;
+  out_.status |= f.status;
+  contacts_ += f.contacts;
+  touching_ += f.contacts > 0;
+  most(out_.contacts_max, f.contacts);
+  most(out_.max_depth_voxels, f.max_depth_voxels);
+  most(out_.missed_depth_voxels, f.missed_depth_voxels);
+  most(out_.net_stiffness_max, f.net_stiffness_max);
+  most(out_.force_jump, norm(contact_force - contact_force_));
+  contact_force_ = contact_force;
+  for (const h6DeviceCommand& c : r.command) {
+    most(out_.max_force, norm(c.wrench.force));
+    most(out_.max_torque, norm(c.wrench.torque));
+  }
+  times_.frame_us.add(f.frame_us);
+  times_.wakeup_us.add(r.wakeup_us);
+  for (std::size_t s = 0; s < H6_STAGE_COUNT; ++s) times_.stage_us[s].add(f.stage_us[s]);
+  out_.final_depth_voxels = f.max_depth_voxels;
+  out_.final_pose = r.body[0].pose;
+  out_.hand_pose = r.hand[0].pose;
+  out_.state_hash = f.state_hash;
+  if (r.time >= late_from_) late_frame(r);
+  verdict_.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
+                 (f.status & H6_STATE_NOT_FINITE) == 0);
+}
+
+void RunTally::late_frame(const h6FrameRecord& r) {
+  const double speed = norm(r.body[0].velocity.linear);
+  late_speed2_ += speed * speed, ++late_;
+  late_low_ = std::min(late_low_, r.report.max_depth_voxels);
+  late_high_ = std::max(late_high_, r.report.max_depth_voxels);
+}
+
+RunTotals RunTally::totals() const {
+  RunTotals out = out_;
+  out.verdict = verdict_.verdict();
+  if (out.frames) out.contacts_mean = contacts_ / static_cast<double>(out.frames);
+  if (touching_) out.touching_contacts_mean = contacts_ / static_cast<double>(touching_);
+  if (late_) {
+    out.late_speed = std::sqrt(late_speed2_ / static_cast<double>(late_));
+    out.late_depth_swing = late_high_ - late_low_;
+  }
+  return out;
+}
+
+}  // namespace h6::cli

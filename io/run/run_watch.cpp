@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// run_watch.cpp - what is made of a live run's stream of frames.
+#include "io/run/run_watch.h"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace h6::cli {
+namespace {
+
+constexpr std::size_t kStripBins = 60, kMostEvents = 1000;
+
+}  // namespace
+
+RunWatch::RunWatch(const io::LoadedScene& loaded, double rate, RunSummary& summary,
+                   io::Recorder* recorder)
+    : summary_(summary),
+      recorder_(recorder),
+      tally_(loaded, rate, summary.seconds),
+      hands_(loaded.hands.size()) {
+  summary_.depth_strip.assign(kStripBins, 0);
+  last_state_.fill(H6_ACTIVE);  // a device that is active from the start is no event
+}
+
+Outcome RunWatch::rows(const h6FrameRecord* rows, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) row(rows[i]);
+  return recorder_ ? recorder_->frames(rows, count) : Outcome(Done{});
+}
+
+void RunWatch::note(const std::string& what, const std::string& detail) {
+  event({last_time_, what, "after frame " + std::to_string(frames_) + ": " + detail});
+}
+
+void RunWatch::finish() {
+  if (summary_.interrupted)
+    event({last_time_, "interrupted", "by the user; every device was told to stop"});
+  static_cast<RunTotals&>(summary_) = tally_.totals();
+  static_cast<RunTimes&>(summary_) = tally_.times();
+}
+
+void RunWatch::row(const h6FrameRecord& r) {
+  ++frames_;
+  tally_.frame(r);
+  const auto bin = static_cast<std::size_t>(kStripBins * r.time / summary_.seconds);
+  if (bin < kStripBins)
+    summary_.depth_strip[bin] =
+        std::max(summary_.depth_strip[bin], static_cast<float>(r.report.max_depth_voxels));
+  note_changes(r);
+  last_time_ = r.time;
+}
+
+// An event when a status bit or a cause comes up, not while it stays. Status bits that the safety
+// chain sets are left out: its causes say more, and name the hand. So are late frames, which have
+// an event each.
+void RunWatch::note_changes(const h6FrameRecord& r) {
+  const h6Status status =
+      r.report.status &
+      ~static_cast<h6Status>(H6_COUPLING_SATURATED | H6_OUTPUT_CLAMPED | H6_OUTPUT_SLEWED |
+                             H6_OUTPUT_FAULT | H6_DEVICE_LOST | H6_LATE);
+  const std::string frame = "frame " + std::to_string(r.report.frame);
+  for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
+    if ((status & bit) && !(last_status_ & bit)) event({r.time, h6StatusName(bit), frame});
+  last_status_ = status;
+  if (r.late) note_late(r);
+  for (std::size_t h = 0; h < hands_; ++h) note_hand(r, h, frame);
+}
+
+void RunWatch::note_late(const h6FrameRecord& r) {
+  const char* cause = r.late & H6_LATE_COMPUTE  ? "late: own computation"
+                      : r.late & H6_LATE_STOLEN ? "late: stolen"
+                                                : "late: wake-up";
+  char detail[160];
+  std::snprintf(detail, sizeof detail,
+                "frame %llu ended %.0f us after its deadline: began %.0f us late, used %.0f us",
+                static_cast<unsigned long long>(r.report.frame), r.late_us, r.wakeup_us, r.cpu_us);
+  event({r.time, cause, detail});
+}
+
+void RunWatch::note_hand(const h6FrameRecord& r, std::size_t h, const std::string& frame) {
+  const std::string hand = "hand " + std::to_string(h) + ", " + frame;
+  const std::uint32_t causes = r.command[h].causes, fresh = causes & ~last_causes_[h];
+  for (int c = 1; c < H6_CAUSE_COUNT; ++c)
+    if (fresh >> c & 1u) event({r.time, h6CauseName(static_cast<h6Cause>(c)), hand});
+  last_causes_[h] = causes;
+  if (r.state[h] == last_state_[h]) return;
+  const std::string was = h6DeviceStateName(last_state_[h]);
+  last_state_[h] = r.state[h];
+  event({r.time, std::string("device ") + h6DeviceStateName(r.state[h]), hand + ", was " + was});
+}
+
+void RunWatch::event(const io::RecordingEvent& e) {
+  if (summary_.events.size() < kMostEvents)
+    summary_.events.push_back(e);
+  else
+    ++summary_.events_dropped;
+  if (recorder_) (void)recorder_->event(e);
+}
+
+}  // namespace h6::cli

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// run_watch.h - what is made of a live run's stream of frames: its tally, its events, its
+// recording.
+#pragma once
+#include <array>
+#include <string>
+
+#include "io/run/run_scene.h"
+#include "io/run/run_tally.h"
+
+namespace h6::cli {
+
+class RunWatch {
+ public:
+  // Fills `summary`. `recorder` may be null.
+  RunWatch(const io::LoadedScene& loaded, double rate, RunSummary& summary, io::Recorder* recorder);
+  Outcome rows(const h6FrameRecord* rows, std::size_t count);
+  // An event that the frames themselves do not show.
+  void note(const std::string& what, const std::string& detail);
+  void finish();
+
+ private:
+  void row(const h6FrameRecord& record);
+  void note_changes(const h6FrameRecord& record);
+  void note_late(const h6FrameRecord& record);
+  void note_hand(const h6FrameRecord& record, std::size_t hand, const std::string& frame);
+  void event(const io::RecordingEvent& event);
+
+  RunSummary& summary_;
+  io::Recorder* recorder_;
+  RunTally tally_;
+  std::size_t hands_;
+  std::uint64_t frames_ = 0;
+  double last_time_ = 0;
+  h6Status last_status_ = 0;
+  std::array<std::uint32_t, H6_MAX_HANDS> last_causes_{};
+  std::array<h6DeviceState, H6_MAX_HANDS> last_state_{};
+};
+
+}  // namespace h6::cli
