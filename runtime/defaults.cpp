@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// defaults.cpp - start values of every definition (METHOD.md, Sec. 4) and names of every
-// enumeration.
+// defaults.cpp - default definitions, from the rows of settings, and the names of enumerations.
 #include <cstring>
 
 #include "hapsix/hapsix.h"
+#include "runtime/settings/engine_settings.h"
 
 namespace {
-constexpr const char* kMethods[H6_METHOD_COUNT] = {"none",   "global", "cluster", "gauss3",
-                                                   "gauss6", "robust", "series"};
 constexpr const char* kStages[H6_STAGE_COUNT] = {"traverse", "contacts",  "weights", "wrench",
                                                  "coupling", "integrate", "output"};
 constexpr const char* kCauses[H6_CAUSE_COUNT] = {
@@ -20,14 +18,14 @@ constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
     "passivity",        "coarse contacts"};
-struct Piece {
-  const char* name;
-  uint32_t bit;
-};
-constexpr Piece kPieces[] = {{"facing", H6_PIECE_FACING},     {"depth", H6_PIECE_DEPTH},
-                             {"product", H6_PIECE_PRODUCT},   {"cluster", H6_PIECE_CLUSTER},
-                             {"geodesic", H6_PIECE_GEODESIC}, {"handles", H6_PIECE_HANDLES},
-                             {"printed", H6_PIECE_PRINTED}};
+
+// The choice with that name of so many letters, or null.
+const h6::Choice* named(std::span<const h6::Choice> choices, const char* name, std::size_t length) {
+  for (const h6::Choice& c : choices)
+    if (std::strlen(c.name) == length && std::strncmp(c.name, name, length) == 0) return &c;
+  return nullptr;
+}
+
 }  // namespace
 
 extern "C" {
@@ -47,29 +45,24 @@ const char* h6DeviceStateName(h6DeviceState state) {
   return state >= 0 && state < H6_DEVICE_STATE_COUNT ? kDeviceStates[state] : nullptr;
 }
 const char* h6MethodName(h6Method method) {
-  return method >= 0 && method < H6_METHOD_COUNT ? kMethods[method] : nullptr;
+  return method >= 0 && method < H6_METHOD_COUNT ? h6::method_names()[method].name : nullptr;
 }
 
 int h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces) {
   if (!name) return -1;
   const std::size_t length = std::strcspn(name, "+");
-  int found = -1;
-  for (int i = 0; i < H6_METHOD_COUNT; ++i)
-    if (std::strlen(kMethods[i]) == length && std::strncmp(kMethods[i], name, length) == 0)
-      found = i;
-  if (found < 0) return -1;
+  const h6::Choice* const found = named(h6::method_names(), name, length);
+  if (!found) return -1;
   uint32_t bits = 0;
   for (const char* rest = name + length; *rest;) {
     ++rest;  // the '+'
     const std::size_t n = std::strcspn(rest, "+");
-    uint32_t bit = 0;
-    for (const Piece& piece : kPieces)
-      if (std::strlen(piece.name) == n && std::strncmp(piece.name, rest, n) == 0) bit = piece.bit;
-    if (!bit) return -1;
-    bits |= bit;
+    const h6::Choice* const piece = named(h6::method_pieces(), rest, n);
+    if (!piece) return -1;
+    bits |= static_cast<uint32_t>(piece->value);
     rest += n;
   }
-  if (method) *method = static_cast<h6Method>(found);
+  if (method) *method = static_cast<h6Method>(found->value);
   if (pieces) *pieces = bits;
   return 0;
 }
@@ -77,73 +70,27 @@ int h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces) {
 h6ModelDef h6DefaultModelDef(void) { return {}; }
 
 h6BodyDef h6DefaultBodyDef(void) {
-  h6BodyDef def{};
-  def.pose.q.w = 1;
-  def.mass = 0.1;
-  def.shell = -1;
-  def.field = -1;
+  h6BodyDef def = h6::default_def<h6BodyDef>(h6::body_settings());
+  def.shell = def.field = -1;
   return def;
 }
-
 h6ContactDef h6DefaultContactDef(void) {
-  h6ContactDef def{};
-  def.method = H6_METHOD_ROBUST;
-  def.stiffness = 1e4;
-  def.damping = 1e-3;
-  def.global_n0 = 10;
-  def.epsilon = 0.01;
-  def.epsilon_normal = 0.05;
-  def.epsilon_torque = 1;
-  def.series_c = 4;
-  def.margin_voxels = 0.5;
-  def.cluster_voxels = 0.5;
-  return def;
+  return h6::default_def<h6ContactDef>(h6::contact_settings());
 }
-
 h6CouplingDef h6DefaultCouplingDef(void) {
-  h6CouplingDef def{};
-  def.stiffness = 1e3;
-  def.damping_ratio = 1;
-  def.max_depth_voxels = 0.5;
-  def.max_step_voxels = 0.5;
-  return def;
+  return h6::default_def<h6CouplingDef>(h6::coupling_settings());
 }
-
-h6SafetyDef h6DefaultSafetyDef(void) {
-  h6SafetyDef def{};
-  def.soft_start = 0.1;
-  def.decay_time = 0.02;
-  def.pose_jump = 0.02;
-  return def;
-}
-
+h6SafetyDef h6DefaultSafetyDef(void) { return h6::default_def<h6SafetyDef>(h6::safety_settings()); }
 h6HandDef h6DefaultHandDef(void) {
-  h6HandDef def{};
-  def.mode = H6_IMPEDANCE;
+  h6HandDef def = h6::default_def<h6HandDef>(h6::hand_settings());
   def.coupling = h6DefaultCouplingDef();
-  def.filter.motion_scale = def.filter.rotation_scale = def.filter.force_scale = 1;
-  def.manipulandum_mass = 0.1;
-  def.safety = h6DefaultSafetyDef();
   return def;
 }
-
 h6SessionDef h6DefaultSessionDef(void) {
-  h6SessionDef def{};
+  h6SessionDef def = h6::default_def<h6SessionDef>(h6::session_settings());
   def.contact = h6DefaultContactDef();
-  def.integrator = H6_IMPLICIT;
-  def.gradient = H6_SYMMETRIC;
-  def.rate = 1000;
-  def.max_contacts = 16384;
-  def.threads = 1;
   return def;
 }
-
-h6LoopDef h6DefaultLoopDef(void) {
-  h6LoopDef def{};
-  def.realtime = true;
-  def.core = -1;
-  def.ring_frames = 1000;
-  return def;
-}
+h6LoopDef h6DefaultLoopDef(void) { return h6::default_def<h6LoopDef>(h6::loop_settings()); }
 
 }  // extern "C"

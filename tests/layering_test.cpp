@@ -38,15 +38,17 @@ const Rooms& below() {
 
     room("runtime/base", {"contract"});
     room("runtime/model", {"contract", "kernels", "kernels/field", "sched", "runtime/base"});
+    room("runtime/settings", {"contract", "runtime/model"});
     room("runtime/hand", {"contract", "runtime/base"});
     room("runtime/contact", {"contract", "kernels", "kernels/contact", "kernels/weights", "sched",
                              "runtime/base", "runtime/model"});
     room("runtime/motion", {"contract", "runtime/base", "runtime/hand", "runtime/contact"});
-    room("runtime/frame", {"contract", "sched", "runtime/base", "runtime/model", "runtime/contact",
-                           "runtime/motion"});
-    room("runtime/loop", {"contract", "sched", "runtime/base", "runtime/hand", "runtime/frame"});
-    room("runtime",
-         {"contract", "kernels", "kernels/contact", "sched", "runtime/contact", "runtime/frame"});
+    room("runtime/frame", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/model",
+                           "runtime/contact", "runtime/motion"});
+    room("runtime/loop", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/hand",
+                          "runtime/frame"});
+    room("runtime", {"contract", "kernels", "kernels/contact", "sched", "runtime/settings",
+                     "runtime/contact", "runtime/frame"});
 
     room("device", {"contract", "sched"});
 
@@ -58,8 +60,8 @@ const Rooms& below() {
     room("io/shell", {"contract", "sched", "io/file", "io/mesh", "io/field", "io/bake"});
     room("io/check", {"contract", "sched", "kernels", "kernels/field", "kernels/bake", "io/file",
                       "io/mesh", "io/field"});
-    room("io/scene",
-         {"contract", "sched", "io/file", "io/mesh", "io/field", "io/bake", "io/shell"});
+    room("io/scene", {"contract", "sched", "runtime/settings", "io/file", "io/mesh", "io/field",
+                      "io/bake", "io/shell"});
     room("io/scenes", {"contract", "io/file", "io/mesh", "io/shell", "io/scene"});
     room("io/scenes/paper", {"contract", "io/file", "io/mesh", "io/scene", "io/scenes"});
     room("io/scenes/industrial", {"contract", "io/file", "io/mesh", "io/scene", "io/scenes"});

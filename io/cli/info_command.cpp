@@ -244,7 +244,7 @@ void add_info(CLI::App& app, Program& program) {
   CLI::App* info =
       app.add_subcommand("info", "What a file is: mesh, field, shell, scene, path or recording");
   auto file = std::make_shared<std::string>(), units = std::make_shared<std::string>("m");
-  auto schema = std::make_shared<bool>(false);
+  auto schema = std::make_shared<bool>(false), settings = std::make_shared<bool>(false);
   auto* option =
       info->add_option("FILE", *file,
                        "STL, OBJ, PLY, glTF, COLLADA (also .gz), .vdb, .json, .csv or .h5")
@@ -254,15 +254,21 @@ void add_info(CLI::App& app, Program& program) {
       ->check(one_of({"m", "mm", "cm", "in"}));
   info->add_flag("--schema", *schema, "Print the JSON schema of scene files, every key explained")
       ->excludes(option);
-  info->callback([&program, file, units, schema] {
-    program.work = [&program, file, units, schema] {
+  info->add_flag("--settings", *settings, "Print the page runtime/SETTINGS.md: every setting")
+      ->excludes(option);
+  info->callback([&program, file, units, schema, settings] {
+    program.work = [&program, file, units, schema, settings] {
       if (*schema) {
         std::printf("%s\n", io::scene_schema().c_str());
         return kOk;
       }
+      if (*settings) {
+        std::printf("%s", io::settings_page().c_str());
+        return kOk;
+      }
       if (file->empty())
         return program.console.fail(
-            "info needs a FILE, or --schema; 'hapsix info --help' tells more", kUsage);
+            "info needs a FILE, --schema or --settings; 'hapsix info --help' tells more", kUsage);
       return info_command(program.console, *file, *units);
     };
   });

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// hands.cpp - opens the devices of a scene's hands.
 #include "io/run/hands.h"
 
 #include "device/simulated_arm.h"
@@ -28,7 +29,7 @@ device::ArmFigures arm_figures(const io::SceneHand& hand, const h6CouplingDef& c
   device::ArmFigures to;
   to.mass = from.mass, to.inertia = from.inertia;
   to.damping = from.damping, to.rotational_damping = from.rotational_damping;
-  to.workspace_min = from.workspace_min, to.workspace_max = from.workspace_max;
+  to.workspace_min = from.workspace.low, to.workspace_max = from.workspace.high;
   to.stop_stiffness = from.stop_stiffness;
   to.max_force = from.max_force, to.max_torque = from.max_torque;
   to.max_velocity = from.max_velocity;
@@ -37,7 +38,7 @@ device::ArmFigures arm_figures(const io::SceneHand& hand, const h6CouplingDef& c
   to.exact_velocity = from.exact_velocity, to.velocity_filter = from.velocity_filter;
   to.delay_frames = from.delay_frames;
   to.servo_frequency = from.servo_frequency;
-  if (hand.def.driver_stiffness > 0) {  // what the engine knows of the driver is true
+  if (hand.def.driver_stiffness > 0) {  // 0: the engine does not know the driver
     to.driver_stiffness = hand.def.driver_stiffness;
     to.driver_damping = hand.def.driver_damping;
   }
@@ -83,7 +84,7 @@ Outcome open_hand(const io::SceneHand& hand, const h6BodyDef& body, const h6Coup
   DevicePlace place;
   place.path = hand_path(hand, body.pose, std::move(steering));
   place.home = body.pose;
-  // A body that never turns hangs on the origin of its mesh frame.
+  // A body that never turns is held at the origin of its mesh frame.
   place.grip = body.translation_only ? h6Vec3{} : body.com;
   place.unit = unit;
   if (hand.device == "arm") return open_arm(hand, std::move(place), coupling, out);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hands.h - the devices of a scene's hands, by name.
+// hands.h - opens the devices of a scene's hands.
 #pragma once
 #include <memory>
 #include <string>
@@ -12,17 +12,17 @@
 
 namespace h6::cli {
 
-// Devices and what they live in.
+// The devices of a run and the objects that own them.
 struct Hands {
   std::vector<h6Device> devices;
   std::vector<std::shared_ptr<void>> alive;
-  std::string real_time;  // a device that lives on the machine's clock; empty: none
+  std::string real_time;  // name of a device that follows the machine's clock; empty: none
 };
 
-// Opens what `hands` names (open_device.h), one for each hand of the session, and tells the session
-// their ratings. The device `arm` is in the mode of `def` and has the figures of `arm`.
-// `hands` are the scene's, changed at will; their `def` must be what the session was made of.
-// `steering` may take the first hand off its path.
+// Opens the device that each of `hands` names (open_device.h) and tells the session its ratings.
+// The device `arm` takes its mode from `def` and its figures from `arm`. `hands` may differ from
+// the scene's, but each `def` must be the one that the session was made with. `steering` may take
+// the first hand off its path.
 Result<Hands> open_hands(const io::LoadedScene& loaded, const std::vector<io::SceneHand>& hands,
                          h6Session* session, std::shared_ptr<device::Steering> steering = nullptr);
 

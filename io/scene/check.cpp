@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// check.cpp - a scene file's JSON against the table of keys.
+// check.cpp - a scene file's JSON against the rows of settings.
 #include "io/scene/check.h"
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <sstream>
+
+#include "io/mesh/mesh_file.h"
+#include "io/scene/setting_text.h"
 
 namespace h6::io {
 
@@ -19,19 +21,11 @@ std::string inside(const std::string& path, const std::string& key) {
   return path.empty() ? key : path + "." + key;
 }
 
-std::string number_text(double value) {
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
-  out.precision(10);
-  out << value;
-  return out.str();
-}
-
 namespace {
 
 using Json = nlohmann::json;
 
-// Edits (insert, drop, change a letter) that turn one word into the other.
+// How many edits (insert, drop or change a letter) turn one word into the other.
 std::size_t edits_between(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -47,38 +41,66 @@ std::size_t edits_between(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-std::string nearest_key(const SceneKeys& keys, const std::string& name) {
-  const SceneKey* best = keys.begin();
+std::string nearest_key(const Settings& rows, const std::string& name) {
+  const char* best = "";
   std::size_t fewest = static_cast<std::size_t>(-1);
-  for (const SceneKey& key : keys) {
-    const std::size_t edits = edits_between(name, key.name);
-    if (edits < fewest) fewest = edits, best = &key;
-  }
-  return best->name;
+  each_setting(rows, nullptr, [&](const Setting& row, const void*) {
+    const std::size_t edits = edits_between(name, row.name);
+    if (edits < fewest) fewest = edits, best = row.name;
+  });
+  return best;
 }
 
-std::string range_text(const SceneKey& key) {
-  const std::string low = (key.above_low ? "above " : "at least ") + number_text(key.low);
-  const std::string high = "at most " + number_text(key.high);
-  if (key.high == kNoLimit) return low;
-  return key.low == -kNoLimit ? high : low + " and " + high;
+// The range of a number as it stands in a file, where one unit is `scale` metres.
+Range range_in_file(const Setting& row, double scale) {
+  Range r = row.range;
+  if (row.is_length()) r.low /= scale, r.high /= scale, r.file_high = kFarthest;
+  r.high = std::min(r.high, r.file_high);
+  if (row.kind == SettingKind::vec3 || row.kind == SettingKind::corners) r.low = -r.high;
+  return r;
 }
 
-void check_number(const Json& value, const SceneKey& key, const std::string& at) {
+std::string range_text(const Range& r) {
+  const std::string low = (r.above_low ? "above " : "at least ") + number_text(r.low);
+  const std::string high = "at most " + number_text(r.high);
+  if (r.high == kNoLimit) return low;
+  return r.low == -kNoLimit ? high : low + " and " + high;
+}
+
+class SceneCheck {
+ public:
+  explicit SceneCheck(double scale) : scale_(scale) {}
+
+  void keys(const Json& value, const Settings& rows, const std::string& at) const;
+
+ private:
+  void value(const Json& value, const Setting& row, const std::string& at) const;
+  void number(const Json& value, const Setting& row, const std::string& at) const;
+  void numbers(const Json& value, std::size_t count, const Setting& row,
+               const std::string& at) const;
+  void quaternion(const Json& value, const Setting& row, const std::string& at) const;
+  void inertia(const Json& value, const Setting& row, const std::string& at) const;
+  void corners(const Json& value, const Setting& row, const std::string& at) const;
+  void list(const Json& value, const Setting& row, const std::string& at) const;
+
+  double scale_;  // metres in one unit of the file
+};
+
+void SceneCheck::number(const Json& value, const Setting& row, const std::string& at) const {
   if (!value.is_number()) throw Complaint{at, "must be a number"};
   const double x = value.get<double>();
-  const bool whole = key.kind != KeyKind::whole || std::floor(x) == x;
-  if (!whole) throw Complaint{at, "must be a whole number"};
-  const bool in_range = (key.above_low ? x > key.low : x >= key.low) && x <= key.high;
-  if (!in_range) throw Complaint{at, "is " + number_text(x) + " but must be " + range_text(key)};
+  if (row.kind == SettingKind::whole && std::floor(x) != x)
+    throw Complaint{at, "must be a whole number"};
+  const Range r = range_in_file(row, scale_);
+  const bool in_range = (r.above_low ? x > r.low : x >= r.low) && x <= r.high;
+  if (!in_range) throw Complaint{at, "is " + number_text(x) + " but must be " + range_text(r)};
 }
 
-void check_numbers(const Json& value, std::size_t count, const SceneKey& key,
-                   const std::string& at) {
+void SceneCheck::numbers(const Json& value, std::size_t count, const Setting& row,
+                         const std::string& at) const {
   if (!value.is_array() || value.size() != count)
     throw Complaint{at, "must be a list of " + std::to_string(count) + " numbers"};
-  for (std::size_t i = 0; i < count; ++i)
-    check_number(value[i], key, at + "[" + std::to_string(i) + "]");
+  for (std::size_t i = 0; i < count; ++i) number(value[i], row, at + "[" + std::to_string(i) + "]");
 }
 
 void check_text(const Json& value, const std::string& at) {
@@ -89,14 +111,12 @@ void check_text(const Json& value, const std::string& at) {
     if (static_cast<unsigned char>(c) < ' ') throw Complaint{at, "holds a control character"};
 }
 
-void check_choice(const Json& value, const SceneKey& key, const std::string& at) {
-  const std::string all = std::string("|") + key.choices + "|";
-  const std::string name = value.is_string() ? value.get<std::string>() : "";
-  if (!name.empty() && name.find('|') == std::string::npos &&
-      all.find("|" + name + "|") != std::string::npos)
-    return;
-  std::string known = key.choices;
-  for (std::size_t bar; (bar = known.find('|')) != std::string::npos;) known.replace(bar, 1, ", ");
+void check_choice(const Json& value, const Setting& row, const std::string& at) {
+  std::string known;
+  for (const Choice& c : row.choices) {
+    if (value == c.name) return;
+    known += (known.empty() ? "" : ", ") + std::string(c.name);
+  }
   throw Complaint{at, "must be one of: " + known};
 }
 
@@ -112,8 +132,8 @@ void check_method(const Json& value, const std::string& at) {
                         "series, and with pieces: gauss3+facing+depth, robust+cluster"};
 }
 
-void check_quaternion(const Json& value, const SceneKey& key, const std::string& at) {
-  check_numbers(value, 4, key, at);
+void SceneCheck::quaternion(const Json& value, const Setting& row, const std::string& at) const {
+  numbers(value, 4, row, at);
   double norm2 = 0;
   for (const Json& x : value) norm2 += x.get<double>() * x.get<double>();
   if (!(std::abs(std::sqrt(norm2) - 1) <= 1e-3))
@@ -121,9 +141,9 @@ void check_quaternion(const Json& value, const SceneKey& key, const std::string&
                             number_text(std::sqrt(norm2)) + ")"};
 }
 
-// A real body's tensor: Sylvester's criterion on xx yy zz xy xz yz.
-void check_inertia(const Json& value, const SceneKey& key, const std::string& at) {
-  check_numbers(value, 6, key, at);
+// Positive definite by Sylvester's criterion, on xx yy zz xy xz yz.
+void SceneCheck::inertia(const Json& value, const Setting& row, const std::string& at) const {
+  numbers(value, 6, row, at);
   double i[6];
   for (int n = 0; n < 6; ++n) i[n] = value[n].get<double>();
   const double minor2 = i[0] * i[1] - i[3] * i[3];
@@ -133,83 +153,83 @@ void check_inertia(const Json& value, const SceneKey& key, const std::string& at
     throw Complaint{at, "is not positive definite (xx yy zz xy xz yz)"};
 }
 
-void check(const Json& value, const SceneKey& key, const std::string& at);
-
-void check_keys(const Json& value, const SceneKeys& keys, const std::string& at) {
-  if (!value.is_object()) throw Complaint{at, "must be an object { ... }"};
-  for (const auto& [name, item] : value.items()) {
-    const auto key = std::find_if(keys.begin(), keys.end(),
-                                  [&, &n = name](const SceneKey& k) { return n == k.name; });
-    if (key == keys.end())
-      throw Complaint{inside(at, shown(name)), "no such key; the nearest known one is \"" +
-                                                   nearest_key(keys, shown(name)) + "\""};
-    check(item, *key, inside(at, name));
-  }
-  for (const SceneKey& key : keys)
-    if (key.required && !value.contains(key.name))
-      throw Complaint{inside(at, key.name), std::string("is missing (") + key.about + ")"};
-}
-
-void check_corners(const Json& value, const SceneKey& key, const std::string& at) {
+void SceneCheck::corners(const Json& value, const Setting& row, const std::string& at) const {
   if (!value.is_array() || value.size() != 2)
     throw Complaint{at, "must be two corners [[x,y,z],[x,y,z]]"};
-  for (int i = 0; i < 2; ++i) check_numbers(value[i], 3, key, at + "[" + std::to_string(i) + "]");
+  for (int i = 0; i < 2; ++i) numbers(value[i], 3, row, at + "[" + std::to_string(i) + "]");
   for (int axis = 0; axis < 3; ++axis)
     if (!(value[0][axis].get<double>() < value[1][axis].get<double>()))
       throw Complaint{at, "the first corner must be lower than the second on every axis"};
 }
 
-void check_list(const Json& value, const SceneKey& key, const std::string& at) {
+void SceneCheck::list(const Json& value, const Setting& row, const std::string& at) const {
   if (!value.is_array()) throw Complaint{at, "must be a list [ ... ]"};
   const auto count = static_cast<double>(value.size());
-  if (count < key.low) throw Complaint{at, "must not be empty"};
-  if (count > key.high)
-    throw Complaint{at, "may have " + number_text(key.high) + " entries at most"};
+  if (count < row.range.low) throw Complaint{at, "must not be empty"};
+  if (count > row.range.high)
+    throw Complaint{at, "may have " + number_text(row.range.high) + " entries at most"};
   for (std::size_t i = 0; i < value.size(); ++i)
-    check_keys(value[i], *key.keys, at + "[" + std::to_string(i) + "]");
+    keys(value[i], *row.inside, at + "[" + std::to_string(i) + "]");
 }
 
-void check(const Json& value, const SceneKey& key, const std::string& at) {
-  switch (key.kind) {
-    case KeyKind::boolean:
+void SceneCheck::value(const Json& value, const Setting& row, const std::string& at) const {
+  switch (row.kind) {
+    case SettingKind::boolean:
       if (!value.is_boolean()) throw Complaint{at, "must be true or false"};
-      break;
-    case KeyKind::number:
-    case KeyKind::whole:
-      check_number(value, key, at);
-      break;
-    case KeyKind::text:
-      check_text(value, at);
-      break;
-    case KeyKind::choice:
-      check_choice(value, key, at);
-      break;
-    case KeyKind::method:
-      check_method(value, at);
-      break;
-    case KeyKind::vec3:
-      check_numbers(value, 3, key, at);
-      break;
-    case KeyKind::inertia:
-      check_inertia(value, key, at);
-      break;
-    case KeyKind::quaternion:
-      check_quaternion(value, key, at);
-      break;
-    case KeyKind::corners:
-      check_corners(value, key, at);
-      break;
-    case KeyKind::object:
-      check_keys(value, *key.keys, at);
-      break;
-    case KeyKind::list:
-      check_list(value, key, at);
-      break;
+      return;
+    case SettingKind::number:
+    case SettingKind::whole:
+      return number(value, row, at);
+    case SettingKind::text:
+      return check_text(value, at);
+    case SettingKind::choice:
+      return check_choice(value, row, at);
+    case SettingKind::method:
+      return check_method(value, at);
+    case SettingKind::vec3:
+      return numbers(value, 3, row, at);
+    case SettingKind::inertia:
+      return inertia(value, row, at);
+    case SettingKind::quaternion:
+      return quaternion(value, row, at);
+    case SettingKind::corners:
+      return corners(value, row, at);
+    case SettingKind::object:
+      return keys(value, *row.inside, at);
+    case SettingKind::list:
+      return list(value, row, at);
   }
+}
+
+void SceneCheck::keys(const Json& object, const Settings& rows, const std::string& at) const {
+  if (!object.is_object()) throw Complaint{at, "must be an object { ... }"};
+  for (const auto& [name, item] : object.items()) {
+    const Setting* known = nullptr;
+    each_setting(rows, nullptr, [&, &n = name](const Setting& row, const void*) {
+      if (n == row.name) known = &row;
+    });
+    if (!known)
+      throw Complaint{inside(at, shown(name)), "no such key; the nearest known one is \"" +
+                                                   nearest_key(rows, shown(name)) + "\""};
+    value(item, *known, inside(at, name));
+  }
+  each_setting(rows, nullptr, [&](const Setting& row, const void*) {
+    if (row.required && !object.contains(row.name))
+      throw Complaint{inside(at, row.name), std::string("is missing (") + row.about + ")"};
+    if (row.replaces && object.contains(row.name) && object.contains(row.replaces))
+      throw Complaint{inside(at, row.name),
+                      std::string("stands beside \"") + row.replaces + "\"; give one of them"};
+  });
 }
 
 }  // namespace
 
-void check_scene_json(const Json& value) { check_keys(value, scene_keys(), ""); }
+void check_scene_json(const Json& root) {
+  double scale = 1;
+  if (root.is_object() && root.contains("units") && root["units"].is_string())
+    if (const Result<Unit> unit = unit_from_name(root["units"].get<std::string>()); unit)
+      scale = metres(*unit);
+  SceneCheck(scale).keys(root, scene_settings(), "");
+}
 
 }  // namespace h6::io

@@ -24,7 +24,7 @@ std::array<double, 6> outer(double x, double y, double z) {
 std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
   const MeshAudit found = audit(mesh);
   if (!found.closed || found.flipped_edges > 0 || found.duplicates > 0) return std::nullopt;
-  // About the middle of the box, so that parts far from their origin keep their digits.
+  // About the middle of the bounding box: parts far from their origin keep their digits.
   const Vec3 o{(found.low.x + found.high.x) / 2, (found.low.y + found.high.y) / 2,
                (found.low.z + found.high.z) / 2};
   double volume = 0;
@@ -52,7 +52,7 @@ std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
   }
   const double diagonal = std::hypot(found.high.x - found.low.x, found.high.y - found.low.y,
                                      found.high.z - found.low.z);
-  // A sheet folded onto itself is closed too, but has nothing inside.
+  // A sheet that is folded onto itself is closed too, but encloses nothing.
   if (!(std::fabs(volume) > 1e-9 * diagonal * diagonal * diagonal)) return std::nullopt;
   const double density = mass / volume;  // negative when wound inside out: signs cancel
   const Vec3 c{first.x / volume, first.y / volume, first.z / volume};

@@ -14,11 +14,11 @@ struct MassProperties {
   std::array<double, 6> inertia;  // xx yy zz xy xz yz about com, mesh axes [kg m^2]
 };
 
-// A uniform solid of this mass, when the mesh encloses a volume: closed, consistently wound (either
-// way). Nothing otherwise.
+// As a uniform solid of this mass [kg]. Only for a mesh that encloses a volume: closed, and wound
+// consistently, inwards or outwards.
 std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass);
 
-// Each point an equal share of the mass. For soups, and shells without a mesh.
+// Each point has an equal share of the mass. For soups, and for shells without a mesh.
 MassProperties shell_mass(const ShellData& shell, double mass);
 
 }  // namespace h6::io

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// path_file.cpp - hand paths: CSV in and out, and where a path is at a time.
+// path_file.cpp - reads, writes and samples hand paths (CSV).
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -32,7 +32,7 @@ bool parse_number(std::string_view text, double& out) {
   return error == std::errc{} && end == text.data() + text.size() && std::isfinite(out);
 }
 
-// Eight numbers, or a complaint.
+// Reads eight numbers; returns what is wrong, or nothing.
 std::string parse_row(std::string_view line, double (&row)[8]) {
   std::size_t column = 0;
   for (bool more = true; more; ++column) {
@@ -60,7 +60,7 @@ std::string checked_row(const double (&row)[8], double scale, const Path& before
   return {};
 }
 
-// As few digits as bring every bit back; a decimal point whatever the locale says.
+// The shortest text that reads back to the same bits, with a decimal point in every locale.
 void put_number(std::ostream& out, double value, char after) {
   char text[40];
   char* end = std::to_chars(text, text + sizeof text - 1, value).ptr;
@@ -96,7 +96,7 @@ h6Quat slerp(const h6Quat& a, const h6Quat& b, double s) {
   return {q.w / norm, q.x / norm, q.y / norm, q.z / norm};
 }
 
-// First row later than t: a path is a segment from the row before it to it.
+// The first row later than t. At t the path is between the row before it and this one.
 Path::const_iterator row_after(const Path& path, double t) {
   return std::upper_bound(path.begin(), path.end(), t,
                           [](double time, const PathRow& row) { return time < row.t; });
@@ -124,7 +124,7 @@ Result<Path> read_path(const std::filesystem::path& file, Unit unit) {
     };
     const std::string_view row_text = trimmed(text);
     if (row_text.empty() || row_text.front() == '#') continue;
-    // Only a header's first column is the letter t: "nan" and the like are bad rows.
+    // A header is known by its first column, t. Other rows that are no numbers are errors.
     const bool header = header_possible && trimmed(row_text.substr(0, row_text.find(','))) == "t";
     header_possible = false;
     if (header) continue;

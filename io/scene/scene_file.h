@@ -5,10 +5,11 @@
 
 namespace h6::io {
 
-// A sentence naming file and place for anything wrong: no such file, not JSON (line and column), an
-// unknown or missing key (its path, "bodies[1].shell.voxels", and the nearest known key), a value
-// of the wrong kind or out of range, a body that is not there, a bad path row (file and line).
-// Relative files are looked for beside the scene file. Paths are read; meshes need only be there.
+// Whatever is wrong is told in one sentence with file and place: no such file, not JSON (line and
+// column), an unknown or missing key (its path, "bodies[1].shell.voxels", and the nearest known
+// key), a value of the wrong kind or out of range, a body that does not exist, a bad path row (file
+// and line). Relative files are looked for beside the scene file. Paths are read; meshes must
+// exist.
 Result<Scene> read_scene(const std::filesystem::path& file);
 
 // CSV `t,x,y,z,qw,qx,qy,qz`, lengths in `unit`; a header line, blank lines and # comments are
@@ -16,19 +17,21 @@ Result<Scene> read_scene(const std::filesystem::path& file);
 Result<Path> read_path(const std::filesystem::path& file, Unit unit);
 Outcome write_path(const std::filesystem::path& file, const Path& path, Unit unit);
 
-// folder/scene.json and the files it names: STL meshes and CSV paths in scene.unit, PLY shells
-// (built from the scene's points) in metres, as every baked file; files that the scene was read
-// from are copied. The folder is made when it is not there. Read back, it is the same scene.
+// Writes folder/scene.json and the files it names: STL meshes and CSV paths in scene.unit, PLY
+// shells (built from the scene's points) in metres. Files that the scene was read from are copied.
+// The folder is made where needed. Reading the result gives the same scene.
 Outcome export_scene(const Scene& scene, const std::filesystem::path& folder);
 
-// The same JSON as text, without writing any file: for the head of a recording. Files keep the
-// names they were read by.
+// The same JSON as text, for the head of a recording. No file is written; files keep the names they
+// were read by.
 std::string scene_text(const Scene& scene);
-// And back: nothing is looked for on disk, paths of hands stay empty. A scene in metres comes back
-// to the bit. `name` is for sentences.
+// Reads such a text. It touches no file, and paths of hands stay empty. A scene in metres comes
+// back to the bit. `name` stands in error sentences.
 Result<Scene> read_scene_text(const std::string& text, const std::string& name);
 
 // A JSON schema of scene files, as text.
 std::string scene_schema();
+// The page runtime/SETTINGS.md: every setting of scene files and of the engine.
+std::string settings_page();
 
 }  // namespace h6::io

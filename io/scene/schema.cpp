@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// schema.cpp - the JSON schema of scene files, printed from the one table of keys.
+// schema.cpp - the JSON schema of scene files, from the rows of settings.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "io/scene/keys.h"
 #include "io/scene/scene_file.h"
+#include "io/scene/scene_settings.h"
+#include "io/scene/setting_text.h"
 
 namespace h6::io {
 namespace {
 
-using Kind = KeyKind;
+using Kind = SettingKind;
 using Json = nlohmann::ordered_json;
 
 Json numbers(std::size_t count) {
@@ -17,44 +18,50 @@ Json numbers(std::size_t count) {
       {"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", count}, {"maxItems", count}};
 }
 
-Json schema_of(const SceneKeys& keys);
+Json schema_of(const Settings& rows);
 
-Json choices_of(const SceneKey& key) {
-  Json names = Json::array();
-  const std::string all = key.choices;
-  for (std::size_t at = 0; at <= all.size();) {
-    const std::size_t end = std::min(all.find('|', at), all.size());
-    names.push_back(all.substr(at, end - at));
-    at = end + 1;
-  }
-  return names;
+// Limits that hold whatever the scene's unit is; a length with bounds in metres has none.
+void add_limits(const Setting& row, Json& out) {
+  const Range& r = row.range;
+  if (row.is_length() && r.high != kNoLimit) return;
+  const double high = row.is_length() ? kFarthest : std::min(r.high, r.file_high);
+  if (r.low != -kNoLimit) out[r.above_low ? "exclusiveMinimum" : "minimum"] = r.low;
+  if (high != kNoLimit) out["maximum"] = high;
 }
 
-void add_limits(const SceneKey& key, Json& out) {
-  if (key.low != -kNoLimit) out[key.above_low ? "exclusiveMinimum" : "minimum"] = key.low;
-  if (key.high != kNoLimit) out["maximum"] = key.high;
+void add_limits_of_items(const Setting& row, Json& items) {
+  if (row.is_length()) items["minimum"] = -kFarthest, items["maximum"] = kFarthest;
 }
 
-Json schema_of(const SceneKey& key) {
+Json default_of(const Setting& row) {
+  if (row.kind == Kind::boolean) return row.start != 0;
+  if (row.kind == Kind::whole) return static_cast<std::int64_t>(row.start);
+  if (row.kind == Kind::number) return row.start;
+  for (const Choice& c : row.choices)
+    if (c.value == row.start) return c.name;
+  return nullptr;
+}
+
+Json schema_of(const Setting& row) {
   Json out;
-  switch (key.kind) {
+  switch (row.kind) {
     case Kind::boolean:
       out["type"] = "boolean";
       break;
     case Kind::number:
       out["type"] = "number";
-      add_limits(key, out);
+      add_limits(row, out);
       break;
     case Kind::whole:
       out["type"] = "integer";
-      add_limits(key, out);
+      add_limits(row, out);
       break;
     case Kind::text:
       out["type"] = "string";
       out["minLength"] = 1;
       break;
     case Kind::choice:
-      out["enum"] = choices_of(key);
+      for (const Choice& c : row.choices) out["enum"].push_back(c.name);
       break;
     case Kind::method:
       out["type"] = "string";
@@ -62,7 +69,7 @@ Json schema_of(const SceneKey& key) {
       break;
     case Kind::vec3:
       out = numbers(3);
-      add_limits(key, out["items"]);
+      add_limits_of_items(row, out["items"]);
       break;
     case Kind::inertia:
       out = numbers(6);
@@ -72,27 +79,42 @@ Json schema_of(const SceneKey& key) {
       break;
     case Kind::corners:
       out = {{"type", "array"}, {"items", numbers(3)}, {"minItems", 2}, {"maxItems", 2}};
-      add_limits(key, out["items"]["items"]);
+      add_limits_of_items(row, out["items"]["items"]);
       break;
     case Kind::object:
-      out = schema_of(*key.keys);
+      out = schema_of(*row.inside);
       break;
     case Kind::list:
-      out = {{"type", "array"}, {"items", schema_of(*key.keys)}};
-      if (key.low > 0) out["minItems"] = static_cast<int>(key.low);
-      out["maxItems"] = static_cast<int>(key.high);
+      out = {{"type", "array"}, {"items", schema_of(*row.inside)}};
+      if (row.range.low > 0) out["minItems"] = static_cast<int>(row.range.low);
+      out["maxItems"] = static_cast<int>(row.range.high);
       break;
   }
-  out["description"] = key.about;
   return out;
 }
 
-Json schema_of(const SceneKeys& keys) {
+std::string description_of(const Setting& row) {
+  std::string out = row.about;
+  if (row.is_length())
+    out += " [scene units]";
+  else if (*row.unit)
+    out += std::string(" [") + row.unit + "]";
+  if (row.is_length() && row.range.high != kNoLimit)
+    out += ", " + number_text(row.range.low) + " to " + number_text(row.range.high) + " m";
+  const std::string start = default_text(row);
+  return start.empty() ? out : out + "; default " + start;
+}
+
+Json schema_of(const Settings& rows) {
   Json properties = Json::object(), required = Json::array();
-  for (const SceneKey& key : keys) {
-    properties[key.name] = schema_of(key);
-    if (key.required) required.push_back(key.name);
-  }
+  each_setting(rows, nullptr, [&](const Setting& row, const void*) {
+    Json& property = properties[row.name] = schema_of(row);
+    // A length other than 0 depends on the scene's unit.
+    if (!default_text(row).empty() && !(row.is_length() && row.start != 0))
+      property["default"] = default_of(row);
+    property["description"] = description_of(row);
+    if (row.required) required.push_back(row.name);
+  });
   Json out = {{"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
   if (!required.empty()) out["required"] = required;
   return out;
@@ -103,7 +125,7 @@ Json schema_of(const SceneKeys& keys) {
 std::string scene_schema() {
   Json out = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
               {"title", "hapsix scene, version 1"}};
-  out.update(schema_of(scene_keys()));
+  out.update(schema_of(scene_settings()));
   return out.dump(2) + "\n";
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// verdict.cpp - what happened in a run. The rules stand in the header.
+// verdict.cpp - judges a run by the rules in the header.
 #include "io/scene/verdict.h"
 
 #include <algorithm>
@@ -189,7 +189,8 @@ bool VerdictWatch::chatters_now(double time) const {
          *high - *low > kChatterDepth;
 }
 
-// Called before this frame enters the window: a phase that ends is judged by what it held.
+// Called before this frame enters the window, so that a phase that ends is judged by its own
+// frames.
 void VerdictWatch::watch_stillness(double time, const h6Pose& hand) {
   if (!first_ && mean_motion2(still_hand_, hand) <= kStillMotion * kStillMotion) return;
   if (!first_ && chatters_now(last_time_)) chattered_ = true;
@@ -204,8 +205,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
                           finite(body.velocity.angular) && std::isfinite(max_depth_voxels);
   finite_ = finite_ && all_finite;
   if (!finite_) return;
-  // A hand that sends nonsense is the device's fault, not the body's: this frame says nothing of
-  // it.
+  // A hand sample that is not finite is the device's fault: the frame does not count.
   if (!finite(hand) || !finite(hand_velocity.linear) || !finite(hand_velocity.angular)) return;
 
   const h6Velocity& v = body.velocity;
@@ -218,7 +218,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   through_ = through_ || entered(body.pose);
 
   watch_stillness(time, hand);
-  // Speed from the motion itself: it is there whatever the body's integrator calls its velocity.
+  // Speed from poses: it does not depend on what the integrator reports as velocity.
   const double dt = first_ || time <= last_time_ ? 1 / rate_ : time - last_time_;
   const double speed2 = first_ ? 0 : mean_motion2(last_body_.pose, body.pose) / (dt * dt);
   window_.speed2[window_.next] = speed2;

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// verdict.h - what happened in a run, from its motion alone: no method name is seen here.
+// verdict.h - judges a run by its motion alone; it does not know the contact method.
 //
-// In this order:
+// The first that applies, in this order:
 //   unstable  a state that is not finite, or a body faster than 100x the hand's peak speed (a peak
 //             below 10 mm/s counts as 10 mm/s: a hand at rest does not make any motion unstable)
 //   through   a shell point or the centre of mass was in a forbidden box
-//   chatters  over the last 0.2 s of a phase in which the hand was still for at least 0.2 s: RMS
-//   point
-//             speed above 2 mm/s, or peak-to-peak depth above 0.1 voxel. The end of each phase is
-//             judged, so that the body has all of it to settle; a limit cycle does not go away.
-//   arrived, stuck   at the end, in a scene with a target
-//   held      else
+//   chatters  the hand was still for at least 0.2 s, and in the last 0.2 s of that phase the RMS
+//             point speed was above 2 mm/s or the peak-to-peak depth above 0.1 voxel. Only the end
+//             of a phase is judged: the body may settle first, and a limit cycle stays to the end.
+//   arrived   the scene has a target, and the run ends there
+//   stuck     the scene has a target, and the run ends elsewhere
+//   held      otherwise
 //
-// Speeds are root mean squares over all shell points, so that turning counts like moving. Still:
-// the hand's shell points have moved less than 0.02 mm since the phase began.
+// Speeds are root mean squares over all shell points, so that rotation counts like translation. The
+// hand is still while the shell points, carried by it, stay within 0.02 mm (RMS) of where they were
+// when the phase began.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -38,7 +39,7 @@ class VerdictWatch {
   Verdict verdict() const;
 
  private:
-  // Points that lie together, mesh frame: one sphere test spares most of them.
+  // Neighbouring points, mesh frame: one sphere test rejects all of them.
   struct Cluster {
     h6Vec3 centre;
     double radius;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // write.cpp - a scene as plain files: scene.json, STL meshes, PLY shells, CSV paths.
 //
-// Every setting is written, defaults too: the file says all that the run depends on.
+// Defaults are written too, so that the file says all that the run depends on.
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "io/file/write_aside.h"
-#include "io/scene/keys.h"
 #include "io/scene/scene_file.h"
+#include "io/scene/scene_settings.h"
+#include "io/scene/setting_json.h"
 #include "io/shell/shell_file.h"
 
 namespace h6::io {
@@ -17,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-// A body's name as a file's: letters that every system takes.
+// A body's name as a file name, in letters that every system accepts.
 std::string file_stem(const std::string& name) {
   std::string out;
   for (const char c : name.substr(0, 60)) {
@@ -48,40 +49,29 @@ class SceneWriter {
  public:
   SceneWriter(const Scene& scene, const fs::path& folder)
       : scene_(scene), folder_(folder), scale_(metres(scene.unit)) {}
-  // Writes no file: the text alone, naming what an export would.
+  // For the text alone: no file is written, but the same names are given.
   explicit SceneWriter(const Scene& scene)
       : scene_(scene), scale_(metres(scene.unit)), files_(false) {}
 
   Json write() {
     Json out = {{"hapsix", 1}};
-    if (!scene_.name.empty()) out["name"] = scene_.name;
-    if (!scene_.about.empty()) out["about"] = scene_.about;
-    out["units"] = unit_name(scene_.unit);
-    out["bodies"] = Json::array();
-    for (const SceneBody& body : scene_.bodies) out["bodies"].push_back(body_json(body));
-    out["contact"] = contact_json();
-    out["coupling"] = coupling_json();
-    out["integrator"] = scene_.integrator == H6_EXPLICIT ? "explicit" : "implicit";
-    out["gradient"] = scene_.gradient == H6_EXACT ? "exact" : "symmetric";
-    out["rate"] = scene_.rate;
-    out["duration"] = scene_.duration;
-    if (scene_.net_stiffness) out["net_stiffness"] = true;
-    out["hands"] = Json::array();
-    for (const SceneHand& hand : scene_.hands) out["hands"].push_back(hand_json(hand));
-    const Json verdict = verdict_json();
-    if (!verdict.empty()) out["verdict"] = verdict;
+    write_settings(scene_settings(), &scene_, scale_, out, [&](const Setting& row, Json& o) {
+      const std::string key = row.name;
+      if (key == "bodies") {
+        o[key] = Json::array();
+        for (const SceneBody& body : scene_.bodies) o[key].push_back(body_json(body));
+      } else if (key == "hands") {
+        o[key] = Json::array();
+        for (const SceneHand& hand : scene_.hands) o[key].push_back(hand_json(hand));
+      } else if (key == "verdict") {
+        const Json verdict = verdict_json();
+        if (!verdict.empty()) o[key] = verdict;
+      }
+    });
     return out;
   }
 
  private:
-  Json lengths(const h6Vec3& v) const {
-    return Json::array({v.x / scale_, v.y / scale_, v.z / scale_});
-  }
-
-  Json pose_json(const h6Pose& pose) const {
-    return {{"p", lengths(pose.p)}, {"q", {pose.q.w, pose.q.x, pose.q.y, pose.q.z}}};
-  }
-
   // A file name in the folder that no other file of this scene has.
   std::string unused(const std::string& stem, const std::string& ending) {
     std::string name = stem + ending;
@@ -135,17 +125,7 @@ class SceneWriter {
     Json out;
     if (!field.file.empty()) return {{"file", copy_file(field.file)}};
     mesh_json(field, stem, out);
-    const FieldBake& bake = field.bake;
-    if (bake.voxel_size > 0)
-      out["voxel_size"] = bake.voxel_size / scale_;
-    else
-      out["voxels"] = bake.voxels;
-    if (bake.offset >= 0) out["offset"] = bake.offset / scale_;
-    out["sign"] = bake.sign == SignMode::flood ? "flood" : "auto";
-    out["cavities"] = bake.cavities == Cavities::hollow ? "hollow" : "solid";
-    if (bake.seal > 0) out["seal"] = bake.seal / scale_;
-    out["band_voxels"] = bake.band_voxels;
-    out["padding_voxels"] = bake.padding_voxels;
+    write_settings(field_source_settings(), &field, scale_, out);
     return out;
   }
 
@@ -161,149 +141,37 @@ class SceneWriter {
       return {{"file", name}};
     }
     mesh_json(shell, stem, out);
-    if (shell.bake.spacing > 0)
-      out["spacing"] = shell.bake.spacing / scale_;
-    else
-      out["points"] = shell.bake.points;
-    out["levels"] = shell.bake.levels;
-    out["seed"] = shell.bake.seed;
-    out["surface"] = name_of(shell.bake.surface);
-    out["normals"] = name_of(shell.bake.normals);
-    const FieldBake& field = shell.bake.field;
-    if (field.voxel_size > 0)
-      out["voxel_size"] = field.voxel_size / scale_;
-    else
-      out["voxels"] = field.voxels;
-    if (field.offset >= 0) out["offset"] = field.offset / scale_;
-    if (field.seal > 0) out["seal"] = field.seal / scale_;
+    write_settings(shell_source_settings(), &shell, scale_, out);
     return out;
   }
 
   Json body_json(const SceneBody& body) {
-    Json out = {{"name", body.name}};
-    if (body.fixed)
-      out["fixed"] = true;
-    else
-      out["mass"] = body.mass;
-    if (body.translation_only) out["translation_only"] = true;
-    if (body.com) out["com"] = lengths(*body.com);
-    if (body.inertia) out["inertia"] = *body.inertia;
-    out["pose"] = pose_json(body.pose);
+    Json out;
+    write_settings(scene_body_settings(), &body, scale_, out);
+    if (body.fixed) out.erase("mass");  // nothing reads it
     const std::string stem = file_stem(body.name);
     if (body.field) out["field"] = field_json(*body.field, stem);
     if (body.shell) out["shell"] = shell_json(*body.shell, stem);
     return out;
   }
 
-  Json contact_json() const {
-    const h6ContactDef& c = scene_.contact;
-    const char* known = h6MethodName(c.method);
-    if (!known) throw WriteFailed{{"the scene's contact method is out of range"}};
-    std::string method = known;
-    if (c.method != H6_METHOD_ROBUST) {  // which has these anyway
-      if (c.pieces & H6_PIECE_FACING) method += "+facing";
-      if (c.pieces & H6_PIECE_DEPTH) method += "+depth";
-      if (c.pieces & H6_PIECE_PRODUCT) method += "+product";
-    }
-    if (c.pieces & H6_PIECE_CLUSTER) method += "+cluster";
-    if (c.pieces & H6_PIECE_GEODESIC) method += "+geodesic";
-    if (c.pieces & H6_PIECE_HANDLES) method += "+handles";
-    if (c.pieces & H6_PIECE_PRINTED) method += "+printed";
-    Json out = {{"method", method},
-                {"stiffness", c.stiffness},
-                {"damping", c.damping},
-                {"global_n0", c.global_n0},
-                {"epsilon", c.epsilon},
-                {"epsilon_normal", c.epsilon_normal},
-                {"epsilon_torque", c.epsilon_torque},
-                {"torque_length", c.torque_length / scale_},
-                {"series_c", c.series_c},
-                {"margin_voxels", c.margin_voxels},
-                {"cluster_voxels", c.cluster_voxels}};
-    if (c.passivity) out["passivity"] = true;
-    return out;
-  }
-
-  Json coupling_json() const {
-    const h6CouplingDef& c = scene_.coupling;
-    const char* modes[] = {"dynamic", "static", "direct"};
-    if (c.mode < 0 || c.mode > H6_COUPLING_DIRECT)
-      throw WriteFailed{{"the scene's coupling mode is out of range"}};
-    return {{"mode", modes[c.mode]},
-            {"stiffness", c.stiffness},
-            {"rotational_stiffness", c.rotational_stiffness},
-            {"damping_ratio", c.damping_ratio},
-            {"max_depth_voxels", c.max_depth_voxels},
-            {"max_force", c.max_force},
-            {"max_torque", c.max_torque},
-            {"max_step_voxels", c.max_step_voxels}};
-  }
-
   Json hand_json(const SceneHand& hand) {
-    Json out = {{"body", hand.body}, {"device", hand.device}};
-    if (!hand.path.empty()) {
+    Json out;
+    write_settings(scene_hand_settings(), &hand, scale_, out, [&](const Setting& row, Json& o) {
+      if (row.name != std::string("path") || hand.path.empty()) return;
       const std::string name = unused(file_stem(hand.body) + "_hand", ".csv");
       if (files_) must(write_path(folder_ / name, hand.path, scene_.unit));
-      out["path"] = name;
-    }
-    add_hand_def(hand.def, out);
-    const Json safety = safety_json(hand.def.safety);
-    if (safety != safety_json(h6DefaultSafetyDef())) out["safety"] = safety;
-    if (hand.arm) out["arm"] = arm_json(*hand.arm);
-    return out;
-  }
-
-  static void add_hand_def(const h6HandDef& def, Json& out) {
-    const h6HandFilterDef& f = def.filter;
-    out["mode"] = def.mode == H6_ADMITTANCE          ? "admittance"
-                  : def.mode == H6_PSEUDO_ADMITTANCE ? "pseudo-admittance"
-                                                     : "impedance";
-    out["motion_scale"] = f.motion_scale;
-    out["rotation_scale"] = f.rotation_scale;
-    out["force_scale"] = f.force_scale;
-    if (f.relative) out["relative"] = true;
-    out["clutch_buttons"] = f.clutch_buttons;
-    out["manipulandum_mass"] = def.manipulandum_mass;
-    out["driver_stiffness"] = def.driver_stiffness;
-    out["driver_damping"] = def.driver_damping;
-    out["admittance_damping"] = def.admittance_damping;
-    if (def.passivity) out["passivity"] = true;
-  }
-
-  Json safety_json(const h6SafetyDef& d) const {
-    return {{"max_force", d.max_force},
-            {"max_torque", d.max_torque},
-            {"max_force_rate", d.max_force_rate},
-            {"max_torque_rate", d.max_torque_rate},
-            {"max_power", d.max_power},
-            {"max_speed", d.max_speed},
-            {"derate_speed", d.derate_speed},
-            {"cut_speed", d.cut_speed},
-            {"soft_start", d.soft_start},
-            {"decay_time", d.decay_time},
-            {"pose_jump", d.pose_jump / scale_},
-            {"freeze_time", d.freeze_time},
-            {"dead_man_buttons", d.dead_man_buttons}};
-  }
-
-  Json arm_json(const SceneArm& arm) const {
-    Json out = {{"delay_frames", arm.delay_frames}};
-    for (const ArmNumber& key : arm_numbers())
-      out[key.name] = arm.*key.value / (key.length ? scale_ : 1);
-    out["velocity"] = arm.exact_velocity ? "exact" : "filtered";
-    if (arm.workspace_min.x < arm.workspace_max.x)
-      out["workspace"] = {lengths(arm.workspace_min), lengths(arm.workspace_max)};
+      o[row.name] = name;
+    });
     return out;
   }
 
   Json verdict_json() const {
     Json out = Json::object();
     for (const Box& box : scene_.verdict.forbidden)
-      out["forbidden"].push_back({{"box", {lengths(box.low), lengths(box.high)}}});
+      write_settings(forbidden_settings(), &box, scale_, out["forbidden"].emplace_back());
     if (scene_.verdict.target)
-      out["target"] = {{"pose", pose_json(*scene_.verdict.target)},
-                       {"tolerance", scene_.verdict.tolerance / scale_},
-                       {"tolerance_angle", scene_.verdict.tolerance_angle}};
+      write_settings(target_settings(), &scene_.verdict, scale_, out["target"]);
     return out;
   }
 
@@ -327,7 +195,7 @@ Outcome export_scene(const Scene& scene, const std::filesystem::path& folder) {
     if (error || !fs::is_directory(folder, error))
       return Failure{folder.string() + ": cannot be made a folder; " + error.message()};
     const Json json = SceneWriter(scene, folder).write();
-    // The scene file last: where it stands, the files it names stand too.
+    // The scene file comes last: where it exists, the files it names exist too.
     return write_aside(folder / "scene.json", [&](const fs::path& aside) -> Outcome {
       std::ofstream out(aside);
       out << json.dump(2) << '\n';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// session_checks.h - is a session definition one that can be run?
+// session_checks.h - refuses session definitions that cannot be run.
 #pragma once
 #include "hapsix/hapsix.h"
 #include "runtime/model/model.h"

@@ -15,6 +15,7 @@
 #include "runtime/frame/session.h"
 #include "runtime/loop/device_gate.h"
 #include "runtime/loop/loop_view.h"
+#include "runtime/settings/engine_settings.h"
 #include "sched/clock.h"
 #include "sched/halt_list.h"
 #include "sched/periodic_thread.h"
@@ -297,15 +298,7 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
                   "hand %zu: safety %s, %g %s, is above what device %zu is rated for, %g %s: leave "
                   "it out or choose less",
                   h, above.key, above.asked, above.unit, h, above.rating, above.unit);
-  if (!(def.duration >= 0) || def.duration > 1e9)
-    return fail(error, "duration must be 0 (no end) to 1e9 s, it is %g", def.duration);
-  if (!(def.spin_us >= 0 && def.spin_us <= 1e4))
-    return fail(error, "spin_us must be in 0..10000, it is %g", def.spin_us);
-  if (def.ring_frames > 10000000)
-    return fail(error, "ring_frames must be at most 10000000, it is %zu", def.ring_frames);
-  if (def.view_contacts > 1000000)
-    return fail(error, "view_contacts must be at most 1000000, it is %zu", def.view_contacts);
-  return true;
+  return check_settings(loop_settings(), &def, "", error);
 }
 
 }  // namespace

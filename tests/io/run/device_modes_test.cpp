@@ -16,7 +16,7 @@
 
 #include "device/simulated_arm.h"
 #include "io/run/run_setup.h"
-#include "io/scene/keys.h"
+#include "io/scene/scene_settings.h"
 #include "io/scenes/scenes.h"
 #include "tests/support/near.h"
 
@@ -160,8 +160,8 @@ TEST_CASE("the arm's figures in a scene reach the arm") {
   run.hands[0].device = "arm";
   run.hands[0].arm.emplace();
   run.hands[0].arm->max_force = 7;
-  run.hands[0].arm->workspace_min = {-0.1, -0.1, -0.1};
-  run.hands[0].arm->workspace_max = {0.1, 0.1, 0.2};
+  run.hands[0].arm->workspace.low = {-0.1, -0.1, -0.1};
+  run.hands[0].arm->workspace.high = {0.1, 0.1, 0.2};
   run.hands[0].arm->position_step = 1e-3;
   REQUIRE(run.open());
   const h6DeviceCapabilities& c = run.devices.devices[0].capabilities;
@@ -179,7 +179,7 @@ TEST_CASE("the arm's figures in a scene reach the arm") {
 TEST_CASE("every figure of an arm in a scene changes what the arm does") {
   // Tilted, and from the start against a stop, so that nothing about it is idle.
   io::SceneArm base;
-  base.workspace_min = {-0.1, -0.1, 6.5e-3}, base.workspace_max = {0.1, 0.1, 0.1};
+  base.workspace = {{-0.1, -0.1, 6.5e-3}, {0.1, 0.1, 0.1}};
   base.max_force = 2, base.max_torque = 0.02;
   io::Path path = pressed_box().scene.hands[0].path;
   path.back().pose.q = {std::cos(0.1), std::sin(0.1), 0, 0};
@@ -208,10 +208,12 @@ TEST_CASE("every figure of an arm in a scene changes what the arm does") {
   };
   const std::vector<double> before = felt(base);
   CHECK(felt(base) == before);
-  for (const io::ArmNumber& figure : io::arm_numbers()) {
+  for (const Setting& figure : io::arm_settings()) {
+    if (figure.kind != SettingKind::number) continue;
     CAPTURE(std::string(figure.name));
     io::SceneArm arm = base;
-    arm.*figure.value *= 0.9;
+    void* const value = figure.member.make(&arm);
+    figure.member.set_number(value, 0.9 * figure.member.number(value));
     CHECK(felt(arm) != before);
   }
 }

@@ -142,13 +142,14 @@ TEST_CASE("every key arrives, lengths in metres") {
   const SceneArm& arm = *s.hands[0].arm;
   CHECK(arm.delay_frames == 2);
   CHECK(arm.exact_velocity);
-  check_same(arm.workspace_min, h6Vec3{-0.09, -0.08, -0.07});
-  check_same(arm.workspace_max, h6Vec3{0.1, 0.11, 0.12});
-  for (const ArmNumber& key : arm_numbers()) {
-    const double said = full_scene()["hands"][0]["arm"][key.name].get<double>();
-    INFO(key.name);
-    check_close(arm.*key.value, key.length ? 1e-3 * said : said);
-    CHECK(arm.*key.value != SceneArm{}.*key.value);  // no default can stand in for what was read
+  check_same(arm.workspace.low, h6Vec3{-0.09, -0.08, -0.07});
+  check_same(arm.workspace.high, h6Vec3{0.1, 0.11, 0.12});
+  for (const Setting& row : arm_figures()) {
+    const double said = full_scene()["hands"][0]["arm"][row.name].get<double>();
+    const double got = row.member.number(row.member.get(&arm));
+    INFO(row.name);
+    check_close(got, row.is_length() ? 1e-3 * said : said);
+    CHECK(got != row.start);  // no default can stand in for what was read
   }
   CHECK(s.hands[1].device == "simulated");
   CHECK(s.hands[1].path.empty());
@@ -196,13 +197,14 @@ TEST_CASE("units scale every length and nothing else") {
   const Bench bench;
   Json json = full_scene();
   const Scene in_mm = *bench.read(json);
+  json["hands"][0]["safety"].erase("pose_jump");  // its range is in metres
   json["units"] = "m";
   const Scene in_m = *bench.read(json);
   check_close(in_m.bodies[3].pose.p.z, 1000 * in_mm.bodies[3].pose.p.z);
   check_close(in_m.bodies[1].field->bake.voxel_size, 1000 * in_mm.bodies[1].field->bake.voxel_size);
   check_close(in_m.contact.torque_length, 1000 * in_mm.contact.torque_length);
   check_close(in_m.hands[0].path[1].pose.p.x, 1000 * in_mm.hands[0].path[1].pose.p.x);
-  check_close(in_m.hands[0].arm->workspace_max.x, 1000 * in_mm.hands[0].arm->workspace_max.x);
+  check_close(in_m.hands[0].arm->workspace.high.x, 1000 * in_mm.hands[0].arm->workspace.high.x);
   check_close(in_m.hands[0].arm->position_step, 1000 * in_mm.hands[0].arm->position_step);
   check_close(in_m.hands[0].arm->grip_stiffness, in_mm.hands[0].arm->grip_stiffness);
   check_close(in_m.contact.stiffness, in_mm.contact.stiffness);
@@ -336,6 +338,8 @@ TEST_CASE("every wrong value is refused with the path of its key") {
       {"/hands/0/driver_damping", "51", "hands[0].driver_damping"},
       {"/hands/0/admittance_damping", "-1", "hands[0].admittance_damping"},
       {"/hands/0/passivity", "null", "hands[0].passivity"},
+      {"/hands/0/safety", "{\"pose_jump\": 60}",
+       "hands[0].safety.pose_jump: is 60 but must be at least 1 and at most 50"},
       {"/hands/0/arm", "[]", "hands[0].arm: must be an object"},
       {"/hands/0/arm", "{\"delay\": 1}", "hands[0].arm.delay: no such key"},
       {"/hands/0/arm", "{\"delay_frames\": 3}", "hands[0].arm.delay_frames: is 3"},
@@ -364,7 +368,7 @@ TEST_CASE("every wrong value is refused with the path of its key") {
 
 TEST_CASE("every figure of an arm has a range, and the key is named where it is left") {
   const Bench bench;
-  for (const ArmNumber& key : arm_numbers())
+  for (const Setting& key : arm_figures())
     for (const double wrong : {-1.0, 1e8}) {
       Json json = small_scene();
       json["hands"][0]["arm"][key.name] = wrong;

@@ -14,8 +14,10 @@
 #include <string>
 #include <vector>
 
-#include "io/scene/keys.h"
 #include "io/scene/scene_file.h"
+#include "io/scene/scene_settings.h"
+#include "io/scene/setting_json.h"
+#include "runtime/settings/engine_settings.h"
 
 namespace h6::io {
 
@@ -138,143 +140,69 @@ inline void check_same(const h6Pose& a, const h6Pose& b) {
   check_same(h6Vec3{a.q.x, a.q.y, a.q.z}, h6Vec3{b.q.x, b.q.y, b.q.z});
 }
 
-inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
-  CHECK(a.method == b.method);
-  if (a.method != H6_METHOD_ROBUST) CHECK(a.pieces == b.pieces);
-  const double xs[] = {a.stiffness,      a.damping,        a.global_n0,     a.epsilon,
-                       a.epsilon_normal, a.epsilon_torque, a.torque_length, a.series_c,
-                       a.margin_voxels,  a.cluster_voxels};
-  CHECK(a.passivity == b.passivity);
-  const double ys[] = {b.stiffness,      b.damping,        b.global_n0,     b.epsilon,
-                       b.epsilon_normal, b.epsilon_torque, b.torque_length, b.series_c,
-                       b.margin_voxels,  b.cluster_voxels};
-  for (int i = 0; i < 10; ++i) check_close(xs[i], ys[i]);
+// The rows of an arm that are plain numbers.
+inline std::vector<Setting> arm_figures() {
+  std::vector<Setting> out;
+  for (const Setting& row : arm_settings())
+    if (row.kind == SettingKind::number) out.push_back(row);
+  return out;
 }
 
-inline void check_same(const h6CouplingDef& a, const h6CouplingDef& b) {
-  const double xs[] = {a.stiffness, a.rotational_stiffness, a.damping_ratio,  a.max_depth_voxels,
-                       a.max_force, a.max_torque,           a.max_step_voxels};
-  const double ys[] = {b.stiffness, b.rotational_stiffness, b.damping_ratio,  b.max_depth_voxels,
-                       b.max_force, b.max_torque,           b.max_step_voxels};
-  CHECK(a.mode == b.mode);
-  for (int i = 0; i < 7; ++i) check_close(xs[i], ys[i]);
-}
-
-inline void check_same(const SceneArm& a, const SceneArm& b) {
-  CHECK(a.delay_frames == b.delay_frames);
-  CHECK(a.exact_velocity == b.exact_velocity);
-  for (const ArmNumber& key : arm_numbers()) {
-    INFO(key.name);
-    check_close(a.*key.value, b.*key.value);
+// The same JSON, numbers within 1e-12.
+inline void check_close(const Json& a, const Json& b) {
+  REQUIRE(a.type() == b.type());
+  if (a.is_number()) return check_close(a.get<double>(), b.get<double>());
+  if (!a.is_structured()) return CHECK(a == b);
+  REQUIRE(a.size() == b.size());
+  for (auto x = a.begin(), y = b.begin(); x != a.end(); ++x, ++y) {
+    if (a.is_object()) CHECK(x.key() == y.key());
+    check_close(*x, *y);
   }
-  check_same(a.workspace_min, b.workspace_min);
-  check_same(a.workspace_max, b.workspace_max);
 }
 
+// Every row has the same value in both.
+inline void check_same(const Settings& rows, const void* a, const void* b) {
+  Json x = Json::object(), y = Json::object();
+  write_settings(rows, a, 1, x);
+  write_settings(rows, b, 1, y);
+  check_close(x, y);
+}
+inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
+  check_same(contact_settings(), &a, &b);
+}
+inline void check_same(const h6CouplingDef& a, const h6CouplingDef& b) {
+  check_same(coupling_settings(), &a, &b);
+}
 // What the scene says of a hand: body and coupling stand elsewhere.
 inline void check_same(const h6HandDef& a, const h6HandDef& b) {
-  CHECK(a.mode == b.mode);
-  CHECK(a.passivity == b.passivity);
-  CHECK(a.filter.relative == b.filter.relative);
-  CHECK(a.filter.clutch_buttons == b.filter.clutch_buttons);
-  check_close(a.filter.motion_scale, b.filter.motion_scale);
-  check_close(a.filter.rotation_scale, b.filter.rotation_scale);
-  check_close(a.filter.force_scale, b.filter.force_scale);
-  check_close(a.manipulandum_mass, b.manipulandum_mass);
-  check_close(a.driver_stiffness, b.driver_stiffness);
-  check_close(a.driver_damping, b.driver_damping);
-  check_close(a.admittance_damping, b.admittance_damping);
-  const auto limits = [](const h6SafetyDef& d) {
-    return std::vector<double>{d.max_force,
-                               d.max_torque,
-                               d.max_force_rate,
-                               d.max_torque_rate,
-                               d.max_power,
-                               d.max_speed,
-                               d.derate_speed,
-                               d.cut_speed,
-                               d.soft_start,
-                               d.decay_time,
-                               d.pose_jump,
-                               d.freeze_time,
-                               static_cast<double>(d.dead_man_buttons)};
-  };
-  const std::vector<double> la = limits(a.safety), lb = limits(b.safety);
-  for (std::size_t i = 0; i < la.size(); ++i) check_close(la[i], lb[i]);
+  check_same(hand_settings(), &a, &b);
 }
 
 inline void check_same(const SceneVerdict& a, const SceneVerdict& b) {
   REQUIRE(a.forbidden.size() == b.forbidden.size());
-  for (std::size_t i = 0; i < a.forbidden.size(); ++i) {
-    check_same(a.forbidden[i].low, b.forbidden[i].low);
-    check_same(a.forbidden[i].high, b.forbidden[i].high);
-  }
-  REQUIRE(a.target.has_value() == b.target.has_value());
-  if (a.target) check_same(*a.target, *b.target);
-  check_close(a.tolerance, b.tolerance);
-  check_close(a.tolerance_angle, b.tolerance_angle);
+  for (std::size_t i = 0; i < a.forbidden.size(); ++i)
+    check_same(forbidden_settings(), &a.forbidden[i], &b.forbidden[i]);
+  check_same(target_settings(), &a, &b);
 }
 
-inline void check_same(const SceneBody& a, const SceneBody& b) {
-  CHECK(a.name == b.name);
-  CHECK(a.fixed == b.fixed);
-  if (!a.fixed) check_close(a.mass, b.mass);
-  CHECK(a.translation_only == b.translation_only);
-  check_same(a.pose, b.pose);
-  REQUIRE(a.com.has_value() == b.com.has_value());
-  if (a.com) check_same(*a.com, *b.com);
-  REQUIRE(a.inertia.has_value() == b.inertia.has_value());
-  if (a.inertia)
-    for (int i = 0; i < 6; ++i) check_close((*a.inertia)[i], (*b.inertia)[i]);
+inline void check_same(SceneBody a, SceneBody b) {
+  if (a.fixed) b.mass = a.mass;  // is not read
+  check_same(scene_body_settings(), &a, &b);
   REQUIRE(a.field.has_value() == b.field.has_value());
-  if (a.field) {
-    const FieldBake &x = a.field->bake, &y = b.field->bake;
-    if (x.voxel_size == 0) CHECK(x.voxels == y.voxels);
-    check_close(x.voxel_size, y.voxel_size);
-    check_close(x.offset, y.offset);
-    CHECK(x.sign == y.sign);
-    CHECK(x.cavities == y.cavities);
-    check_close(x.band_voxels, y.band_voxels);
-    CHECK(x.padding_voxels == y.padding_voxels);
-  }
+  if (a.field) check_same(field_source_settings(), &*a.field, &*b.field);
   REQUIRE(a.shell.has_value() == b.shell.has_value());
-  if (a.shell && !a.shell->points) {
-    const ShellBake &x = a.shell->bake, &y = b.shell->bake;
-    if (x.spacing == 0) CHECK(x.points == y.points);
-    check_close(x.spacing, y.spacing);
-    CHECK(x.levels == y.levels);
-    CHECK(x.seed == y.seed);
-    CHECK(x.surface == y.surface);
-    CHECK(x.normals == y.normals);
-    if (x.field.voxel_size == 0) CHECK(x.field.voxels == y.field.voxels);
-    check_close(x.field.voxel_size, y.field.voxel_size);
-    check_close(x.field.offset, y.field.offset);
-    check_close(x.field.seal, y.field.seal);
-  }
+  if (a.shell && !a.shell->points) check_same(shell_source_settings(), &*a.shell, &*b.shell);
 }
 
 // All that a scene says, sources of meshes and shells aside.
 inline void check_same(const Scene& a, const Scene& b) {
-  CHECK(a.name == b.name);
-  CHECK(a.about == b.about);
-  CHECK(a.unit == b.unit);
+  check_same(scene_settings(), &a, &b);
   REQUIRE(a.bodies.size() == b.bodies.size());
   for (std::size_t i = 0; i < a.bodies.size(); ++i) check_same(a.bodies[i], b.bodies[i]);
-  check_same(a.contact, b.contact);
-  check_same(a.coupling, b.coupling);
-  CHECK(a.integrator == b.integrator);
-  CHECK(a.gradient == b.gradient);
-  check_close(a.rate, b.rate);
-  check_close(a.duration, b.duration);
-  CHECK(a.net_stiffness == b.net_stiffness);
   REQUIRE(a.hands.size() == b.hands.size());
   for (std::size_t i = 0; i < a.hands.size(); ++i) {
     const SceneHand &x = a.hands[i], &y = b.hands[i];
-    CHECK(x.body == y.body);
-    CHECK(x.device == y.device);
-    check_same(x.def, y.def);
-    REQUIRE(x.arm.has_value() == y.arm.has_value());
-    if (x.arm) check_same(*x.arm, *y.arm);
+    check_same(scene_hand_settings(), &x, &y);
     REQUIRE(x.path.size() == y.path.size());
     for (std::size_t r = 0; r < x.path.size(); ++r) {
       check_close(x.path[r].t, y.path[r].t);

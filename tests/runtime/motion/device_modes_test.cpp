@@ -494,7 +494,7 @@ TEST_CASE("invalid device modes are refused with a sentence that names the value
   for (const std::uint32_t mode : {H6_IMPEDANCE, H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE})
     CHECK(complaint_of(mode, [](PushedBox&) {}) == "");
   for (const std::uint32_t mode : {0u, 3u, 5u, 8u, 0xffffffffu})
-    CHECK(complaint_of(mode, [](PushedBox&) {}).find("device mode") != std::string::npos);
+    CHECK(complaint_of(mode, [](PushedBox&) {}).find("hand 0: mode ") != std::string::npos);
   struct Value {
     const char* name;
     double h6HandDef::*value;
