@@ -41,7 +41,7 @@ std::size_t edits_between(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-std::string nearest_key(const Settings& rows, const std::string& name) {
+std::string nearest_key(const SettingTable& rows, const std::string& name) {
   const char* best = "";
   std::size_t fewest = static_cast<std::size_t>(-1);
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
@@ -71,7 +71,7 @@ class SceneCheck {
  public:
   explicit SceneCheck(double scale) : scale_(scale) {}
 
-  void keys(const Json& value, const Settings& rows, const std::string& at) const;
+  void keys(const Json& value, const SettingTable& rows, const std::string& at) const;
 
  private:
   void value(const Json& value, const Setting& row, const std::string& at) const;
@@ -201,7 +201,7 @@ void SceneCheck::value(const Json& value, const Setting& row, const std::string&
   }
 }
 
-void SceneCheck::keys(const Json& object, const Settings& rows, const std::string& at) const {
+void SceneCheck::keys(const Json& object, const SettingTable& rows, const std::string& at) const {
   if (!object.is_object()) throw Complaint{at, "must be an object { ... }"};
   for (const auto& [name, item] : object.items()) {
     const Setting* known = nullptr;

@@ -57,7 +57,7 @@ class SceneReader {
 
   // `mesh` with its bake options, or `file`.
   template <class Source>
-  Source read_source(const Json& o, const Settings& rows, const std::string& at) const {
+  Source read_source(const Json& o, const SettingTable& rows, const std::string& at) const {
     Source out;
     if (o.contains("mesh") == o.contains("file"))
       throw Complaint{at, "needs either \"mesh\" (to bake) or \"file\" (baked), one of them"};

@@ -38,13 +38,13 @@ constexpr Setting choice(const char* name, std::span<const Choice> choices, cons
 constexpr Setting by_hand(const char* name, Kind kind, const char* about) {
   return {.name = name, .kind = kind, .member = {}, .about = about};
 }
-constexpr Setting list(const char* name, const Settings& inside, double least, double most,
+constexpr Setting list(const char* name, const SettingTable& inside, double least, double most,
                        const char* about) {
   Setting row = by_hand(name, Kind::list, about);
   row.inside = &inside, row.range = between(least, most);
   return row;
 }
-constexpr Setting object(const char* name, const Settings& inside, const char* about) {
+constexpr Setting object(const char* name, const SettingTable& inside, const char* about) {
   Setting row = by_hand(name, Kind::object, about);
   row.inside = &inside;
   return row;
@@ -58,7 +58,7 @@ constexpr Setting in_place_of(const char* other, Setting row) {
 
 // The engine's row for a member of a scene's own struct.
 template <auto M>
-Setting same(const Settings& rows, const char* name) {
+Setting same(const SettingTable& rows, const char* name) {
   Setting row = setting_named(rows, name);
   row.member = member<M>();
   return row;
@@ -97,7 +97,7 @@ constexpr Setting kFieldBakeRows[] = {
                                     "every cell nearer than this to the surface gets samples"),
     whole<&FieldBake::padding_voxels>("padding_voxels", between(1, 256),
                                       "empty cells around the mesh")};
-constexpr Settings kFieldBake = settings_of("FieldBake", kFieldBakeRows);
+constexpr SettingTable kFieldBake = settings_of("FieldBake", kFieldBakeRows);
 
 // The field that tells a shell's bake what the outside reaches.
 constexpr Setting kOutsideRows[] = {
@@ -112,7 +112,7 @@ constexpr Setting kOutsideRows[] = {
     quiet(number<&FieldBake::seal>(
         "seal", "m", not_negative(kNoLimit),
         "holes of an open mesh up to this width lead nowhere; 0: all lead inside"))};
-constexpr Settings kOutside = settings_of("FieldBake", kOutsideRows);
+constexpr SettingTable kOutside = settings_of("FieldBake", kOutsideRows);
 
 const Choice kSurfaces[] = {
     {name_of(ShellSurface::automatic), static_cast<int>(ShellSurface::automatic)},
@@ -136,16 +136,16 @@ const Setting kShellBakeRows[] = {
     choice<&ShellBake::normals>("normals", kNormals,
                                 "of the triangles, of the field, or auto (as the points)"),
     h6::object<&ShellBake::field>("", kOutside, "how the outside is found")};
-const Settings kShellBake = settings_of("ShellBake", kShellBakeRows);
+const SettingTable kShellBake = settings_of("ShellBake", kShellBakeRows);
 
 const Setting kFieldRows[] = {
     kMeshRow, by_hand("file", Kind::text, "baked field (.vdb), in metres; instead of mesh"),
     units_of_the_mesh(), h6::object<&FieldSource::bake>("", kFieldBake, "how the mesh is baked")};
-const Settings kField = settings_of("FieldSource", kFieldRows);
+const SettingTable kField = settings_of("FieldSource", kFieldRows);
 const Setting kShellRows[] = {
     kMeshRow, by_hand("file", Kind::text, "baked shell (.ply), in metres; instead of mesh"),
     units_of_the_mesh(), h6::object<&ShellSource::bake>("", kShellBake, "how the mesh is baked")};
-const Settings kShell = settings_of("ShellSource", kShellRows);
+const SettingTable kShell = settings_of("ShellSource", kShellRows);
 
 Setting derived(Setting row, const char* about) {
   row.about = about;
@@ -163,7 +163,7 @@ const Setting kBodyRows[] = {
     same<&SceneBody::pose>(body_settings(), "pose"),
     object("field", kField, "what others touch"),
     object("shell", kShell, "what touches others")};
-const Settings kBody = settings_of("SceneBody", kBodyRows);
+const SettingTable kBody = settings_of("SceneBody", kBodyRows);
 
 constexpr Choice kVelocities[] = {{"filtered", 0}, {"exact", 1}};
 constexpr Setting kArmRows[] = {
@@ -217,10 +217,10 @@ constexpr Setting kArmRows[] = {
     plain<&SceneArm::workspace>("workspace", Kind::corners, "m",
                                 "where the grip can be, world frame: low and high corner; "
                                 "default: no stops")};
-constexpr Settings kArm = settings_of("SceneArm", kArmRows);
+constexpr SettingTable kArm = settings_of("SceneArm", kArmRows);
 
 // The engine's hand, and the driver's coupling of an arm that says nothing else.
-const Settings& hand_def() {
+const SettingTable& hand_def() {
   static const std::vector<Setting> rows = [] {
     std::vector<Setting> out(hand_settings().begin(), hand_settings().end());
     for (Setting& row : out) {
@@ -229,7 +229,7 @@ const Settings& hand_def() {
     }
     return out;
   }();
-  static const Settings settings{hand_settings().of, rows.data(), rows.size()};
+  static const SettingTable settings{hand_settings().of, rows.data(), rows.size()};
   return settings;
 }
 const Setting kHandRows[] = {
@@ -243,7 +243,7 @@ const Setting kHandRows[] = {
     h6::object<&SceneHand::def>("", hand_def(), "of the engine"),
     h6::object<&SceneHand::arm>(
         "arm", kArm, "figures of the device arm: a simulated arm and the person who holds it")};
-const Settings kHand = settings_of("SceneHand", kHandRows);
+const SettingTable kHand = settings_of("SceneHand", kHandRows);
 
 Setting box_row() {
   Setting row = by_hand("box", Kind::corners, "low and high corner, world frame");
@@ -253,7 +253,7 @@ Setting box_row() {
   return required(row);
 }
 const Setting kForbiddenRows[] = {box_row()};
-const Settings kForbidden = settings_of("Box", kForbiddenRows);
+const SettingTable kForbidden = settings_of("Box", kForbiddenRows);
 const Setting kTargetRows[] = {
     required(
         h6::object<&SceneVerdict::target>("pose", pose_settings(), "of the first hand's body")),
@@ -261,12 +261,12 @@ const Setting kTargetRows[] = {
                                                   "of the mesh frame's origin")),
     h6::number<&SceneVerdict::tolerance_angle>("tolerance_angle", "rad", 0, between(0, 3.2),
                                                "0: any orientation will do")};
-const Settings kTarget = settings_of("SceneVerdict", kTargetRows);
+const SettingTable kTarget = settings_of("SceneVerdict", kTargetRows);
 const Setting kVerdictRows[] = {
     list("forbidden", kForbidden, 0, kMostBoxes,
          "where no shell point and no centre of mass of the first hand's body may come"),
     object("target", kTarget, "where the first hand's body should end")};
-const Settings kVerdict = settings_of("SceneVerdict", kVerdictRows);
+const SettingTable kVerdict = settings_of("SceneVerdict", kVerdictRows);
 
 Setting version_row() {
   Setting row = by_hand("hapsix", Kind::whole, "version of the format: 1");
@@ -290,7 +290,7 @@ const Setting kSceneRows[] = {
     same<&Scene::net_stiffness>(session_settings(), "net_stiffness"),
     list("hands", kHand, 0, H6_MAX_HANDS, "default none"),
     object("verdict", kVerdict, "what the run is judged by")};
-const Settings kScene = settings_of("Scene", kSceneRows);
+const SettingTable kScene = settings_of("Scene", kSceneRows);
 
 }  // namespace
 
@@ -300,14 +300,14 @@ h6HandDef default_scene_hand() {
   return def;
 }
 
-const Settings& scene_settings() { return kScene; }
-const Settings& scene_body_settings() { return kBody; }
-const Settings& field_source_settings() { return kField; }
-const Settings& shell_source_settings() { return kShell; }
-const Settings& scene_hand_settings() { return kHand; }
-const Settings& arm_settings() { return kArm; }
-const Settings& forbidden_settings() { return kForbidden; }
-const Settings& target_settings() { return kTarget; }
-const Settings& scene_verdict_settings() { return kVerdict; }
+const SettingTable& scene_settings() { return kScene; }
+const SettingTable& scene_body_settings() { return kBody; }
+const SettingTable& field_source_settings() { return kField; }
+const SettingTable& shell_source_settings() { return kShell; }
+const SettingTable& scene_hand_settings() { return kHand; }
+const SettingTable& arm_settings() { return kArm; }
+const SettingTable& forbidden_settings() { return kForbidden; }
+const SettingTable& target_settings() { return kTarget; }
+const SettingTable& scene_verdict_settings() { return kVerdict; }
 
 }  // namespace h6::io

@@ -9,15 +9,15 @@
 
 namespace h6::io {
 
-const Settings& scene_settings();          // Scene
-const Settings& scene_body_settings();     // SceneBody
-const Settings& field_source_settings();   // FieldSource: its bake's among them
-const Settings& shell_source_settings();   // ShellSource: likewise
-const Settings& scene_hand_settings();     // SceneHand: its def's among them, `arm` inside
-const Settings& arm_settings();            // SceneArm
-const Settings& forbidden_settings();      // Box
-const Settings& target_settings();         // SceneVerdict, its target
-const Settings& scene_verdict_settings();  // SceneVerdict
+const SettingTable& scene_settings();          // Scene
+const SettingTable& scene_body_settings();     // SceneBody
+const SettingTable& field_source_settings();   // FieldSource: its bake's among them
+const SettingTable& shell_source_settings();   // ShellSource: likewise
+const SettingTable& scene_hand_settings();     // SceneHand: its def's among them, `arm` inside
+const SettingTable& arm_settings();            // SceneArm
+const SettingTable& forbidden_settings();      // Box
+const SettingTable& target_settings();         // SceneVerdict, its target
+const SettingTable& scene_verdict_settings();  // SceneVerdict
 
 // Largest coordinate and length, in the scene's units: numbers stay far from overflow whatever is
 // done with them.

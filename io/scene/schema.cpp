@@ -18,7 +18,7 @@ Json numbers(std::size_t count) {
       {"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", count}, {"maxItems", count}};
 }
 
-Json schema_of(const Settings& rows);
+Json schema_of(const SettingTable& rows);
 
 // Limits that hold whatever the scene's unit is; a length with bounds in metres has none.
 void add_limits(const Setting& row, Json& out) {
@@ -105,7 +105,7 @@ std::string description_of(const Setting& row) {
   return start.empty() ? out : out + "; default " + start;
 }
 
-Json schema_of(const Settings& rows) {
+Json schema_of(const SettingTable& rows) {
   Json properties = Json::object(), required = Json::array();
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
     Json& property = properties[row.name] = schema_of(row);

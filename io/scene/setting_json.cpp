@@ -144,7 +144,7 @@ ordered_json json_of(const Setting& row, const void* def, const void* value, dou
 
 }  // namespace
 
-void read_settings(const json& object, const Settings& rows, void* def, double scale) {
+void read_settings(const json& object, const SettingTable& rows, void* def, double scale) {
   for (const Setting& row : rows) {
     if (row.stands_among())
       read_settings(object, *row.inside, row.member.make(def), scale);
@@ -153,7 +153,7 @@ void read_settings(const json& object, const Settings& rows, void* def, double s
   }
 }
 
-void write_settings(const Settings& rows, const void* def, double scale, ordered_json& out,
+void write_settings(const SettingTable& rows, const void* def, double scale, ordered_json& out,
                     const WriteByHand& by_hand) {
   each_setting(rows, def, [&](const Setting& row, const void* at) {
     if (!row.member.get) {

@@ -11,12 +11,12 @@ namespace h6::io {
 
 // `scale`: metres in one unit of the file. Only JSON that check_scene_json has passed comes here.
 // Keys that are missing leave their members alone. Rows without a member are skipped.
-void read_settings(const nlohmann::json& object, const Settings& rows, void* def, double scale);
+void read_settings(const nlohmann::json& object, const SettingTable& rows, void* def, double scale);
 
 // Adds every row of `def` in their order. `by_hand` is called for a row without a member. Throws
 // std::out_of_range for a choice that has no name.
 using WriteByHand = std::function<void(const Setting& row, nlohmann::ordered_json& out)>;
-void write_settings(const Settings& rows, const void* def, double scale,
+void write_settings(const SettingTable& rows, const void* def, double scale,
                     nlohmann::ordered_json& out, const WriteByHand& by_hand = nullptr);
 
 }  // namespace h6::io

@@ -63,7 +63,7 @@ std::string kind_text(SettingKind kind) {
   }
 }
 
-void add_table(const Settings& rows, std::string& out) {
+void add_table(const SettingTable& rows, std::string& out) {
   out += "\n| setting | values | unit | default | meaning |\n|---|---|---|---|---|\n";
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
     std::string values = range_text(row);
@@ -75,7 +75,7 @@ void add_table(const Settings& rows, std::string& out) {
 }
 
 // A table, then those of the objects and lists in it.
-void add_section(const Settings& rows, const std::string& path, std::string& out) {
+void add_section(const SettingTable& rows, const std::string& path, std::string& out) {
   out += "\n### " + (path.empty() ? std::string("The file") : "`" + path + "`") + "\n";
   add_table(rows, out);
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
@@ -112,7 +112,7 @@ std::string settings_page() {
   std::string out = kHead;
   add_section(scene_settings(), "", out);
   out += kEngine;
-  for (const Settings* rows : {&session_settings(), &loop_settings()}) {
+  for (const SettingTable* rows : {&session_settings(), &loop_settings()}) {
     out += std::string("\n### `") + rows->of + "`\n";
     add_table(*rows, out);
   }

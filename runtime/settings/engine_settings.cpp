@@ -14,7 +14,7 @@ constexpr double kAllBits = 4294967295.0;
 constexpr Setting kPoseRows[] = {
     plain<&h6Pose::p>("p", Kind::vec3, "m", "position of the mesh frame"),
     plain<&h6Pose::q>("q", Kind::quaternion, "", "orientation w x y z; default 1 0 0 0")};
-constexpr Settings kPose = settings_of("h6Pose", kPoseRows);
+constexpr SettingTable kPose = settings_of("h6Pose", kPoseRows);
 
 constexpr Setting kBodyRows[] = {
     flag<&h6BodyDef::fixed>("fixed", "the body never moves; its mass and inertia are not read"),
@@ -26,7 +26,7 @@ constexpr Setting kBodyRows[] = {
                                "xx yy zz xy xz yz about com, mesh axes; all zero: from the points "
                                "of the shell, each an equal share of the mass"),
     object<&h6BodyDef::pose>("pose", kPose, "mesh frame to world at the start")};
-constexpr Settings kBody = settings_of("h6BodyDef", kBodyRows);
+constexpr SettingTable kBody = settings_of("h6BodyDef", kBodyRows);
 
 constexpr Choice kMethods[] = {{"none", H6_METHOD_NONE},       {"global", H6_METHOD_GLOBAL},
                                {"cluster", H6_METHOD_CLUSTER}, {"gauss3", H6_METHOD_GAUSS3},
@@ -73,7 +73,7 @@ constexpr Setting kContactRows[] = {
         "cluster, +cluster: contacts nearer than this are one contact"),
     flag<&h6ContactDef::passivity>(
         "passivity", "observe the work of the contacts and damp the energy that they would make")};
-constexpr Settings kContact = settings_of("h6ContactDef", kContactRows);
+constexpr SettingTable kContact = settings_of("h6ContactDef", kContactRows);
 
 constexpr Choice kCouplingModes[] = {{"dynamic", H6_COUPLING_DYNAMIC},
                                      {"static", H6_COUPLING_STATIC},
@@ -99,7 +99,7 @@ constexpr Setting kCouplingRows[] = {
                                        "largest torque; 0: max_force times the body's radius"),
     number<&h6CouplingDef::max_step_voxels>("max_step_voxels", "voxel", 0.5, positive(1000),
                                             "static: no point moves farther than this in a frame")};
-constexpr Settings kCoupling = settings_of("h6CouplingDef", kCouplingRows);
+constexpr SettingTable kCoupling = settings_of("h6CouplingDef", kCouplingRows);
 
 constexpr Setting kFilterRows[] = {
     number<&h6HandFilterDef::motion_scale>(
@@ -115,7 +115,7 @@ constexpr Setting kFilterRows[] = {
     whole<&h6HandFilterDef::clutch_buttons>(
         "clutch_buttons", 0, between(0, kAllBits),
         "bits: while one of these buttons is down the device moves alone; 0: none")};
-constexpr Settings kFilter = settings_of("h6HandFilterDef", kFilterRows);
+constexpr SettingTable kFilter = settings_of("h6HandFilterDef", kFilterRows);
 
 constexpr Setting kSafetyRows[] = {
     number<&h6SafetyDef::max_force>("max_force", "N", 0, not_negative(1e4),
@@ -150,7 +150,7 @@ constexpr Setting kSafetyRows[] = {
     whole<&h6SafetyDef::dead_man_buttons>(
         "dead_man_buttons", 0, between(0, kAllBits),
         "bits: nothing is rendered unless one of these buttons is held; 0: none")};
-constexpr Settings kSafety = settings_of("h6SafetyDef", kSafetyRows);
+constexpr SettingTable kSafety = settings_of("h6SafetyDef", kSafetyRows);
 
 constexpr Choice kHandModes[] = {{"impedance", H6_IMPEDANCE},
                                  {"admittance", H6_ADMITTANCE},
@@ -176,7 +176,7 @@ constexpr Setting kHandRows[] = {
     quiet(object<&h6HandDef::safety>(
         "safety", kSafety,
         "limits of what goes to the device, each at most the device's own rating"))};
-constexpr Settings kHand = settings_of("h6HandDef", kHandRows);
+constexpr SettingTable kHand = settings_of("h6HandDef", kHandRows);
 
 constexpr Choice kIntegrators[] = {{"implicit", H6_IMPLICIT}, {"explicit", H6_EXPLICIT}};
 constexpr Choice kGradients[] = {{"symmetric", H6_SYMMETRIC}, {"exact", H6_EXACT}};
@@ -198,7 +198,7 @@ constexpr Setting kSessionRows[] = {
     number<&h6SessionDef::frame_budget_us>(
         "frame_budget_us", "us", 0, between(0, 1e6),
         "anytime mode: a frame that would take longer leaves out points; 0: never")};
-constexpr Settings kSession = settings_of("h6SessionDef", kSessionRows);
+constexpr SettingTable kSession = settings_of("h6SessionDef", kSessionRows);
 
 constexpr Setting kLoopRows[] = {
     number<&h6LoopDef::duration>("duration", "s", 0, between(0, 1e9),
@@ -216,23 +216,23 @@ constexpr Setting kLoopRows[] = {
     flag<&h6LoopDef::disarmed>("disarmed", "every output stays at zero until h6ArmLoop"),
     whole<&h6LoopDef::view_contacts>("view_contacts", 0, between(0, 1e6),
                                      "rows of contacts kept for a viewer; 0: no viewer")};
-constexpr Settings kLoop = settings_of("h6LoopDef", kLoopRows);
+constexpr SettingTable kLoop = settings_of("h6LoopDef", kLoopRows);
 
 }  // namespace
 
-const Settings& pose_settings() { return kPose; }
-const Settings& body_settings() { return kBody; }
-const Settings& contact_settings() { return kContact; }
-const Settings& coupling_settings() { return kCoupling; }
-const Settings& hand_settings() { return kHand; }
-const Settings& safety_settings() { return kSafety; }
-const Settings& session_settings() { return kSession; }
-const Settings& loop_settings() { return kLoop; }
+const SettingTable& pose_settings() { return kPose; }
+const SettingTable& body_settings() { return kBody; }
+const SettingTable& contact_settings() { return kContact; }
+const SettingTable& coupling_settings() { return kCoupling; }
+const SettingTable& hand_settings() { return kHand; }
+const SettingTable& safety_settings() { return kSafety; }
+const SettingTable& session_settings() { return kSession; }
+const SettingTable& loop_settings() { return kLoop; }
 
 std::span<const Choice> method_names() { return kMethods; }
 std::span<const Choice> method_pieces() { return kPieces; }
 
-const Setting& setting_named(const Settings& rows, const char* name) {
+const Setting& setting_named(const SettingTable& rows, const char* name) {
   const Setting* found = nullptr;
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
     if (std::strcmp(row.name, name) == 0) found = &row;

@@ -5,14 +5,14 @@
 
 namespace h6 {
 
-const Settings& pose_settings();      // h6Pose
-const Settings& body_settings();      // h6BodyDef
-const Settings& contact_settings();   // h6ContactDef
-const Settings& coupling_settings();  // h6CouplingDef
-const Settings& hand_settings();      // h6HandDef: its filter's among them, `safety` inside
-const Settings& safety_settings();    // h6SafetyDef
-const Settings& session_settings();   // h6SessionDef
-const Settings& loop_settings();      // h6LoopDef
+const SettingTable& pose_settings();      // h6Pose
+const SettingTable& body_settings();      // h6BodyDef
+const SettingTable& contact_settings();   // h6ContactDef
+const SettingTable& coupling_settings();  // h6CouplingDef
+const SettingTable& hand_settings();      // h6HandDef: its filter's among them, `safety` inside
+const SettingTable& safety_settings();    // h6SafetyDef
+const SettingTable& session_settings();   // h6SessionDef
+const SettingTable& loop_settings();      // h6LoopDef
 
 // Contact methods, and the pieces that can be added to one: name after the '+', H6_PIECE_* bit.
 std::span<const Choice> method_names();
@@ -21,6 +21,6 @@ std::span<const Choice> method_pieces();
 inline constexpr std::uint32_t kRobustPieces = H6_PIECE_FACING | H6_PIECE_DEPTH | H6_PIECE_PRODUCT;
 
 // The row of that name, which must exist.
-const Setting& setting_named(const Settings& rows, const char* name);
+const Setting& setting_named(const SettingTable& rows, const char* name);
 
 }  // namespace h6

@@ -88,7 +88,7 @@ bool check_row(const Setting& row, const void* value, const char* where, h6Error
 
 }  // namespace
 
-void set_defaults(const Settings& rows, void* def) {
+void set_defaults(const SettingTable& rows, void* def) {
   for (const Setting& row : rows) {
     void* const value = row.member.make(def);
     if (row.inside)
@@ -100,7 +100,7 @@ void set_defaults(const Settings& rows, void* def) {
   }
 }
 
-bool is_default(const Settings& rows, const void* def) {
+bool is_default(const SettingTable& rows, const void* def) {
   bool same = true;
   each_setting(rows, def, [&](const Setting& row, const void* at) {
     if (row.member.number) same = same && row.member.number(row.member.get(at)) == row.start;
@@ -108,7 +108,7 @@ bool is_default(const Settings& rows, const void* def) {
   return same;
 }
 
-bool check_settings(const Settings& rows, const void* def, const char* where, h6Error* error) {
+bool check_settings(const SettingTable& rows, const void* def, const char* where, h6Error* error) {
   bool good = true;
   each_setting(rows, def, [&](const Setting& row, const void* at) {
     good = good && check_row(row, row.member.get(at), where, error);

@@ -59,7 +59,7 @@ struct Member {
   void (*set_number)(void* value, double number) = nullptr;
 };
 
-struct Settings;
+struct SettingTable;
 
 struct Setting {
   const char* name;  // "": an object whose rows stand among these
@@ -70,7 +70,7 @@ struct Setting {
   Range range = {};       // of a list: how many entries
   double start = 0;       // the default
   std::span<const Choice> choices = {};
-  const Settings* inside = nullptr;
+  const SettingTable* inside = nullptr;
   bool required = false;           // in a file
   bool quiet = false;              // written to a file only where it is not the default
   const char* replaces = nullptr;  // the key that must not stand beside this one
@@ -80,7 +80,7 @@ struct Setting {
 };
 
 // The rows of one struct, which `of` names.
-struct Settings {
+struct SettingTable {
   const char* of;
   const Setting* first;
   std::size_t count;
@@ -88,7 +88,7 @@ struct Settings {
   const Setting* end() const { return first + count; }
 };
 template <std::size_t N>
-constexpr Settings settings_of(const char* of, const Setting (&rows)[N]) {
+constexpr SettingTable settings_of(const char* of, const Setting (&rows)[N]) {
   return {of, rows, N};
 }
 
@@ -181,7 +181,7 @@ constexpr Setting choice(const char* name, std::span<const Choice> choices, doub
   return row;
 }
 template <auto M>
-constexpr Setting object(const char* name, const Settings& inside, const char* about) {
+constexpr Setting object(const char* name, const SettingTable& inside, const char* about) {
   Setting row = plain<M>(name, SettingKind::object, "", about);
   row.inside = &inside;
   return row;
@@ -200,7 +200,7 @@ constexpr Setting required(Setting row) {
 // Calls visit(row, def) for every row; rows of an object without a name come in its place. `def`
 // may be null.
 template <class Visit>
-void each_setting(const Settings& rows, const void* def, Visit&& visit) {
+void each_setting(const SettingTable& rows, const void* def, Visit&& visit) {
   for (const Setting& row : rows)
     if (row.stands_among())
       each_setting(*row.inside, def ? row.member.get(def) : nullptr, visit);
@@ -209,18 +209,18 @@ void each_setting(const Settings& rows, const void* def, Visit&& visit) {
 }
 
 // Puts the default of every row into `def`; what has no row stays as it is.
-void set_defaults(const Settings& rows, void* def);
+void set_defaults(const SettingTable& rows, void* def);
 template <class Def>
-Def default_def(const Settings& rows) {
+Def default_def(const SettingTable& rows) {
   Def def{};
   set_defaults(rows, &def);
   return def;
 }
 // Every row of `def` has its default.
-bool is_default(const Settings& rows, const void* def);
+bool is_default(const SettingTable& rows, const void* def);
 
 // Every row of `def` is finite and in its range, every choice exists. False with a sentence that
 // begins with `where` ("hand 0: ") and names the setting, its range and the value.
-bool check_settings(const Settings& rows, const void* def, const char* where, h6Error* error);
+bool check_settings(const SettingTable& rows, const void* def, const char* where, h6Error* error);
 
 }  // namespace h6

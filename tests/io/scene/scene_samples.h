@@ -161,7 +161,7 @@ inline void check_close(const Json& a, const Json& b) {
 }
 
 // Every row has the same value in both.
-inline void check_same(const Settings& rows, const void* a, const void* b) {
+inline void check_same(const SettingTable& rows, const void* a, const void* b) {
   Json x = Json::object(), y = Json::object();
   write_settings(rows, a, 1, x);
   write_settings(rows, b, 1, y);

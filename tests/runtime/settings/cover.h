@@ -27,7 +27,7 @@ constexpr std::size_t member_count() {
 
 // `others` members of T are no settings; the test that calls this says which.
 template <class T>
-void every_member_has_a_row(const Settings& rows, std::size_t others) {
+void every_member_has_a_row(const SettingTable& rows, std::size_t others) {
   T def{};
   const auto* const begin = reinterpret_cast<const char*>(&def);
   std::set<const void*> places;

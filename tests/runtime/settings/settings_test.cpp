@@ -31,7 +31,7 @@ TEST_CASE("every member of every definition has its row") {
 namespace {
 
 template <class Def>
-void check_rows(const Settings& rows, const Def& good) {
+void check_rows(const SettingTable& rows, const Def& good) {
   h6Error error{};
   CHECK_MESSAGE(check_settings(rows, &good, "", &error), error.message);
   const auto refused = [&](const Setting& row, double value) {
