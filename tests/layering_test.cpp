@@ -91,7 +91,7 @@ const Rooms& below() {
 const std::vector<std::pair<std::string, std::set<std::string>>> packages = {
     {"hwy/", {"kernels"}},     {"tbb/", {"sched"}},       {"oneapi/", {"sched"}},
     {"Eigen/", {"runtime"}},   {"Spectra/", {"runtime"}}, {"openvdb/", {"io/field"}},
-    {"embree3/", {"io/mesh"}}, {"hdf5", {"io/record"}},   {"H5", {"io/record"}},
+    {"embree", {"io/mesh"}},   {"hdf5", {"io/record"}},   {"H5", {"io/record"}},
     {"xxhash", {"io/file"}},   {"pugixml", {"io/mesh"}},  {"nlohmann/", {"io"}},
     {"CLI/", {"io/cli"}},      {"boost/", {"io/view"}},   {"meshoptimizer", {"io/view"}},
     {"zlib.h", {"io"}},        {"hidapi", {"device"}},    {"doctest/", {"tests"}},
@@ -216,7 +216,7 @@ TEST_CASE("headers that pull a heavy package in stay inside their own box") {
   const auto is_header = [](const Include& i) { return i.file.extension() == ".h"; };
   std::set<std::string> heavy;  // headers with such an include, directly or through another
   for (const Include& i : all)
-    for (const char* prefix : {"openvdb/", "embree3/", "assimp/", "H5", "hdf5", "nlohmann/json.hpp",
+    for (const char* prefix : {"openvdb/", "embree", "assimp/", "H5", "hdf5", "nlohmann/json.hpp",
                                "tbb/", "oneapi/", "Eigen/", "hwy/"})
       if (!i.quoted && is_header(i) && i.name.rfind(prefix, 0) == 0) heavy.insert(path_of(i));
   for (std::size_t before = 0; before != heavy.size();) {

@@ -2,7 +2,11 @@
 // ray_scene.cpp - Embree proposes triangles, double decides (see ray_scene.h).
 #include "io/mesh/ray_scene.h"
 
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
 #include <embree3/rtcore.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +15,37 @@
 
 namespace h6::io {
 namespace {
+
+// Embree 3 takes a ray's filter in its context, Embree 4 in arguments of their own.
+#if RTC_VERSION_MAJOR >= 4
+using RayContext = RTCRayQueryContext;
+constexpr RTCSceneFlags kFilterInCall = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+
+void intersect(RTCScene scene, RayContext& context, RTCFilterFunctionN filter, RTCRayHit& ray) {
+  rtcInitRayQueryContext(&context);
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context;
+  arguments.filter = filter;
+  if (filter) arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+  rtcIntersect1(scene, &ray, &arguments);
+}
+void occluded(RTCScene scene, RTCRay& ray) { rtcOccluded1(scene, &ray); }
+#else
+using RayContext = RTCIntersectContext;
+constexpr RTCSceneFlags kFilterInCall = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+
+void intersect(RTCScene scene, RayContext& context, RTCFilterFunctionN filter, RTCRayHit& ray) {
+  rtcInitIntersectContext(&context);
+  context.filter = filter;
+  rtcIntersect1(scene, &context, &ray);
+}
+void occluded(RTCScene scene, RTCRay& ray) {
+  RayContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene, &context, &ray);
+}
+#endif
 
 Vec3 on_edge(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 e = b - a;
@@ -105,8 +140,7 @@ Result<std::unique_ptr<RayScene>> RayScene::make(const Mesh& mesh) {
   e->device = rtcNewDevice(nullptr);
   if (!e->device) return no_memory;
   e->scene = rtcNewScene(e->device);
-  rtcSetSceneFlags(e->scene,
-                   RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  rtcSetSceneFlags(e->scene, RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | kFilterInCall));
   e->triangle = that_count(mesh);
   Vec3 low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
   for (const std::uint32_t t : e->triangle)
@@ -189,11 +223,10 @@ RayScene::Near RayScene::nearest(const Vec3& place, double within) const {
 }
 
 void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all) const {
-  struct Collect : RTCIntersectContext {
+  struct Collect : RayContext {
     std::vector<std::uint32_t> found;
   } context;
-  rtcInitIntersectContext(&context);
-  context.filter = [](const RTCFilterFunctionNArguments* args) {
+  const auto collect_all = [](const RTCFilterFunctionNArguments* args) {
     for (unsigned i = 0; i < args->N; ++i) {
       if (args->valid[i] == 0) continue;
       auto* collect = static_cast<Collect*>(args->context);
@@ -202,7 +235,7 @@ void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossi
     }
   };
   RTCRayHit ray = embree_->ray(from, along);
-  rtcIntersect1(embree_->scene, &context, &ray);
+  intersect(embree_->scene, context, collect_all, ray);
   std::sort(context.found.begin(), context.found.end());
   context.found.erase(std::unique(context.found.begin(), context.found.end()), context.found.end());
   all.clear();
@@ -220,18 +253,15 @@ void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossi
 }
 
 bool RayScene::meets(const Vec3& from, const Vec3& along) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRayHit ray = embree_->ray(from, along);
-  rtcOccluded1(embree_->scene, &context, &ray.ray);
+  occluded(embree_->scene, ray.ray);
   return ray.ray.tfar < 0;
 }
 
 double RayScene::free_way(const Vec3& from, const Vec3& along) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  RayContext context;
   RTCRayHit ray = embree_->ray(from, along);
-  rtcIntersect1(embree_->scene, &context, &ray);
+  intersect(embree_->scene, context, nullptr, ray);
   const bool met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   return met ? double(ray.ray.tfar) * embree_->half : std::numeric_limits<double>::infinity();
 }
