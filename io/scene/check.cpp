@@ -8,6 +8,7 @@
 
 #include "io/mesh/mesh_file.h"
 #include "io/scene/setting_text.h"
+#include "runtime/settings/engine_settings.h"
 
 namespace h6::io {
 
@@ -226,9 +227,10 @@ void SceneCheck::keys(const Json& object, const SettingTable& rows, const std::s
 
 void check_scene_json(const Json& root) {
   double scale = 1;
-  if (root.is_object() && root.contains("units") && root["units"].is_string())
-    if (const Result<Unit> unit = unit_from_name(root["units"].get<std::string>()); unit)
-      scale = metres(*unit);
+  if (root.is_object() && root.contains("units")) {  // comes first: ranges of lengths depend on it
+    check_choice(root["units"], setting_named(scene_settings(), "units"), "units");
+    scale = metres(*unit_from_name(root["units"].get<std::string>()));
+  }
   SceneCheck(scale).keys(root, scene_settings(), "");
 }
 
