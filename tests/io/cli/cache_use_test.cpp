@@ -111,12 +111,13 @@ TEST_CASE("a damaged file of the cache is baked again, with a warning") {
     damage([](std::string& b) { b = stl(box_facets(1)); });
   }
   SUBCASE("another's asset under this name") {
-    // Sound in themselves: the field and the shell of another scene.
+    // Sound in themselves: the field of another scene, and the shell of another mesh.
     Sandbox other;
     run(other, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.01", "--json"});
-    std::string field, shell;
-    for (const fs::path& file : cached(other))
-      (file.extension() == ".ply" ? shell : field) = slurp(file);
+    REQUIRE(cached(other).size() == 1);
+    spill(other.file("ball.stl"), stl(sphere_facets(0.01f, 10)));
+    result_of(other, {"bake", "shell", "ball.stl", "-o", "a.ply", "--points", "100"});
+    const std::string field = slurp(cached(other)[0]), shell = slurp(other.file("a.ply"));
     REQUIRE_FALSE(field.empty());
     REQUIRE_FALSE(shell.empty());
     damage([&](std::string& b) { b = b.starts_with("ply") ? shell : field; });
