@@ -176,7 +176,7 @@ void add_report(CLI::App& app, Program& program) {
   auto o = std::make_shared<ReportOptions>();
   report
       ->add_option("REC", o->files,
-                   "Recordings, made by 'hapsix run --record'; laid over one another")
+                   "Recordings, made by 'hapsix run --record'; drawn over one another")
       ->required()
       ->option_text("REC.h5...")
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
