@@ -112,24 +112,29 @@ bool ever(const std::vector<h6FrameRecord>& rows, h6Cause cause) {
 TEST_CASE("an arm that was late, was disarmed and armed again moves the body the same way twice") {
   for (const std::uint32_t mode : {H6_ADMITTANCE, H6_PSEUDO_ADMITTANCE, H6_IMPEDANCE}) {
     CAPTURE(mode);
-    BoxOnFloor box;
-    box.hand.mode = mode;
-    box.hand.safety.soft_start = 0.05;
-    box.open();
-    Arm arm;
-    arm.mode = mode, arm.stall_at = 100, arm.stall_ms = 8;
-    const h6Device device = arm.device();
-    int asked = 0;
-    std::size_t disarmed_at = 0;  // this thread may be starved: count from the frame it has seen
-    const Run first = run(box, device, 0.6, [&](h6Loop* loop, std::size_t frames) {
-      if (asked == 1 && frames > disarmed_at + 60) h6ArmLoop(loop), ++asked;
-      if (asked == 0 && frames > 200) h6DisarmLoop(loop), disarmed_at = frames, ++asked;
-    });
-    REQUIRE(ever(first.rows, H6_CAUSE_LATE));
-    REQUIRE(ever(first.rows, H6_CAUSE_DISARMED));
-    CHECK(parts_at(box, device, first.rows, true) == first.rows.size());
-    // Without the events from outside the run differs.
-    CHECK(parts_at(box, device, first.rows, false) < first.rows.size());
+    bool seen = false;
+    // A loaded machine may trip the watchdog first, which latches the output. Then try again.
+    for (int attempt = 0; attempt < 8 && !seen; ++attempt) {
+      BoxOnFloor box;
+      box.hand.mode = mode;
+      box.hand.safety.soft_start = 0.05;
+      box.open();
+      Arm arm;
+      arm.mode = mode, arm.stall_at = 100, arm.stall_ms = 8;
+      const h6Device device = arm.device();
+      int asked = 0;
+      std::size_t disarmed_at = 0;  // this thread may be starved: count from the frame it has seen
+      const Run first = run(box, device, 0.6, [&](h6Loop* loop, std::size_t frames) {
+        if (asked == 1 && frames > disarmed_at + 60) h6ArmLoop(loop), ++asked;
+        if (asked == 0 && frames > 200) h6DisarmLoop(loop), disarmed_at = frames, ++asked;
+      });
+      seen = ever(first.rows, H6_CAUSE_LATE) && ever(first.rows, H6_CAUSE_DISARMED);
+      if (!seen) continue;
+      CHECK(parts_at(box, device, first.rows, true) == first.rows.size());
+      // Without the events from outside the run differs.
+      CHECK(parts_at(box, device, first.rows, false) < first.rows.size());
+    }
+    REQUIRE(seen);
   }
 }
 
