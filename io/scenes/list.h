@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// list.h - the generated scenes, one function each; scenes.cpp finds them by name.
+// list.h - declares one function for each generated scene; scenes.cpp finds them by name.
 #pragma once
 #include "io/scene/scene.h"
 

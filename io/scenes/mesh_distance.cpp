@@ -31,19 +31,21 @@ std::vector<Triangle> triangles_of(const Mesh& mesh) {
 
 double clamp01(double s) { return std::clamp(s, 0.0, 1.0); }
 
-// Closest points of two segments: the unconstrained pair when it lies inside both, else one end.
+// Distance of the segments ab and cd. The closest points of their lines count when they lie inside
+// both segments; otherwise an end of one segment is the closest.
 double segment_distance(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const h6Vec3& d) {
   const h6Vec3 u = b - a, v = d - c, w = a - c;
   const double uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), uw = dot(u, w), vw = dot(v, w);
   const double det = uu * vv - uv * uv;
-  // Clamp on the first, project onto the second, clamp there and project back.
+  // Clamp on the first segment, project onto the second, clamp there and project back.
   const double s0 = det > 1e-12 * uu * vv ? clamp01((uv * vw - vv * uw) / det) : 0;
   const double t = vv > 0 ? clamp01((vw + s0 * uv) / vv) : 0;
   const double s = uu > 0 ? clamp01((t * uv - uw) / uu) : 0;
   return norm(w + s * u - t * v);
 }
 
-// Distance to the face; infinity when the foot is outside it, where an edge is nearer.
+// Distance of p from the inside of the triangle. It is infinity when the foot of the perpendicular
+// lies outside the triangle, because an edge is nearer then.
 double face_distance(const h6Vec3& p, const Triangle& t) {
   const h6Vec3 u = t.corner[1] - t.corner[0], v = t.corner[2] - t.corner[0];
   const h6Vec3 n = cross(u, v), w = p - t.corner[0];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scenes.h - generated scenes: they need no files.
+// scenes.h - makes the built-in scenes by name; they need no files.
 #pragma once
 #include <string>
 #include <vector>
@@ -16,16 +16,16 @@ struct SceneName {
 std::vector<SceneName> scene_names();
 Result<Scene> make_scene(const std::string& name);
 
-// The alpha puzzle's own geometry: a closed tube of 1,008 triangles swept along an alpha curve.
+// One piece of the alpha puzzle: a closed tube of 1,008 triangles swept along an alpha curve.
 struct AlphaShape {
   Mesh mesh;
-  double tube_radius;  // of the circle that every ring of the mesh is inscribed in [m]
-  double gap;          // between the crossing strands' surfaces, computed from the mesh [m]
+  double tube_radius;  // radius of the circle in which every ring of the mesh is inscribed [m]
+  double gap;          // distance of the crossing strands' surfaces, computed from the mesh [m]
 };
 AlphaShape make_alpha();
 
-// Its centre line, mesh frame: a loop for -1 < t < 1, which closes in the xy view at t = -1 and 1,
-// where the strands cross one above the other; tails beyond, to t = -/+ alpha_end().
+// The alpha's centre line in the mesh frame. The loop is -1 < t < 1. Seen along z it closes at
+// t = -1 and 1, where one strand crosses above the other. The tails end at t = -/+ alpha_end().
 h6Vec3 alpha_point(double t);  // [m]
 double alpha_end();
 

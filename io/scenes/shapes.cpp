@@ -32,7 +32,7 @@ void add_point(PointCloud& cloud, const h6Vec3& p, const h6Vec3& inward) {
 }  // namespace
 
 h6Quat from_axes(const h6Vec3& x, const h6Vec3& y, const h6Vec3& z) {
-  // Of the four squares 4w^2, 4x^2, 4y^2, 4z^2 the largest is safe to divide by.
+  // Divide by the largest of 4w^2, 4x^2, 4y^2 and 4z^2: at least one of them is 1 or more.
   const double squares[4] = {1 + x.x + y.y + z.z, 1 + x.x - y.y - z.z, 1 - x.x + y.y - z.z,
                              1 - x.x - y.y + z.z};
   const double a = y.z - z.y, b = z.x - x.z, c = x.y - y.x;
@@ -62,9 +62,9 @@ Mesh box_mesh(const h6Vec3& low, const h6Vec3& high) {
 Mesh block_with_hole(double half_side, double height, double radius, double depth, int segments) {
   Mesh mesh;
   const double corner_radius = radius / std::cos(kPi / segments);
-  // Four rings with a vertex for every segment: hole floor, hole rim, block's top edge, its bottom
-  // edge. A ring of the block is the same fan of angles, cut by the square: its corners, at odd
-  // multiples of 45 degrees, are among them.
+  // There are four rings with one vertex for every segment: the hole's floor and rim, the block's
+  // top and bottom edge. All use the same angles. The square's corners are at odd multiples of 45
+  // degrees, which are among the angles because `segments` is a multiple of 8.
   const auto ring = [&](bool square, double z) {
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
     for (int i = 0; i < segments; ++i) {
@@ -107,7 +107,7 @@ void add_face(PointCloud& cloud, const h6Vec3& centre, const h6Vec3& u, const h6
 
 void add_box(PointCloud& cloud, const h6Vec3& half, double spacing) {
   const h6Vec3 axes[3] = {{half.x, 0, 0}, {0, half.y, 0}, {0, 0, half.z}};
-  // A side that is a multiple of the spacing up to rounding has just as many points.
+  // The tolerance keeps rounding from adding a point to a side that is a multiple of the spacing.
   const auto cells = [&](const h6Vec3& axis) {
     return std::max(1, static_cast<int>(std::ceil(2 * norm(axis) / spacing - 1e-9)));
   };

@@ -14,13 +14,13 @@ h6Quat from_axes(const h6Vec3& x, const h6Vec3& y, const h6Vec3& z);
 // ---- closed meshes, wound outward --------------------------------------------------------------
 
 Mesh box_mesh(const h6Vec3& low, const h6Vec3& high);
-// A square block |x|, |y| <= half_side, -height <= z <= 0 with a blind hole: a regular prism of
-// `segments` sides (a multiple of 8), around the z axis, whose flats are at `radius` and whose
-// floor is at -depth.
+// A square block |x|, |y| <= half_side, -height <= z <= 0 with a blind hole around the z axis. The
+// hole is a regular prism of `segments` sides (a multiple of 8). Its sides are at distance `radius`
+// from the axis and its floor is at z = -depth.
 Mesh block_with_hole(double half_side, double height, double radius, double depth, int segments);
 
 // Smallest distance between the surfaces of two meshes, 0 when they cross. It tries all triangle
-// pairs whose bounding spheres are near enough: for checks of clearance, too slow for a frame.
+// pairs whose bounding spheres are near enough, so it is meant for checks of clearance only.
 double mesh_distance(const Mesh& a, const Mesh& b);
 
 // ---- explicit shells: grids of cell centres ----------------------------------------------------
@@ -32,7 +32,7 @@ void add_face(PointCloud& cloud, const h6Vec3& centre, const h6Vec3& u, const h6
 void add_box(PointCloud& cloud, const h6Vec3& half, double spacing);
 // The side of a cylinder around the z axis.
 void add_cylinder_side(PointCloud& cloud, double radius, double half_length, int around, int along);
-// Points of a square grid through the axis, inside the circle, at height z.
+// The points inside the circle at height z of a square grid that has a point on the z axis.
 void add_disc(PointCloud& cloud, double radius, double z, double spacing, const h6Vec3& inward);
 
 std::array<double, 6> box_inertia(double mass, const h6Vec3& half);
@@ -54,10 +54,11 @@ class HandPath {
   Path rows_;
 };
 
-// A scene in mm with the contact and coupling settings common to the paper's experiments: voxel 1
-// mm, k = 1e4 N/m, k_VC = 1e3 N/m critically damped, half a voxel, 0.9 N m/rad, 5 N x 30 mm.
+// A scene with the contact and coupling settings that the paper's experiments share: voxel 1 mm,
+// contact stiffness 1e4 N/m, virtual coupling 1e3 N/m and 0.9 N m/rad, critically damped, its force
+// bounded to half a voxel of penetration, its torque to 0.15 N m (5 N x 30 mm).
 Scene common_scene(const std::string& name, const std::string& about);
-// A fixed body with a field of `voxel_size`.
+// A fixed body with a field of `voxel_size` [m].
 SceneBody obstacle(const std::string& name, Mesh mesh, double voxel_size);
 // A hand that leads a body along a path.
 SceneHand path_hand(const std::string& body, Path path);

@@ -5,7 +5,7 @@
 //              \ /                their axes: 6 mm between surfaces, where the tube is 8 mm thick.
 //               X   the gap       Taking the alphas apart needs both gaps at once, one through the
 //              / \                other (their crossing segments, at right angles: axes then pass
-//             |   |  loop         14 / sqrt(2) = 9.9 mm apart, more than 8).
+//             |   |  loop         14 / sqrt(2) = 9.9 mm apart, more than 8 mm).
 //              \_/
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,8 @@
 namespace h6::io {
 namespace {
 
-// c(t) = (a (t^2 - 1), b t (t^2 - 1), z t): nodal cubic, lifted. t and -t are mirrored by half a
-// turn about the x axis.
+// The curve is c(t) = (a (t^2 - 1), b t (t^2 - 1), z t): a nodal cubic, lifted along z. Half a turn
+// about the x axis maps c(t) to c(-t).
 constexpr double kLoopLength = 55 * kMm;  // a
 constexpr double kWidth = 45 * kMm;       // b
 constexpr double kLift = 7 * kMm;         // z: half of the axes' distance at the crossing
@@ -29,7 +29,7 @@ constexpr int kSides = 12, kSegments = 41;  // 12 x 41 x 2 + 2 caps of 12 = 1,00
 
 h6Vec3 tangent(double t) { return {kLoopLength * 2 * t, kWidth * (3 * t * t - 1), kLift}; }
 
-// Parameters that cut the curve into pieces of equal length.
+// Returns pieces + 1 parameters that cut the curve into pieces of equal length.
 std::vector<double> equal_lengths(int pieces) {
   constexpr int kSteps = 8192;
   std::vector<double> along(kSteps + 1, 0.0);
@@ -46,14 +46,14 @@ std::vector<double> equal_lengths(int pieces) {
   return out;
 }
 
-// Rings across the curve, joined by two triangles a side, and a fan at either end.
+// Makes rings across the curve, joined by two triangles a side, and a fan at either end.
 Mesh sweep_tube() {
   Mesh mesh;
   const std::vector<double> parameters = equal_lengths(kSegments);
   for (const double t : parameters) {
     const h6Vec3 along = unit(tangent(t));
-    // The curve never runs along z, so "as upright as possible" is a frame without twist jumps; a
-    // vertex of the ring points along it, so the crossing strands face each other edge to edge.
+    // The curve never runs along z, so `up`, the upright direction across it, does not jump. One
+    // vertex of each ring lies along `up`, so the crossing strands face each other edge to edge.
     const h6Vec3 up = unit(h6Vec3{0, 0, 1} - along.z * along);
     const h6Vec3 left = cross(up, along);
     for (int i = 0; i < kSides; ++i) {
@@ -83,8 +83,8 @@ Mesh sweep_tube() {
   return mesh;
 }
 
-// The triangles of one strand near the crossing and of its tail: the loop's two sides are still far
-// from each other 25 mm before the crossing, and there z already tells them apart.
+// Returns the triangles of one strand near the crossing and of its tail. 25 mm before the crossing
+// the loop's two sides are still far apart, and the sign of z tells the strands apart from there.
 Mesh strand(const Mesh& mesh, bool upper) {
   Mesh out;
   out.vertices = mesh.vertices;
@@ -120,8 +120,8 @@ AlphaShape make_alpha() {
 
 Scene alpha_pair(const std::string& name, const std::string& about, const h6Pose& tool_pose) {
   const AlphaShape alpha = make_alpha();
-  // The voxel is about 0.22 mm: half a voxel at k = 5e4 N/m is 5.4 N. The paper forces its shortcut
-  // (Fig. 8) harder than that, with 20 N, and so does this hand: below about 15 N every rule holds.
+  // The voxel is about 0.22 mm, so half a voxel at k = 5e4 N/m is 5.4 N. The paper (Fig. 8) pushes
+  // with 20 N at its shortcut. So does this hand, because every method holds below about 15 N.
   Scene scene = common_scene(name, about);
   scene.contact.stiffness = 5e4;
   scene.coupling.max_force = 20;

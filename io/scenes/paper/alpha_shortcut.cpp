@@ -2,13 +2,13 @@
 // alpha_shortcut.cpp - one alpha forced through the gap of the other, and pushed at it in many
 // ways.
 //
-// alpha-shortcut: the tool's loop hangs around the lower strand of the static alpha, and the hand
-// slides it along that strand like a ring, out of the loop, through the gap, off the tail's free
+// alpha-shortcut: the tool's loop hangs around the lower strand of the static alpha. The hand
+// slides it along that strand like a ring: out of the loop, through the gap, off the tail's free
 // end. The way is free everywhere but in the gap; tubes 6 mm thick would pass.
 //
-// A push leads the tool into the gap likewise, then runs away from there: in a direction within 30
-// degrees of the strand's own, turning the tool at random. The body, on a bounded spring, is pulled
-// after it. However it is turned, there is no way out: see alpha_solution.cpp.
+// A push leads the tool into the gap in the same way. From there the hand leaves in a direction
+// within 30 degrees of the strand's, and turns the tool at random. The bounded coupling pulls the
+// tool after it. There is no way out for any turn: see alpha_solution.cpp.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -23,8 +23,9 @@
 namespace h6::io {
 namespace {
 
-// Pushes: within this of the strand's direction, the hand so far ahead that the pull is the
-// bound's, turned by at most so much, so many times.
+// A push stays within kPushCone of the strand's direction. The hand goes kPushReach ahead, so far
+// that the coupling pulls with its greatest force, and turns the tool kPushTurns times by at most
+// kPushTurn.
 constexpr double kPushCone = std::numbers::pi / 6, kPushReach = 250 * kMm,
                  kPushTurn = 0.6;  // [rad]
 constexpr int kPushTurns = 6;
@@ -47,8 +48,8 @@ h6Pose tool_with_tip_at(const h6Vec3& tip) {
   return {tip - rotate(q, alpha_tip()), q};
 }
 
-// Where the tip's axis is when the tool has come to t: midway between the strands at the crossing,
-// where it needs all the room there is, clear of the lower strand before and behind it.
+// The place of the tool's tip when the tool has come to t. At the crossing, where the room is
+// least, it is midway between the strands; before and behind it stays clear of the lower strand.
 h6Vec3 tip_over_strand(double t) {
   const double clear = 9.3 * kMm;
   const double away = std::clamp(std::abs(t - 1) / 0.15, 0.0, 1.0);
@@ -68,7 +69,7 @@ Path shortcut_path() {
     slide_to(tip_over_strand(kStart + (alpha_end() - kStart) * i / kSteps));
   slide_to(tip + 88 * kMm * unit(h6Vec3{1, -1, 0}));
 
-  // Twisting while it pulls: about each axis in turn.
+  // The hand twists the tool about each axis in turn while it pulls.
   const h6Pose end = hand.pose();
   constexpr int kTwists = 150;
   for (int i = 1; i <= kTwists; ++i) {
@@ -78,8 +79,9 @@ Path shortcut_path() {
     const h6Vec3 turn = {axis == 0 ? swing : 0, axis == 1 ? swing : 0, axis == 2 ? swing : 0};
     hand.go_to({end.p, product(turn_by(turn), end.q)}, 0.01);
   }
-  // Pulled with a constant force along a frictionless strand the tool swings like a pendulum; only
-  // the contacts damp it, with a time constant of two thirds of a second. Long enough to settle.
+  // A constant force along a frictionless strand makes the tool swing like a pendulum. Only the
+  // contacts damp it, with a time constant of two thirds of a second, so it needs this long to
+  // settle.
   hand.wait(2.4);
   return hand.rows();
 }
@@ -107,11 +109,11 @@ Scene alpha_shortcut() {
       tool_with_tip_at(tip_over_strand(kStart)));
   scene.hands.push_back(path_hand("tool", shortcut_path()));
 
-  // Call the loops, closed by the straight segment across their gaps, rings. Linked rings: the
-  // static ring crosses the convex hull of the tool's ring, so every point of the tool is within
-  // 117 mm (its greatest distance from a point of its own ring) of a point of the static ring. No
-  // point of the static ring is within 120 mm of this box: a tool that touches it is no longer
-  // linked.
+  // A ring is a loop closed by the straight segment across its gap. While the rings are linked, the
+  // static ring crosses the convex hull of the tool's ring. Every point of the tool is then within
+  // 117 mm of a point of the static ring; 117 mm is the greatest distance of a point of the tool
+  // from a point of its own ring. No point of the static ring is within 120 mm of this box, so a
+  // tool that touches the box is no longer linked.
   scene.verdict.forbidden.push_back(
       {{88 * kMm, -300 * kMm, -300 * kMm}, {300 * kMm, -88 * kMm, 300 * kMm}});
   return scene;
@@ -120,7 +122,8 @@ Scene alpha_shortcut() {
 Path alpha_push(int index) {
   std::mt19937_64 engine(static_cast<std::uint64_t>(index) + 1);
   const auto random = [&] { return static_cast<double>(engine() >> 11) * 0x1p-53; };  // [0, 1)
-  const auto any_direction = [&](double least_cosine) {  // about the z axis, equal areas
+  // A unit vector whose z is at least least_cosine, uniform on the sphere's cap.
+  const auto any_direction = [&](double least_cosine) {
     const double z = 1 - random() * (1 - least_cosine), angle = 2 * std::numbers::pi * random();
     const double r = std::sqrt(std::max(0.0, 1 - z * z));
     return h6Vec3{r * std::cos(angle), r * std::sin(angle), z};
@@ -149,8 +152,8 @@ Scene alpha_pushes() {
   Scene scene = alpha_shortcut();
   scene.name = "alpha-pushes";
   scene.hands.front().path = alpha_push(0);
-  // A push may end anywhere. Linked, every point of the tool is within 117 mm of the static ring,
-  // which lies within -55 mm <= x <= 0, |y| < 17.5 mm, |z| <= 7 mm.
+  // A push may end anywhere. While linked, every point of the tool is within 117 mm of the static
+  // ring, which lies within -55 mm <= x <= 0, |y| < 17.5 mm, |z| <= 7 mm.
   const double far = 1000 * kMm, x0 = -175 * kMm, x1 = 120 * kMm, y1 = 138 * kMm, z1 = 127 * kMm;
   for (const Box& box :
        {Box{{-far, -far, -far}, {x0, far, far}}, Box{{x1, -far, -far}, {far, far, far}},

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// alpha_solution.cpp - the alpha puzzle solved: a way without contact that takes the alphas apart.
+// alpha_solution.cpp - the alpha puzzle solved: a path without contact that takes the alphas apart.
 //
-// The alphas are hooked so that each one's crossing lies within the other's loop; the tool is
-// unscrewed, see alpha_solution_path.h. Field, points and hand are those of alpha-shortcut: an
-// engine that lets nothing through there can still let go.
+// The alphas are hooked so that each one's crossing lies within the other's loop, and the hand
+// unscrews the tool (alpha_solution_path.h). Field, points and hand are those of alpha-shortcut.
+// The two scenes together show that an engine that holds the shortcut can still let the tool go.
 //
-// alpha-shortcut starts elsewhere, with the tool's loop around a single strand. Between the two
-// starts a planner (RRT-Connect from both ends, 300,000 samples) found no way, not even for tubes
-// 0.9 mm thinner, but found one at once for tubes 1.5 mm thinner: those fit through the gap, as
-// tubes do that are 1 mm thinner. No proof, but likely the shortcut is the only way from there.
+// alpha-shortcut starts elsewhere, with the tool's loop around a single strand. A planner
+// (RRT-Connect from both ends, 300,000 samples) found no path between the two starts, not even for
+// tubes 0.9 mm thinner. It found one at once for tubes 1.5 mm thinner; tubes fit through the gap
+// once they are 1 mm thinner. So the shortcut is likely, but not proved, to be the only way out of
+// that start.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -23,11 +24,11 @@
 namespace h6::io {
 namespace {
 
-constexpr double kSpeed = 50 * kMm;    // of the fastest point, about [m/s]
-constexpr double kRamp = 0.5;          // to reach it, and to come to rest [s]
-constexpr double kTurnArm = 60 * kMm;  // the tool's points are nearer to the x axis than that
-constexpr double kRow = 0.02;          // [s]
-constexpr int kPieces = 2000;          // that the way is measured with
+constexpr double kSpeed = 50 * kMm;    // approximate speed of the tool's fastest point [m/s]
+constexpr double kRamp = 0.5;          // time to reach that speed, and to come to rest [s]
+constexpr double kTurnArm = 60 * kMm;  // bounds the distance of the tool's points from the x axis
+constexpr double kRow = 0.02;          // time between two rows of the path [s]
+constexpr int kPieces = 2000;          // pieces by which the path's length is measured
 
 h6Pose pose_of(const AlphaKey& key) {
   const h6Quat facing = from_axes({-1, 0, 0}, {0, 0, -1}, {0, -1, 0});
@@ -35,7 +36,7 @@ h6Pose pose_of(const AlphaKey& key) {
   return {{key.advance * kMm, 0, 0}, product(turn_by({angle, 0, 0}), facing)};
 }
 
-// Slope of the turn at a keyframe: that of the parabola through it and its neighbours.
+// The slope of the turn at keyframe i is that of the parabola through it and its neighbours.
 double slope(std::size_t i) {
   constexpr std::size_t kLast = std::size(kAlphaSolution) - 1;
   const auto between = [](const AlphaKey& a, const AlphaKey& b) {
@@ -48,7 +49,7 @@ double slope(std::size_t i) {
   return (after * between(k[-1], k[0]) + before * between(k[0], k[1])) / (before + after);
 }
 
-// The turn as a cubic Hermite spline over the advance: velocities do not jump.
+// Interpolates the turn by a cubic Hermite spline over the advance, so that velocities do not jump.
 AlphaKey key_at(double advance) {
   const auto next = std::find_if(std::begin(kAlphaSolution) + 1, std::end(kAlphaSolution) - 1,
                                  [&](const AlphaKey& key) { return key.advance >= advance; });
@@ -60,7 +61,7 @@ AlphaKey key_at(double advance) {
                        t * t * ((1 + 2 * u) * b.turn - u * span * slope(i))};
 }
 
-// How far the hand has come: speed rises and falls as 3 x^2 - 2 x^3 over a ramp.
+// How far the hand has come [m]. Its speed rises and falls as 3 x^2 - 2 x^3 over a ramp.
 double travelled(double time, double whole) {
   const auto ramp = [](double x) { return kSpeed * kRamp * (x * x * x - x * x * x * x / 2); };
   const double end = whole / kSpeed + kRamp;
@@ -73,7 +74,7 @@ Path solution_path() {
   const double first = std::begin(kAlphaSolution)->advance;
   const double last = std::rbegin(kAlphaSolution)->advance;
   const auto piece = [&](int i) { return key_at(first + (last - first) * i / kPieces); };
-  std::vector<double> along(kPieces + 1, 0.0);  // way of the fastest point [m]
+  std::vector<double> along(kPieces + 1, 0.0);  // path length of the fastest point [m]
   for (int i = 1; i <= kPieces; ++i) {
     const AlphaKey a = piece(i - 1), b = piece(i);
     along[i] = along[i - 1] + std::hypot((b.advance - a.advance) * kMm,
@@ -107,7 +108,7 @@ Scene alpha_solution() {
   scene.hands.push_back(path_hand("tool", path));
   scene.verdict.target = path.back().pose;
   scene.verdict.tolerance = 0.2 * kMm;       // a voxel is 0.22 mm
-  scene.verdict.tolerance_angle = 0.2 / 60;  // as much, where the tool is widest
+  scene.verdict.tolerance_angle = 0.2 / 60;  // 0.2 mm at kTurnArm
   return scene;
 }
 

@@ -4,18 +4,18 @@
 
 namespace h6::io {
 
-// The tool looks at the static alpha: its x axis runs against the world's, both through the
-// crossings. At a turn of 0 its crossing strands stand at right angles to the static ones. It moves
-// along the x axis and turns about it; either alpha is then unchanged by half a turn about that
-// axis, so that nothing pushes it sideways where it passes midway between the strands.
+// The tool faces the static alpha: its x axis points against the world's x axis, and both axes pass
+// through the crossings. At a turn of 0 its crossing strands stand at right angles to the static
+// ones. It moves along the world's x axis and turns about it. Half a turn about that axis maps each
+// alpha onto itself, so nothing pushes the tool sideways where it passes between the strands.
 struct AlphaKey {
-  double advance;  // of the tool's crossing from the static one [mm]
-  double turn;     // about the world's x axis [degrees]
+  double advance;  // x of the tool's crossing, seen from the static one [mm]
+  double turn;     // rotation about the world's x axis [degrees]
 };
 
-// The turn of greatest clearance at each place, searched offline on the exact distance between the
-// tubes' axes; where there is more than enough room, less turn than that. The gaps pass through
-// each other at advance 0, the tightest place.
+// At each advance the turn has the greatest clearance, found offline with the exact distance
+// between the tubes' axes. Where there is more than enough room, the turn is smaller than that. The
+// gaps pass through each other at advance 0, the tightest place.
 inline constexpr AlphaKey kAlphaSolution[] = {
     {-22, 72.0}, {-20, 71.0}, {-18, 69.6}, {-16, 67.4}, {-14, 63.6},  {-13, 61.0},  {-12, 58.2},
     {-11, 54.9}, {-10, 51.1}, {-9, 46.7},  {-8, 42.1},  {-7, 37.4},   {-6, 32.6},   {-5, 27.6},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // box_on_plates.cpp - a box pressed on two plates of very different size (Fig. 7): the few contacts
-// on the small one must carry their side.
+// on the small plate must carry their side of the box.
 #include <cmath>
 
 #include "io/scenes/list.h"
@@ -28,7 +28,7 @@ void press_box(Scene& scene, const Sampling& sampling, int nu, int nv) {
   HandPath hand(box.pose);
   hand.wait(0.05).move_by({0, 0, -15 * kMm}, 40 * kMm).wait(0.5);
   scene.hands.push_back(path_hand("box", hand.rows()));
-  // Past the middle of the small plate, 2 mm thick, a point is pushed out on the other side.
+  // The small plate is 2 mm thick: a point past its middle is pushed out on the other side.
   scene.verdict.forbidden.push_back(
       {{10 * kMm, -12 * kMm, -30 * kMm}, {30 * kMm, 12 * kMm, -1.2 * kMm}});
 }
@@ -64,16 +64,17 @@ Scene box_on_plates_share(double share) {
   scene.coupling.rotational_stiffness = 0.05;
   scene.coupling.max_torque = 0.5;
   add_plate(scene, "large", -20 * kMm, -15 * kMm, 11 * kMm);
-  // 40 x 20 points, one a millimetre: rows of five at y = +-0.5, +-1.5, ... The plate's edges lie
-  // between rows, and its field must have an inside.
+  // The box has 40 x 20 points, one in every square millimetre: five contacts a row, at y = +-0.5,
+  // +-1.5, ... mm. The plate's edges lie between two rows, and its field must have an inside.
   const int contacts = std::max(1, static_cast<int>(std::lround(100 * share)));
   if (contacts > 5) {
     const int pairs = std::max(1, static_cast<int>(std::lround(10 * share)));
     const int per_row = static_cast<int>(std::lround(contacts / (2.0 * pairs)));
     add_plate(scene, "small", (20 - per_row) * kMm, 20 * kMm, -pairs * kMm, pairs * kMm);
   } else {
-    // Part of one row: the plate is 1 mm wide, and a field of 1 mm has its samples on both sides
-    // and nothing in between. Four samples instead; what counts in voxels stays as long as it was.
+    // Part of one row touches a plate 1 mm wide. A field of 1 mm would have samples on both sides
+    // of it and none inside. The voxel is 0.25 mm instead; lengths counted in voxels are scaled so
+    // that they stay the same in metres.
     add_plate(scene, "small", (20 - contacts) * kMm, 20 * kMm, 0, kMm);
     const double voxel = 0.25 * kMm;
     for (SceneBody& plate : scene.bodies) plate.field->bake.voxel_size = voxel;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// box_on_wall_explicit.cpp - the flat contact of Fig. 2 under explicit integration and without
-// contact damping, where the net stiffness alone decides what is stable.
+// box_on_wall_explicit.cpp - the flat contact of Fig. 2 with explicit integration and without
+// contact damping, so that the net stiffness alone decides whether it is stable.
 #include <cmath>
 #include <numbers>
 
@@ -33,7 +33,7 @@ Scene box_on_wall_explicit(int nu, int nv) {
   scene.bodies.push_back(box);
 
   HandPath hand(box.pose);
-  hand.wait(0.05).move_by({0, 0, -3.5 * kMm}, 40 * kMm);  // 3 N: short of the bound, so damped
+  hand.wait(0.05).move_by({0, 0, -3.5 * kMm}, 40 * kMm);  // 3 N: below the bound, hence damped
   const h6Pose pressed = hand.pose();
   constexpr int kSteps = 60;
   for (int i = 1; i <= kSteps; ++i) {
@@ -41,7 +41,7 @@ Scene box_on_wall_explicit(int nu, int nv) {
     const h6Vec3 tilt = {0.05 * std::sin(phase), 0.03 * std::sin(2 * phase), 0};
     hand.go_to({pressed.p + h6Vec3{3 * kMm * std::sin(phase), 0, 0}, turn_by(tilt)}, 0.01);
   }
-  // Once deeper by a little: the hand alone would be in the forbidden part.
+  // A little deeper at the end: a box that followed the hand would be in the forbidden region.
   hand.move_by({0, 0, -1 * kMm}, 40 * kMm).wait(0.6);
   scene.hands.push_back(path_hand("box", hand.rows()));
   scene.verdict.forbidden.push_back({{-side, -side, bottom}, {side, side, -3.5 * kMm}});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// box_over_wire.cpp - a box dragged over a plate against something thin (Fig. 12): a low wire, or a
+// box_over_wire.cpp - a box dragged over a plate against a thin obstacle (Fig. 12): a low wire or a
 // post.
 #include <numbers>
 
@@ -9,7 +9,7 @@
 namespace h6::io {
 namespace {
 
-// Everything but the obstacle.
+// Adds everything but the obstacle.
 Scene dragged_box(Scene scene, const Sampling& sampling) {
   const h6Vec3 half = {6 * kMm, 6 * kMm, 4 * kMm};
   SceneBody box;

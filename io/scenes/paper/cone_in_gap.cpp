@@ -10,7 +10,8 @@
 namespace h6::io {
 namespace {
 
-// The cone stands on z = 0, its apex at `height`; points `spacing` apart on base and side.
+// The cone stands on z = 0 with its apex at `height`; the points of base and side are `spacing`
+// apart, relative to `com`.
 PointCloud cone_shell(double radius, double height, double spacing, const h6Vec3& com,
                       Sampler& sampler) {
   PointCloud cloud;

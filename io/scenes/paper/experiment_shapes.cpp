@@ -70,7 +70,8 @@ Mesh prism_mesh(const h6Vec3& centre, double radius, double low, double high, in
 Mesh plate_with_wire(double side, double thickness, double x, double height, double radius,
                      int segments) {
   // The outline in the xz plane, counter-clockwise seen from -y (x right, z up): bottom left,
-  // bottom right, top right, the wire's arc from its right foot over the top to its left foot.
+  // bottom right, top right, the wire's arc from its right foot over the top to its left foot, top
+  // left.
   struct P {
     double x, z;
   };
@@ -78,7 +79,7 @@ Mesh plate_with_wire(double side, double thickness, double x, double height, dou
   const double foot = std::asin(-height / radius);  // angle of the right foot above +x
   for (int i = 0; i <= segments; ++i) {
     const double angle = foot + (kPi - 2 * foot) * i / segments;
-    // The feet stand on the plate exactly.
+    // The feet are exactly on the plate, without rounding.
     const double z = i == 0 || i == segments ? 0 : height + radius * std::sin(angle);
     outline.push_back({x + radius * std::cos(angle), z});
   }
@@ -93,7 +94,7 @@ Mesh plate_with_wire(double side, double thickness, double x, double height, dou
     mesh.triangles.push_back({i, j, n + j});
     mesh.triangles.push_back({i, n + j, n + i});
   }
-  // The ends: a fan over the plate's corners and feet, and one over the convex arc.
+  // Each end has two fans: one over the plate's corners and the feet, one over the convex arc.
   const std::uint32_t right = 3, left = n - 2, corner = n - 1;
   const auto cap = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     mesh.triangles.push_back({c + n, b + n, a + n});
@@ -105,8 +106,8 @@ Mesh plate_with_wire(double side, double thickness, double x, double height, dou
   both(0, right, left);
   both(0, left, corner);
   for (std::uint32_t i = right + 1; i < left; ++i) both(right, i, i + 1 == left ? left : i + 1);
-  // Outward at y = -side is -y: (x right, z up) counter-clockwise is seen from -y. The sides above
-  // run the other way round.
+  // The outline is counter-clockwise seen from -y, so the ends are wound outward already. The sides
+  // made first are wound inward: turn them.
   for (std::uint32_t t = 0; t < 2 * n; ++t) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
   return mesh;
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // experiments.h - the paper's experiments as scenes, each with the values that studies vary.
 //
-// Without arguments they are the figures' own. Where a figure's start is not its hand's, the hand
-// here starts at the body and moves there first, so that no run begins with a blow.
+// The overloads without arguments (list.h) have the values of the paper's figures. Where the body
+// and the hand of a figure start at different poses, the hand here starts at the body and moves to
+// its own start first, so that no run begins with a jump of the force.
 #pragma once
 #include "io/scenes/paper/experiment_shapes.h"
 
@@ -17,12 +18,13 @@ Scene rod_between_tubes(const Sampling& sampling);  // Fig. 8
 Scene box_on_plates(const Sampling& sampling);      // Fig. 7
 Scene box_on_wall_explicit(int nu, int nv);         // Fig. 2: nu x nv points on the box's bottom
 
-// Fig. 7, two equal plates of which the second is ever narrower: its share of the first one's
-// contact points, 1 or less.
+// Fig. 7 with a second plate that is as wide as the first or narrower. `share` is the number of its
+// contact points over that of the first plate, 1 or less.
 Scene box_on_plates_share(double share);
 
-// Fig. 8: alpha-shortcut for hands that push in other directions, and turn, where it is narrow.
-// Push 0, 1, ...: a path of the tool's hand; the same index is the same push anywhere.
+// Fig. 8: alpha-shortcut for hands that push in other directions and turn at the narrow place.
+// alpha_push gives the hand's path of push 0, 1, ...; the same index gives the same path on every
+// machine.
 Scene alpha_pushes();
 Path alpha_push(int index);
 

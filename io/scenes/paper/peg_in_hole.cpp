@@ -9,7 +9,7 @@
 namespace h6::io {
 namespace {
 
-// The side on a grid of 60 x 40 cells, and the bottom cap, its points 4 mm apart.
+// Samples the peg's side by 60 x 40 cells, and its bottom by points 4 mm apart.
 void add_peg(PointCloud& cloud, double radius, double half_length, Sampler& sampler) {
   const int around = sampler.along(60), along = sampler.along(40);
   for (int i = 0; i < around; ++i)
@@ -57,7 +57,7 @@ Scene peg_in_hole(const Sampling& sampling) {
   hand.move_by({0, 0, -20 * kMm}, speed).wait(0.5);
   scene.hands.push_back(path_hand("peg", hand.rows()));
 
-  // Under the floor, and the four sides of the block around the hole.
+  // Forbidden: the region under the floor, and the block on all four sides of the hole.
   const double deep = 3 * kMm, wall = hole + deep;
   scene.verdict.forbidden = {
       {{-side, -side, -height}, {side, side, -floor - deep}},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// rod_between_tubes.cpp - a rod forced with 20 N at a gap narrower than itself (Fig. 8, in its
-// simplest form).
+// rod_between_tubes.cpp - a rod pushed with 20 N at a gap narrower than the rod (the simplest form
+// of Fig. 8).
 #include <cmath>
 #include <numbers>
 
@@ -14,7 +14,8 @@ Scene rod_between_tubes(const Sampling& sampling) {
       "rod-between-tubes",
       "A rod of 6 mm is pressed with up to 20 N, four times the force for which half a voxel is "
       "promised, at the gap of 4 mm between two fixed tubes of 6 mm. Forbidden: beyond the gap.");
-  // Stiffer than the common coupling in proportion to the force: saturated at the same 5 mm.
+  // Four times the common stiffness for four times the force: the coupling saturates at the same 5
+  // mm.
   scene.coupling.stiffness = 4e3;
   scene.coupling.rotational_stiffness = 3.6;  // k_VC (30 mm)^2
   scene.coupling.max_force = 20;
@@ -35,7 +36,8 @@ Scene rod_between_tubes(const Sampling& sampling) {
   rod.shell.emplace();
   rod.shell->points.emplace();
   Sampling random = sampling;
-  if (sampling.jitter > 0) random.seed += 1000;  // random already: other points then
+  // The plain sampling is random already, so a jittered one only takes another seed.
+  if (sampling.jitter > 0) random.seed += 1000;
   Sampler sampler(random);
   const int count = sampler.count(1440);
   for (int i = 0; i < count; ++i) {
@@ -50,7 +52,7 @@ Scene rod_between_tubes(const Sampling& sampling) {
   HandPath hand(rod.pose);
   hand.wait(0.05).move_by({0, 16 * kMm, 0}, 50 * kMm).wait(0.5);
   scene.hands.push_back(path_hand("rod", hand.rows()));
-  // Held, its front is at -0.3 mm.
+  // The front of a rod that is held stays at y = -0.3 mm.
   scene.verdict.forbidden.push_back(
       {{-20 * kMm, 3.5 * kMm, -60 * kMm}, {20 * kMm, 30 * kMm, 60 * kMm}});
   return scene;
