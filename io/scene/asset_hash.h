@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// asset_hash.h - a fingerprint of the data of a field or shell, as the engine gets them.
+// asset_hash.h - hashes the data of a field or shell that the engine uses.
 //
 // The input hash in a baked file does not prove what the file holds now; this hash does. It has 128
-// bits, as 32 hex digits, and leaves out the names of parts and the history.
+// bits, written as 32 hex digits. Names of parts and the history do not enter it.
 #pragma once
 #include <string>
 

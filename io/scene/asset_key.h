@@ -9,8 +9,8 @@
 
 namespace h6::io {
 
-// A mesh with the hash of its content. The constructor is the only place that hashes a mesh: make
-// one for each mesh, and ask for all its keys with it. The mesh must outlive it, unchanged.
+// A mesh with the hash of its content. Hashing is slow, so make one of these for each mesh and use
+// it for all keys of that mesh. The mesh must outlive it and must not change.
 struct HashedMesh {
   explicit HashedMesh(const Mesh& mesh);
   HashedMesh(Mesh&&) = delete;
@@ -18,8 +18,9 @@ struct HashedMesh {
   const Hash128 hash;
 };
 
-// 32 hex digits. Equal bytes of mesh and options (but `threads`) give equal keys. A version number
-// in asset_key.cpp changes all keys when a baker gives other results.
+// Returns 32 hex digits. Equal meshes and equal options give equal keys; `threads` does not count.
+// When a baker starts to give other results, a new version number in asset_key.cpp changes all
+// keys.
 std::string asset_key(const HashedMesh& mesh, const FieldBake& options);
 std::string asset_key(const HashedMesh& mesh, const ShellBake& options);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// check.h - a scene file's JSON against the rows of settings. Private to the reader.
+// check.h - checks a scene file's JSON against the tables of settings. Only the scene reader uses
+// it.
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -8,18 +9,19 @@
 
 namespace h6::io {
 
-// What is wrong, and with which key. Thrown inside the reader only; read_scene makes a sentence of
-// it.
+// Says which key is wrong and why. Only the reader throws and catches it; read_scene turns it into
+// a sentence.
 struct Complaint {
   std::string where, what;
 };
 
-// Throws a Complaint unless every key is known, of its kind and in its range, and none is missing.
+// Throws a Complaint if a key is unknown or missing, or if its value has the wrong kind or is out
+// of range.
 void check_scene_json(const nlohmann::json& root);
 
 // "bodies[1]" and "shell" -> "bodies[1].shell"
 std::string inside(const std::string& path, const std::string& key);
-// Foreign text for use in a sentence: cut short, without control characters.
+// Makes text from a file safe for a sentence: short and without control characters.
 std::string shown(const std::string& text);
 
 }  // namespace h6::io

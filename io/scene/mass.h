@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mass.h - mass properties of parts whose scene does not state them.
+// mass.h - computes the mass properties that a scene does not state.
 #pragma once
 #include <array>
 #include <optional>
@@ -14,11 +14,12 @@ struct MassProperties {
   std::array<double, 6> inertia;  // xx yy zz xy xz yz about com, mesh axes [kg m^2]
 };
 
-// As a uniform solid of this mass [kg]. Only for a mesh that encloses a volume: closed, and wound
-// consistently, inwards or outwards.
+// Treats the mesh as a uniform solid of this mass [kg]. Returns nothing unless the mesh encloses a
+// volume: it must be closed and wound consistently, inwards or outwards.
 std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass);
 
-// Each point has an equal share of the mass. For soups, and for shells without a mesh.
+// Gives each point an equal share of the mass [kg]. Use it for triangle soups and for shells
+// without a mesh.
 MassProperties shell_mass(const ShellData& shell, double mass);
 
 }  // namespace h6::io

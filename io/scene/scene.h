@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene.h - a scene as data, whether it comes from a file or from a generator.
+// scene.h - the data of a scene, from a file or from a generator.
 //
-// Lengths are in metres here; a file has its own unit. Ranges and meanings: runtime/SETTINGS.md.
+// Lengths are in metres here; a file has its own unit. runtime/SETTINGS.md gives meanings and
+// ranges.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -17,20 +18,21 @@
 
 namespace h6::io {
 
-// One row of a path: where the hand wants the mesh frame of its body to be at a time.
+// One row of a path: the pose that the hand wants for the mesh frame of its body at time t.
 struct PathRow {
   double t;     // [s], strictly increasing
   h6Pose pose;  // unit quaternion
 };
 using Path = std::vector<PathRow>;
 
-// Where a field or shell comes from. Exactly one of mesh, file or (generated scenes) mesh_data /
-// points is set. `unit` is that of the file `mesh`: a baked `file` is always in metres.
+// The source of a field or shell. Exactly one of `mesh` (a mesh file), `file` (a baked file) and,
+// in generated scenes, `mesh_data` or `points` is set. `unit` belongs to `mesh`; a baked file is
+// always in metres.
 struct FieldSource {
   std::filesystem::path mesh, file;
   std::optional<Mesh> mesh_data;
   FieldBake bake;
-  std::optional<Unit> unit;  // of the mesh; the scene's own when not set
+  std::optional<Unit> unit;  // of `mesh`; if not set, the scene's unit
 };
 struct ShellSource {
   std::filesystem::path mesh, file;
@@ -47,8 +49,8 @@ struct Box {
 struct SceneBody {
   std::string name;
   bool fixed = false;
-  double mass = 0.1;          // [kg]
-  std::optional<h6Vec3> com;  // mesh frame [m]; default: a solid if closed, else its points
+  double mass = 0.1;                             // [kg]
+  std::optional<h6Vec3> com;                     // mesh frame [m]; by default load_scene derives it
   std::optional<std::array<double, 6>> inertia;  // xx yy zz xy xz yz about com [kg m^2]
   h6Pose pose{{0, 0, 0}, {1, 0, 0, 0}};
   bool translation_only = false;
@@ -65,7 +67,7 @@ struct SceneArm {
   double force_step = 0.01, torque_step = 1e-3;    // [N], [N m]
   bool exact_velocity = false;
   double velocity_filter = 200;                        // [Hz]
-  Box workspace{};                                     // world frame; empty: no stops [m]
+  Box workspace{};                                     // world frame [m]; if empty, no stops
   double stop_stiffness = 2e4;                         // [N/m]
   double max_force = 30, max_torque = 3;               // [N], [N m]
   double max_velocity = 2;                             // [m/s]
@@ -77,47 +79,47 @@ struct SceneArm {
   double grip_rotational_stiffness = 5, grip_rotational_damping = 0.02;     // [N m/rad] ...
 };
 
-// The engine's default hand, but with the driver's coupling of the simulated arm.
+// The engine's default hand, with the driver's coupling of the simulated arm.
 h6HandDef default_scene_hand();
 
 struct SceneHand {
   std::string body;
-  std::string device = "path";           // "path", "simulated", "arm", or what the program knows
-  Path path;                             // rows, read or generated
-  std::filesystem::path path_file;       // the file they were read from
-  h6HandDef def = default_scene_hand();  // `body` and `coupling` are filled in by load_scene
-  std::optional<SceneArm> arm;           // default figures where there is none
+  std::string device = "path";           // "path", "simulated", "arm", or see open_device.h
+  Path path;                             // read from a file or generated
+  std::filesystem::path path_file;       // the file of `path`
+  h6HandDef def = default_scene_hand();  // load_scene fills in `body` and `coupling`
+  std::optional<SceneArm> arm;           // if not set, the default arm
 };
 
 struct SceneVerdict {
   std::vector<Box> forbidden;    // world frame [m]
-  std::optional<h6Pose> target;  // of the first hand's body
-  double tolerance = 0;          // of the mesh frame's origin [m]
-  double tolerance_angle = 0;    // 0: any orientation will do [rad]
+  std::optional<h6Pose> target;  // pose of the first hand's body
+  double tolerance = 0;          // distance of the mesh frame's origin [m]
+  double tolerance_angle = 0;    // [rad]; 0 accepts any orientation
 };
 
 struct Scene {
   std::string name, about;
-  std::string generated;       // the name make_scene knows it by; empty: from a file
-  std::filesystem::path file;  // it was read from
-  Unit unit = Unit::m;         // of files it is exported to
+  std::string generated;       // its name in make_scene; empty for a scene from a file
+  std::filesystem::path file;  // the file that the scene was read from
+  Unit unit = Unit::m;         // for export
   std::vector<SceneBody> bodies;
   h6ContactDef contact = h6DefaultContactDef();
   h6CouplingDef coupling = h6DefaultCouplingDef();
   h6Integrator integrator = H6_IMPLICIT;
   h6Gradient gradient = H6_SYMMETRIC;
   double rate = 1000;
-  double duration = 0;         // [s]; 0: to the end of the longest path
-  bool net_stiffness = false;  // reported in every frame
+  double duration = 0;         // [s]; 0 means until the longest path ends
+  bool net_stiffness = false;  // whether every frame reports the net stiffness
   std::vector<SceneHand> hands;
   SceneVerdict verdict;
 };
 
-// The pose of a path at a time. Between rows the origin moves on a straight line and the
-// orientation turns the shorter way; before the first row and after the last the path stands still.
-// The path has at least one row.
+// The pose of a path at time t [s]. Between rows the origin moves on a straight line and the
+// orientation turns the shorter way. Before the first row and after the last the path stands still.
+// The path must have at least one row.
 h6Pose sample_path(const Path& path, double t);
-// Its velocity (of the mesh frame's origin): constant between rows, zero outside.
+// The velocity of the mesh frame's origin at time t [s]: constant between rows, zero outside.
 h6Velocity sample_path_velocity(const Path& path, double t);
 
 }  // namespace h6::io

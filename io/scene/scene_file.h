@@ -1,37 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_file.h - scene files (JSON, version 1) and hand paths (CSV).
+// scene_file.h - reads and writes scene files (JSON, version 1) and hand paths (CSV).
 #pragma once
 #include "io/scene/scene.h"
 
 namespace h6::io {
 
-// Whatever is wrong is told in one sentence with file and place: no such file, not JSON (line and
-// column), an unknown or missing key (its path, "bodies[1].shell.voxels", and the nearest known
-// key), a value of the wrong kind or out of range, a body that does not exist, a bad path row (file
-// and line). Relative files are looked for beside the scene file. Paths are read; meshes must
-// exist.
+// Reads a scene file and the hand paths it names. It does not read the meshes, but they must exist.
+// Relative file names start at the folder of the scene file. An error is one sentence that names
+// the file and the place: line and column where the text is not JSON, the path of the key
+// ("bodies[1].shell.voxels") where a key or value is wrong, the line of a bad path row. For an
+// unknown key it also names the nearest known key.
 Result<Scene> read_scene(const std::filesystem::path& file);
 
-// CSV `t,x,y,z,qw,qx,qy,qz`, lengths in `unit`; a header line, blank lines and # comments are
-// skipped. Quaternions within 0.001 of unit length are normalised, others are an error.
+// The CSV columns are `t,x,y,z,qw,qx,qy,qz`, with time in seconds and lengths in `unit`. The reader
+// skips a header line, blank lines and # comments. It normalises quaternions within 0.001 of unit
+// length; others are an error.
 Result<Path> read_path(const std::filesystem::path& file, Unit unit);
 Outcome write_path(const std::filesystem::path& file, const Path& path, Unit unit);
 
-// Writes folder/scene.json and the files it names: STL meshes and CSV paths in scene.unit, PLY
-// shells (built from the scene's points) in metres. Files that the scene was read from are copied.
-// The folder is made where needed. Reading the result gives the same scene.
+// Writes folder/scene.json and the files it names: STL meshes and CSV paths in scene.unit, and PLY
+// shells of the scene's points in metres. It copies the files that the scene was read from, and
+// creates the folder if needed. Reading the result gives the same scene.
 Outcome export_scene(const Scene& scene, const std::filesystem::path& folder);
 
-// The same JSON as text, for the head of a recording. No file is written; files keep the names they
-// were read by.
+// The same JSON as text, for the head of a recording. It writes no file and keeps the file names of
+// the scene.
 std::string scene_text(const Scene& scene);
-// Reads such a text. It touches no file, and paths of hands stay empty. A scene in metres comes
-// back to the bit. `name` stands in error sentences.
+// Reads the result of scene_text. It opens no file, so the paths of hands stay empty. A scene in
+// metres comes back bit for bit. Error sentences call the text `name`.
 Result<Scene> read_scene_text(const std::string& text, const std::string& name);
 
-// A JSON schema of scene files, as text.
+// The JSON schema of scene files, as text.
 std::string scene_schema();
-// The page runtime/SETTINGS.md: every setting of scene files and of the engine.
+// The text of runtime/SETTINGS.md: every setting of scene files and of the engine.
 std::string settings_page();
 
 }  // namespace h6::io

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_settings.h - the rows of a scene: every key of a scene file, once.
+// scene_settings.h - tables of settings with one row for every key of a scene file.
 //
-// They drive check.cpp, setting_json.cpp and schema.cpp. Rows without a member are read and written
-// by read.cpp and write.cpp: names of files, lists, and what depends on them.
+// The tables drive check.cpp, setting_json.cpp and schema.cpp. Some rows have no struct member:
+// file names, lists, and values that depend on them. read.cpp and write.cpp handle those.
 #pragma once
 #include "io/scene/scene.h"
 #include "runtime/settings/setting.h"
@@ -11,16 +11,16 @@ namespace h6::io {
 
 const SettingTable& scene_settings();          // Scene
 const SettingTable& scene_body_settings();     // SceneBody
-const SettingTable& field_source_settings();   // FieldSource: its bake's among them
-const SettingTable& shell_source_settings();   // ShellSource: likewise
-const SettingTable& scene_hand_settings();     // SceneHand: its def's among them, `arm` inside
+const SettingTable& field_source_settings();   // FieldSource, with the rows of its bake
+const SettingTable& shell_source_settings();   // ShellSource, with the rows of its bake
+const SettingTable& scene_hand_settings();     // SceneHand, with the rows of its def and its `arm`
 const SettingTable& arm_settings();            // SceneArm
 const SettingTable& forbidden_settings();      // Box
-const SettingTable& target_settings();         // SceneVerdict, its target
+const SettingTable& target_settings();         // the target of a SceneVerdict
 const SettingTable& scene_verdict_settings();  // SceneVerdict
 
-// Largest coordinate and length, in the scene's units: numbers stay far from overflow whatever is
-// done with them.
+// The largest coordinate and length, in the scene's units. It keeps computed numbers far from
+// overflow.
 inline constexpr double kFarthest = 1e6;
 
 }  // namespace h6::io

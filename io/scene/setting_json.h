@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// setting_json.h - values of settings between a struct and a scene file's JSON. Private to the
-// reader and the writer.
+// setting_json.h - copies setting values between a struct and a scene file's JSON. Only the scene
+// reader and the scene writer use it.
 #pragma once
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -9,12 +9,13 @@
 
 namespace h6::io {
 
-// `scale`: metres in one unit of the file. Only JSON that check_scene_json has passed comes here.
-// Keys that are missing leave their members alone. Rows without a member are skipped.
+// Reads `object` into the struct `def`. `scale` is metres per unit of the file. check_scene_json
+// must have accepted the JSON. A missing key leaves its member alone. Rows without a member are
+// skipped.
 void read_settings(const nlohmann::json& object, const SettingTable& rows, void* def, double scale);
 
-// Adds every row of `def` in their order. `by_hand` is called for a row without a member. Throws
-// std::out_of_range for a choice that has no name.
+// Adds the value of every row to `out`, in the order of the rows. It calls `by_hand` for a row
+// without a member. Throws std::out_of_range for a choice that has no name.
 using WriteByHand = std::function<void(const Setting& row, nlohmann::ordered_json& out)>;
 void write_settings(const SettingTable& rows, const void* def, double scale,
                     nlohmann::ordered_json& out, const WriteByHand& by_hand = nullptr);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// setting_text.h - settings in words.
+// setting_text.h - writes numbers and defaults of settings as text.
 #pragma once
 #include <string>
 
@@ -9,8 +9,8 @@ namespace h6::io {
 
 // Ten digits, without trailing zeros.
 std::string number_text(double value);
-// Empty where the row has no default of its own: it is required, or its sentence names the default.
-// Lengths in metres.
+// The default of a row, with lengths in metres. It is empty if the row is required or if its
+// description names the default.
 std::string default_text(const Setting& row);
 
 }  // namespace h6::io

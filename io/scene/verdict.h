@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // verdict.h - judges a run by its motion alone; it does not know the contact method.
 //
-// The first that applies, in this order:
-//   unstable  a state that is not finite, or a body faster than 100x the hand's peak speed (a peak
-//             below 10 mm/s counts as 10 mm/s: a hand at rest does not make any motion unstable)
+// A run gets the first verdict that applies, in this order:
+//   unstable  a state was not finite, or a body was faster than 100x the hand's peak speed. A peak
+//             below 10 mm/s counts as 10 mm/s, so that a hand at rest still allows small motions.
 //   through   a shell point or the centre of mass was in a forbidden box
 //   chatters  the hand was still for at least 0.2 s, and in the last 0.2 s of that phase the RMS
 //             point speed was above 2 mm/s or the peak-to-peak depth above 0.1 voxel. Only the end
 //             of a phase is judged: the body may settle first, and a limit cycle stays to the end.
 //   arrived   the scene has a target, and the run ends there
 //   stuck     the scene has a target, and the run ends elsewhere
-//   held      otherwise
+//   held      none of the others applies
 //
-// Speeds are root mean squares over all shell points, so that rotation counts like translation. The
-// hand is still while the shell points, carried by it, stay within 0.02 mm (RMS) of where they were
-// when the phase began.
+// Speeds are root mean squares (RMS) over all shell points, so that rotation counts like
+// translation. Stillness is measured on the shell points as if they moved with the hand: the hand
+// is still while they stay within 0.02 mm (RMS) of their places at the start of the phase.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -27,25 +27,27 @@ namespace h6::io {
 enum class Verdict { unstable, through, chatters, held, arrived, stuck };
 const char* verdict_name(Verdict verdict);
 
-// Watches a run frame by frame; memory does not grow with its length.
+// Watches a run frame by frame. Its memory does not grow with the length of the run.
 class VerdictWatch {
  public:
-  // `points` (n x 3) are the shell of the first hand's body, mesh frame [m]; com likewise.
+  // `points` are the shell points of the first hand's body, and `com` is its centre of mass, both
+  // in the mesh frame [m]. `rate` is in frames per second.
   VerdictWatch(const SceneVerdict& rules, std::vector<h6Vec3> points, h6Vec3 com, double rate);
-  // Times increase. The body's velocity is that of its centre of mass, the hand's that of the mesh
-  // frame's origin.
+  // `time` [s] must increase from call to call. `body` gives the velocity of the centre of mass,
+  // `hand_velocity` that of the mesh frame's origin.
   void frame(double time, const h6Pose& hand, const h6Velocity& hand_velocity,
              const h6BodyState& body, double max_depth_voxels, bool state_finite);
   Verdict verdict() const;
 
  private:
-  // Neighbouring points, mesh frame: one sphere test rejects all of them.
+  // Neighbouring points in one bounding sphere, mesh frame [m]. One test of the sphere can rule out
+  // all of them.
   struct Cluster {
     h6Vec3 centre;
     double radius;
     std::uint32_t first, count;
   };
-  struct Window {  // the last 0.2 s, a ring
+  struct Window {  // ring buffer of the last 0.2 s
     std::vector<double> speed2, depth;
     std::size_t next = 0, filled = 0;
   };
@@ -61,13 +63,13 @@ class VerdictWatch {
   SceneVerdict rules_;
   std::vector<h6Vec3> points_;
   std::vector<Cluster> clusters_;
-  h6Vec3 com_, mean_{};    // mean_: of the points, mesh frame [m]
+  h6Vec3 com_, mean_{};    // mean_ is the mean of the points, mesh frame [m]
   double second_[6] = {};  // mean of p pT over the points, xx yy zz xy xz yz [m^2]
   double rate_;
   double peak_hand_speed2_ = 0, peak_speed2_ = 0;
   bool finite_ = true, through_ = false, chattered_ = false, first_ = true;
   double still_since_ = 0, last_time_ = 0;
-  h6Pose still_hand_{};  // where the hand's still phase began
+  h6Pose still_hand_{};  // pose of the hand at the start of the still phase
   h6BodyState last_body_{};
   Window window_;
 };
