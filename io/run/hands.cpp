@@ -16,7 +16,7 @@ device::HandPath hand_path(const io::SceneHand& hand, const h6Pose& start,
     path.time.push_back(row.t);
     path.pose.push_back(row.pose);
   }
-  if (path.time.empty()) {  // a hand without a path holds the body where it is
+  if (path.time.empty()) {  // a hand without a path holds the body in place
     path.time.push_back(0);
     path.pose.push_back(start);
   }
@@ -38,7 +38,7 @@ device::ArmFigures arm_figures(const io::SceneHand& hand, const h6CouplingDef& c
   to.exact_velocity = from.exact_velocity, to.velocity_filter = from.velocity_filter;
   to.delay_frames = from.delay_frames;
   to.servo_frequency = from.servo_frequency;
-  if (hand.def.driver_stiffness > 0) {  // 0: the engine does not know the driver
+  if (hand.def.driver_stiffness > 0) {  // 0 means that the engine does not know the driver
     to.driver_stiffness = hand.def.driver_stiffness;
     to.driver_damping = hand.def.driver_damping;
   }
@@ -64,7 +64,7 @@ void keep(OpenedDevice opened, Hands& out) {
   out.alive.push_back(std::move(opened.alive));
 }
 
-// The scene's own arm, with its figures.
+// Opens the simulated arm with the figures of the scene.
 Outcome open_arm(const io::SceneHand& hand, DevicePlace place, const h6CouplingDef& coupling,
                  Hands& out) {
   auto opened = device::SimulatedArm::open(std::move(place.path),

@@ -16,7 +16,7 @@ namespace h6::cli {
 struct Hands {
   std::vector<h6Device> devices;
   std::vector<std::shared_ptr<void>> alive;
-  std::string real_time;  // name of a device that follows the machine's clock; empty: none
+  std::string real_time;  // name of a device that follows the machine's clock; empty if none does
 };
 
 // Opens the device that each of `hands` names (open_device.h) and tells the session its ratings.

@@ -8,7 +8,8 @@
 
 namespace h6::cli {
 
-// Bins grow by 1 % from 0.01 us to 100 s: percentiles are right to 1 %, the maximum is exact.
+// Each bin is 1 % wider than the one before, from 0.01 us to 100 s. So percentiles are accurate to
+// 1 %; the maximum is exact.
 class Histogram {
  public:
   void add(double us) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// open_device.cpp - every device that the program knows, by name.
+// open_device.cpp - opens every device that the program knows, by name.
 #include "io/run/open_device.h"
 
 #include <algorithm>
@@ -37,7 +37,7 @@ Result<OpenedDevice> keep(Result<std::unique_ptr<Device>> made) {
   return out;
 }
 
-// A device in front of another one, which it keeps alive.
+// Puts `device` in front of another device and keeps both alive.
 template <class Device>
 OpenedDevice in_front(OpenedDevice behind, Device device) {
   struct Both {
@@ -51,7 +51,7 @@ OpenedDevice in_front(OpenedDevice behind, Device device) {
   return out;
 }
 
-// A simulated person who follows the path, or the path itself.
+// Opens the path itself or a simulated person who follows it.
 Result<OpenedDevice> hand_by_name(const std::string& name, device::HandPath path,
                                   const h6Vec3& grip) {
   if (name == "path") return keep(device::PathDevice::open(std::move(path)));

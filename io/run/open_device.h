@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// open_device.h - every device that the program knows, by name: NAME[:TARGET][?KEY=VALUE&...].
+// open_device.h - opens every device that the program knows, from a text of the form
+// NAME[:TARGET][?KEY=VALUE&...].
 #pragma once
 #include <functional>
 #include <memory>
@@ -13,20 +14,20 @@ namespace h6::cli {
 
 struct DeviceKind {
   const char* name;
-  const char* form;     // how the name is typed
+  const char* form;     // how a user types it
   const char* about;    // one line
-  const char* options;  // each with its meaning; empty: none
-  bool real_time;       // follows the machine's clock, not the frames'
+  const char* options;  // each option with its meaning; may be empty
+  bool real_time;       // the device follows the machine's clock, not the time of the frames
 };
 const std::vector<DeviceKind>& device_kinds();
 
-// Whether `text` names a device and its options can be read; nothing is opened.
+// Checks that `text` names a device and that its options are valid. It opens nothing.
 Outcome check_device(const std::string& text);
 
-// What a device needs to know about the scene and the body that it holds.
+// The scene and the held body, as far as a device needs to know them.
 struct DevicePlace {
   device::HandPath path{};               // at least one row
-  h6Pose home{{0, 0, 0}, {1, 0, 0, 0}};  // of the mesh frame at the start
+  h6Pose home{{0, 0, 0}, {1, 0, 0, 0}};  // pose of the mesh frame at the start
   h6Vec3 grip{};                         // the body's centre of mass, mesh frame [m]
   double unit = 1;                       // metres in one unit of the scene
 };
@@ -35,8 +36,8 @@ struct OpenedDevice {
   h6Device device{};
   std::shared_ptr<void> alive;  // owns the device
   bool real_time = false;
-  std::string about;                  // what a plug-in says about itself; else empty
-  std::function<std::string()> live;  // its state beside its pose, for people; may be empty
+  std::string about;                  // a plug-in's description of itself; else empty
+  std::function<std::string()> live;  // its current state as text for the user; may be empty
 };
 
 Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& place);

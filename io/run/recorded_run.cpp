@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_run.cpp - what a recording holds about its run, to JSON and back.
+// recorded_run.cpp - writes the settings of a run as JSON and reads them back.
 #include "io/run/recorded_run.h"
 
 #include <algorithm>
@@ -80,12 +80,12 @@ h6DeviceCapabilities rating(const Json& o) {
   c.workspace_max = vec3(o.at("workspace_max"));
   c.rate = o.at("rate").get<double>();
   c.modes = o.at("modes").get<std::uint32_t>();
-  c.freeze_time = o.value("freeze_time", 0.0);  // older files do without
+  c.freeze_time = o.value("freeze_time", 0.0);  // older recordings lack these two keys
   c.frame_time = o.value("frame_time", false);
   return c;
 }
 
-// The file of a part of the scene as it can be found now; empty: it cannot.
+// Where a part of the scene is now: in its old place or beside the recording. Empty if in neither.
 fs::path find_part(const fs::path& was, const fs::path& recording) {
   const fs::path beside = recording.parent_path() / was.filename();
   for (const fs::path& place : {was, beside}) {
@@ -106,7 +106,7 @@ Outcome find_source(Source& source, const std::string& body, const fs::path& rec
   return Done{};
 }
 
-// Parts of a generated scene are made again.
+// Generates the parts of a generated scene again.
 Outcome take_parts(Scene& scene, const std::string& generated) {
   Result<Scene> made = make_scene(generated);
   if (!made) return made.failure();
@@ -270,7 +270,7 @@ Result<std::unique_ptr<LoadedScene>> load_recorded(const RecordingHead& head,
   Result<std::unique_ptr<LoadedScene>> loaded = load_scene(std::move(*scene), progress);
   if (!loaded) return loaded;
   if (Outcome same = same_assets(**loaded, head); !same) return same.failure();
-  (*loaded)->scene.unit = run.unit;  // for people
+  (*loaded)->scene.unit = run.unit;  // for output
   for (std::size_t i = 0; i < run.bodies.size(); ++i) {
     h6BodyDef& body = (*loaded)->bodies[i];
     const std::int32_t shell = body.shell, field = body.field;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_run.h - what a recording holds about its run beside the scene, so that it can be run
-// again to the bit.
+// recorded_run.h - the settings of a run that its recording holds beside the scene. With them the
+// run can be repeated bit for bit.
 //
-// The scene of a recording is in metres, so that its numbers come back as they were. What loading a
-// scene derives (centres of mass, inertias) is recorded as it was used.
+// The scene of a recording is in metres, so that reading it gives the same bits. A recording also
+// holds the values that loading the scene derived: centres of mass and inertias.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -18,32 +18,33 @@ namespace h6::io {
 
 struct RecordedRun {
   std::string generated;             // the scene's name in make_scene, or empty
-  std::filesystem::path scene_file;  // for people; its parts are named in the scene
-  Unit unit = Unit::m;               // of the scene that was run
+  std::filesystem::path scene_file;  // for messages only; the scene itself names its parts
+  Unit unit = Unit::m;               // unit of the scene that was run
   std::uint32_t threads = 1;
   bool virtual_time = false;
   std::size_t max_contacts = 0;
   double frame_budget_us = 0;
   h6Vec3 gravity{};
-  std::vector<h6BodyDef> bodies;              // as scene.bodies; shell and field stay -1
+  std::vector<h6BodyDef> bodies;              // in the order of the scene; shell and field are -1
   std::vector<h6DeviceCapabilities> ratings;  // of each hand's device
 };
 
-// Settings that a person changed during a run: the detail of a "settings" event, first in words,
-// then in braces to the bit. take_settings reads it into the definitions as they were before, and
-// fails where it cannot. The column `settings` says from which frame on they hold.
+// The detail of a "settings" event: settings that a user changed during a run, first in words, then
+// exactly, in braces. take_settings applies such a text to the definitions as they were before the
+// change; it fails if it cannot read the text. The column `settings` of the recording tells from
+// which frame on the change holds.
 std::string settings_text(const h6ContactDef& contact, const h6CouplingDef& coupling);
 Outcome take_settings(const std::string& text, h6ContactDef& contact, h6CouplingDef& coupling);
 
-// The two texts of a recording's head. `scene` has the settings that it is run with.
+// The two texts of a recording's head. `scene` must have the settings of the run.
 std::string run_text(const RecordedRun& run);
 std::string recorded_scene_text(Scene scene);
 
-// Reads run_text. Fails where a recording has none.
+// Reads the text of run_text from the head of a recording. Fails if it is missing.
 Result<RecordedRun> recorded_run(const RecordingHead& head);
 
-// Loads the scene again. Parts are looked for where they were and beside `recording`. Fails, naming
-// the part, where one is gone or has changed.
+// Loads the scene again. It looks for the parts in their old places and beside `recording`. If a
+// part is missing or has changed, it fails and names the part.
 Result<std::unique_ptr<LoadedScene>> load_recorded(const RecordingHead& head,
                                                    const RecordedRun& run,
                                                    const std::filesystem::path& recording,

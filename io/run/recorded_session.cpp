@@ -9,7 +9,8 @@
 namespace h6::cli {
 namespace {
 
-// Bits depend on the SIMD target: takes the recording's where this machine has it.
+// Switches to the SIMD target of the recording if this machine has it, because another target gives
+// other bits.
 void take_target(const std::string& recorded, std::vector<std::string>& remarks) {
   if (recorded == kernels::target_name()) return;
   if (kernels::force_target(recorded.c_str()))
@@ -70,14 +71,15 @@ Result<std::unique_ptr<RecordedSession>> RecordedSession::open(const std::filesy
   return s;
 }
 
-// Gives the safety chains what devices, deadlines and the program told them then.
+// Gives the safety chains their recorded inputs: faults of devices, missed deadlines, and requests
+// of the program.
 void RecordedSession::set_faults(const h6FrameRecord& recorded) {
   if (has_inputs_) {
     for (std::size_t h = 0; h < hands_; ++h)
       h6SetSafetyInput(session_.get(), static_cast<std::int32_t>(h), &recorded.safety_input[h]);
     return;
   }
-  // Older recordings hold only the outcome.
+  // Older recordings lack these inputs, so the faults are derived from the recorded output.
   const bool latched = recorded.report.status & H6_OUTPUT_FAULT;
   if (latched_ && !latched) h6Rearm(session_.get());
   latched_ = latched;
@@ -88,7 +90,7 @@ void RecordedSession::set_faults(const h6FrameRecord& recorded) {
   }
 }
 
-// Applies settings that a person changed in the live view before this frame.
+// Applies the settings that a user changed in the live view before this frame.
 Outcome RecordedSession::follow_settings(const h6FrameRecord& recorded) {
   const std::string at = "frame " + std::to_string(recorded.report.frame) + ": ";
   if (!says_when_) {
@@ -126,7 +128,7 @@ Result<const h6FrameRecord*> RecordedSession::step(const h6FrameRecord& recorded
   now_.time = recorded.time;
   now_.settings = recorded.settings;
   std::copy(std::begin(recorded.hand), std::end(recorded.hand), now_.hand);
-  // The clock decided then how much was left out.
+  // In the recorded run the clock decided how much the anytime mode left out.
   h6SetCoarse(session_.get(), recorded.report.coarse_pairs, recorded.report.coarse_points);
   h6Step(session_.get(), now_.hand, now_.command);
   now_.report = h6GetFrame(session_.get());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_session.h - runs a recording again: with its scene, settings and SIMD target, the
-// recorded samples of the hands give the same frames.
+// recorded_session.h - runs a recording again. With the scene, the settings and the SIMD target of
+// the recording, the recorded hand samples give the same frames.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -18,22 +18,22 @@ namespace h6::cli {
 
 class RecordedSession {
  public:
-  // What is to differ from the recording; empty or 0: nothing.
+  // Differences from the recording. An empty or zero member changes nothing.
   struct Changes {
     std::string method;
     unsigned threads = 0;
   };
-  // Reads head, events and columns of `recording`, not its frames. Fails where the recording does
-  // not say how it was run, or where parts of its scene are gone or changed. `remarks` gets what a
-  // person should know in any case.
+  // Reads the head, the events and the column names of `recording`, not its frames. Fails if the
+  // recording does not say how it was run, or if a part of its scene is missing or has changed.
+  // `remarks` gets messages for the user, whether it fails or not.
   static Result<std::unique_ptr<RecordedSession>> open(const std::filesystem::path& file,
                                                        const io::Recording& recording,
                                                        const Changes& changes,
                                                        const io::Progress& progress,
                                                        std::vector<std::string>& remarks);
-  // Computes a recorded frame again; rows must come in order, from the first on. The result is
-  // valid until the next call. Fails where settings were changed and the recording does not say how
-  // or when.
+  // Computes a recorded frame again. Pass all rows in order, from the first one. The result is
+  // valid until the next call. Fails if settings were changed and the recording does not say how or
+  // when.
   Result<const h6FrameRecord*> step(const h6FrameRecord& recorded);
 
   const io::LoadedScene& loaded() const { return *loaded_; }
@@ -52,9 +52,9 @@ class RecordedSession {
   std::unique_ptr<io::LoadedScene> loaded_;
   h6SessionDef def_{};
   std::vector<h6HandDef> hand_defs_;
-  std::vector<io::RecordingEvent> settings_;  // events, in order
-  std::uint32_t changed_ = 0;                 // how many of them are done
-  bool own_method_ = false;                   // the method is not the recorded one
+  std::vector<io::RecordingEvent> settings_;  // the "settings" events, in order
+  std::uint32_t changed_ = 0;                 // how many of `settings_` are applied
+  bool own_method_ = false;                   // the caller chose the method
   bool has_inputs_ = false, says_when_ = false;
   SessionPtr session_;
   std::size_t hands_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_json.cpp - the object that `run --json` prints.
+// run_json.cpp - makes the object that `run --json` prints.
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -13,7 +13,7 @@ using nlohmann::ordered_json;
 
 namespace {
 
-// How late frames were, by cause: how many within each power of ten.
+// Histograms of lateness, one for each cause, with a bin for each power of ten.
 ordered_json late_json(const h6LoopReport& report) {
   const auto bins = [](const h6LateHistogram& h) {
     static const char* const names[H6_LATE_BINS] = {"10",    "100",    "1000",
@@ -35,7 +35,7 @@ ordered_json grant_json(const h6Granted& g) {
           {"governor", g.governor[0] ? ordered_json(g.governor) : ordered_json()}};
 }
 
-// What the safety chain did for each hand: the causes that came up.
+// The causes on which the safety chain acted, for each hand.
 ordered_json safety_json(const h6LoopReport& loop, std::size_t hands) {
   ordered_json all = ordered_json::array();
   for (std::size_t h = 0; h < hands; ++h) {

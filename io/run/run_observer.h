@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_observer.h - interface of what watches a live run and may change it.
+// run_observer.h - the interface of an observer, which watches a live run and may change it.
 #pragma once
 #include <cstddef>
 #include <functional>
@@ -10,17 +10,17 @@
 
 namespace h6::cli {
 
-// All calls come on the program's main thread.
+// The run makes all calls on the program's main thread.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  // Before the session is made.
+  // Called before the session is created.
   virtual void prepare(RunSetup&) {}
-  // The loop runs; `note` puts an event into summary and recording.
+  // Called when the loop runs. `note` adds an event to the summary and the recording.
   using Note = std::function<void(const std::string& what, const std::string& detail)>;
   virtual void begin(RunSetup& setup, h6Loop* loop, Note note) = 0;
   virtual void rows(const h6FrameRecord* rows, std::size_t count) = 0;
-  // Every few milliseconds. False: end the run.
+  // Called every few milliseconds. Return false to end the run.
   virtual bool turn() = 0;
   virtual void end() {}
 };

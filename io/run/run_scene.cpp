@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_scene.cpp - a scene driven by its hands in the haptic loop, from its first frame to its
-// summary.
+// run_scene.cpp - runs a scene in the haptic loop, from its first frame to its summary.
 #include "io/run/run_scene.h"
 
 #include <chrono>
@@ -50,7 +49,7 @@ h6LoopDef loop_def(const RunOptions& options, const io::LoadedScene& loaded) {
   return def;
 }
 
-// A run under way: moves rows from the loop to whoever watches it.
+// A run in progress. It passes rows from the loop to the watch, the observer and the trace.
 class LiveRun {
  public:
   LiveRun(RunSetup& run, const RunOptions& options, RunSummary& summary, const Console& console)
@@ -65,7 +64,7 @@ class LiveRun {
     h6Error error{};
     loop_.reset(h6StartLoop(run_.session.get(), run_.devices.devices.data(), &def, &error));
     if (!loop_) return Failure{error.message};
-    // A signal stops the devices from its handler and ends the loop after its frame.
+    // The signal handler stops the devices at once; the loop ends after its current frame.
     set_signal_hook([](void* context) { h6HaltLoop(static_cast<h6Loop*>(context)); }, loop_.get());
     if (interrupted.load()) h6RequestStop(loop_.get());
     if (options_.observer)
@@ -90,7 +89,7 @@ class LiveRun {
     return recorded_;
   }
 
-  // The trace is written, and the recording ends with the summary.
+  // Writes the trace and ends the recording with the summary.
   Outcome finish() {
     watch_.finish();
     if (run_.def.hand_count == 0) follow_first_moving_body();
@@ -111,11 +110,11 @@ class LiveRun {
         progress_("running " + run_.loaded.scene.name, rows_[n - 1].time / summary_.seconds);
     }
     if (recorded_ && run_.recorder)
-      recorded_ = run_.recorder->frames(nullptr, 0);  // what is old enough goes to disk
+      recorded_ = run_.recorder->frames(nullptr, 0);  // writes rows that are old enough to disk
     if (!recorded_) h6RequestStop(loop_.get());
   }
 
-  // Rows hold the bodies of hands only.
+  // Without a hand, the rows hold no body.
   void follow_first_moving_body() {
     for (std::size_t b = 0; b < run_.def.body_count; ++b)
       if (!run_.def.bodies[b].fixed) {
@@ -132,7 +131,7 @@ class LiveRun {
   io::view::Trace trace_;
   io::Progress progress_;
   std::vector<h6FrameRecord> rows_ = std::vector<h6FrameRecord>(256);
-  Outcome recorded_ = Done{};  // once it fails, nothing more is watched
+  Outcome recorded_ = Done{};  // after a failure the run ends and no more rows are watched
   std::unique_ptr<h6Loop, LoopDeleter> loop_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_scene.h - runs a loaded scene with its hands, watches it, records it, sums it up.
+// run_scene.h - runs a loaded scene with its hands, records the run and sums it up.
 #pragma once
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -16,16 +16,16 @@ namespace h6::cli {
 class RunObserver;
 
 struct RunOptions {
-  std::string device;   // empty: what the scene says for each hand
-  double duration = 0;  // 0: the scene's [s]
+  std::string device;   // if empty, each hand has the device that the scene names
+  double duration = 0;  // [s]; 0 means the duration of the scene
   bool virtual_time = false;
-  std::string method;  // empty: the scene's
+  std::string method;  // if empty, the method of the scene
   unsigned threads = 1;
   double spin_us = 0;
-  double budget_us = 0;             // anytime mode; 0: off
-  std::string record;               // empty: none
-  std::string trace;                // .json timeline of the last seconds; empty: none
-  RunObserver* observer = nullptr;  // ends the run, where `duration` is 0
+  double budget_us = 0;             // frame budget of the anytime mode [us]; 0 turns it off
+  std::string record;               // file of the recording; empty for none
+  std::string trace;                // .json timeline of the last seconds; empty for none
+  RunObserver* observer = nullptr;  // ends the run if `duration` is 0
   std::size_t view_contacts = 0;    // rows of contacts kept for the observer
 };
 
@@ -36,18 +36,19 @@ struct RunSummary : RunTotals, RunTimes {
   std::size_t events_dropped = 0;
   std::vector<float> depth_strip;  // deepest contact in each 1/60 of the run [voxel]
   std::string recording;
-  double seconds = 0;  // asked for
+  double seconds = 0;  // requested duration [s]
   bool virtual_time = false;
   bool interrupted = false;
 };
 
-// Refuses an unknown method or device before anything is read or baked.
+// Fails for an unknown method or device. Call it before the scene is read and baked, so that the
+// user does not wait for the error.
 Outcome check_options(const RunOptions& options);
 
 Result<RunSummary> run_scene(const io::LoadedScene& scene, const RunOptions& options,
                              const Console& console);
 
-// The object that `run --json` prints; lengths in the scene's units.
+// The object that `run --json` prints, with lengths in the scene's units.
 nlohmann::ordered_json to_json(const RunSummary& summary, const io::LoadedScene& scene,
                                bool virtual_time);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_setup.cpp - how every run of a loaded scene begins.
+// run_setup.cpp - sets up a run of a loaded scene.
 #include "io/run/run_setup.h"
 
 #include "io/run/recorded_run.h"
@@ -39,7 +39,8 @@ Outcome RunSetup::step(h6FrameRecord& r) {
   return good ? Outcome(Done{}) : Outcome(Failure{"a device was lost"});
 }
 
-// The recording holds the scene as it is run, which may differ from what was loaded.
+// The recording holds the scene with the settings of this run, which may differ from the loaded
+// ones.
 Outcome RunSetup::open_recording() {
   io::Scene scene = loaded.scene;
   scene.contact = def.contact;

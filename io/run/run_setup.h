@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_setup.h - how every run of a loaded scene begins, in real time or not: with a session, the
-// devices of its hands and a recording.
+// run_setup.h - sets up a run of a loaded scene, in real time or not: a session, the devices of its
+// hands and a recording.
 #pragma once
 #include <memory>
 #include <string>
@@ -19,7 +19,7 @@ struct SessionRelease {
 };
 using SessionPtr = std::unique_ptr<h6Session, SessionRelease>;
 
-// A run being prepared: change `def`, `hand_defs` and `hands` as needed, then open.
+// A run in preparation. Change `def`, `hand_defs` and `hands` as needed, then call open().
 struct RunSetup {
   explicit RunSetup(const io::LoadedScene& scene);
   RunSetup(const RunSetup&) = delete;  // def points at hand_defs
@@ -28,8 +28,8 @@ struct RunSetup {
   const io::LoadedScene& loaded;
   h6SessionDef def;
   std::vector<h6HandDef> hand_defs;
-  std::vector<io::SceneHand> hands;  // device, path and figures; `def` is taken from hand_defs
-  std::string record;                // .h5 file, empty: none
+  std::vector<io::SceneHand> hands;  // devices, paths and arms; open() uses hand_defs, not `def`
+  std::string record;                // .h5 file of the recording; empty for none
   std::shared_ptr<device::Steering> steering;  // may take the first hand off its path
   bool virtual_time = true;                    // for the recording's head
 
@@ -37,8 +37,8 @@ struct RunSetup {
   Hands devices;
   std::unique_ptr<io::Recorder> recorder;
   Outcome open();
-  // Steps one frame at r.time on this thread, as the haptic loop does, and fills the rest of the
-  // row.
+  // Computes the frame at r.time on this thread, as the haptic loop does, and fills the rest of
+  // `r`.
   Outcome step(h6FrameRecord& r);
 
  private:

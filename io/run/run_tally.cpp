@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_tally.cpp - sums a run up, frame by frame.
+// run_tally.cpp - sums up a run, frame by frame.
 #include "io/run/run_tally.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace h6::cli {
 namespace {
 
-constexpr double kLate = 0.2;  // the verdict's own window [s]
+constexpr double kLate = 0.2;  // the same window as the verdict's [s]
 
 // The centre of mass of the body that the first hand holds.
 h6Vec3 watched_com(const io::LoadedScene& loaded) {

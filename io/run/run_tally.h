@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_tally.h - sums a run up, frame by frame. Memory does not grow with its length.
+// run_tally.h - sums up a run, frame by frame. Its memory does not grow with the length of the run.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,18 +14,18 @@ namespace h6::cli {
 struct RunTotals {
   io::Verdict verdict = io::Verdict::held;
   std::uint64_t frames = 0;
-  h6Status status = 0;  // all bits seen
+  h6Status status = 0;  // every bit that any frame had
   std::uint32_t contacts_max = 0;
   double contacts_mean = 0;           // over all frames
   double touching_contacts_mean = 0;  // over frames with a contact
   double max_depth_voxels = 0, final_depth_voxels = 0;
-  double missed_depth_voxels = 0;        // of coarse frames, the bound
-  double net_stiffness_max = 0;          // where the scene asks for it [N/m]
+  double missed_depth_voxels = 0;        // bound on the depth that coarse frames missed
+  double net_stiffness_max = 0;          // 0 unless the scene asks for it [N/m]
   double force_jump = 0;                 // largest change of the contact force between frames [N]
-  double late_speed = 0;                 // RMS of the body's centre over the last 0.2 s [m/s]
-  double late_depth_swing = 0;           // peak to peak over the last 0.2 s [voxel]
-  double max_force = 0, max_torque = 0;  // as sent to the devices [N], [N m]
-  h6Pose final_pose{}, hand_pose{};      // of the first hand's body, and of that hand
+  double late_speed = 0;                 // RMS speed of the body's centre, last 0.2 s [m/s]
+  double late_depth_swing = 0;           // peak-to-peak depth over the last 0.2 s [voxel]
+  double max_force = 0, max_torque = 0;  // sent to the devices [N], [N m]
+  h6Pose final_pose{}, hand_pose{};      // last pose of the first hand's body, and of that hand
   std::uint64_t state_hash = 0;
 };
 
@@ -36,9 +36,10 @@ struct RunTimes {
 
 class RunTally {
  public:
-  // `duration` of the run [s]: its last 0.2 s are looked at apart.
+  // `rate` is in frames per second. `duration` of the run is in seconds; the tally needs it to find
+  // the last 0.2 s.
   RunTally(const io::LoadedScene& loaded, double rate, double duration);
-  // `contact_force` on the first hand's body, where somebody looks at it [N].
+  // `contact_force` acts on the first hand's body [N]. Only `force_jump` needs it.
   void frame(const h6FrameRecord& record, const h6Vec3& contact_force = {});
   RunTotals totals() const;
   const RunTimes& times() const { return times_; }
@@ -46,7 +47,7 @@ class RunTally {
  private:
   void late_frame(const h6FrameRecord& record);
 
-  RunTotals out_;  // what needs no division
+  RunTotals out_;  // without the means, the late figures and the verdict
   RunTimes times_;
   io::VerdictWatch verdict_;
   double late_from_;

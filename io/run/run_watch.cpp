@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_watch.cpp - what is made of a live run's stream of frames.
+// run_watch.cpp - turns the frames of a live run into its tally, its events and its recording.
 #include "io/run/run_watch.h"
 
 #include <algorithm>
@@ -49,9 +49,9 @@ void RunWatch::row(const h6FrameRecord& r) {
   last_time_ = r.time;
 }
 
-// An event when a status bit or a cause comes up, not while it stays. Status bits that the safety
-// chain sets are left out: its causes say more, and name the hand. So are late frames, which have
-// an event each.
+// Makes an event when a status bit or a cause appears, not while it stays. Some status bits make no
+// event here: those of the safety chain, because its causes say more and name the hand, and that of
+// late frames, because each late frame has an event of its own.
 void RunWatch::note_changes(const h6FrameRecord& r) {
   const h6Status status =
       r.report.status &

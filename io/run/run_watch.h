@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// run_watch.h - what is made of a live run's stream of frames: its tally, its events, its
-// recording.
+// run_watch.h - turns the frames of a live run into its tally, its events and its recording.
 #pragma once
 #include <array>
 #include <string>
@@ -12,10 +11,10 @@ namespace h6::cli {
 
 class RunWatch {
  public:
-  // Fills `summary`. `recorder` may be null.
+  // Fills `summary`. `rate` is in frames per second. `recorder` may be null.
   RunWatch(const io::LoadedScene& loaded, double rate, RunSummary& summary, io::Recorder* recorder);
   Outcome rows(const h6FrameRecord* rows, std::size_t count);
-  // An event that the frames themselves do not show.
+  // Adds an event that the frames do not show.
   void note(const std::string& what, const std::string& detail);
   void finish();
 
