@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// device_check.h - a device by itself, without a scene: its samples, and a tenth of its force.
+// device_check.h - tests a device without a scene: reads its samples and applies 10 % of its force.
 #pragma once
 #include <functional>
 #include <string>
@@ -13,15 +13,15 @@ namespace h6::cli {
 struct SampleCount {
   std::uint64_t frames = 0, failed = 0;  // reads, and reads that found the device lost
   std::uint64_t unusable = 0;            // not finite, absurdly large, or not a rotation
-  std::uint64_t changed = 0;             // different from the sample before
+  std::uint64_t changed = 0;             // different from the previous sample
   double read_us_max = 0, write_us_max = 0;
 };
 
 // One push of the self check.
 struct Push {
   std::string what;    // "force +x"
-  double applied = 0;  // at its peak [N] or [N m]
-  double moved = 0;    // along the push, at its peak [m] or [rad]
+  double applied = 0;  // peak force [N] or torque [N m]
+  double moved = 0;    // motion along the push, at its peak [m] or [rad]
 };
 
 struct CheckResult {
@@ -30,7 +30,7 @@ struct CheckResult {
   std::string trouble;  // why the check ended early, or what is wrong; empty: all is well
 };
 
-// Called once a frame; false ends it.
+// Called once a frame. It returns false to end the check.
 using EachFrame = std::function<bool(double time, const h6DeviceSample&, bool lost)>;
 
 // Reads at 1 kHz and commands nothing but zero.

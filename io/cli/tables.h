@@ -8,9 +8,10 @@
 
 namespace h6::cli {
 
-// One row a run: method, contacts, deepest point, frame times, late frames by cause, verdict.
+// One row for each run: method, contacts, deepest point, frame times, late frames by cause,
+// verdict.
 std::string table(const std::vector<RunSummary>& runs);
-// Late frames by cause and by how late, coarse frames; empty when there were none.
+// Late frames by cause and delay, and coarse frames; empty when there were none.
 std::string late_table(const RunSummary& run);
 // A chart of the deepest contact over time with the half-voxel line; its height is at least twice
 // that line.

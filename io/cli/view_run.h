@@ -2,8 +2,8 @@
 // view_run.h - a run with a live page: `hapsix run SCENE --view`.
 //
 // The page's server has a thread of its own, and the run has the haptic thread. The program's
-// thread connects them: it sends rows and contacts to the page 60 times a second and passes the
-// page's requests on. A reset or a recording begins the run again; other settings do not.
+// thread connects them: it sends rows and contacts to the page 60 times a second and forwards the
+// page's requests. A reset or a recording restarts the run; other settings do not.
 #pragma once
 #include <functional>
 #include <string>
@@ -18,8 +18,8 @@ namespace h6::cli {
 
 struct ViewOptions {
   bool on = false;
-  int port = 0;              // 0: any free one
-  bool open = true;          // a browser, where there is a screen
+  int port = 0;              // 0: any free port
+  bool open = true;          // opens a browser, if there is a screen
   std::string folder = ".";  // for recordings that the page starts
 };
 

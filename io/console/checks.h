@@ -15,7 +15,7 @@
 #include "hapsix/result.h"
 
 namespace h6::cli {
-// The whole text as a finite number.
+// Parses the whole text as a finite number; returns false if it is none.
 inline bool parse(const std::string& text, double& value) {
   char* end = nullptr;
   value = std::strtod(text.c_str(), &end);
@@ -32,7 +32,7 @@ inline std::string must_be(const std::string& what, const std::string& text) {
   return "must be " + what + ", not '" + text + "'";
 }
 
-// Letters to insert, remove or exchange (Levenshtein), one row at a time.
+// The number of letters to insert, remove or exchange (Levenshtein), computed one row at a time.
 inline std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -111,13 +111,13 @@ inline Outcome check_input(const std::string& file) {
   return Done{};
 }
 
-// A recording, or the log that a killed run left beside its name.
+// The file must be a recording, or a killed run must have left its log beside that name.
 inline Outcome check_recording(const std::string& file) {
   std::error_code error;
   return std::filesystem::is_regular_file(file + ".part", error) ? Done{} : check_input(file);
 }
 
-// A file can be made there. Commands check this before a bake of minutes, not after it.
+// A file must be writable there. Commands check this before a bake of minutes, not after it.
 inline Outcome check_output(const std::string& file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error))
@@ -129,7 +129,7 @@ inline Outcome check_output(const std::string& file) {
   return Done{};
 }
 
-// Programs recognise a file by its ending.
+// Checks the ending of a file name, because other programs recognise a file by it.
 inline Check ends_with(std::string ending) {
   return [ending = std::move(ending)](const std::string& text) {
     const bool good = text.size() > ending.size() &&

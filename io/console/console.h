@@ -25,20 +25,20 @@ class Console {
   int fail(std::string sentence, int code = kFailed) const;
   // JSON as text. Names come from files: bytes that are not UTF-8 are replaced.
   static std::string text(const nlohmann::ordered_json& object, int indent = -1);
-  // Prints the result of a command, when json is set.
+  // Prints the result of a command if json is set.
   void result(const nlohmann::ordered_json& object) const;
-  // Call after all work. Returns `code`, or kFailed when stdout could not take everything (a full
-  // disk).
+  // Call this after all work. Returns `code`, or kFailed if stdout could not take everything (a
+  // full disk).
   int finish(int code) const;
-  // A bar on the terminal for work over half a second, with an estimate of the time that is left;
-  // returns false once the user interrupts.
+  // Shows a bar on the terminal for work over half a second, with an estimate of the remaining
+  // time. The returned function returns false once the user interrupts.
   io::Progress progress() const;
 };
 
 // While it lives, SIGINT and SIGTERM end the program within milliseconds: unfinished files are
-// removed, `sentence` is reported as by Console::fail, and the exit code is kFailed. It is for work
-// that never checks `interrupted` (reading a large mesh, writing to a slow disk) and whose only
-// traces are files written aside. Only one may exist at a time.
+// removed, `sentence` is reported as by Console::fail, and the exit code is kFailed. Use it for
+// work that never checks `interrupted` (reading a large mesh, writing to a slow disk) and that
+// writes nothing but temporary files. Only one may exist at a time.
 class EndsAtOnce {
  public:
   EndsAtOnce(const Console& console, const std::string& sentence);
@@ -49,7 +49,7 @@ class EndsAtOnce {
 
 // Set by SIGINT and SIGTERM: work then ends soon and leaves no unfinished file.
 extern std::atomic<bool> interrupted;
-// Only the program installs handlers, never a library. `on_stop` runs inside the handler.
+// Only the program installs handlers, never a library. `hook` runs inside the handler.
 void install_signal_handlers();
 void set_signal_hook(void (*hook)(void*), void* context);
 

@@ -6,15 +6,15 @@
 
 namespace h6 {
 
-// The state of a body's centre of mass, world frame. Poses in the contract are those of the mesh
-// frame.
+// The state of a body's centre of mass, world frame. Poses in the public headers are those of the
+// mesh frame.
 struct RigidState {
   Vec3 x = Vec3::Zero(), v = Vec3::Zero(), w = Vec3::Zero();
   Quat q = Quat::Identity();
-  Mat3 R = Mat3::Identity();  // of q
+  Mat3 R = Mat3::Identity();  // the rotation matrix of q
 };
 
-// How a body gets from one frame to the next: METHOD.md, Sec. 4.
+// How a body moves from one frame to the next: METHOD.md, Sec. 4.
 enum class Motion : std::uint8_t { dynamic, quasi_static, held };
 
 struct Body : RigidState {
@@ -26,8 +26,8 @@ struct Body : RigidState {
   double mass = 0;               // [kg]
   Vec3 com = Vec3::Zero();       // mesh frame [m]
   Mat3 inertia = Mat3::Zero();   // about com, mesh axes [kg m^2]
-  double voxel = 1e-3;           // the smallest of the fields that the body can touch [m]
-  double radius = 0;             // farthest shell point from com [m]
+  double voxel = 1e-3;           // the smallest voxel of the fields that the body can touch [m]
+  double radius = 0;             // distance of the farthest shell point from com [m]
   double max_step = 0;           // quasi-static: the most that a point may move in a frame [m]
   double drag = 0;               // admittance hands: damping of the free body [N s/m]
 };
@@ -44,8 +44,7 @@ struct LinearWrench {
   }
 };
 
-// The pose and velocity of the body's mesh frame, and of a mesh frame that hangs on `state`
-// instead.
+// The pose and velocity of the body's mesh frame, when its centre of mass has `state`.
 inline h6Pose mesh_pose(const Body& body, const RigidState& state) {
   return {to(Vec3(state.x - state.R * body.com)), to(state.q)};
 }

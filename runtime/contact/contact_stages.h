@@ -9,12 +9,12 @@ namespace h6 {
 
 inline constexpr std::size_t kSumSlice = 1024;  // contacts summed at a time; slices added in order
 
-// ---- side by side for several shell bodies: each writes its shell body and its lane only
+// ---- these may run side by side for several shell bodies: each writes only its own body and lane
 
 // Finds the shell points that touch a field: rows of the last level with a distance below zero, or
-// (series) below the margin. Keeps the deepest where there are too many.
+// (series) below the margin. If there are too many, it keeps the deepest.
 void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
-// Fills depth, normal, gradient and arm of each.
+// Fills depth, normal, gradient and arm of each contact.
 void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Shares the stiffness among all contacts of the shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
@@ -23,15 +23,15 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
 // Sums each pair's contacts into shell.sums.
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 
-// ---- one shell body after the other, in order
+// ---- this runs for one shell body after the other, in order
 
 // Adds the sums to the wrenches on both bodies of each pair, and to the blocks between them.
 void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                   std::span<LinearWrench> acting);
 
-// ---- the parts of add_wrenches, for sums from anywhere
+// ---- the parts of add_wrenches, for sums from any source
 
-// A pair's two bodies, and what acts on each.
+// A pair's two bodies, and the wrench that acts on each.
 struct Sides {
   const Body &a, &b;
   LinearWrench &on_a, &on_b;
@@ -42,12 +42,13 @@ inline Sides sides_of(const Pair& pair, std::span<const Body> bodies,
 }
 void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
                    const kernels::WrenchSum& sum);
-// `series`: first each pair of a shell body, then join_series once, which reads shell.sums.
+// `series`: call spread_series for each pair of a shell body, then join_series once. The latter
+// reads shell.sums.
 void spread_series(const Settings& set, const Sides& sides, Pair& pair,
                    const kernels::WrenchSum& sum);
 void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                  std::span<LinearWrench> acting);
-// Adds what turning the arms and normals does to an elastic wrench f on a.
+// Adds to the derivatives how an elastic wrench f on a changes as its arms and normals turn.
 void add_geometric_terms(const Sides& sides, Pair& pair, const Vec6& f);
 
 // S = [I 0; [x_a - x_b]x I]: carries a wrench about a's centre of mass to b's.

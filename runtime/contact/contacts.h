@@ -8,7 +8,7 @@
 namespace h6 {
 
 struct Contacts {
-  float* depth;          // penetration depth, > 0; `series`: also about to touch [m]
+  float* depth;          // penetration depth, > 0; `series`: <= 0 before a point touches [m]
   float *nx, *ny, *nz;   // inward unit normal, world frame
   float *gx, *gy, *gz;   // unit gradient of the field, world frame, outward
   float *rx, *ry, *rz;   // arm from the centre of mass, world frame           [m]
@@ -22,7 +22,7 @@ struct Contacts {
   std::size_t count, capacity;
 };
 
-// The one list of all columns.
+// Calls f for every column. Columns are listed here only.
 template <class F>
 void each_column(Contacts& c, F&& f) {
   for (float** column : {&c.depth, &c.nx, &c.ny, &c.nz, &c.gx, &c.gy, &c.gz, &c.rx, &c.ry, &c.rz,

@@ -10,7 +10,7 @@
 
 namespace h6 {
 
-// Lists and candidates of one traversal. Sizes are those of the largest shell.
+// Lists and candidates of one traversal, sized for the largest shell.
 struct TraverseScratch {
   std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (groups)
   std::uint32_t *far = nullptr, *far_survivors = nullptr;   // (groups)
@@ -27,8 +27,8 @@ struct TraverseScratch {
 struct Scratch {
   TraverseScratch traverse;
   ClusterScratch cluster{};
-  char* weigh = nullptr;                    // weigh_scratch_bytes of max_contacts, or null
-  std::size_t* slice_count = nullptr;       // (slices of groups) points that touch
+  char* weigh = nullptr;                    // weigh_scratch_bytes(max_contacts) bytes, or null
+  std::size_t* slice_count = nullptr;       // (slices of groups) how many points touch
   kernels::WrenchSum* slice_sum = nullptr;  // (slices of contacts)
 };
 
@@ -36,11 +36,12 @@ struct Lane {
   Scratch* scratch = nullptr;
   TraverseScratch* helper = nullptr;  // for the team's second thread; null: pairs are not shared
   sched::FrameTeam* team = nullptr;
-  ShareGate touching, weighing, summing;  // whether groups, contacts, contacts go to the team
-  Anytime* anytime = nullptr;             // the frame's; only read where lanes run side by side
-  bool cold = false;       // other programs have used the caches since the last frame
-  double tick_ns = 1;      // of sched::ticks
-  h6FrameReport report{};  // of this lane alone
+  // Whether the team shares the search over groups, the weighing and the summing of contacts.
+  ShareGate touching, weighing, summing;
+  Anytime* anytime = nullptr;  // one for the frame; lanes that run side by side only read it
+  bool cold = false;           // other programs have used the caches since the last frame
+  double tick_ns = 1;          // the length of one tick of sched::ticks
+  h6FrameReport report{};      // covers this lane alone
 };
 
 }  // namespace h6

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// net_stiffness.h - how stiff all contacts of a shell body are together. METHOD.md, Sec. 3.
+// net_stiffness.h - the net stiffness of all contacts of a shell body. METHOD.md, Sec. 3.
 #pragma once
 #include "runtime/contact/pair.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings.h - what a session is told when it is made; every stage may read it, none changes it.
+// settings.h - the settings of a session: every stage may read them, none changes them.
 #pragma once
 #include <cstddef>
 
@@ -12,10 +12,10 @@ struct Settings {
   h6ContactDef contact{};
   h6Integrator integrator = H6_IMPLICIT;
   h6Gradient gradient = H6_SYMMETRIC;
-  double dt = 1e-3;              // of a frame [s]
+  double dt = 1e-3;              // length of a frame [s]
   Vec3 gravity = Vec3::Zero();   // world frame [m/s^2]
-  bool net_stiffness = false;    // report it
-  std::size_t max_contacts = 0;  // of one shell body
+  bool net_stiffness = false;    // the report includes it
+  std::size_t max_contacts = 0;  // limit for one shell body
 };
 
 }  // namespace h6

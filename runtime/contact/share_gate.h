@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // share_gate.h - decides by timing whether a second thread helps.
 //
-// Data that a second thread writes must come over from its core's cache. The cost depends on the
-// machine, and on virtual ones it changes while a program runs: sums of 1,000 contacts took 25 us
-// on one thread and 17 on two while both cores shared a cache, and 18 and 27 when they did not. The
-// bits are the same on any thread, so the gate may go by the clock.
+// Data that a second thread writes must be moved from its core's cache. The cost depends on the
+// machine, and on a virtual machine it changes while a program runs: summing 1,000 contacts took
+// 25 us on one thread and 17 on two while both cores shared a cache, and 18 and 27 while they did
+// not. The results have the same bits on any thread, so the gate may decide by the clock.
 #pragma once
 #include <algorithm>
 #include <bit>
@@ -15,13 +15,14 @@ namespace h6 {
 
 class ShareGate {
  public:
-  // Is work of `size` to be shared this time? took() must then say how long it took.
+  // Decides whether to share work of `size` this time. The caller must then report its time to
+  // took().
   bool share(std::size_t size) {
     now_ = &kinds_[std::min<std::size_t>(std::bit_width(size), kKinds) - 1];
     size_ = static_cast<double>(size);
     const std::uint32_t phase = now_->times++ % kEvery;
     trial_ = phase < kTrial;
-    // The first trials find the caches as the other way left them, so they do not count.
+    // The first calls of a trial find the caches as the other way left them, so they do not count.
     settled_ = phase % kTrial >= kTrial / 2 || phase >= 2 * kTrial;
     way_ = now_->shares != trial_;
     return way_;
@@ -33,19 +34,19 @@ class ShareGate {
     if (!settled_) return;
     double& each = kind.each[way_];
     const double seen = ns / size_;
-    // A stolen millisecond counts as twice the usual at most.
+    // If the machine stole time from this call, it counts as twice the usual at most.
     each = each > 0 ? each + (trial_ ? 0.25 : 0.05) * (std::min(seen, 2 * each) - each) : seen;
     if (!(kind.each[0] > 0 && kind.each[1] > 0)) return;
     kind.shares = kind.each[1] < (kind.shares ? 1.0 : kGain) * kind.each[0];
   }
 
  private:
-  static constexpr std::size_t kKinds = 24;     // of sizes, by powers of two
+  static constexpr std::size_t kKinds = 24;     // classes of size, by powers of two
   static constexpr std::uint32_t kEvery = 512;  // calls until the other way is tried again
   static constexpr std::uint32_t kTrial = 8;    // calls of a trial
-  static constexpr double kGain = 0.95;         // sharing begins below this share of the time alone
+  static constexpr double kGain = 0.95;  // sharing begins below this part of one thread's time
   struct Kind {
-    double each[2] = {};  // time of one item alone and shared [ns]
+    double each[2] = {};  // time of one item, on one thread and shared [ns]
     std::uint32_t times = 0;
     bool shares = true;
   } kinds_[kKinds];

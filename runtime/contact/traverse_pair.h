@@ -8,20 +8,20 @@
 
 namespace h6 {
 
-inline constexpr std::size_t kTouchSlice = 32;  // groups sampled at a time: some 2 us
-// Groups from which the helper takes slices: some 6 us of work.
+inline constexpr std::size_t kTouchSlice = 32;  // groups sampled at a time, in about 2 us
+// From this many groups on, about 6 us of work, the helper takes slices.
 inline constexpr std::size_t kWorthSharing = 80;
 
-// Puts the candidates of shell body a against field body b behind `used` in the scratch, and
-// returns how many there are. Two tiers of spheres are tested, then points; of each only those that
-// may have come within reach since they were last tested. Where time is short the traversal ends
-// with the finest tier that is complete; what it leaves out stays expired. `shared`: the pair is
-// itself a slice, so the other thread has work of its own.
+// Writes the candidates of shell body a against field body b behind row `used` of the scratch, and
+// returns how many there are. It tests two tiers of spheres, then points. In each tier it tests
+// only those that may have come within reach since their last test. If time is short, the traversal
+// ends with the finest complete tier, and all that it leaves out stays expired. `shared`: the
+// threads share whole pairs, so the other thread takes no slices of this one.
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared);
 
 kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);
-// From one scratch to another, or within one; the two ranges may overlap.
+// Copies candidates from one scratch to another, or within one. The two ranges may overlap.
 void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
                      std::size_t from_row, std::size_t count);
 

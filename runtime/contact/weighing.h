@@ -16,7 +16,7 @@ namespace h6 {
 // need none.
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                    sched::FrameTeam* team, void* scratch);
-// The scratch that weigh_columns uses for up to `count` contacts; 0 where the rule needs none.
+// The scratch that weigh_columns needs for up to `count` contacts, in bytes; 0 when it needs none.
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
 
 // Rows begin..end-1.
@@ -55,7 +55,7 @@ std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, st
 // ---- series
 // --------------------------------------------------------------------------------------
 
-// L, an upper bound on the arms of the body's contacts [m].
+// The lever L, an upper bound on the arms of the body's contacts [m].
 inline double series_lever(double radius, double voxel) { return radius > voxel ? radius : voxel; }
 
 // Writes e of rows begin..end-1 to load: the depth less the damping at the relative velocity u.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// session.h - what changes from frame to frame, in storage that is sized once.
+// session.h - the state that changes from frame to frame, in storage that is sized once.
 #pragma once
 #include <span>
 
@@ -20,8 +20,8 @@ struct h6Session {
   h6::Settings settings;
 
   std::span<h6::Body> bodies;
-  std::span<h6::LinearWrench> acting;  // (bodies) what acts on each in this frame
-  std::span<h6::Pair> pairs;           // those of one shell body stand together
+  std::span<h6::LinearWrench> acting;  // (bodies) the wrench on each in this frame
+  std::span<h6::Pair> pairs;           // the pairs of one shell body are neighbours
   std::span<h6::ShellBody> shells;
   std::span<h6::Hand> hands;
   std::span<h6::HandDevice> devices;  // (hands)
@@ -34,14 +34,14 @@ struct h6Session {
   h6::sched::TickLength tick_length;
   std::int64_t left_at = 0;  // when the last frame ended, by the clock [ns]
   h6::sched::FrameTeam* team = nullptr;
-  h6::sched::FrameTeam* alone = nullptr;  // for lanes side by side
+  h6::sched::FrameTeam* alone = nullptr;  // a team of one, for lanes side by side
   void* memory = nullptr;
   std::size_t memory_bytes = 0;
 };
 
 namespace h6 {
 
-// The shell body that this body is, or null.
+// The shell body with this body's index, or null.
 inline ShellBody* find_shell(const h6Session& s, std::int32_t body) {
   for (ShellBody& shell : s.shells)
     if (shell.body == body) return &shell;

@@ -6,7 +6,7 @@
 
 namespace h6 {
 
-// False with a sentence that names the entry and the range it must be in.
+// Both return false with a sentence that names the wrong entry and its range.
 bool check_contact(const h6ContactDef& def, h6Error* error);
 bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error);
 

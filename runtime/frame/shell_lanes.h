@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_lanes.h - who weighs the shell bodies of a frame: both threads one after the other, or each
-// thread its own.
+// shell_lanes.h - shares the shell bodies of a frame out: either both threads weigh one after the
+// other, or each thread weighs its own.
 //
-// Two hands usually hold two parts. Traversal, contacts and weights of one shell body touch nothing
-// of another, so two shell bodies can be weighed side by side, each in a lane with scratch and a
-// report of its own. Wrenches are added afterwards, in order: the bits are those of one thread.
+// Two hands usually hold two parts. Traversal, contacts and weights of one shell body need nothing
+// of another, so two shell bodies can be weighed side by side. Each has a lane with its own scratch
+// and report. Wrenches are added afterwards, in order, so the bits are those of one thread.
 #pragma once
 #include "runtime/contact/lane.h"
 #include "runtime/contact/pair.h"
@@ -13,14 +13,15 @@
 namespace h6 {
 
 struct Lanes {
-  Scratch scratch[2];         // of each thread
+  Scratch scratch[2];         // one for each thread
   Lane whole;                 // both threads share the slices and pairs of one shell body
   Lane single[2];             // one thread each
   bool two = false;           // the single lanes can be used
   bool side_by_side = false;  // they were, in this frame
 };
 
-// `scratch` is laid out. `alone` is a team of one thread, or null where there is one shell body.
+// lanes.scratch must be laid out. `alone` is a team of one thread, or null if there is only one
+// shell body.
 void open_lanes(Lanes& lanes, sched::FrameTeam* team, sched::FrameTeam* alone, Anytime* anytime);
 void begin_lanes(Lanes& lanes, bool cold, double tick_ns);
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hand.h - a hand: its coupling to a body, and, in a column of its own, its side towards the
-// device.
+// hand.h - a hand: Hand is its coupling to a body, HandDevice its side towards the device.
 #pragma once
 #include "runtime/contact/body.h"
 #include "runtime/hand/hand_filter.h"
@@ -12,16 +11,16 @@ namespace h6 {
 struct Hand {
   std::int32_t body = -1;
   std::uint32_t mode = H6_IMPEDANCE;
-  bool seen = false;      // a good sample has come
+  bool seen = false;      // a good sample has arrived
   bool clutched = false;  // the device moves alone
-  bool cut_off = false;   // the safety chain lets nothing out: the device's wrench counts for none
-  h6CouplingDef coupling{};                         // with no zeros left
+  bool cut_off = false;   // the safety chain lets nothing out, and the device's wrench is ignored
+  h6CouplingDef coupling{};                         // zeros are replaced by derived values
   double manipulandum_mass = 0.1;                   // [kg]
   double driver_stiffness = 0, driver_damping = 0;  // [N/m], [N s/m]
-  h6DeviceSample sample{};                          // the last good one, in the scene
+  h6DeviceSample sample{};     // the last good one, in the scene's frame and units
   RigidState manipulandum;     // where the hand holds the body's centre of mass; pseudo-admittance:
                                // a body of its own
-  Vec6 wrench = Vec6::Zero();  // of the hand on the body
+  Vec6 wrench = Vec6::Zero();  // the hand's wrench on the body
 };
 
 struct HandDevice {
@@ -30,16 +29,16 @@ struct HandDevice {
   h6SafetyDef safety{};
   DeviceWatch watch;
   OutputGuard guard;
-  // Set from outside for the next frame.
+  // The caller sets these for the next frame.
   bool lost = false;   // the device could not be read or written
-  double overdue = 0;  // the next command comes so much too late [s]
+  double overdue = 0;  // how much too late the next command comes [s]
   h6Wrench told{};     // the last command's wrench
   bool passivity = false;
   HandPort port;
 };
 
 void set_rating(HandDevice& device, const h6DeviceCapabilities& capabilities);
-// `seconds` lie between the last command and the next one. It is late when a frame is missing.
+// `seconds`: the time from the last command to the next one, which is late when a frame is missing.
 void note_interval(HandDevice& device, double dt, double seconds);
 
 }  // namespace h6

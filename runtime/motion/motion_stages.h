@@ -10,35 +10,35 @@
 
 namespace h6 {
 
-// Moving bodies that pairs connect. An island of up to kIslandBodies is solved as one system.
+// Moving bodies that pairs connect. They are solved as one system.
 struct Island {
   std::int32_t body[kIslandBodies];
   int count;
 };
 
-// Makes a device's sample the hand's. A sample that is not finite is not used: the hand stays where
-// it last was, without a wrench.
+// Gives a device's sample to its hand. A sample that is not finite is not used: the hand then stays
+// where it last was, without a wrench.
 void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSample& given,
             double dt, h6Status& status);
 // Direct coupling: puts the body where the hand is, before contacts are found.
 void hold(Hand& hand, Body& body);
-// Adds the hand's wrench to what acts on its body, by coupling and device mode. METHOD.md, Sec. 4.
+// Adds the hand's wrench on its body to `acting`, by coupling and device mode. METHOD.md, Sec. 4.
 void couple(const Settings& set, Hand& hand, const Body& body, LinearWrench& acting,
             h6Status& status);
 // Pseudo-admittance: one time step of the manipulandum between the driver's coupling and the body.
 void step_manipulandum(const Settings& set, Hand& hand, const Body& body, h6Status& status);
-// One time step of all moving bodies.
+// Moves all moving bodies by one time step.
 void step_bodies(const Settings& set, std::span<Body> bodies, std::span<const LinearWrench> acting,
                  std::span<const ShellBody> shells, std::span<const Hand> hands,
                  std::span<const Island> islands, h6Status& status);
-// One step of a body without mass towards the pose in which all that acts on it balances.
+// One step of a body without mass towards the pose in which its wrenches balance.
 void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6Status& status);
-// The command for the device: the hand's wrench on the body turned round, or in the admittance
-// modes the pose of what follows the hand. `command` may be null.
+// Makes the command for the device: in impedance mode the reaction to the hand's wrench on the
+// body, in the admittance modes the pose of the body or the manipulandum. `command` may be null.
 void send(HandDevice& device, Hand& hand, Body& body, double dt, h6DeviceCommand* command,
           h6Status& status);
-// Admittance modes: where the safety chain held the device back, `state` is held back too, by at
-// most what it moved in this frame.
+// Admittance modes: if the safety chain held the device back, this holds `state` back too, by at
+// most its motion in this frame.
 void follow_device(const HandDevice& device, const Body& body, RigidState& state,
                    const h6BodyState& wanted, const h6DeviceCommand& passed, double h);
 
@@ -51,13 +51,13 @@ struct Pull {
 Pull pull_of(h6Gradient gradient, const h6CouplingDef& coupling, const Body& body,
              const RigidState& target, const RigidState& pulled);
 
-// The mass matrix of something in this state whose inertia is the body's in the ratio of the
-// masses, its gyroscopic term [0; w x I w], and (v, w). World frame.
+// For a rigid body in this state, whose inertia is that of `body` in the ratio of the masses: its
+// mass matrix, its gyroscopic term [0; w x I w], and its velocity (v, w). World frame.
 Mat6 mass_matrix(const Body& body, const RigidState& state, double mass);
 Vec6 gyroscopic(const Body& body, const RigidState& state, double mass);
 Vec6 velocity(const RigidState& state);
 // Adds `du` to the velocity, then moves by it for h seconds. False when the result is not finite:
-// the state then rests where it was.
+// the state then stays where it was, at rest.
 bool move_or_rest(RigidState& state, const Vec6& du, double h, bool translation_only);
 
 }  // namespace h6

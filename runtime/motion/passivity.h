@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// passivity.h - keeps ports from giving out more energy than was put in: a time-domain passivity
+// passivity.h - keeps ports from giving out more energy than they took in: a time-domain passivity
 // observer and controller (Hannaford & Ryu 2002) in six dimensions. METHOD.md, Sec. 4, "Passivity".
 //
 // There are two kinds of ports, each with its own option: a hand at its device, and the contacts of
@@ -31,10 +31,10 @@ class HandPort {
   // The engine holds no more than `stored` [J]. Energy put in beyond that was dissipated and must
   // not pay for anything later.
   void spend(double stored) { energy_ = std::min(energy_, stored); }
-  // Once a frame of `dt` seconds, after move. Changes the wrench that the hand is about to feel so
-  // that E stays at 0 or above if the next motion is like the last one, and within one frame's work
-  // of 0 if it is not; true when it did. Neither force [N] nor torque [N m] exceeds the larger of
-  // its bound and what it was.
+  // Call it once a frame of `dt` seconds, after move. It changes the wrench that the hand is about
+  // to feel. E then stays at 0 or above if the next motion is like the last one, and within one
+  // frame's work of 0 if it is not. Returns whether it changed the wrench. Neither force [N] nor
+  // torque [N m] exceeds the larger of its bound and its former value.
   bool damp(h6Wrench& felt, double max_force, double max_torque, double dt);
   void forget() { known_ = false; }  // E is not known until the next start
   bool known() const { return known_; }
@@ -48,9 +48,9 @@ class HandPort {
   double energy_ = 0;
   bool known_ = false, placed_ = false;
   h6Pose pose_{{0, 0, 0}, {1, 0, 0, 0}};
-  Vec3 moved_ = Vec3::Zero(), turned_ = Vec3::Zero();  // since the sample before [m], [rad]
-  double move_change_ = 0, turn_change_ = 0;  // how much that changed from frame to frame, held
-  double share_ = 1;                          // of the wrench, in the last frame
+  Vec3 moved_ = Vec3::Zero(), turned_ = Vec3::Zero();  // since the previous sample [m], [rad]
+  double move_change_ = 0, turn_change_ = 0;           // recent peaks of their change in one frame
+  double share_ = 1;                                   // the share of the wrench let through last
 };
 
 struct Hand;
@@ -61,23 +61,26 @@ void observe_hand(const Settings& set, std::span<const Body> bodies,
 // Impedance: keeps within the coupling's limits; true when it changed the wrench.
 bool damp_hand(HandDevice& device, const Hand& hand, h6Wrench& felt, double dt);
 // Notes the command. In the admittance modes this observes the port: the wrench that came in, over
-// the motion that goes out. Nothing is changed there, for neither is ours.
+// the motion that goes out. It changes nothing there.
 void note_command(HandDevice& device, const Hand& hand, const h6DeviceCommand& command);
 
-// Power of the contacts when alpha times a wrench is taken from theirs: w0 - w1 alpha + w2 alpha^2.
+// The power of the contacts [W] after alpha times a given wrench has been subtracted from theirs:
+// w0 - w1 alpha + w2 alpha^2.
 struct ReliefPower {
   double w0 = 0, w1 = 0, w2 = 0;
 };
-// The least alpha >= 0 with a power of at most `most`; without any, the alpha of least power.
+// The least alpha >= 0 with a power of at most `most` [W]; if there is none, the alpha of least
+// power.
 double relief_for(const ReliefPower& power, double most);
 
-// Before the step, when all wrenches are known: damps contacts that would give out more than E.
+// Damps contacts that would give out more than E. Call it before the step, when all wrenches are
+// known.
 void damp_contacts(const Settings& set, std::span<const Body> bodies, std::span<ShellBody> shells,
                    std::span<LinearWrench> acting, std::span<Hand> hands, h6Status& status);
-// After the step: counts the work that the contacts did on the bodies that moved.
+// Counts the work that the contacts did on the bodies that moved. Call it after the step.
 void observe_contacts(const Settings& set, std::span<const Body> bodies,
                       std::span<ShellBody> shells);
-// The least E of all ports that are observed, or 0 [J].
+// The least E of all observed ports, or 0 if none is observed [J].
 double least_energy(const Settings& set, std::span<const ShellBody> shells,
                     std::span<const HandDevice> devices);
 

@@ -13,11 +13,12 @@ using IslandMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen
 using IslandVector =
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6 * kIslandBodies, 1>;
 
-// Solves A x = b. False when A is not positive where `form` is symmetric, or x is not finite.
+// Solves A x = b. Returns false if `form` is symmetric and A is not positive, or if x is not
+// finite.
 bool solve_system(h6Gradient form, const Mat6& A, const Vec6& b, Vec6& x);
 bool solve_system(h6Gradient form, const IslandMatrix& A, const IslandVector& b, IslandVector& x);
 
-// Takes the rotation of a body that never turns out of the system.
+// Removes from the system the rotation of a body that never turns.
 template <class Matrix, class Vector>
 void hold_rotation(Matrix& A, Vector& b, int body) {
   const int first = 6 * body + 3;

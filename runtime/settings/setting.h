@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// setting.h - one row a setting: its name, member, kind, range, unit, default and meaning.
+// setting.h - one row for each setting: its name, member, kind, range, unit, default and meaning.
 //
 // Rows of the engine's definitions stand in engine_settings.cpp, rows of a scene in
 // io/scene/scene_settings.cpp. They drive the defaults, the checks, reading and writing of scene
@@ -27,19 +27,19 @@ enum class SettingKind {
   quaternion,  // h6Quat: w x y z, unit within 0.001
   inertia,     // 6 double: xx yy zz xy xz yz
   object,      // another struct, with the rows `inside`
-  text,        // std::string; this kind and those below stand in scene files only
+  text,        // std::string; this kind and those below occur in scene files only
   corners,     // two h6Vec3: low corner, high corner
-  list         // of structs with the rows `inside`
+  list         // a list of structs with the rows `inside`
 };
 
 inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-// Which finite values are valid: low <= value <= high. Files are foreign input and their numbers
-// must stay far from overflow, so they may have a limit of their own.
+// A finite value is valid if low <= value <= high. Numbers in files must stay far from overflow, so
+// a file may have a lower limit of its own.
 struct Range {
   double low = -kNoLimit, high = kNoLimit;
   bool above_low = false;       // low itself is not valid
-  double file_high = kNoLimit;  // of the number as it stands in a file
+  double file_high = kNoLimit;  // the highest value that a file may give, in the file's unit
 };
 constexpr Range between(double low, double high) { return {low, high}; }
 constexpr Range above(double low, double high) { return {low, high, true}; }
@@ -55,31 +55,31 @@ struct Choice {
 struct Member {
   const void* (*get)(const void* def) = nullptr;  // gives null for an optional without a value
   void* (*make)(void* def) = nullptr;             // gives an empty optional a value
-  double (*number)(const void* value) = nullptr;  // of boolean, number, whole, choice and method
+  double (*number)(const void* value) = nullptr;  // for boolean, number, whole, choice and method
   void (*set_number)(void* value, double number) = nullptr;
 };
 
 struct SettingTable;
 
 struct Setting {
-  const char* name;  // "": an object whose rows stand among these
+  const char* name;  // "": an object whose rows belong to this table directly
   SettingKind kind;
   Member member;
   const char* about;      // one sentence
-  const char* unit = "";  // "m": a length, which stands in files in the scene's unit
-  Range range = {};       // of a list: how many entries
+  const char* unit = "";  // "m": a length; files give it in the scene's unit
+  Range range = {};       // for a list: how many entries
   double start = 0;       // the default
   std::span<const Choice> choices = {};
   const SettingTable* inside = nullptr;
   bool required = false;           // in a file
-  bool quiet = false;              // written to a file only where it is not the default
-  const char* replaces = nullptr;  // the key that must not stand beside this one
+  bool quiet = false;              // written to a file only if it is not the default
+  const char* replaces = nullptr;  // the key that must not occur beside this one
 
   bool is_length() const { return unit[0] == 'm' && unit[1] == 0; }
   bool stands_among() const { return name[0] == 0; }
 };
 
-// The rows of one struct, which `of` names.
+// The rows of one struct; `of` is the struct's name.
 struct SettingTable {
   const char* of;
   const Setting* first;
@@ -108,7 +108,7 @@ concept AnOptional = requires(V v) {
   v.emplace();
 };
 
-// Programs in C can put any number into an enumeration: it is read by its bytes.
+// A C program can put any number into an enumeration, so its bytes are read.
 template <class V>
 double number_of(const void* value) {
   if constexpr (std::is_enum_v<V>) {
@@ -195,9 +195,9 @@ constexpr Setting required(Setting row) {
   return row;
 }
 
-// ---- what rows do ------------------------------------------------------------------------------
+// ---- functions on rows -------------------------------------------------------------------------
 
-// Calls visit(row, def) for every row; rows of an object without a name come in its place. `def`
+// Calls visit(row, def) for every row. The rows of an object without a name take its place. `def`
 // may be null.
 template <class Visit>
 void each_setting(const SettingTable& rows, const void* def, Visit&& visit) {
@@ -208,7 +208,7 @@ void each_setting(const SettingTable& rows, const void* def, Visit&& visit) {
       visit(row, def);
 }
 
-// Puts the default of every row into `def`; what has no row stays as it is.
+// Puts the default of every row into `def`. Members without a row keep their value.
 void set_defaults(const SettingTable& rows, void* def);
 template <class Def>
 Def default_def(const SettingTable& rows) {
@@ -216,11 +216,12 @@ Def default_def(const SettingTable& rows) {
   set_defaults(rows, &def);
   return def;
 }
-// Every row of `def` has its default.
+// Returns whether every row of `def` has its default.
 bool is_default(const SettingTable& rows, const void* def);
 
-// Every row of `def` is finite and in its range, every choice exists. False with a sentence that
-// begins with `where` ("hand 0: ") and names the setting, its range and the value.
+// Checks that every row of `def` is finite and in its range, and that every choice exists. If not,
+// returns false with a sentence that begins with `where` ("hand 0: ") and names the setting, its
+// range and the value.
 bool check_settings(const SettingTable& rows, const void* def, const char* where, h6Error* error);
 
 }  // namespace h6
