@@ -130,7 +130,11 @@ const char* parse_number(std::string_view word, std::int64_t& value) {
   return error == std::errc::result_out_of_range ? " is too large for a number" : nullptr;
 }
 
-std::string quoted(std::string_view word) { return "'" + cleaned(word, 32) + "'"; }
+std::string quoted(std::string_view word) {
+  std::string text(1, '\'');
+  text += cleaned(word, 32);
+  return text += '\'';
+}
 
 std::string printable(std::string_view name) { return cleaned(name, 200); }
 

@@ -251,7 +251,7 @@ void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
     Contacts contacts{};
     take_columns(contacts, arena, s.settings.max_contacts);
     // Counting has no memory to put headers in.
-    if (s.shells.data()) new (&s.shells[i]) ShellBody{.contacts = contacts};
+    if (s.shells.data()) (new (&s.shells[i]) ShellBody{})->contacts = contacts;
   }
   for (int i = 0; i < (n.shares || n.lanes ? 2 : 1); ++i)
     take_traversal(s.lanes.scratch[i].traverse, arena, n, s.settings.max_contacts);
