@@ -26,7 +26,7 @@ std::string narrow(const wchar_t* text) {
   return out;
 }
 
-// hidapi 0.13 has no call for the descriptor. Everyone may read this file.
+// hidapi 0.13 has no call for the descriptor. Any user may read this file.
 std::vector<std::uint8_t> descriptor_of(const std::string& path) {
   const std::string node = path.substr(path.rfind('/') + 1);
   std::ifstream in("/sys/class/hidraw/" + node + "/device/report_descriptor", std::ios::binary);

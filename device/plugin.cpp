@@ -68,7 +68,7 @@ Result<Loaded> load(const std::string& path) {
 
 bool sensible(double value) { return value >= 0 && value <= 1e9; }
 
-// The capability that makes no sense, for a sentence; empty: all are well.
+// The name of a capability that makes no sense, for an error sentence; empty if all are valid.
 std::string nonsense(const h6PluginCapabilities& c) {
   if (!std::memchr(c.name, 0, sizeof c.name)) return "name without an end";
   if (c.dof_in != 3 && c.dof_in != 6) return "dof_in, which must be 3 or 6";

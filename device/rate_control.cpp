@@ -10,7 +10,7 @@
 namespace h6::device {
 namespace {
 
-// v less a share of its component against the felt wrench f; at |f| = `most` the share is 1.
+// Removes from v a share of its component against the felt wrench f: all of it at |f| = `most`.
 h6Vec3 yielding(const h6Vec3& v, const h6Vec3& f, double most) {
   const double n = norm(f);
   if (!(most > 0) || !(n > 0) || !std::isfinite(n)) return v;
@@ -86,7 +86,7 @@ h6Velocity RateControl::wanted(const std::array<double, 6>& a) const {
           figures_.turn_speed * to_world(a[3], a[4], a[5], figures_.y_up)};
 }
 
-// As fast as the figures allow; a step that reaches home ends there.
+// Goes home at the largest speed that the figures allow, but never past home within a step.
 h6Velocity RateControl::homewards(double dt) const {
   return {at_most((1 / dt) * (home_x_ - x_), figures_.speed),
           at_most((1 / dt) * turn(q_, home_q_), figures_.turn_speed)};

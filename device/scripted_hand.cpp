@@ -68,7 +68,7 @@ class Writer {
       x_ = from + s * (to - from);
       q_ = turned(q, s * turn_by);
       time_ = begun + s * seconds;
-      if (!(time_ > script.path.time.back())) return false;  // too short for a row of its own
+      if (!(time_ > script.path.time.back())) return false;  // too short to get its own row
       keep();
     }
     return true;

@@ -9,8 +9,8 @@
 //   id 0x04  output    LED: 0 off, 1 on
 //   id 0x17            battery: percent, and on some models 1 while it charges
 //
-// The report descriptor decides on a device's layout, or a report's length where there is none; the
-// product never does.
+// The report descriptor gives a device's layout. Without a descriptor the length of a report gives
+// it, never the product.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -30,7 +30,8 @@ HWY_EXPORT(name_of_this_target);
 
 namespace {
 
-// What the machine can run. Found once: Highway's answer changes while a target is forced.
+// The targets that this machine can run. They are found once, because Highway's answer changes
+// while a target is forced.
 std::int64_t machine_targets() {
   static const std::int64_t targets = [] {
     hwy::SetSupportedTargetsForTest(0);

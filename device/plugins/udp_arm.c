@@ -186,7 +186,7 @@ static int write_device(void* device, double time, const h6PluginCommand* comman
   return 0;
 }
 
-/* Sends a datagram of its own and uses no data of the haptic thread. */
+/* Sends its own datagram and uses no data of the haptic thread. */
 static void stop_device(void* device) {
   Device* d = device;
   atomic_store(&d->stopped, 1);

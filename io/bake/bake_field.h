@@ -33,7 +33,7 @@ struct FieldBake {
   unsigned threads = 0;    // 0: all
 };
 
-// What a bake tells its user.
+// The report of a bake for its user.
 struct FieldBakeReport {
   bool closed = false;
   double sealed_area = 0;             // [m^2] put across holes
@@ -47,11 +47,11 @@ struct FieldBakeReport {
 };
 
 // The samples. Outside: distance to the surface minus offset, exact up to band + 2 voxels and a
-// lower bound beyond. Inside a closed mesh: minus the distance to the surface, likewise. Inside a
-// soup: minus (distance + offset), the way out through the nearest sheet; between that sheet and
-// the zero set, distance - offset. Where sheets lie buried in the solid (parts that overlap) the
-// way out is up to 0.74 voxel + 13 % too short, and in a few places too long (inside.cpp).
-// far_grid: a lower bound of the distance; outside it is at most a voxel below.
+// lower bound beyond. Inside a closed mesh: minus the distance to the surface, with the same
+// limits. Inside a soup: minus (distance + offset), the way out through the nearest sheet; between
+// that sheet and the zero set, distance - offset. Where sheets are buried in the solid, because
+// parts overlap, the way out is up to 0.74 voxel + 13 % too short, and in a few places too long
+// (inside.cpp). far_grid: a lower bound of the distance; outside it is at most a voxel below.
 Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                              const Progress& progress = {});
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bins.cpp - which triangles are within reach of which bricks.
+// bins.cpp - finds the triangles within reach of each brick.
 //
 // A triangle visits the tiles of its box and tests the 64 bricks of a tile at once. If the tiles
 // are many, their range is halved, and a half is dropped if a plane of the triangle separates it

@@ -100,9 +100,9 @@ NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
 inline constexpr int kStepsAPass = 3;
 class Chains {
  public:
-  // `rows`: the rows to hold chains for. `buried` (must outlive this): the rows with a buried sheet
-  // in or beside them; chains pass through rows that are neither held nor buried. Without `buried`
-  // they pass through no row that is not held.
+  // `rows`: the rows that hold chains. `buried` (must outlive this): the rows with a buried sheet
+  // in or beside them; chains pass through rows that neither hold chains nor are buried. Without
+  // `buried`, chains pass only through rows that hold chains.
   Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
          const std::vector<std::uint8_t>& rows, unsigned threads,
          const std::vector<std::uint8_t>* buried = nullptr);

@@ -28,7 +28,8 @@ namespace {
 
 constexpr double kSlack = 1e-4;  // [voxel] error of float distances near the surface
 
-// What is known of node (8a, 8b, 8c) without a search. Nodes past the last brick are outside.
+// The part of node (8a, 8b, 8c) that is known without a search. Nodes past the last brick are
+// outside.
 struct Known {
   bool inside;
   double u;  // negative: not known
@@ -53,9 +54,9 @@ double bound(double u, double offset, bool inside) {
   return std::sqrt(std::max(0.0, certain * certain - offset * offset));
 }
 
-// A bound may be this [voxel], or an eighth of itself, below the distance, whichever is less. That
-// is a twelfth of a voxel on average over the nodes of a soup, and it leaves the engine's bound
-// between nodes within a voxel of the truth on average wherever exact nodes would.
+// A bound may be lower than the distance by at most this [voxel] and at most an eighth of itself.
+// Over the nodes of a soup the loss averages a twelfth of a voxel. The engine's bound between nodes
+// then stays within a voxel of the truth on average wherever it would with exact nodes.
 constexpr double kLoose = 0.67;
 
 constexpr double kSpacing = 8;  // of nodes [voxel]
@@ -114,8 +115,8 @@ class Nodes {
     }
   };
 
-  // The pairs around a node whose coordinates are odd where `odd` has a bit; both nodes of a pair
-  // must be known before it.
+  // Finds the pairs around a node whose coordinates are odd along the axes of the bits in `odd`.
+  // Both nodes of a pair must be known before the node.
   void find_pairs(int odd) {
     for (int z = -1; z <= 1; ++z)
       for (int y = -1; y <= 1; ++y)

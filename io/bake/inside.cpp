@@ -272,7 +272,7 @@ class Look {
     return true;
   }
 
-  // A row with nodes whose side is to be found.
+  // A row that has nodes whose side is still unknown.
   struct Asked {
     std::size_t place, row;
     bool held;
@@ -332,8 +332,8 @@ class Look {
         inside_.depths[r].push_back({std::uint32_t(n), dent});
       }
     }
-    // So close to a sheet, chains cannot decide the side. The nearest way to R goes through a
-    // neighbour q. On R's side u grows along that way: q is farther from the sheet than the node
+    // Chains cannot decide the side this close to a sheet. The nearest way to R goes through a
+    // neighbour q. On R's side u grows along that way, so q is farther from the sheet than the node
     // opposite to q.
     NodeMask close;
     for (std::size_t z = 0; z < 8; ++z) close.z[z] = row.todo.z[z] & row.sides.close[z];

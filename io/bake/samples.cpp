@@ -24,7 +24,8 @@ struct Chunk {
   std::size_t buffer;                // their place in the buffer
 };
 
-// The chunks from brick `begin` on whose waiting bricks fit the buffer.
+// The next chunks, from brick `begin` on, as many as have room in the buffer for their waiting
+// bricks.
 std::vector<Chunk> next_chunks(const std::vector<std::uint32_t>& kept, std::size_t begin) {
   std::vector<Chunk> chunks;
   const std::size_t first_row = kept[begin];  // all rows before it have been read

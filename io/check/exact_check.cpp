@@ -178,7 +178,7 @@ class Check {
       t.sum.far_wrong = 1, t.excess = std::max(t.excess, bound - most);
     return {near, most - bound};
   }
-  // The far grid at one of its own nodes, a corner of the place's cell.
+  // Checks the far grid at one of its own nodes, a corner of the cell of `g`.
   void corner(const Vec3& g, Dice& dice, Tally& t) const {
     const std::size_t c[3] = {std::size_t(g.x / 8), std::size_t(g.y / 8), std::size_t(g.z / 8)};
     const std::size_t nx = std::size_t(field_.bricks[0]) + 1,

@@ -38,7 +38,7 @@ struct ExactCheck {
   // counts if at least nine in ten rays agree.
   std::size_t voted = 0, doubtful = 0;
   std::size_t drained = 0;   // the field says outside, rays say inside: wrong if the mesh is closed
-  std::size_t filled = 0;    // the field says inside, rays found a way out: wrong likewise
+  std::size_t filled = 0;    // the field says inside, rays found a way out: wrong if closed
   std::size_t enclosed = 0;  // the field says inside, rays outside, no way out was found: cavities
   // In places without samples: the engine's lower bound of the distance [voxel].
   std::size_t far = 0, far_wrong = 0;
@@ -49,7 +49,8 @@ struct ExactCheck {
   double far_gap = 0, corner_gap = 0, inside_gap = 0;
 
   std::size_t wrong_sides() const { return drained + filled; }
-  // Whether the field is right. Of a soup the sides are not judged: rays may leak through it too.
+  // Whether the field is right. The sides of a soup are not judged, because rays may leak through
+  // it.
   bool agrees() const {
     return worst_node < 1e-3 && far_wrong == 0 && 20 * deep <= nodes &&
            (!closed || wrong_sides() == 0);

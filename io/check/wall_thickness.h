@@ -22,7 +22,7 @@ struct Walls {
   // From a place straight into the solid to its end. Parts that overlap are one solid. Faces that
   // are not within 45 degrees of parallel make an edge or a corner, not a wall.
   std::vector<double> thickness;
-  // From a place straight out to the next face, likewise.
+  // From a place straight out to the next face, under the same rule for faces.
   std::vector<double> gap;
   double bowls = 0;   // on open pieces that hold a volume: measured as if they were closed
   double sheets = 0;  // on other open pieces: not measured

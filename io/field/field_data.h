@@ -27,7 +27,7 @@ struct FieldData {
   // (brick_count) or empty: the mesh's triangle nearest to the middle of the brick; -1 when a
   // sealed hole is nearer.
   std::vector<std::int32_t> triangle;
-  // How it was made.
+  // How the bake made the field.
   double offset = 0;       // sigma [m]; 0 on closed meshes
   std::string sign_mode;   // "closed" or "flood"; "given" by another program
   std::string input_hash;  // of the mesh and the options of the bake

@@ -121,7 +121,7 @@ FloatGrid::Ptr distance_grid(const FieldData& field) {
     samples_to_leaf(&field.samples[std::size_t(field.brick_index[used[i]]) * 512], *leaves[i]);
   });
   for (FloatLeaf* leaf : leaves) grid->tree().addLeaf(leaf);
-  // So that other programs see the inside of a solid as inside. It changes no leaf, as all are
+  // Lets other programs see the inside of a solid as inside. No leaf changes, because all are
   // active.
   openvdb::tools::signedFloodFill(grid->tree());
   return grid;

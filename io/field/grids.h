@@ -39,9 +39,9 @@ struct Place {
 
 // `distance` and `far`, and `part` and `triangle` where the field has them.
 openvdb::GridPtrVec grids_of(const FieldData& field);
-// Back again. Nothing when the grids are no whole field of this format.
+// The field that the grids hold; no value unless they are a complete field of this format.
 std::optional<FieldData> field_of(const openvdb::GridPtrVec& grids);
-// Whether a field of ours is among them, of whatever format.
+// Whether hapsix wrote one of the grids, in any version of its format.
 bool are_ours(const openvdb::GridPtrVec& grids);
 
 // ---- scan.cpp: checks a file before OpenVDB allocates by its lengths ------------------------

@@ -11,7 +11,7 @@ namespace h6::io {
 namespace {
 
 constexpr std::string_view kMagic = "\x1f\x8b";
-constexpr std::size_t kHarmless = std::size_t{16} << 20;  // [bytes] whatever the ratio
+constexpr std::size_t kHarmless = std::size_t{16} << 20;  // [bytes] allowed at any ratio
 constexpr std::size_t kMaxRatio = 250;
 
 struct Inflater {

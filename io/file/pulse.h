@@ -36,8 +36,8 @@ class Pulse {
     };
   }
 
-  // False once cancelled: the caller returns at once, whatever is half made. A hundred calls a
-  // millisecond cost nothing.
+  // False once the work is cancelled. The caller must then return at once, even with a result half
+  // made. A hundred calls a millisecond cost nothing.
   bool alive() {
     if (stopped_.load(std::memory_order_relaxed)) return false;
     if (!progress_ || std::this_thread::get_id() != owner_) return true;

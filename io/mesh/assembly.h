@@ -22,7 +22,7 @@ bool mirrors(const Affine& m);  // det A < 0
 
 Affine translation(double x, double y, double z);
 Affine scaling(double x, double y, double z);
-// Of a unit quaternion.
+// The rotation of a unit quaternion.
 Affine rotation(double x, double y, double z, double w);
 
 // The polygons of one mesh or geometry, in its own frame and the file's unit.
@@ -38,7 +38,7 @@ struct Placed {
   std::string part;
 };
 
-// The most nodes of a file, each counted as often as it is referred to.
+// The largest number of nodes of a file. A node counts once for each reference to it.
 constexpr std::size_t kMaxNodes = 1'000'000;
 
 // All placed shapes in order, one part each, welded. Faces of a mirrored shape are listed

@@ -237,10 +237,11 @@ int Orientation::crossings(const Piece& piece, const Vec3& from, const Vec3& alo
   return count;
 }
 
-// Whether a body is around the piece and none inside it. The windings of closed pieces tell where
-// bodies are: none is where a ray enters as many as it leaves. A piece with the winding of the one
-// around it is a part inside a part, not a hollow; a piece inside a hollow is a body again. A mixed
-// winding tells nothing: then a piece is hollow when an odd number of pieces is around it.
+// Whether the piece has a body around it and no body inside it. The windings of closed pieces tell
+// where bodies are: a place is in no body if a ray from it enters as many pieces as it leaves. A
+// piece with the winding of the one around it is a part inside a part, not a hollow; a piece inside
+// a hollow is a body again. A mixed winding tells nothing: then a piece is hollow when an odd
+// number of pieces is around it.
 bool Orientation::hollow(std::size_t c) const {
   const Piece& piece = pieces_[c];
   std::vector<std::size_t> maybe;

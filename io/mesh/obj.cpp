@@ -13,7 +13,8 @@
 namespace h6::io {
 namespace {
 
-// Appearance, points and lines, and the ends of free-form blocks whose `surf` is refused.
+// Statements that are skipped: appearance, points and lines, and the rest of free-form blocks,
+// whose `surf` is refused.
 constexpr std::string_view kPassedOver[] = {
     "vt",        "vn",     "vp",     "p",     "l",        "s",        "mg",    "usemtl",
     "mtllib",    "usemap", "maplib", "bevel", "c_interp", "d_interp", "lod",   "shadow_obj",

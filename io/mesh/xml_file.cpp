@@ -13,7 +13,7 @@ constexpr int kDeepest = 200;
 // Bytes that may begin an element or an attribute: each costs pugixml up to 64 bytes.
 constexpr std::ptrdiff_t kMostMarks = 40'000'000;
 
-// What went wrong; `rest` begins where the parser stopped.
+// An error sentence for `status`; `rest` begins where the parser stopped.
 std::string sentence(pugi::xml_parse_status status, std::string_view rest) {
   const bool cut = rest.find('>') == std::string_view::npos;
   switch (status) {

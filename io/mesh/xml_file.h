@@ -2,8 +2,8 @@
 // xml_file.h - an XML file as pugixml parses it, with its lines for error sentences. Inside io/mesh
 // only.
 //
-// pugixml neither recurses nor expands entities of the file's own. Here a file is refused besides
-// when it has a DOCTYPE, a second root element, elements nested deeper than 200, or more tags than
+// pugixml neither recurses nor expands entities of the file's own. This reader also refuses a file
+// that has a DOCTYPE, a second root element, elements nested deeper than 200, or more tags than
 // memory should hold.
 #pragma once
 #include <cstdint>

@@ -7,8 +7,8 @@
 //   /events    t, what, detail
 //   /summary   attribute json; the group exists once the run has ended
 //
-// Attributes are for people and their tools, in text of variable length. read_recording reads the
-// same facts from the datasets /config/whole and /summary/whole; stored.cpp says why.
+// Attributes are text of variable length, for people and their tools. read_recording reads the same
+// facts from the datasets /config/whole and /summary/whole; stored.cpp says why.
 #pragma once
 #include <hdf5.h>
 
@@ -90,8 +90,8 @@ class Handle {
   hid_t id_;
 };
 
-// Hold one around every use of the library: Debian's build serves one thread at a time, and it
-// prints its errors unless told not to.
+// Every use of the library must hold one: Debian's build serves one thread at a time, and it prints
+// its errors unless told not to.
 class LibraryLock {
  public:
   LibraryLock();

@@ -17,9 +17,10 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they are in memory");
 
-constexpr std::uint32_t mark = 0x6c367068;                           // "hp6l"
-constexpr std::uint64_t longest_payload = std::uint64_t{256} << 20;  // bounds what a lie can take
-constexpr std::uint32_t longest_chunk = 4096;                        // rows
+constexpr std::uint32_t mark = 0x6c367068;  // "hp6l"
+constexpr std::uint64_t longest_payload = std::uint64_t{256}
+                                          << 20;  // limits what a false size claims
+constexpr std::uint32_t longest_chunk = 4096;     // rows
 
 std::uint32_t checksum(const LogRecord& record, const std::vector<std::byte>& payload) {
   constexpr std::size_t skip = offsetof(LogRecord, kind);
@@ -52,7 +53,7 @@ int write_all(int fd, const std::vector<std::byte>& bytes, std::uint64_t at) {
   return 0;
 }
 
-// Takes the next record into the index; false where it does not fit to those before.
+// Adds the next record to the index; false if it does not fit the records before it.
 bool take(LogIndex& index, const Payload& next) {
   const LogRecord& r = next.record;
   if (index.summary) return false;

@@ -102,7 +102,7 @@ Outcome read_column(const Source& source, const Column& column, const Stored& st
   return Done{};
 }
 
-// Linux promises more memory than there is, and ends the program much later without a word.
+// Linux grants more memory than the machine has and kills the program later, without a message.
 Outcome check_memory(const fs::path& file, std::uint64_t frames) {
   const long pages = ::sysconf(_SC_PHYS_PAGES), bytes = ::sysconf(_SC_PAGESIZE);
   if (pages <= 0 || bytes <= 0) return Done{};

@@ -103,7 +103,7 @@ struct Recorder::Body {
 
   std::vector<h6FrameRecord> rows;  // of the chunk that is not full yet
   std::uint64_t first = 0;          // number of rows[0]
-  std::size_t logged = 0;           // of `rows`, so many are in the log
+  std::size_t logged = 0;           // number of `rows` that are in the log
   Clock::time_point waiting_since;  // of the oldest row that is not
   double logged_until = 0;          // [s] of recorded time
   bool open = false, empty = true;
@@ -204,7 +204,7 @@ Outcome Recorder::Body::write(LogRecord record, const std::vector<std::byte>& pa
   return error == 0 ? Outcome(Done{}) : stop(std::strerror(error));
 }
 
-// The log stays as it is: a disk that is full has no room for an HDF5 file beside it.
+// The log stays unconverted, because a full disk has no room for an HDF5 file beside it.
 Outcome Recorder::Body::stop(const std::string& why) {
   broken = "cannot write " + log_name.string() + ": " + why +
            "; recording ended, and `hapsix info " + file.string() +

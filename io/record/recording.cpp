@@ -31,7 +31,7 @@ std::string last_time(const Recording& r) {
   return text;
 }
 
-// While a run goes on, or where its folder cannot be written: through a copy that goes again.
+// Reads through a temporary copy, while a run goes on or where its folder cannot be written.
 Result<Recording> read_log(const File& log, FrameRange range) {
   static std::atomic<unsigned> counter{0};
   const fs::path copy = fs::temp_directory_path() / ("hapsix-" + std::to_string(::getpid()) + "-" +

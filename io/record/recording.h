@@ -2,20 +2,20 @@
 // recording.h - runs as HDF5, for h5py and MATLAB; a killed run loses at most its last half second.
 //
 // While a run goes on, its frames are appended to OUT.h5.part, a log of our own. At the end the log
-// becomes OUT.h5, written aside and renamed, and is removed. A run that was killed leaves its log:
-// read_recording and repair_recording then make OUT.h5 of it. A file that is there already stays as
-// it is until the new recording is finished, which then replaces it. A run that is killed, fails or
-// records nothing never costs an older file. A kill is meant, not a power cut: the log is not
-// synced to the disk.
+// becomes OUT.h5, written aside and renamed, and is removed. A killed run leaves its log, and
+// read_recording and repair_recording turn it into OUT.h5. An existing OUT.h5 stays unchanged until
+// the new recording is finished and replaces it, so a run that is killed, fails or records nothing
+// never costs an older file. None of this covers a power cut, because the log is not synced to the
+// disk.
 //
 // /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, net_stiffness,
 // stage_us, frame_us, wakeup_us, settings} (n) or (n, width), /frames/{hand_pose, hand_velocity,
 // hand_wrench, buttons, sequence, body_pose, body_velocity, wrench, command_pose, cause, causes,
 // state, safety_asked, overdue} (n, hands) or (n, hands, width), with units and column names as
-// attributes; /config, /events/{t, what, detail}, /summary. Numbers come back to the bit. Every
-// frame has the gravest cause and all causes, the device's state, and the inputs of its safety
-// chain; an event marks the first frame of each. /config and /summary hold their attributes a
-// second time, as the text that read_recording reads.
+// attributes; /config, /events/{t, what, detail}, /summary. Numbers are read back bit for bit.
+// Every frame has the gravest cause and all causes, the device's state, and the inputs of its
+// safety chain. An event marks the first frame of each cause. /config and /summary hold their
+// attributes a second time, as the text that read_recording reads.
 #pragma once
 #include <cstdint>
 #include <filesystem>

@@ -162,7 +162,7 @@ bool put_summary(hid_t file, const Source& from) {
   return group.ok() && put_whole(group, text) && put_text(group, "json", text);
 }
 
-// HDF5 cannot close a file whose last pages do not fit on the disk: ask before.
+// HDF5 cannot close a file whose last pages do not fit on the disk, so check for room first.
 Outcome check_room(const fs::path& out, const LogIndex& index) {
   const std::uint64_t chunks = (index.rows.size() + 1) * columns().size();
   const std::uint64_t needed = index.end + chunks * 128 + (256 << 10);

@@ -8,8 +8,8 @@
 
 namespace h6::io::recording {
 
-// What the log holds, as a new HDF5 file `out`. A torn end is left out. The memory used does not
-// grow with the number of rows. Takes the library's lock.
+// Writes the log's rows, events and summary as a new HDF5 file `out`, without a torn end. The
+// memory used does not grow with the number of rows. Takes the library's lock.
 Outcome write_hdf5(const File& log, const std::filesystem::path& out);
 
 // Turns the log beside `file` into `file`: written aside, then renamed, then the log is removed. An

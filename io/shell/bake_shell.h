@@ -12,10 +12,10 @@
 
 namespace h6::io {
 
-// Where points lie. `triangles`: on the triangles. `field`: where the body's own field is zero. Of
-// a soup that is the field's offset outside the triangles, so that a body is as thick when it moves
-// as when it is touched. `automatic` means `triangles`: with an offset, a nut whose mesh lacks a
-// face would jam on its bolt, and the field that it touches has an offset of its own.
+// Where points lie. `triangles`: on the triangles. `field`: where the body's own field is zero. For
+// a soup, that surface is the field's offset outside the triangles, so that a body is as thick when
+// it moves as when it is touched. `automatic` means `triangles`: with an offset, a nut whose mesh
+// lacks a face would jam on its bolt, and the field that it touches has an offset of its own.
 enum class ShellSurface { automatic, triangles, field };
 // `triangles`: normals of the triangles. `field`: gradients of the distance, which turn smoothly
 // over edges. `automatic`: as ShellSurface.

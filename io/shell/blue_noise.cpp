@@ -245,7 +245,7 @@ float Thrower::nearest_blocker(std::size_t cell_index, const Spot& spot, float r
   return best2 < far2 ? std::sqrt(best2) : INFINITY;
 }
 
-// Tries spots [from, to) of those that were not accepted when the round began.
+// Tries spots [from, to) of the list of spots that were not yet accepted when the round began.
 void Thrower::throw_at(Cell& cell, std::size_t cell_index, float radius, std::size_t from,
                        std::size_t to, std::vector<std::uint32_t>& fresh) {
   for (std::size_t i = std::max<std::size_t>(from, cell.accepted); i < to; ++i) {

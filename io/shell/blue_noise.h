@@ -23,7 +23,7 @@ struct OrientedPoint {
 struct Thinning {
   std::size_t target = 0;     // how many to choose; all if there are no more
   double first_radius = 0;    // > 0 [m]; a poor guess costs time, not quality
-  bool fixed_radius = false;  // one round at first_radius, whatever number that gives
+  bool fixed_radius = false;  // one round at first_radius, for as many points as fit
   bool both_sides = false;    // points whose normals differ by more than 134 degrees, as on the two
                               // faces of a thin plate, keep only 0.75 of the radius
   std::uint64_t seed = 1;

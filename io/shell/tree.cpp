@@ -233,7 +233,7 @@ Result<ShellData> build_tree(std::span<const OrientedPoint> points,
   if (levels.empty()) return cancelled;
   ShellData shell;
   Ids order;                                                 // new place -> id
-  std::vector<std::uint32_t> row_of(points.size(), no_row);  // id -> row in the level at hand
+  std::vector<std::uint32_t> row_of(points.size(), no_row);  // id -> row in the current level
   std::vector<std::uint32_t> place(points.size());           // id -> new place
   Ids rows = levels[0];
   sort_along_curve(points, options, rows);

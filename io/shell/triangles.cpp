@@ -77,8 +77,9 @@ OrientedPoint oriented(const Vec3& p, const Vec3& n, double sign) {
           {float(sign * n.x), float(sign * n.y), float(sign * n.z)}};
 }
 
-// Judges the sides of the surface. A side is reached if the field is clearly positive half a voxel
-// outside its zero set. So walls of gaps that the zero set does not enter are not reached.
+// Decides which sides of the surface are reached. A side is reached if the field is clearly
+// positive half a voxel outside its zero set. So walls of gaps that the zero set does not enter are
+// not reached.
 class Judge {
  public:
   Judge(const FaceTable& faces, const Reach& reach) : faces_(faces), reach_(reach) {}

@@ -158,7 +158,7 @@ void ReportRun::contacts(std::size_t sample, std::vector<ReportContact> all) {
   contacts_[sample] = std::move(all);
 }
 
-// Fills the envelope.
+// Fills the envelope with the report's head and arrays.
 class ReportWriter {
  public:
   ReportWriter(const LoadedScene* scene, Envelope& envelope, std::vector<std::string>& remarks)

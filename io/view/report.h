@@ -33,7 +33,7 @@ class ReportRun {
   void add(const std::vector<h6FrameRecord>& frames);
   void events(std::vector<RecordingEvent> events, std::string summary_json);
 
-  // The frames whose contacts the replay shows, ascending; contacts(i, ...) fills the i-th.
+  // The frames whose contacts the replay shows, ascending; contacts(i, ...) sets those of the i-th.
   const std::vector<std::uint64_t>& replay_frames() const { return replay_frames_; }
   void contacts(std::size_t sample, std::vector<ReportContact> all);
 

@@ -68,7 +68,7 @@ struct ViewServer::Body {
   ServerOptions options;
   std::string page, port_text;
   Receive receive;
-  std::size_t connections = 0;  // before io, whose handlers still count down when it is destroyed
+  std::size_t connections = 0;  // declared before io: io's destructor runs handlers that count down
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
   Message greeting;

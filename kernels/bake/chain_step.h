@@ -16,9 +16,9 @@ inline constexpr int kChainStep[4] = {0, 256, 363, 444};
 
 // One step for all nodes of a brick: the least of the node's own length and those of its 26
 // neighbours plus a step, at most far. `from` is the first node; the next line of nodes is `line`
-// further, the next layer `layer`. The nodes around the brick are readable and stay as they are.
-// `to` is laid out likewise and is `from` itself or does not overlap it. Returns whether a length
-// has changed.
+// further, the next layer `layer`. The nodes around the brick must be readable; they are not
+// changed. `to` has a layout of the same kind and is `from` itself or does not overlap it. Returns
+// whether a length has changed.
 bool chain_step(const Chain* from, std::size_t line, std::size_t layer, Chain* to,
                 std::size_t to_line, std::size_t to_layer);
 bool chain_step_ref(const Chain* from, std::size_t line, std::size_t layer, Chain* to,
@@ -37,7 +37,7 @@ void chain_seeds(const float* u, const std::uint64_t* mask, const ChainSeeds& se
 void chain_seeds_ref(const float* u, const std::uint64_t* mask, const ChainSeeds& seeds, Chain* to,
                      std::size_t to_line, std::size_t to_layer);
 
-// What the chains of a brick tell about the side of its nodes: bit 8*y + x of word z. No bit is set
+// How the chains of a brick decide the side of its nodes: bit 8*y + x of word z. No bit is set
 // where a chain is far.
 struct ChainSides {
   std::uint64_t in_sight[8];  // length < u + offset

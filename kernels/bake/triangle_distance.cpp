@@ -215,7 +215,7 @@ HWY_INLINE void lower_blocks(const Ready& t, const float* first, std::uint32_t l
   const DistanceFacet& f = t.f;
   const VF zero = hn::Zero(d);
   for (std::size_t n = 0; n < kBlock; n += hn::Lanes(d)) {
-    // At the nodes of a block whose middle is the brick's first node.
+    // Values at the nodes of a block whose middle is the brick's first node.
     const auto node = [&](std::size_t k) HWY_ATTR {
       return hn::Add(hn::Load(d, t.nodes.v[k] + n), hn::Set(d, first[k]));
     };

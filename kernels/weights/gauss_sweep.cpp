@@ -26,12 +26,12 @@ using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kRows = 4;  // a group: rows that share loads of columns
 
-// Rows whose hats a column sums before they join the total, so that rounding grows with the number
-// of such sums and not of contacts.
+// The number of rows whose hats a column sums before it adds them to the total. Rounding then grows
+// with the number of such sums, not with the number of contacts.
 constexpr std::size_t kFresh = 128;
-constexpr std::uint32_t kRun = 64 * kLanes;  // columns of a row's sum, likewise
+constexpr std::uint32_t kRun = 64 * kLanes;  // the same for a row's sum over columns
 
-// Coordinate beyond the reach of any hat whose square is still a float.
+// A coordinate beyond the reach of any hat; its square does not overflow a float.
 constexpr float kNowhere = 1e15f;
 
 // Gathers the columns in the order of the bands, with padding.

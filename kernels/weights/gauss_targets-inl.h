@@ -30,8 +30,8 @@ constexpr std::size_t kMostLeaves = 2;  // leaves of targets in one walk
 constexpr float kTogether = 0.1f;       // widths: size and distance of leaves that share a walk
 constexpr std::size_t kOpened = 256;    // leaves collected before they are opened
 
-// How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre, which
-// is precise enough while targets are within a width of it. Otherwise by differences.
+// How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre;
+// precise enough while targets are within a width of the centre. differences: in all other cases.
 enum class Form { products, differences };
 
 // Columns of listed contacts. Form products: 2 x and e^2 - |x|^2 over each sphere, the first sphere
@@ -149,7 +149,7 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
 
 template <int kAxes>
 HWY_NOINLINE void work_off(Targets<kAxes>& t) {
-  // Targets that share loads: as many as registers hold.
+  // The number of targets that share loads: as many as the registers hold.
   constexpr std::size_t kCount = kLanes == 16 && kAxes == 3 ? 4 : 2;
   const DF d;
   if (t.list.count == 0) return;

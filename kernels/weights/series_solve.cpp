@@ -161,8 +161,8 @@ HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const 
   return hn::GetLane(hn::MaxOfLanes(d, max_e));
 }
 
-// A start from a sample of the contacts. Each stands for several, so the spring is made softer
-// instead of the contacts stiffer.
+// Computes a start from a sample of the contacts. Each sampled contact represents several, so the
+// spring is made softer instead of the contacts stiffer.
 HWY_NOINLINE void start_from_some(const SeriesColumns& c, const SeriesParameters& p, double* y,
                                   float* kappa, std::size_t stride) {
   SeriesParameters softer = p;

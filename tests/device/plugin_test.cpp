@@ -51,7 +51,7 @@ TEST_CASE("the template is opened where the body begins, yields to a force, and 
   CHECK(d.write(d.self, 0, &c) == 0);
   for (int i = 1; i <= 3000; ++i) CHECK(d.read(d.self, 1e-3 * i, &s) == 0);
   CHECK(s.pose.p.z == near(home.p.z + 0.02).epsilon(1e-3));
-  d.stop(d.self);  // no force any more, whatever the commands
+  d.stop(d.self);  // no force from now on, for any command
   CHECK(d.write(d.self, 3, &c) == 0);
   for (int i = 3001; i <= 6000; ++i) CHECK(d.read(d.self, 1e-3 * i, &s) == 0);
   CHECK(s.pose.p.z == near(home.p.z).epsilon(1e-3));

@@ -178,7 +178,8 @@ TEST_CASE("sample_field: near the surface it is the distance to within interpola
   on_every_target([&](const std::string&) {
     Random random(8);
     for (int i = 0; i < h6::test::repeated(2000, 200); ++i) {
-      // Around the large sphere, whose curvature is 1/22.3: 3/8 of it and the rounding of samples.
+      // Around the large sphere, of radius 22.3, the error is 3/8 of the curvature and the rounding
+      // of samples.
       double n[3];
       random.direction(n);
       const double r = 22.3 + random.uniform(-2.5, 2.5);

@@ -252,8 +252,8 @@ TEST_CASE("virtual time has no deadline, and leaves nothing out") {
 
 namespace {
 
-// What the clock decides in a scene of `contacts`. Each costs full_ns when all are present, few_ns
-// when a sixteenth is. `stolen`: one of so many frames takes a millisecond more.
+// The costs that the clock sees in a scene of `contacts`. A contact costs full_ns when all are
+// present and few_ns when a sixteenth is. `stolen`: one in so many frames takes a millisecond more.
 struct Costs {
   double contacts, full_ns, few_ns;
   int stolen = 0;
@@ -328,7 +328,7 @@ struct Clocked {
 }  // namespace
 
 TEST_CASE("a tier that does not fit is never tried; the finest tier that fits is used") {
-  // Of a period of 1 ms, a full frame takes 1.3 to 6 ms.
+  // The period is 1 ms; a full frame takes 1.3 to 6 ms.
   struct {
     double full_ns, few_ns;
     std::uint32_t points;  // of sixteen; they surely fit into 0.8 ms

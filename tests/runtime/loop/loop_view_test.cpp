@@ -20,7 +20,7 @@ namespace {
 // A block held 2 mm below a floor's surface by its hand.
 struct Scene : BoxOnFloor {
   Scene() {
-    hand.coupling.max_force = 20;  // whatever the contacts' stiffness
+    hand.coupling.max_force = 20;  // at any stiffness of the contacts
     open();
   }
   static h6Device device() {

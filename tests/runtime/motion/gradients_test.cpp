@@ -155,7 +155,7 @@ struct Columns {
   }
 };
 
-// As much of a session as the assembly reads: one shell body against all others.
+// The part of a session that the assembly reads: one shell body against all others.
 struct Assembly {
   std::array<Body, kBodies> bodies;
   std::array<LinearWrench, kBodies> acting;

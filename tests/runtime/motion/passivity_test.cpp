@@ -214,7 +214,7 @@ struct Pumping {
     bodies[0].fixed = true, bodies[0].field = 0;
     bodies[1].shell = 0;
     hand.body = 1;
-    hand.safety.soft_start = 0;  // has tests of its own
+    hand.safety.soft_start = 0;  // safety_test.cpp tests it
     hand.coupling.max_force = 60;
     def.bodies = bodies.data(), def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;
@@ -342,7 +342,7 @@ PumpedPort pump(const h6Model* model, Path path, unsigned seed, bool passivity) 
   const auto at = [&](int frame) {
     const double t = 1e-3 * frame;
     Vec3 x(sway * wave(0, t), sway * wave(1, t), 5 * mm + reach * wave(2, t));
-    // A tremor of one frame to the next is the hardest: the last motion says nothing of the next.
+    // A tremor that reverses every frame is the hardest: the last motion does not predict the next.
     x.z() += frame % 2 ? tremor : -tremor;
     for (int i = 0; i < 3; ++i) x[i] += 0.3 * uniform(-tremor, tremor);
     return h6Pose{to(x), to(exp_rotation(turn * Vec3(wave(3, t), wave(4, t), wave(5, t))))};
