@@ -6,7 +6,8 @@
 namespace h6::io {
 namespace {
 
-// Hashes the sizes and hashes of columns, so that a value cannot move to the next column unnoticed.
+// Hashes a list of columns. Each column enters as its size and hash, so that moving a value to the
+// next column changes the result.
 class Columns {
  public:
   template <class Column>

@@ -8,11 +8,12 @@
 namespace h6::io {
 namespace {
 
-// Change these when a bake of the same input gives another result, so that it is baked again.
+// Raise a number when its baker gives another result for the same input, so that old cache files
+// are no longer used.
 constexpr std::uint32_t field_bake_version = 4, shell_bake_version = 2;
 
-// Hashes a list. Each text and each column enters as its length and hash, so that no two lists give
-// the same bytes.
+// Hashes a list of values. Each text and each column enters as its length and hash, so that
+// different lists do not give the same bytes.
 class ListHash {
  public:
   void text(const std::string& value) { array(value.data(), value.size()); }

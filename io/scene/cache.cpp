@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// cache.cpp - the key is in the file's name and again inside the file: a file is used only when
-// both agree. Files are written aside and renamed, so two programs that bake the same asset at once
-// both succeed, and the file of the last one stays, which is the same.
+// cache.cpp - keeps baked assets on disk.
+//
+// A file has its key in its name and again inside; it is used only if both agree. Files are written
+// under another name and then renamed. So two programs may bake the same asset at the same time:
+// both succeed, and the second file replaces an equal one.
 #include "io/scene/cache.h"
 
 #include <cstdlib>
@@ -20,7 +22,7 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
-// The file of a key; empty without a folder for the cache.
+// The cache file of a key. Empty if there is no cache folder.
 fs::path cached_file(const std::string& key, const char* ending, Cached& cached) {
   const fs::path folder = cache_folder();
   if (folder.empty()) {
@@ -44,13 +46,12 @@ bool is_it(const Result<Data>& read, const std::string& key, const fs::path& fil
 template <class Write>
 void keep(const fs::path& file, Cached& cached, const Write& write) {
   std::error_code error;
-  fs::create_directories(file.parent_path(), error);  // if it fails, writing says so
+  fs::create_directories(file.parent_path(), error);  // if this fails, `write` reports it
   if (const Outcome kept = write(file); !kept) {
     cached.warnings.push_back("The baked asset is not kept in the cache. " + kept.error());
   }
 }
 
-// Takes an asset from the cache, or bakes it and puts it there.
 template <class Data, class Read, class Bake, class Write>
 Result<Data> through_cache(const std::string& key, const char* ending, Cached* report,
                            const Read& read, const Bake& bake, const Write& write) {
@@ -81,7 +82,7 @@ Result<Data> through_cache(const std::string& key, const char* ending, Cached* r
 std::filesystem::path cache_folder() {
   if (const std::string own = environment("HAPSIX_CACHE"); !own.empty()) return own;
   const fs::path xdg = environment("XDG_CACHE_HOME");
-  if (xdg.is_absolute()) return xdg / "hapsix";  // the XDG rule: relative ones do not count
+  if (xdg.is_absolute()) return xdg / "hapsix";  // the XDG standard ignores relative paths
   const std::string home = environment("HOME");
   return home.empty() ? fs::path{} : fs::path(home) / ".cache" / "hapsix";
 }

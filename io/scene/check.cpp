@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// check.cpp - a scene file's JSON against the rows of settings.
+// check.cpp - checks a scene file's JSON against the tables of settings.
 #include "io/scene/check.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// How many edits (insert, drop or change a letter) turn one word into the other.
+// The Levenshtein distance of two words: the least number of letters to insert, drop or change.
 std::size_t edits_between(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -52,7 +52,7 @@ std::string nearest_key(const SettingTable& rows, const std::string& name) {
   return best;
 }
 
-// The range of a number as it stands in a file, where one unit is `scale` metres.
+// The range of a number in the units of the file, where one unit is `scale` metres.
 Range range_in_file(const Setting& row, double scale) {
   Range r = row.range;
   if (row.is_length()) r.low /= scale, r.high /= scale, r.file_high = kFarthest;
@@ -142,7 +142,7 @@ void SceneCheck::quaternion(const Json& value, const Setting& row, const std::st
                             number_text(std::sqrt(norm2)) + ")"};
 }
 
-// Positive definite by Sylvester's criterion, on xx yy zz xy xz yz.
+// Tests with Sylvester's criterion that xx yy zz xy xz yz is positive definite.
 void SceneCheck::inertia(const Json& value, const Setting& row, const std::string& at) const {
   numbers(value, 6, row, at);
   double i[6];
@@ -227,7 +227,7 @@ void SceneCheck::keys(const Json& object, const SettingTable& rows, const std::s
 
 void check_scene_json(const Json& root) {
   double scale = 1;
-  if (root.is_object() && root.contains("units")) {  // comes first: ranges of lengths depend on it
+  if (root.is_object() && root.contains("units")) {  // first, as ranges of lengths depend on it
     check_choice(root["units"], setting_named(scene_settings(), "units"), "units");
     scale = metres(*unit_from_name(root["units"].get<std::string>()));
   }

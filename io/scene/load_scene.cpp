@@ -60,7 +60,7 @@ class Loader {
     return Done{};
   }
 
-  // Each mesh file is read once.
+  // Reads each mesh file only once.
   template <class Source>
   Result<const Mesh*> mesh_of(const Source& source) {
     if (source.mesh_data) return &*source.mesh_data;
@@ -76,15 +76,15 @@ class Loader {
     return static_cast<const Mesh*>(found->second.get());
   }
 
-  // All fields or all shells, and where each stands, by its key.
+  // All fields or all shells. `index` maps the key of an asset to its place in `all`.
   template <class Data>
   struct Kept {
     std::map<std::string, int> index;
     std::vector<Data> all;
   };
 
-  // The index of a body's field or shell: one that another body has loaded, or a baked file, or a
-  // mesh baked through the cache.
+  // Returns the index of a body's field or shell. It shares the asset of an earlier body if the
+  // content is the same; else it reads the baked file, or bakes the mesh through the cache.
   template <class Data, class Source, class Read, class Bake, class Describe>
   Result<int> obtain(const SceneBody& body, const Source& source, Kept<Data>& kept, Read read,
                      Bake bake, Describe describe) {
@@ -150,8 +150,8 @@ class Loader {
     return keep(shells_, "points of " + body.name, std::move(*built));
   }
 
-  // Mass properties are those that the scene states, else those of the mesh as a uniform solid if
-  // it is closed, else those of the shell's points.
+  // Takes the mass properties that the scene states. It derives the rest from the mesh as a uniform
+  // solid if the mesh is closed, else from the points of the shell.
   Outcome mass(const SceneBody& body, h6BodyDef& def) {
     if (body.fixed) return Done{};
     std::optional<MassProperties> found;
@@ -175,7 +175,7 @@ class Loader {
     }
     def.com = body.com ? *body.com : found->com;
     std::array<double, 6> inertia = body.inertia ? *body.inertia : found->inertia;
-    if (body.com && !body.inertia) {  // from the derived centre to the stated one
+    if (body.com && !body.inertia) {  // move the inertia from the derived centre to the stated one
       const double x = def.com.x - found->com.x, y = def.com.y - found->com.y,
                    z = def.com.z - found->com.z, m = body.mass;
       const double more[6] = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y),

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// mass.cpp - volume integrals of a triangle mesh, tetrahedron by tetrahedron.
+// mass.cpp - mass properties from volume integrals of a triangle mesh.
 //
-// Each triangle and a reference point span a signed tetrahedron; the integral of x_i x_j over one
-// with corners 0, a, b, c is det/120 * (s s^T + a a^T + b b^T + c c^T), s = a + b + c.
+// Each triangle and a reference point span a signed tetrahedron. The integral of x_i x_j over a
+// tetrahedron with corners 0, a, b, c is det/120 * (s s^T + a a^T + b b^T + c c^T), where
+// s = a + b + c.
 #include "io/scene/mass.h"
 
 #include <cmath>
@@ -10,7 +11,7 @@
 namespace h6::io {
 namespace {
 
-// xx yy zz xy xz yz of second moments -> the same of an inertia about that origin.
+// Turns second moments (xx yy zz xy xz yz) into the inertia about the same origin.
 std::array<double, 6> inertia_of(const std::array<double, 6>& m) {
   return {m[1] + m[2], m[0] + m[2], m[0] + m[1], -m[3], -m[4], -m[5]};
 }
@@ -24,7 +25,8 @@ std::array<double, 6> outer(double x, double y, double z) {
 std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
   const MeshAudit found = audit(mesh);
   if (!found.closed || found.flipped_edges > 0 || found.duplicates > 0) return std::nullopt;
-  // About the middle of the bounding box: parts far from their origin keep their digits.
+  // Integrate about the middle of the bounding box, so that a part far from its origin loses no
+  // digits.
   const Vec3 o{(found.low.x + found.high.x) / 2, (found.low.y + found.high.y) / 2,
                (found.low.z + found.high.z) / 2};
   double volume = 0;
@@ -54,7 +56,7 @@ std::optional<MassProperties> solid_mass(const Mesh& mesh, double mass) {
                                      found.high.z - found.low.z);
   // A sheet that is folded onto itself is closed too, but encloses nothing.
   if (!(std::fabs(volume) > 1e-9 * diagonal * diagonal * diagonal)) return std::nullopt;
-  const double density = mass / volume;  // negative when wound inside out: signs cancel
+  const double density = mass / volume;  // if wound inside out, both signs flip and cancel
   const Vec3 c{first.x / volume, first.y / volume, first.z / volume};
   const auto shift = outer(c.x, c.y, c.z);
   for (int i = 0; i < 6; ++i) second[i] = density * second[i] - mass * shift[i];

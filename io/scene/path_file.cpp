@@ -32,7 +32,7 @@ bool parse_number(std::string_view text, double& out) {
   return error == std::errc{} && end == text.data() + text.size() && std::isfinite(out);
 }
 
-// Reads eight numbers; returns what is wrong, or nothing.
+// Reads eight numbers. Returns an error message, or an empty text.
 std::string parse_row(std::string_view line, double (&row)[8]) {
   std::size_t column = 0;
   for (bool more = true; more; ++column) {
@@ -60,7 +60,7 @@ std::string checked_row(const double (&row)[8], double scale, const Path& before
   return {};
 }
 
-// The shortest text that reads back to the same bits, with a decimal point in every locale.
+// Writes the shortest text that reads back to the same bits, with a decimal point in every locale.
 void put_number(std::ostream& out, double value, char after) {
   char text[40];
   char* end = std::to_chars(text, text + sizeof text - 1, value).ptr;
@@ -68,11 +68,11 @@ void put_number(std::ostream& out, double value, char after) {
   out.write(text, end - text);
 }
 
-// ---- between rows ------------------------------------------------------------------------------
+// ---- interpolation -----------------------------------------------------------------------------
 
 h6Vec3 mix(const h6Vec3& a, const h6Vec3& b, double s) { return a + s * (b - a); }
 
-// b * conjugate(a), with the sign that turns by at most half a turn.
+// b * conjugate(a), with the sign that makes the turn at most half a turn.
 h6Quat shorter_turn(const h6Quat& a, const h6Quat& b) {
   const h6Quat d = product(b, conjugate(a));
   return d.w < 0 ? -d : d;
@@ -96,7 +96,7 @@ h6Quat slerp(const h6Quat& a, const h6Quat& b, double s) {
   return {q.w / norm, q.x / norm, q.y / norm, q.z / norm};
 }
 
-// The first row later than t. At t the path is between the row before it and this one.
+// The first row later than t: at t the path is between the row before it and this one.
 Path::const_iterator row_after(const Path& path, double t) {
   return std::upper_bound(path.begin(), path.end(), t,
                           [](double time, const PathRow& row) { return time < row.t; });
@@ -124,7 +124,7 @@ Result<Path> read_path(const std::filesystem::path& file, Unit unit) {
     };
     const std::string_view row_text = trimmed(text);
     if (row_text.empty() || row_text.front() == '#') continue;
-    // A header is known by its first column, t. Other rows that are no numbers are errors.
+    // Only a row whose first column is "t" counts as a header.
     const bool header = header_possible && trimmed(row_text.substr(0, row_text.find(','))) == "t";
     header_possible = false;
     if (header) continue;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// read.cpp - scene files: text -> checked JSON -> Scene.
+// read.cpp - reads scene files: text -> checked JSON -> Scene.
 //
-//   check_json_text   is it JSON, and of a sane size                      (io/file/json.cpp)
-//   check_scene_json  every key known, of its kind, in its range          (check.cpp)
-//   read_settings     values into the members of their rows               (setting_json.cpp)
-//   SceneReader       names to bodies, files to paths; what no row can say
+//   check_json_text   checks that the text is JSON and not too large      (io/file/json.cpp)
+//   check_scene_json  checks every key, its kind and its range            (check.cpp)
+//   read_settings     copies values into the members of their rows        (setting_json.cpp)
+//   SceneReader       resolves names of bodies and files, and reads rows without a member
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -22,11 +22,11 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
 
-// Makes a Scene of JSON that check_scene_json has passed: kinds and ranges hold.
+// Makes a Scene from JSON. check_scene_json must have accepted it, so kinds and ranges are right.
 class SceneReader {
  public:
   explicit SceneReader(const fs::path& file) : folder_(file.parent_path()) {}
-  // For a recording: files are named, not looked for.
+  // Reads the scene of a recording, whose files need not exist.
   SceneReader() : recorded_(true) {}
 
   Scene read(const Json& o) {
@@ -55,7 +55,7 @@ class SceneReader {
     return file;
   }
 
-  // `mesh` with its bake options, or `file`.
+  // Reads `mesh` with its bake options, or `file`.
   template <class Source>
   Source read_source(const Json& o, const SettingTable& rows, const std::string& at) const {
     Source out;
@@ -160,7 +160,7 @@ Result<std::string> read_text(const fs::path& file) {
   return text;
 }
 
-// `text` as a scene; `name` is for sentences.
+// Reads `text` as a scene. Error sentences call it `name`.
 Result<Scene> parse(const std::string& text, const std::string& name, SceneReader reader) {
   try {
     if (const Outcome json = check_json_text(text, name); !json) return json.failure();

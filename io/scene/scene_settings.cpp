@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_settings.cpp - the rows of a scene.
+// scene_settings.cpp - the tables of settings of a scene.
 #include "io/scene/scene_settings.h"
 
 #include <algorithm>
@@ -12,11 +12,11 @@ namespace {
 
 using Kind = SettingKind;
 
-constexpr double kMostPoints = 10e6;  // of a shell: more is a mistake, and costs gigabytes
+constexpr double kMostPoints = 10e6;  // of a shell; more would cost gigabytes
 constexpr double kMostBoxes = 1024;
-constexpr double kExactIntegers = 9007199254740992.0;  // a JSON number is a double
+constexpr double kExactIntegers = 9007199254740992.0;  // 2^53, as JSON numbers are doubles
 
-// Rows of structs that have their defaults in C++: the default is the member's initialiser.
+// Rows whose default is the initialiser of the member in C++.
 template <auto M>
 constexpr double start_of() {
   return static_cast<double>(typename MemberTraits<M>::Def{}.*M);
@@ -34,7 +34,7 @@ constexpr Setting choice(const char* name, std::span<const Choice> choices, cons
   return h6::choice<M>(name, choices, start_of<M>(), about);
 }
 
-// Rows without a member.
+// Rows without a member: read.cpp and write.cpp handle them.
 constexpr Setting by_hand(const char* name, Kind kind, const char* about) {
   return {.name = name, .kind = kind, .member = {}, .about = about};
 }
@@ -50,13 +50,13 @@ constexpr Setting object(const char* name, const SettingTable& inside, const cha
   return row;
 }
 
-// A size that can be given in place of another: 0 or less is "not given".
+// A size that a user can give in place of another. A value of 0 or less means that it is not given.
 constexpr Setting in_place_of(const char* other, Setting row) {
   row.quiet = true, row.replaces = other;
   return row;
 }
 
-// The engine's row for a member of a scene's own struct.
+// The engine's row, with a member of a scene's struct in place of the engine's.
 template <auto M>
 Setting same(const SettingTable& rows, const char* name) {
   Setting row = setting_named(rows, name);
@@ -99,7 +99,7 @@ constexpr Setting kFieldBakeRows[] = {
                                       "empty cells around the mesh")};
 constexpr SettingTable kFieldBake = settings_of("FieldBake", kFieldBakeRows);
 
-// The field that tells a shell's bake what the outside reaches.
+// Options of the field that tells a shell's bake which parts of the surface the outside reaches.
 constexpr Setting kOutsideRows[] = {
     whole<&FieldBake::voxels>(
         "voxels", between(16, 2048),
@@ -219,7 +219,7 @@ constexpr Setting kArmRows[] = {
                                 "default: no stops")};
 constexpr SettingTable kArm = settings_of("SceneArm", kArmRows);
 
-// The engine's hand, and the driver's coupling of an arm that says nothing else.
+// The rows of the engine's hand, with the driver's coupling of the default arm.
 const SettingTable& hand_def() {
   static const std::vector<Setting> rows = [] {
     std::vector<Setting> out(hand_settings().begin(), hand_settings().end());

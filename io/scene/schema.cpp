@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// schema.cpp - the JSON schema of scene files, from the rows of settings.
+// schema.cpp - makes the JSON schema of scene files from the tables of settings.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -20,7 +20,8 @@ Json numbers(std::size_t count) {
 
 Json schema_of(const SettingTable& rows);
 
-// Limits that hold whatever the scene's unit is; a length with bounds in metres has none.
+// Adds the limits that hold in every unit. A length with bounds in metres gets none, because the
+// schema does not know the unit of the scene.
 void add_limits(const Setting& row, Json& out) {
   const Range& r = row.range;
   if (row.is_length() && r.high != kNoLimit) return;
@@ -109,7 +110,7 @@ Json schema_of(const SettingTable& rows) {
   Json properties = Json::object(), required = Json::array();
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
     Json& property = properties[row.name] = schema_of(row);
-    // A length other than 0 depends on the scene's unit.
+    // A default length other than 0 depends on the unit of the scene.
     if (!default_text(row).empty() && !(row.is_length() && row.start != 0))
       property["default"] = default_of(row);
     property["description"] = description_of(row);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// setting_json.cpp - values of settings between a struct and a scene file's JSON.
+// setting_json.cpp - copies setting values between a struct and a scene file's JSON.
 #include "io/scene/setting_json.h"
 
 #include <cmath>
@@ -33,7 +33,7 @@ void read_choice(const json& value, const Setting& row, void* to) {
     if (value == c.name) row.member.set_number(to, c.value);
 }
 
-// The method's pieces are the next member of its definition: they share one text in a file.
+// In a file one text gives both the method and its pieces; the definition has a member for each.
 void read_method(const json& value, void* def) {
   auto& contact = *static_cast<h6ContactDef*>(def);
   h6MethodFromName(value.get_ref<const std::string&>().c_str(), &contact.method, &contact.pieces);
@@ -96,7 +96,7 @@ const char* choice_text(const Setting& row, double value) {
 
 bool left_out(const Setting& row, const void* value) {
   if (!value) return true;
-  if (row.kind == SettingKind::corners) {  // an empty box means that there is none
+  if (row.kind == SettingKind::corners) {  // an empty box means no box
     const Box& box = *static_cast<const Box*>(value);
     return !(box.low.x < box.high.x);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings_page.cpp - the page runtime/SETTINGS.md, from the rows of settings.
+// settings_page.cpp - makes the page runtime/SETTINGS.md from the tables of settings.
 #include <locale>
 #include <sstream>
 
@@ -74,7 +74,7 @@ void add_table(const SettingTable& rows, std::string& out) {
   });
 }
 
-// A table, then those of the objects and lists in it.
+// Adds a table, then the tables of the objects and lists in it.
 void add_section(const SettingTable& rows, const std::string& path, std::string& out) {
   out += "\n### " + (path.empty() ? std::string("The file") : "`" + path + "`") + "\n";
   add_table(rows, out);

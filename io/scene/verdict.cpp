@@ -10,11 +10,11 @@
 namespace h6::io {
 namespace {
 
-constexpr double kWindow = 0.2;            // judged, at the end of a still phase [s]
-constexpr double kStillMotion = 0.02e-3;   // [m]
+constexpr double kWindow = 0.2;            // end of a still phase that is judged [s]
+constexpr double kStillMotion = 0.02e-3;   // RMS over points [m]
 constexpr double kChatterSpeed = 2e-3;     // RMS over points and window [m/s]
 constexpr double kChatterDepth = 0.1;      // peak to peak [voxels]
-constexpr double kUnstableFactor = 100;    // of the hand's peak speed
+constexpr double kUnstableFactor = 100;    // times the hand's peak speed
 constexpr double kLeastPeakSpeed = 10e-3;  // [m/s]
 constexpr std::size_t kClusterSize = 48;
 
@@ -86,7 +86,7 @@ const char* verdict_name(Verdict verdict) {
 VerdictWatch::VerdictWatch(const SceneVerdict& rules, std::vector<h6Vec3> points, h6Vec3 com,
                            double rate)
     : rules_(rules), points_(std::move(points)), com_(com), rate_(rate > 0 ? rate : 1000) {
-  // The centre of mass is watched and moves like a point.
+  // Treat the centre of mass as one more point.
   points_.push_back(com_);
   const double share = 1 / static_cast<double>(points_.size());
   for (const h6Vec3& p : points_) {
@@ -127,7 +127,7 @@ void VerdictWatch::cluster_points(std::size_t first, std::size_t count) {
     const h6Vec3 arm = *p - cluster.centre;
     cluster.radius = std::max(cluster.radius, std::sqrt(dot(arm, arm)));
   }
-  cluster.radius *= 1 + 1e-9;  // rounding of the transform
+  cluster.radius *= 1 + 1e-9;  // allows for rounding in the transform
   clusters_.push_back(cluster);
 }
 
@@ -145,10 +145,10 @@ double VerdictWatch::mean_speed2(const h6Vec3& origin_velocity, const h6Vec3& an
   return std::max(0.0, mean);
 }
 
-// Mean square distance that the points travel from one pose to another. A turn D by the angle t
-// about n carries A to B = D A; with the middle orientation M = D^(1/2) A,
-//   B - A = (D^(1/2) - D^(-1/2)) M = 2 sin(t/2) [n]x M,
-// so the exact chord is the velocity of the "angular velocity" 2 sin(t/2) n at the orientation M.
+// Mean square distance of the points between two poses. A turn D by the angle t about n carries the
+// orientation A to B = D A. With the middle orientation M = D^(1/2) A,
+//   B - A = (D^(1/2) - D^(-1/2)) M = 2 sin(t/2) [n]x M.
+// So mean_speed2 gives the exact chord: its angular velocity is 2 sin(t/2) n, its orientation M.
 double VerdictWatch::mean_motion2(const h6Pose& from, const h6Pose& to) const {
   const h6Quat &a = from.q, &b = to.q;
   h6Quat middle = {a.w + b.w, a.x + b.x, a.y + b.y, a.z + b.z};
@@ -179,7 +179,7 @@ bool VerdictWatch::entered(const h6Pose& body) const {
 }
 
 bool VerdictWatch::chatters_now(double time) const {
-  // Half a frame of slack: times are sums of periods.
+  // Times are sums of frame periods and carry rounding errors, so allow half a frame.
   const bool still_long_enough = time - still_since_ >= kWindow - 0.5 / rate_;
   if (!still_long_enough || window_.filled < window_.speed2.size()) return false;
   double sum = 0;
@@ -189,8 +189,8 @@ bool VerdictWatch::chatters_now(double time) const {
          *high - *low > kChatterDepth;
 }
 
-// Called before this frame enters the window, so that a phase that ends is judged by its own
-// frames.
+// Call it before the frame enters the window, so that a phase that ends here is judged by its own
+// frames only.
 void VerdictWatch::watch_stillness(double time, const h6Pose& hand) {
   if (!first_ && mean_motion2(still_hand_, hand) <= kStillMotion * kStillMotion) return;
   if (!first_ && chatters_now(last_time_)) chattered_ = true;
@@ -205,7 +205,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
                           finite(body.velocity.angular) && std::isfinite(max_depth_voxels);
   finite_ = finite_ && all_finite;
   if (!finite_) return;
-  // A hand sample that is not finite is the device's fault: the frame does not count.
+  // The device is to blame for a hand sample that is not finite, so such a frame does not count.
   if (!finite(hand) || !finite(hand_velocity.linear) || !finite(hand_velocity.angular)) return;
 
   const h6Velocity& v = body.velocity;
@@ -218,7 +218,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   through_ = through_ || entered(body.pose);
 
   watch_stillness(time, hand);
-  // Speed from poses: it does not depend on what the integrator reports as velocity.
+  // Take the speed from poses, so that it does not depend on the velocity of the integrator.
   const double dt = first_ || time <= last_time_ ? 1 / rate_ : time - last_time_;
   const double speed2 = first_ ? 0 : mean_motion2(last_body_.pose, body.pose) / (dt * dt);
   window_.speed2[window_.next] = speed2;

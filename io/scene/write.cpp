@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// write.cpp - a scene as plain files: scene.json, STL meshes, PLY shells, CSV paths.
+// write.cpp - writes a scene as plain files: scene.json, STL meshes, PLY shells, CSV paths.
 //
-// Defaults are written too, so that the file says all that the run depends on.
+// It writes defaults too, so that the file holds everything that the run depends on.
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -18,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-// A body's name as a file name, in letters that every system accepts.
+// Turns a body's name into a file name that every system accepts.
 std::string file_stem(const std::string& name) {
   std::string out;
   for (const char c : name.substr(0, 60)) {
@@ -49,7 +49,7 @@ class SceneWriter {
  public:
   SceneWriter(const Scene& scene, const fs::path& folder)
       : scene_(scene), folder_(folder), scale_(metres(scene.unit)) {}
-  // For the text alone: no file is written, but the same names are given.
+  // Makes the text only and writes no file.
   explicit SceneWriter(const Scene& scene)
       : scene_(scene), scale_(metres(scene.unit)), files_(false) {}
 
@@ -72,7 +72,7 @@ class SceneWriter {
   }
 
  private:
-  // A file name in the folder that no other file of this scene has.
+  // A file name that no other file of this scene has.
   std::string unused(const std::string& stem, const std::string& ending) {
     std::string name = stem + ending;
     for (int n = 2; std::find(used_.begin(), used_.end(), name) != used_.end(); ++n)
@@ -110,7 +110,7 @@ class SceneWriter {
     return name;
   }
 
-  // "mesh" and its unit, when it is not the scene's.
+  // Adds "mesh", and its unit if that is not the scene's.
   template <class Source>
   void mesh_json(const Source& source, const std::string& stem, Json& out) {
     if (source.mesh_data) {
@@ -148,7 +148,7 @@ class SceneWriter {
   Json body_json(const SceneBody& body) {
     Json out;
     write_settings(scene_body_settings(), &body, scale_, out);
-    if (body.fixed) out.erase("mass");  // nothing reads it
+    if (body.fixed) out.erase("mass");  // a fixed body needs no mass
     const std::string stem = file_stem(body.name);
     if (body.field) out["field"] = field_json(*body.field, stem);
     if (body.shell) out["shell"] = shell_json(*body.shell, stem);
@@ -195,7 +195,7 @@ Outcome export_scene(const Scene& scene, const std::filesystem::path& folder) {
     if (error || !fs::is_directory(folder, error))
       return Failure{folder.string() + ": cannot be made a folder; " + error.message()};
     const Json json = SceneWriter(scene, folder).write();
-    // The scene file comes last: where it exists, the files it names exist too.
+    // The scene file is written last, so that the files it names exist when it does.
     return write_aside(folder / "scene.json", [&](const fs::path& aside) -> Outcome {
       std::ofstream out(aside);
       out << json.dump(2) << '\n';
