@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // actuator.cpp - a landing gear's retraction actuator, 25,191 triangles.
 //
-// The pin of its fixed end is the x axis; it pushes along +z, where the rod end's pin is 580 mm
-// away, parallel to the first. A closed surface has an even number of triangles, the paper's part
-// an odd one: here one triangle is there twice, as it happens in exports, and the rest is closed.
+// The pin of its fixed end is the x axis. The actuator pushes along +z; the rod end's pin is 580 mm
+// away, parallel to the first. A closed surface has an even number of triangles, but the paper's
+// part has an odd number. So one triangle is there twice, as in some CAD exports; the rest is
+// closed.
 #include <cmath>
 #include <numbers>
 
@@ -73,7 +74,7 @@ void add_barrel(Assembly& a) {
   a.add("gland wiper",
         revolve({{24, 400}, {32, 400}, {30, 408}, {26, 410}, {24, 410}}, 56, Ends::joined));
   a.add("actuator piston rod", cylinder(24, 300, 560 - 20, 72));
-  // Two bands that carry the line, a position sensor on the other side with its plug.
+  // Two bands carry the line; a position sensor with its plug is on the other side.
   for (const double z : {150.0, 290.0}) {
     a.add("line band", revolve({{kBarrel - 1, z - 9},
                                 {kBarrel + 2, z - 9},
@@ -86,8 +87,8 @@ void add_barrel(Assembly& a) {
 }
 
 void add_hydraulics(Assembly& a) {
-  // Ports: a boss, a fitting with its nut, an elbow; the far one's line runs back beside the
-  // barrel.
+  // A port has a boss, a fitting with its nut, and an elbow. The far port's line runs back beside
+  // the barrel.
   const auto port = [&](double z, double side) {
     const Frame boss = facing({side * (kBarrel - 6), 0, z}, {side, 0, 0}, {0, 0, 1});
     a.add("port boss", block(34, 34, 16, 9, 2.5), boss);

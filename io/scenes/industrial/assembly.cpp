@@ -19,7 +19,7 @@ double distance_to_segment(const h6Vec3& p, const h6Vec3& a, const h6Vec3& b) {
   return norm(p - a - s * ab);
 }
 
-// Longest edge first; equal ones in the order of their vertices.
+// Orders edges for the queue: the longest comes first, equal ones in the order of their vertices.
 struct Edge {
   double squared;
   std::uint32_t a, b;
@@ -28,7 +28,8 @@ struct Edge {
   }
 };
 
-// Splits longest edges until a mesh has so many triangles. An inner edge adds two, a border one.
+// Splits the longest edges until a mesh has so many triangles. Splitting an inner edge adds two
+// triangles, splitting a border edge adds one.
 class Splitter {
  public:
   explicit Splitter(Mesh& mesh) : mesh_(mesh) {
@@ -140,8 +141,8 @@ void Assembly::leave_hole(const std::string& name, const h6Vec3& near, int trian
   holes_.push_back({piece, order});
 }
 
-// Diameter of the largest circle among the missing triangles that touches none of their border; a
-// little more, since centres are tried on a grid.
+// Diameter of the largest ball among the missing triangles that does not cross their border. The
+// result is 5 percent larger, because the centres are tried on a grid.
 double Assembly::hole_width(const std::vector<std::size_t>& triangles) const {
   std::vector<std::array<std::uint32_t, 2>> border;
   for (const std::size_t t : triangles)
@@ -236,7 +237,7 @@ IndustrialInput Assembly::broken(const Defects& defects, std::size_t probes) con
 
   IndustrialTruth& truth = out.truth;
   truth.duplicates = mesh.triangles.size() - single;
-  truth.voxel = bounds_of(mesh).longest() / (1024 - 2 * 8);  // less the padding
+  truth.voxel = bounds_of(mesh).longest() / (1024 - 2 * 8);  // 8 cells of padding at either end
   truth.wires = wires_;
   for (const Hole& hole : holes_) {
     h6Vec3 centre{0, 0, 0}, normal{0, 0, 0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// assembly.h - joins many pieces to one mesh, sound or with the defects of CAD exports, and records
-// what is known about it by construction.
+// assembly.h - joins many pieces to one mesh, either sound or with the defects of CAD exports, and
+// records what the construction knows about it: wires, holes, and which points are inside.
 #pragma once
 #include <string>
 #include <unordered_map>
@@ -10,7 +10,7 @@
 
 namespace h6::io::industrial {
 
-// Numbers that are the same everywhere: SplitMix64 (Steele, Lea, Flood 2014).
+// Random numbers that are the same on every machine: SplitMix64 (Steele, Lea, Flood 2014).
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : state_(seed) {}
@@ -31,29 +31,31 @@ class Dice {
 
 enum class Kind { solid, sheet, wire };
 
-// The defects that a sound assembly gets.
+// The defects that Assembly::broken adds to a sound assembly.
 struct Defects {
-  int narrow_holes;       // single triangles missing, one a solid at most
+  int narrow_holes;       // single missing triangles, at most one in each solid
   double flipped_pieces;  // share of pieces wound inside out
-  double mixed_pieces;    // share of pieces in which every third triangle is
-  std::size_t triangles;  // in all: reached by duplicates
+  double mixed_pieces;    // share of pieces with every third triangle wound inside out
+  std::size_t triangles;  // total count, reached by adding duplicates
 };
 
 class Assembly {
  public:
   Assembly(double voxel, std::uint64_t seed) : voxel_(voxel), dice_(seed) {}
 
-  // One piece of the part `name`; a part may have many.
+  // Adds one piece to the part `name`; a part may have many pieces.
   void add(const std::string& name, const Piece& piece, const Frame& frame = {},
            Kind kind = Kind::solid);
-  // A thin solid rod; its centre line is recorded.
+  // Adds a thin solid rod and records its centre line.
   void add_wire(const std::string& name, const Line& line, double radius);
-  // Of the last piece of a part the `triangles` nearest to the triangle whose centre is nearest to
-  // `near` (world) will be missing. Not for sheets: a probe on one could fall into the hole.
+  // Leaves a hole in the last piece of a part. `triangles` triangles will be missing: the one whose
+  // centre is nearest to `near` (world frame [mm]) and those nearest to its centre. Do not use it
+  // for sheets: a probe on a sheet could fall into the hole.
   void leave_hole(const std::string& name, const h6Vec3& near, int triangles);
 
   std::size_t triangles() const { return triangles_.size(); }
-  // Metres. Splits longest edges until there are so many triangles: the same surface.
+  // The mesh in metres, with the longest edges split until it has so many triangles. Splitting does
+  // not change the surface.
   Mesh sound(std::size_t triangles) const;
   IndustrialInput broken(const Defects& defects, std::size_t probes) const;
 
@@ -69,10 +71,9 @@ class Assembly {
     std::vector<std::size_t> triangles;
   };
 
-  // Corners of triangle t [mm].
-  std::array<h6Vec3, 3> corners(std::size_t t) const;
+  std::array<h6Vec3, 3> corners(std::size_t t) const;                  // of triangle t [mm]
   double hole_width(const std::vector<std::size_t>& triangles) const;  // [mm]
-  // Which triangles are missing, given the dice.
+  // For each triangle, 1 when it is missing. Counts the narrow holes.
   std::vector<std::uint8_t> missing(const Defects& defects, Dice& dice, std::size_t* narrow) const;
 
   double voxel_;  // [m]
@@ -88,11 +89,11 @@ class Assembly {
 
 // A washer and a bolt in it; the frame's z axis points out of the seat.
 void add_bolt(Assembly& a, const std::string& name, const Frame& seat, double d, double length);
-// Bolts standing around an outline, `apart` from each other, seats at height z of the frame.
+// Bolts along an outline, about `apart` from each other, with their seats at height z of the frame.
 void add_bolt_row(Assembly& a, const std::string& name, const Frame& frame, const Polygon& outline,
                   double z, double apart, double d, double length);
 
-// `wires` of them around each other along a smooth curve, taped and tied here and there.
+// A bundle of `wires` wires that wind around each other along a smooth curve, with ties on it.
 void add_bundle(Assembly& a, const std::string& name, const std::vector<h6Vec3>& through, int wires,
                 double radius);
 

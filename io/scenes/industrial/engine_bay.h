@@ -6,12 +6,12 @@
 
 namespace h6::io::industrial {
 
-// Bay and field: 1024 cells less 8 of padding at either end, over 900 mm.
+// The field has 1024 cells, 8 of them padding at either end; the other 1008 span the bay.
 inline constexpr double kBayWidth = 900;
 inline constexpr double kBayVoxel = kBayWidth / 1008;
-inline constexpr double kBayWire = 1.03 * kBayVoxel;  // radius: wires are two voxels thick
+inline constexpr double kBayWire = 1.03 * kBayVoxel;  // radius; wires are two voxels thick
 
-// Where the starter's own frame stands when it is bolted on: pinion towards +x.
+// Origin of the starter's own frame when it is bolted on; its pinion points towards +x.
 inline constexpr h6Vec3 kStarterSeat = {100, -118, 225};
 Frame starter_seat();
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_bay_body.cpp - what the engine stands in: sheets without thickness, rails, tanks, battery.
+// engine_bay_body.cpp - the car's body around the engine: sheets without thickness, rails, tanks,
+// battery.
 #include <cmath>
 #include <numbers>
 
@@ -12,7 +13,7 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kSide = kBayWidth / 2;
 
 void add_firewall(Assembly& a) {
-  // Firewall with its openings, pressed beads on it.
+  // The firewall with its openings and pressed beads.
   Outline wall{rectangle(kBayWidth, 470, 60, 8, {0, 325}), {}};
   wall.holes = {circle(46, 48, {-290, 430}),   circle(24, 32, {-130, 300}),
                 circle(17, 28, {60, 420}),     circle(17, 28, {110, 420}),
@@ -29,7 +30,8 @@ void add_firewall(Assembly& a) {
           {}, Kind::sheet);
 }
 
-// Fender apron with the wheel's arch, strut tower, rail of hat section; side is -1 or 1.
+// Adds the fender apron with the wheel's arch, the strut tower and a rail of hat section. `side` is
+// -1 or 1.
 void add_side(Assembly& a, double side) {
   a.add("fender apron",
         sheet(60, 24,
@@ -104,7 +106,7 @@ void add_engine_mounts(Assembly& a) {
   }
 }
 
-// A tank of two closed walls, `wall` apart.
+// A tank has two closed surfaces, so that its wall is modelled without joining them.
 void add_tank(Assembly& a, const std::string& name, const Piece& outer, const Piece& inner,
               const Frame& frame) {
   a.add(name + " inner wall", inner, frame);
@@ -112,7 +114,7 @@ void add_tank(Assembly& a, const std::string& name, const Piece& outer, const Pi
 }
 
 void add_tanks(Assembly& a) {
-  // Coolant: a ball between two seams, as they are welded; hence finely tessellated.
+  // The coolant tank: a ball welded from two halves, hence finely tessellated.
   const auto ball = [](double r, double h) {
     Profile profile;
     for (int i = 0; i <= 36; ++i) {

@@ -9,7 +9,7 @@ namespace h6::io::industrial {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kY = -357;  // of the core's middle
+constexpr double kY = -357;  // y of the core's middle
 
 void add_core(Assembly& a) {
   constexpr int kTubes = 30;

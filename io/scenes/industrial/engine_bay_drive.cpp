@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// engine_bay_drive.cpp - what the engine drives: belt and accessories, clutch, gearbox, shafts.
+// engine_bay_drive.cpp - the parts the engine drives: belt, accessories, clutch, gearbox, shafts.
 #include <cmath>
 #include <numbers>
 
@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kBeltX = -264;
-constexpr P2 kCrank = {50, 230};   // (y, z)
-constexpr P2 kShaft = {186, 104};  // of the drive shafts, behind and below
+constexpr P2 kCrank = {50, 230};   // (y, z) of the crankshaft
+constexpr P2 kShaft = {186, 104};  // (y, z) of the drive shafts, behind and below
 
 struct Pulley {
   const char* name;
@@ -23,7 +23,7 @@ constexpr Pulley kPulleys[] = {{"crank pulley", 50, 230, 72},
                                {"water pump pulley", 40, 385, 46},
                                {"steering pump pulley", 178, 360, 50}};
 
-// Turned about an axis that points to -x at (y, z).
+// A frame whose z axis points towards -x.
 Frame to_left(double x, double y, double z) { return facing({x, y, z}, {-1, 0, 0}, {0, 1, 0}); }
 
 void add_pulley(Assembly& a, const Pulley& p) {
@@ -148,7 +148,7 @@ void add_gearbox(Assembly& a) {
   a.add("bell housing", extrude(wall, 112, 186), kAcross);
   const Outline back{hull({{kCrank.x, kCrank.y, 172}, {sy, sz, 40}}, 96), {}};
   a.add("bell housing back", extrude(back, 184, 196), kAcross);
-  for (int i = 0; i < 24; ++i) {  // where block and starter leave room for their heads
+  for (int i = 0; i < 24; ++i) {  // bolts, where block and starter leave room for their heads
     const double angle = 2 * kPi * i / 24;
     const double y = kCrank.x + 179 * std::cos(angle), z = kCrank.y + 179 * std::sin(angle);
     const bool at_block = std::abs(y - 50) < 124 && z > 138 && z < 484;

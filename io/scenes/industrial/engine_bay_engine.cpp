@@ -41,7 +41,7 @@ void add_block(Assembly& a) {
   add_bolt(a, "drain plug", facing({-216, 60, 70}, {-1, 0, 0}), 14, 20);
   add_bolt_row(a, "oil pan bolt", facing({-65, 50, 142}, {0, 0, -1}), rectangle(324, 214, 10, 3), 0,
                60, 6, 18);
-  // Oil filter on the rear face, with the grip its wrench takes.
+  // Oil filter on the rear face, with the flats for its wrench.
   std::vector<Line> rings;
   for (const P2& p : Profile{{20, 0},
                              {32, 2},

@@ -90,7 +90,7 @@ void add_bundles(Assembly& a) {
 }
 
 void add_lines(Assembly& a) {
-  // Brake lines from the pressure unit along the firewall, side by side; two voxels thin.
+  // Brake lines run side by side from the pressure unit along the firewall, two voxels thick.
   for (int i = 0; i < 4; ++i) {
     const double z = 270 - 7.0 * i, x = 342 + 30.0 * (i % 3), y = 290 + 30.0 * (i / 3);
     a.add_wire("brake line " + std::to_string(i + 1),
@@ -121,7 +121,7 @@ void add_lines(Assembly& a) {
                                    {84, -100, 506 + 6 * side}},
                                   6),
                            4, 14));
-  // Cables with lugs: plus pole to the fuse box, to the starter's post on the gearbox, to the body.
+  // Cables with lugs: to the fuse box, to the starter's post on the gearbox, and to the body.
   a.add("battery cable",
         rod(smooth({{370, -149, 455}, {350, -120, 466}, {340, -96, 430}, {352, -80, 398}}, 5), 5.5,
             18));

@@ -10,7 +10,7 @@ namespace h6::io::industrial {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr int kSides = 12;  // a multiple of six: corners of hexagons are among them
+constexpr int kSides = 12;  // a multiple of six, so that hexagons have their corners among them
 
 Line round_ring(double radius, double z) {
   Line out;
@@ -18,7 +18,7 @@ Line round_ring(double radius, double z) {
   return out;
 }
 
-// A hexagon `across` flats.
+// A hexagon that is `across` wide between its flats.
 Line hex_ring(double across, double z) {
   Line out;
   for (int i = 0; i < kSides; ++i) {
@@ -30,7 +30,7 @@ Line hex_ring(double across, double z) {
   return out;
 }
 
-// A shank of diameter d from z = 0 down: smooth, then threads as rings, a chamfer, a pole.
+// Adds a shank of diameter d below z = 0: a smooth part, threads as rings, a chamfer, a pole.
 void add_shank(std::vector<Line>& rings, double d, double length) {
   const double r = d / 2, pitch = 0.28 * d, root = r - 0.6 * pitch;
   rings.push_back(round_ring(r, 0));
@@ -80,7 +80,7 @@ Piece washer(double d) {
 }
 
 Piece rivet(double d, int sides) {
-  // The dome's foot lies a little in the sheet.
+  // The dome's foot is a little below the sheet.
   const double r = 0.9 * d;
   return revolve({{0, -0.2 * d}, {0.5 * d, -0.2 * d}, {r, 0}, {0.85 * r, 0.3 * d}, {0, 0.5 * d}},
                  sides);

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Where the i-th wire of a bundle lies: one in the middle, six around it, twelve around those.
+// The place of the i-th wire across a bundle as {distance from the middle, angle}: one wire is in
+// the middle, six are around it, twelve around those.
 P2 bundle_place(int i, double radius) {
   const double step = 2.12 * radius;
   if (i == 0) return {0, 0};

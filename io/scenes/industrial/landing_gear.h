@@ -7,10 +7,10 @@ namespace h6::io::industrial {
 
 inline constexpr double kGearHeight = 2000;
 inline constexpr double kGearVoxel = kGearHeight / 1008;
-inline constexpr double kGearWire = 1.03 * kGearVoxel;  // radius: wires are two voxels thick
+inline constexpr double kGearWire = 1.03 * kGearVoxel;  // radius; wires are two voxels thick
 
-// The actuator between its brackets: its own frame's origin at the bay's pin, z towards the
-// strut's.
+// The actuator's place between its brackets. Its own frame has its origin at the bay's pin and its
+// z axis towards the strut's pin.
 inline constexpr double kActuatorLength = 580;  // pin to pin
 inline constexpr h6Vec3 kBayPin = {640, 205, 1610};
 inline constexpr h6Vec3 kStrutPin = {128.6, 205, 1336.3};

@@ -22,7 +22,7 @@ void add_rivets(Assembly& a, const std::string& name, const h6Vec3& from, const 
     a.add(name, one, facing(from + (static_cast<double>(i) / count) * (to - from), out));
 }
 
-// A frame across the bay: a web with lightening holes whose rims are flanged, caps at its edges.
+// A rib across the bay: a web with flanged lightening holes, and caps at its edges.
 void add_rib(Assembly& a, double y, double low, bool trunnion) {
   Outline web{{{kLeft, low + 120},
                {kLeft + 150, low},
@@ -112,7 +112,7 @@ void add_roof(Assembly& a) {
 }
 
 void add_brackets(Assembly& a) {
-  // Trunnion posts, stay and brace posts, the actuator's fork; all bolted to beams.
+  // The posts of trunnion, stay and brace and the actuator's fork are bolted to beams.
   for (const double y : {-360.0, 360.0}) {
     Outline post{hull({{0, 1690, 92}, {-90, 1960, 30}, {90, 1960, 30}}, 80),
                  {circle(72, 72, {0, 1690})}};
@@ -153,16 +153,18 @@ void add_brackets(Assembly& a) {
       add_bolt(a, "beam bolt", facing({-282 + 47.0 * i, y, 1900}, {0, 0, -1}), 10, 26);
 }
 
-// A door: curved outer skin, inner skin with lightening holes bent to it, hat stiffeners, hinges.
+// A door has a curved outer skin, an inner skin with lightening holes that follows it, stiffeners
+// of hat section, and hinges. at_skin(s, t, d) gives a point of the door [mm]: s runs along y, t
+// downwards, d into the bay.
 void add_door(Assembly& a, const std::string& name,
               const std::function<h6Vec3(double, double, double)>& at_skin, double width,
               double height) {
-  // at_skin(s, t, d): s along y and t downwards in mm, d into the bay side.
   a.add(
       name + " outer skin",
       sheet(120, 90, [&](double u, double v) { return at_skin(width * (u - 0.5), height * v, 0); }),
       {}, Kind::sheet);
-  // The inner skin in rows, each nearly flat: a triangle must not cut through the curve.
+  // The inner skin is made of rows that are nearly flat, so that no triangle cuts through the
+  // curve.
   const int across = static_cast<int>(width / 150), down = static_cast<int>(height / 160);
   const double row = (height - 40) / down;
   for (int j = 0; j < down; ++j) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// landing_gear_lines.cpp - hydraulic lines and hoses, valves, wire bundles two voxels a wire.
+// landing_gear_lines.cpp - hydraulic lines, hoses, valves, and bundles of wires two voxels thick.
 #include <cmath>
 #include <numbers>
 
@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Beside the strut, at an angle around it.
+// A point beside the strut, r from its axis at an angle around it.
 h6Vec3 beside(double angle, double r, double z) {
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
@@ -21,7 +21,7 @@ void add_fitting(Assembly& a, const h6Vec3& where, const h6Vec3& along, double d
   a.add("fitting", hex_bolt(0.8 * d, 1.2 * d), frame * at(0, 0, 0.8 * d));
 }
 
-// Six steel lines down the strut, in clamps; each ends in a hose that follows the piston.
+// Six steel lines run down the strut in clamps; each ends in a hose that follows the piston.
 void add_strut_lines(Assembly& a) {
   for (int i = 0; i < 6; ++i) {
     const double angle = kPi * (1.02 + 0.075 * i), r = 106;
@@ -65,7 +65,7 @@ void add_strut_lines(Assembly& a) {
   }
 }
 
-// Under the roof: ports, solenoid valves, an accumulator.
+// The manifold under the roof has ports, solenoid valves and an accumulator.
 void add_manifold(Assembly& a) {
   const Frame manifold = at(-190, -200, 1880);
   a.add("manifold", block(150, 110, 62, 8, 3), manifold);

@@ -9,8 +9,7 @@ namespace h6::io::industrial {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Outlines in the plane of fore and aft: 2-D (y, z), extruded along x; and of left and right: (x,
-// z).
+// Frames of extruded outlines: kSide takes 2-D (y, z), along x; kBack takes 2-D (x, z), along -y.
 constexpr Frame kSide = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
 constexpr Frame kBack = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
 
@@ -65,8 +64,8 @@ void add_cylinder(Assembly& a) {
   }
 }
 
-// Two A-shaped links that keep the piston from turning: hinged at the cylinder, the axle, each
-// other.
+// Two A-shaped links keep the piston from turning. They are hinged to each other, to the cylinder
+// and to the axle.
 void add_torque_links(Assembly& a) {
   const h6Vec3 top = {0, 112, 905}, apex = {0, 330, 690}, low = {0, 104, 480};
   for (const bool upper : {true, false}) {

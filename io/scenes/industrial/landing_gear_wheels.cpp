@@ -11,12 +11,12 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kAxle = 400;  // height
 constexpr double kTyre = 385;  // outer radius
-constexpr double kHalf = 108;  // of the tyre's width
+constexpr double kHalf = 108;  // half of the tyre's width
 constexpr double kRim = 215;
 
-// Section of a tyre from bead to bead; `groove` says how deep the tread is cut there.
+// A point of the tyre's section, which runs from bead to bead.
 struct TyrePoint {
-  double r, z, tread;  // tread: 1 where blocks are cut
+  double r, z, tread;  // tread: depth of the sipes here, 1 the full depth, 0 none
 };
 std::vector<TyrePoint> tyre_section() {
   std::vector<TyrePoint> out;
@@ -56,7 +56,7 @@ void add_tyre(Assembly& a, const Frame& wheel) {
     Line ring;
     for (int i = 0; i < kAround; ++i) {
       const double angle = 2 * kPi * i / kAround;
-      // Sipes: cut across the ribs, slanted, every seventh step.
+      // Slanted sipes cut across the ribs; they repeat every seventh step.
       const int phase = (i + static_cast<int>(std::lround(p.z / 9)) + 700) % 7;
       const double r = p.r - (p.tread > 0 && phase < 2 ? 7 * p.tread : 0);
       ring.push_back({r * std::cos(angle), r * std::sin(angle), p.z});
@@ -68,7 +68,7 @@ void add_tyre(Assembly& a, const Frame& wheel) {
 
 void add_rim(Assembly& a, const Frame& wheel) {
   for (const double side : {-1.0, 1.0}) {
-    // A half: flange, tube well, web.
+    // The profile of one half: flange, tube well, web.
     Profile half;
     for (const P2& p : Profile{{kRim - 12, 4},
                                {kRim - 12, 62},
@@ -106,7 +106,7 @@ void add_rim(Assembly& a, const Frame& wheel) {
 }
 
 void add_brake(Assembly& a, const Frame& wheel) {
-  // Rotors keyed to the rim, stators to the torque tube, in turn; all with holes.
+  // Rotors (keyed to the rim) and stators (keyed to the torque tube) alternate; all have holes.
   for (int i = 0; i < 9; ++i) {
     const bool rotor = i % 2 == 1;
     const double z = -28 - 11.5 * i;

@@ -23,9 +23,9 @@ bool in_triangle(const P2& p, const P2& a, const P2& b, const P2& c) {
 
 bool same(const P2& a, const P2& b) { return a.x == b.x && a.y == b.y; }
 
-// One loop of vertex numbers around the outline and all its holes, connected by double edges.
-// D. Eberly, "Triangulation by ear clipping": each hole's rightmost vertex sees some vertex of the
-// loop to its right; the holes come by descending x.
+// Ear clipping after D. Eberly, "Triangulation by ear clipping". The loop is one list of vertex
+// numbers around the outline and all its holes, which double edges (bridges) connect. The holes are
+// joined by descending x, and each hole's rightmost vertex sees a vertex of the loop to its right.
 class Ears {
  public:
   explicit Ears(const Outline& outline) {
@@ -50,12 +50,12 @@ class Ears {
     std::size_t i = 0, failures = 0;
     while (loop_.size() > 3) {
       const std::size_t n = loop_.size(), h = (i + n - 1) % n, j = (i + 1) % n;
-      // When nothing is an ear any more, only slivers are left: rounding.
+      // When no ear is left, rounding has left only slivers: clip one.
       if (is_ear(h, i, j) || failures > n) {
         out.push_back({loop_[h], loop_[i], loop_[j]});
         loop_.erase(loop_.begin() + static_cast<std::ptrdiff_t>(i));
         failures = 0;
-        i = (i + 1) % loop_.size();  // skip one: fans are avoided where they can be
+        i = (i + 1) % loop_.size();  // skipping one vertex avoids most fans
       } else {
         ++failures;
         i = j;
@@ -84,7 +84,7 @@ class Ears {
 
   void bridge(const std::vector<Index>& hole) {
     const P2 m = points_[hole[0]];
-    // The nearest edge to the right of m on the loop, and its end farther right.
+    // Find the loop's nearest edge to the right of m, and the end of that edge farther right.
     double nearest = 1e300;
     std::size_t best = 0;
     for (std::size_t i = 0; i < loop_.size(); ++i) {
@@ -95,7 +95,8 @@ class Ears {
       nearest = x;
       best = a.x > b.x ? i : (i + 1) % loop_.size();
     }
-    // A reflex vertex inside the triangle m, hit, best hides it; then the one at the least angle.
+    // Reflex vertices inside the triangle (m, hit, best) hide `best`; take the one at the least
+    // angle then.
     const P2 hit = {nearest, m.y}, target = points_[loop_[best]];
     const bool up = target.y > m.y;
     double least = std::abs(std::atan2(target.y - m.y, target.x - m.x));
@@ -176,7 +177,7 @@ Polygon hull(const std::vector<std::array<double, 3>>& circles, int sides) {
 
 Polygon gear(int teeth, double root, double tip) {
   Polygon out;
-  // Of a pitch: root, flank, rounded tip, flank. {share of the pitch, share of the height}.
+  // One pitch has root, flank, rounded tip, flank: {share of the pitch, share of the height}.
   constexpr double kTooth[][2] = {{0.0, 0},     {0.2, 0},    {0.27, 0.3}, {0.34, 0.65},
                                   {0.42, 0.97}, {0.5, 1},    {0.6, 1},    {0.68, 0.97},
                                   {0.76, 0.65}, {0.83, 0.3}, {0.9, 0}};

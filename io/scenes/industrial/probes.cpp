@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// probes.cpp - probes by construction: no field is asked.
+// probes.cpp - finds probes from the construction, without a distance field.
 //
-// Inside: a piece is closed and well wound before it is spoilt, so its own winding number says on
-// which side a point is. Outside: cells of a coarse grid that no triangle's box comes near, and
-// that are connected through such cells' faces to the grid's border.
+// Inside: a piece is closed and well wound before it gets defects, so its own winding number tells
+// on which side a point is. Outside: a probe lies in a cell of a coarse grid that no triangle's box
+// comes near, and that faces of such cells connect to the grid's border.
 #include "io/scenes/industrial/probes.h"
 
 #include <algorithm>
@@ -42,7 +42,7 @@ double to_triangle(const Corners& t, const h6Vec3& p) {
       {to_segment(p, t[0], t[1]), to_segment(p, t[1], t[2]), to_segment(p, t[2], t[0])});
 }
 
-// Cells of an assembly's surroundings; a border of free cells is around it.
+// A grid of cells around an assembly, with a border of free cells.
 struct Cells {
   h6Vec3 low;
   double size;
@@ -56,8 +56,8 @@ struct Cells {
            static_cast<std::size_t>(i);
   }
 
-  // Every cell that the triangle's bounding box, `margin` larger, touches; large triangles in
-  // parts.
+  // Marks every cell that the triangle's bounding box, `margin` larger, touches. Large triangles
+  // are divided first.
   void mark(const Corners& t, double margin) {
     int from[3], to[3];
     bool large = false;
@@ -137,7 +137,7 @@ void Prober::solids(IndustrialTruth& truth, std::size_t probes) const {
     const Probe probe = behind(range, range.first + dice.below(range.count));
     if (probe.clearance > 0) truth.inside.push_back(probe);
   }
-  // The same number behind every hole; the first ones straight behind it.
+  // Every solid with a hole gets as many probes; the first are straight behind the hole.
   for (const Assembly::Hole& hole : all_.holes_) {
     const Assembly::Range& range = all_.ranges_[hole.range];
     for (const std::size_t t : hole.triangles)
@@ -158,7 +158,7 @@ void Prober::sheets(IndustrialTruth& truth, std::size_t probes) const {
   if (which.empty()) return;
   for (std::size_t i = 0; i < 8 * probes && truth.sheets.size() < probes; ++i) {
     const Assembly::Range& range = all_.ranges_[which[dice.below(which.size())]];
-    // Border edges have one face; a small map would do, but sheets are small: all edges, sorted.
+    // Border edges have one face. Sheets are small, so sorting all edges is enough to find them.
     std::vector<std::array<std::uint32_t, 2>> edges, border;
     for (std::size_t t = range.first; t < range.first + range.count; ++t)
       for (std::size_t k = 0; k < 3; ++k) {
@@ -172,7 +172,7 @@ void Prober::sheets(IndustrialTruth& truth, std::size_t probes) const {
       if (f == e + 1) border.push_back(edges[e]);
       e = f;
     }
-    for (int k = 0; k < 16; ++k) {  // many probes a sheet: its border is found once
+    for (int k = 0; k < 16; ++k) {  // many probes for each search of the border
       const auto [a, b, c] = all_.corners(range.first + dice.below(range.count));
       double u = dice.uniform(0, 1), v = dice.uniform(0, 1);
       if (u + v > 1) u = 1 - u, v = 1 - v;
@@ -204,7 +204,7 @@ void Prober::surroundings(IndustrialTruth& truth, std::size_t probes) const {
   for (std::size_t t = 0; t < all_.triangles_.size(); ++t) cells.mark(all_.corners(t), margin);
   cells.flood();
 
-  // Half of the probes anywhere, half beside cells that something is in.
+  // Half of the probes are anywhere, half beside cells that triangles come near.
   Dice dice = all_.dice_;
   for (std::size_t tries = 0; tries < 2000 * probes && truth.outside.size() < probes; ++tries) {
     int at[3];

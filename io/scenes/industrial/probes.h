@@ -12,7 +12,8 @@ class Prober {
 
  private:
   using Probe = IndustrialTruth::Probe;
-  // A point of the piece's own solid behind one of its triangles, deep enough; none: clearance 0.
+  // A point inside the piece, behind the given triangle and more than a voxel away from all of the
+  // piece's triangles. The clearance is 0 when there is none.
   Probe behind(const Assembly::Range& range, std::size_t triangle) const;
   void solids(IndustrialTruth& truth, std::size_t probes) const;
   void sheets(IndustrialTruth& truth, std::size_t probes) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scenes.cpp - the industrial inputs as scenes: a part led to its place and away again.
+// scenes.cpp - the industrial inputs as scenes: the hand leads a part to its place and away again.
 #include "io/scenes/industrial/engine_bay.h"
 #include "io/scenes/industrial/landing_gear.h"
 #include "io/scenes/list.h"
@@ -13,16 +13,16 @@ h6Pose pose_of(const Frame& frame) { return {kMm * frame.o, from_axes(frame.x, f
 
 struct Fit {
   Frame seat;        // where the part belongs
-  h6Vec3 back, out;  // the way from there: off its mating face, then out of the assembly [mm]
+  h6Vec3 back, out;  // the way back: off its mating face, then out of the assembly [mm]
   double lever;      // the part's radius, for torques [m]
   std::size_t points;
 };
 
-// The hand brings the part to 3 mm before its seat, waits, takes it back.
+// The hand brings the part to 3 mm before its seat, waits, and takes it back.
 Scene fit_scene(const std::string& name, const std::string& about, const std::string& where,
                 Mesh soup, const std::string& what, Mesh mesh, double voxel, const Fit& fit) {
   Scene scene = common_scene(name, about);
-  // F_max is k times half a voxel; torques follow from the part's size.
+  // The largest force is that of half a voxel of penetration; torques follow from the part's size.
   scene.coupling.rotational_stiffness = scene.coupling.stiffness * fit.lever * fit.lever;
   scene.coupling.max_torque = scene.contact.stiffness * 0.5 * voxel * fit.lever;
 

@@ -15,7 +15,7 @@ void flip(Piece& piece) {
   for (auto& t : piece.triangles) std::swap(t[1], t[2]);
 }
 
-// Frames along a line that do not spin about it (double reflection; Wang et al. 2008). z along it.
+// Rotation-minimising frames along a line, z along it (double reflection; Wang et al. 2008).
 std::vector<Frame> frames_along(const Line& line) {
   const std::size_t n = line.size();
   std::vector<Frame> out(n);
@@ -220,7 +220,7 @@ Piece sheet(int nu, int nv, const std::function<h6Vec3(double, double)>& point) 
 
 namespace {
 
-// Centripetal Catmull-Rom between b and c (Barry and Goldman's pyramid), 0 <= s <= 1.
+// The centripetal Catmull-Rom spline between b and c, 0 <= s <= 1 (Barry and Goldman's pyramid).
 h6Vec3 catmull_rom(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const h6Vec3& d, double s) {
   const double t1 = std::sqrt(norm(b - a)), t2 = t1 + std::sqrt(norm(c - b));
   const double t3 = t2 + std::sqrt(norm(d - c)), t = t1 + s * (t2 - t1);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // starter_motor.cpp - a car's starter motor with its solenoid, 18,580 triangles.
 //
-// The shaft is the z axis. The flange's face, which meets the bell housing, is z = 0; spigot and
-// pinion stand out of it towards +z, the motor lies behind it. The solenoid is on the +y side.
+// The shaft is the z axis. The flange's face, which meets the bell housing, is z = 0. Spigot and
+// pinion point towards +z, the motor lies behind the flange. The solenoid is on the +y side.
 #include <cmath>
 #include <numbers>
 
@@ -15,7 +15,7 @@ using namespace industrial;
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kBody = 37;              // radius of the yoke [mm]
-constexpr double kSolenoidY = 63;         // of its axis
+constexpr double kSolenoidY = 63;         // y of the solenoid's axis
 constexpr double kEarY = 20, kEarX = 49;  // of the flange bolts' holes
 
 void add_nose(Assembly& a) {
@@ -127,7 +127,7 @@ void add_solenoid(Assembly& a) {
             {{0, -150}, {18, -150}, {21, -148}, {22, -140}, {24.5, -138}, {24.5, -126}, {0, -126}},
             64),
         axis);
-  // Two studs: battery, motor; each a nut on another nut on a washer.
+  // Two studs, for battery and motor, each with a washer and two nuts.
   for (const double x : {-10.0, 10.0}) {
     const Frame stud = axis * facing({x, -2, -150}, {0, 0, -1});
     a.add("solenoid stud", hex_bolt(7, 22), stud * facing({0, 0, -2}, {0, 0, -1}));
