@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// api.cpp - the functions of the contract that read and change a session.
+// api.cpp - the public functions that read and change a session.
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -9,7 +9,7 @@
 namespace h6 {
 
 // Mixes every bit of all poses, velocities and samples, in order (multiply and shift, 64 bits). A
-// changed sample shows in its own frame, felt or not.
+// changed sample changes the hash of its own frame, even if it moves nothing.
 std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
   std::uint64_t hash = 0x9e3779b97f4a7c15u;
   const auto mix_bits = [&hash](std::uint64_t bits) {
@@ -45,7 +45,8 @@ std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
 
 namespace {
 
-// The body was put somewhere else: the energy in its contacts and couplings there counts as put in.
+// The body was put somewhere else, so the energy in its new contacts and couplings counts as put
+// in.
 void forget_energy(h6Session& s, std::int32_t body) {
   for (ShellBody& shell : s.shells)
     for (const Pair& pair : shell.pairs)

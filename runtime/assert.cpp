@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// assert.cpp - handles a failed assertion. It is part of the contract, so that kernels and sched
-// can assert without the engine.
+// assert.cpp - handles a failed assertion. It is part of the public interface, so that kernels and
+// sched can assert without the engine.
 #include <cstdio>
 
 #include "hapsix/base.h"

@@ -19,7 +19,7 @@ constexpr const char* kStatus[] = {
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
     "passivity",        "coarse contacts"};
 
-// The choice with that name of so many letters, or null.
+// The choice whose name is the first `length` letters of `name`, or null.
 const h6::Choice* named(std::span<const h6::Choice> choices, const char* name, std::size_t length) {
   for (const h6::Choice& c : choices)
     if (std::strlen(c.name) == length && std::strncmp(c.name, name, length) == 0) return &c;

@@ -6,8 +6,9 @@
 //         each shell body against every field it can touch;            each hand     safety, always
 //         bodies side by side or one after the other
 //
-// No allocation, lock, print, exception or wait in here or below. Slices of work may run on the
-// team's helper and are joined in index order, so any number of threads gives the same bits.
+// The frame and all that it calls never allocate, lock, print, throw or wait. Slices of work may
+// run on the team's helper and are joined in index order, so any number of threads gives the same
+// bits.
 #include <algorithm>
 
 #include "kernels/contact/contact_columns.h"
@@ -20,9 +21,9 @@
 namespace h6 {
 namespace {
 
-constexpr std::int64_t kRest = 50000;  // pause after which other programs have used the caches [ns]
+constexpr std::int64_t kRest = 50000;  // after this pause the caches count as cold [ns]
 
-// A stage begins where the one before it ended, so each needs one reading of the clock.
+// A stage begins when the previous one ends, so each needs only one reading of the clock.
 struct Stopwatch {
   h6FrameReport& report;
   double tick_ns;
@@ -58,12 +59,12 @@ void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   }
 }
 
-// Reports the depths of points, so it comes before points are merged into clusters.
+// Reports the depths of points, so it runs before points are merged into clusters.
 void note_depths(std::span<const Body> bodies, const ShellBody& shell, h6FrameReport& report) {
   for (const Pair& pair : shell.pairs) {
     const kernels::Depths depths =
         kernels::look_at_depths(shell.contacts.depth + pair.begin, pair.end - pair.begin);
-    // `series` also has points that are about to touch.
+    // Not all rows count: `series` also has points that are about to touch.
     report.contacts += static_cast<std::uint32_t>(depths.inside);
     report.max_depth = std::max<double>(report.max_depth, depths.deepest);
     report.max_depth_voxels =
@@ -71,7 +72,7 @@ void note_depths(std::span<const Body> bodies, const ShellBody& shell, h6FrameRe
   }
 }
 
-// One shell body against all it can touch. The contacts are summed here too, because the thread
+// Finds and weighs the contacts of one shell body. They are summed here too, because the thread
 // that weighed them has them in its cache.
 void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   Stopwatch watch{lane.report, lane.tick_ns, sched::ticks()};
@@ -82,13 +83,13 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
     note_depths(bodies, shell, lane.report);
   });
   watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(set, bodies, shell, lane); });
-  // Counts the contacts stage too: its columns come back from the helper's cache.
+  // The time includes the contacts stage, because its columns come back from the helper's cache.
   lane.weighing.took(watch.ns_since(since));
   if (set.contact.method == H6_METHOD_SERIES) return;
   watch.timed(H6_STAGE_WRENCH, [&] { sum_contacts(set, bodies, shell, lane); });
 }
 
-// For the timeline: what the helper did.
+// Records the helper's work for the timeline.
 void note_helper(h6Session& s, std::int64_t start) {
   const sched::FrameTeam::HelperWork helped = s.team->helper_work();
   if (!helped.slices) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// anytime.cpp - costs, and the tier that fits.
+// anytime.cpp - learns the costs of a frame's work and chooses the tier that fits the budget.
 #include "runtime/contact/anytime.h"
 
 #include <algorithm>
@@ -8,22 +8,24 @@
 namespace h6 {
 namespace {
 
-// A stolen millisecond may at most double a cost, and half of that is forgotten in 140 frames.
+// If the machine steals a millisecond, that at most doubles a cost, and half of the increase is
+// forgotten in 140 frames.
 void learn(double& cost, double seen) {
   cost = seen > cost ? std::min(seen, 2 * cost) : cost + 0.005 * (seen - cost);
 }
 
 constexpr std::size_t kTelling = 32;    // fewer contacts say nothing about the cost of one
-constexpr double kUnknown = 200;        // ns a contact, before any was seen
+constexpr double kUnknown = 200;        // cost of a contact before any was seen [ns]
 constexpr double kSpare = 0.85;         // share of the budget that a finer tier may take
 constexpr std::uint32_t kCalm = 20;     // frames until a finer tier is allowed
 constexpr std::uint32_t kStrikes = 3;   // frames until the finest tier is no longer allowed
-constexpr std::uint64_t kFresh = 1000;  // frames for which a cost is believed as it is
+constexpr std::uint64_t kFresh = 1000;  // frames until a cost is out of date
 // The cost of a contact is extrapolated to more contacts with 1.25 times the slope seen so far, but
-// at least a quarter of the proportion: `robust` takes 50 ns each for 616 contacts, 99 for 9,627.
+// at least a quarter of proportional growth: `robust` takes 50 ns per contact for 616 contacts and
+// 99 ns for 9,627.
 constexpr double kLeastGrowth = 0.25, kGrowth = 1.25;
 constexpr std::uint32_t kLookEvery = 16;  // frames between two counts of near groups
-constexpr double kLookNs = 60;            // to test a group that is in no cache
+constexpr double kLookNs = 60;            // time to test a group that is in no cache
 
 double middle_of(const double (&seen)[3], std::uint32_t count) {
   if (count < 3) return *std::min_element(seen, seen + std::max(count, 1u));
@@ -62,7 +64,7 @@ double contact_ns(const Anytime& a, double contacts) {
     const double bound = from(a.contact[fewer], fewer);
     return known ? std::min(bound, from(same, size)) : bound;
   }
-  // Fewer than ever: none of them costs more than one of many.
+  // So few contacts were never seen. One of them costs no more than one of many.
   for (int i = size + 1; i < Anytime::kSizes; ++i)
     if (a.contact[i].times > 0) return a.contact[i].ns;
   return kUnknown;
@@ -77,8 +79,8 @@ std::size_t number_of(const Anytime& a, const PairSearch& pair) {
   return static_cast<std::size_t>(&pair - a.pairs.data());
 }
 
-// Work so far, and work that remains in this pair and in all that follow, if these are as they were
-// in their last frame.
+// The work so far, and the work that remains in this pair and in all later ones if these are as in
+// the last frame.
 struct Ahead {
   double elapsed, used;
   double blocks = 0, groups = 0;
@@ -94,7 +96,7 @@ Ahead look_ahead(const Anytime& a, const PairSearch& pair, std::size_t used, std
   return ahead;
 }
 
-// What the whole frame takes when the rest is traversed in `tier` [ns].
+// The time of the whole frame if its rest is traversed in `tier` [ns].
 double foresee(const Anytime& a, const Ahead& ahead, int tier) {
   const double share = static_cast<double>(1 << tier) / 16;
   const double sampled = tier == Anytime::kAll ? ahead.groups : 16 * share * ahead.blocks;
@@ -104,8 +106,8 @@ double foresee(const Anytime& a, const Ahead& ahead, int tier) {
 
 // The finest tier for the rest of the frame.
 int choose(Anytime& a, const Ahead& ahead) {
-  // Where nothing is known it begins with the coarsest: on the way up it sees the cost of each
-  // size.
+  // If nothing is known, it begins with the coarsest tier. On the way up it sees the cost of each
+  // number of contacts.
   if (!a.begun && ahead.groups > 0) {
     a.begun = true;
     if (foresee(a, ahead, Anytime::kAll) > kSpare * a.budget_ns) a.finest = 0;
@@ -137,7 +139,7 @@ void learn_contacts(Anytime& a, double contacts, double spent) {
   c.seen[2] = c.seen[1], c.seen[1] = c.seen[0], c.seen[0] = spent / contacts;
   const bool first = c.times < 3;
   c.times = std::min(c.times + 1, 3u);
-  // One frame in three may have been robbed of its time.
+  // The machine may have stolen time from one frame in three.
   const double now = middle_of(c.seen, c.times);
   if (first)
     c.ns = now, c.contacts = contacts;
@@ -170,7 +172,7 @@ bool is_coarse_anyway(Anytime& a, const PairSearch& pair, std::size_t used, std:
                                             : static_cast<double>(pair.open_groups) /
                                                   static_cast<double>(pair.open_blocks);
   const Ahead ahead = look_ahead(a, pair, used, blocks, each * n);
-  // To test the groups is itself a part of the work; now and then is enough.
+  // Testing the groups is itself a part of the work, so it is done only now and then.
   const bool room = look + foresee(a, ahead, 0) <= kSpare * a.budget_ns;
   if (!a.begun ? look <= 0.5 * a.budget_ns
                : a.finest == Anytime::kAll || (room && a.frames % kLookEvery == 0))
@@ -188,7 +190,7 @@ bool must_be_coarse(Anytime& a, PairSearch& pair, std::size_t used, std::size_t 
 bool must_be_coarser(Anytime& a, const PairSearch& pair, std::size_t used, std::size_t found,
                      std::size_t blocks) {
   const int tier = a.coarse ? a.tier : Anytime::kAll;
-  // All coarse pairs of a frame are in one tier, so only the first of them may change it.
+  // All coarse pairs of a frame have the same tier, so only the first of them may change it.
   if (!a.by_clock || tier == 0 ||
       (a.coarse && number_of(a, pair) + a.coarse_pairs != a.pairs.size()))
     return false;
@@ -213,8 +215,8 @@ bool must_be_few(Anytime& a, const PairSearch& first, std::size_t found) {
   // The coarse pairs of earlier shell bodies have their contacts already.
   if (!a.coarse || a.tier > 0 || a.coarse_pairs + number_of(a, first) > a.pairs.size())
     return false;
-  // The cost of so many contacts must be seen now and then, or frames would keep few for ever. The
-  // first frame reads everything from memory and tells nothing.
+  // The cost of so many contacts must be measured now and then, or frames would keep few for ever.
+  // The first frame reads everything from memory, so its time tells nothing.
   const double n = static_cast<double>(found);
   const Anytime::Cost& seen = a.contact[size_of(n)];
   if (a.frames > 0 && (seen.times == 0 || a.frames - seen.when >= kFresh)) return false;

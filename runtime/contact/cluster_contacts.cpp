@@ -12,8 +12,8 @@
 namespace h6 {
 namespace {
 
-constexpr int kBits = 21;                          // of a coordinate in a cell's key
-constexpr double kMostCells = (1 << (kBits - 1));  // along an axis
+constexpr int kBits = 21;                          // bits of each coordinate in a cell's key
+constexpr double kMostCells = (1 << (kBits - 1));  // most cells along an axis
 constexpr int kReach = 2;                          // cells farther apart than this cannot be linked
 
 std::uint64_t key_of(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
@@ -21,7 +21,7 @@ std::uint64_t key_of(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
 }
 
 // Computes the rows' cells. Coordinates are shifted by kReach so that neighbours never underflow.
-// Where contacts spread over more cells than a key holds, the cells grow.
+// If the contacts spread over more cells than a key holds, the cells grow.
 void fill_cells(const Contacts& c, std::size_t begin, std::size_t n, double distance,
                 std::uint64_t* cell) {
   const float* const axes[3] = {c.rx + begin, c.ry + begin, c.rz + begin};
@@ -31,7 +31,8 @@ void fill_cells(const Contacts& c, std::size_t begin, std::size_t n, double dist
     low[k] = *least;
     extent = std::max(extent, double{*most} - *least);
   }
-  // A little less than the diagonal allows, so that rounding puts no two unlinked rows into a cell.
+  // The edge is a little shorter than the diagonal allows, so that rounding puts no two unlinked
+  // rows into one cell.
   const double edge = std::max(distance / std::sqrt(3.0) * (1 - 1e-6), extent / kMostCells);
   for (std::size_t i = 0; i < n; ++i) {
     std::uint64_t at[3];
@@ -46,7 +47,7 @@ struct Linker {
   std::size_t begin, count;
   double distance2;
   const std::uint64_t* cell;
-  const std::uint32_t* order;  // rows by cell
+  const std::uint32_t* order;  // the rows, sorted by cell
   std::uint32_t* root;         // a row of the same cluster, never above the row itself
 
   std::uint32_t find(std::uint32_t i) const {
@@ -90,7 +91,7 @@ struct Linker {
     for (std::size_t a = 0, a_end; a < count; a = a_end) {
       a_end = run_end(a);
       for (std::size_t i = a + 1; i < a_end; ++i) link(order[a], order[i]);
-      // Only neighbours with a larger key: those with a smaller one have been linked already.
+      // Neighbours with a smaller key have been linked already.
       const std::uint64_t key = cell[order[a]];
       for (int dz = 0; dz <= kReach; ++dz)
         for (int dy = dz == 0 ? 0 : -kReach; dy <= kReach; ++dy) {
@@ -107,7 +108,7 @@ void copy_row(Contacts& c, std::size_t from, std::size_t to) {
   each_column(c, [&](auto* column) { column[to] = column[from]; });
 }
 
-// Running means weighted by depth. weight holds the sum of depths, facing the largest so far.
+// Updates means weighted by depth. `weight` holds the sum of depths, `facing` the largest so far.
 void merge_row(Contacts& c, std::size_t from, std::size_t to) {
   const float depth = c.depth[from];
   c.weight[to] += depth;
@@ -120,7 +121,7 @@ void merge_row(Contacts& c, std::size_t from, std::size_t to) {
   }
 }
 
-// Makes a mean direction unit; false when nothing is left of it.
+// Gives a mean direction unit length; returns false if it nearly vanishes.
 bool normalise(float& x, float& y, float& z) {
   const float length = std::sqrt(x * x + y * y + z * z);
   if (!(length > 1e-3f)) return false;
@@ -142,8 +143,8 @@ std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, st
   const Linker linker{c, begin, n, distance * distance, scratch.cell, scratch.order, scratch.root};
   linker.link_all();
 
-  // In the order of the rows: a cluster's row never lies behind the rows that are still to come.
-  std::uint32_t* const row_of = scratch.order;  // the root's
+  // Rows are read in order, so a cluster's row never overwrites a row that is still unread.
+  std::uint32_t* const row_of = scratch.order;  // by root: the cluster's row
   std::size_t rows = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
     const std::uint32_t root = scratch.root[i] = linker.find(i);
@@ -156,7 +157,7 @@ std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, st
       merge_row(c, begin + i, out + row_of[root]);
     }
   }
-  std::uint64_t* const kept = scratch.cell;  // where each row ends up
+  std::uint64_t* const kept = scratch.cell;  // where each cluster's row ends up
   std::size_t next = out;
   for (std::size_t row = 0; row < rows; ++row) {
     const std::size_t at = out + row;
@@ -168,7 +169,7 @@ std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, st
     if (next != at) copy_row(c, at, next);
     ++next;
   }
-  // Downwards: roots stand below their rows and are still needed.
+  // The loop runs downwards, because a root lies below its rows and is still needed.
   for (std::uint32_t i = static_cast<std::uint32_t>(n); i-- > 0;)
     scratch.root[i] = static_cast<std::uint32_t>(kept[row_of[scratch.root[i]]]);
   return next;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // find_contacts.cpp - finds the points of a shell body that are inside fields, pair by pair, and
-// makes contacts of them.
+// makes contacts from them.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -13,14 +13,16 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kContactSlice = 512;  // contacts made at a time: some 1.5 us
-// Contacts from which two threads make them. Fewer do not pay for the way from the other core's
-// cache: 1,000 take 3.1 us on one thread and 6.2 on two, 10,000 take 46 and 26.
+constexpr std::size_t kContactSlice = 512;  // contacts made at a time, in about 1.5 us
+// From this many contacts on, two threads make them. For fewer, moving the data between the cores'
+// caches costs more than it saves: 1,000 take 3.1 us on one thread and 6.2 on two, 10,000 take 46
+// and 26.
 constexpr std::size_t kManyContacts = 4096;
-constexpr double kPairsWorthSharing = 8000;  // ns of traversal from which threads share the pairs
+constexpr double kPairsWorthSharing = 8000;  // threads share pairs that take longer [ns]
 constexpr std::size_t kPairSlices = 32;
 
-// Contact arms [m], from a's centre of mass along the axes of the world, to voxels of b's field.
+// The map from contact arms [m], from a's centre of mass along the world's axes, to voxels of b's
+// field.
 kernels::Affine arms_to_field(const Body& a, const Body& b) {
   const Field& field = *b.field;
   const Mat3 m = b.R.transpose() / field.voxel;
@@ -50,8 +52,8 @@ std::size_t keep_deepest(const TraverseScratch& t, std::size_t count, std::size_
   return n;
 }
 
-// Keeps only a few of the coarse pairs' candidates where there is no time for more. Returns how
-// many candidates there are then.
+// If there is no time for more, keeps only a few of the coarse pairs' candidates. Returns how many
+// candidates are left in all.
 std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, std::span<PairSearch> all,
                      std::size_t used) {
   const std::span<PairSearch> pairs = all.last(coarse_pairs_of(anytime, all));
@@ -59,7 +61,7 @@ std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, std::span<PairS
   const std::size_t coarse = used - pairs[0].first;
   if (coarse <= Anytime::kFew || !must_be_few(anytime, all[0], used)) return used;
   used = keep_deepest(t, used, Anytime::kFew, pairs);
-  float least = -HUGE_VALF;  // largest distance that was kept: all others are no deeper
+  float least = -HUGE_VALF;  // the largest distance kept; no dropped point is deeper
   for (std::size_t i = pairs[0].first; i < used; ++i)
     least = std::max(least, t.candidate_distance[i]);
   for (PairSearch& pair : pairs) pair.missed = std::max(pair.missed, -least);
@@ -85,8 +87,9 @@ std::size_t traverse_in_order(const Settings& set, std::span<const Body> bodies,
   return used;
 }
 
-// Is there enough work for two threads, and in enough pairs? A pair that has most of the work is
-// shared within. With a budget the clock decides pair after pair, in order.
+// Whether there is enough work for two threads, in enough pairs. If one pair has most of the work,
+// the threads share that pair's slices instead. With a budget the clock decides pair after pair, in
+// order, so pairs cannot be shared.
 bool worth_sharing(const ShellBody& shell, const Lane& lane) {
   if (!lane.helper || shell.pairs.size() < 2 || lane.anytime->by_clock) return false;
   if (shell.traverse_ns < (shell.pairs_shared ? 0.5 * kPairsWorthSharing : kPairsWorthSharing))
@@ -99,9 +102,9 @@ bool worth_sharing(const ShellBody& shell, const Lane& lane) {
   return most < kWorthSharing || 2 * most <= all;
 }
 
-// Each thread fills its own scratch; the results are joined in the order of pairs. False where the
-// scratch is too small, which happens only where contacts will be dropped. The traversal can then
-// simply be repeated, because expiries stay true.
+// Each thread fills its own scratch; the results are joined in the order of pairs. Returns false if
+// the scratch is too small, which happens only when contacts will be dropped. The caller can then
+// repeat the traversal, because expiries stay valid.
 bool traverse_shared(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                      Lane& lane, std::size_t* used) {
   TraverseScratch &mine = lane.scratch->traverse, &helpers = *lane.helper;
@@ -127,7 +130,7 @@ bool traverse_shared(const Settings& set, std::span<const Body> bodies, ShellBod
   std::size_t end = mine.used + helpers.used;
   if (full.load(std::memory_order_relaxed) || end > mine.capacity) return false;
   *used = end;
-  // From the last one on: the caller's own candidates then only ever move up.
+  // The loop begins with the last pair, so that the caller's own candidates only ever move up.
   for (std::size_t p = pairs; p-- > 0;) {
     PairSearch& pair = shell.searches[p];
     end -= pair.candidates;

@@ -2,12 +2,12 @@
 // series.cpp - the rule `series` in a frame: one solve gives the loads of all contacts of a shell
 // body; wrenches and derivatives follow pair by pair. METHOD.md, Sec. 3.
 //
-// With C_p = sum kappa J J^T and B_p = sum kappa J J_g^T over the loaded contacts of pair p (J
-// about a's centre of mass, unscaled), G = c S^-2 and A = G + sum_p C_p, relative motion q of pair
-// q gives
+// Let C_p = sum kappa J J^T and B_p = sum kappa J J_g^T over the loaded contacts of pair p (J about
+// a's centre of mass, unscaled), G = c S^-2 and A = G + sum_p C_p. The relative motion q of pair q
+// then gives
 //     d f_p / d q = -k (delta_pq B_p - C_p A^-1 B_q),     summed over p: -k G A^-1 B_q
-// and each block of the system follows as in sum_wrench.cpp, S_p carrying wrenches to b_p. In
-// symmetric form B_p = C_p.
+// Each block of the system follows as in sum_wrench.cpp; S_p carries wrenches to b_p. In symmetric
+// form B_p = C_p.
 #include <Eigen/LU>
 #include <algorithm>
 

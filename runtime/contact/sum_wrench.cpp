@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// sum_wrench.cpp - a pair's wrench on both of its bodies, and how it changes as they move.
+// sum_wrench.cpp - a pair's wrench on both of its bodies, and its derivatives by their motion.
 //
 // The kernel sums over the shell body's arms. The field body's Jacobian is J_b = -[N; r_b x N] with
 // r_b = r_a + c, c = x_a - x_b: J_b = -S J_a, S = [I 0; [c]x I]. So every block follows from the
-// shell body's own sums, and no contact is touched twice. METHOD.md, Sec. 2.
+// shell body's own sums, and no contact is read twice. METHOD.md, Sec. 2.
 #include <algorithm>
 
 #include "runtime/contact/contact_stages.h"

@@ -2,7 +2,7 @@
 // traverse_pair.cpp - finds the points of a shell that are inside a field.
 //
 // Xu & Barbic 2016, Sec. 3 after McNeely 1999: a sphere whose signed distance exceeds its radius is
-// dropped with all its points. Ours are flat tiers of spheres, and a dropped sphere is not tested
+// dropped with all its points. Here the spheres form flat tiers, and a dropped sphere is not tested
 // again until the shell has moved as far as the sphere was clear. The same holds for single points.
 // METHOD.md, Sec. 6.
 #include "runtime/contact/traverse_pair.h"
@@ -35,7 +35,7 @@ void move_candidates(const TraverseScratch& to, std::size_t to_row, const Traver
 
 namespace {
 
-// Shell coordinates [m], relative to the shell's centre, to voxels of the field.
+// The map from shell coordinates [m], relative to the shell's centre, to voxels of the field.
 kernels::Affine shell_to_field(const Body& a, const Body& b) {
   const Shell& shell = *a.shell;
   const Field& field = *b.field;
@@ -51,23 +51,23 @@ kernels::Affine shell_to_field(const Body& a, const Body& b) {
   return affine;
 }
 
-// `series` needs the points that are about to touch. [voxel]
+// The distance up to which points are found [voxel]. `series` also needs points about to touch.
 float margin_of(const h6ContactDef& contact) {
   return contact.method == H6_METHOD_SERIES ? static_cast<float>(contact.margin_voxels) : 0.0f;
 }
 
 constexpr float kSlack = 1e-3f;  // [voxel]
 constexpr std::size_t kFewGroups =
-    4;                               // of a block: testing them is cheaper than the block's sphere
+    4;  // testing so few groups of a block is cheaper than testing its sphere
 constexpr double kLongestWay = 256;  // float resolves 3e-5 there [voxel]
-constexpr double kStays = 0.04;      // distance to the anchor of a shell that stays [voxel]
-// A slow shell has single points of a group sampled: those nearer than kNearest and the way of
-// kStepsNear steps like the last one.
+constexpr double kStays = 0.04;  // a shell nearer than this to its anchor counts as staying [voxel]
+// When the shell is slow, only single points of a group are sampled: those nearer than kNearest
+// plus the distance of kStepsNear steps like the last one.
 constexpr float kNearest = 0.05f;  // [voxel]
 constexpr double kStepsNear = 16;
 constexpr double kSlowStep = 1 / kStepsNear;  // [voxel]
-// The sphere of a group says soon enough when one of its points comes near, where all points are
-// farther than this [voxel].
+// If all points of a group are farther than this [voxel], testing its sphere tells soon enough when
+// one of them comes near.
 constexpr float kFarGroup = 1;
 
 // The constants of one traversal.
@@ -75,11 +75,11 @@ struct Search {
   const kernels::FieldView& field;
   const Shell& shell;
   kernels::Affine place;
-  float scale;  // voxels a metre
+  float scale;  // voxels per metre
   bool wide;
   float margin;    // [voxel]
   bool cold;       // other programs have used the caches
-  float near = 0;  // single points are sampled up to this distance; 0: always all points [voxel]
+  float near = 0;  // points are sampled up to this distance; 0: all points of a group [voxel]
 
   std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
                    std::uint32_t* survivors, float* clearance) const {
@@ -87,7 +87,7 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
-  // Takes the samples in `vectors`; rows in `out` are rows of the shell.
+  // Evaluates the samples in `vectors`. Rows in `out` are rows of the shell.
   std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
                             const kernels::Touching& out, float* least) const {
     const Samples& samples = shell.samples;
@@ -106,7 +106,7 @@ struct Search {
     }
     return kept;
   }
-  // Samples t.survivors from `first` on.
+  // Samples `count` groups of t.survivors from `first` on.
   std::size_t touch(const TraverseScratch& t, std::size_t first, std::size_t count,
                     const kernels::Touching& out) const {
     return kernels::touch_groups(field, place,
@@ -118,8 +118,8 @@ struct Search {
   }
 };
 
-// Samples `count` groups and puts the points that touch behind `used`, in order, whichever thread
-// runs a slice.
+// Samples `count` groups and writes the points that touch behind row `used`. Their order does not
+// depend on which thread runs a slice.
 std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::size_t count,
                   std::size_t used, bool shared) {
   const auto by_myself = [&] { return search.touch(t, 0, count, candidates_from(t, used)); };
@@ -159,19 +159,21 @@ double motion_bound(const kernels::Affine& from, const kernels::Affine& to, doub
   return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
 }
 
-// The shell's way through the field so far, in voxels. It does not grow while the shell moves to
-// and fro around its anchor.
+// The distance that the shell has travelled through the field [voxel]. It does not grow while the
+// shell moves to and fro around its anchor.
 struct Way {
-  float now;   // the way to the anchor plus the distance from there
-  float from;  // the way to the anchor less that distance: clearances found here count from it
+  float now;   // travelled up to the anchor, plus the distance from there
+  float from;  // travelled up to the anchor, less that distance; clearances found here add to it
 };
 
-// The way at which something with this clearance may touch. kSlack covers the rounding to float.
+// The distance travelled at which a sphere or point with this clearance may touch. kSlack covers
+// the rounding to float.
 float expiry_of(const Way& way, float clearance) {
   return way.from + std::max(clearance - kSlack, 0.0f);
 }
 
-// The way starts anew when it is too long for float, or when nothing is known.
+// Updates the distance travelled. It starts again from zero when it is too long for float, or when
+// nothing is known.
 Way travel(PairSearch& pair, Search& search) {
   const Shell& shell = search.shell;
   double away = 0;
@@ -203,7 +205,7 @@ Way travel(PairSearch& pair, Search& search) {
 }
 
 // Samples some points of each group of `blocks` blocks, and bounds how deep the others may be.
-// Where that gives more contacts than there is time for, it is done again with fewer points.
+// If that gives more contacts than there is time for, samples again with fewer points.
 std::size_t touch_coarsely(const Search& search, PairSearch& pair, TraverseScratch& t,
                            Anytime& anytime, std::size_t blocks, std::size_t used) {
   const Samples& samples = search.shell.samples;
@@ -222,15 +224,15 @@ std::size_t touch_coarsely(const Search& search, PairSearch& pair, TraverseScrat
     for (std::size_t k = 0; k < blocks; ++k) {
       const float reach = search.scale * samples.reach[tier][t.open_blocks[k]];
       const float least = *std::min_element(t.clearance + k * each, t.clearance + (k + 1) * each);
-      // The long form, because cells far inside hold no samples.
+      // The long form is needed, because cells far inside hold no samples.
       pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - least);
     }
   } while (must_be_coarser(anytime, pair, used, found, blocks));
   return found;
 }
 
-// Puts those of `count` groups in t.frontier that are to be sampled into t.survivors. Groups that
-// were near when last sampled still are, or nearly; of the others the spheres decide.
+// Of the `count` groups in t.frontier, writes those that must be sampled to t.survivors. Groups
+// that were near when last sampled are always among them; for the others their spheres decide.
 std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search& search,
                              std::size_t count, const Way& way) {
   std::size_t near = 0, far = 0;
@@ -253,7 +255,7 @@ std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search&
   return near + left;
 }
 
-// Chooses the points of each group that may touch by now.
+// Chooses the points of each group that may touch after the distance `now`.
 void choose_rows(const PairSearch& pair, TraverseScratch& t, const Search& search,
                  std::size_t groups, float now) {
   if (!(search.near > 0)) return;
@@ -264,7 +266,7 @@ void choose_rows(const PairSearch& pair, TraverseScratch& t, const Search& searc
   }
 }
 
-// How many bits are set. std::popcount is a library call where the target has no instruction.
+// Counts the bits that are set. std::popcount is a library call on targets without an instruction.
 std::size_t bits_of(unsigned rows) {
   rows -= rows >> 1 & 0x5555u;
   rows = (rows & 0x3333u) + (rows >> 2 & 0x3333u);
@@ -302,12 +304,12 @@ void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& searc
   pair.pick_rows.learn(kGroupRows * groups, near);
 }
 
-// Each group would wait for memory by itself otherwise.
+// Without this the groups would wait for memory one after the other.
 void prefetch_groups(const Shell& shell, const TraverseScratch& t, std::size_t groups, bool cold) {
   for (std::size_t k = 0; k < groups; ++k)
     for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
       __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
-  if (!cold) return;  // else also what contacts are made of
+  if (!cold) return;  // after a pause, also the columns that contacts are made from
   for (std::size_t k = 0; k < groups; ++k) {
     for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
       __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
@@ -323,7 +325,7 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
   const Field& field = *b.field;
   Anytime& anytime = *lane.anytime;
   const float margin = margin_of(set.contact);
-  // The short form of culling is proved up to half a voxel of margin.
+  // The short form of culling is proved for margins of up to half a voxel.
   Search search{field.view,
                 shell,
                 shell_to_field(a, b),

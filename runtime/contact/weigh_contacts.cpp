@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // weigh_contacts.cpp - how the contact stiffness is shared among a shell body's contacts.
 //
-// Xu & Barbic 2016, Eq. (6)-(12), McNeely 1999 for `global`; `robust` is ours. METHOD.md, Sec. 3,
-// settles the paper's ambiguities: w_i = phi_self / phi_i.
+// The rules are those of Xu & Barbic 2016, Eq. (6)-(12), and of McNeely 1999 for `global`; `robust`
+// is our own. METHOD.md, Sec. 3, settles the paper's ambiguities: w_i = phi_self / phi_i.
 #include <algorithm>
 #include <cmath>
 
@@ -15,14 +15,14 @@
 namespace h6 {
 namespace {
 
-// Contacts from which two threads weigh them: 430 take 6.9 us on one thread and 5.5 on two, 64 take
-// 0.9 and some 3.
+// From this many contacts on, two threads weigh them: 430 take 6.9 us on one thread and 5.5 on two,
+// 64 take 0.9 and about 3.
 constexpr std::size_t kTwoThreads = 192;
-// Contacts from which a density is cut into slices. With fewer, each thread has one of two
-// densities to itself, from the sorting on: its data are in its own cache, and it waits once.
+// From this many contacts on, a density is cut into slices. With fewer, each thread computes one of
+// the two densities from the sorting on, so its data stay in its own cache and it waits only once.
 constexpr std::size_t kWorthSlicing = 4096;
-// Contacts up to which all pairs of contacts are compared without sorting: 50 take 0.43 us, sorted
-// 1.0 to 1.3; 120 take 1.7, sorted 1.9 to 3.3.
+// Up to this many contacts, all pairs of contacts are compared without sorting: 120 take 1.7 us so,
+// and 1.9 to 3.3 us with sorting.
 constexpr std::size_t kWorthSorting = 120;
 constexpr float kFacingEdge = 0.25f;  // N.g from which a contact counts in full
 
@@ -63,7 +63,7 @@ Rule rule_of(const h6ContactDef& def, double voxel) {
   return rule;
 }
 
-// Eq. (8) as it is printed: phi_i over the largest phi. A weight was divided by its phi.
+// Eq. (8) as printed: phi_i over the largest phi. The weights have been divided by their phi.
 void weigh_as_printed(Contacts& c, const Rule& rule) {
   const float self = rule.hat == kernels::Hat::sum ? 2.0f : 1.0f;
   float most = 0;
@@ -99,7 +99,7 @@ void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sche
                [&](std::size_t i) { kernels::gauss_tree_run(tree, stage, i); });
 }
 
-// Where contacts crowd so that the tree is faster, returns false and weighs nothing.
+// If contacts crowd so much that the tree is faster, returns false and weighs nothing.
 bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
                       void* scratch, float* weight) {
   if (view.count > kernels::kGaussSweepMost && !rule.widths.geodesic) return false;
