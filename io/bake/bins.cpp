@@ -129,7 +129,8 @@ struct Boxed {
   Range tiles;
 };
 
-// Triangles that are prepared together. Corners are relative to the first node of the first tile.
+// A batch of triangles that are prepared together. Corners are relative to the first node of the
+// first tile.
 struct Batch {
   static constexpr std::size_t kMost = 64;
   std::vector<Boxed> boxed;

@@ -89,7 +89,8 @@ void ChainRoom::copy(const Box& box, const Chain* from) {
     }
 }
 
-// Chains from the nodes of R alone; all are far where the brick has none and `passes` is false.
+// Sets chains from the nodes of R alone. All are far if the brick has no node of R and `passes` is
+// false.
 void ChainRoom::seed(const Box& box, const NodeMask& wet, const float* u, float offset,
                      bool passes) {
   std::uint64_t mask[8], any = 0;

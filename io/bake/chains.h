@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // chains.h - lengths of chains of neighbouring nodes to the reached set R. Private to this folder;
-// inside.cpp says what they are for.
+// inside.cpp explains their purpose.
 #pragma once
 #include "io/bake/grid.h"
 #include "kernels/bake/chain_step.h"
@@ -14,7 +14,8 @@ using kernels::kChainUnit;
 // Chains end at a node, not on the border of R. So they are too long [voxel] by at most kSlack
 // where the border is flat, and by sqrt(3) - 1 where it has a crease or a corner.
 inline constexpr float kSlack = 0.15f, kCornerSlack = 0.74f;
-inline constexpr float kCrooked = 1.135f;  // most of chain over straight line, with rounding
+// The largest ratio of a chain's length to the straight line, with rounding.
+inline constexpr float kCrooked = 1.135f;
 
 // The rows of a tile and of the bricks around it. Bricks (a,b,c), from -1 to 4, have the place
 // (6*(c + 1) + b + 1)*6 + a + 1.

@@ -45,7 +45,8 @@ Along make_along(const Point (&p)[3], std::size_t axis, std::int64_t area) {
   return a;
 }
 
-// Where a line meets a triangle: the node at or before the hit, and whether the hit is that node.
+// The hit of a line on a triangle: the node at or before it, and whether it is exactly at that
+// node.
 struct Hit {
   std::int64_t node;
   bool exact;

@@ -13,8 +13,8 @@ constexpr double kFar = 100;  // [voxel]
 
 using Corner = std::array<double, 3>;
 
-// Which corner and edge of the triangle each corner and edge of a part is; kOwn: the cut made it.
-// Edge e runs from corner e to the next.
+// The corner and the edge of the triangle that each corner and edge of a part comes from; kOwn: the
+// cut made it. Edge e runs from corner e to the next.
 constexpr std::int8_t kOwn = -1;
 struct Part {
   std::array<std::int8_t, 3> corner, edge;
@@ -297,7 +297,7 @@ std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& 
     float* u = band.nodes(r);
     if (weighed >> b & 1)
       kernels::brick_distance(*room, std::size_t(b), u);
-    else  // the cut left nothing of the large triangles here
+    else  // the cut left no part of the large triangles here
       std::fill_n(u, kBrickSamples, float(grid.reach()));
     band.first_node[r] = u[0];
     band.free[r] = above(u, float(grid.offset));

@@ -173,7 +173,8 @@ bool Flood::from_nodes(const Masks& seeds, std::uint8_t tag) {
     }
   });
   if (std::none_of(slabs_.begin(), slabs_.end(), [](const Slab& s) { return s.any; })) return false;
-  // Over rows, nearly all rows are seeds and full now, so it is cheaper that the others draw.
+  // With Over::rows nearly all rows are seeds and already full, so it is cheaper if the others
+  // draw.
   if (over_ == Over::rows) {
     each_slab([&](Slab& slab) {
       for (std::size_t r = slab.first_row; r < slab.end_row; ++r) {

@@ -2,8 +2,8 @@
 // flood.h - flood fill over nodes, 64 at a time. Private to this folder.
 //
 // The flood moves between passable nodes along edges that no triangle crosses. Bricks without a row
-// are all passable and are filled as a whole. The result is a set, so it does not depend on the
-// order of work or the number of threads.
+// are passable everywhere and are filled as a whole. The result is a set, so it does not depend on
+// the order of work or the number of threads.
 #pragma once
 #include <algorithm>
 
@@ -78,7 +78,7 @@ inline NodeMask after(const NodeMask& m, std::size_t axis) {
 class Flood {
  public:
   enum class Edges { cut, open };
-  enum class Over { cells, rows };  // whether bricks without a row are passable
+  enum class Over { cells, rows };  // cells: through bricks without a row too
   // `free` must outlive the flood.
   Flood(const Grid& grid, const NarrowBand& band, const Masks& free, Edges edges, unsigned threads,
         Over over = Over::cells);

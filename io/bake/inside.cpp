@@ -33,8 +33,8 @@ namespace {
 
 constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
 
-// Whether a cell of the brick, or one that shares its nodes, has a point within the band. Means
-// something only where R is near.
+// Whether a cell of the brick, or one that shares its nodes, has a point within the band. The
+// result is only valid where R is near.
 bool near_zero_set(const NarrowBand& band, const Around& around) {
   bool near = false;
   for (std::size_t i = 0; i < 27; ++i) {
@@ -70,7 +70,8 @@ NodeMask beside_any(const Around& around, const Masks& nodes) {
   return spread<kOthers>(at);
 }
 
-// The same within the brick alone, which mostly decides. `flip` all ones: as kOthers.
+// The same within the brick alone, which mostly decides. `flip` with all bits set has the effect of
+// kOthers.
 NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
   constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
   std::uint64_t layer[10] = {};
@@ -163,7 +164,7 @@ class Look {
           all &= w;
         }
         const bool whole = all == ~std::uint64_t{0};
-        // The row alone mostly decides, and the rows around it are scattered over memory.
+        // The row alone is mostly enough, and the rows around it are scattered over memory.
         const bool near = band_.towards[r] >> 13 & 1;
         std::optional<Around> around;
         if (some == 0 || !near) around.emplace(rows, place);

@@ -56,7 +56,7 @@ Eight hilbert(std::array<Eight, 3> c) {
 }
 
 // A stable radix sort by the upper half of the words, which has 24 bits. Slices count in parallel;
-// from the counts of all, each slice knows where its words go.
+// the counts of all slices give each slice the places of its words.
 void sort_by_code(Large<std::uint64_t>& words, unsigned threads) {
   constexpr std::size_t kSlice = 65536, kDigits = 4096;
   Large<std::uint64_t> other(words.size());
@@ -85,7 +85,7 @@ class Halves {
   static constexpr std::size_t kMost = 512;
 
   void order(const Surface& surface, std::uint32_t* triangles, std::size_t count) {
-    // All indices before all corners: loads that do not wait for each other overlap.
+    // Reads all indices before all corners, because loads that do not depend on each other overlap.
     std::array<std::uint32_t, 3> corners[kMost];
     for (std::size_t i = 0; i < count; ++i) corners[i] = surface.triangles[triangles[i]];
     float low[3][kMost], high[3][kMost];

@@ -17,7 +17,7 @@ using Corners = std::array<Vec3, 3>;
 constexpr double kPiece = 4;     // [voxel] longest edge
 constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
 
-// About how many pieces a triangle is cut into.
+// Estimates the number of pieces that a triangle is cut into.
 double pieces_of(const Corners& c) {
   const Vec3 u = c[1] - c[0], v = c[2] - c[0];
   const Vec3 n = cross(u, v);

@@ -19,7 +19,7 @@ struct FieldPlan {
   double seconds = 0;                    // a rough guess, for two threads of a server of 2023
 };
 
-// Fails with the sentence that the bake would fail with.
+// Fails where the bake would fail, with the same sentence.
 Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const FieldBake& options);
 
 }  // namespace h6::io

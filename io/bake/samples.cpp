@@ -20,7 +20,7 @@ constexpr std::size_t kBuffer = 2048;  // bricks: 4 MiB
 
 struct Chunk {
   std::size_t begin, end;            // bricks
-  std::size_t late_begin, late_end;  // the bricks among them that wait
+  std::size_t late_begin, late_end;  // those of the bricks that wait
   std::size_t buffer;                // their place in the buffer
 };
 

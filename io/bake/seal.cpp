@@ -24,7 +24,7 @@ namespace {
 
 using namespace flooding;
 
-// mask(row) for all rows.
+// Calls mask(row) for all rows.
 template <class F>
 Masks for_rows(const NarrowBand& band, unsigned threads, F&& mask) {
   Masks out(band.rows());
@@ -57,7 +57,8 @@ Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, doubl
   });
 }
 
-// Adds the corners left over of band.free to `open`; returns the nodes behind holes.
+// Adds to `open` the remaining nodes of band.free that lie in corners; returns the nodes behind
+// holes.
 Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, unsigned threads,
                    Masks& open) {
   Masks near = open;

@@ -97,7 +97,8 @@ Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, 
   const Masks& free = band.free;
   Flood outside(grid, band, free, Flood::Edges::cut, threads);
   outside.from_border();
-  // In a soup every crack would be a pocket and parity means nothing, so pockets stay inside.
+  // In a soup every crack would be a pocket, and parity has no meaning there, so pockets stay
+  // inside.
   if (!band.crossing.empty() && surface.closed)
     reach_pockets(surface, grid, band, free, threads, outside);
   if (cavities == Cavities::hollow) return open_cavities(grid, band, free, threads, outside);

@@ -214,7 +214,7 @@ Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
                      " has a coordinate that is not finite"};
     surface.duplicates += slice.duplicates;
     surface.flat += slice.flat;
-    kept += std::exchange(slice.kept, kept);  // from here on, where the slice's first one goes
+    kept += std::exchange(slice.kept, kept);  // from here on: place of its first triangle
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], slice.low[k]);
       high[k] = std::max(high[k], slice.high[k]);

@@ -136,7 +136,8 @@ double TriangleTree::search(const double (&p)[3], std::span<const std::uint32_t>
   if (double(found.above) <= most * most) return std::max(0.0, least - double(kRounded));
   const double squared = squared_to(p, found.place);
   if (squared <= most * most) return std::max(0.0, least - double(kRounded));
-  return search_exactly(p, squared, found.place);  // float's bound of slivers and huge ones is low
+  // In float, the bounds of slivers and huge triangles are too low.
+  return search_exactly(p, squared, found.place);
 }
 
 double TriangleTree::search_exactly(const double (&p)[3], double best2,

@@ -40,7 +40,7 @@ Outcome write_grids(const std::filesystem::path& path, const FieldData& field,
   return seal_file(path);
 }
 
-// A stream that goes on with zeros past its end, and remembers that they were read.
+// A stream that reads as zeros past its end, and remembers whether they were read.
 class ZerosBehind : public std::streambuf {
  public:
   explicit ZerosBehind(std::streambuf& bytes) : bytes_(bytes) {}
@@ -79,7 +79,7 @@ class ZerosBehind : public std::streambuf {
   std::streamsize passed_ = 0;
 };
 
-// All grids of a file; a sentence when it ends too early.
+// Reads all grids of a file. Fails, with a sentence, when the file ends too early.
 Result<openvdb::GridPtrVec> read_grids(const std::filesystem::path& file) {
   std::filebuf bytes;
   bytes.open(file, std::ios::in | std::ios::binary);
@@ -126,7 +126,7 @@ Result<FieldData> read_field(const std::filesystem::path& file) {
   const std::string name = file.string();
   const Result<std::optional<std::int32_t>> format = scan_vdb(file);
   if (!format) return format.failure();
-  // Before the seal, which another version may compute in another way.
+  // The format is checked before the seal, which another version may compute differently.
   if (*format && **format != kFieldFormat)
     return Failure{name + " was written by another version of hapsix: bake it again"};
   try {

@@ -15,9 +15,9 @@ enum class Compression { none, blosc };
 // a file does not keep another order.
 Outcome write_field(const std::filesystem::path& file, const FieldData& field,
                     Compression compression = Compression::blosc);
-// Fields of this program come back to the bit; those of another version are refused. A .vdb of
-// another program is read when it has one level set of floats: a far grid of safe bounds is derived
-// from its narrow band and background.
+// Fields of this program are read back bit for bit; fields of another version are refused. A .vdb
+// of another program is read when it has one level set of floats: a far grid of safe bounds is
+// derived from its narrow band and background.
 Result<FieldData> read_field(const std::filesystem::path& file);
 
 }  // namespace h6::io

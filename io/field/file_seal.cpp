@@ -49,7 +49,7 @@ std::string_view head_of(std::span<const char> file) {
   return {file.data(), std::min(file.size(), kHead)};
 }
 
-// Where the digits stand; npos without a mark.
+// The place of the digits; npos without a mark.
 std::size_t digits_at(std::span<const char> file) {
   const std::size_t mark = head_of(file).find(kMark);
   if (mark == std::string_view::npos || mark + kMark.size() + kDigits > file.size())
@@ -92,7 +92,7 @@ Result<Seal> check_seal(const std::filesystem::path& file) {
   const auto bytes = mapped.bytes();
   if (bytes.empty()) return Failure{file.string() + " is empty or cannot be read"};
   const std::size_t at = digits_at(bytes);
-  // Our name without our mark: the mark itself is damaged.
+  // The file has our name but not our mark, so the mark itself is damaged.
   if (at == std::string_view::npos)
     return head_of(bytes).find("hapsix") == std::string_view::npos ? Seal::none : Seal::broken;
   return digits_of(bytes) == std::string_view(&bytes[at], kDigits) ? Seal::whole : Seal::broken;

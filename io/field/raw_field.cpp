@@ -168,7 +168,7 @@ int write_all(DirectFile& file, const FieldData& field) {
 
 // ---- reading ------------------------------------------------------------------------------------
 
-// The field with its arrays at their sizes; nothing when the head does not fit a file of this size.
+// A field whose arrays have their sizes; no value when the head does not fit a file of this size.
 std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::vector<char>& text) {
   std::uint64_t cells = 1, nodes = 1;
   for (const std::int32_t n : head.bricks) {
@@ -200,7 +200,7 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
   return f;
 }
 
-// Fills the pieces and tells the seal of what it read.
+// Fills the pieces and returns the seal of the bytes that it read.
 int read_pieces(DirectFile& file, const Head& head, const Pieces& pieces, Hash128& found) {
   const std::uint64_t size = total(pieces);
   std::vector<Hash128> hashes(blocks_of(size));

@@ -13,8 +13,8 @@ namespace h6::io {
 
 // Written aside, then renamed.
 Outcome write_raw_field(const std::filesystem::path& file, const FieldData& field);
-// To the bit what was written. A sentence when the file is of another kind or version, truncated or
-// damaged; memory is never allocated beyond the file's size.
+// Reads a field back bit for bit. Fails, with a sentence, when the file is of another kind or
+// version, truncated or damaged. Never allocates more memory than the file's size.
 Result<FieldData> read_raw_field(const std::filesystem::path& file);
 
 }  // namespace h6::io

@@ -44,7 +44,7 @@ class Scan {
     at_ += length;
     return bool(in_);
   }
-  // Takes the 32-bit number of that name, if there is one.
+  // Reads the 32-bit number of that name, if there is one.
   bool metadata(const char* wanted = "", std::optional<std::int32_t>* number = nullptr) {
     std::uint32_t count = 0;
     if (!take(count)) return false;
@@ -81,7 +81,8 @@ bool grids_fit(Scan& scan, bool offsets, std::optional<std::int32_t>& format) {
     if (!scan.take(compression) || !scan.metadata("hapsix_format", i == 0 ? &format : nullptr) ||
         !scan.string())
       return false;
-    // Without offsets the next grid begins where this one's tree ends: OpenVDB alone knows.
+    // Without offsets the next grid begins where this one's tree ends, and only OpenVDB knows that
+    // place.
     if (!offsets) return true;
     if (place[2] < 0 || !scan.to(std::uint64_t(place[2]))) return false;
   }

@@ -44,7 +44,7 @@ std::vector<Vec3> ColladaGeometry::positions(Element source) {
   return out;
 }
 
-// Which numbers of a stride are x, y, z: those of the first three params with a name.
+// Finds the numbers of a stride that are x, y, z: those of the first three params with a name.
 std::array<std::uint64_t, 3> ColladaGeometry::axes(Element accessor) const {
   std::array<std::uint64_t, 3> out{0, 1, 2};
   if (!accessor) return out;

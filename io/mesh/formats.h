@@ -48,8 +48,8 @@ Mesh read_ply(const MeshSource& source);
 Mesh read_gltf(const MeshSource& source);  // .gltf and .glb; the first bytes tell which
 Mesh read_collada(const MeshSource& source);
 
-// Throws unless first bytes (84 suffice) and size fit an STL, so that other files are not read
-// whole.
+// Throws unless the first bytes (84 are enough) and the size fit an STL, so that other files are
+// not read whole.
 void check_stl_size(std::string_view head, std::uint64_t size, const MeshSource& source);
 
 // The first `count` bytes (fewer if it is shorter) of a file that the mesh names. It must lie in

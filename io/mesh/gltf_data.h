@@ -66,7 +66,7 @@ class GltfData {
   // Whether an object uses an extension.
   static bool uses(const Json& object, const char* extension);
 
-  // `type` is what it must be, of `width` numbers.
+  // Fails unless the accessor is of this `type`, which has `width` numbers.
   GltfColumn accessor(std::uint64_t index, const char* type, std::uint64_t width,
                       const std::string& from);
 

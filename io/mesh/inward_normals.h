@@ -15,7 +15,7 @@ struct FaceTable {
   std::vector<char> sheet;   // (triangles) 1 in an open piece, which has two outer sides
   std::vector<char> bowl;    // (triangles) 1 in an open piece that nearly encloses a volume
   std::size_t pieces = 0;    // those with area
-  std::size_t sheets = 0;    // the open ones of them
+  std::size_t sheets = 0;    // the open ones among them
   std::vector<std::string> warnings;  // sentences about what was repaired or is uncertain
 };
 

@@ -68,7 +68,7 @@ Vec3 point_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   return best;
 }
 
-// The triangles with area, of each three corners the first.
+// The triangles with area; only the first of those with the same three corners.
 std::vector<std::uint32_t> that_count(const Mesh& mesh) {
   struct Key {
     std::array<std::uint32_t, 3> corners;

@@ -28,12 +28,12 @@ struct Crossing {
 };
 
 // Queries are in the mesh frame and in metres; `along` is a unit vector. Any number of threads may
-// ask at once.
+// query at once.
 class RayScene {
  public:
-  // Holds the triangles with area; of triangles with the same three corners it holds the first.
-  // Indices must be in range, vertices finite, and the mesh must outlive this. Fails, with a
-  // sentence, where memory does not suffice.
+  // Holds the triangles with area. Among triangles with the same three corners it holds only the
+  // first. Indices must be in range, vertices finite, and the mesh must outlive this. Fails, with a
+  // sentence, if there is not enough memory.
   static Result<std::unique_ptr<RayScene>> make(const Mesh& mesh);
   ~RayScene();
   RayScene(const RayScene&) = delete;

@@ -45,7 +45,8 @@ std::string_view first_word(std::string_view head) {
 
 enum class Kind { text, binary };
 
-// Fewer bytes after the last triangle than one more would take are accepted as padding.
+// Bytes after the last triangle are accepted as padding if they are fewer than one more triangle
+// takes.
 Kind kind_of(std::string_view head, std::uint64_t size, const MeshSource& source) {
   const bool has_count = size >= kHead && head.size() >= kHead;
   const std::uint64_t announced = has_count ? load<std::uint32_t>(head, 80) : 0;

@@ -17,10 +17,9 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they are in memory");
 
-constexpr std::uint32_t mark = 0x6c367068;  // "hp6l"
-constexpr std::uint64_t longest_payload = std::uint64_t{256}
-                                          << 20;  // limits what a false size claims
-constexpr std::uint32_t longest_chunk = 4096;     // rows
+constexpr std::uint32_t mark = 0x6c367068;                           // "hp6l"
+constexpr std::uint64_t longest_payload = std::uint64_t{256} << 20;  // limits forged sizes
+constexpr std::uint32_t longest_chunk = 4096;                        // rows
 
 std::uint32_t checksum(const LogRecord& record, const std::vector<std::byte>& payload) {
   constexpr std::size_t skip = offsetof(LogRecord, kind);

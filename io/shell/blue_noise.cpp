@@ -262,8 +262,9 @@ void Thrower::throw_at(Cell& cell, std::size_t cell_index, float radius, std::si
   }
 }
 
-// Accepts spots that keep `radius` from all others, until no more do. A few spots per cell come
-// first, then all: if a cell chose among all its spots before its neighbours, the grid would show.
+// Accepts spots that keep `radius` from all accepted ones, until no spot is left that does. A few
+// spots per cell come first, then all: if a cell chose among all its spots before its neighbours,
+// the grid would show.
 void Thrower::round(double radius) {
   fresh_.clear();
   std::vector<std::vector<std::uint32_t>> fresh;

@@ -21,9 +21,9 @@ struct Demand {
   unsigned threads = 0;
 
   bool by_spacing() const { return spacing > 0; }
-  // How many points an area takes. Fails, with a sentence, if they are too many.
+  // The number of points for this area. Fails, with a sentence, if it is too large.
   Result<double> wanted(double area) const;
-  // Roughly the distance between them.
+  // Roughly the distance between the points.
   double guess(double area, double count) const;
 };
 

@@ -25,10 +25,10 @@ namespace h6::io {
 // Written aside, then renamed. Refuses a shell that read_shell would refuse.
 Outcome write_shell(const std::filesystem::path& file, const ShellData& shell);
 
-// A shell of this program comes back to the bit or fails: all that h6ShellDef promises is checked.
-// A .ply with x y z nx ny nz and no `node` element, binary or text, gets its tree on reading. Its
-// normals must point INTO the body, as ours do; nothing in a point cloud shows which way they
-// point.
+// A shell of this program is read back bit for bit, or fails: all that h6ShellDef promises is
+// checked. A .ply with x y z nx ny nz and no `node` element, binary or text, gets its tree on
+// reading. Its normals must point INTO the body, as ours do; nothing in a point cloud shows which
+// way they point.
 Result<ShellData> read_shell(const std::filesystem::path& file);
 
 // The same from bytes; failures name them `name`.

@@ -2,8 +2,8 @@
 // zero_set.cpp - candidates on the zero set of a field.
 //
 // Darts fall uniformly into the volume. Those that hit a layer half a voxel thick just outside the
-// surface count. |grad d| = 1 there, so the layer holds equally many above every piece of surface,
-// whatever its slope against the grid. Samples outside are exact distances minus the offset;
+// surface count. |grad d| = 1 there, so the layer holds equally many hits above every piece of
+// surface, at any slope against the grid. Samples outside are exact distances minus the offset;
 // samples inside need not be, and nothing here uses them. A first thinning follows. Then each
 // candidate moves along the line to the nearest point of the mesh until the offset is all that lies
 // between, which is exact even where the grid rounds creases off.
@@ -39,7 +39,8 @@ class Layer {
   }
   std::size_t bricks() const { return bricks_.size(); }
 
-  // Throws `rate` darts per cell on average and returns the hits, which `part` gets if it is given.
+  // Throws `rate` darts per cell on average and returns the number of hits. Writes them to `part`
+  // unless it is null.
   std::size_t throw_darts(std::size_t row, double rate, Part* part) const {
     const std::size_t brick = bricks_[row];
     const auto bx = std::size_t(field_.bricks[0]), by = std::size_t(field_.bricks[1]);

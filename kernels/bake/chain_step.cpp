@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // chain_step.cpp - the fast twin of chain_step_ref.
 //
-// A step goes along x, then y, then z. From a line of nodes and its neighbours along x, the lengths
-// that it offers to itself, to the lines beside it and to those diagonally across are made once.
+// A step goes along x, then y, then z. The lengths that a line of nodes, with its neighbours along
+// x, offers to itself, to the lines beside it and to those diagonally across are computed once.
 // Layers are done in order, and each is written as soon as the next has been read, so no copy is
 // needed.
 #include "kernels/bake/chain_step.h"

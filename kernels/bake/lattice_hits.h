@@ -7,7 +7,7 @@
 namespace h6::kernels {
 
 // Nodes are one voxel apart, 32 along a side of a tile; coordinates are integers of 2^-18 voxel
-// from its first node. Sums of products of two of less than 2^25 are exact in double.
+// from its first node. Sums of products of two of them below 2^25 are exact in double.
 inline constexpr std::size_t kLatticeSide = 32;
 inline constexpr double kLatticeVoxel = 262144;
 inline constexpr std::int32_t kLatticeMost = 1 << 24;  // a corner is less than this from the node

@@ -43,10 +43,10 @@ HWY_INLINE std::uint32_t keep(VF found, float most, std::size_t i, float* square
 
 // Lower bounds of the squared distances of triangles i and up. In the frame of a triangle the
 // square is h^2 over its inside, else h^2 + min over edges (off^2 + beyond^2), where beyond is the
-// distance past the ends of the edge. A point that may be over the inside is taken to be: h is
-// never more than the distance. Rounding hides the inside of a sliver; there the foot of a point
-// over it is at most the inradius away from an edge. `slack`: the most that rounding changes the
-// square.
+// distance past the ends of the edge. A point that may be over the inside counts as over it, which
+// is safe: h is never more than the distance. Rounding hides the inside of a sliver; there the foot
+// of a point over it is at most the inradius away from an edge. `slack`: the most that rounding
+// changes the square.
 HWY_INLINE VF triangles_from(const EightTriangles& t, const V3& at, std::size_t i, VF& slack) {
   constexpr float kDigits = 4e-6f;
   const D d;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Anytime mode: what a frame leaves out when time is short, what it reports, and that such a run
-// can be repeated.
+// Anytime mode: a frame that is short of time leaves points out and reports it, and its run can be
+// repeated.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -360,7 +360,7 @@ TEST_CASE("a coarse frame that the machine delayed is in time with few contacts"
   CHECK(all.late == 0);
   CHECK(all.few > 150);
   CHECK(all.few <= 200);
-  // Where one point of sixteen is always too much it is tried now and then, and cut at once.
+  // If even one point of sixteen always takes too long, it is tried now and then, and cut at once.
   Clocked slow;
   all = slow.decide({10000, 2600, 2500}, 20000);
   CHECK(all.few > 19900);

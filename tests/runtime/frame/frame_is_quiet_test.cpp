@@ -198,9 +198,9 @@ struct Counts {
   long worth_sharing = 0, shared = 0;  // frames with work for a helper, and with a helper's work
 };
 
-// From now on every system call of this thread is counted instead of made, but for the ends of
-// signal handlers and of the process, and write for the result; the monotonic clock is none, or is
-// excepted.
+// From now on every system call of this thread is counted instead of made. The exceptions are the
+// ends of signal handlers and of the process, write for the result, and the monotonic clock where
+// it is a system call.
 bool forbid_calls() {
   struct sigaction action {};
   action.sa_sigaction = [](int, siginfo_t*, void*) { calls.fetch_add(1); };
@@ -231,7 +231,7 @@ bool forbid_calls() {
   std::vector<h6DeviceSample> samples;
   for (int i = 0; i < 1000; ++i) samples.push_back(scene.sample(i));
   std::vector<h6DeviceCommand> commands(1);
-  // The helper comes once its thread has started, which may take long on a busy machine.
+  // The helper works once its thread has started, which may take long on a busy machine.
   bool helper_came = threads == 1;
   for (int i = 0; i < 50 || (!helper_came && i < 20000); ++i) {
     h6Step(scene.session, &samples[0], commands.data());

@@ -77,8 +77,8 @@ double uniform(std::mt19937_64& random) {
   return std::ldexp(static_cast<double>(random() >> 11), -52) - 1;
 }  // [-1, 1)
 
-// How many contacts press a body with a field around it further in, over random poses of a ball
-// that is stuck in a sheet thinner than itself.
+// Counts the contacts that press a body further into the field around it, over random poses of a
+// ball that is stuck in a sheet thinner than itself.
 int contacts_that_pull(h6Method method, std::uint32_t pieces, int* loaded) {
   Scene scene(sheet_field(), sphere_points(4 * mm, 500));
   scene.def.contact.method = method;
@@ -178,8 +178,8 @@ void check_too_weak(h6CouplingMode mode, h6Gradient gradient, h6Method method, d
   }
   CHECK(free == 0);
   const h6BodyState later = h6GetBody(scene.session, 1);
-  // A ten-thousandth of a voxel in 1.5 s; sideways also what the 0.98 N are rounded to in float may
-  // do in that time, for nothing else is there to hold a part without friction.
+  // The bound is a ten-thousandth of a voxel in 1.5 s. Sideways the rounding of the 0.98 N to float
+  // adds to it, because nothing else holds a part without friction.
   const double rounded = 0.5 * (0.98 * std::ldexp(1, -24) / 0.1) * 1.5 * 1.5;  // 0.66 um
   CHECK(std::fabs(later.pose.p.x - settled.pose.p.x) < 1e-4 * mm + rounded);
   CHECK(std::fabs(later.pose.p.y - settled.pose.p.y) < 1e-4 * mm + rounded);
@@ -196,8 +196,8 @@ TEST_CASE("a hand too weak to lift a part holds it still and says that it is sat
     for (const h6Method method : {H6_METHOD_ROBUST, H6_METHOD_SERIES}) {
       for (const double bound : {0.5, 1e-3, 1e-9})
         check_too_weak(H6_COUPLING_DYNAMIC, gradient, method, bound);
-      // Sideways nothing but the hand holds a part without mass and friction: not one of less than
-      // the contacts' 1 N is rounded to.
+      // Sideways only the hand holds a part without mass and friction. A hand weaker than the
+      // rounding error of the contacts' 1 N cannot.
       for (const double bound : {0.5, 1e-3})
         check_too_weak(H6_COUPLING_STATIC, gradient, method, bound);
     }

@@ -74,7 +74,7 @@ Run run(BoxOnFloor& box, const h6Device& device, double seconds,
   return run;
 }
 
-// The first row that differs; rows.size() where none does.
+// The first row that differs; rows.size() if no row does.
 std::size_t parts_at(
     BoxOnFloor& box, const h6Device& device, const std::vector<h6FrameRecord>& rows,
     bool with_inputs, const std::function<void(std::uint32_t)>& change = [](std::uint32_t) {}) {

@@ -147,8 +147,8 @@ constexpr Rule kRules[] = {{H6_METHOD_NONE, 0},
                            {H6_METHOD_SERIES, 0}};
 
 // A patch of a ball with neighbours near enough to cluster, and gradients that are not the normals.
-// Not about the ball's own centre: there r is parallel to N, and a direction of r x N is rounding
-// noise.
+// The origin is not the ball's own centre: there r is parallel to N, and a direction of r x N is
+// rounding noise.
 Rows crowded_cap() {
   std::mt19937_64 random(31);
   const auto uniform = [&] { return std::ldexp(static_cast<double>(random() >> 11), -52) - 1; };

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whatever is requested, the output to a device is finite, inside the rating, slow enough and
-// explained.
+// For any request, the output to a device is finite, inside the rating, slow enough and explained.
 #include <doctest/doctest.h>
 #include "hapsix/vector.h"
 #include "tests/support/near.h"

@@ -21,8 +21,7 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-// A device made of two lambdas' worth of state: sinks 3 mm into the floor within a tenth of a
-// second.
+// A device that sinks 3 mm into the floor within a tenth of a second.
 struct Pusher {
   std::vector<h6DeviceCommand> written;
   std::atomic<int> stops{0};
@@ -224,7 +223,8 @@ void wait_for_writes(const Pusher& pusher, int more) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
-// In real time with devices in the time of frames: on a slow machine nothing is late either.
+// The loop runs in real time and the devices in the time of frames, so nothing is late on a slow
+// machine.
 struct Live {
   Scene scene;
   h6Device device;

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double ms = 1e-3;
 
-// A box of 0.1 kg on or above a floor z < 0 that carries with k = 1e4 N/m as a whole; 5 N at most.
+// A box of 0.1 kg on or above a floor z < 0 whose stiffness is k = 1e4 N/m as a whole; 5 N at most.
 struct PushedBox : BoxOnFloor {
   h6DeviceCommand told{};
 
@@ -81,7 +81,7 @@ TEST_CASE("admittance: a twist is bounded by the largest torque") {
   scene.open();
   const h6Status status = scene.push(torque(0, 0, 1e3), 2000);
   CHECK((status & H6_COUPLING_SATURATED) != 0);
-  // Damping is in the ratio of inertia to mass, and that of a lever of 50 mm.
+  // Damping scales as inertia does to mass, with the ratio of a lever of 50 mm.
   const double inertia = scene.bodies[1].inertia[2];
   CHECK(scene.body().velocity.angular.z ==
         h6::test::near(0.01 / (50 * (inertia / 0.1 + 2.5e-3))).epsilon(1e-6));
@@ -166,7 +166,7 @@ TEST_CASE("admittance: stable with a stiff person behind 5 ms of delay, free and
         PushedBox scene(H6_ADMITTANCE, target > 10 * mm ? 58 * mm : 5.2 * mm);
         scene.set_mass(mass);
         scene.open();
-        // What the person feels of the handle is `delay` frames old.
+        // The person feels the handle as it was `delay` frames ago.
         std::deque<double> seen(static_cast<std::size_t>(delay) + 1, scene.told.pose.p.z);
         double speed = 0, swing = 0;
         for (int i = 0; i < 4000; ++i) {

@@ -201,7 +201,7 @@ TEST_CASE("a body put into a wall may leave it: what the contacts hold there was
 
 namespace {
 
-// A box and a hand that moves up and down through a floor's surface, whatever force it feels.
+// A box and a hand that moves up and down through a floor's surface, unmoved by the force it feels.
 struct Pumping {
   FieldArrays field = sample_analytic([](double, double, double z) { return z; },
                                       {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body that is pushed against a field must do by physics.
+// How a body that is pushed against a field must move by physics.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 

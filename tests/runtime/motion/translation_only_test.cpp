@@ -50,7 +50,7 @@ TEST_CASE("a body of translations alone keeps its orientation to the bit and giv
       CHECK(same_bits(scene.body().pose.q, q));
       CHECK(norm(scene.body().velocity.angular) == 0);
       CHECK((h6GetFrame(scene.session).status & (H6_SOLVE_FAILED | H6_STATE_NOT_FINITE)) == 0);
-      // The wrist turns, the body's mesh frame does not go round with it.
+      // The wrist turns, but the body's mesh frame does not turn with it.
       if (way.mode == H6_COUPLING_DIRECT) CHECK(norm(scene.body().pose.p - sample.pose.p) < 1e-15);
     }
     CHECK(touched > 0);

@@ -14,11 +14,11 @@ using test::every_member_has_a_row;
 TEST_CASE("every member of every definition has its row") {
   // No settings: velocity, shell, field. The inertia counts as six members.
   every_member_has_a_row<h6BodyDef>(body_settings(), 3 + 5);
-  // pieces, which the row `method` holds too.
+  // One member has no row: pieces, which the row `method` also holds.
   every_member_has_a_row<h6ContactDef>(contact_settings(), 1);
   every_member_has_a_row<h6CouplingDef>(coupling_settings(), 0);
   every_member_has_a_row<h6SafetyDef>(safety_settings(), 0);
-  // body; coupling, which has rows of its own.
+  // Two members have no row here: body; coupling, which has its own rows.
   every_member_has_a_row<h6HandDef>(hand_settings(), 2);
   for (const Setting& row : hand_settings())
     if (row.stands_among()) every_member_has_a_row<h6HandFilterDef>(*row.inside, 0);
