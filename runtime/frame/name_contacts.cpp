@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // name_contacts.cpp - names the part and the triangle that each contact is with, on request.
 //
-// A field keeps them by brick. A contact's brick is found again from its arm and the place of the
-// last traversal. So the frame itself pays one matrix a pair, and nothing a contact.
+// A field keeps them by brick. A contact's brick is found again from its arm and the pose of the
+// last traversal. So the frame itself stores only one matrix per pair, and nothing per contact.
 #include <algorithm>
 #include <cmath>
 

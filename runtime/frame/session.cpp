@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// session.cpp - makes a session from its definition: derives, sizes and reserves everything, so
-// that a frame has nothing left to decide.
+// session.cpp - makes a session from its definition: derives all values and reserves all memory, so
+// that a frame need not.
 #include "runtime/frame/session.h"
 
 #include <Eigen/Eigenvalues>
@@ -31,15 +31,15 @@ std::vector<h6PairDef> pairs_of(const h6SessionDef& def) {
         pairs.push_back({a, b});
       }
   }
-  // Pairs of one shell body stand together, because their contacts are weighed together.
+  // Pairs of one shell body must be neighbours, because their contacts are weighed together.
   std::stable_sort(pairs.begin(), pairs.end(), [](const h6PairDef& l, const h6PairDef& r) {
     return l.shell_body < r.shell_body;
   });
   return pairs;
 }
 
-// Each point has an equal share of the mass. A ball of one voxel is added where the points lie on a
-// line or in a spot.
+// Each point has an equal share of the mass. If the points lie on a line or in one spot, the
+// inertia of a ball of one voxel is added.
 Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) {
   Mat3 I = Mat3::Zero();
   for (std::size_t r = 0; r < shell.points; ++r) {
@@ -53,7 +53,8 @@ Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) 
   return I;
 }
 
-// The smallest voxel of the fields that body i can touch, or of its own where others touch it [m].
+// The smallest voxel of the fields that body i can touch, and of its own field if others touch it
+// [m].
 double voxel_of(std::span<const Body> bodies, std::int32_t i, std::span<const h6PairDef> pairs) {
   double voxel = HUGE_VAL;
   for (const h6PairDef& p : pairs)
@@ -86,8 +87,8 @@ void set_body(Body& body, const h6BodyDef& def, double voxel) {
   if (body.translation_only) body.w.setZero();
 }
 
-// The damping of a free body that a person pushes, where the definition leaves it open (METHOD.md,
-// Sec. 4): a grip of 1500 N/m behind 5 ms of delay takes 7.5 N s/m away.
+// The damping of a free body that a person pushes, unless the definition sets it (METHOD.md,
+// Sec. 4): a grip of 1500 N/m behind 5 ms of delay removes 7.5 N s/m.
 double admittance_damping(const h6HandDef& def, double mass) {
   return def.admittance_damping > 0 ? def.admittance_damping : std::max(mass / 0.02, 10.0);
 }
@@ -101,7 +102,7 @@ void set_hand(Hand& hand, HandDevice& device, Body& body, const h6HandDef& def,
   hand.driver_damping = def.driver_damping;
   device.motion_scale = def.filter.motion_scale;
   device.rotation_scale = def.filter.rotation_scale;
-  // A body that never turns hangs on the origin of its mesh frame.
+  // A body that never turns is held at the origin of its mesh frame.
   const Vec3 com = body.translation_only ? Vec3(Vec3::Zero()) : body.com;
   device.filter.set(def.filter, com, def.mode != H6_IMPEDANCE);
   device.safety = def.safety;
@@ -125,9 +126,9 @@ void set_hand(Hand& hand, HandDevice& device, Body& body, const h6HandDef& def,
   hand.manipulandum = body;
 }
 
-// Moving bodies that pairs connect, in groups of at most four. A larger group falls into single
-// bodies; within a step each treats its neighbours as if they stood still. Quasi-static and held
-// bodies have no mass of their own and are in no island.
+// Moving bodies that pairs connect, in groups of at most four. A larger group is split into single
+// bodies; within a step each treats its neighbours as fixed. Quasi-static and held bodies have no
+// mass of their own and are in no island.
 std::vector<Island> islands_of(std::span<const Body> bodies, std::span<const h6PairDef> pairs) {
   const auto dynamic = [&](std::int32_t i) {
     return !bodies[i].fixed && bodies[i].motion == Motion::dynamic;
@@ -160,8 +161,8 @@ std::vector<Island> islands_of(std::span<const Body> bodies, std::span<const h6P
 struct Sizes {
   std::size_t bodies = 0, pairs = 0, hands = 0;
   std::size_t shells = 0;                      // bodies that are the shell of a pair
-  std::size_t groups = 16, blocks = 16;        // of the largest shell
-  std::size_t all_groups = 0, all_blocks = 0;  // of all pairs together
+  std::size_t groups = 16, blocks = 16;        // for the largest shell
+  std::size_t all_groups = 0, all_blocks = 0;  // for all pairs together
   std::size_t between = 0, of_fields = 0;      // pairs with these columns
   bool shares = false;                         // two threads share the pairs of a shell body
   bool lanes = false;                          // two threads share the shell bodies
@@ -193,7 +194,7 @@ Sizes sizes_of(const h6Model& model, const h6SessionDef& def, std::span<const h6
   return n;
 }
 
-// Columns that pairs point into.
+// The columns that pairs point into.
 struct PairColumns {
   PairSearch* searches;
   kernels::WrenchSum* sums;
@@ -234,7 +235,7 @@ void take_scratch(Scratch& scratch, Arena& arena, const Sizes& n, const Settings
   scratch.slice_sum = arena.take<kernels::WrenchSum>(set.max_contacts / kSumSlice + 1);
 }
 
-// Called twice: with an empty arena to count, then to take.
+// Called twice: with an empty arena to count bytes, then with memory to take it.
 void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
   s.bodies = take<Body>(arena, n.bodies);
   s.acting = take<LinearWrench>(arena, n.bodies);
@@ -250,7 +251,7 @@ void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
   for (std::size_t i = 0; i < n.shells; ++i) {
     Contacts contacts{};
     take_columns(contacts, arena, s.settings.max_contacts);
-    // Counting has no memory to put headers in.
+    // While counting there is no memory for the objects.
     if (s.shells.data()) (new (&s.shells[i]) ShellBody{})->contacts = contacts;
   }
   for (int i = 0; i < (n.shares || n.lanes ? 2 : 1); ++i)
@@ -259,13 +260,13 @@ void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
     take_scratch(s.lanes.scratch[i], arena, n, s.settings);
 }
 
-// Sets all pairs and shell bodies; bodies are laid out already.
+// Sets all pairs and shell bodies. All columns must be laid out.
 void set_pairs(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef> pairs,
                PairColumns to) {
   PairSearch* const searches = to.searches;
   kernels::WrenchSum* const sums = to.sums;
   ShellBody* shell = nullptr;
-  std::size_t shells = 0, first = 0;  // first pair of the shell body
+  std::size_t shells = 0, first = 0;  // `first`: the first pair of the shell body
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     Pair& pair = *new (&s.pairs[i]) Pair();
     PairSearch& search = *new (&searches[i]) PairSearch();
@@ -307,7 +308,7 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   if (!s.memory)
     return fail(error, "no memory for the session (%zu MB): lower max_contacts",
                 s.memory_bytes / 1000000);
-  // Pages are touched now, not in the first frames.
+  // This touches all pages now, so that the first frames have no page faults.
   std::fill_n(static_cast<char*>(s.memory), s.memory_bytes, char{0});
   Arena arena(s.memory, s.memory_bytes);
   lay_out(s, columns, arena, n);
@@ -360,7 +361,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   bool ready = false;
   try {
     ready = fill(*s, *def, error);
-  } catch (const std::exception& e) {  // threads, small tables
+  } catch (const std::exception& e) {  // from threads and small tables
     fail(error, "the session could not be made: %s", e.what());
   }
   s->tick_length.see(sched::now_ns(), sched::ticks());

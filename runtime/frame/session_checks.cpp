@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// session_checks.cpp - ranges come from the rows of settings; this file knows what fits together.
+// session_checks.cpp - checks whether the values of a definition fit together. Their ranges come
+// from the rows of settings.
 #include "runtime/frame/session_checks.h"
 
 #include <Eigen/Cholesky>
@@ -37,7 +38,7 @@ bool check_inertia(const h6BodyDef& b, std::size_t i, h6Error* error) {
 }
 
 bool check_body(const h6Model& model, h6BodyDef b, std::size_t i, h6Error* error) {
-  if (b.fixed) {  // neither is read
+  if (b.fixed) {  // neither value is read
     b.mass = h6DefaultBodyDef().mass;
     for (double& v : b.inertia) v = 0;
   }
@@ -66,7 +67,7 @@ bool check_pair(const h6SessionDef& def, std::size_t i, h6Error* error) {
 
 bool check_coupling(const h6HandDef& h, std::size_t i, h6Error* error) {
   h6CouplingDef c = h.coupling;
-  if (c.max_force > 0) c.max_depth_voxels = 1;  // is not read then
+  if (c.max_force > 0) c.max_depth_voxels = 1;  // its value is not read then
   if (!check_settings(coupling_settings(), &c, Where("hand", i, "coupling ").text, error))
     return false;
   if (c.mode != H6_COUPLING_DYNAMIC && h.mode != H6_IMPEDANCE)
@@ -79,8 +80,8 @@ bool check_coupling(const h6HandDef& h, std::size_t i, h6Error* error) {
   return true;
 }
 
-// Several dynamic couplings can pull on one body. A static or direct one sets its pose: it is
-// alone.
+// Several dynamic couplings can pull on one body. A static or direct one sets the body's pose, so
+// it must be the only one.
 bool check_other_hands(const h6SessionDef& def, std::size_t i, h6Error* error) {
   const auto alone = [](const h6HandDef& h) { return h.coupling.mode != H6_COUPLING_DYNAMIC; };
   for (std::size_t j = 0; j < i; ++j)

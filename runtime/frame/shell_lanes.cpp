@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_lanes.cpp - shell bodies one after the other, or two at a time.
+// shell_lanes.cpp - weighs shell bodies one after the other, or two at a time.
 #include "runtime/frame/shell_lanes.h"
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 namespace h6 {
 namespace {
 
-constexpr double kWorthSharing = 6000;  // ns that the other thread could take over
-// One shell body with more than this share of the work is better shared within.
+constexpr double kWorthSharing = 6000;  // least time that the other thread must save [ns]
+// If one shell body has more than this share of the work, both threads share that body's work.
 constexpr double kLopsided = 0.7;
 
-// Is there enough work for two threads, in several shell bodies?
+// Whether there is enough work for two threads, in several shell bodies.
 bool worth_two(const Lanes& lanes, std::span<const ShellBody> shells) {
   // With a budget the clock decides pair after pair, in order.
   if (!lanes.two || lanes.whole.anytime->by_clock) return false;
@@ -35,8 +35,8 @@ void join(h6FrameReport& to, const h6FrameReport& from) {
   to.series_residual = std::max(to.series_residual, from.series_residual);
 }
 
-// Stages of two lanes overlap. Each gets the part of the wall time that it had of the work, so that
-// the stages of a frame add up to no more than the frame.
+// The stages of two lanes overlap. Each stage is reported with its share of the wall time, in
+// proportion to its work, so that the stages of a frame add up to no more than the frame.
 void join_times(const Lanes& lanes, double wall_us, h6FrameReport& report) {
   double work = 0;
   for (const Lane& lane : lanes.single)

@@ -11,12 +11,12 @@
 namespace h6 {
 namespace {
 
-// All that a call needs, in one block.
+// The memory that a call needs, in one block.
 struct Work {
   Contacts contacts{};
   ClusterScratch cluster{};
   std::uint32_t* source = nullptr;  // (rows) the index of each row's contact, before clustering
-  char* scratch = nullptr;          // of weigh_columns, large enough for any rule
+  char* scratch = nullptr;          // for weigh_columns, large enough for any rule
 };
 
 void lay_out(Work& work, Arena& arena, std::size_t count) {
@@ -24,7 +24,7 @@ void lay_out(Work& work, Arena& arena, std::size_t count) {
   work.cluster = {arena.take<std::uint32_t>(count), arena.take<std::uint32_t>(count),
                   arena.take<std::uint64_t>(count)};
   work.source = arena.take<std::uint32_t>(count);
-  h6ContactDef hungriest{};  // two trees, even for few contacts
+  h6ContactDef hungriest{};  // the rule that needs most: two trees, even for few contacts
   hungriest.method = H6_METHOD_GAUSS6;
   work.scratch = arena.take<char>(weigh_scratch_bytes(hungriest, count));
 }
@@ -36,7 +36,7 @@ std::size_t bytes_of(std::size_t count) {
   return counting.used() + kAlignment;  // the block may start anywhere
 }
 
-// The caller's block, or one from the heap.
+// Uses the caller's block, or takes one from the heap.
 class Block {
  public:
   Block(const h6ContactArrays& in, std::size_t bytes)

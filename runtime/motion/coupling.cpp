@@ -10,7 +10,7 @@
 namespace h6 {
 namespace {
 
-// y shortened to at most `most`; P is the derivative of the result by y.
+// y shortened to at most `most`; P is the derivative of the shortened y by y.
 struct Saturated {
   Vec3 value;
   Mat3 P;
@@ -24,7 +24,7 @@ Saturated saturate(const Vec3& y, double most) {
 }
 
 // For a quasi-static step, which has no mass. The true derivative is singular along the pull, so
-// free motion would have no solution; the secant leads to where the pull ends.
+// free motion would have no solution. The secant leads to the pose at which the pull ends.
 Saturated saturate_secant(const Vec3& y, double most) {
   Saturated cut = saturate(y, most);
   if (cut.cut) cut.P = most / y.norm() * Mat3::Identity();
@@ -44,7 +44,7 @@ RigidState held_by(const h6DeviceSample& sample, const Body& body) {
   return m;
 }
 
-// The damping of the free body is part of its step.
+// Adds the device's wrench. The damping of the free body is part of its step.
 void couple_admittance(Hand& hand, const Body& body, LinearWrench& acting, h6Status& status) {
   if (hand.cut_off) return;  // a lost device no longer pushes
   const Saturated force = saturate(from(hand.sample.wrench.force), hand.coupling.max_force);
@@ -101,7 +101,7 @@ void couple(const Settings& set, Hand& hand, const Body& body, LinearWrench& act
   if (hand.mode == H6_ADMITTANCE) return couple_admittance(hand, body, acting, status);
   if (hand.mode == H6_IMPEDANCE && !hand.seen) return;
   if (body.motion == Motion::held) {
-    // The hand carries all that acts on the body.
+    // The hand carries the whole wrench on the body.
     hand.wrench = -acting.f;
     if (body.translation_only) hand.wrench.tail<3>().setZero();
     return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hand_port.cpp - a device's sample in, its command out, each frame. METHOD.md, Sec. 4.
+// hand_port.cpp - reads a device's sample and makes its command, each frame. METHOD.md, Sec. 4.
 //
 //   sample -> watch -> finite? -> filter -> the frame's hand ... wrench or motion -> filter ->
 //   safety -> command
@@ -18,7 +18,8 @@ h6Velocity hand_velocity(const HandDevice& device, const Body& body) {
   return {to(Vec3(from(at.velocity.linear) + w.cross(from(at.pose.q) * body.com))), to(w)};
 }
 
-// The state of the device decides on the output before anything else does. Is the sample good?
+// Passes the state of the device to the output guard before anything else. Returns whether the
+// sample is good.
 bool watched(HandDevice& device, const h6DeviceSample& given, double dt, h6Status& status) {
   const bool finite = usable(given.pose, given.velocity), good = finite && !device.lost;
   if (device.lost) status |= H6_DEVICE_LOST;
@@ -61,7 +62,7 @@ void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSamp
     status |= H6_HAND_NOT_FINITE;
     sample.wrench = {};
   }
-  // A manipulandum with mass follows the hand, or the body itself.
+  // The hand moves a manipulandum with mass, or the body itself.
   const RigidState& state =
       hand.mode == H6_PSEUDO_ADMITTANCE ? std::as_const(hand.manipulandum) : body;
   const h6Pose here = mesh_pose(body, state);

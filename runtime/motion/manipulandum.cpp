@@ -4,16 +4,16 @@
 //   device --[driver's coupling]-- manipulandum --[virtual coupling]-- body --[contacts]-- world
 //
 // The driver reports the wrench of its coupling, F_d = k_dd (x_dev - x_m) + b_dd (v_dev - v_m). A
-// frame takes two implicit steps: the manipulandum's, then the body's towards where the first
-// ended. And, for both admittance modes: the state in the scene does not run away from its device.
-// METHOD.md, Sec. 4.
+// frame takes two implicit steps: the manipulandum's, then the body's towards the manipulandum's
+// new pose. This file also keeps the state in the scene from running away from its device, in both
+// admittance modes. METHOD.md, Sec. 4.
 #include "runtime/motion/motion_stages.h"
 #include "runtime/motion/solve.h"
 
 namespace h6 {
 namespace {
 
-// The lever that makes the driver's stiffness a rotational one (METHOD.md, Sec. 4) [m].
+// The lever that turns the driver's stiffness into a rotational one (METHOD.md, Sec. 4) [m].
 constexpr double kDriverLever = 0.03;
 
 Mat6 diagonal(double translation, double rotation) {
@@ -30,7 +30,6 @@ Vec6 velocity_of_device(const Hand& hand, const Body& body) {
   return u;
 }
 
-// Shortened to at most `most`.
 Vec3 at_most(const Vec3& v, double most) {
   const double n = v.norm();
   return n > most ? Vec3(most / n * v) : v;
@@ -67,7 +66,6 @@ void step_manipulandum(const Settings& set, Hand& hand, const Body& body, h6Stat
   const double h = set.dt, lever2 = kDriverLever * kDriverLever;
   const Mat6 K = diagonal(-hand.driver_stiffness, -hand.driver_stiffness * lever2);
   const Mat6 D = diagonal(-hand.driver_damping, -hand.driver_damping * lever2);
-  // The body's pull on the manipulandum.
   const LinearWrench pull = pull_of(set.gradient, hand.coupling, body, body, m).wrench;
   Vec6 driver;
   driver << from(hand.sample.wrench.force), from(hand.sample.wrench.torque);

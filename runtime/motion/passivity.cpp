@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// passivity.cpp - the energy of hands and contacts, and what keeps it from going below zero.
+// passivity.cpp - observes the energy of hands and contacts and keeps it from going below zero.
 #include "runtime/motion/passivity.h"
 
 #include <algorithm>
@@ -11,11 +11,12 @@
 namespace h6 {
 namespace {
 
-// The hand's damper is at most the one that reaches the coupling's bound at this speed [m/s]. At
-// the speeds of an encoder's noise the deficit over the motion would be any number.
+// The hand's damper is at most the one that reaches the coupling's bound at this speed [m/s].
+// Without a limit it would take any value at the speeds of an encoder's noise, where the motion by
+// which the deficit is divided is almost zero.
 constexpr double kFullSpeed = 0.05;
-constexpr double kStill = 1e-9;  // motion in a frame below which there is no direction [m]
-// The share rises from 0 to 1 in this time, and changes of the motion are held as long [s].
+constexpr double kStill = 1e-9;  // a smaller motion in a frame has no direction [m]
+// The share rises from 0 to 1 in this time, and peaks of change in the motion fade as slowly [s].
 constexpr double kMemory = 0.02;
 
 void shorten(Vec3& v, double most) {
@@ -33,8 +34,9 @@ Vec6 accelerated_by(const Body& body, const Vec6& f) {
   return a;
 }
 
-// The mean velocity in the coming step. Of an explicit step it is exact but for gyroscopic terms;
-// of an implicit step it is the velocity now, which overestimates what the contacts will give out.
+// The mean velocity in the coming step. For an explicit step it is exact but for gyroscopic terms.
+// For an implicit step it is the present velocity, which overestimates the energy that the contacts
+// will give out.
 Vec6 mean_velocity(const Settings& set, const Body& body, const LinearWrench& acting) {
   Vec6 u = velocity(body);
   if (set.integrator == H6_EXPLICIT && free_mass(body))
@@ -69,7 +71,7 @@ Vec6 relative(const Pair& pair, const Vec6& ua, const Vec6& ub) {
   return u;
 }
 
-// Takes f from the pair's wrench on a. A hand that holds a body carries all that acts on it.
+// Subtracts f from the pair's wrench on a. A hand that holds a body carries the whole wrench on it.
 void take_away(std::span<const Body> bodies, const Sides& sides, Pair& pair, const Vec6& f,
                std::span<Hand> hands) {
   const Vec6 on_b = arm_shift(sides.a, sides.b) * f;
@@ -94,8 +96,9 @@ void add_damping(const Sides& sides, Pair& pair, double alpha) {
 
 enum class Relief { damping, scaling };
 
-// Takes as little as possible from the contacts of one shell body so that they give out `most` [W]:
-// by damping along their motion, or as a share of all of them. Returns what they then give out.
+// Reduces the wrenches of one shell body's contacts as little as possible, so that they give out at
+// most `most` [W]: by damping along their motion, or by scaling all of them. Returns the power that
+// they then give out [W].
 double relieve(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                std::span<LinearWrench> acting, std::span<Hand> hands, double most, Relief by,
                h6Status& status) {
@@ -115,7 +118,8 @@ double relieve(const Settings& set, std::span<const Body> bodies, ShellBody& she
   }
   add_power(set, a, ua, F, c, power);
   if (power.w0 <= most) return power.w0;
-  // Contacts that give out energy may be stopped from it, no more: together they never pull.
+  // Contacts that give out power may be reduced to giving out none, but no further: together they
+  // must never pull.
   const double alpha = relief_for(power, power.w0 > 0 ? std::max(most, 0.0) : most);
   if (!(alpha > 0)) return power.w0;
   for (Pair& pair : shell.pairs) {
@@ -129,7 +133,7 @@ double relieve(const Settings& set, std::span<const Body> bodies, ShellBody& she
   return power.w0 - alpha * power.w1 + alpha * alpha * power.w2;
 }
 
-// Energy of a spring of stiffness k whose force is at most `most` [J].
+// The energy of a spring of stiffness k whose force is at most `most` [J].
 double spring_energy(double k, double stretch, double most) {
   const double knee = most / k;
   return stretch <= knee ? 0.5 * k * stretch * stretch : most * (stretch - 0.5 * knee);
@@ -174,7 +178,7 @@ void HandPort::move(const h6Pose& pose, const h6Wrench& wrench) {
   placed_ = true;
 }
 
-// Takes energy from the hand along its motion. True when it changed the wrench.
+// Takes energy from the hand along its motion. Returns whether it changed the wrench.
 bool HandPort::add_damper(Vec3& force, Vec3& torque, double max_force, double max_torque,
                           double dt) const {
   // The felt wrench acts on the hand, so its work leaves the engine.
@@ -193,7 +197,8 @@ bool HandPort::add_damper(Vec3& force, Vec3& torque, double max_force, double ma
   return true;
 }
 
-// The share of the wrench, 0 .. 1, with which the next motion cannot take more than the port has.
+// The share of the wrench, 0 .. 1, with which the next motion cannot take out more than the port
+// has.
 double HandPort::share_for(const Vec3& force, const Vec3& torque) const {
   const double out = force.dot(moved_) + torque.dot(turned_);
   // The next motion differs from the last one by up to the changes seen lately: the wrench then
@@ -208,8 +213,8 @@ bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double 
   if (!known_) return false;
   Vec3 force = from(felt.force), torque = from(felt.torque);
   bool changed = add_damper(force, torque, max_force, max_torque, dt);
-  // Down at once, up slowly: a share that comes back in one frame is felt as a click, and would
-  // follow a tremor up and down.
+  // The share falls at once and rises slowly. A share that rises in one frame is felt as a click,
+  // and it would follow a tremor up and down.
   share_ = std::min(share_for(force, torque), share_ + dt / kMemory);
   const double held = std::max(0.0, 1 - dt / kMemory);
   move_change_ *= held;
@@ -281,8 +286,8 @@ void damp_contacts(const Settings& set, std::span<const Body> bodies, std::span<
     port.known = true;
     const double most = port.energy / set.dt;
     const double left = relieve(set, bodies, shell, acting, hands, most, Relief::damping, status);
-    // An explicit step may take a body in and throw it out; no damping along its motion undoes
-    // that.
+    // An explicit step may take a body in and throw it out again. Damping along its motion cannot
+    // undo that.
     if (set.integrator == H6_EXPLICIT && left > std::max(most, 0.0) + 1e-9 * std::abs(left))
       relieve(set, bodies, shell, acting, hands, most, Relief::scaling, status);
   }
@@ -298,7 +303,7 @@ void observe_contacts(const Settings& set, std::span<const Body> bodies,
       const Body& b = bodies[pair.b];
       const Vec6 u = relative(pair, velocity(a), velocity(b));
       Vec6 f = pair.f;
-      // A body that a hand holds is moved by the hand, under the wrench as it is.
+      // The hand moves a body that it holds, so the wrench there does not change with the step.
       if (set.integrator == H6_IMPLICIT && (free_mass(a) || free_mass(b)))
         f -= set.dt * (pair.B * u) + (set.contact.damping + port.alpha) * (pair.B * (u - pair.u));
       port.energy -= 0.5 * set.dt * f.dot(u + pair.u);

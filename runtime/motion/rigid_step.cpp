@@ -9,14 +9,14 @@
 namespace h6 {
 namespace {
 
-constexpr double kGripLever = 0.05;  // lever of a hand that twists a part (METHOD.md, Sec. 4) [m]
+constexpr double kGripLever = 0.05;  // lever of a hand that twists a part; METHOD.md, Sec. 4 [m]
 
 bool sane(const RigidState& state) {
   return state.x.allFinite() && state.v.allFinite() && state.w.allFinite() &&
          state.q.coeffs().allFinite();
 }
 
-// Admittance: damping of the free body. The grip's lever damps the twist of a small part too.
+// Admittance: the damping of the free body. The grip's lever also damps the twist of a small part.
 Mat6 drag_matrix(const Body& body) {
   Mat6 B = body.drag / body.mass * mass_matrix(body, body, body.mass);
   B.bottomRightCorner<3, 3>().diagonal().array() += body.drag * kGripLever * kGripLever;
@@ -28,7 +28,7 @@ Vec6 driving(const Body& body, const LinearWrench& acting) {
   return acting.f - gyroscopic(body, body, body.mass);
 }
 
-// The change of velocity in one explicit step. The drag stays implicit.
+// The change of velocity in one explicit step. The drag is still implicit.
 Vec6 explicit_change(const Body& body, const LinearWrench& acting, double dt) {
   const Vec6 f = dt * driving(body, acting);
   Vec6 du = Vec6::Zero();
@@ -85,7 +85,7 @@ OwnTerms own_terms(const Body& body, const LinearWrench& acting) {
   return own;
 }
 
-// A body that is coupled to no other moving body.
+// Solves for a body that is coupled to no other moving body.
 bool solve_one(const Settings& set, const Body& body, const LinearWrench& acting, Vec6& du) {
   const double h = set.dt;
   const OwnTerms own = own_terms(body, acting);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// solve.cpp - the factorisations of a step, all in one file because Eigen's compile slowly.
+// solve.cpp - the factorisations of a step. They share one file, because Eigen compiles slowly.
 #include "runtime/motion/solve.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-// Unrolled, one body's system stays in registers: twice as fast.
+// Unrolled loops keep one body's system in registers, which is twice as fast.
 #if defined(__GNUC__) && !defined(__clang__)
 #define H6_UNROLL_SIX _Pragma("GCC unroll 6")
 #elif defined(__clang__)
@@ -19,7 +19,7 @@ namespace {
 
 // Solves A x = b by LDL^T, from the lower triangle, without pivoting or square roots, which
 // positive matrices do not need. Each column is eliminated from all later ones at once, so that
-// only pivots depend on one another. False when a pivot is not positive.
+// only pivots depend on one another. Returns false if a pivot is not positive.
 template <class Matrix, class Vector>
 bool solve_positive(const Matrix& A, const Vector& b, Vector& x) {
   constexpr int kMost = Matrix::MaxRowsAtCompileTime;
@@ -59,7 +59,7 @@ bool solve(h6Gradient form, const Matrix& A, const Vector& b, Vector& x) {
     x = A.partialPivLu().solve(b);
   } else {
     if (solve_positive(A, b, x)) return x.allFinite();
-    // Semidefinite or nearly so: with pivoting.
+    // A semidefinite matrix, or one nearly so, needs pivoting.
     const Eigen::LDLT<Matrix> factors(A);
     if (factors.info() != Eigen::Success || !factors.isPositive()) return false;
     x = factors.solve(b);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// static_step.cpp - a quasi-static body goes straight to where all that acts on it balances.
+// static_step.cpp - a quasi-static body moves straight to the pose in which its wrenches balance.
 //
 // Wan & McNeely 2003: dq = -(K_c + K_VC)^-1 (f_c + f_VC), one solve a frame. METHOD.md, Sec. 4.
 #include "runtime/motion/motion_stages.h"
@@ -8,7 +8,7 @@
 namespace h6 {
 namespace {
 
-// No point of the body moves farther than this.
+// An upper bound on the motion of the body's points.
 double reach(const Body& body, const Vec6& dq) {
   return dq.head<3>().norm() + dq.tail<3>().norm() * body.radius;
 }
@@ -25,7 +25,7 @@ void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6
   }
   const double far = reach(body, dq);
   if (far > body.max_step) dq *= body.max_step / far;
-  // dq is moved as a velocity for one second; the body has no velocity before or after.
+  // dq acts as a velocity for one second; the body has no velocity before or after.
   body.v.setZero();
   body.w.setZero();
   if (!move_or_rest(body, dq, 1, body.translation_only)) status |= H6_STATE_NOT_FINITE;

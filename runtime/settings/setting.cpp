@@ -10,9 +10,9 @@
 namespace h6 {
 namespace {
 
-constexpr std::size_t kSentence = 320;  // letters of a part of a sentence
+constexpr std::size_t kSentence = 320;  // bytes for a part of a sentence
 
-// "above 0 N/m", "0 s or more", "in 0..10", "in (0, 2]"
+// Writes a range in words: "above 0 N/m", "0 s or more", "in 0..10", "in (0, 2]".
 void say_range(const Setting& row, char (&out)[kSentence]) {
   const Range& r = row.range;
   const char *space = *row.unit ? " " : "", *unit = row.unit;
