@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Baked assets are kept: a second run starts from them, and no state of the cache stops a run.
+// A second run takes its baked assets from the cache, and no state of the cache stops a run.
 #include <functional>
 #include <set>
 #include <string>
@@ -72,7 +72,7 @@ TEST_CASE("a damaged file of the cache is baked again, with a warning") {
     CHECK(ended.code == 0);
     for (const fs::path& file : cached(box)) {
       CAPTURE(file);
-      const std::size_t at = ended.err.find(file.string());  // said of each file, by its name
+      const std::size_t at = ended.err.find(file.string());  // a warning names each file
       REQUIRE(at != std::string::npos);
       const std::string said = ended.err.substr(ended.err.rfind('\n', at) + 1, 300);
       CHECK(said.starts_with("warning: body '"));
@@ -93,12 +93,12 @@ TEST_CASE("a damaged file of the cache is baked again, with a warning") {
     damage([](std::string& b) { b[b.size() / 2] ^= 4; });
   }
   SUBCASE("of an older format") {
-    // The number behind this name, as an older program would have left it.
+    // Change the version number behind this name, as if an older program had written the file.
     damage([](std::string& b) {
       std::size_t at = b.find("hapsix cached field 1");
       if (at == 0)
         b[20] = '0';
-      else {  // .ply: a comment in words
+      else {  // a .ply file has it in a comment
         at = b.find("comment hapsix");
         REQUIRE(at != std::string::npos);
         at = b.find('1', at);
@@ -111,7 +111,7 @@ TEST_CASE("a damaged file of the cache is baked again, with a warning") {
     damage([](std::string& b) { b = stl(box_facets(1)); });
   }
   SUBCASE("another's asset under this name") {
-    // Sound in themselves: the field of another scene, and the shell of another mesh.
+    // Valid files, but with the field of another scene and the shell of another mesh.
     Sandbox other;
     run(other, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.01", "--json"});
     REQUIRE(cached(other).size() == 1);
@@ -156,7 +156,7 @@ TEST_CASE("two programs that bake the same at once both succeed") {
   CHECK(cached(box).size() == 2);  // and no unfinished file
   CHECK(all_from_cache(one_object(run(box, kRun))));
 
-  // Also to the same output file.
+  // Two bakes may also write the same output file at the same time.
   spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 30)));
   const Args bake{"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", "128"};
   Process three(box, bake), four(box, bake);

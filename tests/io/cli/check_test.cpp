@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hapsix check from outside: what it says of meshes, scenes and fields, and how it exits.
+// Runs `hapsix check` on meshes, scenes and fields, and tests its output and its exit code.
 #include <cmath>
 #include <set>
 #include <string>
@@ -34,17 +34,17 @@ TEST_CASE(
   CHECK(near(plate["walls_voxels"]["p5"].get<double>(), 4, 1e-4));
   CHECK(near(plate["walls_voxels"]["median"].get<double>(), 4, 1e-4));
   CHECK(plate["gaps_voxels"].is_null());
-  CHECK(near(plate["holding_force_N"].get<double>(), 1e5 * 1e-3, 1e-3));  // to its middle
+  CHECK(near(plate["holding_force_N"].get<double>(), 1e5 * 1e-3, 1e-3));  // k times half thickness
   CHECK(plate["bricks_estimate"].get<int>() > 100);
   CHECK(plate["field_bytes_estimate"].get<double>() > 1e5);
   CHECK(plate["bake_seconds_estimate"].get<double>() > 0);
   CHECK(plate["warnings"].empty());
-  // With voxels as large as the plate is thick, it is said.
+  // Voxels as large as the plate is thick give a warning.
   const Json coarse = result_of(box, {"check", "plate.stl", "--units", "mm", "--voxel-size", "2"});
   REQUIRE(coarse["meshes"][0]["warnings"].size() == 1);
   CHECK(coarse["meshes"][0]["warnings"][0].get<std::string>().find("thinner than two voxels") !=
         std::string::npos);
-  // The same as text, one block a mesh.
+  // As text there is one block for each mesh.
   const Ended text = run(box, {"check", "plate.stl", "plate.stl", "--units", "mm"});
   CHECK(text.code == 0);
   CHECK(text.out.find("plate.stl: 12 triangles, closed") != std::string::npos);
@@ -83,7 +83,7 @@ TEST_CASE("a baked field is compared with its mesh: 0 when it agrees, 1 when it 
   CHECK(said["meshes"][0]["field"]["node_error_max"].get<double>() > 1);
   CHECK(run(box, with({"check", "other.stl"})).out.find("DISAGREES") != std::string::npos);
 
-  // And a field that is made for the purpose.
+  // Without a field file, check bakes one for the comparison.
   const Json fresh = result_of(box, {"check", "other.stl", "--units", "mm", "--voxels", "64",
                                      "--verify", "--points", "1000", "--far-points", "1000"});
   CHECK(fresh["agrees"] == true);

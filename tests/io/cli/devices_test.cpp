@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hapsix devices, and runs with devices that are not simulated, from outside.
+// Runs `hapsix devices`, and runs scenes with devices that are not simulated.
 #include <chrono>
 #include <cstdlib>
 #include <set>
@@ -16,7 +16,7 @@ namespace {
 
 const std::string plugins = HAPSIX_PLUGIN_FOLDER "/";
 
-// The other end of the UDP plug-in; killed with its object.
+// The process at the other end of the UDP plug-in. The destructor kills it.
 struct ArmProcess {
   explicit ArmProcess(int at = 0) {
     int ends[2];
@@ -99,7 +99,7 @@ TEST_CASE(
     CHECK(std::count(ended.err.begin(), ended.err.end(), '\n') == 1);
     CHECK(ended.err.size() < 600);
   }
-  // The same from a run, which has baked nothing by then where that can be known.
+  // A run refuses the device too, and before it bakes anything if it can.
   for (const auto& [device, code] :
        {std::pair<std::string, int>{"plugin:" + plugins + "bad_crash.so", 1}, {"plugin", 2}}) {
     const Ended ended = run(box, {"run", "box-on-wall", "--device", device, "--json"});
@@ -114,10 +114,10 @@ TEST_CASE("a check pushes along every axis with a tenth of the rating, and tells
       result_of(box, {"devices", "plugin:" + plugins + "template_device.so", "--test"});
   CHECK(json["name"] == "a handle on a spring");
   CHECK(json["passed"] == true);
-  REQUIRE(json["pushes"].size() == 6);  // it renders no torque
+  REQUIRE(json["pushes"].size() == 6);  // forces only, as the device renders no torque
   for (const Json& push : json["pushes"]) {
-    CHECK(push["applied"] == 1);  // of 10 N
-    CHECK(push["moved"] > 1e-3);  // 500 N/m
+    CHECK(push["applied"] == 1);  // [N], a tenth of the rating
+    CHECK(push["moved"] > 1e-3);  // [m]; 1 N on 500 N/m moves 2 mm
   }
   CHECK(json["samples"]["failed"] == 0);
   CHECK(json["samples"]["frames"] == 3500);
@@ -140,7 +140,7 @@ TEST_CASE("a run with a plug-in in real time; virtual time is refused") {
   const Json json =
       result_of(box, {"run", "box-on-wall", "--device", arm.device(), "--duration", "1"});
   CHECK(json["frames"] == 1000);
-  // A machine that holds the haptic thread up is not the device's fault.
+  // The device is not to blame if a busy machine held up the haptic thread.
   const std::string fault = json["fault"];
   CHECK_MESSAGE((fault == "none" || fault == "watchdog" || fault == "late"), fault);
   const Ended refused =
@@ -162,7 +162,7 @@ TEST_CASE("the process behind a plug-in is killed in a run: no more force, lost,
   CHECK(ended.code >= 0);  // it ended by itself
   const Json json = one_object(ended);
   CHECK(json["frames"] == 2500);
-  // Unless the machine held the haptic thread up before: then the output was at zero already.
+  // If a busy machine held up the haptic thread before, the output was at zero already.
   const std::string fault = json["fault"];
   CHECK_MESSAGE((fault == "device lost" || fault == "watchdog" || fault == "late"), fault);
   bool told = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hapsix experiments: the schema that other programs read, the report and recordings, mistakes.
+// Tests `hapsix experiments`: the JSON for other programs, the report, the recordings and errors.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -67,7 +67,7 @@ TEST_CASE("the same experiment gives the same figures, and -o writes a report an
   CHECK(info["whole"] == true);
 }
 
-// Minutes under ThreadSanitizer, and nothing that the others do not show it.
+// Skipped under ThreadSanitizer: it would take minutes, and other tests cover the same threads.
 TEST_CASE("studies say what they measured for every method" * doctest::skip(kThreadSanitized)) {
   Sandbox box;
   const Json result = result_of(box, {"experiments", "plate-share", "smoothness", "net-stiffness"});
@@ -85,14 +85,14 @@ TEST_CASE("studies say what they measured for every method" * doctest::skip(kThr
   }
   for (const char* share : {"0.10", "0.05", "0.02", "0.01"})
     CHECK(studies["plate-share"][share]["robust"]["verdict"] == "held");
-  // A continuous force changes a tenth as much in a tenth of the time; a jump does not.
+  // In a tenth of the time a continuous force changes a tenth as much, but a jump stays as large.
   const Json& edge = studies["smoothness"]["slide off an edge"];
   const auto shrinks = [&](const char* method) {
     return edge[method]["1ms"].get<double>() / edge[method]["0.1ms"].get<double>();
   };
   CHECK(shrinks("robust") > 5);
   CHECK(shrinks("gauss3") < 2);
-  // 144 parallel contacts in the engine are as stiff as METHOD.md says.
+  // METHOD.md gives these stiffnesses for 144 parallel contacts.
   const Json& wall = studies["net-stiffness"]["wall, 144"];
   CHECK(std::abs(wall["none"]["shares"].get<double>() - 144) < 0.1);
   CHECK(std::abs(wall["gauss3"]["derivative"].get<double>() - 1) < 0.02);
@@ -105,8 +105,8 @@ TEST_CASE("two inclined planes are as stiff as their normals say, whatever the w
   Sandbox box;
   const Json planes = result_of(box, {"experiments", "two-planes"})["studies"]["two-planes"];
   CHECK(planes["alpha"].size() == 9);
-  // Each plane's contacts are one for the paper's weights: 2 sin^2 and 2 cos^2, and as many times
-  // that as the shares of 64 add up to for the others.
+  // With the paper's weights the contacts of a plane count as one, so the stiffnesses are 2 sin^2
+  // and 2 cos^2. For the other methods they are larger by the sum of the shares of 64 contacts.
   CHECK(std::abs(planes["per_plane"]["gauss3"].get<double>() - 1) < 0.01);
   CHECK(std::abs(planes["per_plane"]["none"].get<double>() - 64) < 0.1);
   for (const char* method : {"none", "global", "gauss3", "gauss6", "robust"})

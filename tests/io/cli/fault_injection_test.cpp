@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults of devices, threads and processes, seen from the other end of the wire: this process plays
-// the device and hears every command and every stop, also the last ones of an engine that dies.
+// Injects faults of devices, threads and processes. This process plays the device, so it receives
+// every command and every stop, even the last ones of an engine that dies.
 //
-// The engine runs in a child process, in real time. A loaded machine can hold it up long enough for
-// its watchdog: a scenario then ends at zero like any other, only for another cause.
+// The engine runs in a child process, in real time. A busy machine can hold it up until its
+// watchdog acts: the force then ends at zero as it should, only for another cause.
 #include <doctest/doctest.h>
 
 #include <signal.h>
@@ -30,7 +30,7 @@
 #include "tests/support/box_on_floor.h"
 
 #if defined(__SANITIZE_THREAD__)
-// One of these processes exits in the midst of its loop on purpose: its thread is still there then.
+// One test makes the engine exit while its loop runs, so that its thread still exists at the exit.
 extern "C" const char* __tsan_default_options() { return "report_thread_leaks=0"; }
 #endif
 
@@ -38,7 +38,7 @@ using namespace h6::test;
 
 namespace {
 
-constexpr double kRating = 20, kRate = 2000;  // [N], [N/s]
+constexpr double kRating = 20, kRate = 2000;  // force limit [N], slew limit [N/s]
 
 using Clock = std::chrono::steady_clock;
 
@@ -47,26 +47,25 @@ double now_seconds() {
 }
 void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
 
-// What the two processes share: the wishes of this one.
+// Faults that this process wants from the engine's process, in shared memory.
 struct Wishes {
   std::atomic<bool> freeze{false}, no_number{false}, unplugged{false};
-  std::atomic<double> shift{0};        // of the pose [m]
-  std::atomic<int> stall_ms{0};        // once, in read; < 0: until it is 0 again
-  std::atomic<int> write_stall_ms{0};  // once, in write, after the command
+  std::atomic<double> shift{0};        // shift of the pose [m]
+  std::atomic<int> stall_ms{0};        // one stall in read; if < 0, it lasts until this is 0 again
+  std::atomic<int> write_stall_ms{0};  // one stall in write, after the command
   std::atomic<bool> arm{false}, crash{false}, exits{false}, destroys{false};
 };
 
-// What goes over the wire. A stop is one, too.
+// A message from the engine's process: a command, a stop or a report.
 struct Packet {
   enum Kind : int { kWrite, kStop, kReport } kind;
   double sent;  // [s]
   h6Vec3 force;
-  h6Cause cause;  // kReport: the latched one
+  h6Cause cause;  // the latched cause, in a report
   std::uint32_t causes;
 };
 
-// ---- the engine's process
-// ------------------------------------------------------------------------
+// ---- the engine's process ----------------------------------------------------------------------
 
 struct Driver {
   Wishes* wishes;
@@ -112,7 +111,7 @@ struct Driver {
   }
 };
 
-// As a program would: a signal handler of its own that halts every loop.
+// A signal handler as a program would have it: it halts every loop.
 void on_signal(int number) {
   h6HaltAll();
   signal(number, SIG_DFL);
@@ -140,7 +139,7 @@ void on_signal(int number) {
     pause_ms(1);
     if (wishes.arm.exchange(false)) h6ArmLoop(loop);
     if (wishes.crash.load()) {
-      // Nobody may write there; a null pointer would be the sanitizer's to report.
+      // Write to a protected page. A sanitizer would catch a null pointer first.
       void* const page = mmap(nullptr, 4096, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
       *static_cast<volatile int*>(page) = 1;
     }
@@ -155,8 +154,7 @@ void on_signal(int number) {
   }
 }
 
-// ---- the device's process: this one
-// --------------------------------------------------------------
+// ---- the device's process: this one ------------------------------------------------------------
 
 class Rig {
  public:
@@ -167,7 +165,7 @@ class Rig {
     wishes = new (shared) Wishes;
     int ends[2];
     REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends) == 0);
-    std::fflush(nullptr);  // else the child says it again
+    std::fflush(nullptr);  // else the child prints the buffered text again
     pid_ = fork();
     REQUIRE(pid_ >= 0);
     if (pid_ == 0) {
@@ -188,7 +186,7 @@ class Rig {
   Wishes* wishes;
   std::vector<Packet> heard;
 
-  // Listens until it holds, or for much longer than anything takes; false: it does not.
+  // Listens until the condition holds. Returns false if it does not hold in time.
   bool until(const std::function<bool()>& holds, double seconds = 20) {
     for (const double end = now_seconds() + seconds; now_seconds() < end;) {
       listen();
@@ -202,10 +200,11 @@ class Rig {
     while (recv(wire_, &packet, sizeof packet, MSG_DONTWAIT) == sizeof packet)
       heard.push_back(packet);
   }
-  // What the device renders: the last word counts.
+  // The force that the device renders, from the last message [N].
   double force() const { return heard.empty() ? 0 : norm(heard.back().force); }
   bool full() const { return force() > 4.9; }
-  // Armed and pushing. A machine that was too slow for the watchdog is armed again.
+  // Waits until the engine pushes with full force. If the machine was too slow for the watchdog, it
+  // arms the engine again.
   void push() {
     for (int tries = 0; tries < 100; ++tries) {
       if (until([&] { return full() && heard.size() > 50; }, 0.5)) return;
@@ -213,12 +212,12 @@ class Rig {
     }
     FAIL("no force");
   }
-  // The same after what was latched.
+  // Does the same after a latched fault.
   void push_again() {
     wishes->arm.store(true);
     push();
   }
-  // From here on; and what was said since.
+  // said() looks only at messages after the last mark().
   void mark() {
     listen();
     from_ = heard.size();
@@ -237,7 +236,7 @@ class Rig {
     }
     return true;
   }
-  // The trouble ends at zero, latched, for this reason, and stays there.
+  // Checks that the fault takes the force to zero for this cause, and that it stays there.
   void ends_at_zero(h6Cause cause) {
     CAPTURE(h6CauseName(cause));
     const double since = now_seconds();
@@ -251,7 +250,7 @@ class Rig {
     for (const Packet& p : heard) {
       if (p.kind == Packet::kReport) continue;
       REQUIRE(norm(p.force) <= kRating);
-      // A step away from nothing is never more than the slew limit.
+      // The force may grow only at the slew limit.
       REQUIRE(norm(p.force) - norm(last) <= kRate * 1e-3 * (1 + 1e-9));
       last = p.force;
     }
@@ -264,7 +263,7 @@ class Rig {
     listen();
     return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
   }
-  // Dead, its last word was nothing, and nothing more came.
+  // Checks that the engine stopped the device as its last message.
   void last_word_is_nothing() {
     REQUIRE(!heard.empty());
     CHECK(heard.back().kind == Packet::kStop);
@@ -364,7 +363,7 @@ TEST_CASE("the haptic thread hangs for good: the watchdog alone keeps the device
   rig.wishes->stall_ms = -1;
   CHECK(rig.until([&] { return rig.heard.back().kind == Packet::kStop; }));
   CHECK(rig.for_a_while([&] { return rig.heard.back().kind == Packet::kStop; }));
-  rig.wishes->stall_ms = 0;  // and when it comes back, it comes back with nothing
+  rig.wishes->stall_ms = 0;  // the thread runs on, but the force must stay zero
   CHECK(rig.until([&] { return rig.heard.back().kind == Packet::kWrite; }));
   CHECK(rig.for_a_while([&] { return rig.force() == 0; }));
   CHECK(rig.said(H6_CAUSE_WATCHDOG));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A disk that is full: one sentence that names the file, exit 1, and no half file.
+// On a full disk the program prints one sentence that names the file, exits with 1 and leaves no
+// half-written file.
 #include <cstdlib>
 #include <set>
 #include <sstream>
@@ -11,7 +12,7 @@ using namespace h6::test;
 
 namespace {
 
-constexpr rlim_t kRoom = 20'000;  // less than any file made here
+constexpr rlim_t kRoom = 20'000;  // [bytes], less than any file of these tests
 
 Ended run_out_of_room(Sandbox& box, const Args& args) {
   return Process(box, args, "", -1, kRoom).wait();
@@ -45,7 +46,7 @@ TEST_CASE("a bake onto a full disk says so and leaves no file, and the older one
       CHECK(ended.code == 1);
       CHECK(lines(ended.err, "hapsix: ") == 1);
       CHECK(ended.err.find(out) != std::string::npos);
-      CHECK(ended.err.find("unfinished") == std::string::npos);  // not a name anybody gave
+      CHECK(ended.err.find("unfinished") == std::string::npos);  // no name of a temporary file
       CHECK(ended.out.empty());
       CHECK(box.files() == before);
       if (there_before) CHECK(slurp(box.file(out)) == "older");
@@ -73,15 +74,14 @@ TEST_CASE("a recording that outgrows the disk ends the run with a sentence, and 
   CHECK(ended.code == 1);
   CHECK(lines(ended.err, "hapsix: ") == 1);
   CHECK(ended.err.find("run.h5") != std::string::npos);
-  CHECK(box.files() == std::set<std::string>{"run.h5.part"});  // no room for more than its log
+  CHECK(box.files() == std::set<std::string>{"run.h5.part"});  // only the log had room
   const Json info = result_of(box, {"info", "run.h5"});
   CHECK(info["kind"] == "recording");
   CHECK(info["whole"] == false);
   CHECK(box.files() == std::set<std::string>{"run.h5"});
 }
 
-// A file system of its own, as small as a disk with nothing left. In a mount namespace: it is gone
-// with its process, whatever happens here.
+// Mounts a tiny file system in a mount namespace, so that it goes away with its process.
 TEST_CASE("a real file system without room is told like any other full disk") {
   Sandbox box;
   const fs::path disk = box.file("disk");

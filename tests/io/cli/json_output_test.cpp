@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// --json: one object on stdout with the keys that other programs rely on; people's words on stderr.
+// Tests --json: stdout has one object with the keys that other programs rely on, and stderr has the
+// text for people.
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,7 +64,7 @@ TEST_CASE("bake says what it made, how long it took and what it found") {
   CHECK(shell["points"] == 500);
   CHECK(shell["file_bytes"] == fs::file_size(box.file("ball.ply")));
 
-  // An open mesh: the same keys, and a warning that is also said on stderr.
+  // An open mesh gives the same keys and a warning, which also goes to stderr.
   std::vector<Facet> open = sphere_facets(50, 20);
   open.resize(open.size() - 200);
   spill(box.file("open.stl"), stl(open));
@@ -124,7 +125,7 @@ TEST_CASE("a scene says how its arm talks, and what telemetry it wants") {
   }
   CHECK(hashes[0] != hashes[1]);
   CHECK(hashes[1] != hashes[2]);
-  // Only an arm does more than impedance.
+  // Only the device "arm" has other modes than impedance.
   const Ended refused = run(box, {"run", "scene/scene.json", "--device", "path", "--json"});
   CHECK(refused.code == 1);
   CHECK(refused.err.find("impedance mode only") != std::string::npos);
@@ -162,7 +163,7 @@ TEST_CASE("info knows every kind of file the program reads or writes") {
     CHECK(info["kind"] == kind);
     CHECK(info["file"] == file);
     has(info, keys);
-    // The words for people hold the same facts.
+    // The text for people states the same facts.
     const Ended plain = run(box, {"info", file, "--units", "mm"});
     CHECK(plain.code == 0);
     for (const std::string& key : keys) CHECK(plain.out.find(key) != std::string::npos);
@@ -202,7 +203,7 @@ TEST_CASE("without --json the result is on stdout and nothing else, and help goe
   CHECK(ended.code == 0);
   CHECK(ended.out.find("held") != std::string::npos);
   CHECK(ended.out.find("warning") == std::string::npos);
-  CHECK(ended.out.find("field of") == std::string::npos);  // how it was prepared: stderr
+  CHECK(ended.out.find("field of") == std::string::npos);  // preparation is reported on stderr
   CHECK(ended.err.find("field of wall") != std::string::npos);
   for (const Args& words : std::vector<Args>{{},
                                              {"bake"},

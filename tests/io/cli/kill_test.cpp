@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run of the program that is killed at any instant leaves its log: `info` turns that into a
-// recording and says so, and the frames in it replay to the bit.
+// A run that is killed at any time leaves its log. `info` turns the log into a recording and says
+// so, and its frames replay bit for bit.
 #include <algorithm>
 #include <memory>
 #include <random>
@@ -44,7 +44,7 @@ TEST_CASE("runs killed at random instants: info makes a recording of each, and i
     CHECK(info["whole"] == false);
     CHECK(std::string(info["repaired"]).find(v.file + ".part") != std::string::npos);
     CHECK_FALSE(fs::exists(log_of(v)));
-    CHECK(result_of(box, {"info", v.file})["repaired"] == "");  // nothing is left to do
+    CHECK(result_of(box, {"info", v.file})["repaired"] == "");  // the first `info` repaired it
     most = std::max(most, info["frames"].get<std::uint64_t>());
     if (info["frames"] == 0) continue;
     CHECK(info["event_counts"].is_object());

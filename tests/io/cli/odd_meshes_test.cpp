@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes that nobody means to make and everybody has: bakes, info and runs end with a clear result
-// or with one sentence, never otherwise.
+// Feeds defective meshes to bakes, info and runs. Each command must end with a clear result or with
+// one error sentence.
 #include <array>
 #include <functional>
 #include <limits>
@@ -79,9 +79,9 @@ Triangle with(double bad) { return {{{0, 0, 0}, {0.1, 0, 0}, {0, bad, 0}}}; }
 struct Odd {
   const char* file;
   std::string bytes;
-  const char* refused;  // words of the sentence, nullptr: it can be baked
-  const char* read;     // words of the sentence where it cannot even be read
-  const char* warned;   // words of a warning of both bakes, nullptr: none is asked for
+  const char* refused;  // words of the error sentence of a bake; nullptr if the bake succeeds
+  const char* read;     // words of the error sentence if the mesh cannot be read
+  const char* warned;   // words of a warning of both bakes; nullptr if none is required
 };
 
 std::vector<Odd> odd_meshes() {
@@ -116,7 +116,7 @@ std::vector<Odd> odd_meshes() {
   };
 }
 
-// The end of a command: no crash, no hang, and either success or one sentence.
+// Checks that a command did not crash or hang, and ended with success or one error sentence.
 void check_end(const Ended& ended, bool may_fail, bool may_succeed) {
   CAPTURE(ended.err);
   CHECK(ended.in_time);
@@ -187,7 +187,7 @@ TEST_CASE("a mesh far from its origin, in a file of doubles, has the field it ha
   }
   CHECK(far["voxel_size"].get<double>() ==
         h6::test::near(near["voxel_size"].get<double>()).epsilon(1e-5));
-  // Points of a shell are single precision: they cannot be right there, and that is said.
+  // Shell points have single precision, which is too coarse so far out. A warning must say so.
   const Json shell =
       result_of(sandbox, {"bake", "shell", "far.obj", "-o", "far.ply", "--points", "100"});
   REQUIRE(!shell["warnings"].empty());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// program.h - the program from outside: runs it as a user would, in a folder and with a cache of
-// its own, and tells what came out. Nothing of hapsix is linked.
+// program.h - runs the program as a user would, with a folder and a cache of its own, and returns
+// its exit code and output. It links nothing of hapsix.
 #pragma once
 #include <doctest/doctest.h>
 #include <fcntl.h>
@@ -45,17 +45,17 @@ inline void spill(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
 }
 
-// What a process left: its code, or minus the signal that ended it.
+// The result of a process. `code` is its exit code, or minus the signal that ended it.
 struct Ended {
   int code = 0;
-  bool in_time = true;  // false: it hung and was killed
+  bool in_time = true;  // false if it hung and was killed
   std::string out, err;
-  double cpu_seconds = 0;  // user and system: hardly changes with the load of the machine
+  double cpu_seconds = 0;  // user and system time; it hardly depends on the load of the machine
   double wall_seconds = 0;
 };
 
-// A folder that is gone with its object: the working folder of the processes started here. The
-// cache and what they print lie beside it, so `files` shows only what the program made.
+// The working folder of the processes that a test starts; the destructor removes it. Their cache
+// and their output lie beside it, so that `files` shows only files that the program made.
 class Sandbox {
  public:
   Sandbox() {
@@ -81,7 +81,7 @@ class Sandbox {
       found.insert(fs::relative(entry.path(), folder()).string());
     return found;
   }
-  // A new place for a stream of a process.
+  // A new file for an output stream of a process.
   fs::path stream() { return root_ / ("stream-" + std::to_string(streams_++)); }
 
  private:
@@ -89,8 +89,8 @@ class Sandbox {
   int streams_ = 0;
 };
 
-// A started program. `terminal` >= 0 (an end of a pty) becomes its stderr and
-// is closed here. `most_bytes` > 0: no file of it may become larger, as on a full disk.
+// A running program. `terminal` >= 0 (an end of a pty) becomes its stderr; the constructor closes
+// it here. `most_bytes` > 0 limits the size of its files, as on a full disk.
 class Process {
  public:
   Process(Sandbox& box, const Args& args, const std::string& cache = "", int terminal = -1,
@@ -106,11 +106,11 @@ class Process {
     pid_ = fork();
     REQUIRE(pid_ >= 0);
     if (pid_ != 0) {
-      if (terminal >= 0) close(terminal);  // else its reader would never see the end
+      if (terminal >= 0) close(terminal);  // else the reader would never see the end of the stream
       return;
     }
     setenv("HAPSIX_CACHE", keep.c_str(), 1);
-    signal(SIGINT, SIG_DFL);  // a job of a shell without job control inherits it ignored
+    signal(SIGINT, SIG_DFL);  // a shell without job control starts its jobs with SIGINT ignored
     redirect(open(out_.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
     redirect(terminal >= 0 ? terminal : open(err_.c_str(), O_WRONLY | O_CREAT, 0600),
              STDERR_FILENO);
@@ -126,9 +126,9 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   void send(int number) const { kill(pid_, number); }
-  // Whether it has come so far as to handle the signal itself.
+  // Whether the program has installed its handler for the signal.
   bool handles(int number) const {
-    std::error_code gone;  // before exec it is a copy of this process, with the handlers of this
+    std::error_code gone;  // before exec it is a copy of this process, with the same handlers
     if (!fs::equivalent("/proc/" + std::to_string(pid_) + "/exe", HAPSIX_PROGRAM, gone))
       return false;
     std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
@@ -137,14 +137,14 @@ class Process {
         return std::stoull(line.substr(7), nullptr, 16) >> (number - 1) & 1;
     return false;
   }
-  // Whether it has come to its end; wait() still tells what it left.
+  // Whether the program has ended. wait() still returns the result.
   bool ended() const {
     siginfo_t info{};
     return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            info.si_pid == pid_;
   }
-  // Its end, or SIGKILL after `limit` seconds: more than a busy machine takes; ThreadSanitizer has
-  // ten times as long, AddressSanitizer three times.
+  // Waits for the end and kills the program after `limit` seconds, which is ample on a busy
+  // machine. ThreadSanitizer gets ten times as long, AddressSanitizer three times.
   Ended wait(double limit = 100) {
     if (kSanitized) limit *= kThreadSanitized ? 10 : 3;
     Ended ended;
@@ -189,7 +189,8 @@ inline Ended run(Sandbox& box, const Args& args, const std::string& cache = "") 
   return Process(box, args, cache).wait();
 }
 
-// stdout as one JSON object and nothing else; null (and a failed check) when it is not.
+// Reads stdout, which must be one JSON object and nothing else. Otherwise a check fails and the
+// result is null.
 inline Json one_object(const Ended& ended) {
   const Json json = Json::parse(ended.out, nullptr, false);
   INFO("stdout: ", ended.out.substr(0, 500), "\nstderr: ", ended.err.substr(0, 500));
@@ -197,7 +198,7 @@ inline Json one_object(const Ended& ended) {
   return json.is_object() ? json : Json::object();
 }
 
-// Runs with --json, must succeed.
+// Runs the program with --json. It must succeed.
 inline Json result_of(Sandbox& box, Args args, const std::string& cache = "") {
   args.push_back("--json");
   const Ended ended = run(box, args, cache);
@@ -206,7 +207,7 @@ inline Json result_of(Sandbox& box, Args args, const std::string& cache = "") {
   return one_object(ended);
 }
 
-// Waits for a condition; false after `limit` seconds.
+// Waits until the condition holds. Returns false after `limit` seconds.
 template <class Condition>
 bool soon(Condition condition, double limit = 10) {
   for (double waited = 0; waited < limit; waited += 0.005) {
@@ -216,7 +217,7 @@ bool soon(Condition condition, double limit = 10) {
   return condition();
 }
 
-// --- meshes, written by hand: the library's own writer is not trusted here ----------------------
+// --- meshes, written by hand so that no test relies on the library's own writer -----------------
 
 using Corner = std::array<float, 3>;
 using Facet = std::array<Corner, 3>;

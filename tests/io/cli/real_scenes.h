@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// real_scenes.h - scenes made of real meshes, as files for the program: scene.json and hand.csv.
+// real_scenes.h - writes scenes of real meshes as files for the program: scene.json and hand.csv.
 //
-// The meshes come from $HAPSIX_TEST_DATA and are in metres, each pair in one assembled frame,
-// unless said otherwise. Every fixed part is a field, the part in the hand is a shell.
+// The meshes come from $HAPSIX_TEST_DATA. Unless a comment says otherwise, they are in metres and
+// both parts of a pair share one assembled frame. Every fixed part is a field; the part in the hand
+// is a shell.
 //
-// Stiffness: k such that half a voxel of depth, the coupling's largest force, is a newton or two;
-// k_VC = k/10. `half_size` sets the rotational stiffness k_VC half_size^2: the default, a lever of
-// 30 voxels, is only 3 mm at these voxels and lets a 50 mm peg lean on its hole's rim.
+// The coupling gives its largest force at half a voxel of penetration. The contact stiffness k
+// makes that force 1 to 2 N, and k_VC = k/10. `half_size` sets the rotational stiffness
+// k_VC half_size^2. The default lever of 30 voxels would be only 3 mm here, so that a 50 mm peg
+// could lean on the rim of its hole.
 #pragma once
 #include <array>
 #include <cmath>
@@ -35,7 +37,7 @@ inline std::array<double, 4> turn_about_z(double angle) {
 
 struct Grip {
   double contact_stiffness;  // k [N/m]
-  double half_size;          // of the part held [m]
+  double half_size;          // half size of the held part [m]
   double stiffness() const { return contact_stiffness / 10; }
   double rotational_stiffness() const { return stiffness() * half_size * half_size; }
 };
@@ -50,7 +52,7 @@ inline json shell_of(const std::string& name, const fs::path& mesh, json bake, c
   return {{"name", name}, {"mass", 0.1}, {"shell", bake}, {"pose", {{"p", at.p}, {"q", at.q}}}};
 }
 
-// The last body is the one in the hand. Answers the scene file.
+// The last body is the one in the hand. Returns the scene file.
 inline fs::path write_scene(const fs::path& folder, const json& bodies, const Grip& grip,
                             const HandPath& path) {
   fs::create_directories(folder);
@@ -73,11 +75,10 @@ inline fs::path write_scene(const fs::path& folder, const json& bodies, const Gr
   return folder / "scene.json";
 }
 
-// M16 nut on its bolt, pitch 2 mm, right-handed; both meshes' flanks, folded along the helix, are
-// 0.072 mm apart along the axis on either side. In the frame of the files the nut's lowest turn
-// runs into the thread's run-out (z = 16 to 18 mm): it starts three turns further up.
-// The bolt is closed, so its field has no offset. The nut is closed but for T-junctions (108 edges
-// between outer faces that are subdivided differently), which a shell does not mind.
+// An M16 nut on its bolt: pitch 2 mm, right-handed, with an axial play of 0.072 mm either way. In
+// the frame of the files the nut's lowest turn runs into the thread's run-out (z = 16 to 18 mm), so
+// the nut starts three turns further up. The bolt is closed, so its field has no offset. The nut
+// has T-junctions at 108 edges; a shell can be built all the same.
 namespace nut {
 constexpr double voxel = 1e-4, pitch = 2e-3, play = 0.072e-3, start = 6e-3;
 constexpr Grip grip{2e4, 7e-3};
@@ -91,12 +92,12 @@ inline fs::path write(const fs::path& data, const fs::path& folder, const HandPa
                 path.front())},
       grip, path);
 }
-// 10 mm up in a second, a rest, and back.
+// The hand goes up 10 mm in a second, rests, and comes back.
 inline HandPath pull() {
   return {{0, {0, 0, start}},          {0.2, {0, 0, start}}, {1.2, {0, 0, start + 0.01}},
           {1.7, {0, 0, start + 0.01}}, {2.7, {0, 0, start}}, {3.2, {0, 0, start}}};
 }
-// `turns` > 0 unscrews, in a second each; `lead` metres up per turn.
+// The hand makes one turn a second; `turns` > 0 unscrews. It rises by `lead` metres per turn.
 inline HandPath turn(double turns, double lead) {
   HandPath path;
   const double steps = std::ceil(std::abs(turns)) * 100;
@@ -110,16 +111,17 @@ inline HandPath turn(double turns, double lead) {
 }
 }  // namespace nut
 
-// The medium gear and the middle post of its base. The fit is 0.0125 mm a side (bore 5.000 mm,
-// post 4.987 mm): a sixteenth of a voxel. A field without an offset resolves it, its error on this
-// cylinder is voxel^2/(8 R) = 0.001 mm. The base has T-junctions, 68 edges, so it counts as open
-// and would be moved out by 0.9 voxel: the gear then comes to rest on top of the post, at
-// z = 20.8 mm. Offset 0 is right here: no hole is wider than rounding, nothing leaks.
+// The medium gear and the middle post of its base. The clearance is 0.0125 mm a side (bore radius
+// 5.000 mm, post radius 4.987 mm), a sixteenth of a voxel. A field without an offset resolves it:
+// its error on this cylinder is voxel^2/(8 R) = 0.001 mm. The base has T-junctions at 68 edges, so
+// it counts as open, and the default offset of 0.9 voxel would keep the gear on top of the post.
+// The scene sets the offset to 0; no gap of the mesh is wider than rounding, so nothing leaks.
 namespace gear {
 constexpr double voxel = 2e-4, start = 22e-3;
 constexpr Grip grip{2e4, 20e-3};
 constexpr double max_force = grip.contact_stiffness * voxel / 2;  // 2 N
-// Lowered 2 mm below its seat until 1.5 s, pushed sideways until 2.2 s, back, and drawn off.
+// The hand goes down to 2 mm below the seat until 1.5 s, pushes sideways until 2.2 s, comes back
+// and draws the gear off.
 constexpr double seated = 1.49, pushed = 2.19, lifting = 3.0;
 
 inline fs::path write(const fs::path& data, const fs::path& folder) {
@@ -137,14 +139,15 @@ inline fs::path write(const fs::path& data, const fs::path& folder) {
 }
 }  // namespace gear
 
-// A 16 mm peg (r = 7.997 mm) in its hole (r = 8.250 mm, 9 mm deep). The hole goes through: a plate
-// under it is the floor. The hole has T-junctions, 36 edges, and counts as open: the default offset
-// of 0.9 voxel stands, and of 0.253 mm clearance 0.163 mm remain.
+// A 16 mm peg (r = 7.997 mm) in its hole (r = 8.250 mm, 9 mm deep). The hole goes through, and a
+// plate under it is the floor. The part with the hole has T-junctions at 36 edges, so it counts as
+// open and gets the default offset of 0.9 voxel. Of the clearance of 0.253 mm, 0.163 mm remain.
 namespace peg {
 constexpr double voxel = 1e-4, start = 15e-3, clearance = 0.253e-3 - 0.9 * voxel;
 constexpr Grip grip{2e4, 25e-3};
 constexpr double max_force = grip.contact_stiffness * voxel / 2;  // 1 N
-// Lowered 2 mm below the floor until 1.2 s, pushed sideways until 2 s, back, and drawn out.
+// The hand goes down to 2 mm below the floor until 1.2 s, pushes sideways until 2 s, comes back and
+// draws the peg out.
 constexpr double seated = 1.19, pushed = 1.99, lifting = 2.8;
 
 inline void write_floor(const fs::path& file) {
@@ -173,14 +176,14 @@ inline fs::path write(const fs::path& data, const fs::path& folder) {
 }
 }  // namespace peg
 
-// The whole robot as a soup of 377,205 triangles, 512 voxels of 1.9 mm, and a ship's anchor whose
-// file says no unit: read as centimetres it is 9 cm long, its thinnest part (the ring) as thick as
-// a voxel. Crown down, between two sensors on the trunk's lid (z = 781 mm): a fluke meets the side
-// of one on the way.
+// A whole robot, a soup of 377,205 triangles at 512 voxels of 1.9 mm, and a ship's anchor. The file
+// of the anchor states no unit. Read as centimetres the anchor is 9 cm long, and its thinnest part,
+// the ring, is as thick as a voxel. It goes crown down between two sensors on the trunk's lid
+// (z = 781 mm); on the way a fluke meets the side of one sensor.
 namespace anchor {
 constexpr double lid = 0.781, crown = 0.08137, gap = 0.02;
 constexpr Grip grip{2e3, 45e-3};
-// 60 mm down from 20 mm above the lid until 1.6 s, and back.
+// The hand starts 20 mm above the lid, goes 60 mm down until 1.6 s, and comes back.
 constexpr double pushed = 1.59;
 
 inline fs::path write(const fs::path& data, const fs::path& folder) {
