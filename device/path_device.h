@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// path_device.h - a hand that follows its path whatever force it feels, like an infinitely strong
-// person.
+// path_device.h - a hand that follows its path regardless of the force it feels, like an infinitely
+// strong person.
 #pragma once
 #include <memory>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_hand.h - a hand that repeats the samples of an earlier run to the bit, whatever force it
-// feels; after the last sample it rests there.
+// recorded_hand.h - a hand that repeats the samples of an earlier run bit for bit, regardless of
+// the force it feels; after the last sample it rests there.
 #pragma once
 #include <memory>
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scripted_hand.h - a hand that follows a text, line by line:
+// scripted_hand.h - a hand that executes the lines of a text:
 //
 //   move DX DY DZ in SECONDS      straight, world frame, in the text's unit of length
 //   turn RX RY RZ in SECONDS      about the grip: a rotation vector, world frame [degrees]

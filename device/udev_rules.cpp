@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same text as device/udev/70-hapsix.rules, for users who have only the program. A test
+// Holds the text of device/udev/70-hapsix.rules, for users who have only the program. A test
 // compares them.
 #include "device/hid_port.h"
 

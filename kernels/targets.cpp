@@ -42,7 +42,7 @@ std::int64_t machine_targets() {
 
 std::int64_t home_targets = 0;  // of force_target(nullptr); 0: the best of the machine
 
-// The one of `targets` with this name, 0 when there is none.
+// The target with this name among `targets`; 0 when there is none.
 std::int64_t target_in(std::int64_t targets, const char* name) {
   for (std::int64_t left = targets; left != 0; left &= left - 1)
     if (std::strcmp(name, hwy::TargetName(left & -left)) == 0) return left & -left;

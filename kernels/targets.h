@@ -17,8 +17,8 @@ const char* target_name();
 std::size_t supported_targets(const char** names, std::size_t capacity);
 
 // Makes every kernel run on this target from now on. Null: on the one that HAPSIX_SIMD named, else
-// on the best. False, and nothing changes, when this machine or build does not have the target. Not
-// while kernels run.
+// on the best. Returns false, and changes nothing, when this machine or build does not have the
+// target. Must not be called while kernels run.
 bool force_target(const char* name);
 
 // Forces the target that the environment variable HAPSIX_SIMD names. For the main of a program: a

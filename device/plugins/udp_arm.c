@@ -56,7 +56,7 @@ static void send_command(Device* d, uint32_t motors, const h6PluginCommand* from
     memcpy(c.torque, from->torque, sizeof c.torque);
   }
   if (d->waits == 0) d->waits = now();
-  /* When nobody listens or a queue is full, samples fail to come, and read reports that. */
+  /* When nobody listens or a queue is full, no samples arrive, and read reports that. */
   (void)!send(d->socket, &c, sizeof c, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 

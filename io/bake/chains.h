@@ -102,8 +102,8 @@ inline constexpr int kStepsAPass = 3;
 class Chains {
  public:
   // `rows`: the rows that hold chains. `buried` (must outlive this): the rows with a buried sheet
-  // in or beside them; chains pass through rows that neither hold chains nor are buried. Without
-  // `buried`, chains pass only through rows that hold chains.
+  // in or beside them; chains pass through rows that neither hold chains nor are in `buried`.
+  // Without `buried`, chains pass only through rows that hold chains.
   Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
          const std::vector<std::uint8_t>& rows, unsigned threads,
          const std::vector<std::uint8_t>* buried = nullptr);

@@ -154,7 +154,7 @@ struct Features {
 // features.cpp
 void find_features(const Surface& surface, unsigned threads, Features& out);
 
-// The bricks near triangles, one row each in the order of cells, and what is known of their nodes.
+// The bricks near triangles, one row each in the order of cells, with the data of their nodes.
 struct NarrowBand {
   Tiles tiles;
   Features features;                   // of the surface, for measure_tile
@@ -223,7 +223,8 @@ std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const 
 
 class Chains;  // chains.h
 
-// inside.cpp: which rows the field needs, and what their signed distances need besides u.
+// inside.cpp: the rows that the field needs, and the data beside u that their signed distances
+// need.
 struct Inside {
   std::vector<std::uint8_t> needed;  // (rows) has a node of a cell within the band
   Masks in_sight;                    // (rows) nodes not in R, but on R's side of the sheet

@@ -62,7 +62,8 @@ Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, doubl
 Masks behind_holes(const Grid& grid, const NarrowBand& band, double radius, unsigned threads,
                    Masks& open) {
   Masks near = open;
-  // The corner of three walls is (sqrt 3 - 1) radii from the ball: sqrt 3 times as many steps.
+  // The corner of three walls is (sqrt 3 - 1) radii from the ball, which takes sqrt 3 times as many
+  // steps.
   const int steps = int(std::ceil(1.27 * radius)) + 1;
   for (int i = 0; i < steps; ++i) {
     const Masks next = neighbours(grid, band, near, threads);

@@ -22,8 +22,9 @@ class RayVotes {
   Side side(const Vec3& place, Dice& dice) const;
 
   // Whether a ball of radius `clearance` [m] (0: a point) finds a way far outside that touches no
-  // triangle, by up to `runs` straight runs in random directions, each from somewhere along the one
-  // before. True is a proof. False is none, since the search easily misses a narrow way.
+  // triangle. It makes up to `runs` straight runs in random directions, each from a random place
+  // along the one before. True is a proof. False proves nothing, because the search easily misses a
+  // narrow way.
   bool way_out(const Vec3& place, double clearance, int runs, Dice& dice) const;
 
  private:

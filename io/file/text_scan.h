@@ -35,7 +35,8 @@ class TextScan {
   std::size_t line_ = 0, joined_ = 0;
 };
 
-// Null when the word is a number, else what is wrong with it: "line 3: " + quoted(word) + fault.
+// Null when the word is a number, else the fault that completes the sentence "line 3: " +
+// quoted(word) + fault.
 const char* parse_number(std::string_view word, double& value);
 const char* parse_number(std::string_view word, std::int64_t& value);
 

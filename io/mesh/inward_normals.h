@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// inward_normals.h - the normals of a mesh that point into the body, whatever its winding.
+// inward_normals.h - the normals of a mesh that point into the body, for any winding.
 #pragma once
 #include <string>
 #include <vector>

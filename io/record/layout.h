@@ -66,7 +66,8 @@ struct Span {
   const std::byte* from;
   std::size_t bytes;
 };
-// And back: the compressed chunks, in the order of columns(). False when the sizes do not add up.
+// The inverse: the compressed chunks, in the order of columns(). False when the sizes do not add
+// up.
 bool find_chunks(const std::vector<std::byte>& payload, std::vector<Span>& chunks);
 
 // Any HDF5 object, released at the end of the scope.

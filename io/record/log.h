@@ -42,7 +42,7 @@ struct EventRow {
   char what[event_what_bytes], detail[event_detail_bytes];  // filled with NULs
 };
 
-// The file that a symbolic link names: that one is written and has its log beside it.
+// The file that a symbolic link names. That file is written and has its log beside it.
 std::filesystem::path followed(const std::filesystem::path& file);
 std::filesystem::path part_of(const std::filesystem::path& file);  // OUT.part
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// to_hdf5.h - the log of a run becomes an HDF5 file. Private.
+// to_hdf5.h - turns the log of a run into an HDF5 file. Private.
 #pragma once
 #include <filesystem>
 

@@ -178,8 +178,8 @@ class Bake {
     pulse_.step("spreading points", 0.4, 0.8);
     Result<Candidates> samples = sample_zero_set(*field_, demand(), pulse_);
     if (!samples) return samples;
-    // First half as many again as are wanted, at the grid's accuracy; then those move exactly to
-    // the surface.
+    // Chooses 1.5 times the wanted number at the grid's accuracy, then moves these points exactly
+    // to the surface.
     const Thinned some = thinned(*samples, demand().spacing * 0.8, options_.points * 3 / 2);
     if (some.cancelled) return cancelled_;
     for (std::size_t i = 0; i < some.chosen.size(); ++i) {

@@ -84,7 +84,7 @@ HWY_INLINE std::uint64_t bricks_met(const DistanceFacet& f, const FacetRegion& r
   constexpr float kBrickHalf[3] = {3.5f, 3.5f, 3.5f};
   const D d;
   const hn::RebindToSigned<D> d32;
-  // For one brick the test costs as much as the work it saves.
+  // For a single brick the test costs as much as it saves.
   const bool all = r.everywhere || (bricks & (bricks - 1)) == 0;
   Gains gain = {};
   if (!all) set_gains(f, r, kBrickHalf, gain);

@@ -13,7 +13,7 @@ struct Touching {
   float *distance, *gx, *gy, *gz;
 };
 
-// Which points of each group are sampled, and what is learnt of the group.
+// Which points of each group are sampled, and what their samples tell about the group.
 struct GroupLook {
   const std::uint16_t* rows;  // bit i: point i of the group is sampled; null: all are
   float* least;               // the smallest sampled distance, infinity when none is sampled

@@ -27,8 +27,8 @@ constexpr std::size_t kLanes = hn::MaxLanes(DF());
 // of axis-parallel walls fall on different places. The second direction is perpendicular to it.
 constexpr float kLine[3] = {0.6104f, -0.3702f, 0.7003f};
 constexpr float kAcross[3] = {-0.7690f, -0.0652f, 0.6359f};
-constexpr std::size_t kSorted = 48;       // contacts from which sorting pays
-constexpr std::size_t kManyBands = 4096;  // contacts of a product from which several bands pay
+constexpr std::size_t kSorted = 48;       // fewest contacts for which sorting pays
+constexpr std::size_t kManyBands = 4096;  // fewest for several bands of a product
 
 // ---- order
 

@@ -29,7 +29,7 @@ struct BandRuns {
 };
 
 struct GaussBands {
-  const float* column[3];  // as they came
+  const float* column[3];  // in the caller's order
   float width;
   bool geodesic;               // as of GaussWidths
   bool order_only;             // only the order is wanted, no sums

@@ -19,8 +19,8 @@ using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kParts = kBandBlock / kLanes;  // vectors that hold a block
 
-// Hats that are summed before they join the total, so that rounding grows with the number of such
-// sums and not of hats.
+// The number of hats that are summed before they are added to the total. Rounding then grows with
+// the number of such sums, not with the number of hats.
 constexpr std::size_t kFresh = 128;
 
 // A block, a lane for each item.

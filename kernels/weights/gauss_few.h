@@ -7,7 +7,7 @@ namespace h6::kernels {
 
 inline constexpr std::size_t kGaussFew = 128;  // contacts at most
 
-// Arguments as of gauss_weights_ref, which is the specification. weight (count).
+// Takes the arguments of gauss_weights_ref, which is the specification. weight (count).
 void gauss_weights_few(const DirectionsView& c, Hat hat, const GaussWidths& widths, float* weight);
 
 }  // namespace h6::kernels

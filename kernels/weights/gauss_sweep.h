@@ -23,7 +23,7 @@ inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536
 
 // The pairs of a product of two hats.
 struct GaussPairs {
-  const float* column[6];  // as they came
+  const float* column[6];  // in the caller's order
   float width[2];
   float *at[6], *share;                                    // in order of the bands
   float *fresh[kGaussSweepParts], *sum[kGaussSweepParts];  // part by part
@@ -44,14 +44,14 @@ struct GaussSweep {
 // Bytes of `memory`, any alignment.
 std::size_t gauss_sweep_bytes(std::size_t count, Hat hat);
 
-// Arguments as of gauss_weights_ref. weight (count).
+// Takes the arguments of gauss_weights_ref. weight (count).
 GaussSweep gauss_sweep(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
                        float* weight);
 std::size_t gauss_sweep_slices(const GaussSweep& sweep, int stage);
 void gauss_sweep_run(const GaussSweep& sweep, int stage, std::size_t slice);
 
-// After stage 0: whether the pairs cost less than gauss_tree. The tree cannot do angles, which are
-// no quadratics.
+// After stage 0: whether the pairs cost less than gauss_tree. The tree cannot do angles, because
+// they are not quadratic.
 inline bool gauss_sweep_pays(const GaussSweep& sweep) {
   if (sweep.bands[0].geodesic) return true;
   const std::uint64_t each = sweep.hat == Hat::product ? kGaussSweepPairs6 : kGaussSweepPairs3;

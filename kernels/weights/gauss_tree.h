@@ -32,7 +32,7 @@ struct GaussLevel {
 // The density of one hat, over one sphere or the product of both.
 struct GaussDensity {
   int axes;                // 3, or 6: N and T
-  const float* column[6];  // as they came
+  const float* column[6];  // in the caller's order
   float width[2];
   bool unit;  // all s_j are 1
   // In order of the curve, leaf by leaf: 16 of each column, then 16 times s_j over the largest s.
@@ -41,7 +41,7 @@ struct GaussDensity {
   std::uint64_t* order[2];
   GaussLevel level[kGaussLevels];
   int levels;
-  float* phi;  // as contacts came
+  float* phi;  // in the contacts' order
 };
 
 struct GaussTree {
@@ -56,7 +56,8 @@ struct GaussTree {
 // Bytes of `memory`: at most 120 a contact and 20,000, any alignment.
 std::size_t gauss_tree_bytes(std::size_t count, Hat hat);
 
-// Arguments as of gauss_weights_ref, geodesic excepted: that is not a quadratic. weight (count).
+// Takes the arguments of gauss_weights_ref, except geodesic, which is not quadratic. weight
+// (count).
 GaussTree gauss_tree(const DirectionsView& c, Hat hat, const GaussWidths& widths, void* memory,
                      float* weight);
 std::size_t gauss_tree_slices(const GaussTree& tree, int stage);

@@ -91,7 +91,7 @@ HWY_INLINE Rows root(const Rows& r) {
   return each([&](std::size_t p) HWY_ATTR { return hn::Sqrt(r.part[p]); });
 }
 
-// Makes a node without share, which is never near anything.
+// Makes a node without share, which is far from every target.
 HWY_INLINE void clear(const GaussDensity& g, const GaussLevel& level, std::size_t node) {
   for (int k = 0; k < g.axes; ++k) level.centre[k][node] = level.rest[k][node] = 0;
   for (int s = 0; s < g.axes / 3; ++s) level.radius[s][node] = 0;

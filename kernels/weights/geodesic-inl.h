@@ -19,8 +19,8 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// epsilon^2 - angle^2, cut at 0, from epsilon^2 - chord^2. An angle is never below its chord, so a
-// contact within epsilon by the angle is also within epsilon by the chord.
+// epsilon^2 - angle^2, cut at 0, from epsilon^2 - chord^2. An angle is never smaller than its
+// chord, so a contact within epsilon by the angle is also within epsilon by the chord.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V geodesic_hat(D d, V width2, V below_edge) {
   const V chord2 = hn::Max(hn::Sub(width2, below_edge), hn::Zero(d));

@@ -28,7 +28,7 @@ using DF = hn::Rebind<float, DD>;
 using VD = hn::Vec<DD>;
 
 constexpr float kDoubt = 1e-5f;  // a hundred times the rounding of a sum of some ten floats
-constexpr std::size_t kManyToStart = 256;  // contacts from which a start is worth its time
+constexpr std::size_t kManyToStart = 256;  // fewest contacts for which a start is worth its time
 
 HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
   return hn::PromoteTo(DD(), load_n(DF(), column + first, live));

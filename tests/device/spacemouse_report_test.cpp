@@ -139,7 +139,8 @@ TEST_CASE("a million random reports: states stay in range, ignored reports chang
     if (kind == ReportKind::ignored) wrong += !(s == before);
   }
   CHECK(wrong == 0);
-  for (const std::size_t n : taken) CHECK(n > 10000);  // the fuzzer reached every kind of report
+  for (const std::size_t n : taken)
+    CHECK(n > 10000);  // the random bytes reached every kind of report
 }
 
 TEST_CASE("reading random and damaged descriptors always ends") {

@@ -137,7 +137,7 @@ TEST_CASE("a command is answered by the next frame at 1 kHz; the round trip is p
     const std::uint32_t sent = s.sequence;
     const auto begun = Clock::now();
     plugin->write(device, 0, &command);
-    if (i % 7 != 0) continue;  // most answers wait for the next frame, some are waited for
+    if (i % 7 != 0) continue;  // most answers are read in the next frame; every seventh is awaited
     while (plugin->read(device, 0, &s) == 0 && s.sequence == sent &&
            Clock::now() - begun < std::chrono::milliseconds(5)) {
     }

@@ -43,7 +43,7 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Those of the machine, or the one that HAPSIX_SIMD names.
+// The targets of the machine, or the one that HAPSIX_SIMD names.
 inline std::vector<std::string> all_targets() {
   if (const char* forced = std::getenv("HAPSIX_SIMD"); forced && *forced) return {forced};
   const char* names[32];
@@ -78,7 +78,7 @@ class Column {
     return data_.data() + (64 - address % 64) % 64 / sizeof(float) + shift_;
   }
   float& operator[](std::size_t i) { return begin()[i]; }
-  // Nothing but rows 0..count-1 was written.
+  // Whether only rows 0..count-1 were written.
   bool padding_untouched() {
     for (const float& v : data_) {
       const bool inside = &v >= begin() && &v < begin() + count_;

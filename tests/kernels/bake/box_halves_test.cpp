@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Halving boxes: the axis of the specification, whatever the count.
+// Halving boxes picks the axis that the specification picks, for any number of boxes.
 #include "kernels/bake/box_halves.h"
 
 #include <doctest/doctest.h>

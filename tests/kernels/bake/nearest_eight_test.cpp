@@ -305,7 +305,7 @@ TEST_CASE("nearest_search: what looking at every triangle finds, from any start,
       CHECK(std::sqrt(exact) <= std::sqrt(double(found.above)) + 1e-4);
       nearest_search(tree, p, nullptr, 0, -1, &nothing);
       CHECK((nothing.place == 7) == (all.squared >= 1e-3f));
-      // Content with what the first leaf has, or not.
+      // A search stops at the first leaf if that is near enough; else it finds the nearest of all.
       NearestFound first{1e12f, 0, 0}, content{1e12f, 0, 0}, never{1e12f, 0, 0};
       nearest_search(tree, p, start, 1, 1e11f, &first);
       CHECK(first.place / 8 == start[0]);

@@ -185,7 +185,7 @@ TEST_CASE("contact_wrench: contacts that carry nothing may be most of them, wher
         Contacts c = random_contacts(700, 3, 40 + apart);
         WrenchParameters p = kMoving;
         if (still) p.damping = 0;
-        // By their weight, or by their depth.
+        // Contacts lose their load by their weight or by their depth.
         for (std::size_t i = 0; i < c.count; ++i)
           if (i % apart != apart / 2) c.column[i / 32 % 2][i] = 0;
         for (const bool exact : {false, true}) {

@@ -157,7 +157,7 @@ TEST_CASE("field_layout: distances beyond the range of an int16 are clamped") {
   CHECK(distance_at(field, {0, 3, 3}) == h6::test::near(-32).epsilon(1e-4));
   CHECK(distance_at(field, {15, 3, 3}) == h6::test::near(32).epsilon(1e-4));
   CHECK(distance_at(field, {4, 3, 3}) == 0.0f);
-  // And those of far cells to theirs: 1024 voxels.
+  // Bounds of far cells are clamped to their own range: 1024 voxels.
   const AnalyticField wide(4, 1, 1, [](const Point& p) { return 5000.0 + p.x; });
   CHECK(distance_at(wide, {10, 3, 3}) == h6::test::near(1024).epsilon(1e-3));
 }

@@ -58,7 +58,7 @@ float distance_at(const AnalyticField& field, double x, double y, double z) {
   return sample(sample_field, field, kIdentity, p, nullptr, 1, false).distance[0];
 }
 
-// Distance of the nearest of v's planes spaced by `step`.
+// The distance from v to the nearest of the planes that are `step` apart.
 double to_plane(double v, double step) { return std::fabs(v - step * std::nearbyint(v / step)); }
 
 double to_faces(const double q[3], double step) {

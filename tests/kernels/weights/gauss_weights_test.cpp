@@ -120,7 +120,7 @@ TEST_CASE("gauss weights: the product hat tells torque directions apart, the nor
   on_every_way(c.count, [&](const auto& weights) {
     CHECK(weights(c.view(true), Hat::product, kRobust)[0] == h6::test::near(1.0));
     CHECK(weights(c.view(true), Hat::normal, kRobust)[0] == h6::test::near(0.5));
-    // As printed: 2 / (2 + 1).
+    // Eq. (10)-(12) as printed give 2 / (2 + 1).
     CHECK(weights(c.view(true), Hat::sum, kRobust)[0] == h6::test::near(2.0 / 3));
   });
 }

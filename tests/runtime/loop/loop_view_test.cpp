@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a viewer sees of a running loop, and what it may change: settings and pace.
+// A viewer sees a running loop and may change its settings and pace.
 #include <doctest/doctest.h>
 
 #include <algorithm>

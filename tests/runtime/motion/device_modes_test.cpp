@@ -182,7 +182,7 @@ TEST_CASE("admittance: stable with a stiff person behind 5 ms of delay, free and
         CAPTURE(target);
         CHECK(speed < 1e-4);
         CHECK(swing < 1e-6);
-        // At rest: the person's pull is what the floor gives back.
+        // At rest the person's pull and the floor's push are equal.
         if (target > 10 * mm)
           CHECK(scene.told.pose.p.z == h6::test::near(target).epsilon(1e-5));
         else
