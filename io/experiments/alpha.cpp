@@ -11,7 +11,7 @@ constexpr int kPushes = 20;
 
 struct Force {
   const char* name;
-  double newtons;  // 0: k times half a voxel
+  double newtons;  // 0: contact stiffness times half a voxel
 };
 constexpr Force kForces[] = {{"20 N", 20}, {"half a voxel's force", 0}};
 

@@ -8,8 +8,9 @@
 namespace h6::cli {
 namespace {
 
-// A closed cycle: down while tilted, flat while down, up while flat (or the other way round). Work
-// done by the contacts, in peaks of the work done against them.
+// The box goes down tilted, turns flat while it is down, and goes up flat (or the other way round).
+// Returns the contacts' net work over this closed cycle, divided by the greatest work done against
+// them on the way.
 double cycle_work(const io::LoadedScene& loaded, const MethodColumn& method, bool reverse) {
   Probe probe(loaded, method);
   if (!probe) return 0;
@@ -27,7 +28,8 @@ double cycle_work(const io::LoadedScene& loaded, const MethodColumn& method, boo
       tilt = 0.05 * (2 - 3 * u);
     else
       z = 4.6 + 3.6 * (u - 2.0 / 3);
-    const h6Vec3 p = {0, 0, z * kMm}, turn = {0.5 * tilt, tilt, 0};  // one axis: angles add up
+    // One fixed axis, so angles add up.
+    const h6Vec3 p = {0, 0, z * kMm}, turn = {0.5 * tilt, tilt, 0};
     const h6Wrench f = elastic_wrench(probe.at({p, turn_by(turn)}), kProbeStiffness);
     if (i > 0) {
       work += 0.5 * dot(f.force + last.force, p - last_p) +
@@ -39,15 +41,15 @@ double cycle_work(const io::LoadedScene& loaded, const MethodColumn& method, boo
   return stored > 0 ? work / stored : 0;
 }
 
-// A tilted box falls 3 mm and bounces for 2 s: its highest energy, in its first.
+// A tilted box falls 3 mm and bounces for 2 s. Returns its greatest energy over its initial energy.
 double bounce_peak(const io::LoadedScene& loaded, const MethodColumn& method, double damping,
                    int integrator, bool passivity = false) {
   h6SessionDef def = loaded.session_def();
   method.apply(def.contact);
   def.contact.damping = damping;
   def.contact.passivity = passivity;
-  // The same net stiffness on the flat for all: those that add contacts up get a share.
-  // (Points are 1 mm apart: no two are one cluster.)
+  // All methods get the same net stiffness on a flat wall, so the contacts of methods that do not
+  // share the load get a share of it. The points are 1 mm apart, so each is its own cluster.
   if (method.method == "none" || method.method == "cluster") def.contact.stiffness /= 400;
   if (def.contact.method == H6_METHOD_GLOBAL) def.contact.stiffness /= def.contact.global_n0;
   def.integrator = static_cast<h6Integrator>(integrator);

@@ -9,7 +9,7 @@ namespace {
 struct Claim {
   const char* scene;
   const char* figure;
-  const char* says;  // the paper, about global scaling
+  const char* says;  // the paper's claim about global scaling
 };
 constexpr Claim kClaims[] = {
     {"cone-in-gap", "Fig. 3", "the cone slides in under the ceiling"},
@@ -34,7 +34,7 @@ constexpr Variant kVariants[] = {
 
 bool fails(const RunFigures& run) { return !run.moved_on() || run.max_depth_voxels > 0.5; }
 
-// For scenes in which n0 = 10 does not fail: names what fails there.
+// For a scene in which n0 = 10 does not fail, a sentence with the variants of `global` that do.
 std::string why_held(const Claim& claim, const std::vector<RunFigures>& runs) {
   if (fails(runs[0])) return "";
   std::string found;

@@ -7,13 +7,13 @@ namespace h6::cli {
 
 using Loaded = std::unique_ptr<io::LoadedScene>;
 
-// A table's head: what the rows are, then the names of the columns.
+// A table with its head only: `first` names the rows, the other cells name the columns.
 TextTable head(const std::string& first, const std::vector<MethodColumn>& columns);
 
 // Loads the scenes in order; a scene that fails is null.
 std::vector<Loaded> load_all(std::vector<io::Scene> scenes);
 
-// Scene s with column m is at [s][m].
+// The run of scene s with column m is at [s][m].
 using RunGrid = std::vector<std::vector<RunFigures>>;
 RunGrid run_grid(const std::vector<Loaded>& scenes, const std::vector<MethodColumn>& columns,
                  const std::string& label, const Console& console);

@@ -10,7 +10,7 @@ namespace h6::cli {
 namespace {
 
 constexpr int kDelays = 3;  // 0, 1 and 2 frames
-constexpr int kSteps = 20;  // of a gain, by a factor of sqrt(2) each
+constexpr int kSteps = 20;  // steps of a gain up or down, each by a factor of sqrt(2)
 constexpr double kStep = 1.4142135623730951;
 
 enum class Gain { coupling, hand };
@@ -42,7 +42,7 @@ RunFigures run_mode(const io::LoadedScene& loaded, const MethodColumn& method, c
   change.device = "arm";
   change.arm.emplace();
   change.arm->delay_frames = delay;
-  if (mode.gain == Gain::hand) {  // stiffer, in the same ratio of damping
+  if (mode.gain == Gain::hand) {  // keeps the damping ratio
     change.arm->grip_stiffness *= factor, change.arm->grip_rotational_stiffness *= factor;
     change.arm->grip_damping *= std::sqrt(factor);
     change.arm->grip_rotational_damping *= std::sqrt(factor);
@@ -55,7 +55,8 @@ RunFigures run_mode(const io::LoadedScene& loaded, const MethodColumn& method, c
   return run_experiment(loaded, change);
 }
 
-// The largest stable gain in steps from the default, -kSteps .. kSteps; lower when none is stable.
+// The largest stable gain, in steps from the default: -kSteps .. kSteps, or -kSteps - 1 when none
+// is stable.
 int largest_gain(const std::function<bool(int)>& holds) {
   if (holds(kSteps)) return kSteps;
   int low = -kSteps - 1, high = kSteps;
@@ -70,7 +71,7 @@ int largest_gain(const std::function<bool(int)>& holds) {
   return low;
 }
 
-// The value of the gain after so many steps.
+// The value of the gain after `steps` steps; 0 when none is stable.
 double gain_value(Gain gain, const io::LoadedScene& loaded, int steps) {
   const double first =
       gain == Gain::coupling ? loaded.hands[0].coupling.stiffness : io::SceneArm{}.grip_stiffness;

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// probe.h - contacts at given poses: a study puts a free body somewhere and reads its contacts.
+// probe.h - contacts at given poses: a study places a free body and reads its contacts.
 #pragma once
 #include "io/experiments/grid.h"
 
 namespace h6::cli {
 
 inline constexpr double kMm = io::kMm, kProbeStiffness = 1e4, kProbeVoxel = 1e-3;
-inline constexpr double kProbeDepth = 0.2 * kMm;  // how deep the points of a patch are
+inline constexpr double kProbeDepth = 0.2 * kMm;  // penetration depth of a patch's points
 
-// A free body with these points against one obstacle, in a field of kProbeVoxel, at
-// `obstacle_pose`.
+// A scene with one obstacle (voxel kProbeVoxel) at `obstacle_pose` and a free body with these
+// points.
 io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points,
                       const h6Pose& obstacle_pose = {{0, 0, 0}, {1, 0, 0, 0}});
 
-// A plate of 12 mm under z = 0, and the bottom of a box of 20 x 20 x 10 mm around its centre.
+// A plate 12 mm thick below z = 0, and the bottom of a box of 20 x 20 x 10 mm in the frame of the
+// box's centre.
 io::Mesh plate(double from_x, double to_x);
 io::PointCloud bottom(int nu, int nv);
 

@@ -6,7 +6,7 @@
 namespace h6::cli {
 namespace {
 
-// Width in letters: UTF-8 continuation bytes take no room.
+// The width in characters: UTF-8 continuation bytes do not count.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
@@ -17,7 +17,7 @@ std::string prototype_cell(const TableScene& scene, const std::string& column) {
   return found == scene.prototype.end() ? "–" : found->second;
 }
 
-// The verdict in a cell: the word before the figure.
+// The verdict in a cell is the word before the figure.
 std::string verdict_word(const std::string& cell) { return cell.substr(0, cell.find(' ')); }
 
 // Columns in which the engine's verdict differs from the prototype's.

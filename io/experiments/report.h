@@ -7,7 +7,7 @@
 
 namespace h6::cli {
 
-// Rows of cells, the first of which is the head; columns get the width that they need.
+// Rows of cells; the first row is the head.
 using TextTable = std::vector<std::vector<std::string>>;
 std::string plain(const TextTable& table);
 std::string markdown(const TextTable& table);

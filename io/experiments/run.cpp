@@ -16,12 +16,12 @@
 namespace h6::cli {
 namespace {
 
-// The definitions of a run: the scene's, with the changes applied.
+// Applies the changes to the scene's definitions and opens the run.
 Outcome open(const RunChange& change, RunSetup& run) {
   for (h6HandDef& hand : run.hand_defs) {
     h6CouplingDef& c = hand.coupling;
     c.stiffness *= change.force, c.rotational_stiffness *= change.force;
-    c.max_depth_voxels *= change.force;  // the bound that a max_force of 0 derives
+    c.max_depth_voxels *= change.force;  // a max_force of 0 derives its bound from this
     if (change.max_force >= 0) c.max_force = change.max_force;
     c.max_force *= change.force, c.max_torque *= change.force;
   }
@@ -121,7 +121,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
               const std::string& label) {
   std::atomic<std::size_t> next{0}, done{0};
-  std::exception_ptr thrown;  // for instance out of memory; rethrown on the caller's thread
+  std::exception_ptr thrown;  // for instance std::bad_alloc; rethrown on the caller's thread
   std::mutex lock;
   const auto work = [&] {
     for (std::size_t i; !interrupted.load() && (i = next.fetch_add(1)) < jobs.size();) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// run.h - runs a scene in virtual time on the calling thread and measures the figures of the
-// tables; runs independent pieces of work side by side.
+// run.h - runs a scene in virtual time on the calling thread, measures the figures of the tables,
+// and runs independent jobs on two threads.
 #pragma once
 #include <functional>
 #include <optional>
@@ -14,29 +14,30 @@
 
 namespace h6::cli {
 
-// A column of the tables: a weight method with its pieces and, for `global`, its n0.
+// A column of the tables: a weight method, its options and, for `global`, its n0.
 struct MethodColumn {
   std::string name;      // in tables and JSON
-  std::string method;    // as h6MethodFromName takes it
+  std::string method;    // a name for h6MethodFromName
   double global_n0 = 0;  // 0: the scene's
   void apply(h6ContactDef& contact) const;
 };
-// Every method that the engine has, the paper's two also with the facing filter, and `global` also
-// with n0 = 1, the Gauss methods' net stiffness on a flat wall.
+// Every method of the engine. The paper's two Gauss methods also come with the facing filter, and
+// `global` also comes with n0 = 1, which gives the Gauss methods' net stiffness on a flat wall.
 std::vector<MethodColumn> method_columns();
 
 struct RunChange {
   MethodColumn method;
-  double force = 1;                 // multiple of the coupling's stiffness and bounds
-  double stiffness = 0;             // of contacts, 0: the scene's [N/m]
-  double damping = -1;              // of contacts, < 0: the scene's [s]
-  int integrator = -1;              // < 0: the scene's
-  double rate = 0;                  // 0: the scene's [Hz]
-  double max_force = -1;            // of the coupling [N]; 0: half a voxel's, < 0: the scene's
+  double force = 1;      // multiple of the coupling's stiffness and bounds
+  double stiffness = 0;  // of the contacts, 0: the scene's [N/m]
+  double damping = -1;   // of the contacts, < 0: the scene's [s]
+  int integrator = -1;   // < 0: the scene's
+  double rate = 0;       // 0: the scene's [Hz]
+  // Of the coupling [N]; 0: the engine derives it from max_depth_voxels, < 0: the scene's.
+  double max_force = -1;
   const io::Path* path = nullptr;   // of the first hand, null: the scene's
   std::string device = "path";      // of every hand, as `hapsix run --device` takes it
   std::optional<io::SceneArm> arm;  // of every hand, none: the scene's
-  // Called last on the definitions, once for every hand: modes, filters, ...
+  // Called last, once for every hand, to change anything else in the definitions.
   std::function<void(h6SessionDef&, h6HandDef&)> also;
   std::string record;  // .h5 file, empty: none
 };
@@ -44,19 +45,19 @@ struct RunChange {
 struct RunFigures : RunTotals {
   double frame_us_p50 = 0, frame_us_p99 = 0;
   std::string error;       // why the run failed; empty when it did not
-  bool moved_on() const {  // what a scene of the paper calls held
+  bool moved_on() const {  // the paper counts such a run as held
     return error.empty() && (verdict == io::Verdict::held || verdict == io::Verdict::arrived);
   }
 };
 
 RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change);
 
-// Total wrench of a body's contacts from their loads: elastic, under `series` with what damping
-// takes. Sum of k load N [N], [N m].
+// Total wrench of a body's contacts [N, N m]: the sum of k load N, where `load` is the contacts'.
+// It is the elastic part; under `series` the loads include the effect of contact damping.
 h6Wrench elastic_wrench(const h6Contacts& contacts, double stiffness);
 
-// Independent pieces of work on two threads; ends early once the user interrupts. `label` and the
-// share done go to the progress bar.
+// Runs independent jobs on two threads; ends early once the user interrupts. The progress bar shows
+// `label` and the share of jobs done. An exception of a job is rethrown here.
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
               const std::string& label);
 

@@ -8,9 +8,9 @@
 
 namespace h6::cli {
 
-// The prototype damped the coupling outside its bound and let contact damping pull; its Gauss
-// columns all had the facing filter. Its figures are not targets. The table is data, so it may be
-// longer than a screen.
+// The prototype's figures are for comparison and are not targets. It damped the coupling outside
+// its bound, its contact damping could pull, and its Gauss columns all had the facing filter. The
+// table is data, so it may be longer than a screen.
 const std::vector<TableScene>& table_scenes() {
   static const std::vector<TableScene> scenes = {
       {"box-on-wall-explicit",
@@ -181,7 +181,7 @@ std::vector<SceneRow> run_scene_table(const std::vector<const TableScene*>& scen
   std::vector<std::unique_ptr<SharedScene>> shared;
   std::vector<std::function<void()>> jobs;
   for (std::size_t s = scenes.size();
-       s-- > 0;) {  // in reverse: the largest is last in the list and should start first
+       s-- > 0;) {  // in reverse, because the last scene takes longest and should start first
     const TableScene* scene = scenes[s];
     rows[s] = {scene, std::vector<RunFigures>(columns.size()),
                std::vector<std::string>(columns.size())};

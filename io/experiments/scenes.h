@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// scenes.h - the scenes of the experiments' table: the paper's claim about each, what a
-// prototype with analytic distances measured, and the runs.
+// scenes.h - the scenes of the experiments' table: the paper's claim about each, the figures of a
+// prototype with analytic distances, and the runs.
 #pragma once
 #include <functional>
 #include <map>
@@ -18,14 +18,15 @@ struct TableScene {
   const char* figure;
   const char* claim;       // the paper's, in one sentence
   const char* difference;  // why the engine's row differs from the prototype's; may be empty
-  // Makes the scene with another sampling of its shell; null: only its own sampling.
+  // Makes the scene with another sampling of its shell; null when there is only its own sampling.
   io::Scene (*sampled)(const io::Sampling&);
-  bool thin;  // its shell is explicit and small: in the studies of sampling and of force
+  bool thin;  // the shell is explicit and small; the studies of sampling and force use such scenes
   std::map<std::string, const char*> prototype;  // column -> its verdict and depth [voxel]
 };
 const std::vector<TableScene>& table_scenes();
 
-// A scene's assets: the first run to come makes them, the others share them.
+// A scene's assets, safe to use from several threads: the first run loads them, the others share
+// them.
 class SharedScene {
  public:
   explicit SharedScene(std::function<Result<io::Scene>()> make) : make_(std::move(make)) {}
@@ -42,7 +43,7 @@ class SharedScene {
 
 struct SceneRow {
   const TableScene* scene;
-  std::vector<RunFigures> runs;  // as columns
+  std::vector<RunFigures> runs;  // one for each column
   std::vector<std::string> recordings;
 };
 
@@ -51,7 +52,7 @@ std::vector<SceneRow> run_scene_table(const std::vector<const TableScene*>& scen
                                       const std::vector<MethodColumn>& columns,
                                       const std::string& folder, const Console& console);
 
-// "held .21": the verdict and the deepest contact [voxel].
+// The verdict and the deepest contact [voxel], such as "held .21".
 std::string cell(const RunFigures& run);
 
 }  // namespace h6::cli

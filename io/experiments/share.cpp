@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// share.cpp - Fig. 7 with fewer and fewer contacts on one of two plates.
+// share.cpp - the box on two plates (Fig. 7) with fewer and fewer contacts on one of them.
 #include "io/experiments/grid.h"
 
 namespace h6::cli {

@@ -69,8 +69,8 @@ Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& 
 
 namespace {
 
-// How the obstacle's mesh is turned before it is baked; its pose turns it back. Its surface then
-// crosses the lattice at all angles, as parts of a machine do.
+// The obstacle's mesh is turned before it is baked, and its pose turns it back. Its surface then
+// crosses the lattice at all angles, as the surfaces of machine parts do.
 const h6Quat kBakedTurn = turn_by({0.37, 0.61, 0.23});
 const h6Quat kTurnedBack = turn_by({-0.37, -0.61, -0.23});
 
@@ -79,7 +79,7 @@ io::Scene ripple_scene(const io::Mesh& obstacle, io::PointCloud points) {
                      {{0, 0, 0}, kTurnedBack});
 }
 
-// A ridge along x: the upper half of a cylinder of 4 mm, in 256 sides of the whole.
+// A ridge along x: a cylinder of radius 4 mm with 256 sides, its top at z = 0.
 io::Mesh ridge() {
   const io::Mesh upright = io::prism_mesh({0, 0, 0}, 4 * kMm, -40 * kMm, 40 * kMm, 256);
   const h6Quat lie = turn_by({0, std::numbers::pi / 2, 0});
@@ -102,7 +102,7 @@ io::PointCloud peg() {
   return cloud;
 }
 
-// The lower half of a ball, without what is near the bowl's rim.
+// The lower half of a ball, without the part near the bowl's rim.
 io::PointCloud ball(int count) {
   io::PointCloud cloud;
   const double turn = std::numbers::pi * (3 - std::sqrt(5.0)), radius = 10 * kMm;
@@ -117,12 +117,14 @@ io::PointCloud ball(int count) {
 constexpr int kFrames = 400;
 
 struct Ripple {
-  double force = 0, torque = 0;  // root mean square around the mean, k voxel and k voxel L
-  double mean = 0;               // length of the mean force, k voxel
+  // Root mean square deviation from the mean, in k voxel and in k voxel L, where L is the greatest
+  // distance of a point from the body's origin.
+  double force = 0, torque = 0;
+  double mean = 0;  // length of the mean force, in k voxel
 };
 
-// Root mean square of the points' interpolated depths around each one's mean over the way, for the
-// points that touch in every frame [voxel].
+// How much the interpolated depths vary along the path [voxel]: the root mean square deviation of
+// each point's depth from its own mean, over the points that touch in every frame.
 double field_noise(const io::LoadedScene& loaded, h6Pose (*at)(double t)) {
   Probe probe(loaded, {"none", "none", 0});
   if (!probe) return 0;

@@ -19,8 +19,9 @@ constexpr Setting kSettings[] = {{"explicit, undamped", H6_EXPLICIT, 0},
 constexpr double kLeastStiffness = 500;  // [N/m]
 constexpr int kDoublings = 18;           // to 1.3e8 N/m
 
-// The coupling's bound is out of reach: a saturated coupling does not damp, and this study is about
-// the contacts. No region is forbidden: soft contacts go deep, which is not instability.
+// The coupling's bound is put out of reach, because a saturated coupling does not damp and this
+// study is about the contacts. No region is forbidden, because soft contacts go deep without being
+// unstable.
 io::Scene for_stability(io::Scene scene) {
   scene.coupling.max_force = 20;
   scene.coupling.max_torque = 0.6;
@@ -37,7 +38,7 @@ io::Scene cone_at_ceiling() {
   return scene;
 }
 
-// In doublings of the least stiffness; -1: unstable at the least.
+// The largest stable stiffness, in doublings of the least; -1 when the least is unstable.
 int largest_stable(const io::LoadedScene& loaded, RunChange change) {
   const auto stable = [&](int doublings) {
     change.stiffness = kLeastStiffness * std::exp2(doublings);

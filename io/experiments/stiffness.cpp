@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// stiffness.cpp - the net stiffness of the weighted contacts: against the sampling of flat and
-// curved patches, and against the angle between two planes.
+// stiffness.cpp - the net stiffness of the weighted contacts as a function of the sampling of flat
+// and curved patches, and of the angle between two planes.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -32,7 +32,7 @@ struct Matrix3 {
   double m[3][3] = {};
 };
 
-// Sum w N N^T: the stiffness that the implicit step assumes.
+// Sum of w N N^T: the stiffness that the implicit step assumes, in k.
 Matrix3 frozen_stiffness(const h6Contacts& c) {
   Matrix3 out;
   for (std::size_t i = 0; i < c.count; ++i) {
@@ -77,7 +77,7 @@ io::Mesh bowl() {
   return io::block_with_cavity(20 * kMm, 20 * kMm, rings, -10 * kMm, 96);
 }
 
-io::PointCloud half_ball(int count) {  // along a spiral: equal areas
+io::PointCloud half_ball(int count) {  // points along a spiral, with equal areas
   io::PointCloud cloud;
   const double turn = kPi * (3 - std::sqrt(5.0)), radius = 10 * kMm + kProbeDepth;
   for (int i = 0; i < count; ++i) {
@@ -94,7 +94,7 @@ io::PointCloud cylinder(int around, int along) {
   return cloud;
 }
 
-io::PointCloud cone(double spacing) {  // its tip down, 20 mm high, in a seat of the same angle
+io::PointCloud cone(double spacing) {  // 20 mm high, tip down, in a seat of the same angle
   io::PointCloud cloud;
   const double radius = 10 * kMm, height = 20 * kMm;
   const h6Vec3 down = {0, 0, -kProbeDepth * std::hypot(radius, height) / radius};
@@ -192,8 +192,8 @@ namespace {
 
 constexpr int kSide = 8;  // 64 points on either plane
 
-// A block whose bottom is two slanted faces, each parallel to the plane under it; the planes rise
-// outward at `angle` on either side and push inward and up.
+// A block whose bottom has two slanted faces, each parallel to the plane under it. The planes rise
+// outward at `angle` [rad] on either side and push inward and up.
 io::Scene two_planes(double angle) {
   io::Scene scene = io::common_scene("two-planes", "two-planes");
   io::SceneBody block;
@@ -220,10 +220,10 @@ io::Scene two_planes(double angle) {
   return scene;
 }
 
-// Of a symmetric matrix without coupling of y to x and z: across, and the two in the xz plane, the
-// first the one nearer to the x axis.
+// The eigenvalues in the xz plane of a symmetric matrix that does not couple y to x and z. The
+// eigenvector of `x` is the one nearer to the x axis.
 struct Eigenvalues {
-  double x, z, rest;  // rest: the largest of what should be zero
+  double x, z, rest;  // rest: the largest of the entries that should be zero
 };
 Eigenvalues eigenvalues(const Matrix3& K) {
   const double a = K.m[0][0], b = K.m[2][2], c = K.m[0][2];

@@ -15,7 +15,7 @@ const std::vector<StudyKind>& studies();
 
 // stability.cpp
 Study study_stability(const std::vector<MethodColumn>& columns, const Console& console);
-// variations.cpp: the scenes with one thing changed.
+// variations.cpp
 Study study_sampling(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_force(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_voxel(const std::vector<MethodColumn>& columns, const Console& console);

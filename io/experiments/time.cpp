@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// time.cpp - the time of a frame against the number of contacts (Fig. 6).
+// time.cpp - the time of a frame as a function of the number of contacts (Fig. 6).
 #include <algorithm>
 
 #include "io/experiments/probe.h"
@@ -47,7 +47,7 @@ Study study_time(const std::vector<MethodColumn>& columns, const Console& consol
         return v[v.size() / 2];
       };
       const double c = median(collision), w = median(weights), s = median(system);
-      // Only methods whose time grows with n^2 can take too long.
+      // Only a method whose time grows with n^2 can take too long.
       per_contact2[m] = n >= 1000 && w > 1e-4 * n * n ? w / (1.0 * n * n) : 0;
       out.table.back().push_back(number(c, c < 10 ? 1 : 0) + " / " + number(w, w < 10 ? 1 : 0) +
                                  " / " + number(s, s < 10 ? 1 : 0));

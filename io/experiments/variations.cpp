@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// variations.cpp - the scenes again with one thing changed: the sampling of the shell,
-// the force of the hand, the voxels of the fields.
+// variations.cpp - the scenes with one change each: the sampling of the shell, the force of the
+// hand, or the voxels of the fields.
 #include <algorithm>
 
 #include "io/experiments/grid.h"

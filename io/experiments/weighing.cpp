@@ -10,7 +10,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char *kOld = "robust", *kNew = "series";
-constexpr double kEqual = 0.02;  // shares of each other that count as the same
+constexpr double kEqual = 0.02;  // figures that differ by less than this share count as the same
 
 class Weighing {
  public:
@@ -24,7 +24,7 @@ class Weighing {
     add_words(what, a, b, std::abs(more) <= tie || a == b ? 0 : more > 0 ? 1 : -1);
     json_[what] = {{kOld, old_value}, {kNew, new_value}};
   }
-  // `better`: 1 the new one, -1 the old one, 0 neither.
+  // `better` is 1 when the new method is better, -1 when the old one is, 0 when neither is.
   void add_words(const std::string& what, const std::string& a, const std::string& b, int better) {
     table_.push_back({what, a, b, better == 0 ? "same" : better > 0 ? kNew : kOld});
     (better == 0 ? same_ : better > 0 ? wins_ : losses_).push_back(what);
@@ -58,8 +58,8 @@ struct Both {
     old_value = std::max(old_value, a), new_value = std::max(new_value, b);
   }
 };
-// The two columns' figures in an object with one entry for each column; the pointer names the
-// figure.
+// The figures of both methods in an object that has one entry for each column. The JSON pointer
+// names the figure in an entry.
 Both both(const ordered_json& row, const char* pointer = "") {
   const ordered_json::json_pointer at(pointer);
   return {row.at(kOld).at(at).get<double>(), row.at(kNew).at(at).get<double>()};
