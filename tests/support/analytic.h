@@ -11,7 +11,7 @@
 
 namespace h6::test {
 
-// Storage behind an h6FieldDef, sampled from a signed distance function of mesh-frame metres.
+// Storage behind an h6FieldDef, sampled from a signed distance function (mesh frame, metres).
 struct FieldArrays {
   std::vector<std::int32_t> index;
   std::vector<float> samples, far;
@@ -47,7 +47,7 @@ inline FieldArrays sample_analytic(const Distance& f, h6Vec3 origin, double voxe
   for (int c = 0; c <= bz; ++c)
     for (int b = 0; b <= by; ++b)
       for (int a = 0; a <= bx; ++a) {
-        // Towards zero, so that rounding to float cannot make the bound too large.
+        // Round towards zero, so that the bound cannot become too large.
         const double d = at(8 * a, 8 * b, 8 * c);
         out.far.push_back(std::nextafter(static_cast<float>(d), 0.0f));
       }

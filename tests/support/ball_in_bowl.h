@@ -14,8 +14,7 @@ namespace h6::test {
 
 inline constexpr double kMm = 1e-3;
 
-// A ball pressed into a conforming bowl: hundreds of contacts in all directions, body rolling
-// about.
+// A ball pressed into a conforming bowl. It has hundreds of contacts in all directions and rolls.
 struct BallInBowl {
   FieldArrays bowl = sample_analytic(
       [](double x, double y, double z) { return 20.2 * kMm - std::sqrt(x * x + y * y + z * z); },
@@ -44,7 +43,8 @@ struct BallInBowl {
     session = h6CreateSession(model.handle, &def, &error);
     REQUIRE_MESSAGE(session, error.message);
   }
-  // Leans on the wall from the first frame on. Modes read of it what they need.
+  // The hand leans on the wall from the first frame on. The sample has values for every device
+  // mode.
   h6DeviceSample sample(int i) const {
     const double a = 0.2 * std::sin(0.01 * i), x = std::sin(1.2 + 0.02 * i);
     h6DeviceSample s =

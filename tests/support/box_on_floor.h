@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// box_on_floor.h - a box on a floor, a hand that holds it, and the little geometry tests need.
+// box_on_floor.h - a box on a floor, a hand that holds it, and a few geometric helpers for tests.
 #pragma once
 #include <doctest/doctest.h>
 
@@ -25,7 +25,7 @@ inline bool same_bits(const h6Quat& a, const h6Quat& b) {
   return std::memcmp(&a, &b, sizeof a) == 0;
 }
 inline double angle_between(const h6Quat& a, const h6Quat& b) {
-  // From the difference: the arc cosine of the product loses half of the digits.
+  // Computed from the difference, because the arc cosine of the product loses half of the digits.
   const auto from = [&](double sign) {
     return std::hypot(std::hypot(a.w - sign * b.w, a.x - sign * b.x),
                       std::hypot(a.y - sign * b.y, a.z - sign * b.z));
@@ -33,7 +33,7 @@ inline double angle_between(const h6Quat& a, const h6Quat& b) {
   return 4 * std::asin(std::min(1.0, std::min(from(1), from(-1)) / 2));
 }
 
-// A box on a floor z < 0, 1 mm voxels; its centre of mass is not the mesh's origin.
+// A box on a floor z < 0 with 1 mm voxels. The box's centre of mass is not its mesh's origin.
 struct BoxOnFloor {
   FieldArrays field = sample_analytic([](double, double, double z) { return z; },
                                       {-64 * mm, -64 * mm, -32 * mm}, mm, 16, 16, 8);
@@ -54,7 +54,7 @@ struct BoxOnFloor {
     const double inertia[6] = {a, a, c, 0, 0, 0};
     std::copy(inertia, inertia + 6, bodies[1].inertia);
     hand.body = 1;
-    hand.safety.soft_start = 0;  // has tests of its own
+    hand.safety.soft_start = 0;  // the soft start has its own tests
     def.bodies = bodies.data(), def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;
   }
@@ -74,7 +74,7 @@ struct BoxOnFloor {
   h6BodyState body() const { return h6GetBody(session, 1); }
 };
 
-// A hand that goes everywhere, through the floor and far from the body, and turns.
+// A hand that turns and goes everywhere, also through the floor and far from the body.
 inline h6DeviceSample wild(int i) {
   h6DeviceSample sample = hand_at(
       {{0.03 * std::sin(0.11 * i), 0.02 * std::cos(0.07 * i), 0.005 + 0.03 * std::sin(0.05 * i)},

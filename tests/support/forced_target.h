@@ -7,8 +7,8 @@
 
 namespace h6::test {
 
-// 0, or the exit code of a test program that cannot run: 77 (skipped, for ctest) where the machine
-// lacks the target, 2 where the name is wrong.
+// Returns 0 when the test program can run, else its exit code: 77 (ctest counts it as skipped) when
+// the machine lacks the target, 2 when the name is wrong.
 inline int force_target_or_exit_code() {
   bool built = false;
   const char* const why = kernels::force_target_from_environment(&built);

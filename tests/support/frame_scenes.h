@@ -2,7 +2,7 @@
 // frame_scenes.h - seeded scenes for whole frames: a part of 56,823 points in clutter and in a
 // socket that fits it, both in fields of 1024^3 voxels sampled from signed distance functions.
 //
-// `size` below 1 makes all of it so much smaller, voxels apart: tests take a quarter.
+// `size` scales everything except the voxels; tests take 0.25.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -20,10 +20,10 @@ using Point = std::array<double, 3>;  // voxels, the part's centre at 0
 
 inline constexpr double kVoxel = 5e-4;    // [m]
 inline constexpr int kBricks = 128;       // along each axis
-inline constexpr double kMiddle = 512.0;  // node of the origin
+inline constexpr double kMiddle = 512.0;  // node index of the origin on each axis
 inline constexpr double kBand = 3.0;      // voxels
 inline constexpr std::size_t kPoints = 56823;
-inline constexpr double kClearance = 0.25;  // voxels, of the socket
+inline constexpr double kClearance = 0.25;  // gap between part and socket [voxel]
 
 class Random {
  public:
@@ -36,7 +36,8 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// A box with rounded edges, turned about z; long and thin it is a post, a tube when it is round.
+// A box with rounded edges, or a round tube, turned about z by `turn` [rad]. A long thin box is a
+// post. Voxels.
 struct Solid {
   Point centre, half;
   double round, turn = 0;
@@ -77,7 +78,7 @@ inline double distance(const Solids& solids, const Point& p) {
   return d;
 }
 
-// A motor on a gear case on a foot: a starter, roughly.
+// Roughly a starter: a motor on a gear case on a foot.
 inline Solids part() {
   return {{{0, 0, 0}, {110, 62, 62}, 30},
           {{150, 0, 0}, {50, 34, 34}, 20},
@@ -89,7 +90,7 @@ inline Solids part() {
 struct PartPoints {
   std::vector<Point> at, inward;
 };
-// Random points of the part's surface: dropped anywhere near it, then moved onto it.
+// Random points near the part, moved onto its surface.
 inline const PartPoints& part_points(double size = 1) {
   static std::map<double, PartPoints> made;
   PartPoints& out = made[size];
@@ -139,7 +140,7 @@ inline Solids clutter(double size = 1) {
     double nearest = 1e9;
     for (std::size_t i = 0; i < points.size(); i += 7)
       nearest = std::min(nearest, s.distance(points[i]));
-    // A third of them stand close.
+    // Every fourth solid must stand close to the part.
     if (nearest < 2 || (solids.size() % 4 == 0 && nearest > 12)) continue;
     solids.push_back(s);
   }
@@ -152,7 +153,8 @@ struct FieldArrays {
   h6FieldDef def{};
 };
 
-// Distance to the solids, or (socket) to what is left when the grown part is taken out of all.
+// Samples the distance to the solids. With `socket` it is the distance to the socket instead: all
+// space less the solids grown by kClearance.
 inline FieldArrays sample(const Solids& solids, bool socket, double size = 1) {
   FieldArrays out;
   const int bricks = static_cast<int>(kBricks * size), blocks = bricks / 8;
@@ -162,7 +164,8 @@ inline FieldArrays sample(const Solids& solids, bool socket, double size = 1) {
     return turned ? kClearance - d : d;
   };
   constexpr double kHalfDiagonal = 4 * 1.7320508 + 1e-6;
-  // Solids that can be the nearest in a block; blocks of 8 bricks first, then bricks.
+  // The solids that can be the nearest within `reach` of a centre. This narrows the list for blocks
+  // of 8 x 8 x 8 bricks first, then for bricks.
   const auto nearest = [](const Solids& set, const Point& centre, double reach) {
     const double least = distance(set, centre);
     Solids some;
@@ -210,7 +213,8 @@ inline FieldArrays sample(const Solids& solids, bool socket, double size = 1) {
   return out;
 }
 
-// The part's points with a sphere tree of 7 nested levels, four times as many points on each.
+// The part's points with a sphere tree of 7 nested levels, each with four times as many points as
+// the one above.
 struct ShellArrays {
   std::vector<float> x, y, z, nx, ny, nz, radius;
   std::vector<std::uint32_t> level_first{0}, point, first_child, child_count;
@@ -224,7 +228,8 @@ struct ShellArrays {
       const Point& n = points.inward[i];
       nx.push_back(float(n[0])), ny.push_back(float(n[1])), nz.push_back(float(n[2]));
     }
-    // The points of a level, those of one parent together, and the row of each one's parent.
+    // members: the points of a level, those of one parent together. parent: the row of each row's
+    // parent.
     std::vector<std::uint32_t> members(14), parent;
     for (std::uint32_t i = 0; i < 14; ++i) members[i] = i;
     for (int level = 0; level < 7; ++level) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// main.cpp - main of every test program that has none of its own.
+// main.cpp - the main function of every test program that does not define its own.
 #include <doctest/doctest.h>
 
 #include <cstdio>
@@ -8,7 +8,7 @@
 
 namespace {
 
-// A filter that matches nothing must not pass: the file it names may have been renamed.
+// A filter that matches no test must fail, because the file that it names may have been renamed.
 unsigned matching = 0;
 struct CountMatches : doctest::IReporter {
   explicit CountMatches(const doctest::ContextOptions&) {}

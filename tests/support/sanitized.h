@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// sanitized.h - what a test does less of where everything is instrumented: AddressSanitizer makes
-// it two to five times slower, ThreadSanitizer ten to a hundred times.
+// sanitized.h - tells a test under which sanitizer it runs, so that it can do less work.
 //
-// Repetitions become fewer, and arithmetic on one thread alone is left out under ThreadSanitizer,
-// which has nothing to see there. Whatever two threads touch stays.
+// AddressSanitizer makes tests two to five times slower, ThreadSanitizer ten to a hundred times.
+// Under ThreadSanitizer tests repeat less often and leave out arithmetic on a single thread, where
+// it has nothing to find. Everything that two threads touch stays.
 #pragma once
 
 namespace h6::test {
@@ -20,7 +20,7 @@ inline constexpr bool kAddressSanitized = false;
 #endif
 inline constexpr bool kSanitized = kThreadSanitized || kAddressSanitized;
 
-// Repetitions: so many, under ThreadSanitizer so few.
+// The number of repetitions: `few` under ThreadSanitizer, else `many`.
 template <class N>
 constexpr N repeated(N many, N few) {
   return kThreadSanitized ? few : many;

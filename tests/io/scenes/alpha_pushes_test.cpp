@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// alpha_pushes_test.cpp - the alpha pushed at its shortcut: that the pushes are what they are said
-// to be, that "through" means unlinked whatever the direction, and that the default method holds.
+// alpha_pushes_test.cpp - the alpha pushed at its shortcut: the pushes differ as documented,
+// "through" means unlinked for every direction, and the default method holds.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kPushes = 20;
 
-// The loop, closed by a segment across the gap, itself cut in pieces.
+// The loop, closed by a segment across the gap; the segment is cut into 20 pieces.
 std::vector<h6Vec3> ring(const h6Pose& pose) {
   std::vector<h6Vec3> out;
   for (int i = 0; i <= 240; ++i)
@@ -34,7 +34,8 @@ std::vector<h6Vec3> ring(const h6Pose& pose) {
   return out;
 }
 
-// Gauss's double integral over two closed polygons, summed at the edges' middles.
+// The linking number: Gauss's double integral over two closed polygons, evaluated at the edges'
+// middles.
 double linking(const h6Pose& tool) {
   const std::vector<h6Vec3> a = ring({{0, 0, 0}, {1, 0, 0, 0}}), b = ring(tool);
   double sum = 0;
@@ -92,7 +93,7 @@ TEST_CASE("pushes begin as the shortcut does and differ, each within 30 degrees 
     CHECK(norm(path.front().pose.p - shortcut.hands[0].path.front().pose.p) < 1e-12);
     REQUIRE(path.size() == again.size());
     CHECK(norm(path.back().pose.p - again.back().pose.p) == 0);
-    // The gap is where the tool is last led slowly; from there the hand goes 250 mm.
+    // At the gap the hand stops moving slowly; from there it goes 250 mm.
     const h6Vec3 end = path.back().pose.p;
     h6Vec3 gap = path.front().pose.p;
     for (const PathRow& row : path)
@@ -110,8 +111,8 @@ TEST_CASE("pushes begin as the shortcut does and differ, each within 30 degrees 
 
 TEST_CASE("no point of the tool can be in a forbidden box while the loops are linked") {
   const Scene scene = alpha_pushes();
-  // Linked rings: the static ring meets the hull of the tool's ring, so the tool's points are no
-  // farther from the static ring than from the farthest point of the tool's ring.
+  // While linked, the static ring meets the convex hull of the tool's ring. A point of the tool is
+  // then no farther from the static ring than from the farthest point of the tool's own ring.
   const AlphaShape alpha = make_alpha();
   const std::vector<h6Vec3> still = ring({{0, 0, 0}, {1, 0, 0, 0}});
   double reach = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// alpha_solution_test.cpp - the puzzle has a solution: proved on the geometry, then run.
+// alpha_solution_test.cpp - the puzzle has a solution: the tests prove it on the geometry, then run
+// the scene.
 #include <doctest/doctest.h>
 #include <unistd.h>
 
@@ -44,10 +45,10 @@ Scene solution() {
 
 // ---- a tube as a chain of straight pieces ------------------------------------------------------
 
-// Centres of the mesh's rings. A triangle joins two neighbouring rings, or closes an end, and every
-// vertex is within `radius` of its ring's centre; so every point of the mesh, a mean of vertices,
-// is within `radius` of the chain, and two meshes are at least the chains' distance less twice
-// `radius` apart. The test of that name checks the premises.
+// The centres of the mesh's rings. Every triangle joins two neighbouring rings or closes an end,
+// and every vertex is within the tube's radius of its ring's centre. A point of the mesh is a mean
+// of such vertices, so it is within the radius of the chain. The distance of two meshes is then at
+// least the chains' distance less twice the radius. The first test checks these premises.
 std::vector<h6Vec3> chain_of(const Mesh& mesh) {
   std::vector<h6Vec3> out(mesh.vertices.size() / kSides);
   for (std::uint32_t i = 0; i < out.size() * kSides; ++i)
@@ -55,8 +56,8 @@ std::vector<h6Vec3> chain_of(const Mesh& mesh) {
   return out;
 }
 
-// Least distance of two segments: the minimum of a convex function on a square is inside, where
-// both slopes vanish, or on one of its four sides.
+// Distance of two segments. It is the minimum of a convex function on a square, which lies inside,
+// where both slopes vanish, or on one of the four sides.
 double segment_distance(const h6Vec3& a, const h6Vec3& b, const h6Vec3& c, const h6Vec3& d) {
   const auto to_point = [](const h6Vec3& p, const h6Vec3& from, const h6Vec3& to) {
     const h6Vec3 u = to - from;
@@ -93,7 +94,7 @@ std::vector<h6Vec3> placed(const h6Pose& pose, std::vector<h6Vec3> points) {
 
 const h6Pose kHere = {{0, 0, 0}, {1, 0, 0, 0}};
 
-// The loop, closed by a segment across the gap, itself cut in pieces.
+// The loop, closed by a segment across the gap; the segment is cut into pieces.
 std::vector<h6Vec3> ring(const h6Pose& pose) {
   std::vector<h6Vec3> out;
   for (int i = 0; i <= 240; ++i) out.push_back(place(pose, alpha_point(-1 + i / 120.0)));
@@ -102,7 +103,8 @@ std::vector<h6Vec3> ring(const h6Pose& pose) {
   return out;
 }
 
-// Gauss's double integral over two closed polygons, summed at the edges' middles.
+// The linking number: Gauss's double integral over two closed polygons, evaluated at the edges'
+// middles.
 double gauss_linking(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
@@ -146,7 +148,7 @@ TEST_CASE(
   const Mesh& mesh = *scene.bodies[0].field->mesh_data;
   const double radius = make_alpha().tube_radius;
   const std::vector<h6Vec3> chain = chain_of(mesh);
-  double reach = 0;  // of the tool from its mesh frame's origin
+  double reach = 0;  // greatest distance of a point of the tool from its mesh frame's origin
   for (std::uint32_t i = 0; i < mesh.vertices.size(); ++i)
     reach = std::max(reach, norm(mesh.vertices[i]));
   const Path& path = scene.hands.front().path;
@@ -156,8 +158,8 @@ TEST_CASE(
     const h6Pose pose = sample_path(path, i * kTick);
     const double now = chain_distance(chain, placed(pose, chain)) - 2 * radius;
     tightest = std::min(tightest, now);
-    // On its way here no point of the tool moved farther than this; each end of the interval
-    // guards its half.
+    // No point of the tool moved farther than this since the last tick. The clearance at each end
+    // of the interval covers the half next to it.
     const double moved = norm(pose.p - last.p) + reach * norm(turn(last.q, pose.q));
     INFO("t = " << i * kTick << " s, clearance " << now / kMm << " mm");
     REQUIRE(now > 0.5 * kMm);
@@ -176,7 +178,7 @@ TEST_CASE("the meshes' own distance, triangle by triangle, is no less than the t
   double tightest = 1;
   for (double t = 0; t < path.back().t; t += 0.05) {
     const h6Pose pose = sample_path(path, t);
-    if (norm(pose.p) > 30 * kMm) break;  // apart: the chains say enough
+    if (norm(pose.p) > 30 * kMm) break;  // the alphas are apart; the chains' test is enough
     const double tubes = chain_distance(chain, placed(pose, chain)) - 2 * make_alpha().tube_radius;
     const double meshes = mesh_distance(mesh, moved(mesh, pose));
     INFO("t = " << t);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// experiment_scenes_test.cpp - the paper's experiments as scenes: sizes, samplings, and that each
-// run begins clear of everything.
+// experiment_scenes_test.cpp - the paper's experiments as scenes: their sizes and samplings, and a
+// start without contact.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -97,7 +97,7 @@ TEST_CASE("a density of 2 or 0.5 doubles or halves the points, jitter keeps them
     CHECK(points_of(uneven).x == points_of(again).x);
     CHECK(points_of(uneven).x != points_of(other).x);
     CHECK(points_of(uneven).x != points_of(plain).x);
-    // Surfaces are flat or round: nothing lies farther out than before by more than rounding.
+    // Jitter moves points within flat or round surfaces, so hardly any point lies farther out.
     double far = 0, farther = 0;
     for (const Scene* scene : {&plain, &uneven}) {
       const PointCloud& c = points_of(*scene);
@@ -121,7 +121,7 @@ TEST_CASE("meshes of wires and prisms are closed, wound outward and as large as 
   CHECK(wire.closed);
   CHECK(wire.flipped_edges == 0);
   CHECK(wire.degenerate == 0);
-  // The segment of the circle above the plate.
+  // The area of the wire's section above the plate.
   const double half = std::acos(-0.6), segment = half - std::sin(2 * half) / 2;
   CHECK(wire.volume == h6::test::near(20 * (20 * 3 + segment)).epsilon(1e-4));
 }
@@ -133,7 +133,7 @@ TEST_CASE("a block with a cavity lacks the cavity's volume") {
   CHECK(found.flipped_edges == 0);
   CHECK(found.components == 1);
   const double pi = 3.14159265358979323846;
-  const double base = 64 * 64 * std::sin(2 * pi / 128);  // of the cone's polygon
+  const double base = 64 * 64 * std::sin(2 * pi / 128);  // area of the cone's base polygon
   CHECK(found.volume == h6::test::near(20 * 20 * 9 - base * 6 / 3).epsilon(1e-9));
 }
 

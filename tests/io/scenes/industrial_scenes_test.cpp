@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// industrial_scenes_test.cpp - the generated industrial inputs: sizes, defects, and whether what
-// they claim to know of themselves is true.
+// industrial_scenes_test.cpp - the generated industrial inputs: their sizes, their defects, and
+// whether their recorded truth is true.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -65,7 +65,7 @@ void is_sane(const Mesh& mesh) {
   for (const std::string& name : mesh.part_names) CHECK(!name.empty());
 }
 
-// Triangles of one part, each once whatever its winding; and all of them.
+// The triangles of one part without duplicates of either winding.
 std::vector<Corners> part_of(const Mesh& mesh, std::int32_t part) {
   std::map<std::array<std::uint32_t, 3>, std::size_t> once;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -102,7 +102,7 @@ double to_all(const h6Vec3& p, const std::vector<Corners>& triangles) {
   return nearest;
 }
 
-// Crossings of the triangles with a ray from p (Moeller, Trumbore).
+// How many triangles a ray from p crosses (Moeller, Trumbore).
 int crossings(const h6Vec3& p, const h6Vec3& along, const std::vector<Corners>& triangles) {
   int count = 0;
   for (const Corners& t : triangles) {
@@ -116,8 +116,8 @@ int crossings(const h6Vec3& p, const h6Vec3& along, const std::vector<Corners>& 
   return count;
 }
 
-// The pieces of a part: what is joined by common vertices. Each is a solid by itself; they may run
-// into each other.
+// The pieces of a part; triangles with a common vertex are in the same piece. Each piece is a solid
+// by itself, and pieces may overlap.
 std::vector<std::vector<Corners>> pieces_of(const Mesh& mesh, std::int32_t part) {
   std::map<std::uint32_t, std::uint32_t> above;
   const auto root = [&](std::uint32_t v) {
@@ -140,8 +140,8 @@ std::vector<std::vector<Corners>> pieces_of(const Mesh& mesh, std::int32_t part)
   return out;
 }
 
-// Inside one of the pieces at least, by the parity of most of five rays: one that goes through a
-// missing triangle is outvoted.
+// Tells whether p is inside at least one of the pieces, by the parity of most of five rays. A ray
+// that passes through a missing triangle is outvoted.
 bool inside_a_piece(const h6Vec3& p, const std::vector<std::vector<Corners>>& pieces) {
   for (const std::vector<Corners>& piece : pieces) {
     int votes = 0;
@@ -160,14 +160,14 @@ std::size_t part_count(const Mesh& mesh, const char* word) {
   return count;
 }
 
-// The voxel that a bake of 1024 cells, 8 of them padding at either end, has.
+// The voxel of a bake with 1024 cells, 8 of them padding at either end.
 double voxel_of(const MeshAudit& found) {
   return std::max(
              {found.high.x - found.low.x, found.high.y - found.low.y, found.high.z - found.low.z}) /
          (1024 - 16);
 }
 
-// Probes of the same part together: its triangles are gathered once.
+// Groups the probes by part, so that each part's triangles are gathered once.
 std::map<std::int32_t, std::vector<Probe>> by_part(const std::vector<Probe>& probes) {
   std::map<std::int32_t, std::vector<Probe>> out;
   for (const Probe& probe : probes) out[probe.part].push_back(probe);
@@ -191,8 +191,8 @@ void check_solids(const IndustrialInput& input, std::size_t most_triangles) {
   CHECK(inside == judged);
 }
 
-// No triangle is as near as the claim says. That the cells between them and the border are as free
-// is the same claim, made for each cell on the way.
+// No triangle may be nearer than the claimed clearance. This does not check the path to the border;
+// every cell on it makes the same claim.
 void check_surroundings(const IndustrialInput& input) {
   const Mesh& mesh = input.mesh;
   REQUIRE(input.truth.outside.size() == kProbes);
@@ -231,8 +231,8 @@ void check_wires(const IndustrialInput& input, double voxel) {
     const std::vector<Corners> skin = part_of(input.mesh, wire.part);
     CHECK(2 * wire.radius > 1.9 * voxel);
     CHECK(2 * wire.radius < 2.5 * voxel);
-    // Everywhere along the line, the ends' caps aside, the skin is a radius away, or where it is
-    // flat a little less; bends bring it nearer on their inner side.
+    // Except at the caps, the skin is about a radius away from the line. It is a little nearer on
+    // its flats, and nearer still on the inner side of bends.
     for (std::size_t i = 1; i + 2 < wire.line.size(); i += 5) {
       const double r = to_all(0.5 * (wire.line[i] + wire.line[i + 1]), skin);
       CHECK(2 * r > 1.5 * voxel);
@@ -249,7 +249,8 @@ void check_holes(const IndustrialInput& input) {
     CHECK(hole.width > 2 * truth.voxel);
     CHECK(hole.width < 5 * truth.voxel);
     CHECK(norm(hole.normal) == h6::test::near(1));
-    // Its middle is as far from what is left as the ball that passes is large, at most.
+    // The distance of the hole's middle from the remaining triangles is at most the radius of the
+    // largest ball that passes.
     const std::vector<Corners> rest = part_of(input.mesh, hole.part);
     CHECK(2 * to_all(hole.centre, rest) > 0.5 * hole.width);
     CHECK(2 * to_all(hole.centre, rest) <= hole.width);
@@ -371,8 +372,7 @@ TEST_CASE("recorded holes are open, as wide as recorded, and what is behind them
 
 namespace {
 
-// Distance of the meshes as far as points on them tell: corners and centres, in cells of 12 mm (no
-// more than that is found).
+// Distance of the part's corners and triangle centres from the soup's triangles, 12 mm at most.
 double least_distance(const Mesh& soup, const Mesh& part) {
   constexpr double kCell = 12 * kMm;
   using Cell = std::array<int, 3>;
@@ -442,8 +442,8 @@ TEST_CASE("the industrial scenes have the paper's sizes; their parts start and e
       REQUIRE(path[i].t > path[i - 1].t);
       CHECK(norm(path[i].pose.p - path[i - 1].pose.p) <= 0.1001 * (path[i].t - path[i - 1].t));
     }
-    // Where the hand waits, its tightest place, and at the start: vertices of neither come near a
-    // triangle of the other, nor do triangles' centres.
+    // Where the hand waits, which is the tightest place, and at the start, the part's points come
+    // near no triangle of the soup.
     const h6Pose tight = sample_path(path, path.back().t / 2);
     CHECK(norm(tight.p - part.pose.p) > 0.15);
     const double voxel = (std::string(name) == "engine-bay" ? bay() : gear()).truth.voxel;
@@ -465,7 +465,7 @@ TEST_CASE("an industrial scene is exported as plain files and read back" *
   REQUIRE_MESSAGE(mesh, mesh.error());
   CHECK(mesh->triangles.size() == 505276);
   const MeshAudit x = audit(bay().mesh), y = audit(*mesh);
-  // Single precision may make two corners one, or not: nearly the same, not exactly.
+  // Single precision may merge two corners, so the counts are nearly but not exactly the same.
   CHECK(std::abs(static_cast<double>(x.open_edges) - static_cast<double>(y.open_edges)) <
         0.01 * x.open_edges);
   const Result<Mesh> part = read_mesh(back->bodies[1].shell->mesh, back->unit);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scenes_test.cpp - generated scenes: are they what they claim, before anything is simulated?
+// scenes_test.cpp - checks that the generated scenes are what they claim, without simulating them.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -29,8 +29,8 @@ Scene scene_of(const std::string& name) {
   return *scene;
 }
 
-// Not the industrial inputs: soups of up to 1.8 million triangles, a second each to make, of which
-// less is claimed than of these. industrial_scenes_test.cpp has them.
+// All scenes but the industrial ones, which have up to 1.8 million triangles and take a second each
+// to make. industrial_scenes_test.cpp checks those.
 std::vector<SceneName> small_scenes() {
   std::vector<SceneName> out;
   for (const SceneName& entry : scene_names())
@@ -45,7 +45,8 @@ const SceneBody& body_of(const Scene& scene, const std::string& name) {
   return scene.bodies.front();
 }
 
-// Points of the body's shell, mesh frame: the grid's, or its mesh's vertices and triangle centres.
+// Points of the body's shell in the mesh frame: those of its grid, or the vertices and triangle
+// centres of its mesh.
 std::vector<h6Vec3> shell_points(const SceneBody& body) {
   std::vector<h6Vec3> out;
   if (const auto& cloud = body.shell->points)
@@ -72,8 +73,8 @@ bool any_forbidden(const Scene& scene, const std::vector<h6Vec3>& points, const 
   return false;
 }
 
-// Solid angle of the mesh seen from p, in full spheres: 1 inside, 0 outside (van Oosterom,
-// Strackee).
+// Winding number of the mesh around p: its solid angle in full spheres, 1 inside and 0 outside (van
+// Oosterom, Strackee).
 double winding(const Mesh& mesh, const h6Vec3& p) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {
@@ -102,10 +103,10 @@ double least_distance(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b
 
 const h6Pose kHere = {{0, 0, 0}, {1, 0, 0, 0}};
 
-// Loop and the segment that closes it, as a closed polygon.
+// The loop and the segment that closes it, as a closed polygon.
 std::vector<h6Vec3> ring(const h6Pose& pose) { return centre_line(-1, 1, 300, pose); }
 
-// Linking number of two closed polygons: signed solid angles of pairs of edges (Banchoff).
+// Linking number of two closed polygons, from the signed solid angles of pairs of edges (Banchoff).
 double linking(const std::vector<h6Vec3>& a, const std::vector<h6Vec3>& b) {
   double sum = 0;
   const auto angle = [](const h6Vec3& u, const h6Vec3& v, const h6Vec3& w) {
@@ -269,7 +270,8 @@ TEST_CASE("peg-in-hole has Fig. 10's grid, clearance and depth") {
     ++(std::abs(peg.shell->points->nz[i]) > 0.5 ? cap : side);
   CHECK(side == 60 * 40);
   CHECK(cap == 21);  // grid points 4 mm apart within 10 mm
-  // The hole is a prism around the circle: nowhere nearer than 10.3 mm, nowhere much farther.
+  // The hole is a prism around the circle, so its sides are never nearer than 10.3 mm and never
+  // much farther.
   const Mesh& block = *body_of(scene, "block").field->mesh_data;
   double nearest = 1, farthest = 0, deepest = 0;
   for (const auto& t : block.triangles)
@@ -303,15 +305,16 @@ TEST_CASE("the alpha has exactly 1,008 triangles and lies on its tube") {
 
 TEST_CASE("the alpha's gap is narrower than the tube at its thinnest, wide enough for the puzzle") {
   const AlphaShape alpha = make_alpha();
-  // Independently of the mesh: axes' distance less the thickness; the mesh's facets only add to it.
+  // Without the mesh, the gap is the axes' distance less the thickness. The mesh's facets can only
+  // make the gap wider.
   const double axes = least_distance(centre_line(0.7, alpha_end(), 3000, kHere),
                                      centre_line(-alpha_end(), -0.7, 3000, kHere));
   CHECK(alpha.gap >= axes - kTube - 1e-6);
   CHECK(alpha.gap <= axes - kTube + 2 * alpha.tube_radius * (1 - std::cos(kPi / 12)));
   const double thinnest = kTube * std::cos(kPi / 12);  // between opposite flats of the 12-gon
   CHECK(alpha.gap < thinnest - 1 * kMm);
-  // Gap through gap: the crossing segments cut each other at right angles in their middles; their
-  // ends, on the axes of the strands, are then axes / sqrt(2) apart.
+  // When one gap passes through the other, the segments across the gaps cut each other at right
+  // angles in their middles. Their ends, on the axes of the strands, are then axes / sqrt(2) apart.
   CHECK(axes / std::sqrt(2.0) > kTube + 1 * kMm);
   const Scene scene = scene_of("alpha-shortcut");
   char stated[32];
@@ -364,8 +367,8 @@ TEST_CASE("the hand's way unlinks the alphas and is blocked by nothing but the g
 TEST_CASE(
     "no point of the tool can be in alpha-shortcut's forbidden box while the loops are linked") {
   const Scene scene = scene_of("alpha-shortcut");
-  // Linked rings: the static ring meets the hull of the tool's ring, so the tool's points are no
-  // farther from the static ring than from the farthest point of the tool's ring.
+  // While linked, the static ring meets the convex hull of the tool's ring. A point of the tool is
+  // then no farther from the static ring than from the farthest point of the tool's own ring.
   double reach = 0;
   for (const h6Vec3& p : shell_points(body_of(scene, "tool")))
     for (const h6Vec3& q : ring(kHere)) reach = std::max(reach, norm(p - q));
@@ -379,7 +382,8 @@ TEST_CASE(
                         outside(p.z, box.low.z, box.high.z)};
     REQUIRE(norm(gap) > reach + 1 * kMm);
   }
-  // Where the hand rests, much of the tool is in it: a method that lets it through is caught.
+  // At the hand's last pose much of the tool is in the box, so the verdict catches a method that
+  // lets the tool through.
   const h6Pose end = scene.hands.front().path.back().pose;
   std::size_t in = 0;
   const std::vector<h6Vec3> points = shell_points(body_of(scene, "tool"));
