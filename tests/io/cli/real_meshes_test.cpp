@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real meshes end to end: files in, `hapsix run` as a user starts it, and what physics says about
-// threads, fits and soups. Scenes, sizes and clearances: real_scenes.h.
+// Runs real meshes through `hapsix run` as a user would, and checks the results against the physics
+// of threads, fits and triangle soups. real_scenes.h has the scenes, sizes and clearances.
 //
-// A run is cut short (--duration) where the interesting pose is that of the middle: its JSON then
-// ends there. Bakes are made once, in a cache of this test's own.
+// If the pose of interest is in the middle of a run, --duration cuts the run there, so that its
+// JSON has that pose. The tests have a cache of their own and bake each mesh once.
 #include <doctest/doctest.h>
 
 #include <unistd.h>
@@ -25,7 +25,7 @@ namespace {
 
 const std::string kMethods[] = {"robust", "global", "none"};
 
-// Where the meshes are; nothing, and a message, where they are not.
+// The folder of the meshes. If it is missing, prints a message and returns nothing.
 std::optional<fs::path> test_data() {
   const char* folder = std::getenv("HAPSIX_TEST_DATA");
   if (folder && fs::exists(fs::path(folder) / "nut-bolt")) return fs::path(folder);
@@ -33,7 +33,7 @@ std::optional<fs::path> test_data() {
   return std::nullopt;
 }
 
-// A folder of this process, gone when it ends.
+// A folder for this process. The destructor removes it.
 class Workplace {
  public:
   Workplace() : folder_(fs::temp_directory_path() / ("hapsix-real-" + std::to_string(getpid()))) {
@@ -59,7 +59,8 @@ std::string text_of(const fs::path& file) {
   return text.str();
 }
 
-// duration 0: to the end of the hand's path. Null when the program failed.
+// Runs a scene. A duration of 0 means until the hand's path ends. Returns null if the program
+// fails.
 json run(const fs::path& scene, const std::string& method, double duration = 0) {
   const fs::path out = workplace() / "out.json", log = workplace() / "log.txt";
   std::ostringstream command;
@@ -94,12 +95,12 @@ double angle_between(const Pose& a, const Pose& b) {
   const double dot = a.q[0] * b.q[0] + a.q[1] * b.q[1] + a.q[2] * b.q[2] + a.q[3] * b.q[3];
   return 2 * std::acos(std::min(1.0, std::abs(dot)));
 }
-// Between the axes of the two poses, whatever they turned about them [rad].
+// `lean` is the tilt of the z axis, `turned` the turn about it [rad].
 double lean(const Pose& a) { return 2 * std::asin(std::hypot(a.q[1], a.q[2])); }
 double turned(const Pose& a) { return 2 * std::atan2(a.q[3], a.q[0]); }
 
-// What holds for every scene and method here: nothing chatters or leaves, no contact is deeper than
-// half a voxel, nothing was dropped or cut.
+// Checks what must hold for every scene and method: nothing chatters or gets away, no contact is
+// deeper than half a voxel, and the soft start is the only event, so nothing was dropped or cut.
 void check_sound(const json& result) {
   INFO(result["scene"].get<std::string>(), " ", result["method"].get<std::string>());
   CHECK(result["verdict"] == "held");
@@ -112,7 +113,7 @@ void check_with_its_hand(const json& result, double metres) {
   CHECK(angle_between(body(result), hand(result)) < 1e-3);
 }
 
-// doctest's Approx adds 1 to the size of what it compares: in metres it would let anything pass.
+// doctest's Approx adds 1 to the size of the values, so for metres it would let anything pass.
 bool near(double a, double b, double tolerance) { return std::abs(a - b) <= tolerance; }
 
 void report(const json& r) {
@@ -126,8 +127,6 @@ void report(const json& r) {
 
 }  // namespace
 
-// Measured, for 72 um of play: 74.5 um up in robust, 80.4 in global, 72.7 in none, of which 1 um is
-// the turn; 1,696, 1,818 and 276 contacts.
 TEST_CASE("a nut pulled along its bolt goes as far as the play of the thread, and comes back") {
   const auto data = test_data();
   if (!data) return;
@@ -140,8 +139,8 @@ TEST_CASE("a nut pulled along its bolt goes as far as the play of the thread, an
     CHECK(near(hand(held).p[2], nut::start + 0.01, 1e-6));
     CHECK(held["contacts"]["max"].get<int>() > 100);
     CHECK(near(held["max_force"].get<double>(), nut::max_force, 0.01 * nut::max_force));
-    // Without friction the pull also unscrews it, as far as the hand's rotational spring lets it:
-    // F pitch/2pi = k_rot turn. Beyond play and turn it sinks in by a part of a voxel.
+    // Without friction the pull also unscrews the nut until the hand's rotational spring balances
+    // it: F pitch/2pi = k_rot turn. Beyond play and turn the nut penetrates by a part of a voxel.
     const double per_radian = nut::pitch / (2 * std::numbers::pi);
     const double turn = nut::max_force * per_radian / nut::grip.rotational_stiffness();
     const double found = turned(body(held));
@@ -171,7 +170,7 @@ TEST_CASE("a nut in the right screw motion follows its hand and is not held") {
   CHECK(result["max_force"].get<double>() < 0.2 * nut::max_force);
 }
 
-// The hand stays at its height: only the thread can move the nut.
+// The hand stays at its height, so only the thread can move the nut along its axis.
 TEST_CASE("a nut that is only turned climbs one pitch a turn, and descends the other way") {
   const auto data = test_data();
   if (!data) return;
@@ -188,8 +187,6 @@ TEST_CASE("a nut that is only turned climbs one pitch a turn, and descends the o
   }
 }
 
-// Measured, robust: seated 0.009 mm deep with 2,955 contacts, pushed 0.02 mm sideways of the
-// 0.0125 mm there are; the deepest contact 0.09 voxel (global 0.43, none 0.04).
 TEST_CASE("a gear sits on its post, is held by it sideways, and comes off freely") {
   const auto data = test_data();
   if (!data) return;
@@ -205,8 +202,8 @@ TEST_CASE("a gear sits on its post, is held by it sideways, and comes off freely
     const json pushed = run(scene, method, gear::pushed);
     CHECK(near(hand(pushed).p[0], 3e-3, 1e-6));
     CHECK(std::abs(body(pushed).p[2]) < 0.25 * gear::voxel);
-    CHECK(body(pushed).p[0] > 0.005e-3);                            // it used the play it has ...
-    CHECK(sideways(body(pushed)) < 0.0125e-3 + 0.5 * gear::voxel);  // ... and no more
+    CHECK(body(pushed).p[0] > 0.005e-3);  // the gear moves within its play, but no further
+    CHECK(sideways(body(pushed)) < 0.0125e-3 + 0.5 * gear::voxel);
 
     const json lifting = run(scene, method, gear::lifting);  // still around the post
     CHECK(body(lifting).p[2] < 0.01);
@@ -219,11 +216,9 @@ TEST_CASE("a gear sits on its post, is held by it sideways, and comes off freely
   }
 }
 
-// Measured: 0.26 voxel deep at most in robust, 0.20 in global, 0.09 in none. A straight press makes
-// it creep sideways in robust, to the wall and no further: one point on the 45 degree chamfer,
-// within 0.01 mm of the bottom edge, touches the floor beside 678 flat ones; alone in its direction
-// it keeps all of k, and bears a fifth of the load along its own normal. In the others it stays
-// within 0.002 mm.
+// With the method robust a straight press makes the peg creep sideways up to the wall. One point on
+// the 45 degree chamfer touches the floor beside 678 flat ones. It is alone in its direction, so it
+// keeps all of k and bears a fifth of the load along its own normal.
 TEST_CASE("a peg in its hole is held by floor and wall, and is drawn out freely") {
   const auto data = test_data();
   if (!data) return;
@@ -240,7 +235,7 @@ TEST_CASE("a peg in its hole is held by floor and wall, and is drawn out freely"
     CHECK(near(hand(pushed).p[0], 3e-3, 1e-6));
     CHECK(at.p[0] > 0.3 * peg::clearance);
     CHECK(at.p[0] < peg::clearance + peg::voxel);
-    // The hand pushes above the rim: it leans as far as a hole 9 mm deep lets it, on one edge.
+    // The hand pushes above the rim, so the peg leans as far as a hole 9 mm deep allows.
     CHECK(lean(at) < 2 * (peg::clearance + peg::voxel) / 9e-3);
     CHECK(at.p[2] > -0.5 * peg::voxel);
     CHECK(at.p[2] < 8e-3 * lean(at) + 0.5 * peg::voxel);
@@ -256,8 +251,6 @@ TEST_CASE("a peg in its hole is held by floor and wall, and is drawn out freely"
   }
 }
 
-// Measured, robust: at rest 14 contacts of the crown, 0.21 voxel deep; 0.24 at most, while a fluke
-// slides down a sensor's side.
 TEST_CASE("an anchor pushed onto a robot's lid is held there, and is free again above it") {
   const auto data = test_data();
   if (!data) return;
@@ -272,7 +265,7 @@ TEST_CASE("an anchor pushed onto a robot's lid is held there, and is free again 
     const double max_force = anchor::grip.contact_stiffness * voxel / 2;
     CHECK(held["contacts"]["max"].get<int>() > 3);
     CHECK(near(held["max_force"].get<double>(), max_force, 0.01 * max_force));
-    // The lid's surface is 0.9 voxel up, the soup's offset; the hand is 40 mm below it.
+    // The offset of the soup raises the lid's surface by 0.9 voxel. The hand is 40 mm below it.
     const double resting = anchor::lid + 0.9 * voxel + anchor::crown;
     CHECK(body(held).p[2] > resting - voxel);
     CHECK(body(held).p[2] < resting + voxel);

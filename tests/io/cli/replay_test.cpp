@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording replays to the bit, and a difference is reported with its place.
+// A recording replays bit for bit, and a replay reports where a difference is.
 #include <hdf5.h>
 
 #include <algorithm>
@@ -52,7 +52,7 @@ void change_head(const fs::path& file, const std::string& from, const std::strin
   H5Tclose(type), H5Dclose(data), H5Fclose(h5);
 }
 
-// A ball goes 5 mm deep into the top of a block.
+// Runs a scene in which the hand pushes a ball 5 mm into the top of a block.
 Json ball_and_block(Sandbox& box) {
   spill(box.file("ball.stl"), stl(sphere_facets(20, 16)));
   spill(box.file("block.stl"), stl(box_facets(60)));
@@ -99,11 +99,11 @@ TEST_CASE("real time and virtual time, people and arms: every run replays") {
   for (Args args : runs) {
     args.insert(args.end(), {"--record", "run.h5"});
     const Json recorded = result_of(box, args);
-    if (recorded["records_lost"] > 0) continue;  // the machine stalled: there is nothing to compare
+    if (recorded["records_lost"] > 0) continue;  // the machine stalled, so frames are missing
     const Json json = result_of(box, {"replay", "run.h5", "--verify"});
     CHECK(json["same"] == true);
     CHECK(json["frames"] == recorded["frames"]);
-    // Every late frame has an event with its cause, and a place in its histogram.
+    // Every late frame has an event with its cause and counts in the histogram of that cause.
     const Json& deadline = recorded["deadline"];
     for (const char* cause : {"compute", "wakeup", "stolen"}) {
       const std::string said = std::string(cause) == "compute"  ? "late: own computation"
@@ -143,7 +143,7 @@ TEST_CASE("a flipped bit is found at its frame, with its column") {
     CHECK(json["divergence"]["frame"] == frame);
     const std::string said = json["error"];
     CHECK(said.find("frame " + std::to_string(frame)) != std::string::npos);
-    // A changed input shows in the first result that it affects; a changed result is named itself.
+    // A changed result is reported by its own name, a changed input by the first result it affects.
     if (std::string(flip.column).rfind("hand_", 0) != 0)
       CHECK(json["divergence"]["column"] == flip.column);
     if (std::string(flip.column) == "body_pose") CHECK(json["divergence"]["cell"] == "qy");
@@ -168,7 +168,7 @@ TEST_CASE("files come back to the bit, from where they were or from beside the r
     fs::rename(box.file(name), box.file("else") / name);
   CHECK(verified("else/run.h5"));
 
-  // A part that has changed, and a part that is gone.
+  // One part has changed; below, one is missing.
   spill(box.file("else") / "block.stl", stl(box_facets(61)));
   const Ended other = run(box, {"replay", "else/run.h5", "--verify"});
   CHECK(other.code == 1);
@@ -231,7 +231,7 @@ TEST_CASE(
   };
   const Ended unknown = as_if("M");
   CHECK(unknown.err.find("does not have") != std::string::npos);
-  CHECK(unknown.code == 0);  // the recorded name is wrong, the bits are right
+  CHECK(unknown.code == 0);  // only the recorded name is wrong; the bits agree
   if (target != "AVX3") return;
   const Ended old = as_if("SSE4");
   CHECK(old.code == 1);
@@ -249,7 +249,7 @@ TEST_CASE("the log of a killed run is replayed as far as it goes") {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     std::this_thread::sleep_for(std::chrono::milliseconds(900));
   }  // killed
-  // The first look at it turns the log into a recording, and says so.
+  // The first program that reads the log turns it into a recording and says so.
   const Json json = result_of(box, {"replay", "run.h5", "--verify"});
   CHECK(json["same"] == true);
   CHECK(json["frames"] > 100);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the program writes it reads back to the same physics, and the same input gives the same
-// bits.
+// The program reads its own files back to the same physics, and the same input gives the same bits.
 #include <set>
 #include <string>
 
@@ -15,7 +14,7 @@ TEST_CASE("an exported scene runs like the scene it came from") {
   for (const Json& scene : list["scenes"]) {
     const std::string name = scene["name"];
     CAPTURE(name);
-    // Minutes each, and their bakes' threads are seen at work on smaller meshes.
+    // With a sanitizer these take minutes each, and smaller meshes test the threads of a bake too.
     if (kSanitized && (name == "engine-bay" || name == "landing-gear")) continue;
     const auto run_of = [&](const std::string& what) {
       Args args{"run", what, "--virtual-time"};
@@ -27,7 +26,7 @@ TEST_CASE("an exported scene runs like the scene it came from") {
     const Json exported = run_of(name + "/scene.json");
     CHECK(exported["verdict"] == named["verdict"]);
     CHECK(exported["frames"] == named["frames"]);
-    // Meshes go through single precision: the last digits may move, and with them a contact.
+    // Mesh files have single precision, so the last digits may change, and with them a contact.
     CHECK(exported["max_depth_voxels"].get<double>() ==
           doctest::Approx(named["max_depth_voxels"].get<double>()).epsilon(0.01));
     CHECK(exported["max_force"].get<double>() ==
@@ -39,7 +38,7 @@ TEST_CASE("baked files in a scene give the very run of the meshes they came from
   Sandbox box;
   spill(box.file("ball.stl"), stl(sphere_facets(20, 16)));
   spill(box.file("block.stl"), stl(box_facets(60)));
-  // The ball goes 5 mm deep into the top of the block.
+  // The hand pushes the ball 5 mm into the top of the block.
   spill(box.file("hand.csv"),
         "t,x,y,z,qw,qx,qy,qz\n0,30,30,85,1,0,0,0\n0.5,30,30,75,1,0,0,0\n0.8,30,30,75,1,0,0,0\n");
   Json scene = Json::parse(R"({"hapsix": 1, "units": "mm",
@@ -60,7 +59,7 @@ TEST_CASE("baked files in a scene give the very run of the meshes they came from
   scene["bodies"][1]["shell"] = {{"file", "ball.ply"}};
   spill(box.file("baked.json"), scene.dump());
   const Json from_files = result_of(box, {"run", "baked.json", "--virtual-time"});
-  // Also from one thread to all of them, which baked the first.
+  // The first assets were baked with all threads, these with one.
   CHECK(from_files["state_hash"] == from_mesh["state_hash"]);
   CHECK(from_files["max_depth_voxels"] == from_mesh["max_depth_voxels"]);
 
@@ -75,7 +74,7 @@ TEST_CASE("baked files in a scene give the very run of the meshes they came from
   CHECK(shell_info["points"] == shell["points"]);
   CHECK(shell_info["level_points"] == shell["level_points"]);
 
-  // Units of the mesh are those said: the same numbers in metres are a thousand times as large.
+  // The option --units decides: the same numbers read as metres give a mesh 1000 times as large.
   const Json large =
       result_of(box, {"bake", "field", "block.stl", "-o", "large.vdb", "--voxels", "48"});
   CHECK(large["voxel_size"].get<double>() ==
@@ -98,7 +97,7 @@ TEST_CASE(
   CHECK(with_threads("2")["state_hash"] == first["state_hash"]);
   Args other = args;
   other.push_back("--method"), other.push_back("global");
-  CHECK(result_of(box, other)["state_hash"] != first["state_hash"]);  // the hash sees the motion
+  CHECK(result_of(box, other)["state_hash"] != first["state_hash"]);  // another motion
 }
 
 TEST_CASE("a recording holds every frame and the result of its run") {
@@ -110,7 +109,7 @@ TEST_CASE("a recording holds every frame and the result of its run") {
   CHECK(info["whole"] == true);
   CHECK(info["summary"]["state_hash"] == run_result["state_hash"]);
   CHECK(info["summary"]["verdict"] == run_result["verdict"]);
-  CHECK(box.files() == std::set<std::string>{"run.h5"});  // nothing beside it
+  CHECK(box.files() == std::set<std::string>{"run.h5"});  // no temporary file
   // A second run replaces it.
   result_of(box,
             {"run", "peg-in-hole", "--virtual-time", "--duration", "0.1", "--record", "run.h5"});

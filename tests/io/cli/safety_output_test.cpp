@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a user sees of the safety chain: keys of a scene, events and counters of a run, and what a
-// signal does to a run.
+// Tests the safety chain as a user sees it: keys of a scene, events and counters of a run, and the
+// effect of a signal on a run.
 #include <string>
 
 #include "tests/io/cli/program.h"
@@ -92,7 +92,7 @@ TEST_CASE("without the dead-man button nothing is rendered") {
 
 TEST_CASE("a terminal that hangs up ends a run like Ctrl-C; a crash stays a crash") {
   for (const int number : {SIGHUP, SIGSEGV, SIGABRT}) {
-    if (kSanitized && number == SIGSEGV) continue;  // the sanitizer's own to report
+    if (kSanitized && number == SIGSEGV) continue;  // the sanitizer handles it
     CAPTURE(number);
     Sandbox box;
     Process process(box, {"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"});

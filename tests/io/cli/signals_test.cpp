@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C, a kill, a terminal: the program ends soon, leaves nothing half made, keeps what it
-// recorded.
+// On Ctrl-C the program ends soon, leaves no half-written file and keeps its recording. It also
+// keeps the log when it is killed, and shows its progress on a terminal.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -18,18 +18,18 @@ using namespace h6::test;
 namespace {
 
 constexpr double kSlower = kSanitized ? 15 : 1;
-// Of runs in real time, whose frames take longer too.
+// For runs in real time: with a sanitizer their frames take longer.
 constexpr double kPatience = kSanitized ? 6 : 1;
 constexpr int kSomeFrames = kSanitized ? 10 : 100;
 
-// Work that takes long, however it is built.
+// Bake sizes that take long in every build.
 const std::string kVoxels = kThreadSanitized ? "640" : "2048";
 const std::string kPoints = kThreadSanitized ? "300000" : "2000000";
 constexpr std::size_t kTriangles = repeated(2'000'000, 300'000);
 
 void pause_seconds(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
 
-// A pseudo terminal; what was written to it can be read once all its writers are gone.
+// A pseudo terminal. Its text can be read when all its writers have closed it.
 struct Terminal {
   int mine = posix_openpt(O_RDWR | O_NOCTTY), theirs = -1;
   Terminal() {
@@ -104,7 +104,7 @@ TEST_CASE("a killed run leaves a recording that opens and lacks half a second at
   CHECK(process.wait().code == -SIGKILL);
   const Json info = result_of(box, {"info", "run.h5"});
   CHECK(info["kind"] == "recording");
-  // 1.5 s less half a second, and much room for a loaded machine.
+  // The log may lack the last half second of the 1.5 s. The rest is a margin for a busy machine.
   CHECK(info["frames"] >= 3 * kSomeFrames);
   CHECK(info["whole"] == false);
   CHECK(!info.value("remark", "").empty());
@@ -126,7 +126,7 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
     CHECK(one_object(ended).value("error", "").find("cancelled") != std::string::npos);
     CHECK(box.files() == before);
   }
-  // The same bake on its way into the cache.
+  // The same bake, now for the cache.
   spill(box.file("scene.json"), R"({"hapsix": 1, "units": "m", "bodies": [
     {"name": "ball", "fixed": true, "field": {"mesh": "ball.stl", "voxels": )" +
                                     kVoxels + "}}]}");
@@ -142,7 +142,8 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
 
 namespace {
 
-// Started, interrupted after a while: it ends soon, with one sentence, and leaves nothing.
+// Starts the program, interrupts it after `after` seconds, and checks that it ends soon, with one
+// sentence, and leaves no file.
 void check_interrupted(Sandbox& box, const Args& args, double after) {
   CAPTURE(args[1]);
   CAPTURE(after);
@@ -176,7 +177,7 @@ TEST_CASE("Ctrl-C ends bakes of fields and of millions of points within half a s
 
 TEST_CASE("Ctrl-C ends the reading of a large mesh within half a second") {
   Sandbox box;
-  // Every corner another one.
+  // No two corners are equal.
   std::string bytes(80, '\0');
   const auto count = static_cast<std::uint32_t>(kTriangles);
   bytes.append(reinterpret_cast<const char*>(&count), 4);
@@ -222,7 +223,7 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
     const std::string seen = terminal.read_all();
     CHECK(count(seen, "running box-on-wall") >= 3);
     CHECK(count(seen, "%") >= 3);
-    // Every bar is wiped before the next line: nothing of it stays on the screen.
+    // The program wipes each bar before the next line, so that nothing of it stays on the screen.
     const std::string wipe = "\r\033[K";
     CHECK(seen.rfind(wipe) > seen.rfind('%'));
     for (std::size_t at = seen.find('%'); at != std::string::npos; at = seen.find('%', at + 1)) {
@@ -231,11 +232,11 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
       CHECK(seen.find('\n', at) > end);
       CHECK(end - seen.rfind(wipe, at) - wipe.size() <= 80);  // a longer line would wrap
     }
-    // After a second, what is left of 1.8.
+    // The run takes 1.8 s, and the estimate appears after one second.
     CHECK(count(seen, "about 1 s left") >= 1);
   }
   {
-    // A bake tells the same: a share that only grows, and an estimate.
+    // A bake shows a share that only grows, and an estimate too.
     Terminal terminal;
     spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
     Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", kVoxels}, "",
@@ -257,7 +258,7 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
   }
   {
     Terminal terminal;
-    // Short even on a machine that is busy with something else.
+    // This run is short even on a busy machine.
     Process process(box, {"run", "box-on-wall", "--virtual-time", "--duration", "0.1"}, "",
                     dup(terminal.theirs));
     CHECK(process.wait().code == 0);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole program with a SpaceMouse that umockdev makes: listed, checked, and in the hand of a
-// run at 1 kHz. HAPSIX_SOAK_SECONDS=30 runs the alpha for so long instead of a box for two seconds.
+// Tests the whole program with a SpaceMouse that umockdev simulates: listing it, checking it, and
+// a run at 1 kHz. The run takes two seconds with a box; HAPSIX_SOAK_SECONDS=30 runs alpha-shortcut
+// for 30 seconds instead.
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -69,7 +70,7 @@ TEST_CASE("a run at 1 kHz in the hand of a cap that moves all the while") {
   Sandbox box;
   result_of(box, {"run", scene, "--virtual-time", "--duration", "0.01"});  // bakes
   Process process(box, {"run", scene, "--device", "spacemouse", "--duration", seconds, "--json"});
-  // Pushed to and fro as a hand does: each half report every 8 ms, and the light is looked at.
+  // Push it to and fro as a hand would, with each half of a report every 8 ms, and watch its light.
   bool ended = false;
   std::size_t lit = 0, sent = 0;
   for (int i = 0; !ended && i < 60000; ++i) {
@@ -92,10 +93,10 @@ TEST_CASE("a run at 1 kHz in the hand of a cap that moves all the while") {
           json["frame_us"]["p50"].get<double>(), " us, p99 ", json["frame_us"]["p99"].get<double>(),
           " us, max ", json["frame_us"]["max"].get<double>(), " us");
   CHECK(json["frames"] == std::lround(1000 * std::stod(seconds)));
-  // A machine that holds the haptic thread up is not the device's fault.
+  // The device is not to blame if a busy machine held up the haptic thread.
   const std::string fault = json["fault"];
   CHECK_MESSAGE((fault == "none" || fault == "watchdog" || fault == "late"), fault);
   const Json still = result_of(box, {"run", scene, "--device", "spacemouse", "--duration", "0.05"});
-  CHECK(json["hand_pose"] != still["hand_pose"]);  // it was moved
+  CHECK(json["hand_pose"] != still["hand_pose"]);
   machine().unplug(cap);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every mistake of a user: one sentence that says what and where, the right exit code, soon, and
-// nothing left behind.
+// On a user's mistake the program ends soon with the right exit code and one sentence that says
+// what is wrong and where. It leaves no file behind.
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kSlower = kSanitized ? 15 : 1;
 
-// What holds for every mistake; `words` must be in the sentence.
+// Checks what must hold for every mistake. The sentence must contain `words`.
 void check_refusal(const Ended& ended, int code, const std::vector<std::string>& words) {
   CAPTURE(ended.err);
   REQUIRE(ended.in_time);
@@ -32,7 +32,7 @@ void check_refusal(const Ended& ended, int code, const std::vector<std::string>&
   }
 }
 
-// One run, as a person starts it.
+// Checks one run without --json.
 void refused(Sandbox& box, const Args& args, int code, const std::vector<std::string>& words) {
   CAPTURE(args.back());
   const std::set<std::string> before = box.files();
@@ -42,7 +42,7 @@ void refused(Sandbox& box, const Args& args, int code, const std::vector<std::st
   CHECK(box.files() == before);
 }
 
-// The same, and beside it a run with --json, as a program starts it.
+// Checks a run without --json and one with it.
 void mistake(Sandbox& box, Args args, int code, const std::vector<std::string>& words) {
   std::string line;
   for (const std::string& a : args) line += " " + a.substr(0, 60);
@@ -118,7 +118,7 @@ TEST_CASE(
   bad_mesh(box, "nan.stl", {"triangle 4", "not finite"});
   bad_mesh(box, "none.stl", {"no triangle"});
   bad_mesh(box, "folder.stl", {"folder"});
-  bad_mesh(box, "pipe.stl", {"not a regular file"});  // would wait for a writer for ever
+  bad_mesh(box, "pipe.stl", {"not a regular file"});  // reading it would wait for ever
 }
 
 TEST_CASE("a hundred megabytes of garbage are refused under any name") {
@@ -158,7 +158,7 @@ TEST_CASE("options out of range are wrong usage, told before the mesh is read") 
     refused(box, {"run", "box-on-wall", "--duration", s}, 2, {"--duration", s});
   refused(box, {"run", "box-on-wall", "--threads", "3"}, 2, {"--threads", "1 to 2"});
 
-  // Sizes that only the mesh can judge: in range, but gigabytes.
+  // Sizes in range that would take gigabytes for this mesh.
   mistake(box, {"bake", "field", "box.stl", "-o", "out.vdb", "--voxel-size", "1e-9"}, 1,
           {"box.stl", "2048"});
   mistake(box, {"bake", "shell", "box.stl", "-o", "out.ply", "--spacing", "1e-9"}, 1,
@@ -190,7 +190,7 @@ TEST_CASE("a file that cannot be written is told before the bake, and no input i
   mistake(box, {"scene", "export", "box-on-wall", "box.stl"}, 1, {"box.stl"});
   mistake(box, {"demo", "--virtual-time", "-o", "box.stl"}, 1, {"box.stl"});
 
-  // A shell that would replace the very mesh it comes from.
+  // The shell must not overwrite its own mesh.
   spill(box.file("mesh.ply"),
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
         "float z\n"
@@ -276,7 +276,7 @@ TEST_CASE("a result that cannot be written is a failure") {
     MESSAGE("skipped: no /dev/full");
     return;
   }
-  // The shell redirects: the helper keeps stdout for itself.
+  // The shell must redirect stdout, because Process sends it to a file of its own.
   const std::string command =
       std::string("'") + HAPSIX_PROGRAM + "' scene list > /dev/full 2> " + box.file("err").string();
   const int status = std::system(command.c_str());
