@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes in the hand of a simulated arm: every way that a device and the engine can talk, with and
-// without delay.
+// Runs scenes with a simulated arm in every device mode, with and without delay.
 #include <doctest/doctest.h>
 #include <unistd.h>
 
@@ -26,7 +25,7 @@ using h6::test::near;
 
 namespace {
 
-// Bakes go to a folder of this run's own.
+// Gives this run a cache folder of its own.
 struct PrivateCache {
   std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("hapsix-modes-" + std::to_string(getpid()));
@@ -35,7 +34,7 @@ struct PrivateCache {
 };
 const PrivateCache cache;
 
-// A box of 10 mm height, pressed onto a wall by a person who wants to be 3 mm inside.
+// A box of 10 mm height on a wall. The person who presses it aims 3 mm below the surface.
 const io::LoadedScene& pressed_box() {
   static const std::unique_ptr<io::LoadedScene> loaded = [] {
     io::Scene scene = *io::make_scene("box-on-wall");
@@ -51,11 +50,11 @@ const io::LoadedScene& pressed_box() {
 }
 
 struct Rest {
-  double depth = 0, deepest = 0;  // at the end, and ever [voxel]
-  double late_speed = 0;          // RMS of the body over the last 0.2 s [m/s]
-  double swing = 0;               // of its height over the last 0.2 s [m]
+  double depth = 0, deepest = 0;  // depth at the end, and its maximum over the run [voxel]
+  double late_speed = 0;          // RMS speed of the body over the last 0.2 s [m/s]
+  double swing = 0;               // peak-to-peak height over the last 0.2 s [m]
   std::uint32_t contacts = 0;
-  double force = 0;  // of the contacts at the end, along the wall's normal [N]
+  double force = 0;  // sum over the contacts at the end, along the wall's normal [N]
   h6Status status = 0;
 };
 
@@ -112,10 +111,10 @@ TEST_CASE("a box on a wall, held by an arm, rests in contact in every mode and w
       CHECK(rest.contacts > 20);
       CHECK(rest.depth > 0);
       CHECK(rest.deepest < 0.1);
-      CHECK(rest.late_speed < 0.5e-3);  // the encoders' steps; a verdict calls 2 mm/s chatter
+      CHECK(rest.late_speed < 0.5e-3);  // from the encoders' steps; chatter begins at 2 mm/s
       CHECK(rest.swing < 5e-6);
       CHECK((rest.status & (H6_STATE_NOT_FINITE | H6_HAND_NOT_FINITE | H6_OUTPUT_FAULT)) == 0);
-      // 3 mm of reach over the springs between the person and the box.
+      // The force is 3 mm divided by the compliance of the springs between the person and the box.
       const double give = person + (mode == H6_ADMITTANCE ? 0 : coupling) +
                           (mode == H6_PSEUDO_ADMITTANCE ? driver : 0);
       CHECK(rest.force == near(3e-3 / give).epsilon(0.04));
@@ -177,7 +176,7 @@ TEST_CASE("the arm's figures in a scene reach the arm") {
 }
 
 TEST_CASE("every figure of an arm in a scene changes what the arm does") {
-  // Tilted, and from the start against a stop, so that nothing about it is idle.
+  // The arm is tilted and starts against a stop, so that each of its figures has an effect.
   io::SceneArm base;
   base.workspace = {{-0.1, -0.1, 6.5e-3}, {0.1, 0.1, 0.1}};
   base.max_force = 2, base.max_torque = 0.02;

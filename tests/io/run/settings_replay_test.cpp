@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that a person changes in the live view are part of a recording: replay changes them
-// before the same frame, and says so where a recording cannot.
+// A recording holds the settings that a user changes in the live view. Replay changes them before
+// the same frame, or says why the recording does not allow that.
 #include <doctest/doctest.h>
 #include <hdf5.h>
 #include <unistd.h>
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Bakes and recordings go to a folder of this run's own.
+// Gives this run a folder of its own for bakes and recordings.
 struct PrivateFolder {
   fs::path path = fs::temp_directory_path() / ("hapsix-settings-" + std::to_string(getpid()));
   PrivateFolder() {
@@ -41,7 +41,7 @@ const io::LoadedScene& pressed_box() {
   return *loaded;
 }
 
-// A run as the live view makes one: other settings after 300, 600 and 601 frames.
+// Records a run as the live view does, with other settings after 300, 600 and 601 frames.
 fs::path recorded(const std::string& name, bool tell = true) {
   RunSetup run(pressed_box());
   run.record = folder.path / name;
@@ -77,8 +77,8 @@ fs::path recorded(const std::string& name, bool tell = true) {
 }
 
 struct Replayed {
-  std::size_t frames = 0;  // that are the same
-  std::string stopped;     // the sentence
+  std::size_t frames = 0;  // number of frames that agree
+  std::string stopped;     // the error sentence, if any
 };
 
 Replayed replay(const fs::path& file, const std::string& method = "") {
@@ -102,7 +102,7 @@ Replayed replay(const fs::path& file, const std::string& method = "") {
 TEST_CASE("settings changed on the way are changed again, to the bit") {
   const fs::path file = recorded("run.h5");
   CHECK(replay(file).frames == 900);
-  // With a method of one's own choice the rest of them still changes.
+  // If the caller chooses the method, the other settings still change.
   CHECK(replay(file, "none").frames == 900);
 }
 
@@ -128,7 +128,7 @@ TEST_CASE("settings come back to the bit, and nonsense in their place is a sente
   contact.stiffness = 1e5 / 7, contact.epsilon = 1.0 / 3, contact.epsilon_torque = 1e-300;
   coupling.max_depth_voxels = 0.1, coupling.max_torque = 1.0 / 9;
   const std::string text = io::settings_text(contact, coupling);
-  CHECK(text.size() < 400);  // an event's detail is cut after 512 bytes
+  CHECK(text.size() < 400);  // a recording cuts the detail of an event after 512 bytes
   REQUIRE(io::take_settings("after frame 12: " + text, back, held));
   CHECK(std::memcmp(&back, &contact, sizeof back) == 0);
   CHECK(std::memcmp(&held, &coupling, sizeof held) == 0);

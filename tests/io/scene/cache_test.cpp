@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// cache_test.cpp - the cache finds baked assets again, checks what it reads, and never stops a run.
+// cache_test.cpp - the cache finds baked assets again, checks the files it reads, and never stops a
+// run.
 #include <doctest/doctest.h>
 
 #include <unistd.h>
@@ -23,7 +24,7 @@ using namespace h6::io;
 
 namespace {
 
-// Sets HAPSIX_CACHE to a folder that does not exist yet, for one test.
+// Sets HAPSIX_CACHE for one test, to a folder that does not exist yet.
 struct CacheFolder {
   fs::path root = fs::temp_directory_path() / ("hapsix-cache-test-" + std::to_string(getpid()));
   fs::path path = root / "not" / "yet";
@@ -52,7 +53,7 @@ FieldBake field_options() {
 const Mesh box_mesh = box({0, 0, 0}, {0.03, 0.02, 0.01});
 const HashedMesh mesh(box_mesh);
 
-// One run; REQUIREs success.
+// Takes a shell through the cache and REQUIREs success.
 Cached shell_run(ShellData* out = nullptr, const ShellBake& options = shell_options()) {
   Cached cached;
   const auto shell = cached_shell(mesh, options, &cached);
@@ -103,7 +104,7 @@ TEST_CASE("the folder is HAPSIX_CACHE, else that of XDG, else the home's") {
   unsetenv("HOME");
   CHECK(cache_folder().empty());
   Cached cached;
-  CHECK(cached_shell(mesh, shell_options(), &cached));  // baked all the same
+  CHECK(cached_shell(mesh, shell_options(), &cached));  // it bakes without a cache
   CHECK(cached.warnings.size() == 1);
   restore("XDG_CACHE_HOME", xdg ? old_xdg.c_str() : nullptr);
   restore("HOME", home ? old_home.c_str() : nullptr);
@@ -216,7 +217,7 @@ TEST_CASE("a damaged or foreign file is baked again, says so, and is then good")
     CHECK(cached.warnings.size() == 1);
     CHECK(shell_run().hit);
   }
-  // A sound shell of other options under this name.
+  // A valid shell with other options, under the name of this key.
   ShellBake other = shell_options();
   other.seed = 77;
   const auto foreign = bake_shell(box_mesh, other, nullptr);
@@ -241,10 +242,10 @@ TEST_CASE("a cache that cannot be written is a warning, not an error") {
   CHECK_FALSE(cached.hit);
   CHECK(cached.warnings.size() == 1);
   CHECK(field_run().warnings.size() == 1);
-  // And a folder where the file should be.
+  // A folder in the place of the file.
   setenv("HAPSIX_CACHE", folder.root.c_str(), 1);
   fs::create_directories(folder.root / (asset_key(mesh, shell_options()) + ".ply"));
-  CHECK(shell_run().warnings.size() == 2);  // not read, not written
+  CHECK(shell_run().warnings.size() == 2);  // one for reading, one for writing
 }
 
 TEST_CASE("a bake that fails or is cancelled leaves nothing in the cache") {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a scene to what the engine runs: mass properties, shared assets, sentences that name the
-// body.
+// Tests loading a scene: mass properties, shared assets, and error sentences that name the body.
 #include <doctest/doctest.h>
 #include <unistd.h>
 #include "tests/support/near.h"
@@ -22,7 +21,7 @@ using namespace h6::io;
 
 namespace {
 
-// A box with corners at +-half, moved by `at`; wound outward, or inside out.
+// A box with corners at +-half, moved by `at`, wound outward or inside out.
 Mesh box(Vec3 half, Vec3 at, bool inside_out = false) {
   Mesh m;
   for (int i = 0; i < 8; ++i)
@@ -39,7 +38,7 @@ Mesh box(Vec3 half, Vec3 at, bool inside_out = false) {
   return m;
 }
 
-// Bakes go to a folder of this run's own.
+// Gives this run a cache folder of its own.
 struct PrivateCache {
   std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("hapsix-load-" + std::to_string(getpid()));
@@ -117,7 +116,7 @@ TEST_CASE("a scene becomes a model, bodies and hands that a session takes") {
   h6DeviceSample sample{};
   sample.pose = {{0, 0, 0.0145}, {1, 0, 0, 0}};
   for (int i = 0; i < 1000; ++i) h6Step(session, &sample, nullptr);
-  // A box of half height 10 mm on a wall whose top is at 5 mm, pushed half a millimetre into it.
+  // A box of half height 10 mm is pushed 0.5 mm into a wall whose top is at 5 mm.
   CHECK(h6GetFrame(session).contacts > 20);
   CHECK(h6GetBody(session, 1).pose.p.z == h6::test::near(0.015).epsilon(0.01));
   h6DestroySession(session);
@@ -136,7 +135,7 @@ TEST_CASE("bodies with the same content share one asset, and a second load comes
   auto second = load_scene(scene);
   REQUIRE(second);
   for (const LoadedAsset& a : (*second)->assets) CHECK(a.from_cache);
-  twin.field->bake.voxels = 32;  // another bake of the same mesh is another asset
+  twin.field->bake.voxels = 32;  // other options of a bake give another asset
   scene.bodies[2] = twin;
   auto third = load_scene(scene);
   REQUIRE(third);
@@ -149,7 +148,7 @@ TEST_CASE("what the scene states wins over what could be derived") {
   auto loaded = load_scene(scene);
   REQUIRE(loaded);
   CHECK((*loaded)->bodies[1].com.z == 0.004);
-  // The inertia is then about the stated point (parallel axes).
+  // The inertia is then about the stated centre (parallel axis theorem).
   CHECK((*loaded)->bodies[1].inertia[2] ==
         h6::test::near(0.1 / 3 * 2e-4 + 0.1 * 9e-6).epsilon(1e-6));
   scene.bodies[1].inertia = std::array<double, 6>{1e-5, 2e-5, 3e-5, 0, 0, 0};

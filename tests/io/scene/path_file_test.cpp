@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// path_file_test.cpp - hand paths: CSV there and back, what is refused, and what is between rows.
+// path_file_test.cpp - hand paths: writing and reading CSV, refused files, and interpolation.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -83,7 +83,7 @@ TEST_CASE("a bad path row is refused with file and line") {
 
 TEST_CASE("between rows a path moves evenly, turns the shorter way and stands still outside") {
   const double h = std::sqrt(0.5);
-  // A quarter turn about z; the second quaternion with the other sign.
+  // A quarter turn about z. The second quaternion has the opposite sign.
   const Path path = {{1, {{0, 0, 0}, {1, 0, 0, 0}}}, {3, {{4, 0, -2}, {-h, 0, 0, -h}}}};
   check_same(sample_path(path, 0), path[0].pose);
   check_same(sample_path(path, 1), path[0].pose);

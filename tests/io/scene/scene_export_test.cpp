@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_export_test.cpp - scenes written as files, and the schema of what is in them.
+// scene_export_test.cpp - scenes written as files, and the schema of scene files.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -22,7 +22,7 @@ using namespace h6::io;
 
 TEST_CASE("every generated scene, exported and read back, is the same scene") {
   for (const SceneName& entry : scene_names()) {
-    // Soups, 25 and 90 MB as files: industrial_scenes_test.cpp exports them.
+    // Their soups make files of 25 and 90 MB; industrial_scenes_test.cpp exports them.
     if (entry.name == "engine-bay" || entry.name == "landing-gear") continue;
     CAPTURE(entry.name);
     const Folder folder;
@@ -74,7 +74,7 @@ TEST_CASE(
   CHECK(back->bodies[0].field->unit == Unit::in);
   CHECK(text_of(back->bodies[0].field->mesh) == "not read here");
   CHECK(back->bodies[0].field->mesh.parent_path() == out);
-  // Exported onto itself it is what it was.
+  // An export onto itself changes nothing.
   const std::string before = text_of(out / "scene.json");
   REQUIRE(export_scene(*back, out));
   CHECK(text_of(out / "scene.json") == before);
@@ -90,7 +90,7 @@ TEST_CASE("bodies with awkward or equal file names do not write over each other"
   SceneBody third = scene.bodies[0];
   third.name = "third";
   third.field->mesh_data->vertices[0].x -= 0.001;
-  SceneBody fourth = scene.bodies[0];  // the same mesh: one file is enough
+  SceneBody fourth = scene.bodies[0];  // the same mesh, which must not be written twice
   fourth.name = "fourth";
   scene.bodies.push_back(third);
   scene.bodies.push_back(fourth);
@@ -124,7 +124,7 @@ TEST_CASE("an export that cannot be written is one sentence and leaves no scene 
 
 namespace {
 
-// Every object of the schema: where it stands in a scene that has it.
+// Calls `visit` for every object of the schema, with a JSON pointer to its place in a scene.
 template <class Visit>
 void each_object(const Json& schema, const std::string& pointer, Visit&& visit) {
   if (schema.contains("properties")) {
@@ -136,7 +136,7 @@ void each_object(const Json& schema, const std::string& pointer, Visit&& visit) 
   }
 }
 
-// "/bodies/0/field" -> "bodies[0].field"
+// Turns "/bodies/0/field" into "bodies[0].field".
 std::string said_path(std::string pointer) {
   std::string out;
   for (std::size_t i = 1; i < pointer.size(); ++i) {
@@ -150,7 +150,7 @@ std::string said_path(std::string pointer) {
   return out;
 }
 
-// Every key of a scene and where it stands, list numbers left out.
+// Collects every key of a scene with its path, without list numbers.
 void keys_of(const Json& json, const std::string& at, std::vector<std::string>& out) {
   if (json.is_object())
     for (const auto& [name, child] : json.items()) {
@@ -173,7 +173,8 @@ TEST_CASE("the reader knows every key of the schema, and no key beside them") {
     for (const auto& [name, property] : object["properties"].items()) {
       ++keys;
       CHECK(!property["description"].get<std::string>().empty());
-      // A value that no key takes: known keys complain of it, unknown ones of the key.
+      // No key takes this value. A known key gives an error about the value, an unknown one about
+      // the key.
       for (const std::string& key : {name, name + "q"}) {
         Json json = full_scene();
         Json& place = pointer.empty() ? json : json[Json::json_pointer(pointer)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_file_test.cpp - scene files: what is read, what is refused and how that is said.
+// scene_file_test.cpp - scene files: the scenes read from them, and the errors of bad files.
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
@@ -14,13 +14,13 @@
 using namespace h6;
 using namespace h6::io;
 
-// ---- what is read ------------------------------------------------------------------------------
+// ---- good files --------------------------------------------------------------------------------
 
 TEST_CASE("a scene with only what is needed has the engine's defaults for the rest") {
   const Bench bench;
   const Result<Scene> scene = bench.read(small_scene());
   REQUIRE_MESSAGE(scene, scene.error());
-  CHECK(scene->name == "scene");  // of the file
+  CHECK(scene->name == "scene");  // the name of the file
   CHECK(scene->rate == 1000);
   CHECK(scene->duration == 0);
   CHECK(scene->integrator == H6_IMPLICIT);
@@ -149,7 +149,7 @@ TEST_CASE("every key arrives, lengths in metres") {
     const double got = row.member.number(row.member.get(&arm));
     INFO(row.name);
     check_close(got, row.is_length() ? 1e-3 * said : said);
-    CHECK(got != row.start);  // no default can stand in for what was read
+    CHECK(got != row.start);  // else a default would pass for a value that was read
   }
   CHECK(s.hands[1].device == "simulated");
   CHECK(s.hands[1].path.empty());
@@ -220,7 +220,7 @@ TEST_CASE("a quaternion within 0.001 of unit length is normalised") {
   check_close(scene->bodies[1].pose.q.w, std::sqrt(0.5));
 }
 
-// ---- what is refused ---------------------------------------------------------------------------
+// ---- bad files ---------------------------------------------------------------------------------
 
 TEST_CASE("an unknown key is named with its full path and the nearest known key") {
   const Bench bench;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_samples.h - scenes as JSON for tests, the files they name, and when two scenes are the
-// same.
+// scene_samples.h - scenes as JSON for tests, the files they name, and checks that two scenes are
+// equal.
 #pragma once
 #include <doctest/doctest.h>
 #include <unistd.h>
@@ -24,7 +24,7 @@ namespace h6::io {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// A folder that is gone when the test is.
+// A folder for a test. The destructor removes it.
 struct Folder {
   fs::path path;
   Folder() {
@@ -38,7 +38,7 @@ struct Folder {
     fs::remove_all(path, ignored);
   }
   fs::path write(const std::string& name, const std::string& text) const {
-    fs::remove(path / name);  // some file systems flush a file that is written over
+    fs::remove(path / name);  // some file systems flush a file that is overwritten, which is slow
     std::ofstream(path / name, std::ios::binary) << text;
     return path / name;
   }
@@ -53,7 +53,7 @@ inline bool says(const std::string& sentence, const std::string& part) {
   return sentence.find(part) != std::string::npos;
 }
 
-// The files that the scenes below name, and two scenes with every key between them.
+// Makes the files that the scenes below name, and reads scenes in their folder.
 struct Bench : Folder {
   Bench() {
     write("bay.stl", "not read here");
@@ -140,7 +140,7 @@ inline void check_same(const h6Pose& a, const h6Pose& b) {
   check_same(h6Vec3{a.q.x, a.q.y, a.q.z}, h6Vec3{b.q.x, b.q.y, b.q.z});
 }
 
-// The rows of an arm that are plain numbers.
+// The rows of an arm whose value is a plain number.
 inline std::vector<Setting> arm_figures() {
   std::vector<Setting> out;
   for (const Setting& row : arm_settings())
@@ -148,7 +148,7 @@ inline std::vector<Setting> arm_figures() {
   return out;
 }
 
-// The same JSON, numbers within 1e-12.
+// Checks that two JSON values are equal, with numbers within 1e-12.
 inline void check_close(const Json& a, const Json& b) {
   REQUIRE(a.type() == b.type());
   if (a.is_number()) return check_close(a.get<double>(), b.get<double>());
@@ -163,7 +163,7 @@ inline void check_close(const Json& a, const Json& b) {
   }
 }
 
-// Every row has the same value in both.
+// Checks that every row has the same value in both structs.
 inline void check_same(const SettingTable& rows, const void* a, const void* b) {
   Json x = Json::object(), y = Json::object();
   write_settings(rows, a, 1, x);
@@ -176,7 +176,7 @@ inline void check_same(const h6ContactDef& a, const h6ContactDef& b) {
 inline void check_same(const h6CouplingDef& a, const h6CouplingDef& b) {
   check_same(coupling_settings(), &a, &b);
 }
-// What the scene says of a hand: body and coupling stand elsewhere.
+// Compares only the settings that a scene has under a hand: not its body and its coupling.
 inline void check_same(const h6HandDef& a, const h6HandDef& b) {
   check_same(hand_settings(), &a, &b);
 }
@@ -189,7 +189,7 @@ inline void check_same(const SceneVerdict& a, const SceneVerdict& b) {
 }
 
 inline void check_same(SceneBody a, SceneBody b) {
-  if (a.fixed) b.mass = a.mass;  // is not read
+  if (a.fixed) b.mass = a.mass;  // the reader ignores it
   check_same(scene_body_settings(), &a, &b);
   REQUIRE(a.field.has_value() == b.field.has_value());
   if (a.field) check_same(field_source_settings(), &*a.field, &*b.field);
@@ -197,7 +197,7 @@ inline void check_same(SceneBody a, SceneBody b) {
   if (a.shell && !a.shell->points) check_same(shell_source_settings(), &*a.shell, &*b.shell);
 }
 
-// All that a scene says, sources of meshes and shells aside.
+// Compares all settings of two scenes, but not their meshes and shells.
 inline void check_same(const Scene& a, const Scene& b) {
   check_same(scene_settings(), &a, &b);
   REQUIRE(a.bodies.size() == b.bodies.size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings_test.cpp - rows cover a scene's structs, and runtime/SETTINGS.md is up to date.
+// settings_test.cpp - the rows cover a scene's structs, and runtime/SETTINGS.md is up to date.
 #include "io/scene/scene_settings.h"
 
 #include "tests/io/scene/scene_samples.h"
@@ -10,13 +10,13 @@ using namespace h6::io;
 using test::every_member_has_a_row;
 
 TEST_CASE("every member of a scene's structs has its row") {
-  // generated, file; lists that are read by hand: bodies, hands, verdict.
+  // The numbers count members that no row points at: generated, file, bodies, hands, verdict.
   every_member_has_a_row<Scene>(scene_settings(), 5);
   every_member_has_a_row<SceneBody>(scene_body_settings(), 2);  // field, shell
   every_member_has_a_row<SceneHand>(scene_hand_settings(), 2);  // path and its file
   every_member_has_a_row<SceneArm>(arm_settings(), 0);
   every_member_has_a_row<SceneVerdict>(target_settings(), 1);  // forbidden
-  // Where the data come from: mesh, file, unit, and what a generated scene holds itself.
+  // mesh, file, unit, and the data of a generated scene.
   every_member_has_a_row<FieldSource>(field_source_settings(), 4);
   every_member_has_a_row<ShellSource>(shell_source_settings(), 5);
   for (const Setting& row : field_source_settings())

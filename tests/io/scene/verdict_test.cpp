@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// verdict_test.cpp - runs made up as motions, and what is said of them.
+// verdict_test.cpp - verdicts on runs whose motion is given by formulas.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ constexpr double kRate = 1000;
 h6Quat about_z(double angle) { return {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}; }
 h6Pose at(double x, double y, double z) { return {{x, y, z}, {1, 0, 0, 0}}; }
 
-// A cube of 20 mm, its corners and face centres, com at the centre.
+// Points of a cube of 20 mm. Its centre of mass is at its centre.
 std::vector<h6Vec3> cube() {
   std::vector<h6Vec3> out;
   for (int i = -1; i <= 1; ++i)
@@ -42,7 +42,8 @@ struct Moment {
   bool finite = true;
 };
 
-// The hand moves 10 mm along x in the first 0.2 s (50 mm/s) and then rests; the body is with it.
+// The hand moves 10 mm along x in the first 0.2 s (50 mm/s) and then rests. The body follows it
+// exactly.
 Moment calm(double t) {
   Moment m;
   const double x = 0.05 * std::min(t, 0.2);
@@ -68,7 +69,7 @@ Verdict judge(double duration, const std::function<Moment(double)>& run) {
   return judge({}, duration, run);
 }
 
-// A body that swings along y about its place with this RMS speed, at 50 Hz, from t = 0.2 s.
+// From t = 0.2 s the body swings along y about its place, at 50 Hz and with this RMS speed [m/s].
 Moment swinging(double t, double rms_speed) {
   Moment m = calm(t);
   const double w = 2 * kPi * 50, amplitude = rms_speed * std::sqrt(2.0) / w;
@@ -111,7 +112,7 @@ TEST_CASE("a state that is not finite is unstable, whichever way it is told") {
   CHECK(nan_at([&](Moment& m) { m.body.pose.q.w = nan; }) == Verdict::unstable);
   CHECK(nan_at([&](Moment& m) { m.body.velocity.angular.z = INFINITY; }) == Verdict::unstable);
   CHECK(nan_at([&](Moment& m) { m.depth = nan; }) == Verdict::unstable);
-  // A hand's nonsense is not the body's.
+  // A bad hand sample does not make the body unstable.
   CHECK(nan_at([&](Moment& m) { m.hand.p.x = nan; }) == Verdict::held);
 }
 
@@ -119,7 +120,7 @@ TEST_CASE("unstable begins at 100 times the hand's peak speed, wherever in the r
   const auto with_speed = [](double speed) {
     return judge(0.6, [=](double t) {
       Moment m = calm(t);
-      if (t < 0.01) m.body.velocity.linear.y = speed;  // before the hand has reached its peak
+      if (t < 0.01) m.body.velocity.linear.y = speed;  // before the hand reaches its peak speed
       if (t < 0.1) m.hand_velocity = {};
       return m;
     });
@@ -153,7 +154,7 @@ TEST_CASE("a hand at rest does not make slow settling unstable") {
 TEST_CASE("one shell point in a forbidden box for one frame is through") {
   SceneVerdict rules;
   rules.forbidden.push_back({{0.0195, 0.009, 0.009}, {0.5, 0.5, 0.5}});
-  // calm ends at x = 10 mm, its corner at 20 mm.
+  // The motion `calm` ends with the body at x = 10 mm, so its corner is at 20 mm.
   CHECK(judge(rules, 0.6, calm) == Verdict::through);
   rules.forbidden[0].low.x = 0.0205;
   CHECK(judge(rules, 0.6, calm) == Verdict::held);
@@ -267,7 +268,7 @@ TEST_CASE("a turning hand is not still") {
 TEST_CASE("the verdict is the same at other rates") {
   for (const double rate : {100.0, 333.0, 4000.0})
     for (const double speed : {1.8e-3, 2.2e-3}) {
-      // 20 Hz, so that 100 frames a second still see the swing.
+      // The swing has 20 Hz, so that 100 frames a second still resolve it.
       const auto slow = [&](double t) {
         Moment m = calm(t);
         const double w = 2 * kPi * 10;
@@ -284,7 +285,7 @@ TEST_CASE("a scene with a target ends arrived or stuck, by place and by angle") 
   rules.target = at(0.01, 0, 0);
   rules.target->q = about_z(0.1);
   rules.tolerance = 1e-3;
-  CHECK(judge(rules, 0.6, calm) == Verdict::arrived);  // any orientation
+  CHECK(judge(rules, 0.6, calm) == Verdict::arrived);  // the rules accept any orientation
   rules.tolerance_angle = 0.09;
   CHECK(judge(rules, 0.6, calm) == Verdict::stuck);
   rules.tolerance_angle = 0.11;
