@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bake_command.cpp - hapsix bake field|shell: a mesh becomes an asset that opens in other programs.
+// bake_command.cpp - hapsix bake field|shell: bakes a mesh into an asset for other programs, too.
 #include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
@@ -27,7 +27,7 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// The process's largest memory so far.
+// The peak memory of this process so far.
 std::size_t peak_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -89,7 +89,7 @@ void add_unless_empty(std::vector<std::string>& all, std::string sentence) {
   if (!sentence.empty()) all.push_back(std::move(sentence));
 }
 
-// Why a bake failed; says so too when the mesh lies too far from the origin.
+// Reports why a bake failed, and whether the mesh lies too far from the origin.
 int bake_failed(const Console& console, const Common& c, const Input& input, std::string why) {
   const std::string far = io::too_far_for_floats(input.audit.low, input.audit.high);
   if (!far.empty() && why.ends_with('.')) why.pop_back();
@@ -126,7 +126,8 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   io::FieldBakeReport report;
   Result<io::FieldData> field = io::bake_field(input->mesh, o.bake, &report, console.progress());
   if (!field) return bake_failed(console, o.common, *input, field.error());
-  // The field is as good far from the origin, but the file's own numbers may have lost the shape.
+  // A field far from the origin is as good as any, but STL stores floats, which lose the shape
+  // there.
   if (const std::string name = o.common.mesh;
       name.ends_with("stl") || name.ends_with("STL") || name.ends_with("stl.gz"))
     add_unless_empty(report.warnings, io::too_far_for_floats(input->audit.low, input->audit.high));

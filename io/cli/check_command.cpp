@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// check_command.cpp - hapsix check: whether meshes are fit for fields, before an hour is spent on
-// them, and whether a baked field is what its mesh says.
+// check_command.cpp - hapsix check: checks whether meshes are fit for fields, before a long bake,
+// and whether a baked field agrees with its mesh.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -52,9 +52,9 @@ ordered_json spread(const std::vector<double>& lengths, double voxel) {
   return out;
 }
 
-// The force at which a wall gives way. Penetration depth grows up to the middle of a wall; beyond
-// it contact pushes out on the other side. Contacts share one stiffness, so one contact stands for
-// all.
+// The force at which a part is pushed through a wall [N]. Penetration depth grows up to the middle
+// of the wall; beyond it contact pushes out on the other side. Contacts share one stiffness, so one
+// contact stands for all.
 double holding_force(double stiffness, double thickness, double offset) {
   return stiffness * (thickness / 2 + offset);
 }
@@ -122,7 +122,8 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls, cons
                 m["holding_force_N"].get<double>());
 }
 
-// How far the far bounds are below the distance, as far as places were found to compare them.
+// Describes how far the bounds of the far field lie below the distance, if any places could be
+// compared.
 std::string looseness(const io::ExactCheck& c) {
   char text[128];
   std::string all;
@@ -151,7 +152,7 @@ void print(const io::ExactCheck& c) {
       c.far_wrong, looseness(c).c_str());
 }
 
-// Findings that deserve a warning sentence.
+// Returns a warning sentence for each bad finding.
 std::vector<std::string> warnings_of(const Subject& s, const io::MeshAudit& a,
                                      const io::Walls& walls, const io::FieldPlan& p) {
   std::vector<std::string> out = s.mesh.remarks;
@@ -216,7 +217,8 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
                  {"bowls_share", walls->bowls},
                  {"sheets_share", walls->sheets},
                  {"buried_share", walls->buried}};
-  // The thinnest hundredth: a few rays graze an edge and see no wall.
+  // The first percentile stands for the thinnest wall, because a few rays graze an edge and see no
+  // wall.
   const double thin = walls->sheets > 0.001 ? 0 : io::quantile(walls->thickness, 0.01);
   const bool known = walls->sheets > 0.001 || !walls->thickness.empty();
   m["holding_force_N"] =
@@ -262,7 +264,7 @@ Result<std::vector<Subject>> subjects_of_scene(const io::Scene& scene) {
   return out;
 }
 
-// The distance of every shell from a field at the start of the scene, less the field's offset.
+// The distance of every shell from a field at the start of the scene, minus the field's offset.
 Result<ordered_json> clearances(const Console& console, const io::Scene& scene, const Subject& s,
                                 const ordered_json& m, unsigned threads) {
   ordered_json list = ordered_json::array();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// demo_command.cpp - hapsix demo: the alpha puzzle forced through its gap, global scaling against
-// the adaptive weights, in real time.
+// demo_command.cpp - hapsix demo: forces the alpha puzzle through its gap in real time, with global
+// scaling and with the adaptive weights.
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -32,7 +32,7 @@ void print(const std::vector<RunSummary>& runs, bool virtual_time) {
   for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
 }
 
-// Without the page's files there is no report; the demo still runs.
+// Writes the report. A program built without the page's files writes none, but the demo still runs.
 Outcome report(const Console& console, const DemoOptions& o, const std::vector<RunSummary>& runs,
                nlohmann::ordered_json& json) {
   if (io::view::report_page().empty()) return Done{};
@@ -85,7 +85,7 @@ int demo_command(const Console& console, DemoOptions o) {
     return console.fail(reported.error());
   if (o.view.on) {
     o.view.folder = o.folder;
-    o.run = {};  // endless, with the scene's own settings; records only on request
+    o.run = {};  // the run is endless, uses the scene's own settings and records only on request
     const Outcome viewed = view_scene(**loaded, o.run, o.view, console, [](const RunSummary&) {});
     if (!viewed) return console.fail(viewed.error());
   }

@@ -117,7 +117,7 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
       h6Wrench w{};
       part(torque ? w.torque : w.force, axis) = sign * most * 0.5 * (1 - std::cos(kPi * i / 200));
       if (!go_on(w)) return false;
-      if (i != 220) continue;  // a little after the peak: a device that yields lags
+      if (i != 220) continue;  // measures a little after the peak, because the device lags
       h6Vec3 moved =
           torque ? turned(before.q, frames.sample.pose.q) : frames.sample.pose.p - before.p;
       p.moved = sign * part(moved, axis);
@@ -132,7 +132,7 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
                torque = std::min(0.1 * c.max_torque, 1.0);
   bool going = true;
   for (int i = 0; i < 500 && going; ++i) going = go_on({});
-  // A device without motors may show the force by a light.
+  // A device without motors may show the force with a light.
   for (int i = 0; i < 1000 && going && c.dof_out == 0; ++i) going = go_on({{0, 0, force}, {}});
   for (const bool turn : {false, true})
     for (int axis = 0; axis < 3; ++axis)

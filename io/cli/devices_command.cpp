@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// devices_command.cpp - hapsix devices: lists devices, says why one cannot be used, watches and
-// tests one.
+// devices_command.cpp - hapsix devices: lists devices, explains why one cannot be used, watches one
+// and tests one.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -112,7 +112,7 @@ ordered_json counts(const SampleCount& s) {
           {"changed", s.changed}, {"read_us_max", s.read_us_max}, {"write_us_max", s.write_us_max}};
 }
 
-// One line for a sample: millimetres, degrees, buttons, force.
+// Formats a sample as one line: millimetres, degrees, buttons, force.
 std::string live_line(const h6DeviceSample& s, bool lost, const OpenedDevice& opened) {
   if (lost) return "lost";
   const double degrees = 57.29577951308232 * norm(turn({1, 0, 0, 0}, s.pose.q));
@@ -215,7 +215,7 @@ int devices_command(const Console& console, DevicesOptions o) {
                 opened->device.capabilities.max_force, opened->device.capabilities.max_torque);
     if (!opened->about.empty()) std::printf("%s\n", opened->about.c_str());
   }
-  // The signal handler stops the motors at once; the view ends after it.
+  // The signal handler stops the motors at once. The view ends after that.
   set_signal_hook(
       [](void* context) {
         const auto& d = *static_cast<const h6Device*>(context);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// experiments_command.cpp - hapsix experiments [NAME...]: the paper's experiments, every method, as
-// tables that anyone can reproduce.
+// experiments_command.cpp - hapsix experiments [NAME...]: runs the paper's experiments with every
+// method and prints tables.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -27,7 +27,7 @@ struct Chosen {
   std::vector<const StudyKind*> studies;
 };
 
-// Without names: every scene and study.
+// Finds the scenes and studies of these names. Without names it returns all of them.
 Result<Chosen> choose(const std::vector<std::string>& names) {
   Chosen out;
   std::vector<std::string> known;
@@ -97,7 +97,7 @@ int experiments_command(const Console& console, const Options& o) {
         failed = std::string(row.scene->name) + ": " + run.error;
   }
   for (const Study& study : done) json["studies"][study.name] = study.json;
-  if (o.names.empty()) {  // with everything there
+  if (o.names.empty()) {  // this study needs the results of all scenes
     done.push_back(weigh_series(rows, columns, done));
     json[done.back().name] = done.back().json;
     if (!console.json)

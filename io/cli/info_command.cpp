@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// info_command.cpp - hapsix info FILE: describes a file and what is wrong with it.
+// info_command.cpp - hapsix info FILE: describes a file and its defects.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
@@ -27,7 +27,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// A value as text: a list of plain values on one line, an object by its plain members.
+// Formats a value as text: a list of plain values as one line, an object as its plain members.
 std::string text_of(const ordered_json& value) {
   if (value.is_string())
     return value.get_ref<const std::string&>().empty() ? "-" : value.get<std::string>();
@@ -46,7 +46,7 @@ std::string text_of(const ordered_json& value) {
   return out.empty() ? "-" : out;
 }
 
-// One line for each key and for each object of a list: the same facts as the JSON.
+// Prints the facts of the JSON, one line for each key and for each object of a list.
 void print(const ordered_json& object) {
   for (const auto& [key, value] : object.items()) {
     const bool list = value.is_array() && !value.empty() && value.front().is_object();
@@ -66,7 +66,7 @@ int show(const Console& console, const ordered_json& object) {
 
 ordered_json vec(const io::Vec3& v) { return {v.x, v.y, v.z}; }
 
-// Every part and its number of triangles; empty for a mesh of one part.
+// Lists every part and its number of triangles; empty for a mesh of one part.
 ordered_json part_list(const io::Mesh& mesh) {
   std::vector<std::size_t> count(mesh.part_names.size());
   for (const std::int32_t part : mesh.part) ++count[static_cast<std::size_t>(part)];
@@ -201,14 +201,14 @@ Result<ordered_json> path_info(const std::string& file, io::Unit unit) {
   return ordered_json{{"kind", "path"}, {"rows", p->size()}, {"seconds", p->back().t}};
 }
 
-// The header names its elements within the first kilobytes.
+// A PLY header names its elements within the first kilobytes.
 bool has_faces(const std::string& file) {
   char head[4096] = {};
   std::ifstream(file, std::ios::binary).read(head, sizeof head - 1);
   return std::string(head).find("element face") != std::string::npos;
 }
 
-// A .ply without faces is taken for a shell.
+// A PLY file without faces counts as a shell.
 Result<ordered_json> ply_info(const Console& console, const std::string& file, io::Unit unit) {
   return has_faces(file) ? mesh_info(console, file, unit) : shell_info(file);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// main.cpp - hapsix, the program: parses, dispatches, exits 0 (done), 1 (failed) or 2 (wrong
+// main.cpp - the program hapsix: parses and dispatches; exits with 0 (done), 1 (failed) or 2 (wrong
 // usage).
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -13,7 +13,7 @@ using namespace h6::cli;
 
 namespace {
 
-// The subcommand that was chosen, and its full name.
+// Returns the chosen subcommand and writes its full name.
 const CLI::App* reached(const CLI::App& app, std::string& name) {
   const CLI::App* at = &app;
   name = at->get_name();
@@ -24,11 +24,11 @@ const CLI::App* reached(const CLI::App& app, std::string& name) {
   return at;
 }
 
-// One sentence: what is wrong with the command line, and which --help to read.
+// Returns a sentence that explains the mistake in the command line and names the --help to read.
 std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
   std::string command, what = error.what();
   const CLI::App* at = reached(app, command);
-  std::vector<std::string> next;  // commands that may stand here
+  std::vector<std::string> next;  // commands that may follow here
   for (const CLI::App* sub : at->get_subcommands({})) next.push_back(sub->get_name());
   const bool missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
   const bool extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;

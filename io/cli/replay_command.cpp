@@ -45,14 +45,14 @@ std::string hex(std::uint64_t value) {
   return text;
 }
 
-// The figures by which a person compares two runs.
+// Figures for a person who compares two runs.
 struct Figures {
   std::uint64_t frames = 0;
   double contacts = 0, max_depth_voxels = 0, max_force = 0, max_torque = 0;
   std::uint32_t contacts_max = 0;
   Histogram frame_us;
   io::VerdictWatch verdict;
-  std::uint64_t hash = 0;  // of all state hashes, in order
+  std::uint64_t hash = 0;  // a hash of all state hashes, in order
 
   Figures(const io::LoadedScene& loaded, double rate)
       : verdict(loaded.scene.verdict, loaded.watched_points,
@@ -117,7 +117,7 @@ class Replay {
     return Done{};
   }
 
-  // Frame after frame; `as_recorded` gets the recorded rows, `now` the new ones.
+  // Runs frame after frame. `as_recorded` gets the recorded rows, `now` the new ones.
   Outcome play() {
     recorded_.emplace(session_->loaded(), head_.rate);
     replayed_.emplace(session_->loaded(), head_.rate);
@@ -187,7 +187,7 @@ class Replay {
                   session_->threads() == 1 ? "" : "s");
   }
 
-  // The sentence for a divergence.
+  // Describes the divergence in a sentence.
   std::string sentence() const {
     const io::RowDifference& d = divergence->where;
     char text[400];
@@ -213,7 +213,7 @@ class Replay {
   static constexpr std::uint64_t kPiece = 4096;
 
   bool same(const h6FrameRecord& row, const h6FrameRecord& now) {
-    // Times are not part of the state, nor is the safety chain's answer to a late frame.
+    // Neither times nor the safety chain's reaction to a late frame are part of the state.
     if (!io::first_difference(row, now, head_.hands, false)) return true;
     divergence =
         Divergence{row.report.frame, row.time, *io::first_difference(row, now, head_.hands, true),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// report_command.cpp - hapsix report REC.h5... -o OUT.html: recordings as one HTML file.
+// report_command.cpp - hapsix report REC.h5... -o OUT.html: writes recordings as one HTML file.
 //
 // Recordings hold the motion of devices and bodies. Their contacts are computed again by replaying
-// each recorded hand. Where that is no longer possible, the report says so and leaves them out.
+// each recorded hand. If that is no longer possible, the report says so and omits the contacts.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <fstream>

@@ -18,7 +18,7 @@
 namespace h6::cli {
 namespace {
 
-// A scene file, or the name of a generated scene.
+// Reads a scene file, or makes the generated scene of that name.
 Result<io::Scene> find_scene(const std::string& name) {
   const bool is_file = std::filesystem::exists(name);
   std::vector<std::string> known;
@@ -50,7 +50,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
       if (Outcome known = check_device(hand.device); !known)
         return console.fail(name + ": hand of '" + hand.body + "': " + known.error());
       if (hand.device.rfind("plugin:", 0) ==
-          0)  // a plug-in is code, and a scene may come from anyone
+          0)  // a plug-in is code, and the scene may come from a stranger
         return console.fail(name + ": hand of '" + hand.body +
                             "': a scene does not load plug-ins by itself, give it with --device");
     }
@@ -73,7 +73,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
   const std::string stopped =
       "interrupted after " + std::to_string(summary->loop.frames) + " frames";
   nlohmann::ordered_json json = to_json(*summary, **loaded, options.virtual_time);
-  if (summary->interrupted) json["error"] = stopped;  // beside the figures of the run up to there
+  if (summary->interrupted) json["error"] = stopped;  // the figures cover the run up to that point
   console.result(json);
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),

@@ -14,12 +14,12 @@ std::string format(const char* pattern, auto... values) {
   return text;
 }
 
-// In virtual time no frame can be late.
+// The number of late frames as text. In virtual time no frame can be late.
 std::string late(const RunSummary& run, std::uint64_t frames) {
   return run.virtual_time ? "-" : std::to_string(frames);
 }
 
-// How an asset was obtained.
+// Says where an asset came from.
 const char* origin(const io::LoadedScene& scene, const io::LoadedAsset& asset) {
   if (asset.from_cache) return "from the cache";
   const int index = scene.body_index(asset.body);

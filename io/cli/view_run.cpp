@@ -32,8 +32,8 @@ using Clock = std::chrono::steady_clock;
 using io::view::ViewRequest;
 
 constexpr auto kPicture = std::chrono::microseconds(16667);
-constexpr std::size_t kWaiting = 256;        // requests of the page that wait
-constexpr std::size_t kViewContacts = 2000;  // arrows
+constexpr std::size_t kWaiting = 256;        // most requests of the page that may wait
+constexpr std::size_t kViewContacts = 2000;  // most contacts drawn as arrows
 
 // Carries requests from the server's thread to the program's.
 class Wishes {
@@ -45,7 +45,7 @@ class Wishes {
       refused_ = request.error();
       return;
     }
-    // Only the last place of the hand counts.
+    // Only the hand's latest position counts, so it replaces one that still waits.
     if (std::holds_alternative<io::view::MoveHand>(*request) && !waiting_.empty() &&
         std::holds_alternative<io::view::MoveHand>(waiting_.back()))
       waiting_.pop_back();
@@ -160,7 +160,7 @@ class Viewer : public RunObserver {
     wish_.placed = false;
     steering_->wish(wish_);
   }
-  // The page gives places in the scene; after clutching, the device's frame is shifted from it.
+  // The page gives positions in the scene. After clutching, the device's frame is shifted from it.
   void act(const io::view::MoveHand& move) {
     if (!wish_.held) return;
     if (!wish_.clutched && state_.any()) {
@@ -194,7 +194,7 @@ class Viewer : public RunObserver {
     if (set.max_depth_voxels > 0) {
       coupling_.max_depth_voxels = set.max_depth_voxels;
       coupling_.max_force = coupling_.max_torque =
-          0;  // the engine derives them from the new stiffness
+          0;  // the engine then derives both from the new stiffness
     }
     apply(*setup_);
     h6Error error{};
@@ -207,14 +207,14 @@ class Viewer : public RunObserver {
       server_->say(io::view::LiveState::note(error.message));
       return;
     }
-    (void)setup_->session.release();  // it is `old`
+    (void)setup_->session.release();  // the next line destroys it as `old`
     h6DestroySession(old);
     setup_->session = std::move(next);
     state_.settings(contact_, coupling_);
     note_("settings", io::settings_text(contact_, coupling_));
   }
   void act(const io::view::SetPace& set) {
-    if (!setup_->devices.real_time.empty())  // its commands would come too rarely
+    if (!setup_->devices.real_time.empty())  // a slower pace would give it too few commands
       return server_->say(io::view::LiveState::note("the device '" + setup_->devices.real_time +
                                                     "' lives on the clock: no slow motion"));
     h6SetPace(loop_, set.pace);
@@ -236,7 +236,7 @@ class Viewer : public RunObserver {
     do
       record_ = options_.folder + "/" + loaded_.scene.name + "-view-" + std::to_string(n++) + ".h5";
     while ((stat(record_.c_str(), &exists) == 0 ||
-            stat((record_ + ".part").c_str(), &exists) == 0) &&  // of a killed run
+            stat((record_ + ".part").c_str(), &exists) == 0) &&  // left by a killed run
            n < 10000);
     server_->say(io::view::LiveState::note("recording from the start: " + record_));
   }
@@ -287,7 +287,7 @@ Outcome view_scene(const io::LoadedScene& loaded, const RunOptions& given, const
   h6ContactDef contact = loaded.session_def().contact;
   if (!options.method.empty())
     h6MethodFromName(options.method.c_str(), &contact.method, &contact.pieces);
-  options.method.clear();  // the viewer's from now on
+  options.method.clear();  // from now on the viewer sets the method
   const h6CouplingDef coupling =
       loaded.hands.empty() ? h6DefaultCouplingDef() : loaded.hands[0].coupling;
   if (Outcome opened = viewer.open(contact, coupling); !opened) return opened;

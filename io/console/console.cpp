@@ -34,7 +34,7 @@ void on_signal(int number) {
   }
 }
 
-// A crash first stops the devices, then takes its default course.
+// On a crash signal this stops the devices and then lets the former handler act.
 constexpr int kCrashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGQUIT};
 struct sigaction before_crash[std::size(kCrashes)];
 void on_crash(int number) {
@@ -59,7 +59,7 @@ void install_signal_handlers() {
   for (std::size_t i = 0; i < std::size(kCrashes); ++i)
     sigaction(kCrashes[i], &action, &before_crash[i]);
   signal(SIGPIPE, SIG_IGN);
-  signal(SIGXFSZ, SIG_IGN);  // a file over the limit is a failed write, with a sentence
+  signal(SIGXFSZ, SIG_IGN);  // a write over the file size limit then fails with a sentence
 }
 
 void set_signal_hook(void (*hook)(void*), void* context) {
@@ -70,7 +70,7 @@ void set_signal_hook(void (*hook)(void*), void* context) {
 
 namespace {
 
-// For signal handlers: text that cannot be written is lost.
+// Signal handlers call this. Text that cannot be written is lost.
 void write_all(int to, const std::string& text) {
   for (std::size_t done = 0; done < text.size();) {
     const ssize_t some = write(to, text.data() + done, text.size() - done);
@@ -83,7 +83,7 @@ void write_all(int to, const std::string& text) {
 
 EndsAtOnce::EndsAtOnce(const Console& console, const std::string& sentence) {
   static std::string error,
-      result;  // the handler must not allocate, and must not find them destroyed
+      result;  // the handler must not allocate, nor find these strings destroyed
   error = (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("hapsix: " + sentence) + "\n";
   result = console.json ? Console::text({{"error", sentence}}, 2) + "\n" : "";
   set_signal_hook(
@@ -105,7 +105,7 @@ void Console::warn(const std::vector<std::string>& sentences) const {
 }
 
 int Console::fail(std::string sentence, int code) const {
-  // Sentences come from many places; this gives them all the same ending.
+  // Sentences come from many sources; this gives them all the same ending.
   if (!sentence.empty() && sentence.back() == '.') sentence.pop_back();
   log("hapsix: " + sentence);
   if (json) result({{"error", sentence}});
@@ -132,7 +132,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// "about 3 s left", from the speed so far; empty while too little is done to tell.
+// Returns "about 3 s left", from the speed so far; empty while too little work is done to estimate.
 std::string time_left(double seconds, double share) {
   if (seconds < 1 || share < 0.02 || share >= 1) return "";
   const double left = seconds * (1 - share) / share;
@@ -156,7 +156,7 @@ struct Bar {
     if (drawn) std::fprintf(stderr, "\r\033[K");
     drawn = false;
   }
-  // A line of at most 80 columns: a longer one would wrap and could not be wiped.
+  // The line has at most 80 columns, because a longer one would wrap and could not be erased.
   void draw(const std::string& what, Clock::time_point now) {
     constexpr int width = 20;
     const int full = static_cast<int>(width * share);
@@ -177,7 +177,7 @@ io::Progress Console::progress() const {
   return [terminal, bar = std::make_shared<Bar>()](const std::string& what, double done) {
     const auto now = Clock::now();
     const double share = done > 0 ? std::min(done, 1.0) : 0;  // NaN is 0
-    if (share < bar->share) bar->began = now;                 // the next work
+    if (share < bar->share) bar->began = now;                 // the next piece of work has begun
     bar->share = share;
     if (terminal && now - bar->start > std::chrono::milliseconds(500) &&
         now - bar->shown > std::chrono::milliseconds(80))
