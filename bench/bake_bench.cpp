@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// bake_bench.cpp - mesh in memory to asset in memory: bake/MESH/voxels:N/threads:T and
-// bake/MESH/points:N/threads:T. bake/openvdb/... is OpenVDB's meshToLevelSet on the same mesh and
-// voxel, in the same run. Meshes are generated; $HAPSIX_BENCH_MESHES (a list of files separated by
-// colons) adds more, and HAPSIX_BENCH_SOUPS=1 adds the engine bay and the landing gear.
+// bake_bench.cpp - times bakes from a mesh in memory to an asset in memory:
+// bake/MESH/voxels:N/threads:T and bake/MESH/points:N/threads:T. bake/openvdb/... is OpenVDB's
+// meshToLevelSet on the same mesh and voxel, in the same run. Meshes are generated;
+// $HAPSIX_BENCH_MESHES (a list of files separated by colons) adds more, and HAPSIX_BENCH_SOUPS=1
+// adds the engine bay and the landing gear.
 //
-// Before a time is reported, the field is checked: distances at nodes outside against all triangles
-// in double, sides where a generated input says what is solid. peak_MB is the peak of the process
-// during the first bake, with the mesh and the benchmark's own data; ms_STAGE is the wall time of a
-// stage. Times exclude the cost of getting memory from the machine (0.13 ms per MB at best, more
-// than 2 ms where a virtual machine has returned idle memory to its host): five untimed bakes come
-// first, and the process keeps what they free. ms_cold is the first bake, which includes that cost.
-// OpenVDB is timed in the same way.
+// Before a time is reported, the field is checked: distances at nodes outside are compared with the
+// distance from all triangles in double, and sides are compared if the generated input knows what
+// is solid. peak_MB is the peak memory of the process during the first bake, with the mesh and the
+// benchmark's own data. ms_STAGE is the wall time of a stage. Times exclude the cost of getting
+// memory from the machine (0.13 ms per MB at best, more than 2 ms if a virtual machine has returned
+// idle memory to its host): five untimed bakes come first, and the process keeps the memory that
+// they free. ms_cold is the time of the first bake, which includes that cost. OpenVDB is timed in
+// the same way.
 //
-// bake/scaling/MESH/voxels:N bakes with one thread and with two in turn, since machines change
-// their speed, and reports how many times faster two are, in all and by stage, as medians over the
-// rounds. Both fields must be the same bits.
+// bake/scaling/MESH/voxels:N bakes with one thread and with two in turn, because machines change
+// their speed. It reports the speedup of two threads, in all and by stage, as medians over the
+// rounds. Both fields must have the same bits.
 #include <benchmark/benchmark.h>
 
 #ifdef __GLIBC__
@@ -46,7 +48,7 @@ namespace {
 
 using namespace h6;
 
-// A closed ring with teeth, two triangles per cell.
+// Makes a closed ring with teeth, of two triangles per cell.
 io::Mesh gear(int around, int across) {
   io::Mesh mesh;
   for (int i = 0; i < around; ++i)
@@ -68,7 +70,7 @@ io::Mesh gear(int around, int across) {
   return mesh;
 }
 
-// Linux: resets the peak and frees memory that earlier benchmarks left; reads the peak [MB].
+// On Linux these reset the peak, free memory that earlier benchmarks left, and read the peak [MB].
 void forget_peak() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -86,7 +88,7 @@ double peak_megabytes() {
   return 0;
 }
 
-// While one of these lives, the process keeps memory that is freed.
+// While an object lives, the process keeps freed memory.
 class KeepMemory {
  public:
   KeepMemory() { set(0, -1); }
@@ -133,7 +135,7 @@ double distance_to_all(const io::Mesh& mesh, const double (&p)[3]) {
   return std::sqrt(least);
 }
 
-// The worst error at some nodes of the band outside [voxel].
+// The worst distance error at some nodes of the band outside the solid [voxel].
 double worst_error(const io::FieldData& f, const io::Mesh& mesh) {
   constexpr std::size_t kNodes = 24;
   double worst = 0;
@@ -170,7 +172,7 @@ bool is_inside(const io::FieldData& f, const h6Vec3& p) {
   return f.far_grid[(coarse[2] * (by + 1) + coarse[1]) * (bx + 1) + coarse[0]] < 0;
 }
 
-// Counts wrong probes among those with so much room that offset and voxel do not matter.
+// Counts wrong sides at probes that are too far from the surface for offset and voxel to matter.
 std::size_t wrong_sides(const io::FieldData& f, const Input& input) {
   const double room = f.offset + 8 * f.voxel_size;
   std::size_t wrong = 0;
@@ -193,8 +195,8 @@ void bake_field(benchmark::State& state, const Lazy& make, int voxels, unsigned 
   state.counters["ms_cold"] = 1e-6 * double(sched::now_ns() - begin);
   const double peak = peak_megabytes();
   const KeepMemory keep;
-  // Without a report, as below: the allocator uses several places for large blocks before all of
-  // them have been touched.
+  // One bake does not warm up all memory, because the allocator uses several places for large
+  // blocks. These bakes need no report.
   for (int i = 0; i < 4; ++i)
     if (auto field = io::bake_field(input->mesh, options, nullptr)) last = std::move(*field);
   for (auto _ : state) {
@@ -354,7 +356,7 @@ InputPtr industrial(io::IndustrialInput&& made) {
   add_fields("gear100k", ring, {256, 512}, true);
   add_shells("gear100k", ring);
   add_scaling("gear100k", ring, 512);
-  // Large inputs take seconds to bake and minutes by OpenVDB, so they are optional.
+  // Large inputs take seconds to bake and OpenVDB takes minutes, so they are optional.
   const char* which = std::getenv("HAPSIX_BENCH_SOUPS");
   if (which != nullptr && *which != '\0' && *which != '0') {
     constexpr std::size_t kProbes = 400;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// far_search_bench.cpp - bake/far/MESH/voxels:N: the distance of every node of a far grid, by the
-// bake's tree and by Embree's point query, in turn on one thread. It settles which of the two the
-// far field uses (io/bake/far.cpp). The meshes: a torus; with HAPSIX_BENCH_SOUPS=1 also the engine
-// bay and the landing gear.
+// far_search_bench.cpp - bake/far/MESH/voxels:N: computes the distance of every node of a far grid
+// by the bake's tree and by Embree's point query, in turn on one thread. The result decides which
+// of the two the far field uses (io/bake/far.cpp). The mesh is a torus; with HAPSIX_BENCH_SOUPS=1
+// also the engine bay and the landing gear.
 //
-// Both search the same nodes in the same order and get the same hint, the node before: the tree
-// starts at its triangle, Embree at its distance plus the step. Counters, medians of five rounds:
-//   build_tree, build_embree [ms]   the tree on one thread; Embree takes all
-//   tree, embree             [us]   of a search
-//   worst                 [voxel]   difference of their distances
+// Both search the same nodes in the same order and get the previous node as a hint: the tree starts
+// at its triangle, Embree at its distance plus the step. The counters are medians of five rounds:
+//   build_tree, build_embree [ms]   build time; the tree uses one thread, Embree all
+//   tree, embree             [us]   time of a search
+//   worst                 [voxel]   largest difference of their distances
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -55,7 +55,7 @@ void far_search(benchmark::State& state, const std::function<io::Mesh()>& make, 
   const int nx = grid->bricks[0] + 1, ny = grid->bricks[1] + 1, nz = grid->bricks[2] + 1;
   std::vector<double> by_tree(std::size_t(nx) * std::size_t(ny) * std::size_t(nz)),
       by_embree(by_tree);
-  // In rows of nodes, as the far field does.
+  // Nodes are searched row by row, as in the far field.
   const auto each = [&](const auto& search) {
     for (std::size_t i = 0; i < by_tree.size(); ++i) {
       const int a = int(i) % nx, b = int(i) / nx % ny, c = int(i) / nx / ny;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// field_file_bench.cpp - baked fields to files and back: bake/file/MESH/voxels:N/WHAT, where WHAT
-// is
-//   write       a file of the cache, to the disk (fsync), renamed
-//   load/warm   it, from the page cache
-//   load/cold   it, dropped from the page cache by posix_fadvise before every load
+// field_file_bench.cpp - writes baked fields to files and reads them back:
+// bake/file/MESH/voxels:N/WHAT, where WHAT is
+//   write       writes a cache file to the disk (fsync) and renames it
+//   load/warm   reads it from the page cache
+//   load/cold   reads it after posix_fadvise dropped it from the page cache
 //   write/blosc, load/blosc   an exported .vdb, compressed by OpenVDB; warm
 //   write/none, load/none     an exported .vdb, uncompressed; warm
-// All use every thread of the machine. Each field that is read is compared, to the bit, with the
-// one that was written. Files lie in $HAPSIX_BENCH_FOLDER, else in the folder of temporary files;
-// its disk bounds these times. The engine bay runs only with HAPSIX_BENCH_SOUPS=1.
+// All use every thread of the machine. Each field that is read is compared, bit by bit, with the
+// field that was written. Files are in $HAPSIX_BENCH_FOLDER, or else in the folder of temporary
+// files, whose disk limits these times. The engine bay runs only with HAPSIX_BENCH_SOUPS=1.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>
 #include <unistd.h>
@@ -33,7 +33,7 @@ namespace {
 using namespace h6;
 namespace fs = std::filesystem;
 
-// A field that is baked on first use.
+// Bakes a field on first use.
 class Baked {
  public:
   Baked(std::function<io::Mesh()> mesh, int voxels) : mesh_(std::move(mesh)), voxels_(voxels) {}
@@ -82,7 +82,7 @@ bool same_field(const io::FieldData& a, const io::FieldData& b) {
          a.input_hash == b.input_hash && a.triangles == b.triangles;
 }
 
-// Linux: into the page cache, or out of it.
+// On Linux these bring a file into the page cache, or drop it from there.
 void warm_up(const fs::path& file) {
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC);
   std::vector<char> bytes(1 << 20);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// frame_bench.cpp - whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold.
+// frame_bench.cpp - times whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold.
 //
 // The hand pushes the tool into the gap until it has the wanted contacts and then holds it. Before
 // a time is reported, the frame's contacts are compared with a brute-force test of all points.
@@ -41,7 +41,7 @@ h6DeviceSample sample_at(double t) {
   return sample;
 }
 
-// Follows the scene's hand until the tool has `contacts`, or to the end of the path.
+// Follows the scene's hand until the tool has `contacts` contacts, or to the end of the path.
 Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6DeviceSample* held) {
   h6SessionDef def = alpha()->session_def();
   def.contact.method = method;
@@ -56,8 +56,9 @@ Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6D
   return session;
 }
 
-// Compares the next frame's contacts with all points at the pose before it. Points within a
-// thousandth of a voxel of the surface may differ, since this samples them by another code path.
+// Compares the next frame's contacts with a test of all points at the pose before that frame.
+// Points within a thousandth of a voxel of the surface may differ, because this samples them by
+// another code path.
 bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   const h6Pose pose = h6GetBody(session, 1).pose;
   std::vector<double> points, depth(alpha()->watched_points.size());
@@ -71,7 +72,7 @@ bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   const h6Contacts found = h6GetContacts(session, 1);
   std::vector<bool> touching(depth.size());
   for (std::size_t i = 0; i < found.count; ++i)
-    if (found.depth[i] > 0) touching[found.point[i]] = true;       // `series`: some are about to
+    if (found.depth[i] > 0) touching[found.point[i]] = true;  // `series` has others, about to touch
   const bool merged = found.count < h6GetFrame(session).contacts;  // clusters name one point each
   const double doubt = 1e-3 * h6GetVoxel(session, 1);
   for (std::size_t i = 0; i < depth.size(); ++i)

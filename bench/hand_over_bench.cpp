@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hand_over_bench.cpp - the cost of sharing a frame's work with the resident helper:
+// hand_over_bench.cpp - measures the cost of sharing a frame's work with the resident helper:
 //     sched/hand_over               an empty slice, from the caller to the helper and back
 //     sched/sums/us:N               arithmetic in registers, in slices of 1 us
 //     sched/columns/rows:N          sums of columns that the caller has just written; the caller
@@ -91,7 +91,7 @@ void compare(benchmark::State& state, const Before& before, const Job& job) {
   double slices = 0;
   for (auto _ : state) {
     for (int i = 0; i < 2 * kJobs; ++i) {
-      // A hundred with each in turn, so that changes of the machine's speed affect both.
+      // Each team runs a hundred in turn, so that changes of the machine's speed affect both.
       FrameTeam& team = i / 100 % 2 ? two : one;
       team.begin_frame(now_ns());
       before(i);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// level_set_peer.cpp - compiled with the same flags as the bake, so that times can be compared.
+// level_set_peer.cpp - runs OpenVDB, compiled with the bake's flags so that times can be compared.
 #include "level_set_peer.h"
 
 #include <oneapi/tbb/global_control.h>

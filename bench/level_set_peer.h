@@ -7,7 +7,8 @@
 
 namespace h6::bench {
 
-// Half-width 3 voxels, on `threads` threads. Returns the number of leaf bricks.
+// Makes a level set with a half-width of 3 voxels on `threads` threads. Returns the number of leaf
+// bricks.
 std::size_t mesh_to_level_set(const io::Mesh& mesh, double voxel_size, unsigned threads);
 
 }  // namespace h6::bench

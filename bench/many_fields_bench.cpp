@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// many_fields_bench.cpp - whole frames with many pairs, and with several hands:
+// many_fields_bench.cpp - times whole frames with many pairs, and with several hands:
 // frame/many_fields/fields:N/threads:T/slow|fast
 // frame/two_hands/contacts:N/threads:T/slow|fast
 //
 // A ball of 56,823 points touches one in eight of N smaller balls, each an obstacle of its own.
-// Slow: 0.01 voxel a frame. Fast: the frame before was a metre away, so nothing can be reused. Two
-// hands: each presses such a ball into one smaller ball, N contacts each. Before a time is
-// reported, one thread and two must give the same bits.
+// Slow: it moves 0.01 voxel per frame. Fast: it was a metre away in the previous frame, so nothing
+// can be reused. Two hands: each presses such a ball into one smaller ball, with N contacts each.
+// Before a time is reported, one thread and two must give the same bits.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ Session open(const Balls& balls, int fields, unsigned threads) {
   return Session(h6CreateSession(balls.model.handle, &def, nullptr));
 }
 
-// The same sample for every hand.
+// Steps with the same sample for every hand.
 void step(h6Session* session, int i, bool fast) {
   if (fast) {
     const h6DeviceSample away = test::hand_at(test::pose(1, 0, 0));
@@ -73,7 +73,8 @@ const Balls& balls() {
   return all;
 }
 
-// Two large balls, each against a small one of its own, `deep` inside it [mm].
+// Opens a session of two large balls. Each is pressed into a small ball of its own, to the depth
+// `deep` [mm].
 Session open_hands(double deep, unsigned threads) {
   h6BodyDef bodies[4] = {h6DefaultBodyDef(), h6DefaultBodyDef(), h6DefaultBodyDef(),
                          h6DefaultBodyDef()};
@@ -92,7 +93,7 @@ Session open_hands(double deep, unsigned threads) {
   return Session(h6CreateSession(balls().model.handle, &def, nullptr));
 }
 
-// The depth at which each hand has so many contacts.
+// Finds the depth at which each hand has about `contacts` contacts [mm].
 double depth_for(double contacts) {
   double low = 0, high = 8;
   for (int i = 0; i < 20; ++i) {

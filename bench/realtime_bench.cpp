@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// realtime_bench.cpp - the haptic thread beside a plain sleeping thread, idle and under load:
+// realtime_bench.cpp - compares the haptic thread with a plain sleeping thread, idle and under
+// load:
 //     realtime/alpha|socket/RATEHz/idle|loaded/threads:T/spin:US
 //     realtime/arithmetic/RATEHz/idle|loaded
 //
 // Alpha: the hand follows its path there and back, 60 s at 1 kHz or 20 s at 4 kHz. Then the same
-// frames run for a sixth of that on a std::thread that sleeps until the next tick.
+// frames run for a sixth of that time on a std::thread that sleeps until the next tick.
 // HAPSIX_BENCH_SECONDS=3 sets the time to 3 s. Socket: 10,000 contacts on a part that follows the
-// hand exactly, with a budget of 0.8 periods (anytime mode). Load: a host that saturates TBB and a
-// streamer of memory, on both cores. Before times are reported, all frames are stepped again on one
+// hand exactly, with a budget of 0.8 periods (anytime mode). Load: one thread saturates TBB and one
+// streams memory, on both cores. Before times are reported, all frames are stepped again on one
 // thread and must have the same hashes. HAPSIX_BENCH_LATE=1 prints each late frame stage by stage,
 // with its page faults and the core's speed before and after it.
 //
-// late_compute: frames whose CPU time was over the period. On a virtual machine that clock also
-// counts interrupts and time that the host took without saying so. So those frames are timed again
-// when all are stepped again: late_compute_again is how many take longer than a period then too,
-// again_max_us the longest. unstolen_wakeup: wake-ups of frames without a sign of stolen time, that
-// is, wall and CPU time agree and the machine's count of stolen ticks did not move.
+// late_compute counts frames whose CPU time exceeded the period. On a virtual machine the CPU clock
+// also counts interrupts and time that the host stole without reporting it. So those frames are
+// timed again when all are stepped again: late_compute_again counts the frames that exceed the
+// period then too, and again_max_us is the longest. unstolen_wakeup covers the wake-ups of frames
+// without a sign of stolen time: wall and CPU time agree and no stolen ticks were counted.
 //
-// Arithmetic: a sum in registers on the same thread, which takes a coarse frame's time and touches
-// no memory. It cannot be late by its own work, so its late_compute shows what the machine took and
-// counted as CPU time; the other rows contain as much.
+// Arithmetic: a sum in registers on the same thread, which takes a coarse frame's time and uses no
+// memory. Its own work is never late, so its late_compute shows the time that the machine took and
+// counted as CPU time; the other rows include as much.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
@@ -80,7 +81,7 @@ class Load {
   std::vector<std::thread> threads_;
 };
 
-// ---- Measuring.
+// ---- Measurement.
 
 void report(benchmark::State& state, const std::string& what, std::vector<double>& us) {
   if (us.empty()) return;
@@ -114,8 +115,7 @@ bool asked_for_late() {
   return asked;
 }
 
-// Ticks of 10 ms that the host has stolen from all cores together, as far as the machine reports
-// it.
+// The ticks of 10 ms that the host has stolen from all cores together, if the machine reports them.
 long stolen_ticks() {
   long cpu[8] = {};
   if (std::FILE* file = std::fopen("/proc/stat", "r")) {
@@ -128,7 +128,7 @@ long stolen_ticks() {
 }
 
 // A hand that notes possible causes of long frames at the beginning of each frame: page faults
-// since the frame before, and the core's speed in registers.
+// since the previous frame, and the core's speed in registers.
 struct NotingHand {
   struct Note {
     long faults = 0;
@@ -168,13 +168,13 @@ struct Stepped {
   h6DeviceSample hand;
   std::uint64_t hash;
   std::uint32_t pairs, points;
-  bool own;  // counted as late by its own work
+  bool own;  // the frame counted as late by its own work
   double again_us = 0;
 };
 
 // Steps all frames again on one thread in virtual time and compares their bits. Frames that were
-// late by their CPU time are timed again by the same clock, with cold caches: the time they take
-// now is their own work, and the rest was the machine's.
+// late by their CPU time are timed again by the same clock, with cold caches. The time that they
+// take now is their own work; the machine took the rest.
 bool same_again(Scene& scene, double rate, std::vector<Stepped>& frames) {
   const Session session = scene.session(rate, 1, false);
   for (Stepped& frame : frames) {
@@ -276,7 +276,7 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
     double contacts = 0, missed = 0;
     std::vector<h6FrameRecord> rows(256), late;
     std::vector<Stepped> stepped;
-    std::vector<bool> robbed;  // (frames) time was stolen in or around the frame
+    std::vector<bool> robbed;  // (frames) whether time was stolen in or around the frame
     std::uint64_t few = 0;
     long ticks = stolen_ticks();
     bool had_stolen = false;
@@ -371,7 +371,8 @@ void arithmetic(benchmark::State& state, double rate, bool loaded) {
       for (const bool loaded : {false, true})
         for (const unsigned threads : {1u, 2u})
           for (const int spin : {100, 0}) {
-            if (spin == 0 && (scene != "alpha" || threads > 1)) continue;  // waking is the same
+            // Without spinning, other scenes and threads wake in the same way.
+            if (spin == 0 && (scene != "alpha" || threads > 1)) continue;
             const std::string name = "realtime/" + scene + "/" + std::to_string(rate) + "Hz/" +
                                      (loaded ? "loaded" : "idle") +
                                      "/threads:" + std::to_string(threads) +

@@ -108,7 +108,7 @@ class Socket : public Scene {
   double push_ = 0;
 };
 
-// One at a time: the socket's field is hundreds of megabytes.
+// Keeps one scene at a time, because the socket's field takes hundreds of megabytes.
 inline Scene& scene_named(const std::string& name) {
   static std::unique_ptr<Scene> scene;
   static std::string held;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// scene_frame_bench.cpp - whole frames on seeded scenes of 1024^3 voxels and 56,823 points:
+// scene_frame_bench.cpp - times whole frames on seeded scenes of 1024^3 voxels and 56,823 points:
 //     frame/clutter|conforming/METHOD/contacts:N/threads:T/warm|cold/slow|fast
 //
 // Clutter: most of the part's surface is free. Conforming: a socket with 0.25 voxel of clearance.
-// The part moves in until it has about the wanted contacts. Slow: 0.01 voxel a frame. Fast: the
-// frame before was far outside the field, so nothing can be reused. Before a time is reported, the
-// contacts of the timed poses are compared with a test of all points. The stepping thread is pinned
-// to one core, like a haptic thread; the helper has the other.
+// The part moves in until it has about the wanted contacts. Slow: it moves 0.01 voxel per frame.
+// Fast: it was far outside the field in the previous frame, so nothing can be reused. Before a time
+// is reported, the contacts of the timed poses are compared with a test of all points. The stepping
+// thread is pinned to one core, like a haptic thread; the helper has the other.
 //     field/memory/voxels:1024/bricks:N
 // The time is that of h6CreateModel; resident_mb is the memory that it adds to this process.
 #include <benchmark/benchmark.h>
@@ -55,7 +55,7 @@ class OneCore {
   cpu_set_t before_;
 };
 
-// One model at a time: a field is hundreds of megabytes.
+// Keeps one model at a time, because a field takes hundreds of megabytes.
 h6Model* model_of(bool socket) {
   static std::unique_ptr<h6Model, ModelDeleter> model;
   static int held = -1;
@@ -79,7 +79,7 @@ std::vector<double> depths(const h6Model* model, const h6Vec3& shift) {
 
 h6Vec3 along(double t) { return {kVoxel * t * 0.7, kVoxel * t * 0.6, kVoxel * t * -0.387}; }
 
-// How far [voxel] along a fixed direction until `wanted` points touch.
+// Finds how far the part must move along a fixed direction until `wanted` points touch [voxel].
 double push_for(const h6Model* model, std::size_t wanted, double most) {
   double low = 0, high = most;
   for (int i = 0; i < 24; ++i) {
@@ -91,7 +91,7 @@ double push_for(const h6Model* model, std::size_t wanted, double most) {
   return high;
 }
 
-// Points within a thousandth of a voxel of the surface may differ, since this samples them by
+// Points within a thousandth of a voxel of the surface may differ, because this samples them by
 // another code path.
 bool contacts_are_right(const h6Session* session, const h6Model* model, const h6Vec3& shift) {
   const auto d = depths(model, shift);
@@ -141,7 +141,7 @@ void frame(benchmark::State& state, bool socket, h6Method method, std::size_t wa
     h6Step(session.get(), &sample, nullptr);
     return p;
   };
-  // A triangle of 0.01 voxel a frame about the pose.
+  // The part moves to and fro about the pose, by 0.01 voxel per frame.
   const auto slow = [&](int i) { return push + 0.01 * (std::abs(i % 4 - 2) - 1); };
   for (int i = 0; i < 45; ++i) {
     if (fast) step(1500);
@@ -187,7 +187,7 @@ double resident_bytes() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-// The memory of bricks does not depend on their content.
+// Measures the memory of a field; bricks take as much whatever they hold.
 void memory(benchmark::State& state) {
   const auto bricks = static_cast<std::size_t>(state.range(0));
   for (auto _ : state) {

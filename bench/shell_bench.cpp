@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// shell_bench.cpp - mesh in memory to shell in memory: bake/shell/points:56823/threads:T of the
-// starter motor (18,580 triangles), and bake/shell/MESH/points:N/threads:T of other meshes: the
-// actuator (25,191), a torus of one closed piece, a soup of slit tori with points on the zero set
-// of its field and with points on its triangles; with HAPSIX_BENCH_SOUPS=1 also the engine bay
-// (505,276) and the landing gear (1,789,551).
+// shell_bench.cpp - times bakes from a mesh in memory to a shell in memory.
+// bake/shell/points:56823/threads:T uses the starter motor (18,580 triangles).
+// bake/shell/MESH/points:N/threads:T uses other meshes: the actuator (25,191), a torus of one
+// closed piece, and a soup of slit tori with points on the zero set of its field or on its
+// triangles; with HAPSIX_BENCH_SOUPS=1 also the engine bay (505,276) and the landing gear
+// (1,789,551).
 //
-// Each shell is judged before it is timed. Counters:
+// Each shell is checked before it is timed. Counters:
 //   spacing      least over mean distance of neighbours, on the worst level of ten points or more
 //   off_surface  largest distance of a point from its surface [voxel of a field of 256]
 //   normal_deg   largest angle between a normal and the analytic one, on the torus
-//   levels       number of levels; every sphere was found to hold all its descendants
+//   levels       number of levels; the check proves that every sphere holds all its descendants
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -30,7 +31,7 @@ namespace {
 using namespace h6;
 using Normal = std::function<io::Vec3(const io::Vec3&)>;
 
-// A mesh that is made on first use and kept.
+// Makes a mesh on first use and keeps it.
 class Input {
  public:
   explicit Input(std::function<io::Mesh()> make, Normal inward = {})
@@ -55,7 +56,7 @@ io::Vec3 into_torus(const io::Vec3& p) {
   return {-off * p.x / (r * length), -off * p.y / (r * length), -p.z / length};
 }
 
-// Tori of all sizes through one another, every one with a slit.
+// Makes tori of all sizes that pass through one another, each with a slit.
 io::Mesh slit_tori(int count) {
   io::Mesh mesh;
   for (int k = 0; k < count; ++k) {
@@ -145,7 +146,7 @@ void add(const std::string& name, const InputPtr& input, std::size_t points,
   add("torus100k/", torus, 1'000'000);
   add("soup100k/field/", soup, 56823, io::ShellSurface::field);
   add("soup100k/", soup, 56823);
-  // Large inputs take seconds to make and to judge, so they are optional.
+  // Large inputs take seconds to make and to check, so they are optional.
   if (const char* soups = std::getenv("HAPSIX_BENCH_SOUPS"); soups && *soups && *soups != '0') {
     add("soup500k/", input([] { return io::make_engine_bay().mesh; }), 56823);
     add("soup1800k/", input([] { return io::make_landing_gear().mesh; }), 56823);

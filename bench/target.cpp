@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// target.cpp - all benchmarks on the SIMD target that HAPSIX_SIMD names.
+// target.cpp - runs all benchmarks on the SIMD target that HAPSIX_SIMD names.
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
