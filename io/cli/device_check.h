@@ -27,7 +27,7 @@ struct Push {
 struct CheckResult {
   SampleCount samples;
   std::vector<Push> pushes;
-  std::string trouble;  // why the check ended early, or what is wrong; empty: all is well
+  std::string trouble;  // why the check ended early, or the defect found; empty if there is none
 };
 
 // Called once a frame. It returns false to end the check.

@@ -135,7 +135,7 @@ bool decide(Anytime& a, const Ahead& ahead, const PairSearch& pair) {
 void learn_contacts(Anytime& a, double contacts, double spent) {
   if (contacts < kTelling) return;
   Anytime::Cost& c = a.contact[size_of(contacts)];
-  if (a.frames - c.when >= kFresh) c.times = 0;  // what was known before is out of date
+  if (a.frames - c.when >= kFresh) c.times = 0;  // the old cost is out of date
   c.seen[2] = c.seen[1], c.seen[1] = c.seen[0], c.seen[0] = spent / contacts;
   const bool first = c.times < 3;
   c.times = std::min(c.times + 1, 3u);

@@ -34,7 +34,7 @@ struct Anytime {
   // The state of this frame.
   std::int64_t start = 0;
   bool by_clock = false;  // the clock decides
-  bool coarse = false;    // the clock has decided: this pair and all that follow are coarse
+  bool coarse = false;    // the clock has decided that this pair and all later ones are coarse
   std::uint32_t coarse_pairs = 0;  // how many of the last `pairs` are coarse
   int tier = 0;                    // the tier of the coarse pairs
   bool few = false;                // coarse pairs keep kFew contacts per shell body
