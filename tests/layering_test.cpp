@@ -18,8 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 const fs::path root = HAPSIX_SOURCE_DIR;
 
-// What each room may include besides itself. A file belongs to the deepest room that holds it;
-// "contract" is runtime/include. The order is from the bottom to the top.
+// This table says what each room may include besides itself. A file belongs to the deepest room
+// that holds it; "contract" is runtime/include. The order is from the bottom to the top.
 using Rooms = std::map<std::string, std::set<std::string>>;
 const Rooms& below() {
   static const Rooms rooms = [] {
@@ -71,9 +71,9 @@ const Rooms& below() {
     room("io/console", {"contract", "io/file"});
     room("io/run", {"contract", "kernels", "sched", "device", "io/console", "io/file", "io/mesh",
                     "io/scene", "io/scenes", "io/record", "io/view"});
-    room("io/experiments", {"contract", "kernels", "sched", "device", "io/console", "io/file",
-                            "io/mesh", "io/field", "io/bake", "io/shell", "io/scene", "io/scenes",
-                            "io/scenes/paper", "io/record", "io/run"});
+    room("io/experiments",
+         {"contract", "kernels", "sched", "io/console", "io/file", "io/mesh", "io/field", "io/bake",
+          "io/shell", "io/scene", "io/scenes", "io/scenes/paper", "io/record", "io/run"});
     // Programs and proof see everything.
     std::set<std::string> all;
     for (const auto& [name, sees] : r) all.insert(name);

@@ -32,7 +32,8 @@ struct RunChange {
   double damping = -1;   // of the contacts, < 0: the scene's [s]
   int integrator = -1;   // < 0: the scene's
   double rate = 0;       // 0: the scene's [Hz]
-  // Of the coupling [N]; 0: the engine derives it from max_depth_voxels, < 0: the scene's.
+  // The coupling's largest force [N]. 0: the engine derives it from max_depth_voxels; < 0: the
+  // scene's.
   double max_force = -1;
   const io::Path* path = nullptr;   // of the first hand, null: the scene's
   std::string device = "path";      // of every hand, as `hapsix run --device` takes it

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What holds in every frame of any scene: no contact pulls, no force jumps, no bound breaks, and
-// invalid samples do no harm.
+// These promises hold in every frame of any scene: no contact pulls, no force jumps, no bound
+// breaks, and invalid samples do no harm.
 #include <doctest/doctest.h>
 
 #include <algorithm>
