@@ -58,8 +58,8 @@ constexpr std::array<ChainRoom::Box, TileRows::kPlaces> ChainRoom::make_boxes() 
 
 namespace {
 
-template <class T>
-void ask_for(const T* brick, const auto& box) {
+template <class T, class Box>
+void ask_for_box(const T* brick, const Box& box) {
   const std::size_t apart = std::max<std::size_t>(1, 64 / (8 * sizeof(T)));
   for (std::size_t k = 0; k < box.layers; ++k)
     for (std::size_t j = 0; j < box.lines; j += apart) __builtin_prefetch(brick + box.node(j, k));
@@ -145,9 +145,9 @@ void ChainRoom::fill(const Grid& grid, const NarrowBand& band, const Reached& re
     if (const std::size_t k = i + kSoon - kLater; i + kSoon >= kLater && k < count) {
       const Box& box = kBoxes[from[k]];
       if (held(row(k)))
-        ask_for(chains->nodes(row(k)), box);
+        ask_for_box(chains->nodes(row(k)), box);
       else
-        ask_for(band.nodes(row(k)), box);
+        ask_for_box(band.nodes(row(k)), box);
     }
     if (i < kLater) continue;
     const std::size_t r = row(i - kLater);

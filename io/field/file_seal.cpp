@@ -20,7 +20,7 @@ namespace h6::io {
 namespace {
 
 constexpr std::string_view kMark = "hapsix-file-checksum:";
-constexpr std::size_t kDigits = 32, kHead = 65536, kBlock = std::size_t{4} << 20;
+constexpr std::size_t kDigits = 32, kHead = 65536, kSealed = std::size_t{4} << 20;
 
 // The bytes of a file, mapped into memory.
 class Mapped {
@@ -61,11 +61,11 @@ std::size_t digits_at(std::span<const char> file) {
 std::string digits_of(std::span<const char> file) {
   const std::size_t at = digits_at(file);
   const auto before = file.first(at), behind = file.subspan(at + kDigits);
-  std::vector<Hash128> hashes(1 + (behind.size() + kBlock - 1) / kBlock);
+  std::vector<Hash128> hashes(1 + (behind.size() + kSealed - 1) / kSealed);
   hashes[0] = hash_bytes(before.data(), before.size());
   sched::parallel_for(hashes.size() - 1, 0, [&](std::size_t i) {
-    const auto rest = behind.subspan(i * kBlock);
-    hashes[i + 1] = hash_bytes(rest.data(), std::min(kBlock, rest.size()));
+    const auto rest = behind.subspan(i * kSealed);
+    hashes[i + 1] = hash_bytes(rest.data(), std::min(kSealed, rest.size()));
   });
   return hex(hash_bytes(hashes.data(), hashes.size() * sizeof(Hash128)));
 }

@@ -24,8 +24,8 @@
 namespace h6::io {
 namespace {
 
-constexpr std::size_t kBlock = std::size_t{4} << 20;
-constexpr std::string_view kMagic = "hapsix cached field ", kVersion = "1\n";
+constexpr std::size_t kHashed = std::size_t{4} << 20;
+constexpr std::string_view kFieldMagic = "hapsix cached field ", kVersion = "1\n";
 
 struct Head {
   char magic[24] = {};
@@ -59,7 +59,7 @@ std::uint64_t total(const Pieces& pieces) {
   return bytes;
 }
 
-std::size_t blocks_of(std::uint64_t bytes) { return std::size_t((bytes + kBlock - 1) / kBlock); }
+std::size_t blocks_of(std::uint64_t bytes) { return std::size_t((bytes + kHashed - 1) / kHashed); }
 
 // Calls copy(bytes of a piece, place in the block, count) for all that lies in a block.
 template <class Copy>
@@ -125,7 +125,7 @@ bool take_texts(std::span<const char> bytes, FieldData& f) {
 
 Head head_of(const FieldData& f, std::size_t text_bytes) {
   Head head;
-  (std::string(kMagic) + std::string(kVersion)).copy(head.magic, sizeof head.magic);
+  (std::string(kFieldMagic) + std::string(kVersion)).copy(head.magic, sizeof head.magic);
   head.bricks = f.bricks;
   head.origin[0] = f.origin.x, head.origin[1] = f.origin.y, head.origin[2] = f.origin.z;
   head.voxel_size = f.voxel_size;
@@ -145,9 +145,9 @@ int write_all(DirectFile& file, const FieldData& field) {
   const std::uint64_t size = total(pieces);
   if (const int error = file.reserve(kDirectPage + size)) return error;
   std::vector<Hash128> hashes(blocks_of(size));
-  const int error = for_blocks(hashes.size(), kBlock, [&](std::size_t i, char* buffer) {
-    const std::uint64_t begin = i * kBlock;
-    const std::size_t count = std::size_t(std::min<std::uint64_t>(kBlock, size - begin));
+  const int error = for_blocks(hashes.size(), kHashed, [&](std::size_t i, char* buffer) {
+    const std::uint64_t begin = i * kHashed;
+    const std::size_t count = std::size_t(std::min<std::uint64_t>(kHashed, size - begin));
     const char* block = block_place(pieces, begin, count, buffer);
     if (block == buffer)
       for_overlaps(pieces, begin, count, [&](const char* from, std::uint64_t to, std::size_t n) {
@@ -204,9 +204,9 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
 int read_pieces(DirectFile& file, const Head& head, const Pieces& pieces, Hash128& found) {
   const std::uint64_t size = total(pieces);
   std::vector<Hash128> hashes(blocks_of(size));
-  const int error = for_blocks(hashes.size(), kBlock, [&](std::size_t i, char* buffer) {
-    const std::uint64_t begin = i * kBlock;
-    const std::size_t count = std::size_t(std::min<std::uint64_t>(kBlock, size - begin));
+  const int error = for_blocks(hashes.size(), kHashed, [&](std::size_t i, char* buffer) {
+    const std::uint64_t begin = i * kHashed;
+    const std::size_t count = std::size_t(std::min<std::uint64_t>(kHashed, size - begin));
     char* block = block_place(pieces, begin, count, buffer);
     if (const int failed = file.read(kDirectPage + begin, block, count)) return failed;
     hashes[i] = hash_bytes(block, count);
@@ -246,8 +246,8 @@ Result<FieldData> read_raw_field(const std::filesystem::path& file) {
   std::memset(page.get(), 0, kDirectPage);
   if (const int error = in.read(0, page.get(), kDirectPage)) return cannot_read(error);
   const std::string_view start(page.get(), kDirectPage);
-  if (!start.starts_with(kMagic)) return Failure{name + " is no field of the cache."};
-  if (!start.substr(kMagic.size()).starts_with(kVersion))
+  if (!start.starts_with(kFieldMagic)) return Failure{name + " is no field of the cache."};
+  if (!start.substr(kFieldMagic.size()).starts_with(kVersion))
     return Failure{name + " was written by another version of hapsix."};
   Head head;
   std::memcpy(&head, page.get(), sizeof head);

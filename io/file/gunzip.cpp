@@ -10,7 +10,7 @@
 namespace h6::io {
 namespace {
 
-constexpr std::string_view kMagic = "\x1f\x8b";
+constexpr std::string_view kGzipMagic = "\x1f\x8b";
 constexpr std::size_t kHarmless = std::size_t{16} << 20;  // [bytes] allowed at any ratio
 constexpr std::size_t kMaxRatio = 250;
 
@@ -29,7 +29,7 @@ std::string place(const std::string& name, std::size_t at, const std::string& wh
 
 Result<std::string> inflate_all(std::string_view bytes, const std::string& name,
                                 std::size_t limit) {
-  if (!bytes.starts_with(kMagic))
+  if (!bytes.starts_with(kGzipMagic))
     return Failure{name + ": the ending says gzip but the content is not; rename it or pack it."};
   Inflater inflater;
   if (!inflater.ready) return Failure{name + ": no memory to inflate it."};
@@ -63,7 +63,7 @@ Result<std::string> inflate_all(std::string_view bytes, const std::string& name,
     written += room - z.avail_out;
 
     if (state == Z_STREAM_END) {
-      const bool more = bytes.substr(read).starts_with(kMagic);
+      const bool more = bytes.substr(read).starts_with(kGzipMagic);
       if (!more) break;  // gzip ignores other bytes after the last member, too
       inflateReset(&z);
     } else if (state == Z_BUF_ERROR || (state == Z_OK && read == bytes.size() && z.avail_out > 0)) {

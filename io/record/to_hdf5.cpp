@@ -91,14 +91,14 @@ bool write_rows(hid_t dataset, hid_t type, hsize_t first, hsize_t count, const v
 
 // ---- the parts of a recording
 
-struct Source {
+struct LogSource {
   const File& log;
   LogIndex index;
   RecordingHead head;
 };
 
 // The chunks are in the log as HDF5 stores them, so nothing is compressed again.
-bool put_frames(hid_t file, const Source& from) {
+bool put_frames(hid_t file, const LogSource& from) {
   const Handle group = H5Gcreate2(file, "frames", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   std::vector<Handle> datasets;
   for (const Column& column : columns()) {
@@ -123,7 +123,7 @@ bool put_frames(hid_t file, const Source& from) {
   return true;
 }
 
-bool put_events(hid_t file, const Source& from) {
+bool put_events(hid_t file, const LogSource& from) {
   const Handle group = H5Gcreate2(file, "events", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   const Handle what_type = fixed_text_type(event_what_bytes);
   const Handle detail_type = fixed_text_type(event_detail_bytes);
@@ -153,7 +153,7 @@ bool put_events(hid_t file, const Source& from) {
   return true;
 }
 
-bool put_summary(hid_t file, const Source& from) {
+bool put_summary(hid_t file, const LogSource& from) {
   if (!from.index.summary) return true;
   std::vector<std::byte> payload;
   if (!read_payload(from.log, *from.index.summary, payload)) return false;
@@ -190,7 +190,7 @@ Outcome write_hdf5(const File& log, const fs::path& out) {
   if (!index) return Failure{"its log is damaged at the start"};
   Result<RecordingHead> head = parse_head(index->head);
   if (!head) return head.failure();
-  const Source from{log, std::move(*index), std::move(*head)};
+  const LogSource from{log, std::move(*index), std::move(*head)};
   if (Outcome room = check_room(out, from.index); !room) return room;
   const LibraryLock lock;
   // The library's oldest file format, which is its default: MATLAB reads it.

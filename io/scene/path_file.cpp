@@ -13,7 +13,7 @@
 namespace h6::io {
 namespace {
 
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{512} << 20;
+constexpr std::uintmax_t kMostPathBytes = std::uintmax_t{512} << 20;
 constexpr std::size_t kMostRows = 4'000'000;  // over an hour at 1 kHz
 constexpr double kLongest = 1e6;              // [s]
 constexpr double kFarthestMetres = 1e6;
@@ -109,7 +109,7 @@ Result<Path> read_path(const std::filesystem::path& file, Unit unit) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error))
     return Failure{name + ": no such file; a hand path is a CSV file t,x,y,z,qw,qx,qy,qz"};
-  if (std::filesystem::file_size(file, error) > kMostBytes || error)
+  if (std::filesystem::file_size(file, error) > kMostPathBytes || error)
     return Failure{name + ": larger than 512 MiB; thin the path out"};
   std::ifstream in(file);
   if (!in) return Failure{name + ": cannot be opened; check its permissions"};

@@ -8,8 +8,6 @@
 namespace h6::io {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 std::uint32_t add_vertex(Mesh& mesh, const h6Vec3& p) {
   mesh.vertices.push_back(p);
   return static_cast<std::uint32_t>(mesh.vertices.size() - 1);
@@ -61,14 +59,14 @@ Mesh box_mesh(const h6Vec3& low, const h6Vec3& high) {
 
 Mesh block_with_hole(double half_side, double height, double radius, double depth, int segments) {
   Mesh mesh;
-  const double corner_radius = radius / std::cos(kPi / segments);
+  const double corner_radius = radius / std::cos(std::numbers::pi / segments);
   // There are four rings with one vertex for every segment: the hole's floor and rim, the block's
   // top and bottom edge. All use the same angles. The square's corners are at odd multiples of 45
   // degrees, which are among the angles because `segments` is a multiple of 8.
   const auto ring = [&](bool square, double z) {
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
     for (int i = 0; i < segments; ++i) {
-      const double angle = 2 * kPi * i / segments;
+      const double angle = 2 * std::numbers::pi * i / segments;
       const double c = std::cos(angle), s = std::sin(angle);
       const double r = square ? half_side / std::max(std::abs(c), std::abs(s)) : corner_radius;
       add_vertex(mesh, {r * c, r * s, z});
@@ -122,7 +120,7 @@ void add_cylinder_side(PointCloud& cloud, double radius, double half_length, int
                        int along) {
   for (int i = 0; i < around; ++i)
     for (int j = 0; j < along; ++j) {
-      const double angle = 2 * kPi * (i + 0.5) / around;
+      const double angle = 2 * std::numbers::pi * (i + 0.5) / around;
       const h6Vec3 out = {std::cos(angle), std::sin(angle), 0};
       const double z = half_length * ((2 * j + 1.0) / along - 1);
       add_point(cloud, radius * out + h6Vec3{0, 0, z}, -1.0 * out);

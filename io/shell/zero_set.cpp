@@ -25,7 +25,7 @@ void three_units(std::uint64_t bits, double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = double((bits >> (21 * k)) & 0x1FFFFF) * 0x1p-21;
 }
 
-struct Part {  // the candidates of one brick
+struct BrickPart {  // the candidates of one brick
   RawVector<OrientedPoint> points;
 };
 
@@ -41,7 +41,7 @@ class Layer {
 
   // Throws `rate` darts per cell on average and returns the number of hits. Writes them to `part`
   // unless it is null.
-  std::size_t throw_darts(std::size_t row, double rate, Part* part) const {
+  std::size_t throw_darts(std::size_t row, double rate, BrickPart* part) const {
     const std::size_t brick = bricks_[row];
     const auto bx = std::size_t(field_.bricks[0]), by = std::size_t(field_.bricks[1]);
     const std::array<std::int32_t, 3> low{std::int32_t(8 * (brick % bx)),
@@ -76,7 +76,7 @@ class Layer {
   }
 
   bool throw_one(const std::array<std::int32_t, 3>& cell, const float corner[8], const double at[3],
-                 Part* part) const {
+                 BrickPart* part) const {
     Vec3 g{};
     const double h = field_.voxel_size, d = trilinear(corner, at, &g) / h;
     if (!(d > layer_low && d < layer_high)) return false;
@@ -155,7 +155,7 @@ Result<Candidates> sample_zero_set(const FieldData& field, const Demand& demand,
   if (!wanted) return wanted.failure();
   double rate = candidates_for(*wanted, demand.by_spacing()) / (out.area * thickness);
   for (int round = 0; round < 4; ++round, rate *= 4) {
-    std::vector<Part> parts(layer.bricks());
+    std::vector<BrickPart> parts(layer.bricks());
     if (!each([&](std::size_t row) { layer.throw_darts(row, rate, &parts[row]); }))
       return Failure{"cancelled"};
     std::vector<std::size_t> first(parts.size() + 1, 0);

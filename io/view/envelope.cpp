@@ -9,6 +9,11 @@ namespace h6::io::view {
 
 static_assert(std::endian::native == std::endian::little, "arrays are sent as they are in memory");
 
+void append_pose(std::vector<float>& to, const h6Pose& p) {
+  for (const double x : {p.p.x, p.p.y, p.p.z, p.q.w, p.q.x, p.q.y, p.q.z})
+    to.push_back(static_cast<float>(x));
+}
+
 Envelope::Envelope() : arrays_(std::make_unique<nlohmann::ordered_json>()) {
   *arrays_ = nlohmann::ordered_json::array();
 }

@@ -13,9 +13,14 @@
 #include <string>
 #include <vector>
 
+#include "hapsix/types.h"
+
 namespace h6::io::view {
 
 using Message = std::shared_ptr<const std::string>;  // shared by all clients, never changed
+
+// Appends a pose as x y z, w x y z, the columns of poses in every message.
+void append_pose(std::vector<float>& to, const h6Pose& p);
 
 class Envelope {
  public:

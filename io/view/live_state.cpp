@@ -13,11 +13,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-void append(std::vector<float>& to, const h6Pose& p) {
-  for (const double x : {p.p.x, p.p.y, p.p.z, p.q.w, p.q.x, p.q.y, p.q.z})
-    to.push_back(static_cast<float>(x));
-}
-
 // Bins of a quarter octave from 1/4 us on.
 std::size_t bin_of(double us, std::size_t bins) {
   if (!(us > 0.25)) return 0;
@@ -35,7 +30,7 @@ constexpr std::size_t kMaxRows = 64;  // of the strips, in one message
 
 LiveState::LiveState(const LoadedScene& loaded)
     : loaded_(loaded), frame_bins_(kBins), wake_bins_(kBins) {
-  for (const h6BodyDef& body : loaded.bodies) append(poses_, body.pose);
+  for (const h6BodyDef& body : loaded.bodies) append_pose(poses_, body.pose);
 }
 
 void LiveState::settings(const h6ContactDef& contact, const h6CouplingDef& coupling) {
@@ -77,7 +72,7 @@ void LiveState::rows(const h6FrameRecord* all, std::size_t count) {
 
 void LiveState::contacts(const h6LoopView& view) {
   poses_.clear();
-  for (std::size_t b = 0; b < view.body_count; ++b) append(poses_, view.bodies[b]);
+  for (std::size_t b = 0; b < view.body_count; ++b) append_pose(poses_, view.bodies[b]);
   for (std::vector<float>* column : {&p_, &n_, &t_, &w_, &d_}) column->clear();
   stiffness_ = {};
   for (std::size_t i = 0; i < view.row_count; ++i) {
@@ -144,7 +139,7 @@ Message LiveState::state_message() {
     const h6Vec3 wanted = place(hand, loaded_.bodies[body].com);
     const h6Vec3 is = place(r.body[0].pose, loaded_.bodies[body].com);
     lag = norm(wanted - is);
-    append(hands, hand);
+    append_pose(hands, hand);
   }
   envelope.add("poses", poses_);
   envelope.add("hands", hands);

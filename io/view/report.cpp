@@ -21,11 +21,6 @@ constexpr std::uint64_t kSpans = 3000, kReplaySamples = 4000;
 constexpr std::size_t kContacts = 64, kLateFrames = 200, kEvents = 500, kTriangles = 60000;
 constexpr double kReplayRate = 60;
 
-void append(std::vector<float>& to, const h6Pose& p) {
-  for (const double x : {p.p.x, p.p.y, p.p.z, p.q.w, p.q.x, p.q.y, p.q.z})
-    to.push_back(static_cast<float>(x));
-}
-
 double percentile(std::vector<float> v, double share) {
   if (v.empty()) return 0;
   const auto at =
@@ -106,8 +101,8 @@ void ReportRun::row(const h6FrameRecord& r) {
   const std::size_t shown = replay_t_.size();
   if (shown < replay_frames_.size() && replay_frames_[shown] == seen_) {
     replay_t_.push_back(static_cast<float>(r.time));
-    append(replay_body_, r.body[0].pose);
-    append(replay_hand_, r.hand[0].pose);
+    append_pose(replay_body_, r.body[0].pose);
+    append_pose(replay_hand_, r.hand[0].pose);
   }
   for (std::size_t s = 0; s < stage_us_.size(); ++s)
     stage_us_[s].push_back(static_cast<float>(r.report.stage_us[s]));

@@ -15,7 +15,6 @@ namespace {
 
 using namespace industrial;
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kBarrel = 46;                                       // outer radius [mm]
 const Frame kAlongX = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};  // 2-D (y, z), extruded along x
 
@@ -28,7 +27,7 @@ void add_ends(Assembly& a) {
   a.add("actuator end cap",
         revolve({{0, 44}, {40, 44}, {52, 50}, {54, 54}, {54, 80}, {50, 84}, {0, 84}}, 64));
   for (int i = 0; i < 8; ++i) {
-    const double angle = kPi / 8 + kPi / 4 * i;
+    const double angle = std::numbers::pi / 8 + std::numbers::pi / 4 * i;
     a.add("actuator cap bolt", socket_bolt(7, 8),
           facing({45 * std::cos(angle), 45 * std::sin(angle), 47}, {0, 0, -1}));
   }
@@ -68,7 +67,7 @@ void add_barrel(Assembly& a) {
             64));
   a.add("gland nut", extrude({gear(12, 50, 56), {circle(44, 56)}}, 372, 384));
   for (int i = 0; i < 10; ++i) {
-    const double angle = 2 * kPi * i / 10;
+    const double angle = 2 * std::numbers::pi * i / 10;
     a.add("gland bolt", hex_bolt(6, 8), at(44.5 * std::cos(angle), 44.5 * std::sin(angle), 391));
   }
   a.add("gland wiper",

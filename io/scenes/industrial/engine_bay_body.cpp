@@ -9,7 +9,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kSide = kBayWidth / 2;
 
 void add_firewall(Assembly& a) {
@@ -24,7 +23,7 @@ void add_firewall(Assembly& a) {
     a.add("firewall bead",
           sheet(80, 6,
                 [&](double u, double v) {
-                  const double c = std::cos(kPi * (v - 0.5));
+                  const double c = std::cos(std::numbers::pi * (v - 0.5));
                   return h6Vec3{-380 + 760 * u, 375 - 7 * c, z + 26 * (v - 0.5)};
                 }),
           {}, Kind::sheet);
@@ -54,7 +53,7 @@ void add_side(Assembly& a, double side) {
   a.add("strut nut", nut(14), top * at(0, 0, 15));
   a.add("strut rod", cylinder(7, -60, 40, 24), top);
   for (int i = 0; i < 3; ++i) {
-    const Frame stud = rolled(top, 2 * kPi * i / 3) * at(52, 0, 0);
+    const Frame stud = rolled(top, 2 * std::numbers::pi * i / 3) * at(52, 0, 0);
     a.add("strut stud", hex_bolt(8, 24), stud * facing({0, 0, -2}, {0, 0, -1}));
     a.add("strut stud nut", nut(9), stud * at(0, 0, 1));
   }
@@ -84,7 +83,7 @@ void add_cross_members(Assembly& a) {
   a.add("rear cross member", block(780, 80, 34, 12, 4), at(0, 300, 62));
   for (const double x : {-250.0, -90.0, 90.0, 250.0}) {
     Outline bracket{rectangle(60, 90, 8, 4, {x, 70}), {}};
-    bracket.holes = {slot(18, 5, {x, 92}, kPi / 2), circle(6, 20, {x - 16, 50}),
+    bracket.holes = {slot(18, 5, {x, 92}, std::numbers::pi / 2), circle(6, 20, {x - 16, 50}),
                      circle(6, 20, {x + 16, 50})};
     a.add("radiator bracket", extrude(bracket, 318, 322), kFront);
     for (const double dx : {-16.0, 16.0})
@@ -118,7 +117,7 @@ void add_tanks(Assembly& a) {
   const auto ball = [](double r, double h) {
     Profile profile;
     for (int i = 0; i <= 36; ++i) {
-      const double t = -kPi / 2 + kPi * i / 36;
+      const double t = -std::numbers::pi / 2 + std::numbers::pi * i / 36;
       const double c = std::pow(std::max(0.0, std::cos(t)), 0.55), s = std::sin(t);
       profile.push_back(
           {i == 0 || i == 36 ? 0 : r * c, h * std::copysign(std::pow(std::abs(s), 0.7), s)});

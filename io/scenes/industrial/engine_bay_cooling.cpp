@@ -8,7 +8,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kY = -357;  // y of the core's middle
 
 void add_core(Assembly& a) {
@@ -58,21 +57,21 @@ void add_fans(Assembly& a) {
     a.add("fan hub", revolve({{0, -2}, {36, -2}, {38, 0}, {38, 16}, {34, 20}, {0, 20}}, 56), fan);
     a.add("fan motor", revolve({{0, 20}, {28, 20}, {28, 40}, {24, 44}, {0, 44}}, 48), fan);
     for (int b = 0; b < 7; ++b) {
-      const Frame root = rolled(fan, 2 * kPi * b / 7);
+      const Frame root = rolled(fan, 2 * std::numbers::pi * b / 7);
       std::vector<Line> rings;  // twisted, swept back, thin
       for (int i = 0; i <= 14; ++i) {
         const double r = 34 + 80.0 * i / 14, twist = 0.95 - 0.45 * i / 14,
                      sweep_back = 0.004 * (r - 34) * (r - 34) * 0.6;
         Line ring;
-        for (const P2& p : slot(30 + 0.12 * r, 1.4, {0, 0}, twist - kPi / 2, 4))
+        for (const P2& p : slot(30 + 0.12 * r, 1.4, {0, 0}, twist - std::numbers::pi / 2, 4))
           ring.push_back(root.at({r, p.y - sweep_back * 0.4, 9 + p.x * 0.35}));
         rings.push_back(ring);
       }
       a.add("fan blade", loft(rings, Ends::capped));
     }
     for (int i = 0; i < 3; ++i)
-      a.add("fan strut", sweep({rolled(fan, 0.5 + 2 * kPi * i / 3).at({26, 0, 30}),
-                                rolled(fan, 0.5 + 2 * kPi * i / 3).at({120, 0, 14})},
+      a.add("fan strut", sweep({rolled(fan, 0.5 + 2 * std::numbers::pi * i / 3).at({26, 0, 30}),
+                                rolled(fan, 0.5 + 2 * std::numbers::pi * i / 3).at({120, 0, 14})},
                                rectangle(5, 10, 1.5, 2), {0, 1, 0}, Ends::capped));
   }
 }
@@ -83,14 +82,15 @@ void add_hose(Assembly& a, const std::string& name, const std::vector<h6Vec3>& t
   const Line way = smooth(through, corrugated ? 2 : 5);
   const double length = line_length(way);
   const int sides = r > 15 ? 36 : 16;
-  a.add(name, corrugated ? rod(
-                               way,
-                               [=](double s) {
-                                 const bool cuff = s < 26 || s > length - 26;
-                                 return cuff ? r : r + 0.09 * r * std::cos(2 * kPi * s / 10);
-                               },
-                               sides)
-                         : rod(way, r, sides));
+  a.add(name, corrugated
+                  ? rod(
+                        way,
+                        [=](double s) {
+                          const bool cuff = s < 26 || s > length - 26;
+                          return cuff ? r : r + 0.09 * r * std::cos(2 * std::numbers::pi * s / 10);
+                        },
+                        sides)
+                  : rod(way, r, sides));
   if (r < 12) return;
   for (const double s : {14.0, length - 14})
     a.add("hose clamp", hose_clamp(r + 0.2), frame_on(way, s));

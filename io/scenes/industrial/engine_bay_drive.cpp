@@ -8,7 +8,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kBeltX = -264;
 constexpr P2 kCrank = {50, 230};   // (y, z) of the crankshaft
 constexpr P2 kShaft = {186, 104};  // (y, z) of the drive shafts, behind and below
@@ -85,7 +84,7 @@ void add_accessories(Assembly& a) {
           alternator);
   a.add("alternator stator", revolve({{0, 40}, {61, 40}, {61, 72}, {0, 72}}, 96), alternator);
   for (int i = 0; i < 24; ++i) {
-    const Frame fin = rolled(alternator, 2 * kPi * i / 24);
+    const Frame fin = rolled(alternator, 2 * std::numbers::pi * i / 24);
     a.add("alternator fin", box({34, -2.2, 0}, {57, 2.2, 13}), fin);
     a.add("alternator fin", box({34, -2.2, 98}, {57, 2.2, 104}), fin);
   }
@@ -149,7 +148,7 @@ void add_gearbox(Assembly& a) {
   const Outline back{hull({{kCrank.x, kCrank.y, 172}, {sy, sz, 40}}, 96), {}};
   a.add("bell housing back", extrude(back, 184, 196), kAcross);
   for (int i = 0; i < 24; ++i) {  // bolts, where block and starter leave room for their heads
-    const double angle = 2 * kPi * i / 24;
+    const double angle = 2 * std::numbers::pi * i / 24;
     const double y = kCrank.x + 179 * std::cos(angle), z = kCrank.y + 179 * std::sin(angle);
     const bool at_block = std::abs(y - 50) < 124 && z > 138 && z < 484;
     if (at_block || std::hypot(y - sy, z - sz) < 125) continue;
@@ -168,7 +167,7 @@ void add_gearbox(Assembly& a) {
         revolve({{0, 190}, {165, 190}, {150, 205}, {118, 240}, {112, 330}, {0, 330}}, 80), axis);
   for (int i = 0; i < 20; ++i)
     a.add("gearbox rib", box({0, -2.5, 195}, {128, 2.5, 322}),
-          rolled(axis, 2 * kPi * i / 20 + 0.1));
+          rolled(axis, 2 * std::numbers::pi * i / 20 + 0.1));
   a.add("gearbox flange", extrude({hull({{0, 0, 122}, {-30, -60, 80}}, 80), {}}, 322, 336), axis);
   a.add("gearbox cover", block(190, 180, 46, 40, 16, 8), axis * at(-8, -8, 334));
   add_bolt_row(a, "gearbox bolt", axis, hull({{0, 0, 116}, {-30, -60, 74}}, 64), 336, 45, 8, 28);

@@ -8,7 +8,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kCylinders[] = {-190, -110, -30, 50};  // x of the cylinders' axes
 
 void add_block(Assembly& a) {
@@ -54,7 +53,8 @@ void add_block(Assembly& a) {
                              {26, 87}}) {
     Line ring;
     for (int i = 0; i < 60; ++i) {
-      const double angle = 2 * kPi * i / 60, r = p.x - (p.y > 65 && i % 4 < 2 ? 1.2 : 0);
+      const double angle = 2 * std::numbers::pi * i / 60,
+                   r = p.x - (p.y > 65 && i % 4 < 2 ? 1.2 : 0);
       ring.push_back({r * std::cos(angle), r * std::sin(angle), p.y});
     }
     rings.push_back(ring);
@@ -82,14 +82,14 @@ void add_intake(Assembly& a) {
   // Plenum along the engine, bulging over each runner.
   Line axis;
   for (int i = 0; i <= 110; ++i) axis.push_back({-232 + 3.0 * i, -205, 470});
-  a.add("intake plenum", rod(
-                             axis,
-                             [](double s) {
-                               const double ends =
-                                   std::min(1.0, std::sqrt(std::min(s, 330 - s) / 24 + 0.35));
-                               return ends * (35 + 2.5 * std::cos(2 * kPi * (s - 42) / 80));
-                             },
-                             48));
+  a.add("intake plenum",
+        rod(
+            axis,
+            [](double s) {
+              const double ends = std::min(1.0, std::sqrt(std::min(s, 330 - s) / 24 + 0.35));
+              return ends * (35 + 2.5 * std::cos(2 * std::numbers::pi * (s - 42) / 80));
+            },
+            48));
   a.leave_hole("intake plenum", {-150, -228, 498}, 2);
   for (int i = 0; i < 9; ++i)
     a.add("intake plenum rib", box({-214 + 36.0 * i, -242, 462}, {-211 + 36.0 * i, -168, 480}));
@@ -130,7 +130,8 @@ void add_intake(Assembly& a) {
   a.add("throttle plate", revolve({{0, 24}, {28.5, 24}, {28.5, 26}, {0, 26}}, 48), throttle);
   a.add("throttle motor", block(34, 46, 62, 10, 4), throttle * facing({-30, 0, 22}, {-1, 0, 0}));
   for (int i = 0; i < 4; ++i) {
-    const Frame ear = rolled(throttle, kPi / 4 + kPi / 2 * i) * at(40, 0, 0);
+    const Frame ear =
+        rolled(throttle, std::numbers::pi / 4 + std::numbers::pi / 2 * i) * at(40, 0, 0);
     add_bolt(a, "throttle bolt", ear * at(0, 0, 3), 6, 24);
   }
 }
@@ -157,9 +158,10 @@ void add_exhaust(Assembly& a) {
   }
   Profile can = {{0, 160}, {26, 160}, {26, 140}};
   for (int i = 0; i <= 8; ++i)
-    can.push_back({26 + 29 * std::sin(kPi / 2 * i / 8), 132 - 28 * i / 8.0});
+    can.push_back({26 + 29 * std::sin(std::numbers::pi / 2 * i / 8), 132 - 28 * i / 8.0});
   for (int i = 0; i < 26; ++i) can.push_back({55 + (i % 6 == 3 ? 1.5 : 0), 102 - 4.0 * i});
-  for (int i = 0; i <= 8; ++i) can.push_back({55 - 30 * std::sin(kPi / 2 * i / 8), -4 - 3.5 * i});
+  for (int i = 0; i <= 8; ++i)
+    can.push_back({55 - 30 * std::sin(std::numbers::pi / 2 * i / 8), -4 - 3.5 * i});
   can.push_back({25, -60});
   can.push_back({0, -60});
   a.add("catalytic converter", revolve(can, 72), at(collector.x, collector.y, 196));
@@ -175,8 +177,10 @@ void add_exhaust(Assembly& a) {
       sheet(
           60, 44,
           [&](double u, double v) {
-            const double angle = kPi * (-0.62 + 1.24 * u) + kPi / 2, z = 330 - 170 * v;
-            const double r = 67 + 1.2 * std::cos(24 * kPi * u) * std::cos(18 * kPi * v);
+            const double angle = std::numbers::pi * (-0.62 + 1.24 * u) + std::numbers::pi / 2,
+                         z = 330 - 170 * v;
+            const double r = 67 + 1.2 * std::cos(24 * std::numbers::pi * u) *
+                                      std::cos(18 * std::numbers::pi * v);
             return h6Vec3{collector.x + r * std::cos(angle), collector.y + r * std::sin(angle), z};
           }),
       {}, Kind::sheet);

@@ -9,7 +9,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr int kSides = 12;  // a multiple of six, so that hexagons have their corners among them
 
 Line round_ring(double radius, double z) {
@@ -22,8 +21,8 @@ Line round_ring(double radius, double z) {
 Line hex_ring(double across, double z) {
   Line out;
   for (int i = 0; i < kSides; ++i) {
-    const double angle = 2 * kPi * i / kSides;
-    const double from_flat = std::remainder(angle - kPi / 6, kPi / 3);
+    const double angle = 2 * std::numbers::pi * i / kSides;
+    const double from_flat = std::remainder(angle - std::numbers::pi / 6, std::numbers::pi / 3);
     const double r = across / 2 / std::cos(from_flat);
     out.push_back({r * std::cos(angle), r * std::sin(angle), z});
   }

@@ -9,15 +9,13 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 // The place of the i-th wire across a bundle as {distance from the middle, angle}: one wire is in
 // the middle, six are around it, twelve around those.
 P2 bundle_place(int i, double radius) {
   const double step = 2.12 * radius;
   if (i == 0) return {0, 0};
-  if (i < 7) return {step, kPi / 3 * i};
-  return {1.95 * step, kPi / 6 * (i - 7) + 0.2};
+  if (i < 7) return {step, std::numbers::pi / 3 * i};
+  return {1.95 * step, std::numbers::pi / 6 * (i - 7) + 0.2};
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kRoof = 1992, kLeft = -320, kRight = 800, kHalf = 500;
 constexpr Frame kBack = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // 2-D (x, z), along -y
 
@@ -81,12 +80,12 @@ void add_roof(Assembly& a) {
         sheet(60, 50,
               [](double u, double v) {
                 return h6Vec3{kLeft + (kRight - kLeft) * u, -kHalf + 2 * kHalf * v,
-                              kRoof + 6 * std::sin(kPi * u)};
+                              kRoof + 6 * std::sin(std::numbers::pi * u)};
               }),
         {}, Kind::sheet);
   for (int i = 0; i < 12; ++i) {
     const double x = kLeft + 40 + 92.0 * i,
-                 z = kRoof + 6 * std::sin(kPi * (x - kLeft) / (kRight - kLeft));
+                 z = kRoof + 6 * std::sin(std::numbers::pi * (x - kLeft) / (kRight - kLeft));
     const Polygon zee = {{-34, 0}, {0, 0}, {0, -38}, {20, -38}};
     a.add("stringer",
           sheet(50, 3,
@@ -206,7 +205,7 @@ void add_door(Assembly& a, const std::string& name,
 
 void add_doors(Assembly& a) {
   const auto outboard = [](double s, double t, double d) {
-    const double x = -392 - 40 * std::sin(kPi * t / 760) + d;
+    const double x = -392 - 40 * std::sin(std::numbers::pi * t / 760) + d;
     return h6Vec3{x, s, 1530 - t};
   };
   add_door(a, "strut door", outboard, 760, 720);
@@ -222,7 +221,7 @@ void add_doors(Assembly& a) {
     }
   }
   const auto inboard = [](double s, double t, double d) {
-    return h6Vec3{806 + 30 * std::sin(kPi * t / 560) - d, s, 1590 - t};
+    return h6Vec3{806 + 30 * std::sin(std::numbers::pi * t / 560) - d, s, 1590 - t};
   };
   add_door(a, "bay door", inboard, 900, 520);
 }

@@ -8,8 +8,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 // A point beside the strut, r from its axis at an angle around it.
 h6Vec3 beside(double angle, double r, double z) {
   return {r * std::cos(angle), r * std::sin(angle), z};
@@ -24,7 +22,7 @@ void add_fitting(Assembly& a, const h6Vec3& where, const h6Vec3& along, double d
 // Six steel lines run down the strut in clamps; each ends in a hose that follows the piston.
 void add_strut_lines(Assembly& a) {
   for (int i = 0; i < 6; ++i) {
-    const double angle = kPi * (1.02 + 0.075 * i), r = 106;
+    const double angle = std::numbers::pi * (1.02 + 0.075 * i), r = 106;
     const double side = i < 3 ? -1 : 1;
     const Line line = smooth({{-150 - 14.0 * i, -180, 1880},
                               {-140 - 14.0 * i, -150, 1800},
@@ -44,24 +42,28 @@ void add_strut_lines(Assembly& a) {
                               {side * (100 + 6.0 * i), -128, 470},
                               {side * (118 + 5.0 * (i % 3)), -90 - 14.0 * (i % 3), 420}},
                              1.5);
-    a.add("brake hose",
-          rod(
-              hose, [](double s) { return 9.5 + 0.9 * std::cos(2 * kPi * s / 9); }, 24));
+    a.add(
+        "brake hose",
+        rod(
+            hose, [](double s) { return 9.5 + 0.9 * std::cos(2 * std::numbers::pi * s / 9); }, 24));
     if (i == 2) a.leave_hole("brake hose", hose[hose.size() / 2] + h6Vec3{0, -10, 0}, 30);
     add_fitting(a, hose.back(), {side, 0, 0}, 14);
   }
   for (const double z : {1480.0, 1360.0, 1140.0, 1060.0}) {
     for (int i = 0; i < 6; ++i) {
-      const double angle = kPi * (1.02 + 0.075 * i);
+      const double angle = std::numbers::pi * (1.02 + 0.075 * i);
       a.add("line clamp", revolve({{5, -7}, {9.5, -7}, {9.5, 7}, {5, 7}}, 28, Ends::joined),
             at(0, 0, z) * facing(beside(angle, 106, 0), {0, 0, 1}));
     }
     a.add("clamp bar",
-          sweep({beside(kPi * 1.0, 97, z), beside(kPi * 1.21, 96, z), beside(kPi * 1.42, 97, z)},
+          sweep({beside(std::numbers::pi * 1.0, 97, z), beside(std::numbers::pi * 1.21, 96, z),
+                 beside(std::numbers::pi * 1.42, 97, z)},
                 rectangle(14, 5, 1, 2), {0, 0, 1}, Ends::capped));
     for (const double f : {0.985, 1.42})
-      add_bolt(a, "clamp bolt", facing(beside(kPi * f, 99, z), beside(kPi * f, 1, 0), {0, 0, 1}), 8,
-               20);
+      add_bolt(a, "clamp bolt",
+               facing(beside(std::numbers::pi * f, 99, z), beside(std::numbers::pi * f, 1, 0),
+                      {0, 0, 1}),
+               8, 20);
   }
 }
 
@@ -79,7 +81,7 @@ void add_manifold(Assembly& a) {
   }
   Profile ball;
   for (int i = 0; i <= 40; ++i) {
-    const double t = -kPi / 2 + kPi * i / 40;
+    const double t = -std::numbers::pi / 2 + std::numbers::pi * i / 40;
     ball.push_back({i == 0 || i == 40 ? 0 : 62 * std::cos(t), 62 * std::sin(t)});
   }
   const Profile inner = [&] {
@@ -117,7 +119,7 @@ void add_roof_lines(Assembly& a) {
   }
 }
 
-void add_plug(Assembly& a, const h6Vec3& where, const h6Vec3& along) {
+void add_line_plug(Assembly& a, const h6Vec3& where, const h6Vec3& along) {
   const Frame plug = facing(where, along);
   a.add(
       "connector",
@@ -126,7 +128,9 @@ void add_plug(Assembly& a, const h6Vec3& where, const h6Vec3& along) {
   a.add("connector ring", extrude({gear(24, 17, 18.5), {circle(15, 36)}}, -6, 8), plug);
 }
 
-h6Vec3 strut(double fraction, double z, double out = 108) { return beside(kPi * fraction, out, z); }
+h6Vec3 strut(double fraction, double z, double out = 108) {
+  return beside(std::numbers::pi * fraction, out, z);
+}
 
 void add_harnesses(Assembly& a) {
   const double r = kGearWire;
@@ -206,7 +210,7 @@ void add_harnesses(Assembly& a) {
 void add_single_wires(Assembly& a) {
   const auto lone = [&](const std::string& name, const std::vector<h6Vec3>& through) {
     a.add_wire(name, smooth(through, 16), kGearWire);
-    add_plug(a, through.back(), through.back() - through[through.size() - 2]);
+    add_line_plug(a, through.back(), through.back() - through[through.size() - 2]);
   };
   for (int i = 0; i < 4; ++i)
     lone("valve wire", {{-296, -250, 1850},

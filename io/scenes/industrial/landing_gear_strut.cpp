@@ -8,7 +8,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 // Frames of extruded outlines: kSide takes 2-D (y, z), along x; kBack takes 2-D (x, z), along -y.
 constexpr Frame kSide = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
 constexpr Frame kBack = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
@@ -55,7 +54,7 @@ void add_cylinder(Assembly& a) {
     a.add("strut band",
           revolve({{83, z - 16}, {93, z - 16}, {93, z + 16}, {83, z + 16}}, 120, Ends::joined));
     for (int i = 0; i < 12; ++i) {
-      const double angle = 2 * kPi * (i + 0.5) / 12;
+      const double angle = 2 * std::numbers::pi * (i + 0.5) / 12;
       add_bolt(a, "band bolt",
                facing({93 * std::cos(angle), 93 * std::sin(angle), z},
                       {std::cos(angle), std::sin(angle), 0}, {0, 0, 1}),

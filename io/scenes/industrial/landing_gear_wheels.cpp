@@ -8,7 +8,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kAxle = 400;  // height
 constexpr double kTyre = 385;  // outer radius
 constexpr double kHalf = 108;  // half of the tyre's width
@@ -23,7 +22,7 @@ std::vector<TyrePoint> tyre_section() {
   const auto add = [&](double r, double z, double tread = 0) { out.push_back({r, z, tread}); };
   const auto wall = [&](double side, bool outward) {
     for (int k = 0; k <= 22; ++k) {
-      const double t = (outward ? k : 22 - k) / 22.0, angle = kPi * (0.06 + 0.66 * t);
+      const double t = (outward ? k : 22 - k) / 22.0, angle = std::numbers::pi * (0.06 + 0.66 * t);
       const double r = 300 - 96 * std::cos(angle) - (t > 0.9 ? (t - 0.9) * 30 : 0);
       const double rib = k == 9 || k == 12 ? 1.5 : 0;  // moulded rings
       add(r, side * (62 + (kHalf - 62 + rib) * std::sin(angle)));
@@ -55,7 +54,7 @@ void add_tyre(Assembly& a, const Frame& wheel) {
   for (const TyrePoint& p : tyre_section()) {
     Line ring;
     for (int i = 0; i < kAround; ++i) {
-      const double angle = 2 * kPi * i / kAround;
+      const double angle = 2 * std::numbers::pi * i / kAround;
       // Slanted sipes cut across the ribs; they repeat every seventh step.
       const int phase = (i + static_cast<int>(std::lround(p.z / 9)) + 700) % 7;
       const double r = p.r - (p.tread > 0 && phase < 2 ? 7 * p.tread : 0);
@@ -88,14 +87,14 @@ void add_rim(Assembly& a, const Frame& wheel) {
   add_bolt_circle(web, 172, 18, 6.2, 0.1, {0, 0}, 20);
   a.add("wheel web", extrude(web, -2, 24), wheel);
   for (int i = 0; i < 18; ++i) {
-    const Frame seat = rolled(wheel, 0.1 + 2 * kPi * i / 18) * at(172, 0, 24);
+    const Frame seat = rolled(wheel, 0.1 + 2 * std::numbers::pi * i / 18) * at(172, 0, 24);
     add_bolt(a, "tie bolt", seat, 11, 44);
     a.add("tie bolt nut", nut(11),
-          rolled(wheel, 0.1 + 2 * kPi * i / 18) * facing({172, 0, -2}, {0, 0, -1}));
+          rolled(wheel, 0.1 + 2 * std::numbers::pi * i / 18) * facing({172, 0, -2}, {0, 0, -1}));
   }
   for (int i = 0; i < 9; ++i)
     a.add("wheel spoke rib", box({58, -5, 20}, {kRim - 24, 5, 40}),
-          rolled(wheel, 2 * kPi * (i + 0.5) / 9));
+          rolled(wheel, 2 * std::numbers::pi * (i + 0.5) / 9));
   a.add("hub", revolve({{44, -20}, {62, -20}, {62, 60}, {54, 66}, {44, 66}}, 96, Ends::joined),
         wheel);
   a.add("hub cap", revolve({{0, 92}, {30, 91}, {46, 84}, {54, 70}, {56, 62}, {0, 62}}, 96), wheel);
@@ -122,11 +121,12 @@ void add_brake(Assembly& a, const Frame& wheel) {
   add_bolt_circle(plate, 84, 10, 5.4, 0.3, {0, 0}, 18);
   a.add("brake housing", extrude(plate, -152, -134), wheel);
   for (int i = 0; i < 8; ++i) {
-    const Frame piston = rolled(wheel, 2 * kPi * i / 8) * facing({124, 0, -152}, {0, 0, -1});
+    const Frame piston =
+        rolled(wheel, 2 * std::numbers::pi * i / 8) * facing({124, 0, -152}, {0, 0, -1});
     a.add("brake piston", revolve({{0, -2}, {27, -2}, {27, 22}, {23, 27}, {0, 27}}, 56), piston);
     a.add("brake piston cap", extrude({gear(20, 15, 16.5), {}}, 27, 33), piston);
     a.add("adjuster pin", hex_bolt(8, 20),
-          rolled(wheel, 2 * kPi * (i + 0.5) / 8) * facing({136, 0, -152}, {0, 0, -1}));
+          rolled(wheel, 2 * std::numbers::pi * (i + 0.5) / 8) * facing({136, 0, -152}, {0, 0, -1}));
   }
   add_bolt_row(a, "brake bolt", wheel * facing({0, 0, -152}, {0, 0, -1}), circle(84, 60), 0, 52, 10,
                30);
@@ -134,7 +134,8 @@ void add_brake(Assembly& a, const Frame& wheel) {
     a.add("heat shield",
           sheet(30, 24,
                 [&](double u, double v) {
-                  const double angle = 2 * kPi * (i + 1.06 * u) / 12, r = 182.5 + 1.2 * u;
+                  const double angle = 2 * std::numbers::pi * (i + 1.06 * u) / 12,
+                               r = 182.5 + 1.2 * u;
                   return h6Vec3{r * std::cos(angle), r * std::sin(angle), -6 - 122 * v};
                 }),
           wheel, Kind::sheet);

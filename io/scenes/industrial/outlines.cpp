@@ -9,7 +9,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 using Index = std::uint32_t;
 
 // Twice the area of the triangle a b c, positive when counter-clockwise.
@@ -122,7 +121,7 @@ class Ears {
 Polygon circle(double radius, int sides, P2 centre) {
   Polygon out;
   for (int i = 0; i < sides; ++i) {
-    const double angle = 2 * kPi * i / sides;
+    const double angle = 2 * std::numbers::pi * i / sides;
     out.push_back({centre.x + radius * std::cos(angle), centre.y + radius * std::sin(angle)});
   }
   return out;
@@ -134,7 +133,7 @@ Polygon rectangle(double w, double h, double corner, int steps, P2 centre) {
   const P2 centres[4] = {{x, y}, {-x, y}, {-x, -y}, {x, -y}};
   for (int k = 0; k < 4; ++k)
     for (int i = 0; i <= (corner > 0 ? steps : 0); ++i) {
-      const double angle = kPi / 2 * (k + static_cast<double>(i) / steps);
+      const double angle = std::numbers::pi / 2 * (k + static_cast<double>(i) / steps);
       out.push_back({centre.x + centres[k].x + corner * std::cos(angle),
                      centre.y + centres[k].y + corner * std::sin(angle)});
     }
@@ -146,7 +145,8 @@ Polygon slot(double length, double radius, P2 centre, double angle, int steps) {
   const double c = std::cos(angle), s = std::sin(angle);
   for (int end = 0; end < 2; ++end)
     for (int i = 0; i <= steps; ++i) {
-      const double a = -kPi / 2 + kPi * (end + static_cast<double>(i) / steps);
+      const double a =
+          -std::numbers::pi / 2 + std::numbers::pi * (end + static_cast<double>(i) / steps);
       const double x = (end == 0 ? 1 : -1) * length / 2 + radius * std::cos(a);
       const double y = radius * std::sin(a);
       out.push_back({centre.x + c * x - s * y, centre.y + s * x + c * y});
@@ -183,7 +183,8 @@ Polygon gear(int teeth, double root, double tip) {
                                   {0.76, 0.65}, {0.83, 0.3}, {0.9, 0}};
   for (int i = 0; i < teeth; ++i)
     for (const auto& [along, height] : kTooth) {
-      const double angle = 2 * kPi * (i + along) / teeth, r = root + height * (tip - root);
+      const double angle = 2 * std::numbers::pi * (i + along) / teeth,
+                   r = root + height * (tip - root);
       out.push_back({r * std::cos(angle), r * std::sin(angle)});
     }
   return out;
@@ -192,7 +193,7 @@ Polygon gear(int teeth, double root, double tip) {
 void add_bolt_circle(Outline& outline, double radius, int count, double hole, double phase,
                      P2 centre, int sides) {
   for (int i = 0; i < count; ++i) {
-    const double angle = phase + 2 * kPi * i / count;
+    const double angle = phase + 2 * std::numbers::pi * i / count;
     outline.holes.push_back(circle(
         hole, sides, {centre.x + radius * std::cos(angle), centre.y + radius * std::sin(angle)}));
   }

@@ -9,8 +9,6 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 void flip(Piece& piece) {
   for (auto& t : piece.triangles) std::swap(t[1], t[2]);
 }
@@ -115,7 +113,7 @@ Piece revolve(const Profile& profile, int sides, Ends ends) {
   for (const P2& p : profile) {
     Line ring;
     for (int i = 0; i < (p.x == 0 ? 1 : sides); ++i) {
-      const double angle = 2 * kPi * i / sides;
+      const double angle = 2 * std::numbers::pi * i / sides;
       ring.push_back({p.x * std::cos(angle), p.x * std::sin(angle), p.y});
     }
     rings.push_back(std::move(ring));
@@ -138,11 +136,11 @@ Piece block(double w, double d, double h, double corner, double rim, int steps) 
   };
   const int rounds = 3;
   for (int i = 0; i <= rounds; ++i) {
-    const double angle = kPi / 2 * i / rounds;
+    const double angle = std::numbers::pi / 2 * i / rounds;
     add(rim * (1 - std::sin(angle)), rim * (1 - std::cos(angle)));
   }
   for (int i = rounds; i >= 0; --i) {
-    const double angle = kPi / 2 * i / rounds;
+    const double angle = std::numbers::pi / 2 * i / rounds;
     add(rim * (1 - std::sin(angle)), h - rim * (1 - std::cos(angle)));
   }
   return loft(rings, Ends::capped);
@@ -266,7 +264,7 @@ Line helix(double radius, double pitch, double turns, int per_turn) {
   Line out;
   const int steps = static_cast<int>(std::lround(turns * per_turn));
   for (int i = 0; i <= steps; ++i) {
-    const double angle = 2 * kPi * i / per_turn;
+    const double angle = 2 * std::numbers::pi * i / per_turn;
     out.push_back({radius * std::cos(angle), radius * std::sin(angle), pitch * i / per_turn});
   }
   return out;
@@ -278,7 +276,7 @@ Line companion(const Line& line, double radius, double angle, double lay) {
   const std::vector<Frame> frames = frames_along(line);
   for (std::size_t i = 0; i < line.size(); ++i) {
     if (i > 0) s += norm(line[i] - line[i - 1]);
-    const double a = angle + 2 * kPi * s / lay;
+    const double a = angle + 2 * std::numbers::pi * s / lay;
     out.push_back(frames[i].at({radius * std::cos(a), radius * std::sin(a), 0}));
   }
   return out;

@@ -13,7 +13,6 @@ namespace {
 
 using namespace industrial;
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kBody = 37;              // radius of the yoke [mm]
 constexpr double kSolenoidY = 63;         // y of the solenoid's axis
 constexpr double kEarY = 20, kEarX = 49;  // of the flange bolts' holes
@@ -86,7 +85,7 @@ void add_motor(Assembly& a) {
                                    72));
   // Field coil screws, countersunk pads.
   for (int i = 0; i < 4; ++i) {
-    const double angle = kPi / 4 + kPi / 2 * i;
+    const double angle = std::numbers::pi / 4 + std::numbers::pi / 2 * i;
     const h6Vec3 out = {std::cos(angle), std::sin(angle), 0};
     const Frame on = facing(kBody * out + h6Vec3{0, 0, -90}, out, {0, 0, 1});
     a.add("starter pole screw",
@@ -94,7 +93,7 @@ void add_motor(Assembly& a) {
   }
   // Two through bolts hold end cap, yoke and drive housing together.
   for (const double side : {-1.0, 1.0}) {
-    const double angle = 0.15 + (side > 0 ? 0 : kPi);
+    const double angle = 0.15 + (side > 0 ? 0 : std::numbers::pi);
     const h6Vec3 p = {41 * std::cos(angle), 41 * std::sin(angle), 0};
     a.add("starter through bolt", cylinder(2.7, -186, -46, 20), at(p.x, p.y, 0));
     a.add("starter through bolt", hex_bolt(5, 12), facing(p + h6Vec3{0, 0, -185}, {0, 0, -1}));

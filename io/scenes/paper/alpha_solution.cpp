@@ -24,11 +24,11 @@
 namespace h6::io {
 namespace {
 
-constexpr double kSpeed = 50 * kMm;    // approximate speed of the tool's fastest point [m/s]
-constexpr double kRamp = 0.5;          // time to reach that speed, and to come to rest [s]
-constexpr double kTurnArm = 60 * kMm;  // bounds the distance of the tool's points from the x axis
-constexpr double kRow = 0.02;          // time between two rows of the path [s]
-constexpr int kPieces = 2000;          // pieces by which the path's length is measured
+constexpr double kPathSpeed = 50 * kMm;  // approximate speed of the tool's fastest point [m/s]
+constexpr double kRamp = 0.5;            // time to reach that speed, and to come to rest [s]
+constexpr double kTurnArm = 60 * kMm;    // bounds the distance of the tool's points from the x axis
+constexpr double kRow = 0.02;            // time between two rows of the path [s]
+constexpr int kPieces = 2000;            // pieces by which the path's length is measured
 
 h6Pose pose_of(const AlphaKey& key) {
   const h6Quat facing = from_axes({-1, 0, 0}, {0, 0, -1}, {0, -1, 0});
@@ -63,11 +63,11 @@ AlphaKey key_at(double advance) {
 
 // How far the hand has come [m]. Its speed rises and falls as 3 x^2 - 2 x^3 over a ramp.
 double travelled(double time, double whole) {
-  const auto ramp = [](double x) { return kSpeed * kRamp * (x * x * x - x * x * x * x / 2); };
-  const double end = whole / kSpeed + kRamp;
+  const auto ramp = [](double x) { return kPathSpeed * kRamp * (x * x * x - x * x * x * x / 2); };
+  const double end = whole / kPathSpeed + kRamp;
   if (time < kRamp) return ramp(time / kRamp);
   if (time > end - kRamp) return whole - ramp(std::max(end - time, 0.0) / kRamp);
-  return kSpeed * (time - kRamp / 2);
+  return kPathSpeed * (time - kRamp / 2);
 }
 
 Path solution_path() {
@@ -82,7 +82,7 @@ Path solution_path() {
   }
   HandPath hand(pose_of(piece(0)));
   hand.wait(0.2);
-  const int rows = static_cast<int>(std::ceil((along.back() / kSpeed + kRamp) / kRow));
+  const int rows = static_cast<int>(std::ceil((along.back() / kPathSpeed + kRamp) / kRow));
   for (int r = 1; r <= rows; ++r) {
     const double way = travelled(r * kRow, along.back());
     const auto next = std::lower_bound(along.begin() + 1, along.end() - 1, way);

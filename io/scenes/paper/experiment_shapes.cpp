@@ -8,8 +8,6 @@
 namespace h6::io {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 std::uint32_t add_vertex(Mesh& mesh, double x, double y, double z) {
   mesh.vertices.push_back({x, y, z});
   return static_cast<std::uint32_t>(mesh.vertices.size() - 1);
@@ -47,10 +45,10 @@ void add_shell_point(PointCloud& cloud, const h6Vec3& p, const h6Vec3& inward) {
 
 Mesh prism_mesh(const h6Vec3& centre, double radius, double low, double high, int segments) {
   Mesh mesh;
-  const double corner = radius / std::cos(kPi / segments);
+  const double corner = radius / std::cos(std::numbers::pi / segments);
   for (const double z : {low, high})
     for (int i = 0; i < segments; ++i) {
-      const double angle = 2 * kPi * i / segments;
+      const double angle = 2 * std::numbers::pi * i / segments;
       add_vertex(mesh, centre.x + corner * std::cos(angle), centre.y + corner * std::sin(angle),
                  centre.z + z);
     }
@@ -78,7 +76,7 @@ Mesh plate_with_wire(double side, double thickness, double x, double height, dou
   std::vector<P> outline = {{-side, -thickness}, {side, -thickness}, {side, 0}};
   const double foot = std::asin(-height / radius);  // angle of the right foot above +x
   for (int i = 0; i <= segments; ++i) {
-    const double angle = foot + (kPi - 2 * foot) * i / segments;
+    const double angle = foot + (std::numbers::pi - 2 * foot) * i / segments;
     // The feet are exactly on the plate, without rounding.
     const double z = i == 0 || i == segments ? 0 : height + radius * std::sin(angle);
     outline.push_back({x + radius * std::cos(angle), z});
@@ -120,7 +118,7 @@ Mesh block_with_cavity(double half_side, double height, const std::vector<Ring>&
   const auto ring = [&](double radius, double z, bool square) {
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
     for (int i = 0; i < segments; ++i) {
-      const double angle = 2 * kPi * i / segments;
+      const double angle = 2 * std::numbers::pi * i / segments;
       const double c = std::cos(angle), s = std::sin(angle);
       const double r = square ? half_side / std::max(std::abs(c), std::abs(s)) : radius;
       add_vertex(mesh, r * c, r * s, z);
