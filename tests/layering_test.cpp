@@ -235,26 +235,30 @@ TEST_CASE("headers that pull a heavy package in stay inside their own box") {
 TEST_CASE("link lines agree with the house") {
   static const std::regex call(R"(h6_library\(\s*([a-z_]+)([^)]*)\))");
   static const std::regex target(R"(hapsix_([a-z]+))");
+  // One library a box; io has two, since scenes and recordings are not optimised.
   const std::map<std::string, std::set<std::string>> links = {
       {"kernels", {"contract"}},
       {"sched", {"contract"}},
       {"runtime", {"contract", "kernels", "sched"}},
       {"device", {"contract", "sched"}},
       {"io", {"contract", "runtime", "kernels", "sched"}},
+      {"scene", {"io"}},
   };
   std::size_t seen = 0;
-  for (const auto& [box, allowed] : links) {
+  for (const char* box : {"kernels", "sched", "runtime", "device", "io"}) {
     const std::string text = slurp(root / box / "CMakeLists.txt");
     for (std::sregex_iterator it(text.begin(), text.end(), call), end; it != end; ++it) {
-      CHECK((*it)[1] == box);  // one target a box
-      const std::string body = (*it)[2];
+      const std::string library = (*it)[1], body = (*it)[2];
+      const auto allowed = links.find(library);
+      REQUIRE_MESSAGE(allowed != links.end(), box, " has an unknown library ", library);
       for (std::sregex_iterator t(body.begin(), body.end(), target); t != end; ++t) {
+        if ((*t)[1] == library) continue;  // its own name, in what is said about it later
         ++seen;
-        CHECK_MESSAGE(allowed.count((*t)[1]) == 1, box, " links ", (*t)[0].str());
+        CHECK_MESSAGE(allowed->second.count((*t)[1]) == 1, library, " links ", (*t)[0].str());
       }
     }
   }
-  CHECK(seen >= 7);
+  CHECK(seen >= 8);
 }
 
 TEST_CASE("every source file names its licence in its first line") {
