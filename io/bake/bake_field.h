@@ -30,7 +30,10 @@ struct FieldBake {
   double seal = 0;
   double band_voxels = 3;  // cells nearer than this to the surface get samples, 1 .. 8
   int padding_voxels = 8;  // empty cells around the mesh
-  unsigned threads = 0;    // 0: all
+  // Moves the nodes against the mesh, whose centre they share else [voxel], each -0.5 .. 0.5. For
+  // studies of what a result owes to the place of the nodes; no scene file has it.
+  h6Vec3 shift{};
+  unsigned threads = 0;  // 0: all
 };
 
 // The report of a bake for its user.

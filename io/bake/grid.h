@@ -29,10 +29,10 @@ namespace h6::io::bake {
 
 using kernels::kBrickSamples;
 
-// The nodes fill a box around the mesh and share its centre, so that a symmetric part gets a
-// symmetric field and a mesh far from the origin keeps its digits.
+// The nodes fill a box around the mesh and share its centre (but for FieldBake::shift), so that a
+// symmetric part gets a symmetric field and a mesh far from the origin keeps its digits.
 struct Grid {
-  Vec3 centre{};     // of the mesh's box, mesh frame [m]
+  Vec3 centre{};     // of the nodes, mesh frame [m]
   double voxel = 0;  // [m]
   std::array<std::int32_t, 3> bricks{};
   double offset = 0;  // sigma [voxel]

@@ -261,6 +261,9 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
   if (!(options.seal >= 0) || !std::isfinite(options.seal))
     return Failure{"the width of holes to seal must be a length, or 0 for none"};
   if (!std::isfinite(options.offset)) return Failure{"the offset must be a length, or -1 for auto"};
+  for (const double s : {options.shift.x, options.shift.y, options.shift.z})
+    if (!(std::abs(s) <= 0.5))
+      return Failure{"the nodes move by at most half a voxel, not by " + number(s)};
 
   Grid grid;
   grid.band = options.band_voxels;
@@ -286,6 +289,8 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
                            (longest + seal) / (n - 4)});
     padding = std::max({padding, margin + extra / grid.voxel, 0.5 * seal / grid.voxel + 2});
   }
+  if (norm(options.shift) > 0) padding += 0.5;
+  grid.centre = grid.centre + grid.voxel * options.shift;
   grid.offset = automatic ? auto_offset : options.offset / grid.voxel;
   if (grid.offset > 64)
     return Failure{"the offset of " + number(options.offset) + " m is " + number(grid.offset) +

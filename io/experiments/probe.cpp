@@ -3,11 +3,9 @@
 
 namespace h6::cli {
 
-io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points,
-                      const h6Pose& obstacle_pose) {
+io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points) {
   io::Scene scene = io::common_scene(name, name);
   scene.bodies.push_back(io::obstacle("obstacle", std::move(obstacle), kProbeVoxel));
-  scene.bodies.back().pose = obstacle_pose;
   io::SceneBody body;
   body.name = "body";
   body.com = h6Vec3{0, 0, 0};

@@ -8,10 +8,8 @@ namespace h6::cli {
 inline constexpr double kMm = io::kMm, kProbeStiffness = 1e4, kProbeVoxel = 1e-3;
 inline constexpr double kProbeDepth = 0.2 * kMm;  // penetration depth of a patch's points
 
-// A scene with one obstacle (voxel kProbeVoxel) at `obstacle_pose` and a free body with these
-// points.
-io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points,
-                      const h6Pose& obstacle_pose = {{0, 0, 0}, {1, 0, 0, 0}});
+// A scene with one obstacle (voxel kProbeVoxel) and a free body with these points.
+io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points);
 
 // A plate 12 mm thick below z = 0, and the bottom of a box of 20 x 20 x 10 mm in the frame of the
 // box's centre.

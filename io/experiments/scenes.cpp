@@ -17,7 +17,6 @@ const std::vector<TableScene>& table_scenes() {
        "Fig. 2",
        "Integrated explicitly, the unscaled penalty is unstable where the scaled ones are stable.",
        "",
-       nullptr,
        false,
        {}},
       {"cone-in-gap",
@@ -28,7 +27,6 @@ const std::vector<TableScene>& table_scenes() {
        "weight and drag the cone on, past the hand (in the recordings it ends tens of "
        "millimetres ahead of it). The prototype's Gauss columns all had the filter; with "
        "it both hold.",
-       io::cone_in_gap,
        true,
        {{"none", "held .21"},
         {"global", "through 1.99"},
@@ -46,7 +44,6 @@ const std::vector<TableScene>& table_scenes() {
        "so chance decides which of them it merges. In the prototype it chattered; here it "
        "merges little and stays near the unscaled penalty, with the same depth and force "
        "jumps.",
-       io::box_on_plates,
        true,
        {{"none", "held .01"},
         {"global", "held .50"},
@@ -59,7 +56,6 @@ const std::vector<TableScene>& table_scenes() {
        "Fig. 8",
        "Forced with 20 N, global scaling goes through the gap; the adaptive weights do not.",
        "",
-       io::rod_between_tubes,
        true,
        {{"none", "held .06"},
         {"global", "through"},
@@ -74,7 +70,6 @@ const std::vector<TableScene>& table_scenes() {
        "Stiff rules go deeper than in the prototype: along the wall `none` is 0.01 voxel deep "
        "and `robust` 0.04, but where the peg's edge comes into the corner between wall and "
        "floor, which samples one voxel apart round off, single contacts go to 0.1 and 0.16.",
-       io::peg_in_hole,
        true,
        {{"none", "held .04"},
         {"global", "held 1.12"},
@@ -92,7 +87,6 @@ const std::vector<TableScene>& table_scenes() {
        "out of force, and chatters or pops. The study of finer fields shows it: from 0.5 mm on "
        "`gauss6+facing` holds as in the prototype, and `gauss3+facing`, which at 1 mm pops as "
        "the prototype's does, needs 0.65 mm to 0.8 mm.",
-       io::box_over_wire,
        true,
        {{"none", "held .04"},
         {"global", "held .37"},
@@ -116,7 +110,6 @@ const std::vector<TableScene>& table_scenes() {
        "(0.26 and 0.14 mm deep). They also hold with the wire 0.2 mm higher, and with plate "
        "and wire as two fields of the same samples. If the grid moves by a quarter or half of "
        "a voxel, the same scene is held, chatters or goes through.",
-       nullptr,
        false,
        {}},
       {"box-over-post",
@@ -131,7 +124,6 @@ const std::vector<TableScene>& table_scenes() {
        "goes to the others, so the force jumps to 5.5 N from one frame to the next, around the "
        "5 N that it should be. With a pull of 4.75 N the box is calm, and with a field of "
        "0.125 mm it holds.",
-       io::box_over_post,
        true,
        {{"none", "held .04"},
         {"global", "through"},
@@ -144,14 +136,12 @@ const std::vector<TableScene>& table_scenes() {
        "Fig. 8, the alpha puzzle",
        "Forced at the shortcut, the alpha never gets through with the adaptive weights.",
        "",
-       nullptr,
        false,
        {}},
       {"alpha-solution",
        "Fig. 8, the way that does go through",
        "The puzzle can be solved: led along a collision-free way, the alpha arrives.",
        "",
-       nullptr,
        false,
        {}},
   };

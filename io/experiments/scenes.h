@@ -18,8 +18,6 @@ struct TableScene {
   const char* figure;
   const char* claim;       // the paper's, in one sentence
   const char* difference;  // why the engine's row differs from the prototype's; may be empty
-  // Makes the scene with another sampling of its shell; null when there is only its own sampling.
-  io::Scene (*sampled)(const io::Sampling&);
   bool thin;  // the shell is explicit and small; the studies of sampling and force use such scenes
   std::map<std::string, const char*> prototype;  // column -> its verdict and depth [voxel]
 };

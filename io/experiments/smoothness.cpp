@@ -5,9 +5,9 @@
 #include <numbers>
 
 #include "io/experiments/probe.h"
+#include "io/experiments/vary_scene.h"
 
 namespace h6::cli {
-namespace {}  // namespace
 
 Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console) {
   Study out;
@@ -69,14 +69,11 @@ Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& 
 
 namespace {
 
-// The obstacle's mesh is turned before it is baked, and its pose turns it back. Its surface then
-// crosses the lattice at all angles, as the surfaces of machine parts do.
-const h6Quat kBakedTurn = turn_by({0.37, 0.61, 0.23});
-const h6Quat kTurnedBack = turn_by({-0.37, -0.61, -0.23});
-
-io::Scene ripple_scene(const io::Mesh& obstacle, io::PointCloud points) {
-  return posed_scene("ripple", io::moved(obstacle, {{0, 0, 0}, kBakedTurn}), std::move(points),
-                     {{0, 0, 0}, kTurnedBack});
+// The obstacle's surface crosses the lattice at all angles, as the surfaces of machine parts do.
+io::Scene ripple_scene(io::Mesh obstacle, io::PointCloud points) {
+  io::Scene scene = posed_scene("ripple", std::move(obstacle), std::move(points));
+  turn_lattice(scene.bodies[0], turn_by({0.37, 0.61, 0.23}));
+  return scene;
 }
 
 // A ridge along x: a cylinder of radius 4 mm with 256 sides, its top at z = 0.

@@ -4,9 +4,23 @@
 #include <algorithm>
 
 #include "io/experiments/grid.h"
-#include "io/scenes/scenes.h"
+#include "io/experiments/vary_scene.h"
 
 namespace h6::cli {
+namespace {
+
+Variation in_voxels(double factor) {
+  Variation v;
+  v.voxel = factor;
+  return v;
+}
+
+// A scene whose name is in the code always exists.
+void add_varied(std::vector<io::Scene>& scenes, const char* name, const Variation& v) {
+  if (Result<io::Scene> scene = vary(name, v)) scenes.push_back(std::move(*scene));
+}
+
+}  // namespace
 
 // ---- other samplings of the shell --------------------------------------------------------------
 
@@ -27,7 +41,11 @@ Study study_sampling(const std::vector<MethodColumn>& columns, const Console& co
     for (const double density : {0.5, 1.0, 2.0}) variants.push_back({density, jitter, 1});
   std::vector<io::Scene> scenes;
   for (const TableScene* kind : kinds)
-    for (const io::Sampling& v : variants) scenes.push_back(kind->sampled(v));
+    for (const io::Sampling& sampling : variants) {
+      Variation v;
+      v.sampling = sampling;
+      add_varied(scenes, kind->name, v);
+    }
   const std::vector<Loaded> loaded = load_all(std::move(scenes));
 
   const RunGrid runs = run_grid(loaded, columns, "samplings", console);
@@ -81,14 +99,11 @@ Study study_force(const std::vector<MethodColumn>& columns, const Console& conso
   for (const TableScene& s : table_scenes()) {
     if (!s.thin) continue;
     kinds.push_back(s.name);
-    scenes.push_back(s.sampled(io::Sampling{}));
+    add_varied(scenes, s.name, {});
   }
-  for (io::Scene& fine : std::vector<io::Scene>{io::box_over_wire({}), io::box_over_post({})}) {
-    fine.coupling.max_force = 5;
-    for (io::SceneBody& body : fine.bodies)
-      if (body.field) body.field->bake.voxel_size = 0.25 * io::kMm;
-    kinds.push_back(fine.name + ", 0.25 mm");
-    scenes.push_back(std::move(fine));
+  for (const char* name : {"box-over-wire", "box-over-post"}) {
+    kinds.push_back(std::string(name) + ", 0.25 mm");
+    add_varied(scenes, name, in_voxels(0.25));
   }
   const std::vector<Loaded> loaded = load_all(std::move(scenes));
   std::vector<double> held(kinds.size() * columns.size(), 0);
@@ -127,17 +142,10 @@ Study study_voxel(const std::vector<MethodColumn>& columns, const Console& conso
       "and deepest contact in mm. Results that change with the voxel come from the baked field; "
       "results that stay come from the method.";
   const std::vector<const char*> names = {"box-over-wire", "box-over-fused-wire", "box-over-post"};
-  const std::vector<double> voxels = {1, 0.5, 0.25};  // [mm]
+  const std::vector<double> voxels = {1, 0.5, 0.25};  // [mm]; the scenes' own are 1 mm
   std::vector<io::Scene> scenes;
   for (const char* name : names)
-    for (const double voxel : voxels) {
-      Result<io::Scene> scene = io::make_scene(name);
-      if (!scene) return out;
-      scene->coupling.max_force = 5;
-      for (io::SceneBody& body : scene->bodies)
-        if (body.field) body.field->bake.voxel_size = voxel * io::kMm;
-      scenes.push_back(std::move(*scene));
-    }
+    for (const double voxel : voxels) add_varied(scenes, name, in_voxels(voxel));
   const std::vector<Loaded> loaded = load_all(std::move(scenes));
   const RunGrid runs = run_grid(loaded, columns, "finer fields", console);
   out.table = head("scene, voxel", columns);

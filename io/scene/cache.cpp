@@ -44,7 +44,7 @@ bool is_it(const Result<Data>& read, const std::string& key, const fs::path& fil
 }
 
 template <class Write>
-void keep(const fs::path& file, Cached& cached, const Write& write) {
+void store(const fs::path& file, Cached& cached, const Write& write) {
   std::error_code error;
   fs::create_directories(file.parent_path(), error);  // if this fails, `write` reports it
   if (const Outcome kept = write(file); !kept) {
@@ -53,7 +53,7 @@ void keep(const fs::path& file, Cached& cached, const Write& write) {
 }
 
 template <class Data, class Read, class Bake, class Write>
-Result<Data> through_cache(const std::string& key, const char* ending, Cached* report,
+Result<Data> through_cache(const std::string& key, const char* ending, bool keep, Cached* report,
                            const Read& read, const Bake& bake, const Write& write) {
   Cached unheard;
   Cached& cached = report ? *report : unheard;
@@ -71,8 +71,8 @@ Result<Data> through_cache(const std::string& key, const char* ending, Cached* r
   Result<Data> baked = bake(cached);
   if (!baked) return baked;
   baked->input_hash = key;
-  if (!cached.file.empty()) {
-    keep(cached.file, cached, [&](const fs::path& file) { return write(file, *baked); });
+  if (keep && !cached.file.empty()) {
+    store(cached.file, cached, [&](const fs::path& file) { return write(file, *baked); });
   }
   return baked;
 }
@@ -88,9 +88,9 @@ std::filesystem::path cache_folder() {
 }
 
 Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options, Cached* cached,
-                               const Progress& progress) {
+                               const Progress& progress, bool keep) {
   return through_cache<FieldData>(
-      asset_key(mesh, options), ".field", cached,
+      asset_key(mesh, options), ".field", keep, cached,
       [](const fs::path& file) { return read_raw_field(file); },
       [&](Cached& told) {
         FieldBakeReport report;
@@ -102,9 +102,9 @@ Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options,
 }
 
 Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options, Cached* cached,
-                               const Progress& progress) {
+                               const Progress& progress, bool keep) {
   return through_cache<ShellData>(
-      asset_key(mesh, options), ".ply", cached,
+      asset_key(mesh, options), ".ply", keep, cached,
       [](const fs::path& file) { return read_shell(file); },
       [&](Cached& told) {
         if (std::string far = too_far_for_floats(mesh.mesh); !far.empty())

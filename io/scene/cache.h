@@ -23,10 +23,10 @@ struct Cached {
 
 // Takes the asset from the cache, or bakes it and stores it there. A file that cannot be used is
 // replaced, with a warning. A cache that cannot be written gives a warning, not an error. `cached`
-// may be null.
+// may be null. Without `keep` nothing is stored.
 Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options, Cached* cached,
-                               const Progress& progress = {});
+                               const Progress& progress = {}, bool keep = true);
 Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options, Cached* cached,
-                               const Progress& progress = {});
+                               const Progress& progress = {}, bool keep = true);
 
 }  // namespace h6::io

@@ -101,7 +101,8 @@ class Loader {
     }
     if (const auto known = kept.index.find(key); known != kept.index.end()) return known->second;
     Cached cached;
-    Result<Data> data = mesh ? bake(*mesh, source.bake, &cached, progress_) : read(source.file);
+    Result<Data> data =
+        mesh ? bake(*mesh, source.bake, &cached, progress_, source.keep) : read(source.file);
     if (!data) return data.failure();
     for (const std::string& w : cached.warnings)
       out_.warnings.push_back("body '" + body.name + "': " + w);

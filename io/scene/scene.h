@@ -27,12 +27,13 @@ using Path = std::vector<PathRow>;
 
 // The source of a field or shell. Exactly one of `mesh` (a mesh file), `file` (a baked file) and,
 // in generated scenes, `mesh_data` or `points` is set. `unit` belongs to `mesh`; a baked file is
-// always in metres.
+// always in metres. `keep`: the cache keeps what is baked; studies bake much that is used once.
 struct FieldSource {
   std::filesystem::path mesh, file;
   std::optional<Mesh> mesh_data;
   FieldBake bake;
   std::optional<Unit> unit;  // of `mesh`; if not set, the scene's unit
+  bool keep = true;
 };
 struct ShellSource {
   std::filesystem::path mesh, file;
@@ -40,6 +41,7 @@ struct ShellSource {
   std::optional<PointCloud> points;
   ShellBake bake;
   std::optional<Unit> unit;
+  bool keep = true;
 };
 
 struct Box {

@@ -103,19 +103,6 @@ void add_face(PointCloud& cloud, const h6Vec3& centre, const h6Vec3& u, const h6
                 inward);
 }
 
-void add_box(PointCloud& cloud, const h6Vec3& half, double spacing) {
-  const h6Vec3 axes[3] = {{half.x, 0, 0}, {0, half.y, 0}, {0, 0, half.z}};
-  // The tolerance keeps rounding from adding a point to a side that is a multiple of the spacing.
-  const auto cells = [&](const h6Vec3& axis) {
-    return std::max(1, static_cast<int>(std::ceil(2 * norm(axis) / spacing - 1e-9)));
-  };
-  for (int a = 0; a < 3; ++a)
-    for (const double side : {-1.0, 1.0}) {
-      const h6Vec3 &n = axes[a], &u = axes[(a + 1) % 3], &v = axes[(a + 2) % 3];
-      add_face(cloud, side * n, u, v, cells(u), cells(v), -side * unit(n));
-    }
-}
-
 void add_cylinder_side(PointCloud& cloud, double radius, double half_length, int around,
                        int along) {
   for (int i = 0; i < around; ++i)

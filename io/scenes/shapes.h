@@ -28,8 +28,6 @@ double mesh_distance(const Mesh& a, const Mesh& b);
 // nu x nv points on the parallelogram centre +- u +- v.
 void add_face(PointCloud& cloud, const h6Vec3& centre, const h6Vec3& u, const h6Vec3& v, int nu,
               int nv, const h6Vec3& inward);
-// Six faces of the box |x|, |y|, |z| <= half, points `spacing` apart or a little less.
-void add_box(PointCloud& cloud, const h6Vec3& half, double spacing);
 // The side of a cylinder around the z axis.
 void add_cylinder_side(PointCloud& cloud, double radius, double half_length, int around, int along);
 // The points inside the circle at height z of a square grid that has a point on the z axis.

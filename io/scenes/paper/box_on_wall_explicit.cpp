@@ -9,7 +9,7 @@
 
 namespace h6::io {
 
-Scene box_on_wall_explicit(int nu, int nv) {
+Scene box_on_wall_explicit(int nu, int nv, const Sampling& sampling) {
   Scene scene = common_scene(
       "box-on-wall-explicit",
       "A box of 20 x 20 x 10 mm with 13 x 14 points under it is pressed 3 mm deep onto a wall and "
@@ -28,7 +28,8 @@ Scene box_on_wall_explicit(int nu, int nv) {
   box.pose = {{0, 0, 5.5 * kMm}, {1, 0, 0, 0}};
   box.shell.emplace();
   box.shell->points.emplace();
-  add_face(*box.shell->points, {0, 0, -half.z}, {half.x, 0, 0}, {0, half.y, 0}, nu, nv, {0, 0, 1});
+  Sampler(sampling).face(*box.shell->points, {0, 0, -half.z}, {half.x, 0, 0}, {0, half.y, 0}, nu,
+                         nv, {0, 0, 1});
   box.shell->bake.levels = 3;
   scene.bodies.push_back(box);
 
@@ -48,6 +49,9 @@ Scene box_on_wall_explicit(int nu, int nv) {
   return scene;
 }
 
-Scene box_on_wall_explicit() { return box_on_wall_explicit(13, 14); }
+Scene box_on_wall_explicit(const Sampling& sampling) {
+  return box_on_wall_explicit(13, 14, sampling);
+}
+Scene box_on_wall_explicit() { return box_on_wall_explicit(Sampling{}); }
 
 }  // namespace h6::io

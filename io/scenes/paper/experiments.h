@@ -13,10 +13,13 @@ Scene cone_in_gap(const Sampling& sampling);    // Fig. 3
 Scene peg_in_hole(const Sampling& sampling);    // Fig. 10
 Scene box_over_wire(const Sampling& sampling);  // Fig. 12
 Scene box_over_fused_wire(const Sampling& sampling);
-Scene box_over_post(const Sampling& sampling);      // Fig. 12, the wire upright
-Scene rod_between_tubes(const Sampling& sampling);  // Fig. 8
-Scene box_on_plates(const Sampling& sampling);      // Fig. 7
-Scene box_on_wall_explicit(int nu, int nv);         // Fig. 2: nu x nv points on the box's bottom
+Scene box_over_post(const Sampling& sampling);         // Fig. 12, the wire upright
+Scene rod_between_tubes(const Sampling& sampling);     // Fig. 8
+Scene box_on_plates(const Sampling& sampling);         // Fig. 7
+Scene box_on_wall(const Sampling& sampling);           // cf. Fig. 2
+Scene box_on_wall_explicit(const Sampling& sampling);  // Fig. 2
+// With nu x nv points on the box's bottom; the figure has 13 x 14.
+Scene box_on_wall_explicit(int nu, int nv, const Sampling& sampling = {});
 
 // Fig. 7 with a second plate that is as wide as the first or narrower. `share` is the number of its
 // contact points over that of the first plate, 1 or less.

@@ -110,6 +110,18 @@ TEST_CASE("the folder is HAPSIX_CACHE, else that of XDG, else the home's") {
   restore("HOME", home ? old_home.c_str() : nullptr);
 }
 
+TEST_CASE(
+    "what is not to be kept is baked and not stored, and a stored asset serves it all the same") {
+  const CacheFolder folder;
+  Cached cached;
+  REQUIRE(cached_field(mesh, field_options(), &cached, {}, false));
+  CHECK_FALSE(cached.hit);
+  CHECK_FALSE(fs::exists(folder.path));
+  REQUIRE(cached_field(mesh, field_options(), &cached));
+  REQUIRE(cached_field(mesh, field_options(), &cached, {}, false));
+  CHECK(cached.hit);
+}
+
 TEST_CASE("every parameter and every part of the mesh makes another key, threads do not") {
   std::set<std::string> keys{asset_key(mesh, ShellBake{}), asset_key(mesh, FieldBake{})};
   std::size_t expected = 2;
@@ -143,6 +155,8 @@ TEST_CASE("every parameter and every part of the mesh makes another key, threads
   field([](FieldBake& o) { o.seal = 1e-3; });
   field([](FieldBake& o) { o.band_voxels = 4; });
   field([](FieldBake& o) { o.padding_voxels = 9; });
+  field([](FieldBake& o) { o.shift = {0.25, 0, 0}; });
+  field([](FieldBake& o) { o.shift = {0, 0.25, 0}; });
   const auto other_mesh = [&](auto change) {
     Mesh changed_mesh = box_mesh;
     change(changed_mesh);

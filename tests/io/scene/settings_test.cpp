@@ -16,11 +16,11 @@ TEST_CASE("every member of a scene's structs has its row") {
   every_member_has_a_row<SceneHand>(scene_hand_settings(), 2);  // path and its file
   every_member_has_a_row<SceneArm>(arm_settings(), 0);
   every_member_has_a_row<SceneVerdict>(target_settings(), 1);  // forbidden
-  // mesh, file, unit, and the data of a generated scene.
-  every_member_has_a_row<FieldSource>(field_source_settings(), 4);
-  every_member_has_a_row<ShellSource>(shell_source_settings(), 5);
+  // mesh, file, unit, and the data of a generated scene: mesh_data or points, and keep.
+  every_member_has_a_row<FieldSource>(field_source_settings(), 5);
+  every_member_has_a_row<ShellSource>(shell_source_settings(), 6);
   for (const Setting& row : field_source_settings())
-    if (row.stands_among()) every_member_has_a_row<FieldBake>(*row.inside, 1);  // threads
+    if (row.stands_among()) every_member_has_a_row<FieldBake>(*row.inside, 2);  // threads, shift
   for (const Setting& row : shell_source_settings())
     if (row.stands_among()) every_member_has_a_row<ShellBake>(*row.inside, 1);  // threads
 }
