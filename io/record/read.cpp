@@ -41,7 +41,7 @@ Result<Source> open_source(const fs::path& file) {
 }
 
 Result<Handle> open_group(const Source& source, const char* name) {
-  if (!has(source.h5, name, H5O_TYPE_GROUP))
+  if (!has(source.h5, name, H5I_GROUP))
     return source.wrong(std::string("the group ") + name + " is missing");
   Handle group = H5Gopen2(source.h5, name, H5P_DEFAULT);
   if (!group.ok()) return source.wrong(library_reason());

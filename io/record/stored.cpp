@@ -71,7 +71,7 @@ Result<Stored> open_any(const Source& source, hid_t group, const char* folder, c
                         hid_t wanted) {
   Stored stored;
   stored.name = std::string(folder) + "/" + name;
-  if (!has(group, name, H5O_TYPE_DATASET)) return source.wrong(stored.name + " is missing");
+  if (!has(group, name, H5I_DATASET)) return source.wrong(stored.name + " is missing");
   stored.dataset = H5Dopen2(group, name, H5P_DEFAULT);
   if (!stored.dataset.ok()) return source.wrong(stored.name + ": " + library_reason());
   const Handle type = H5Dget_type(stored.dataset), space = H5Dget_space(stored.dataset);
@@ -131,14 +131,14 @@ bool read_piece(const Stored& stored, hsize_t first, hsize_t count, std::byte* o
 
 }  // namespace
 
-bool has(hid_t at, const char* name, H5O_type_t type) {
+bool has(hid_t at, const char* name, H5I_type_t type) {
   H5L_info_t link;
-  H5O_info_t object;
   if (H5Lexists(at, name, H5P_DEFAULT) <= 0 || H5Lget_info(at, name, &link, H5P_DEFAULT) < 0)
     return false;
-  return link.type == H5L_TYPE_HARD &&
-         H5Oget_info_by_name2(at, name, &object, H5O_INFO_BASIC, H5P_DEFAULT) >= 0 &&
-         object.type == type;
+  if (link.type != H5L_TYPE_HARD) return false;
+  // Not H5Oget_info_by_name: its arguments differ between HDF5 1.10 and 1.14.
+  const Handle object = H5Oopen(at, name, H5P_DEFAULT);
+  return object.ok() && H5Iget_type(object) == type;
 }
 
 Result<Stored> open_stored(const Source& source, hid_t group, const char* folder, const char* name,

@@ -22,7 +22,7 @@ struct Source {
 };
 
 // Whether the file itself has this group or dataset; links to elsewhere do not count.
-bool has(hid_t at, const char* name, H5O_type_t type);
+bool has(hid_t at, const char* name, H5I_type_t type);
 
 // A dataset that was checked to have all its rows in the file.
 struct Stored {
