@@ -87,6 +87,7 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   if (body.translation_only) body.w.setZero();
   if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
   if (ShellBody* shell = find_shell(*session, index)) std::fill_n(shell->series_y, 6, 0.0);
+  if (session->frame == 0) forget_relief(*session, index);
   forget_energy(*session, index);
   for (Hand& hand : session->hands)
     if (hand.body == index) hand.manipulandum = body;

@@ -157,9 +157,11 @@ void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shel
     lane.report.status |= H6_CONTACTS_DROPPED;
   }
   if (timed) shell.traverse_ns = static_cast<double>(sched::now_ns() - since);
-  for (const PairSearch& pair : shell.searches)
+  for (const PairSearch& pair : shell.searches) {
     lane.report.missed_depth_voxels =
         std::max<double>(lane.report.missed_depth_voxels, pair.missed);
+    lane.report.fit_depth_voxels = std::max<double>(lane.report.fit_depth_voxels, pair.fit.deepest);
+  }
 }
 
 void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane) {

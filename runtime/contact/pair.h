@@ -11,6 +11,7 @@
 #include "runtime/base/math.h"
 #include "runtime/contact/body.h"
 #include "runtime/contact/contacts.h"
+#include "runtime/contact/fit.h"
 
 namespace h6 {
 
@@ -53,6 +54,7 @@ struct alignas(64) PairSearch {
   kernels::Affine last_place{};  // from the shell to the field, in the last traversal
   kernels::Affine anchor{};      // a place that the shell has stayed near to since
   kernels::Affine arms{};        // maps contact arms [m] to voxels, as the contacts were made
+  PairFit fit;
 };
 
 // A pair whose bodies both move: how the motion of one changes the wrench on the other.

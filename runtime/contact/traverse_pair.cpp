@@ -317,10 +317,10 @@ void prefetch_groups(const Shell& shell, const TraverseScratch& t, std::size_t g
   }
 }
 
-}  // namespace
-
-std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
-                          TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
+// `complete` becomes false where the traversal is coarse.
+std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                        TraverseScratch& t, Lane& lane, std::size_t used, bool shared,
+                        bool& complete) {
   const Shell& shell = *a.shell;
   const Field& field = *b.field;
   Anytime& anytime = *lane.anytime;
@@ -358,14 +358,17 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
   const auto note_blocks = [&] {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
   };
-  if (is_coarse_anyway(anytime, pair, used, blocks))
+  const auto coarsely = [&] {
+    complete = false;
     return touch_coarsely(search, pair, t, anytime, blocks, used);
+  };
+  if (is_coarse_anyway(anytime, pair, used, blocks)) return coarsely();
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
   prefetch_groups(shell, t, groups, search.cold);
   if (must_be_coarse(anytime, pair, used, blocks, groups)) {
     pair.cull_groups.left_out = 0;
     note_blocks();
-    return touch_coarsely(search, pair, t, anytime, blocks, used);
+    return coarsely();
   }
   if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
   choose_rows(pair, t, search, groups, way.now);
@@ -374,12 +377,25 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
   learn_sampling(anytime, groups, groups, found, since);
   if (must_be_coarser(anytime, pair, used, found, blocks)) {
     note_blocks();
-    return touch_coarsely(search, pair, t, anytime, blocks, used);
+    return coarsely();
   }
   pair.sampled = groups;
   note_groups(pair, t, search, groups, way);
   note_blocks();
   return found;
+}
+
+}  // namespace
+
+std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                          TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
+  bool complete = true;
+  const std::size_t found = search_pair(set, a, b, pair, t, lane, used, shared, complete);
+  pair.fit.deepest = 0;
+  if (pair.fit.count == 0 && !(set.contact.fit_offset > 0)) return found;
+  const FitRule rule{static_cast<float>(set.contact.fit_offset / b.field->voxel),
+                     margin_of(set.contact)};
+  return relieve(pair.fit, candidates_from(t, used), found, rule, complete);
 }
 
 }  // namespace h6

@@ -15,8 +15,9 @@ inline constexpr std::size_t kWorthSharing = 80;
 // Writes the candidates of shell body a against field body b behind row `used` of the scratch, and
 // returns how many there are. It tests two tiers of spheres, then points. In each tier it tests
 // only those that may have come within reach since their last test. If time is short, the traversal
-// ends with the finest complete tier, and all that it leaves out stays expired. `shared`: the
-// threads share whole pairs, so the other thread takes no slices of this one.
+// ends with the finest complete tier, and all that it leaves out stays expired. Distances have the
+// points' relief in them. `shared`: the threads share whole pairs, so the other thread takes no
+// slices of this one.
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared);
 

@@ -3,6 +3,8 @@
 //
 // A field keeps them by brick. A contact's brick is found again from its arm and the pose of the
 // last traversal. So the frame itself stores only one matrix per pair, and nothing per contact.
+#include "runtime/frame/name_contacts.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -30,13 +32,20 @@ void name_rows(const Contacts& c, const Field& field, const Pair& pair, const ke
       const float* m = arms.m[k];
       at[k] = m[0] * c.rx[i] + (m[1] * c.ry[i] + (m[2] * c.rz[i] + m[3]));
     }
-    const std::int32_t row = brick_of(field.view, at);
-    if (part) part[i] = row < 0 || field.part.count == 0 ? -1 : field.part[row];
-    if (triangle) triangle[i] = row < 0 || field.triangle.count == 0 ? -1 : field.triangle[row];
+    const NamedPlace name = name_place(field, at);
+    if (part) part[i] = name.part;
+    if (triangle) triangle[i] = name.triangle;
   }
 }
 
 }  // namespace
+
+NamedPlace name_place(const Field& field, const float (&at)[3]) {
+  const std::int32_t row = brick_of(field.view, at);
+  return {row < 0 || field.part.count == 0 ? -1 : field.part[row],
+          row < 0 || field.triangle.count == 0 ? -1 : field.triangle[row]};
+}
+
 }  // namespace h6
 
 using namespace h6;

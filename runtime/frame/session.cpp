@@ -332,7 +332,7 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   s.team = new sched::FrameTeam(def.threads);
   if (n.lanes) s.alone = new sched::FrameTeam(1);
   open_lanes(s.lanes, s.team, s.alone, &s.anytime);
-  return true;
+  return measure_overlap(s, error);
 }
 
 }  // namespace
@@ -374,6 +374,7 @@ void h6DestroySession(h6Session* s) {
   if (!s) return;
   delete s->team;
   delete s->alone;
+  forget_overlap(*s);
   release(s->allocator, s->memory, s->memory_bytes);
   const h6Allocator allocator = s->allocator;
   destroy(allocator, s);

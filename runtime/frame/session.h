@@ -8,6 +8,7 @@
 #include "runtime/contact/pair.h"
 #include "runtime/contact/settings.h"
 #include "runtime/frame/shell_lanes.h"
+#include "runtime/frame/start_overlap.h"
 #include "runtime/model/model.h"
 #include "runtime/motion/hand.h"
 #include "runtime/motion/motion_stages.h"
@@ -35,6 +36,7 @@ struct h6Session {
   std::int64_t left_at = 0;  // when the last frame ended, by the clock [ns]
   h6::sched::FrameTeam* team = nullptr;
   h6::sched::FrameTeam* alone = nullptr;  // a team of one, for lanes side by side
+  h6::StartOverlap overlap;
   void* memory = nullptr;
   std::size_t memory_bytes = 0;
 };

@@ -31,6 +31,7 @@ void join(h6FrameReport& to, const h6FrameReport& from) {
   to.max_depth = std::max(to.max_depth, from.max_depth);
   to.max_depth_voxels = std::max(to.max_depth_voxels, from.max_depth_voxels);
   to.missed_depth_voxels = std::max(to.missed_depth_voxels, from.missed_depth_voxels);
+  to.fit_depth_voxels = std::max(to.fit_depth_voxels, from.fit_depth_voxels);
   to.series_iterations = std::max(to.series_iterations, from.series_iterations);
   to.series_residual = std::max(to.series_residual, from.series_residual);
 }

@@ -79,6 +79,7 @@ void take_over(h6Session& next, const h6Session& before) {
     device.passivity = passivity;
     if (!passivity) device.port.forget();
   }
+  take_over_relief(next, before);
   next.anytime.no_clock = before.anytime.no_clock;
   next.report = before.report;
   next.frame = before.frame;

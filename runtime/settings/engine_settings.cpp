@@ -37,6 +37,8 @@ constexpr Choice kPieces[] = {{"facing", H6_PIECE_FACING},     {"depth", H6_PIEC
                               {"geodesic", H6_PIECE_GEODESIC}, {"handles", H6_PIECE_HANDLES},
                               {"printed", H6_PIECE_PRINTED}};
 
+constexpr Choice kFits[] = {{"relieve", H6_FIT_RELIEVE}, {"tight", H6_FIT_TIGHT}};
+
 constexpr Setting method_row(Setting row) {
   row.kind = Kind::method;
   return row;
@@ -72,7 +74,14 @@ constexpr Setting kContactRows[] = {
         "cluster_voxels", "voxel", 0.5, above(0.01, 100),
         "cluster, +cluster: contacts nearer than this are one contact"),
     flag<&h6ContactDef::passivity>(
-        "passivity", "observe the work of the contacts and damp the energy that they would make")};
+        "passivity", "observe the work of the contacts and damp the energy that they would make"),
+    quiet(choice<&h6ContactDef::fit>(
+        "fit", kFits, H6_FIT_RELIEVE,
+        "where parts overlap at the start; relieve: the depth that a point has there does not "
+        "push until the point has once been free; tight: every depth pushes")),
+    quiet(number<&h6ContactDef::fit_offset>(
+        "fit_offset", "m", 0, not_negative(kNoLimit),
+        "play: every depth counts less by this, at most 3 voxels of each field"))};
 constexpr SettingTable kContact = settings_of("h6ContactDef", kContactRows);
 
 constexpr Choice kCouplingModes[] = {{"dynamic", H6_COUPLING_DYNAMIC},

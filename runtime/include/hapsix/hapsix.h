@@ -76,7 +76,21 @@ H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6Devi
  * coarse_points of each h6FrameReport this repeats a run in anytime mode to the bit. */
 H6_API void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points);
 
-/* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. */
+/* Where shells overlap fields at the start, whatever `fit` says: one row for each pair that overlaps,
+ * in the order of pairs, and one row for each point, in the order of pairs. Writes at most `capacity`
+ * rows (out may be NULL when it is 0) and returns how many there are. Below its band a field knows only
+ * bounds: a point is then at least as deep as is written. */
+H6_API size_t h6GetOverlaps(const h6Session* session, h6Overlap* out, size_t capacity);
+H6_API size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, size_t capacity);
+/* Makes the present poses a new start: measures the overlap and sets the relief anew. False with
+ * `error` filled when memory is out: nothing has changed. It allocates; call it between steps, not
+ * while a loop runs. */
+H6_API bool   h6RestartFit(h6Session* session, h6Error* error);
+
+/* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. An
+ * overlap that it makes pushes in full, since programs move obstacles with it. A point that has relief
+ * keeps it unless it is free now; before the first step all points of the body lose it. To make the new
+ * place a start, call h6RestartFit. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
@@ -220,7 +234,8 @@ H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
 H6_API void   h6SetPace(h6Loop* loop, double pace);
 /* Changes settings while the loop runs: `next` has the same model, bodies, hands and rate. Between two
  * frames it takes over poses, velocities, hands and the state of their safety chains; other history is
- * forgotten (coherence, warm starts). Filters and safety limits of the hands stay as they were.
+ * forgotten (coherence, warm starts). A point keeps the relief that it has left, if its start in `next`
+ * overlaps too and `next` relieves. Filters and safety limits of the hands stay as they were.
  * Returns the previous session, which the caller destroys; or NULL with `error` filled, and nothing
  * has changed. Waits for the frame in progress. One thread at a time may call it, not the haptic
  * thread. */

@@ -112,6 +112,16 @@ enum {
   H6_PIECE_PRINTED = 1u << 6  /* Eq. 8 as printed: w = phi / largest phi                           */
 };
 
+/* What becomes of an overlap at the start. Parts in their designed place overlap their neighbours:
+ * press fits, threads, gaps of zero, coarse triangles (METHOD.md, Sec. 7). */
+typedef enum h6Fit {
+  H6_FIT_RELIEVE = 0, /* the depth that a point has at the start is its zero, until it has once been
+                         free; deeper than H6_DEEPEST_FIT voxels it takes no part until then       */
+  H6_FIT_TIGHT        /* depths count in full from the first frame on                              */
+} h6Fit;
+/* Deeper than this, or than its band, a field holds bounds and no distances              [voxel] */
+#define H6_DEEPEST_FIT 3.0
+
 typedef struct h6ContactDef {
   h6Method method;          /* default robust                                                      */
   uint32_t pieces;          /* H6_PIECE_*; robust always has the first three                       */
@@ -130,6 +140,9 @@ typedef struct h6ContactDef {
                                100] voxels                                                         */
   bool     passivity;       /* observe the work of each shell body's contacts and damp energy that
                                they would generate (Hannaford & Ryu 2002)                          */
+  h6Fit    fit;             /* of sessions; h6WeighContacts does not read it                       */
+  double   fit_offset;      /* play: of sessions, every depth counts less by this, 0 .. 3 voxels of
+                               each field                                                     [m]  */
 } h6ContactDef;
 
 typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
@@ -266,7 +279,8 @@ typedef struct h6BodyState { h6Pose pose; h6Velocity velocity; } h6BodyState;
 
 /* The contacts of one shell body in the last frame. Columns of `count` rows, valid until the next
  * step. World frame. With clusters a row is a cluster: means weighted by depth, and the index of its
- * deepest point. Under `series`, rows with depth <= 0 are about to touch: weight 0, load >= 0. */
+ * deepest point. Under `series`, rows with depth <= 0 are about to touch: weight 0, load >= 0. Depths
+ * are those that push: relief and fit_offset are taken off. */
 typedef struct h6Contacts {
   size_t          count;
   const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
@@ -298,7 +312,8 @@ typedef struct h6FrameReport {
   uint64_t frame;                     /* 0 for the first                                           */
   h6Status status;
   uint32_t contacts;                  /* points that touch, over all shell bodies                  */
-  double   max_depth;                 /* depth of the deepest contact, 0 without contacts     [m]  */
+  double   max_depth;                 /* depth of the deepest contact, without its relief and the
+                                         fit_offset; 0 without contacts                       [m]  */
   double   max_depth_voxels;          /* the same in voxels of its field                           */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
@@ -319,7 +334,29 @@ typedef struct h6FrameReport {
                                         0: 1, and a shell body kept only its 64 deepest contacts    */
   double   missed_depth_voxels;      /* H6_COARSE: no point that was left out is deeper, as long as
                                         none is deeper than its field's band                        */
+  double   fit_depth_voxels;         /* true depth of the deepest point, relieved or not, of the pairs
+                                        with relief or a fit_offset; 0: there are none              */
 } h6FrameReport;
+
+/* The overlap of a shell body with a field body at the start: the points inside the field. */
+typedef struct h6Overlap {
+  int32_t  shell_body, field_body;
+  uint32_t points;
+  uint32_t relieved;     /* of these, points that have relief now                                  */
+  double   depth;        /* of the deepest point                                              [m]  */
+  double   depth_voxels; /* the same in voxels of the field                                        */
+  uint32_t deepest;      /* the deepest: its row among those of h6GetOverlapPoints                 */
+} h6Overlap;
+typedef struct h6OverlapPoint {
+  int32_t  shell_body, field_body;
+  uint32_t point;          /* index into the shell's points                                        */
+  int32_t  part, triangle; /* of the field's mesh, as h6NameContacts gives them; -1: not known     */
+  h6Vec3   position;       /* at the start, world frame                                       [m]  */
+  double   depth;          /* at the start                                                    [m]  */
+  double   depth_voxels;   /* the same in voxels of the field                                      */
+  double   relief;         /* what does not count of its depth now; 0: it has been free; INFINITY:
+                              it started too deep and takes no part until it is free          [m]  */
+} h6OverlapPoint;
 
 #ifdef __cplusplus
 }

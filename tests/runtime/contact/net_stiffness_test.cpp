@@ -29,6 +29,7 @@ struct Touching {
 
   explicit Touching(ShellArrays s) : shell(std::move(s)) {
     def.contact.stiffness = kStiffness;
+    def.contact.fit = H6_FIT_TIGHT;
     def.net_stiffness = true;
   }
   h6FrameReport report(double height = 4.5 * mm) {

@@ -30,6 +30,7 @@ struct Frame {
     h6SessionDef def = h6DefaultSessionDef();
     def.bodies = bodies.data(), def.body_count = 2;
     def.contact = contact;
+    def.contact.fit = H6_FIT_TIGHT;
     h6Error error{};
     session = h6CreateSession(model.handle, &def, &error);
     REQUIRE_MESSAGE(session, error.message);

@@ -128,6 +128,7 @@ constexpr Mode kModes[] = {
        s.hand.filter.motion_scale = 1.2, s.hand.filter.force_scale = 0.9;
        s.hand.filter.relative = true, s.hand.filter.clutch_buttons = 1;
      }},
+    {"relief of a tight fit", [](BallInBowl& s) { s.bodies[1].pose.p.x = 0.9 * mm; }},
     {"translation only", [](BallInBowl& s) { s.bodies[1].translation_only = true; }},
     {"explicit step",
      [](BallInBowl& s) { s.def.integrator = H6_EXPLICIT, s.def.contact.stiffness = 100; }}};

@@ -77,6 +77,7 @@ struct Scene {
     h6SessionDef def = h6DefaultSessionDef();
     def.bodies = bodies.data(), def.body_count = 3;
     def.contact.method = method;
+    def.contact.fit = H6_FIT_TIGHT;
     session = h6CreateSession(model, &def, nullptr);
     REQUIRE(session);
   }

@@ -107,6 +107,7 @@ TEST_CASE("the filter weighs a session's contacts as the session does") {
     h6SessionDef def = h6DefaultSessionDef();
     def.bodies = bodies.data(), def.body_count = 2;
     def.contact = method(m);
+    def.contact.fit = H6_FIT_TIGHT;
     h6Session* s = h6CreateSession(model.handle, &def, nullptr);
     REQUIRE(s);
     h6Step(s, nullptr, nullptr);

@@ -333,6 +333,7 @@ PumpedPort pump(const h6Model* model, Path path, unsigned seed, bool passivity) 
   def.contact.method = H6_METHOD_NONE;
   def.contact.damping = 0;
   def.contact.stiffness = 500;
+  def.contact.fit = H6_FIT_TIGHT;
   const double reach = uniform(1, 4) * mm, turn = path == Path::turning ? 0.1 : 0,
                sway = path == Path::turning ? 3 * mm : 0,
                tremor = path == Path::trembling ? uniform(1e-3, 2e-2) * mm : 0;
