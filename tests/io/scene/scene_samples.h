@@ -97,6 +97,7 @@ inline Json full_scene() {
                 "global_n0": 7, "epsilon": 0.02, "epsilon_normal": 0.03,
                 "epsilon_torque": 0.9, "torque_length": 1.5,
                 "series_c": 3, "margin_voxels": 0.25, "cluster_voxels": 0.75,
+                "fit": "tight", "fit_offset": 0.0001,
                 "passivity": true},
     "coupling": {"mode": "static", "stiffness": 1500, "rotational_stiffness": 0.7,
                  "damping_ratio": 0.8, "max_depth_voxels": 0.4, "max_force": 3, "max_torque": 0.2,
