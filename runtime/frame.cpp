@@ -85,7 +85,7 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
   watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(set, bodies, shell, lane); });
   // The time includes the contacts stage, because its columns come back from the helper's cache.
   lane.weighing.took(watch.ns_since(since));
-  if (set.contact.method == H6_METHOD_SERIES) return;
+  if (uses_series(set.contact)) return;
   watch.timed(H6_STAGE_WRENCH, [&] { sum_contacts(set, bodies, shell, lane); });
 }
 

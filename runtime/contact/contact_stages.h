@@ -19,6 +19,8 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
 // Shares the stiffness among all contacts of the shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                     Lane& lane);
+// Whether the weighing of so many contacts is faster on two threads.
+bool worth_two_threads(const h6ContactDef& def, std::size_t count, Lane& lane);
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Sums each pair's contacts into shell.sums.
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);

@@ -23,9 +23,8 @@ void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin,
 
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever,
                                    double y[6]) {
-  fill_facing(c, true);
   const kernels::SeriesColumns columns{c.nx, c.ny,   c.nz,     c.rx,   c.ry,
-                                       c.rz, c.load, c.facing, c.count};
+                                       c.rz, c.load, c.weight, c.count};
   const kernels::SeriesResult result =
       kernels::series_solve(columns, {def.series_c, lever}, y, c.kappa, c.slack);
   kernels::series_loads(c.kappa, c.slack, c.depth, c.count, c.load, c.weight);
@@ -48,6 +47,12 @@ Mat6 series_spring(const h6ContactDef& def, double lever) {
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const Body& a = bodies[shell.body];
   Contacts& c = shell.contacts;
+  const bool firm = set.contact.method == H6_METHOD_FIRM;
+  for (const Pair& pair : shell.pairs)
+    if (firm) note_firmness(c, set.contact, bodies[pair.b].field->voxel, pair.begin, pair.end);
+  fill_inner_stiffness(c, set.contact, a.voxel,
+                       worth_two_threads(set.contact, c.count, lane) ? lane.team : nullptr,
+                       firm ? lane.scratch->weigh : nullptr);
   for (const Pair& pair : shell.pairs)
     fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin, pair.end);
   const kernels::SeriesResult result =

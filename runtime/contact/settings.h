@@ -18,4 +18,9 @@ struct Settings {
   std::size_t max_contacts = 0;  // limit for one shell body
 };
 
+// Whether all contacts of a shell body stand in series with one spring.
+inline bool uses_series(const h6ContactDef& contact) {
+  return contact.method == H6_METHOD_SERIES || contact.method == H6_METHOD_FIRM;
+}
+
 }  // namespace h6

@@ -125,7 +125,7 @@ void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& 
 
 void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                   std::span<LinearWrench> acting) {
-  const bool series = set.contact.method == H6_METHOD_SERIES;
+  const bool series = uses_series(set.contact);
   for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
     Pair& pair = shell.pairs[i];
     const Sides sides = sides_of(pair, bodies, acting);

@@ -53,7 +53,7 @@ kernels::Affine shell_to_field(const Body& a, const Body& b) {
 
 // The distance up to which points are found [voxel]. `series` also needs points about to touch.
 float margin_of(const h6ContactDef& contact) {
-  return contact.method == H6_METHOD_SERIES ? static_cast<float>(contact.margin_voxels) : 0.0f;
+  return uses_series(contact) ? static_cast<float>(contact.margin_voxels) : 0.0f;
 }
 
 constexpr float kSlack = 1e-3f;  // [voxel]

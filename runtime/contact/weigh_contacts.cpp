@@ -50,6 +50,7 @@ Rule rule_of(const h6ContactDef& def, double voxel) {
       rule.hat = def.pieces & H6_PIECE_PRODUCT ? kernels::Hat::product : kernels::Hat::sum;
       break;
     case H6_METHOD_ROBUST:
+    case H6_METHOD_FIRM:
       rule.gauss = rule.facing = rule.depth = true;
       rule.hat = kernels::Hat::product;
       rule.widths = {static_cast<float>(def.epsilon_normal),
@@ -76,14 +77,16 @@ void weigh_as_printed(Contacts& c, const Rule& rule) {
     if (c.weight[i] > 0) c.weight[i] = c.facing[i] * c.load[i] / most;
 }
 
-}  // namespace
-
-void fill_facing(Contacts& c, bool filter) {
-  if (filter) return kernels::contact_facing(kernel_columns(c, 0, c.count), kFacingEdge, c.facing);
-  std::fill_n(c.facing, c.count, 1.0f);
+// clamp(N.g / 0.25, 0, 1), or 1 without the filter.
+void fill_facing(const Contacts& c, bool filter, float* facing) {
+  if (filter) return kernels::contact_facing(kernel_columns(c, 0, c.count), kFacingEdge, facing);
+  std::fill_n(facing, c.count, 1.0f);
 }
 
-namespace {
+void fill_torque_directions(Contacts& c, const Rule& rule, double lever) {
+  kernels::torque_directions(kernel_columns(c, 0, c.count), rule.l0,
+                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx, c.ty, c.tz);
+}
 
 template <class Run>
 void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
@@ -124,7 +127,9 @@ bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sch
   return true;
 }
 
-void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
+// `presence`: how much each contact counts in the density, where the rule asks for it.
+void weigh_gauss(Contacts& c, const Rule& rule, const float* presence, sched::FrameTeam* team,
+                 void* scratch) {
   const kernels::DirectionsView view{c.nx,
                                      c.ny,
                                      c.nz,
@@ -132,7 +137,7 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
                                      c.ty,
                                      c.tz,
                                      rule.facing ? c.facing : nullptr,
-                                     rule.depth ? c.depth : nullptr,
+                                     rule.depth ? presence : nullptr,
                                      c.count};
   if (c.count < kTwoThreads) team = nullptr;
   if (c.count <= kWorthSorting)
@@ -168,11 +173,10 @@ std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                    sched::FrameTeam* team, void* scratch) {
   const Rule rule = rule_of(def, voxel);
-  fill_facing(c, rule.facing);
-  kernels::torque_directions(kernel_columns(c, 0, c.count), rule.l0,
-                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx, c.ty, c.tz);
+  fill_facing(c, rule.facing, c.facing);
+  fill_torque_directions(c, rule, lever);
   if (rule.gauss) {
-    weigh_gauss(c, rule, team, scratch);
+    weigh_gauss(c, rule, c.depth, team, scratch);
   } else {
     const double n = static_cast<double>(c.count);
     const float w = def.method == H6_METHOD_GLOBAL && n > def.global_n0
@@ -183,17 +187,44 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
   for (std::size_t i = 0; i < c.count; ++i) c.load[i] = c.weight[i] * c.depth[i];
 }
 
+void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
+                   std::size_t end) {
+  const float margin = static_cast<float>(def.margin_voxels * voxel);
+  const float scale = static_cast<float>(2 / voxel);
+  const float shallow = static_cast<float>(def.firmness_shallow);
+  const float rise = static_cast<float>(def.firmness - def.firmness_shallow);
+  for (std::size_t i = begin; i < end; ++i) {
+    const float way = std::clamp(scale * c.depth[i], 0.0f, 1.0f);
+    c.slack[i] = std::max(0.0f, c.depth[i] + margin);
+    c.kappa[i] = shallow + rise * way * way;
+  }
+}
+
+void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
+                          sched::FrameTeam* team, void* scratch) {
+  if (def.method == H6_METHOD_SERIES) return fill_facing(c, true, c.weight);
+  const Rule rule = rule_of(def, voxel);
+  fill_facing(c, rule.facing, c.facing);
+  fill_torque_directions(c, rule, 0);
+  weigh_gauss(c, rule, c.slack, team, scratch);
+  for (std::size_t i = 0; i < c.count; ++i) c.weight[i] *= c.kappa[i];
+}
+
+bool worth_two_threads(const h6ContactDef& def, std::size_t count, Lane& lane) {
+  return def.method != H6_METHOD_SERIES && count >= kTwoThreads && lane.team->threads() > 1 &&
+         lane.weighing.share(count);
+}
+
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                     Lane& lane) {
-  if (set.contact.method == H6_METHOD_SERIES) return weigh_series(set, bodies, shell, lane);
+  if (uses_series(set.contact)) return weigh_series(set, bodies, shell, lane);
   Contacts& c = shell.contacts;
   if (c.count == 0) return;
   if (uses_clusters(set.contact)) merge_clusters(set, bodies, shell, lane.scratch->cluster);
   const Body& body = bodies[shell.body];
-  const bool two =
-      c.count >= kTwoThreads && lane.team->threads() > 1 && lane.weighing.share(c.count);
   weigh_columns(c, set.contact, body.voxel, series_lever(body.radius, body.voxel),
-                two ? lane.team : nullptr, lane.scratch->weigh);
+                worth_two_threads(set.contact, c.count, lane) ? lane.team : nullptr,
+                lane.scratch->weigh);
 }
 
 }  // namespace h6

@@ -11,9 +11,9 @@
 
 namespace h6 {
 
-// Fills facing, T, weight and load of all rows, for every rule but `series`. `lever`: the body's
-// radius [m]. `team` may be null. `scratch`: weigh_scratch_bytes of c.count or more; up to 120 rows
-// need none.
+// Fills facing, T, weight and load of all rows, for every rule but `series` and `firm`. `lever`:
+// the body's radius [m]. `team` may be null. `scratch`: weigh_scratch_bytes of c.count or more; up
+// to 120 rows need none.
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                    sched::FrameTeam* team, void* scratch);
 // The scratch that weigh_columns needs for up to `count` contacts, in bytes; 0 when it needs none.
@@ -25,9 +25,6 @@ inline kernels::ContactColumns kernel_columns(const Contacts& c, std::size_t beg
   return {c.nx + begin, c.ny + begin, c.nz + begin, c.gx + begin, c.gy + begin,
           c.gz + begin, c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
 }
-
-// Fills facing: clamp(N.g / 0.25, 0, 1), or 1 without the filter.
-void fill_facing(Contacts& c, bool filter);
 
 // ---- clusters
 // ------------------------------------------------------------------------------------
@@ -60,7 +57,17 @@ inline double series_lever(double radius, double voxel) { return radius > voxel 
 
 // Writes e of rows begin..end-1 to load: the depth less the damping at the relative velocity u.
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end);
-// Fills facing, kappa, slack, load (from e) and weight. y holds the start and then the extension.
+// `firm`: notes in slack how much rows begin..end-1 count in the density, margin + depth, and in
+// kappa the stiffness rho of their direction. `voxel`: of their field [m].
+void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
+                   std::size_t end);
+// Writes to weight the stiffness of each contact inside the common spring, in units of k: the
+// facing factor; under `firm` its share of rho on the Gauss map, from slack and kappa. `voxel`: of
+// the body; `team` may be null; `scratch` as in weigh_columns, not used by `series`.
+void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
+                          sched::FrameTeam* team, void* scratch);
+// Fills kappa (from weight, the inner stiffness), slack, load (from e) and weight. y holds the
+// start and then the extension.
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6]);
 // sum lambda J, sum kappa J J_g^T and sum kappa J J^T over rows that carry load.
 kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,

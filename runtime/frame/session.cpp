@@ -172,7 +172,7 @@ bool both_move(const h6SessionDef& def, const h6PairDef& p) {
   return !def.bodies[p.shell_body].fixed && !def.bodies[p.field_body].fixed;
 }
 bool couples_fields(const h6SessionDef& def, const h6PairDef& p) {
-  return def.contact.method == H6_METHOD_SERIES && !def.bodies[p.field_body].fixed;
+  return uses_series(def.contact) && !def.bodies[p.field_body].fixed;
 }
 
 Sizes sizes_of(const h6Model& model, const h6SessionDef& def, std::span<const h6PairDef> pairs) {

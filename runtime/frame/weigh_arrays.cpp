@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "hapsix/hapsix.h"
+#include "runtime/contact/settings.h"
 #include "runtime/contact/weighing.h"
 #include "runtime/frame/session_checks.h"
 
@@ -92,7 +93,7 @@ bool check_arrays(const h6ContactDef& def, const h6ContactArrays& in, double vox
   if (in.scratch && in.scratch_bytes < bytes_of(in.count))
     return fail(error, "scratch has %zu bytes, %zu contacts need %zu", in.scratch_bytes, in.count,
                 bytes_of(in.count));
-  return check_rows(in, def.method == H6_METHOD_SERIES, lever, error);
+  return check_rows(in, uses_series(def), lever, error);
 }
 
 void fill_rows(const h6ContactArrays& in, bool series, Work& work) {
@@ -193,7 +194,7 @@ int h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts
   Arena arena(block.aligned(), bytes - kAlignment);
   lay_out(work, arena, in.count);
 
-  const bool series = contact->method == H6_METHOD_SERIES, exact = in.form == H6_EXACT;
+  const bool series = uses_series(*contact), exact = in.form == H6_EXACT;
   Vec6 u = Vec6::Zero();
   if (in.velocity) u << from(in.velocity->linear), from(in.velocity->angular);
   Contacts& c = work.contacts;
@@ -204,6 +205,8 @@ int h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts
   Sums sums;
   if (series) {
     double y[6] = {};
+    if (contact->method == H6_METHOD_FIRM) note_firmness(c, *contact, voxel, 0, rows);
+    fill_inner_stiffness(c, *contact, voxel, nullptr, work.scratch);
     fill_series_gap(c, contact->damping, u, 0, rows);
     solve_series(c, *contact, lever, y);
     sums = sum_series_weighted(c, *contact, lever, exact);

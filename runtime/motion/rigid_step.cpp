@@ -120,8 +120,7 @@ bool solve_together(const Settings& set, std::span<const Body> bodies,
       D.block<6, 6>(6 * a, 6 * b) += pair.between->Dab;
       D.block<6, 6>(6 * b, 6 * a) += pair.between->Dba;
     }
-  if (set.contact.method == H6_METHOD_SERIES)
-    add_between_fields(shells, island, set.contact.damping, K, D);
+  if (uses_series(set.contact)) add_between_fields(shells, island, set.contact.damping, K, D);
   A -= h * D + h * h * K;
   f += h * K.lazyProduct(u);
   f *= h;

@@ -31,7 +31,7 @@ constexpr SettingTable kBody = settings_of("h6BodyDef", kBodyRows);
 constexpr Choice kMethods[] = {{"none", H6_METHOD_NONE},       {"global", H6_METHOD_GLOBAL},
                                {"cluster", H6_METHOD_CLUSTER}, {"gauss3", H6_METHOD_GAUSS3},
                                {"gauss6", H6_METHOD_GAUSS6},   {"robust", H6_METHOD_ROBUST},
-                               {"series", H6_METHOD_SERIES}};
+                               {"series", H6_METHOD_SERIES},   {"firm", H6_METHOD_FIRM}};
 constexpr Choice kPieces[] = {{"facing", H6_PIECE_FACING},     {"depth", H6_PIECE_DEPTH},
                               {"product", H6_PIECE_PRODUCT},   {"cluster", H6_PIECE_CLUSTER},
                               {"geodesic", H6_PIECE_GEODESIC}, {"handles", H6_PIECE_HANDLES},
@@ -47,7 +47,8 @@ constexpr Setting method_row(Setting row) {
 constexpr Setting kContactRows[] = {
     method_row(choice<&h6ContactDef::method>(
         "method", kMethods, H6_METHOD_ROBUST,
-        "none, global, cluster, gauss3, gauss6, robust or series; the Gauss methods and robust "
+        "none, global, cluster, gauss3, gauss6, robust, series or firm; the Gauss methods and "
+        "robust "
         "also with pieces: +facing, +depth, +product, +cluster, +geodesic, +handles, +printed")),
     number<&h6ContactDef::stiffness>("stiffness", "N/m", 1e4, positive(1e9),
                                      "k, the stiffness of one contact alone"),
@@ -59,17 +60,24 @@ constexpr Setting kContactRows[] = {
     number<&h6ContactDef::epsilon>("epsilon", "", 0.01, above(0, 2),
                                    "gauss3, gauss6: half-width of the density hat"),
     number<&h6ContactDef::epsilon_normal>("epsilon_normal", "", 0.05, above(0, 2),
-                                          "robust: half-width of the hat over normals"),
-    number<&h6ContactDef::epsilon_torque>("epsilon_torque", "", 1, above(0, 2),
-                                          "robust: half-width of the hat over torque directions"),
-    number<&h6ContactDef::torque_length>(
-        "torque_length", "m", 0, not_negative(kNoLimit),
-        "l0, lever arms below it count for less; 0: one voxel for robust, none for the others"),
+                                          "robust, firm: half-width of the hat over normals"),
+    number<&h6ContactDef::epsilon_torque>(
+        "epsilon_torque", "", 1, above(0, 2),
+        "robust, firm: half-width of the hat over torque directions"),
+    number<&h6ContactDef::torque_length>("torque_length", "m", 0, not_negative(kNoLimit),
+                                         "l0, lever arms below it count for less; 0: one voxel for "
+                                         "robust and firm, none for the others"),
     number<&h6ContactDef::series_c>("series_c", "", 4, above(2, 1e6),
-                                    "series: the net stiffness is at most this times k"),
+                                    "series, firm: the net stiffness is at most this times k"),
+    number<&h6ContactDef::firmness>(
+        "firmness", "", 60, {1, kNoLimit, false, 1e6},
+        "firm: stiffness of one direction of contact inside the common spring, in units of k, from "
+        "half a voxel of depth on"),
+    number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 10, {1, kNoLimit, false, 1e6},
+                                            "firm: the same at the surface"),
     number<&h6ContactDef::margin_voxels>(
         "margin_voxels", "voxel", 0.5, between(0, 2),
-        "series: points nearer than this take part before they touch"),
+        "series, firm: points nearer than this take part before they touch"),
     number<&h6ContactDef::cluster_voxels>(
         "cluster_voxels", "voxel", 0.5, above(0.01, 100),
         "cluster, +cluster: contacts nearer than this are one contact"),

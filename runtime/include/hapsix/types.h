@@ -97,6 +97,8 @@ typedef enum h6Method {
   H6_METHOD_GAUSS6,   /* the paper's Eq. 10-12: density of normals plus density of torque directions*/
   H6_METHOD_ROBUST,   /* product density, weighted by depth, contacts facing away dropped          */
   H6_METHOD_SERIES,   /* the whole penalty in series with one spring: net stiffness <= series_c k  */
+  H6_METHOD_FIRM,     /* `series` whose contacts share their stiffness on the Gauss map and stiffen with
+                         depth: holds the depth below x_max, net stiffness <= series_c k           */
   H6_METHOD_COUNT
 } h6Method;
 
@@ -133,8 +135,11 @@ typedef struct h6ContactDef {
   double   epsilon_torque;  /* `robust`: half-width of the hat over torque directions, (0, 2]      */
   double   torque_length;   /* l0: lever arms below it count less; 0: one voxel for robust, none for
                                the others                                                     [m]  */
-  double   series_c;        /* `series`: c in (2, 1e6]; the net stiffness is at most c k           */
-  double   margin_voxels;   /* `series`: points nearer than this take part before they touch,
+  double   series_c;        /* `series`, `firm`: c in (2, 1e6]; the net stiffness is at most c k           */
+  double   firmness;        /* `firm`: rho, stiffness of one direction of contact inside the common
+                               spring, in units of k, from half a voxel of depth on; 1 .. 1e6      */
+  double   firmness_shallow; /* `firm`: the same at the surface, 1 .. 1e6                          */
+  double   margin_voxels;   /* `series`, `firm`: points nearer than this take part before they touch,
                                0 .. 2 voxels of the field                                          */
   double   cluster_voxels;  /* `cluster`, `+cluster`: contacts nearer than this are one, in (0.01,
                                100] voxels                                                         */

@@ -96,7 +96,7 @@ inline Json full_scene() {
     "contact": {"method": "gauss6+facing+product+geodesic", "stiffness": 2e4, "damping": 2e-3,
                 "global_n0": 7, "epsilon": 0.02, "epsilon_normal": 0.03,
                 "epsilon_torque": 0.9, "torque_length": 1.5,
-                "series_c": 3, "margin_voxels": 0.25, "cluster_voxels": 0.75,
+                "series_c": 3, "firmness": 30, "firmness_shallow": 5, "margin_voxels": 0.25, "cluster_voxels": 0.75,
                 "fit": "tight", "fit_offset": 0.0001,
                 "passivity": true},
     "coupling": {"mode": "static", "stiffness": 1500, "rotational_stiffness": 0.7,

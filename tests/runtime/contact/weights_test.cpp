@@ -56,13 +56,14 @@ const h6Method gauss_methods[] = {H6_METHOD_GAUSS3, H6_METHOD_GAUSS6, H6_METHOD_
 
 }  // namespace
 
-TEST_CASE("a lone contact keeps the whole stiffness") {
+TEST_CASE("a lone contact keeps the whole stiffness, but under `firm`") {
   FieldArrays field = floor_field();
   ShellArrays one;
   one.add(3 * mm, 2 * mm, -5 * mm, 0, 0, 1);
   one.add(3 * mm, 2 * mm, 5 * mm, 0, 0, -1);  // above the floor
   Model model({def_of(field)}, {one.def()});
   for (int m = 0; m < H6_METHOD_COUNT; ++m) {
+    if (m == H6_METHOD_FIRM) continue;  // stiffer than k: firm_test.cpp
     Frame frame(model, pose(0, 0, 4.7 * mm), method(static_cast<h6Method>(m)));
     REQUIRE(frame.contacts.count == 1);
     CHECK(frame.contacts.weight[0] == h6::test::near(1).epsilon(1e-5));

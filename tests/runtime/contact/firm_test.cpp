@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// `firm`: shares of stiffness on the Gauss map inside the series spring.
+#include <doctest/doctest.h>
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "hapsix/hapsix.h"
+#include "tests/support/near.h"
+
+namespace {
+
+constexpr double mm = 1e-3, kVoxel = mm, kLever = 20 * mm;
+using Mat6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+using Vec3 = Eigen::Vector3d;
+
+struct Rows {
+  std::vector<float> n, r, d;
+  void add(const Vec3& normal, const Vec3& arm, double depth) {
+    for (int axis = 0; axis < 3; ++axis) {
+      n.push_back(static_cast<float>(normal[axis]));
+      r.push_back(static_cast<float>(arm[axis]));
+    }
+    d.push_back(static_cast<float>(depth));
+  }
+};
+
+h6ContactDef firm() {
+  h6ContactDef def = h6DefaultContactDef();
+  def.method = H6_METHOD_FIRM;
+  return def;
+}
+
+struct Answer {
+  std::vector<float> weight;
+  h6Wrench wrench{};
+  Mat6 K, D;
+  explicit Answer(const Rows& rows, const h6ContactDef& def = firm()) : weight(rows.d.size()) {
+    h6ContactArrays in{};
+    in.count = rows.d.size();
+    in.normals = rows.n.data(), in.arms = rows.r.data(), in.depths = rows.d.data();
+    h6Error error{};
+    const int code = h6WeighContacts(&def, &in, kVoxel, kLever, weight.data(), &wrench, K.data(),
+                                     D.data(), &error);
+    REQUIRE_MESSAGE(code == 0, error.message);
+  }
+};
+
+double uniform(std::mt19937_64& random, double from, double to) {
+  return from + (to - from) * std::ldexp(static_cast<double>(random() >> 11), -53);
+}
+
+Vec3 direction(std::mt19937_64& random) {
+  const double z = uniform(random, -1, 1), a = uniform(random, 0, 6.283185307);
+  const double q = std::sqrt(1 - z * z);
+  return {q * std::cos(a), q * std::sin(a), z};
+}
+
+// Contacts about a few directions, some alike, some not yet touching.
+Rows searched_set(std::mt19937_64& random) {
+  Rows rows;
+  const int bundles = 1 + static_cast<int>(random() % 6);
+  for (int b = 0; b < bundles; ++b) {
+    const Vec3 axis = direction(random), place = kLever * uniform(random, 0, 1) * direction(random);
+    const double width = std::pow(10, uniform(random, -4, 0));
+    const int contacts = 1 + static_cast<int>(random() % 20);
+    for (int i = 0; i < contacts; ++i) {
+      Vec3 arm = place + width * kLever * direction(random);
+      if (arm.norm() > kLever) arm *= kLever / arm.norm();
+      rows.add((axis + width * direction(random)).normalized(), arm,
+               kVoxel * uniform(random, -0.5, 2));
+    }
+  }
+  return rows;
+}
+
+// The eigenvalues of -K with torques and turns in units of the lever [k], in rising order.
+Eigen::Matrix<double, 6, 1> net_stiffness(const Mat6& K) {
+  Eigen::Matrix<double, 6, 1> unit;
+  unit << 1, 1, 1, 1 / kLever, 1 / kLever, 1 / kLever;
+  const Mat6 net = -1e-4 * unit.asDiagonal() * K * unit.asDiagonal();
+  return Eigen::SelfAdjointEigenSolver<Mat6>(0.5 * (net + net.transpose())).eigenvalues();
+}
+
+// A disc of contacts that all push up.
+Rows patch(int contacts, double radius, double depth) {
+  Rows rows;
+  for (int i = 0; i < contacts; ++i) {
+    const double r = radius * std::sqrt((i + 0.5) / contacts), a = 2.39996 * i;
+    rows.add({0, 0, 1}, {r * std::cos(a), r * std::sin(a), -5 * mm}, depth);
+  }
+  return rows;
+}
+
+}  // namespace
+
+TEST_CASE("the net stiffness stays between 0 and c k, whatever the contacts") {
+  std::mt19937_64 random(21);
+  double most = 0;
+  for (int set = 0; set < 2000; ++set) {
+    const auto net = net_stiffness(Answer(searched_set(random)).K);
+    CHECK(net[0] >= -1e-6);
+    CHECK(net[5] <= 4 * (1 + 1e-6));
+    most = std::max(most, net[5]);
+  }
+  CHECK(most > 3.5);  // the search comes near the bound
+}
+
+TEST_CASE("no contact pulls") {
+  std::mt19937_64 random(22);
+  for (int set = 0; set < 500; ++set)
+    for (const float weight : Answer(searched_set(random)).weight) CHECK(weight >= 0);
+}
+
+TEST_CASE("400 contacts at one place push as one does") {
+  Rows one, many;
+  one.add({0, 0, 1}, {mm, 0, -5 * mm}, 0.3 * mm);
+  for (int i = 0; i < 400; ++i) many.add({0, 0, 1}, {mm, 0, -5 * mm}, 0.3 * mm);
+  const Answer a(one), b(many);
+  CHECK(b.wrench.force.z == h6::test::near(a.wrench.force.z).epsilon(1e-4));
+  CHECK(b.wrench.torque.y == h6::test::near(a.wrench.torque.y).epsilon(1e-4));
+  CHECK((a.K - b.K).norm() <= 1e-3 * a.K.norm());
+}
+
+TEST_CASE("a lone contact is stiffer than k, stiffens with depth, and stays below c k") {
+  double before = 1;
+  for (const double depth : {0.02, 0.1, 0.2, 0.35, 0.5}) {
+    Rows one;
+    one.add({0, 0, 1}, {0, 0, -5 * mm}, depth * kVoxel);
+    const double stiffness = Answer(one).wrench.force.z / (1e4 * depth * kVoxel);
+    CHECK(stiffness > before);
+    CHECK(stiffness < 4);
+    before = stiffness;
+  }
+}
+
+TEST_CASE("a patch a third of a voxel deep carries the force of half a voxel") {
+  for (const int contacts : {1, 3, 30, 300, 3000}) {
+    CAPTURE(contacts);
+    CHECK(Answer(patch(contacts, 4 * mm, kVoxel / 3)).wrench.force.z > 0.5 * 1e4 * kVoxel);
+  }
+}
+
+TEST_CASE("a point that enters the margin changes nothing") {
+  Rows rows = patch(30, 4 * mm, 0.2 * mm);
+  const Answer before(rows);
+  rows.add({0, 0, 1}, {mm, mm, -5 * mm}, -0.5 * mm);
+  const Answer after(rows);
+  CHECK(after.weight.back() == 0);
+  CHECK(after.wrench.force.z == h6::test::near(before.wrench.force.z).epsilon(1e-6));
+  CHECK((after.K - before.K).norm() <= 1e-5 * before.K.norm());
+}
