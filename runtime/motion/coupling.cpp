@@ -2,7 +2,8 @@
 // coupling.cpp - the coupling between a hand and its body.
 //
 // Virtual coupling: McNeely 1999, Wan & McNeely 2003. Saturation: Barbic & James 2008. METHOD.md,
-// Sec. 4. Spring and damper saturate together: damping outside the bound would break it.
+// Sec. 4. The spring saturates first, then its sum with the damper: so the pull is damped along
+// itself, and the bound holds for both.
 #include <cmath>
 
 #include "runtime/motion/motion_stages.h"
@@ -23,12 +24,35 @@ Saturated saturate(const Vec3& y, double most) {
   return {most * d, most / n * (Mat3::Identity() - d * d.transpose()), true};
 }
 
-// For a quasi-static step, which has no mass. The true derivative is singular along the pull, so
-// free motion would have no solution. The secant leads to the pose at which the pull ends.
-Saturated saturate_secant(const Vec3& y, double most) {
-  Saturated cut = saturate(y, most);
-  if (cut.cut) cut.P = most / y.norm() * Mat3::Identity();
-  return cut;
+struct Spring {
+  double k, b, most;
+};
+struct Link {
+  Vec3 f;
+  Mat3 K, D;  // derivatives of f by the pulled body's place and velocity
+  bool cut;
+};
+// A spring that holds at most `most`, and a damper that is critical for what is left of the spring.
+// Their sum is saturated again.
+//
+// A quasi-static body takes the secant: the true derivative is singular along the pull, so free
+// motion would have no solution, while the secant leads to the pose at which the pull ends.
+Link link(const Spring& spring, const Vec3& stretch, const Vec3& rate, bool secant, bool exact) {
+  const Vec3 pull = spring.k * stretch;
+  const Saturated held = saturate(pull, spring.most);
+  const double left = held.cut ? spring.most / pull.norm() : 1.0;
+  const double b = spring.b * std::sqrt(left);
+  const Saturated sum = saturate(held.value + b * rate, spring.most);
+  Link out{sum.value, Mat3::Zero(), -(b * sum.P), held.cut || sum.cut};
+  if (secant)
+    out.K = -(spring.k * left) * Mat3::Identity();
+  else if (!exact)
+    out.K = -(spring.k * (sum.cut ? spring.most / (held.value + b * rate).norm() : 1.0)) * held.P;
+  else
+    out.K = -spring.k * sum.P *
+            (held.cut ? Mat3(held.P - (0.5 * b / pull.squaredNorm()) * rate * pull.transpose())
+                      : held.P);
+  return out;
 }
 
 // Where the hand holds the body's centre of mass. A body that never turns is held at the origin of
@@ -60,32 +84,29 @@ void couple_admittance(Hand& hand, const Body& body, LinearWrench& acting, h6Sta
 Pull pull_of(h6Gradient gradient, const h6CouplingDef& c, const Body& body,
              const RigidState& target, const RigidState& pulled) {
   const bool at_rest = c.mode == H6_COUPLING_STATIC;
-  const auto limit = at_rest ? saturate_secant : saturate;
   const double zeta = at_rest ? 0 : c.damping_ratio;
-  const double b = 2 * zeta * std::sqrt(c.stiffness * body.mass);
-  const Saturated force =
-      limit(c.stiffness * (target.x - pulled.x) + b * (target.v - pulled.v), c.max_force);
+  const Spring forward{c.stiffness, 2 * zeta * std::sqrt(c.stiffness * body.mass), c.max_force};
+  const Link force =
+      link(forward, target.x - pulled.x, target.v - pulled.v, at_rest, gradient == H6_EXACT);
   Pull pull;
   pull.wrench.set_zero();
   auto& [f, K, D] = pull.wrench;
-  f.head<3>() = force.value;
-  K.topLeftCorner<3, 3>() = -(c.stiffness * force.P);
-  D.topLeftCorner<3, 3>() = -(b * force.P);
+  f.head<3>() = force.f;
+  K.topLeftCorner<3, 3>() = force.K;
+  D.topLeftCorner<3, 3>() = force.D;
   pull.cut = force.cut;
   if (body.translation_only) return pull;
 
-  const double b_rot = 2 * zeta * std::sqrt(c.rotational_stiffness * body.inertia.trace() / 3);
+  const double k = c.rotational_stiffness;
+  const Spring turning{k, 2 * zeta * std::sqrt(k * body.inertia.trace() / 3), c.max_torque};
   const Vec3 theta = log_rotation(target.q * pulled.q.conjugate());
-  const Saturated torque =
-      limit(c.rotational_stiffness * theta + b_rot * (target.w - pulled.w), c.max_torque);
-  f.tail<3>() = torque.value;
-  D.bottomRightCorner<3, 3>() = -(b_rot * torque.P);
+  const Link torque = link(turning, theta, target.w - pulled.w, at_rest, gradient == H6_EXACT);
+  f.tail<3>() = torque.f;
+  D.bottomRightCorner<3, 3>() = torque.D;
   pull.cut = pull.cut || torque.cut;
+  K.bottomRightCorner<3, 3>() = torque.K;
   if (gradient == H6_EXACT && !(at_rest && torque.cut))
-    K.bottomRightCorner<3, 3>() =
-        -(c.rotational_stiffness * torque.P * right_jacobian_inverse(theta));
-  else
-    K.bottomRightCorner<3, 3>() = -(c.rotational_stiffness * torque.P);
+    K.bottomRightCorner<3, 3>() *= right_jacobian_inverse(theta);
   return pull;
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
+#include "hapsix/vector.h"
 #include "tests/support/analytic.h"
 #include "tests/support/near.h"
 
@@ -186,7 +187,9 @@ void check_too_weak(h6CouplingMode mode, h6Gradient gradient, h6Method method, d
   CHECK(std::fabs(later.pose.p.z - settled.pose.p.z) < 1e-4 * mm);
   CHECK(std::fabs(later.velocity.linear.z) < 1e-6);
   CHECK(std::fabs(later.pose.p.z - 5 * mm) < 0.5 * mm);
-  CHECK(felt.wrench.force.z == near(-bound).epsilon(1e-6));
+  CHECK(h6::norm(felt.wrench.force) <= bound * (1 + 1e-9));
+  // The damper of the sideways motion tilts the force a little.
+  CHECK(felt.wrench.force.z == near(-bound).epsilon(0.02));
 }
 
 }  // namespace

@@ -86,6 +86,23 @@ TEST_CASE("saturation bounds spring and damper together, at any hand speed") {
   }
 }
 
+TEST_CASE("a far hand pulls with the whole force, and the body arrives without overshoot") {
+  for (const double way : {20.0, 100.0, 500.0}) {
+    CAPTURE(way);
+    CentredBox scene;
+    scene.open();
+    double pull = 0, highest = 0;
+    for (int i = 0; i < 8000; ++i) {
+      const h6DeviceCommand felt = scene.hold(pose(0, 0, way * mm), 1);
+      pull = std::max(pull, norm(felt.wrench.force));
+      highest = std::max(highest, h6GetBody(scene.session, 1).pose.p.z);
+    }
+    CHECK(pull == h6::test::near(5).epsilon(1e-9));
+    CHECK(highest < (way + 0.02 * way) * mm);
+    CHECK(h6GetBody(scene.session, 1).pose.p.z == h6::test::near(way * mm).epsilon(1e-6));
+  }
+}
+
 TEST_CASE("without contact the body follows the hand to where it is") {
   CentredBox scene;
   scene.open();
