@@ -83,9 +83,8 @@ void change_field(io::SceneBody& body, const Variation& v) {
 }  // namespace
 
 const char* vary_name(Vary kind) {
-  constexpr const char* kNames[kVaryCount] = {"all",  "all but force", "voxel", "shift",
-                                              "turn", "sampling",      "mass",  "speed",
-                                              "step", "force"};
+  constexpr const char* kNames[kVaryCount] = {"all",      "voxel", "shift", "turn",
+                                              "sampling", "mass",  "speed", "step"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -109,10 +108,8 @@ Variation draw_variation(Vary kind, std::uint64_t seed) {
   all.mass = factor(1.0 / 3, 3);
   all.speed = factor(0.5, 2);
   all.step = factor(0.5, 2);
-  all.force = factor(1, 8);
-  const auto changes = [&](Vary one) {
-    return kind == one || kind == Vary::all || (kind == Vary::all_but_force && one != Vary::force);
-  };
+  out.push = factor(1.5, 8);
+  const auto changes = [&](Vary one) { return kind == one || kind == Vary::all; };
   if (changes(Vary::voxel)) out.voxel = all.voxel;
   if (changes(Vary::shift)) out.shift = all.shift;
   if (changes(Vary::turn)) out.turn = all.turn;
@@ -120,13 +117,11 @@ Variation draw_variation(Vary kind, std::uint64_t seed) {
   if (changes(Vary::mass)) out.mass = all.mass;
   if (changes(Vary::speed)) out.speed = all.speed;
   if (changes(Vary::step)) out.step = all.step;
-  if (changes(Vary::force)) out.force = all.force;
   return out;
 }
 
 Vary kind_in_series(std::size_t index) {
-  if (index % 4 == 0) return Vary::all;
-  if (index % 4 == 2) return Vary::all_but_force;
+  if (index % 2 == 0) return Vary::all;
   constexpr int kFirst = static_cast<int>(Vary::voxel);
   return static_cast<Vary>(kFirst + static_cast<int>(index / 2 % (kVaryCount - kFirst)));
 }

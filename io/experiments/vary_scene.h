@@ -18,22 +18,23 @@ struct Variation {
   double mass = 1;          // and inertia
   double speed = 1;         // of the hand where it moves; its pauses last as long as before
   double step = 1;          // length of a time step
-  double force = 1;  // of the hand. vary() leaves it to RunChange::force: a loaded scene serves all
+  double push = 1;  // of the hand's force. vary() leaves it to RunChange::force: a loaded scene
+                    // serves the scene's own force and the push
 };
 
-// What a drawn variation changes: everything at once, everything but the force, or one thing.
-enum class Vary { all, all_but_force, voxel, shift, turn, sampling, mass, speed, step, force };
-inline constexpr int kVaryCount = 10;
+// What a drawn variation changes beside the push: everything at once, or one thing.
+enum class Vary { all, voxel, shift, turn, sampling, mass, speed, step };
+inline constexpr int kVaryCount = 8;
 const char* vary_name(Vary kind);
 
 // Draws a variation; the same seed gives the same one on every machine, and two kinds of one seed
 // agree in what both change. Factors are uniform in their logarithm: voxel 0.5 .. 1.25, density of
-// the sampling 0.5 .. 2, mass 1/3 .. 3, speed and step 0.5 .. 2, force 1 .. 8. Shift and turn are
+// the sampling 0.5 .. 2, mass 1/3 .. 3, speed and step 0.5 .. 2, push 1.5 .. 8. Shift and turn are
 // uniform over all places and directions of the lattice; the jitter is uniform in 0 .. 0.4.
 Variation draw_variation(Vary kind, std::uint64_t seed);
 
-// Variation `index` of a series, for one scene. Of four in turn one changes all, one all but the
-// force, and two a single thing, each thing in its turn; a longer series begins like a shorter one.
+// Variation `index` of a series, for one scene. Every other one changes all, the others a single
+// thing, each thing in its turn; a longer series begins like a shorter one.
 Vary kind_in_series(std::size_t index);
 std::uint64_t seed_in_series(std::uint64_t seed, const std::string& scene, std::size_t index);
 
