@@ -74,6 +74,9 @@ const Rooms& below() {
     room("io/experiments",
          {"contract", "kernels", "sched", "io/console", "io/file", "io/mesh", "io/field", "io/bake",
           "io/shell", "io/scene", "io/scenes", "io/scenes/paper", "io/record", "io/run"});
+    std::set<std::string> map = r["io/experiments"];
+    map.insert("io/experiments");
+    room("io/experiments/map", map);
     // Programs and proof see everything.
     std::set<std::string> all;
     for (const auto& [name, sees] : r) all.insert(name);

@@ -27,5 +27,6 @@ void add_devices(CLI::App& app, Program& program);
 void add_scene(CLI::App& app, Program& program);
 void add_demo(CLI::App& app, Program& program);
 void add_experiments(CLI::App& app, Program& program);
+void add_map(CLI::App& app, Program& program);
 
 }  // namespace h6::cli

@@ -94,6 +94,7 @@ int main(int argc, char** argv) {
   add_scene(app, program);
   add_demo(app, program);
   add_experiments(app, program);
+  add_map(app, program);
   app.footer(
       "COMMAND --help explains each. To begin with:\n"
       "  hapsix demo                                  two methods side by side\n"

@@ -41,6 +41,21 @@ Outcome open(const RunChange& change, RunSetup& run) {
   return run.open();
 }
 
+// Whether the rule takes r x N made unit, without a bound on its length.
+bool bare_torque_directions(const h6ContactDef& c) {
+  return c.method == H6_METHOD_GAUSS6 && c.torque_length == 0 && !(c.pieces & H6_PIECE_HANDLES);
+}
+
+// Whether some r x N is so short that the rounding of r and N turns it by a twentieth of the hat's
+// width: the weights, and all that follows, then differ from one processor to the next.
+bool has_torque_noise(const h6Contacts& c) {
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const h6Vec3 r = {c.rx[i], c.ry[i], c.rz[i]}, n = {c.nx[i], c.ny[i], c.nz[i]};
+    if (norm(cross(r, n)) < 1e-4 * norm(r)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 void MethodColumn::apply(h6ContactDef& contact) const {
@@ -82,6 +97,8 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
   const h6HandDef& first = run.hand_defs[0];
   const bool has_shell = loaded.bodies[static_cast<std::size_t>(first.body)].shell >= 0;
 
+  const bool bare = bare_torque_directions(def.contact);
+
   const double duration = change.path ? change.path->back().t : loaded.duration();
   RunTally tally(loaded, def.rate, duration);
   const auto frames = static_cast<std::uint64_t>(duration * def.rate + 0.5);
@@ -91,11 +108,10 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
     r = {};
     r.time = static_cast<double>(i) / def.rate;
     if (Outcome done = run.step(r); !done) return out.error = done.error(), out;
-    const h6Vec3 force = has_shell ? elastic_wrench(h6GetContacts(run.session.get(), first.body),
-                                                    def.contact.stiffness)
-                                         .force
-                                   : h6Vec3{};
-    tally.frame(r, force);
+    const h6Contacts contacts =
+        has_shell ? h6GetContacts(run.session.get(), first.body) : h6Contacts{};
+    out.torque_noise = out.torque_noise || (bare && has_torque_noise(contacts));
+    tally.frame(r, elastic_wrench(contacts, def.contact.stiffness).force);
     if (!recorder)
       rows.clear();
     else if (rows.size() == 100) {
@@ -119,7 +135,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
 }
 
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
-              const std::string& label) {
+              const std::string& label, int threads) {
   std::atomic<std::size_t> next{0}, done{0};
   std::exception_ptr thrown;  // for instance std::bad_alloc; rethrown on the caller's thread
   std::mutex lock;
@@ -136,16 +152,15 @@ void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& con
       done.fetch_add(1);
     }
   };
-  std::thread other(work);
-  std::thread one(work);
+  std::vector<std::thread> workers;
+  for (int i = 0; i < threads; ++i) workers.emplace_back(work);
   const io::Progress progress = console.progress();
   const double count = static_cast<double>(std::max<std::size_t>(1, jobs.size()));
   while (done.load() < jobs.size() && !interrupted.load()) {
     progress(label, 0.999 * static_cast<double>(done.load()) / count);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  one.join();
-  other.join();
+  for (std::thread& worker : workers) worker.join();
   progress(label, 1);
   if (thrown) std::rethrow_exception(thrown);
 }

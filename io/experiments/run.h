@@ -45,8 +45,10 @@ struct RunChange {
 
 struct RunFigures : RunTotals {
   double frame_us_p50 = 0, frame_us_p99 = 0;
-  std::string error;       // why the run failed; empty when it did not
-  bool moved_on() const {  // the paper counts such a run as held
+  bool torque_noise = false;  // the weights had a torque direction that is rounding noise: r is
+                              // parallel to N, and the rule uses r x N made unit
+  std::string error;          // why the run failed; empty when it did not
+  bool moved_on() const {     // the paper counts such a run as held
     return error.empty() && (verdict == io::Verdict::held || verdict == io::Verdict::arrived);
   }
 };
@@ -57,9 +59,9 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
 // It is the elastic part; under `series` the loads include the effect of contact damping.
 h6Wrench elastic_wrench(const h6Contacts& contacts, double stiffness);
 
-// Runs independent jobs on two threads; ends early once the user interrupts. The progress bar shows
-// `label` and the share of jobs done. An exception of a job is rethrown here.
+// Runs independent jobs on some threads; ends early once the user interrupts. The progress bar
+// shows `label` and the share of jobs done. An exception of a job is rethrown here.
 void run_jobs(const std::vector<std::function<void()>>& jobs, const Console& console,
-              const std::string& label);
+              const std::string& label, int threads = 2);
 
 }  // namespace h6::cli

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// map_command.cpp - hapsix map: how robust the weight methods are, over many variations of every
+// scene.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "io/cli/commands.h"
+#include "io/console/checks.h"
+#include "io/experiments/map/map_report.h"
+#include "io/file/write_aside.h"
+
+namespace h6::cli {
+namespace {
+
+struct Options {
+  std::string methods, scenes, only, csv, report;
+  MapOptions map;
+};
+
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> out;
+  std::stringstream in(list);
+  for (std::string word; std::getline(in, word, ',');) out.push_back(word);
+  return out;
+}
+
+std::string unknown(const char* what, const std::string& name,
+                    const std::vector<std::string>& known) {
+  const std::string like = nearest(name, known);
+  std::string list;
+  for (const std::string& k : known) list += (list.empty() ? "" : ", ") + k;
+  return std::string("there is no ") + what + " '" + name + "'" +
+         (like.empty() ? "; there are " + list : ", did you mean '" + like + "'?");
+}
+
+// `robust` comes first, because the others are compared with it.
+Outcome choose_methods(const std::string& list, std::vector<MethodColumn>& out) {
+  const std::vector<MethodColumn> known = method_columns();
+  std::vector<std::string> names, wanted = split(list);
+  for (const MethodColumn& column : known) names.push_back(column.name);
+  if (std::find(wanted.begin(), wanted.end(), "robust") == wanted.end())
+    wanted.insert(wanted.begin(), "robust");
+  std::stable_partition(wanted.begin(), wanted.end(),
+                        [](const std::string& name) { return name == "robust"; });
+  for (const std::string& name : wanted) {
+    const auto same = [&](const MethodColumn& column) { return column.name == name; };
+    const auto found = std::find_if(known.begin(), known.end(), same);
+    if (found == known.end()) return Failure{unknown("method", name, names)};
+    if (std::none_of(out.begin(), out.end(), same)) out.push_back(*found);
+  }
+  return Done{};
+}
+
+Outcome choose(Options& o) {
+  if (o.methods.empty())
+    o.map.methods = map_methods();
+  else if (Outcome chosen = choose_methods(o.methods, o.map.methods); !chosen)
+    return chosen;
+  o.map.scenes = split(o.scenes);
+  if (!o.only.empty()) {
+    const std::size_t colon = o.only.find(':');
+    const std::string index = colon == std::string::npos ? "" : o.only.substr(colon + 1);
+    if (!whole_within(0, 999999)(index).empty())
+      return Failure{"--only " + must_be("SCENE:INDEX such as cone-in-gap:3", o.only)};
+    o.map.scenes = {o.only.substr(0, colon)};
+    o.map.only = std::stoul(index);
+    o.map.variations = *o.map.only + 1;
+  }
+  const std::vector<std::string> known = map_scene_names();
+  for (const std::string& name : o.map.scenes)
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return Failure{unknown("scene", name, known)};
+  return Done{};
+}
+
+Outcome write_text(const std::string& file, const std::string& text) {
+  return io::write_aside(file, [&](const std::filesystem::path& place) {
+    std::ofstream out(place, std::ios::binary);
+    out << text;
+    out.close();
+    return out ? Outcome(Done{}) : Outcome(Failure{file + ": it cannot be written"});
+  });
+}
+
+int map_command(const Console& console, Options& o) {
+  if (Outcome chosen = choose(o); !chosen) return console.fail(chosen.error(), kUsage);
+  for (const std::string& file : {o.csv, o.report})
+    if (Outcome good = file.empty() ? Outcome(Done{}) : check_output(file); !good)
+      return console.fail(good.error());
+  const std::vector<MapScene> scenes = run_map(o.map, console);
+  if (interrupted.load()) return console.fail("interrupted");
+  const MapReport report{o.map, scenes};
+  if (!console.json) std::printf("%s", report.text(false).c_str());
+  if (!o.csv.empty())
+    if (Outcome written = write_text(o.csv, report.csv()); !written)
+      return console.fail(written.error());
+  if (!o.report.empty())
+    if (Outcome written = write_text(o.report, report.text(true)); !written)
+      return console.fail(written.error());
+  console.result(report.json());
+  const std::string error = report.first_error();
+  if (error.empty()) return kOk;
+  console.log("hapsix: " + error);
+  return kFailed;
+}
+
+}  // namespace
+
+void add_map(CLI::App& app, Program& program) {
+  CLI::App* map = app.add_subcommand(
+      "map",
+      "How robust the weight methods are: many variations of every scene, compared in pairs");
+  auto o = std::make_shared<Options>();
+  map->add_option("--variations", o->map.variations, "Variations of each scene")
+      ->check(whole_within(1, 100000))
+      ->capture_default_str();
+  map->add_option("--seed", o->map.seed, "Another seed draws other variations")
+      ->check(whole_within(0, 1LL << 53))
+      ->capture_default_str();
+  std::string methods;
+  for (const MethodColumn& m : map_methods()) methods += (methods.empty() ? "" : ",") + m.name;
+  map->add_option("--methods", o->methods,
+                  "Weight methods, such as robust,gauss6+facing; default: " + methods);
+  map->add_option("--scenes", o->scenes,
+                  "Scenes, such as cone-in-gap,peg-in-hole; default: all that are made quickly");
+  map->add_option("--only", o->only, "One variation alone, with every run")
+      ->option_text("SCENE:INDEX");
+  map->add_option("--jobs", o->map.jobs, "Threads; the figures do not depend on it")
+      ->check(whole_within(1, 256))
+      ->capture_default_str();
+  map->add_option("--csv", o->csv, "A row for each run")
+      ->check(ends_with(".csv"))
+      ->option_text("FILE.csv");
+  map->add_option("-o,--output", o->report, "The tables as Markdown")
+      ->check(ends_with(".md"))
+      ->option_text("FILE.md");
+  map->callback(
+      [&program, o] { program.work = [&program, o] { return map_command(program.console, *o); }; });
+}
+
+}  // namespace h6::cli

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/experiments/map/map.h"
+
+#include <algorithm>
+
+#include "io/experiments/probe.h"
+#include "io/scenes/scenes.h"
+
+namespace h6::cli {
+namespace {
+
+// Scenes that only run when they are asked for by name.
+struct Slow {
+  const char* scene;
+  const char* why;
+};
+constexpr Slow kSlow[] = {
+    {"engine-bay", "each variation bakes 505,276 triangles anew; --scenes engine-bay runs it"},
+    {"landing-gear",
+     "each variation bakes 1,789,551 triangles anew; --scenes landing-gear runs it"}};
+
+MapRun run_once(const io::LoadedScene& loaded, const MethodColumn& method, double stiffness,
+                double newtons, double push) {
+  RunChange change;
+  change.method = method;
+  change.stiffness = stiffness;
+  change.max_force = newtons / push;  // the push multiplies it, and the coupling's stiffness
+  change.force = push;
+  const RunFigures figures = run_experiment(loaded, change);
+  return {
+      figures.verdict,    figures.moved_on(),       figures.torque_noise, figures.max_depth_voxels,
+      figures.late_speed, figures.late_depth_swing, figures.error};
+}
+
+void run_variation(const MapScene& scene, const std::vector<MethodColumn>& methods,
+                   MapVariation& v) {
+  Result<io::Scene> made = vary(scene.name, v.change);
+  if (!made) return void(v.error = made.error());
+  v.newtons[kHalfVoxelForce] = half_voxel_force(*made);
+  v.newtons[kSceneForce] = largest_force(*made);
+  v.newtons[kPushForce] = v.change.push * largest_force(*made);
+  const double stiffness = made->contact.stiffness;
+  const auto loaded = io::load_scene(std::move(*made));
+  if (!loaded) return void(v.error = loaded.error());
+  for (std::size_t m = 0; m < methods.size(); ++m)
+    for (int table = 0; table < kMapTables; ++table) {
+      const double factor = table == kEqualWall ? scene.stiffer[m] : 1;
+      for (int force = 0; force < kMapForces; ++force) {
+        if (interrupted.load()) return;
+        if (table == kEqualWall && factor == 1)  // the same run again
+          v.runs.push_back(v.run(kEqualStiffness, force, m));
+        else
+          v.runs.push_back(run_once(**loaded, methods[m], factor * stiffness, v.newtons[force],
+                                    force == kPushForce ? v.change.push : 1));
+      }
+    }
+}
+
+// The scene with its variations drawn and nothing run yet.
+MapScene planned(const std::string& name, const MapOptions& options) {
+  MapScene out;
+  out.name = name;
+  if (options.scenes.empty())
+    for (const Slow& slow : kSlow)
+      if (name == slow.scene) out.left_out = slow.why;
+  const Result<io::Scene> scene = io::make_scene(name);
+  if (!scene) out.left_out = scene.error();
+  if (!out.left_out.empty()) return out;
+  std::vector<double> walls;
+  for (const MethodColumn& method : options.methods)
+    walls.push_back(wall_stiffness(scene->contact, method));
+  for (const double wall : walls) {
+    out.stiffer.push_back(wall == walls[0] ? 1 : walls[0] / wall);
+    if (!(wall > 0)) out.left_out = "the stiffness of a flat wall cannot be measured";
+  }
+  for (std::size_t i = 0; i < options.variations; ++i) {
+    if (options.only && i != *options.only) continue;
+    MapVariation v;
+    v.index = i;
+    v.seed = seed_in_series(options.seed, name, i);
+    v.change = draw_variation(kind_in_series(i), v.seed);
+    out.variations.push_back(std::move(v));
+  }
+  return out;
+}
+
+}  // namespace
+
+double wall_stiffness(const h6ContactDef& contact, const MethodColumn& method) {
+  io::Scene scene = posed_scene("wall", plate(-40 * kMm, 40 * kMm), bottom(40, 40));
+  scene.contact = contact;
+  const auto loaded = io::load_scene(std::move(scene));
+  if (!loaded) return 0;
+  Probe probe(**loaded, method);
+  if (!probe) return 0;
+  const auto pressed = [&](double depth) {
+    return elastic_wrench(probe.at({{0, 0, 5 * kMm - depth}, {1, 0, 0, 0}}), 1).force.z;
+  };
+  constexpr double kStep = 0.01 * kProbeVoxel;
+  return (pressed(kProbeDepth + kStep) - pressed(kProbeDepth - kStep)) / (2 * kStep);
+}
+
+std::vector<std::string> map_scene_names() {
+  std::vector<std::string> out;
+  for (const io::SceneName& scene : io::scene_names()) out.push_back(scene.name);
+  return out;
+}
+
+std::vector<MethodColumn> map_methods() {
+  std::vector<MethodColumn> out;
+  for (const char* name : {"robust", "gauss6", "series", "firm"})
+    for (const MethodColumn& column : method_columns())
+      if (column.name == name) out.push_back(column);
+  return out;
+}
+
+std::vector<MapScene> run_map(const MapOptions& options, const Console& console) {
+  std::vector<MapScene> out;
+  for (const std::string& name : options.scenes.empty() ? map_scene_names() : options.scenes)
+    out.push_back(planned(name, options));
+  std::vector<std::function<void()>> jobs;
+  for (std::size_t s = out.size(); s-- > 0;)  // in reverse: the last scenes take longest
+    if (out[s].left_out.empty())
+      for (MapVariation& v : out[s].variations)
+        jobs.push_back(
+            [&scene = out[s], &v, &options] { run_variation(scene, options.methods, v); });
+  run_jobs(jobs, console, "variations", options.jobs);
+  for (MapScene& scene : out) {  // a scene that can never be varied has no rows
+    const auto made = [](const MapVariation& v) { return v.error.empty(); };
+    const auto& all = scene.variations;
+    if (scene.left_out.empty() && !all.empty() && std::none_of(all.begin(), all.end(), made))
+      scene.left_out = all.front().error;
+  }
+  return out;
+}
+
+}  // namespace h6::cli

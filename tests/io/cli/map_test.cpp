@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests `hapsix map` from outside: its files, one variation alone, and mistakes.
+#include <algorithm>
+#include <string>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+TEST_CASE("map writes a row for each run, a report, and the same figures as JSON") {
+  Sandbox box;
+  const Json map =
+      result_of(box, {"map", "--scenes", "box-over-wire,cone-in-gap", "--methods", "gauss3,robust",
+                      "--variations", "2", "--csv", "runs.csv", "-o", "map.md"});
+  CHECK(map["methods"] == Json::parse(R"(["robust", "gauss3"])"));
+  CHECK(map["scenes"].size() == 2);
+  const Json& wire = map["scenes"]["box-over-wire"];
+  CHECK(wire["equal_wall_stiffness"]["gauss3"]["stiffer"].get<double>() > 4);  // METHOD.md: 4.5
+  CHECK(wire["equal_stiffness"]["gauss3"]["scene"]["runs"] == 2);
+  CHECK(wire["runs"].size() == 2);
+  // 2 scenes, 2 variations, 2 tables, 3 forces, 2 methods, and the head.
+  const std::string rows = slurp(box.file("runs.csv"));
+  CHECK(std::count(rows.begin(), rows.end(), '\n') == 1 + 2 * 2 * 2 * 3 * 2);
+  const std::string report = slurp(box.file("map.md"));
+  for (const char* words : {"| box-over-wire | robust |", "## Conclusions", "--only SCENE:INDEX"})
+    CHECK_MESSAGE(report.find(words) != std::string::npos, words);
+
+  const Ended alone = run(box, {"map", "--methods", "gauss3", "--only", "cone-in-gap:1"});
+  CHECK(alone.code == 0);
+  CHECK(alone.out.rfind("cone-in-gap:1: voxel ", 0) == 0);
+  const Json again = result_of(box, {"map", "--methods", "gauss3", "--only", "cone-in-gap:1"});
+  CHECK(again["scenes"]["cone-in-gap"]["runs"][0] == map["scenes"]["cone-in-gap"]["runs"][1]);
+}
+
+TEST_CASE("map says what is wrong with its arguments before it runs") {
+  Sandbox box;
+  const auto told = [&](const Args& args, int code, const std::string& words) {
+    const Ended ended = run(box, args);
+    CHECK(ended.code == code);
+    CHECK_MESSAGE(ended.err.find(words) != std::string::npos, ended.err);
+  };
+  told({"map", "--methods", "robst"}, 2, "did you mean 'robust'?");
+  told({"map", "--scenes", "cone-in-gab"}, 2, "did you mean 'cone-in-gap'?");
+  told({"map", "--only", "cone-in-gap"}, 2, "SCENE:INDEX");
+  told({"map", "--only", "cone-in-gap:x"}, 2, "SCENE:INDEX");
+  told({"map", "--variations", "0"}, 2, "must be a whole number");
+  told({"map", "--csv", "runs.txt"}, 2, ".csv");
+  told({"map", "--scenes", "box-on-wall", "--csv", "no/folder/runs.csv"}, 1, "does not exist");
+  CHECK(box.files().empty());
+}
