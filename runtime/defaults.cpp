@@ -17,7 +17,7 @@ constexpr const char* kDeviceStates[H6_DEVICE_STATE_COUNT] = {"absent", "ready",
 constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
-    "passivity",        "coarse contacts"};
+    "passivity",        "coarse contacts", "motion shortened"};
 
 // The choice whose name is the first `length` letters of `name`, or null.
 const h6::Choice* named(std::span<const h6::Choice> choices, const char* name, std::size_t length) {

@@ -45,17 +45,29 @@ struct Stopwatch {
 void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   s.report = {};
   s.report.frame = s.frame++;
-  begin_anytime(s.anytime, start);
-  begin_lanes(s.lanes, start - s.left_at > kRest, s.tick_length.ns());
+  for (std::size_t h = 0; h < s.hands.size(); ++h)
+    accept(s.devices[h], s.hands[h], s.bodies[s.hands[h].body], samples[h], s.settings.dt,
+           s.report.status);
+  s.substeps = plan_substeps(s);
+  s.report.substeps = s.substeps.count;
+  if (s.substeps.needed > s.substeps.count)
+    for (const Hand& hand : s.hands)
+      if (s.bodies[hand.body].motion == Motion::held) s.report.status |= H6_SHORTENED;
+  begin_anytime(s.anytime, start, s.substeps.count);
+}
+
+void begin_step(h6Session& s, std::uint32_t step, bool cold) {
+  if (step == 1) decide_no_more(s.anytime);
+  begin_lanes(s.lanes, cold && step == 0, s.tick_length.ns());
+  s.report.contacts = 0;
   for (std::size_t i = 0; i < s.bodies.size(); ++i) {
     const Body& body = s.bodies[i];
     s.acting[i].set_zero();
     if (!body.fixed) s.acting[i].f.head<3>() = body.mass * s.settings.gravity;
   }
-  for (std::size_t h = 0; h < s.hands.size(); ++h) {
-    Body& body = s.bodies[s.hands[h].body];
-    accept(s.devices[h], s.hands[h], body, samples[h], s.settings.dt, s.report.status);
-    hold(s.hands[h], body);
+  for (Hand& hand : s.hands) {
+    Body& body = s.bodies[hand.body];
+    hold(hand, body, share_of_way(s.substeps, body.motion == Motion::held, step));
   }
 }
 
@@ -89,6 +101,61 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
   watch.timed(H6_STAGE_WRENCH, [&] { sum_contacts(set, bodies, shell, lane); });
 }
 
+// Finds the wrench on every body at its present pose.
+void collide(h6Session& s, const Settings& set) {
+  run_lanes(s.lanes, set, s.bodies, s.shells, weigh_shell, s.report);
+  Stopwatch watch{s.report, s.tick_length.ns(), sched::ticks()};
+  watch.timed(H6_STAGE_WRENCH, [&] {
+    for (ShellBody& shell : s.shells) add_wrenches(set, s.bodies, shell, s.acting);
+  });
+}
+
+// Couples the hands and moves the bodies. `last`: of the frame.
+void couple_and_step(h6Session& s, const Settings& set, bool last) {
+  h6Status& status = s.report.status;
+  Stopwatch watch{s.report, s.tick_length.ns(), sched::ticks()};
+  watch.timed(H6_STAGE_COUPLING, [&] {
+    for (std::size_t h = 0; h < s.hands.size(); ++h) {
+      Hand& hand = s.hands[h];
+      couple(set, hand, s.bodies[hand.body], s.acting[hand.body], status);
+      if (last) observe_hand(set, s.bodies, s.shells, hand, s.devices[h]);
+    }
+    if (set.contact.passivity) damp_contacts(set, s.bodies, s.shells, s.acting, s.hands, status);
+    if (set.net_stiffness && last) report_net_stiffness(s.bodies, s.shells, s.report);
+  });
+  watch.timed(H6_STAGE_INTEGRATE, [&] {
+    for (const Hand& hand : s.hands) {
+      Body& body = s.bodies[hand.body];
+      if (body.motion == Motion::quasi_static && hand.seen)
+        step_static(set.gradient, body, s.acting[hand.body], body.max_step / s.substeps.count,
+                    status);
+    }
+    accelerate_bodies(set, s.bodies, s.acting, s.shells, s.islands, status);
+    if (slow_down(s, set.dt)) status |= H6_SHORTENED;
+    move_bodies(set, s.bodies, s.islands, status);
+    if (set.contact.passivity) observe_contacts(set, s.bodies, s.shells);
+  });
+}
+
+// The hands feel the mean over the steps of a frame: it is the impulse that their bodies got.
+class MeanWrench {
+ public:
+  explicit MeanWrench(std::span<Hand> hands) : hands_(hands) {}
+  void add() {
+    for (std::size_t h = 0; h < hands_.size(); ++h)
+      sum_[h] = count_ ? Vec6(sum_[h] + hands_[h].wrench) : hands_[h].wrench;
+    ++count_;
+  }
+  void take() {
+    for (std::size_t h = 0; h < hands_.size(); ++h) hands_[h].wrench = sum_[h] / count_;
+  }
+
+ private:
+  std::span<Hand> hands_;
+  Vec6 sum_[H6_MAX_HANDS];
+  int count_ = 0;
+};
+
 // Records the helper's work for the timeline.
 void note_helper(h6Session& s, std::int64_t start) {
   const sched::FrameTeam::HelperWork helped = s.team->helper_work();
@@ -103,32 +170,24 @@ void note_helper(h6Session& s, std::int64_t start) {
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands) {
   const sched::FlushDenormals flush;
   const std::int64_t start_ticks = sched::ticks(), start = sched::now_ns();
-  const Settings& set = s.settings;
   h6Status& status = s.report.status;
   s.tick_length.see(start, start_ticks);
   s.team->begin_frame(start);
   begin(s, samples, start);
-  run_lanes(s.lanes, set, s.bodies, s.shells, weigh_shell, s.report);
+  Settings set = s.settings;
+  set.dt /= s.substeps.count;
+  MeanWrench felt(s.hands);
+  for (std::uint32_t step = 0; step < s.substeps.count; ++step) {
+    begin_step(s, step, start - s.left_at > kRest);
+    collide(s, set);
+    couple_and_step(s, set, step + 1 == s.substeps.count);
+    felt.add();
+  }
+  felt.take();
   Stopwatch watch{s.report, s.tick_length.ns(), sched::ticks()};
-  watch.timed(H6_STAGE_WRENCH, [&] {
-    for (ShellBody& shell : s.shells) add_wrenches(set, s.bodies, shell, s.acting);
-  });
-  watch.timed(H6_STAGE_COUPLING, [&] {
-    for (std::size_t h = 0; h < s.hands.size(); ++h) {
-      Hand& hand = s.hands[h];
-      couple(set, hand, s.bodies[hand.body], s.acting[hand.body], status);
-      observe_hand(set, s.bodies, s.shells, hand, s.devices[h]);
-    }
-    if (set.contact.passivity) damp_contacts(set, s.bodies, s.shells, s.acting, s.hands, status);
-    if (set.net_stiffness) report_net_stiffness(s.bodies, s.shells, s.report);
-  });
-  watch.timed(H6_STAGE_INTEGRATE, [&] {
-    step_bodies(set, s.bodies, s.acting, s.shells, s.hands, s.islands, status);
-    if (set.contact.passivity) observe_contacts(set, s.bodies, s.shells);
-  });
   watch.timed(H6_STAGE_OUTPUT, [&] {
     for (std::size_t h = 0; h < s.hands.size(); ++h)
-      send(s.devices[h], s.hands[h], s.bodies[s.hands[h].body], set.dt,
+      send(s.devices[h], s.hands[h], s.bodies[s.hands[h].body], s.settings.dt,
            commands ? &commands[h] : nullptr, status);
   });
   learn_frame(s.anytime, s.report);
@@ -140,7 +199,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   const double took = watch.ns_since(start_ticks);
   s.report.frame_us = 1e-3 * took;
   s.left_at = start + static_cast<std::int64_t>(took);
-  s.team->end_frame(start + static_cast<std::int64_t>(1e9 * set.dt));
+  s.team->end_frame(start + static_cast<std::int64_t>(1e9 * s.settings.dt));
   return s.report.status;
 }
 

@@ -71,7 +71,10 @@ double contact_ns(const Anytime& a, double contacts) {
 }
 
 // A frame that cannot keep its budget may end halfway between the budget and the deadline.
-double latest_ns(const Anytime& a) { return 0.5 * (a.budget_ns + a.period_ns); }
+double latest_ns(const Anytime& a) { return 0.5 * (a.budget_ns + a.period_ns) / a.steps; }
+
+// All steps of a frame share its budget.
+double budget_ns(const Anytime& a) { return a.budget_ns / a.steps; }
 
 double elapsed_ns(const Anytime& a) { return static_cast<double>(a.clock() - a.start); }
 
@@ -110,13 +113,13 @@ int choose(Anytime& a, const Ahead& ahead) {
   // number of contacts.
   if (!a.begun && ahead.groups > 0) {
     a.begun = true;
-    if (foresee(a, ahead, Anytime::kAll) > kSpare * a.budget_ns) a.finest = 0;
+    if (foresee(a, ahead, Anytime::kAll) > kSpare * budget_ns(a)) a.finest = 0;
   }
   int fits = std::min(a.finest + 1, Anytime::kAll);
-  while (fits > 0 && foresee(a, ahead, fits) > kSpare * a.budget_ns) --fits;
+  while (fits > 0 && foresee(a, ahead, fits) > kSpare * budget_ns(a)) --fits;
   a.fitting = std::min(a.fitting, fits);
   int tier = a.finest;
-  while (tier > 0 && tier > fits && foresee(a, ahead, tier) > a.budget_ns) --tier;
+  while (tier > 0 && tier > fits && foresee(a, ahead, tier) > budget_ns(a)) --tier;
   return tier;
 }
 
@@ -150,8 +153,9 @@ void learn_contacts(Anytime& a, double contacts, double spent) {
 
 }  // namespace
 
-void begin_anytime(Anytime& a, std::int64_t start) {
+void begin_anytime(Anytime& a, std::int64_t start, std::uint32_t steps) {
   a.start = start;
+  a.steps = steps;
   a.coarse = false;
   a.coarse_pairs = 0;
   a.few = false;
@@ -164,6 +168,8 @@ void begin_anytime(Anytime& a, std::int64_t start) {
   a.forced = Anytime::kByClock;
 }
 
+void decide_no_more(Anytime& a) { a.by_clock = false; }
+
 bool is_coarse_anyway(Anytime& a, const PairSearch& pair, std::size_t used, std::size_t blocks) {
   if (!a.by_clock) return number_of(a, pair) + a.coarse_pairs >= a.pairs.size();
   if (a.coarse) return true;
@@ -173,8 +179,8 @@ bool is_coarse_anyway(Anytime& a, const PairSearch& pair, std::size_t used, std:
                                                   static_cast<double>(pair.open_blocks);
   const Ahead ahead = look_ahead(a, pair, used, blocks, each * n);
   // Testing the groups is itself a part of the work, so it is done only now and then.
-  const bool room = look + foresee(a, ahead, 0) <= kSpare * a.budget_ns;
-  if (!a.begun ? look <= 0.5 * a.budget_ns
+  const bool room = look + foresee(a, ahead, 0) <= kSpare * budget_ns(a);
+  if (!a.begun ? look <= 0.5 * budget_ns(a)
                : a.finest == Anytime::kAll || (room && a.frames % kLookEvery == 0))
     return false;
   return decide(a, ahead, pair);

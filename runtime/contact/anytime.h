@@ -33,6 +33,7 @@ struct Anytime {
   std::int64_t (*clock)() = sched::now_ns;  // tests replace it
   // The state of this frame.
   std::int64_t start = 0;
+  double steps = 1;       // of the frame
   bool by_clock = false;  // the clock decides
   bool coarse = false;    // the clock has decided that this pair and all later ones are coarse
   std::uint32_t coarse_pairs = 0;  // how many of the last `pairs` are coarse
@@ -56,7 +57,11 @@ struct Anytime {
   std::uint32_t calm = 0, strikes = 0;  // frames in a row that would allow a finer or coarser tier
 };
 
-void begin_anytime(Anytime& a, std::int64_t start);
+// `steps` of the frame share its budget.
+void begin_anytime(Anytime& a, std::int64_t start, std::uint32_t steps = 1);
+// Call it after the first of several steps. The others leave out the same pairs and points, so that
+// one pair of numbers repeats the frame. Nothing is learnt from such a frame.
+void decide_no_more(Anytime& a);
 // Both decide whether the pair is traversed coarsely, in a.tier. After the first coarse pair all
 // later ones of the frame are coarse. `pair` is one of a.pairs, `used` contacts were found before
 // it, and `blocks` of its own are open. is_coarse_anyway is called before the pair's groups are

@@ -29,7 +29,9 @@ struct Body : RigidState {
   double voxel = 1e-3;           // the smallest voxel of the fields that the body can touch [m]
   double radius = 0;             // distance of the farthest shell point from com [m]
   double max_step = 0;           // quasi-static: the most that a point may move in a frame [m]
-  double drag = 0;               // admittance hands: damping of the free body [N s/m]
+  // How much velocity the solver gave a free body in the last frame, before it was slowed down.
+  Vec3 gained_v = Vec3::Zero(), gained_w = Vec3::Zero();
+  double drag = 0;  // admittance hands: damping of the free body [N s/m]
 };
 
 // A wrench about a body's centre of mass and its derivatives by the body's own pose and velocity,

@@ -118,6 +118,19 @@ struct Search {
   }
 };
 
+Search search_of(const Settings& set, const Body& a, const Body& b, bool cold) {
+  const Field& field = *b.field;
+  const float margin = margin_of(set.contact);
+  // The short form of culling is proved for margins of up to half a voxel.
+  return {field.view,
+          *a.shell,
+          shell_to_field(a, b),
+          static_cast<float>(1.0 / field.voxel),
+          field.wide || margin > 0.5f,
+          margin,
+          cold};
+}
+
 // Samples `count` groups and writes the points that touch behind row `used`. Their order does not
 // depend on which thread runs a slice.
 std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::size_t count,
@@ -322,17 +335,8 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
                         TraverseScratch& t, Lane& lane, std::size_t used, bool shared,
                         bool& complete) {
   const Shell& shell = *a.shell;
-  const Field& field = *b.field;
   Anytime& anytime = *lane.anytime;
-  const float margin = margin_of(set.contact);
-  // The short form of culling is proved for margins of up to half a voxel.
-  Search search{field.view,
-                shell,
-                shell_to_field(a, b),
-                static_cast<float>(1.0 / field.voxel),
-                field.wide || margin > 0.5f,
-                margin,
-                lane.cold};
+  Search search = search_of(set, a, b, lane.cold);
   const Way way = travel(pair, search);
   pair.sampled = 0;
   pair.missed = 0;
@@ -386,6 +390,28 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
 }
 
 }  // namespace
+
+double clearance(const Settings& set, const Body& a, const Body& b, double enough,
+                 TraverseScratch& t) {
+  const Shell& shell = *a.shell;
+  const Search search = search_of(set, a, b, false);
+  const float far = static_cast<float>(enough) + kSlack;
+  float least = HUGE_VALF;
+  search.cull(shell.blocks, nullptr, shell.blocks.count, t.survivors, t.clearance);
+  std::size_t groups = 0;
+  for (std::size_t block = 0; block < shell.blocks.count; ++block) {
+    if (!(t.clearance[block] < far)) {
+      least = std::min(least, t.clearance[block]);
+      continue;
+    }
+    const std::size_t end = std::min(16 * block + 16, shell.groups.count);
+    for (std::size_t g = 16 * block; g < end; ++g)
+      t.frontier[groups++] = static_cast<std::uint32_t>(g);
+  }
+  search.cull(shell.groups, t.frontier, groups, t.survivors, t.clearance);
+  for (std::size_t k = 0; k < groups; ++k) least = std::min(least, t.clearance[k]);
+  return least - kSlack;
+}
 
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {

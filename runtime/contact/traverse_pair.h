@@ -21,6 +21,12 @@ inline constexpr std::size_t kWorthSharing = 80;
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared);
 
+// The way that no point of shell body a can come nearer to field body b than its margin [voxel],
+// from the spheres of blocks; where that is under `enough`, from the spheres of groups. It follows
+// from the poses alone: what the traversal remembers can depend on threads and on the clock.
+double clearance(const Settings& set, const Body& a, const Body& b, double enough,
+                 TraverseScratch& t);
+
 kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);
 // Copies candidates from one scratch to another, or within one. The two ranges may overlap.
 void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,

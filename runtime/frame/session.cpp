@@ -355,7 +355,8 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
                  .dt = 1 / def->rate,
                  .gravity = from(def->gravity),
                  .net_stiffness = def->net_stiffness,
-                 .max_contacts = def->max_contacts};
+                 .max_contacts = def->max_contacts,
+                 .max_substeps = def->max_substeps};
   s->anytime.budget_ns = 1e3 * def->frame_budget_us;
   s->anytime.period_ns = 1e9 * s->settings.dt;
   bool ready = false;

@@ -9,6 +9,7 @@
 #include "runtime/contact/settings.h"
 #include "runtime/frame/shell_lanes.h"
 #include "runtime/frame/start_overlap.h"
+#include "runtime/frame/substeps.h"
 #include "runtime/model/model.h"
 #include "runtime/motion/hand.h"
 #include "runtime/motion/motion_stages.h"
@@ -28,6 +29,7 @@ struct h6Session {
   std::span<h6::HandDevice> devices;  // (hands)
   std::span<h6::Island> islands;
 
+  h6::Substeps substeps;
   h6::Anytime anytime;
   h6::Lanes lanes;
   h6FrameReport report{};

@@ -55,17 +55,26 @@ Link link(const Spring& spring, const Vec3& stretch, const Vec3& rate, bool seca
   return out;
 }
 
-// Where the hand holds the body's centre of mass. A body that never turns is held at the origin of
-// its mesh frame, so that a turning wrist does not move it.
-RigidState held_by(const h6DeviceSample& sample, const Body& body) {
+// Where a hand at this pose holds the body's centre of mass. A body that never turns is held at the
+// origin of its mesh frame, so that a turning wrist does not move it.
+RigidState held_by(const Hand& hand, const h6Pose& pose, const Body& body) {
+  const h6Velocity& velocity = hand.sample.velocity;
   RigidState m;
-  m.q = body.translation_only ? body.q : from(sample.pose.q);
+  m.q = body.translation_only ? body.q : from(pose.q);
   m.R = body.translation_only ? body.R : m.q.toRotationMatrix();
-  if (!body.translation_only) m.w = from(sample.velocity.angular);
+  if (!body.translation_only) m.w = from(velocity.angular);
   const Vec3 lever = m.q * body.com;
-  m.x = from(sample.pose.p) + lever;
-  m.v = from(sample.velocity.linear) + m.w.cross(lever);
+  m.x = from(pose.p) + lever;
+  m.v = from(velocity.linear) + m.w.cross(lever);
   return m;
+}
+
+h6Pose between(const h6Pose& a, const h6Pose& b, double share) {
+  if (share >= 1) return b;
+  const Quat q = from(a.q);
+  const Vec3 turn = log_rotation(from(b.q) * q.conjugate());
+  return {to(Vec3(from(a.p) + share * (from(b.p) - from(a.p)))),
+          to((exp_rotation(share * turn) * q).normalized())};
 }
 
 // Adds the device's wrench. The damping of the free body is part of its step.
@@ -110,9 +119,17 @@ Pull pull_of(h6Gradient gradient, const h6CouplingDef& c, const Body& body,
   return pull;
 }
 
-void hold(Hand& hand, Body& body) {
-  if (body.motion != Motion::held || !hand.seen) return;
-  hand.manipulandum = held_by(hand.sample, body);
+Way way_of(const Hand& hand, const Body& body) {
+  const RigidState from = held_by(hand, hand.start, body),
+                   goal = held_by(hand, hand.sample.pose, body);
+  return {(goal.x - from.x).norm(), log_rotation(goal.q * from.q.conjugate()).norm()};
+}
+
+void hold(Hand& hand, Body& body, double share) {
+  if (!hand.seen) return;
+  hand.now = between(hand.start, hand.sample.pose, share);
+  if (body.motion != Motion::held) return;
+  hand.manipulandum = held_by(hand, hand.now, body);
   static_cast<RigidState&>(body) = hand.manipulandum;
 }
 
@@ -128,7 +145,7 @@ void couple(const Settings& set, Hand& hand, const Body& body, LinearWrench& act
     return;
   }
   if (hand.mode == H6_IMPEDANCE)
-    hand.manipulandum = held_by(hand.sample, body);
+    hand.manipulandum = held_by(hand, hand.now, body);
   else
     step_manipulandum(set, hand, body, status);
   const Pull pull = pull_of(set.gradient, hand.coupling, body, hand.manipulandum, body);

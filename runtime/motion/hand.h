@@ -17,7 +17,9 @@ struct Hand {
   h6CouplingDef coupling{};                         // zeros are replaced by derived values
   double manipulandum_mass = 0.1;                   // [kg]
   double driver_stiffness = 0, driver_damping = 0;  // [N/m], [N s/m]
-  h6DeviceSample sample{};     // the last good one, in the scene's frame and units
+  h6DeviceSample sample{};  // the last good one, in the scene's frame and units
+  // The hand moves from `start` to the sample's pose during a frame, and is at `now` in this step.
+  h6Pose start{{0, 0, 0}, {1, 0, 0, 0}}, now{{0, 0, 0}, {1, 0, 0, 0}};
   RigidState manipulandum;     // where the hand holds the body's centre of mass; pseudo-admittance:
                                // a body of its own
   Vec6 wrench = Vec6::Zero();  // the hand's wrench on the body

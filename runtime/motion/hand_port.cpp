@@ -66,7 +66,12 @@ void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSamp
   const RigidState& state =
       hand.mode == H6_PSEUDO_ADMITTANCE ? std::as_const(hand.manipulandum) : body;
   const h6Pose here = mesh_pose(body, state);
+  const h6Pose before = hand.sample.pose;
   hand.sample = device.filter.to_scene(sample, here, &hand.clutched);
+  // A held body may be behind its hand.
+  hand.start = !hand.seen                    ? hand.sample.pose
+               : body.motion == Motion::held ? mesh_pose(body)
+                                             : before;
   hand.seen = true;
 }
 

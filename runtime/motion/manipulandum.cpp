@@ -81,7 +81,8 @@ void step_manipulandum(const Settings& set, Hand& hand, const Body& body, h6Stat
     status |= H6_SOLVE_FAILED;
     du.setZero();
   }
-  if (!move_or_rest(m, du, h, body.translation_only)) status |= H6_STATE_NOT_FINITE;
+  add_velocity(m, du, body.translation_only);
+  if (!move_or_rest(m, h, body.translation_only)) status |= H6_STATE_NOT_FINITE;
 }
 
 }  // namespace h6

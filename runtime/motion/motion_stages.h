@@ -20,19 +20,30 @@ struct Island {
 // where it last was, without a wrench.
 void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSample& given,
             double dt, h6Status& status);
-// Direct coupling: puts the body where the hand is, before contacts are found.
-void hold(Hand& hand, Body& body);
+// The hand's way in this frame: shift of the body's centre of mass [m], turn [rad].
+struct Way {
+  double shift = 0, turn = 0;
+};
+Way way_of(const Hand& hand, const Body& body);
+// Puts the hand at this share of its way, 0 .. 1, and with it a body under direct coupling. Call it
+// before contacts are found.
+void hold(Hand& hand, Body& body, double share);
 // Adds the hand's wrench on its body to `acting`, by coupling and device mode. METHOD.md, Sec. 4.
 void couple(const Settings& set, Hand& hand, const Body& body, LinearWrench& acting,
             h6Status& status);
 // Pseudo-admittance: one time step of the manipulandum between the driver's coupling and the body.
 void step_manipulandum(const Settings& set, Hand& hand, const Body& body, h6Status& status);
-// Moves all moving bodies by one time step.
-void step_bodies(const Settings& set, std::span<Body> bodies, std::span<const LinearWrench> acting,
-                 std::span<const ShellBody> shells, std::span<const Hand> hands,
-                 std::span<const Island> islands, h6Status& status);
-// One step of a body without mass towards the pose in which its wrenches balance.
-void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6Status& status);
+// Adds the change of one time step to the velocities of all free bodies.
+void accelerate_bodies(const Settings& set, std::span<Body> bodies,
+                       std::span<const LinearWrench> acting, std::span<const ShellBody> shells,
+                       std::span<const Island> islands, h6Status& status);
+// Moves all free bodies by one time step, with the velocities that they have.
+void move_bodies(const Settings& set, std::span<Body> bodies, std::span<const Island> islands,
+                 h6Status& status);
+// One step of a body without mass towards the pose in which its wrenches balance. No point moves
+// farther than `most` [m].
+void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, double most,
+                 h6Status& status);
 // Makes the command for the device: in impedance mode the reaction to the hand's wrench on the
 // body, in the admittance modes the pose of the body or the manipulandum. `command` may be null.
 void send(HandDevice& device, Hand& hand, Body& body, double dt, h6DeviceCommand* command,
@@ -56,8 +67,9 @@ Pull pull_of(h6Gradient gradient, const h6CouplingDef& coupling, const Body& bod
 Mat6 mass_matrix(const Body& body, const RigidState& state, double mass);
 Vec6 gyroscopic(const Body& body, const RigidState& state, double mass);
 Vec6 velocity(const RigidState& state);
-// Adds `du` to the velocity, then moves by it for h seconds. False when the result is not finite:
-// the state then stays where it was, at rest.
-bool move_or_rest(RigidState& state, const Vec6& du, double h, bool translation_only);
+void add_velocity(RigidState& state, const Vec6& du, bool translation_only);
+// Moves by the velocity for h seconds. False when the result is not finite: the state then stays
+// where it was, at rest.
+bool move_or_rest(RigidState& state, double h, bool translation_only);
 
 }  // namespace h6

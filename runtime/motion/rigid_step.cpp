@@ -129,8 +129,9 @@ bool solve_together(const Settings& set, std::span<const Body> bodies,
   return solve_system(set.gradient, A, f, du);
 }
 
-void step_island(const Settings& set, std::span<Body> bodies, std::span<const LinearWrench> acting,
-                 std::span<const ShellBody> shells, const Island& island, h6Status& status) {
+void accelerate_island(const Settings& set, std::span<Body> bodies,
+                       std::span<const LinearWrench> acting, std::span<const ShellBody> shells,
+                       const Island& island, h6Status& status) {
   IslandVector du;
   Vec6 alone;
   const bool one = island.count == 1, implicit = set.integrator == H6_IMPLICIT;
@@ -144,7 +145,9 @@ void step_island(const Settings& set, std::span<Body> bodies, std::span<const Li
     const Vec6 change = !solved ? explicit_change(body, acting[b], set.dt)
                         : one   ? alone
                                 : Vec6(du.segment<6>(6 * i));
-    if (!move_or_rest(body, change, set.dt, body.translation_only)) status |= H6_STATE_NOT_FINITE;
+    add_velocity(body, change, body.translation_only);
+    body.gained_v += change.head<3>();
+    body.gained_w += change.tail<3>();
   }
 }
 
@@ -172,12 +175,15 @@ Vec6 gyroscopic(const Body& body, const RigidState& state, double mass) {
   return g;
 }
 
-bool move_or_rest(RigidState& state, const Vec6& du, double h, bool translation_only) {
-  const RigidState before = state;
+void add_velocity(RigidState& state, const Vec6& du, bool translation_only) {
   state.v += du.head<3>();
+  if (!translation_only) state.w += du.tail<3>();
+}
+
+bool move_or_rest(RigidState& state, double h, bool translation_only) {
+  const RigidState before = state;
   state.x += h * state.v;
   if (!translation_only) {
-    state.w += du.tail<3>();
     state.q = (exp_rotation(h * state.w) * state.q).normalized();
     state.R = state.q.toRotationMatrix();
   }
@@ -189,15 +195,20 @@ bool move_or_rest(RigidState& state, const Vec6& du, double h, bool translation_
   return false;
 }
 
-void step_bodies(const Settings& set, std::span<Body> bodies, std::span<const LinearWrench> acting,
-                 std::span<const ShellBody> shells, std::span<const Hand> hands,
-                 std::span<const Island> islands, h6Status& status) {
-  for (const Hand& hand : hands) {
-    Body& body = bodies[hand.body];
-    if (body.motion == Motion::quasi_static && hand.seen)
-      step_static(set.gradient, body, acting[hand.body], status);
-  }
-  for (const Island& island : islands) step_island(set, bodies, acting, shells, island, status);
+void accelerate_bodies(const Settings& set, std::span<Body> bodies,
+                       std::span<const LinearWrench> acting, std::span<const ShellBody> shells,
+                       std::span<const Island> islands, h6Status& status) {
+  for (const Island& island : islands)
+    accelerate_island(set, bodies, acting, shells, island, status);
+}
+
+void move_bodies(const Settings& set, std::span<Body> bodies, std::span<const Island> islands,
+                 h6Status& status) {
+  for (const Island& island : islands)
+    for (int i = 0; i < island.count; ++i) {
+      Body& body = bodies[island.body[i]];
+      if (!move_or_rest(body, set.dt, body.translation_only)) status |= H6_STATE_NOT_FINITE;
+    }
 }
 
 }  // namespace h6

@@ -15,7 +15,8 @@ double reach(const Body& body, const Vec6& dq) {
 
 }  // namespace
 
-void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6Status& status) {
+void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, double most,
+                 h6Status& status) {
   Mat6 A = -acting.K;
   Vec6 f = acting.f, dq;
   if (body.translation_only) hold_rotation(A, f, 0);
@@ -24,11 +25,12 @@ void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, h6
     return;
   }
   const double far = reach(body, dq);
-  if (far > body.max_step) dq *= body.max_step / far;
+  if (far > most) dq *= most / far;
   // dq acts as a velocity for one second; the body has no velocity before or after.
   body.v.setZero();
   body.w.setZero();
-  if (!move_or_rest(body, dq, 1, body.translation_only)) status |= H6_STATE_NOT_FINITE;
+  add_velocity(body, dq, body.translation_only);
+  if (!move_or_rest(body, 1, body.translation_only)) status |= H6_STATE_NOT_FINITE;
   body.v.setZero();
   body.w.setZero();
 }

@@ -251,6 +251,9 @@ typedef struct h6SessionDef {
   double       rate;          /* frames per second, 100 .. 10000                             [Hz]  */
   h6Vec3       gravity;       /* default 0: the arm carries the part                      [m/s^2]  */
   size_t       max_contacts;  /* per shell body; storage is reserved once                          */
+  uint32_t     max_substeps;  /* most steps that a frame takes so that no point near a field moves
+                                 farther than a quarter of a voxel in a step, 1 .. 64; 1: each
+                                 frame takes one step, however far it goes                         */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
   double       frame_budget_us; /* anytime mode: a step that would take longer samples fewer points
@@ -341,6 +344,8 @@ typedef struct h6FrameReport {
                                         none is deeper than its field's band                        */
   double   fit_depth_voxels;         /* true depth of the deepest point, relieved or not, of the pairs
                                         with relief or a fit_offset; 0: there are none              */
+  uint32_t substeps;                 /* steps that the frame took. `contacts` and h6GetContacts are
+                                        those of the last one, depths are the deepest of all        */
 } h6FrameReport;
 
 /* The overlap of a shell body with a field body at the start: the points inside the field. */

@@ -131,6 +131,11 @@ constexpr Mode kModes[] = {
      }},
     {"relief of a tight fit", [](BallInBowl& s) { s.bodies[1].pose.p.x = 0.9 * mm; }},
     {"translation only", [](BallInBowl& s) { s.bodies[1].translation_only = true; }},
+    {"substeps",
+     [](BallInBowl& s) {
+       s.def.max_substeps = 8;
+       s.bodies[1].velocity = {{2, 1, 0}, {0, 50, 0}};
+     }},
     {"explicit step",
      [](BallInBowl& s) { s.def.integrator = H6_EXPLICIT, s.def.contact.stiffness = 100; }}};
 

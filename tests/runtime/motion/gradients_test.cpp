@@ -415,6 +415,7 @@ TEST_CASE(
     h.sample = test::hand_at(test::pose(30 * mm, 10 * mm, -20 * mm));
     const Quat q0 = exp_rotation({0.3, 0.7, -0.4});
     h.sample.pose.q = to(exp_rotation(at.angle * Vec3(0.5, -1, 0.7).normalized()) * q0);
+    h.now = h.sample.pose;
     h.sample.velocity = {{0.01, 0.02, -0.01}, {0.2, 0.1, -0.3}};
     Body& body = s->bodies[1];
     body.q = q0, body.R = q0.toRotationMatrix();

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// substeps.cpp - bounds the motion of points relative to the fields that they are near.
+#include "runtime/frame/substeps.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/contact/traverse_pair.h"
+#include "runtime/frame/session.h"
+
+namespace h6 {
+namespace {
+
+bool is_free(const Body& body) { return !body.fixed && body.motion == Motion::dynamic; }
+
+// A bound on the motion of a pair's points against its field, from a shift of a's centre of mass
+// against b's frame and a turn [m].
+double reach(const Body& a, double shift, double turn) { return shift + turn * a.radius; }
+
+// The motion that the velocities of free bodies make in `dt` seconds [m].
+double free_motion(const Body& a, const Body& b, double dt) {
+  Vec3 v = Vec3::Zero(), w = Vec3::Zero();
+  if (is_free(a)) v = a.v, w = a.w;
+  if (is_free(b)) v -= b.v + b.w.cross(a.x - b.x), w -= b.w;
+  return dt * reach(a, v.norm(), w.norm());
+}
+
+// The motion that the hands of held bodies make in this frame [m].
+double held_motion(const h6Session& s, const Pair& pair) {
+  const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+  double way = 0;
+  for (const Hand& hand : s.hands) {
+    const Body& body = s.bodies[hand.body];
+    if (body.motion != Motion::held || !hand.seen) continue;
+    const Way of = way_of(hand, body);
+    if (hand.body == pair.a) way += reach(a, of.shift, of.turn);
+    if (hand.body == pair.b) way += reach(a, of.shift + of.turn * (a.x - b.x).norm(), of.turn);
+  }
+  return way;
+}
+
+// The speed that this body's points gain in a frame if it gains as much as in the last one, as far
+// away as the pair's points are [m/s].
+double gain(const Body& body, const Body& a) {
+  if (!is_free(body)) return 0;
+  const double lever = (a.x - body.x).norm() + a.radius;
+  return body.gained_v.norm() + body.gained_w.norm() * lever;
+}
+
+// How far the pair's points may go in one step if they would go `way` [voxel].
+double allowed(h6Session& s, const Pair& pair, double way) {
+  if (way <= kLongestStep) return way;
+  const double clear =
+      clearance(s.settings, s.bodies[pair.a], s.bodies[pair.b], way, s.lanes.scratch[0].traverse);
+  return std::min(way, std::max(clear, kLongestStep));
+}
+
+}  // namespace
+
+Substeps plan_substeps(h6Session& s) {
+  if (s.settings.max_substeps == 1) return {};
+  double needed = 1;
+  for (const Pair& pair : s.pairs) {
+    const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+    const double dt = s.settings.dt;
+    const double way =
+        (free_motion(a, b, dt) + dt * (gain(a, a) + gain(b, a)) + held_motion(s, pair)) /
+        b.field->voxel;
+    if (way > needed * kLongestStep && allowed(s, pair, way) < way)
+      needed = std::ceil(way / kLongestStep);
+  }
+  for (Body& body : s.bodies) body.gained_v.setZero(), body.gained_w.setZero();
+  const double most = s.settings.max_substeps;
+  return {static_cast<std::uint32_t>(std::min(needed, most)), needed};
+}
+
+double share_of_way(const Substeps& plan, bool held, std::uint32_t i) {
+  return (i + 1) / (held ? plan.needed : plan.count);
+}
+
+bool slow_down(h6Session& s, double dt) {
+  if (s.settings.max_substeps == 1) return false;
+  double share = 1;
+  for (const Pair& pair : s.pairs) {
+    const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
+    const double held = held_motion(s, pair) / s.substeps.needed;
+    const double moved = free_motion(a, b, dt) / b.field->voxel;
+    const double way = moved + held / b.field->voxel;
+    if (way > kLongestStep && moved > 0)
+      share = std::min(share, std::max(0.0, 1 - (way - allowed(s, pair, way)) / moved));
+  }
+  if (!(share < 1)) return false;
+  for (Body& body : s.bodies)
+    if (is_free(body)) body.v *= share, body.w *= share;
+  return true;
+}
+
+}  // namespace h6

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// Substeps: near a field no point jumps over an obstacle, and elsewhere nothing changes.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/ball_in_bowl.h"
+#include "tests/support/box_on_floor.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr double kStep = 0.25 * mm;  // a quarter of a voxel of all scenes here
+
+double moved(const h6BodyState& before, const h6BodyState& after) {
+  return norm(after.pose.p - before.pose.p);
+}
+
+// A ball without a hand that flies along the floor, one voxel above it, and spins.
+struct FlyingBall : BoxOnFloor {
+  ShellArrays ball = sphere_points(5 * mm, 500);
+  Model round{{def_of(field)}, {ball.def()}};
+  explicit FlyingBall(double speed, unsigned substeps) {
+    bodies[1].com = {};
+    std::fill_n(bodies[1].inertia, 6, 0.0);
+    for (int i = 0; i < 3; ++i) bodies[1].inertia[i] = 1e-6;
+    bodies[1].pose = pose(-40 * mm, 0, 6 * mm);
+    bodies[1].velocity = {{speed, 0, 0}, {0, 30, 40}};
+    def.hand_count = 0;
+    def.max_substeps = substeps;
+    h6Error error{};
+    session = h6CreateSession(round.handle, &def, &error);
+    REQUIRE_MESSAGE(session, error.message);
+  }
+  h6FrameReport step() {
+    h6Step(session, nullptr, nullptr);
+    return h6GetFrame(session);
+  }
+};
+
+// A hand that holds a box directly and moves it through a sheet, half a voxel thick.
+struct Sweep : BoxOnFloor {
+  FieldArrays sheet =
+      sample_analytic([](double, double, double z) { return std::fabs(z) - 0.25 * mm; },
+                      {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8);
+  Model thin{{def_of(sheet)}, {shell.def()}};
+  explicit Sweep(unsigned substeps) {
+    def.max_substeps = substeps;
+    hand.coupling.mode = H6_COUPLING_DIRECT;
+    h6Error error{};
+    session = h6CreateSession(thin.handle, &def, &error);
+    REQUIRE_MESSAGE(session, error.message);
+  }
+  h6FrameReport step(double z, h6DeviceCommand* command = nullptr) {
+    const h6DeviceSample sample = hand_at(pose(0, 0, z + 5 * mm));  // z: of the points
+    h6Step(session, &sample, command);
+    return h6GetFrame(session);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("far from everything, fast motion takes one step and has the bits of no substeps") {
+  BoxOnFloor one, many;
+  many.def.max_substeps = 16;
+  one.open(), many.open();
+  for (int i = 0; i < 300; ++i) {
+    h6DeviceSample sample = wild(i);
+    sample.pose.p.z += 0.12;  // above the floor by more than the box and its way are long
+    if (i == 0)
+      for (BoxOnFloor* box : {&one, &many}) {
+        const h6BodyState state{sample.pose, {{3, -2, 1}, {40, 0, 20}}};
+        h6SetBody(box->session, 1, &state);
+      }
+    h6Step(one.session, &sample, nullptr);
+    h6Step(many.session, &sample, nullptr);
+    REQUIRE(h6GetFrame(many.session).substeps == 1);
+    REQUIRE(h6GetFrame(one.session).state_hash == h6GetFrame(many.session).state_hash);
+  }
+  CHECK(norm(many.body().velocity.linear) > 0.1);
+}
+
+TEST_CASE("slow contact takes one step and has the bits of no substeps") {
+  for (const h6CouplingMode mode : {H6_COUPLING_DYNAMIC, H6_COUPLING_STATIC, H6_COUPLING_DIRECT}) {
+    CAPTURE(static_cast<int>(mode));
+    BoxOnFloor one, many;
+    for (BoxOnFloor* box : {&one, &many}) box->hand.coupling.mode = mode;
+    many.def.max_substeps = 16;
+    one.open(), many.open();
+    std::uint32_t contacts = 0;
+    for (int i = 0; i < 500; ++i) {
+      const h6DeviceSample sample = hand_at(
+          {{2 * mm * std::sin(0.01 * i), 0, (5.2 - 0.004 * i) * mm}, about(1, 0, 0, 1e-4 * i)});
+      h6Step(one.session, &sample, nullptr);
+      h6Step(many.session, &sample, nullptr);
+      REQUIRE(h6GetFrame(many.session).substeps == 1);
+      REQUIRE(h6GetFrame(one.session).state_hash == h6GetFrame(many.session).state_hash);
+      contacts = std::max(contacts, h6GetFrame(many.session).contacts);
+    }
+    CHECK(contacts > 10);
+  }
+}
+
+TEST_CASE("free flight close to a wall ends where it ends without substeps") {
+  FlyingBall one(1.9, 1), many(1.9, 16);
+  for (int i = 0; i < 40; ++i) {
+    one.step();
+    const h6FrameReport r = many.step();
+    REQUIRE(r.contacts == 0);
+    REQUIRE(r.substeps > 1);
+    REQUIRE((r.status & H6_SHORTENED) == 0);
+  }
+  const h6BodyState a = one.body(), b = many.body();
+  CHECK(norm(a.pose.p - b.pose.p) < 1e-12);
+  CHECK(norm(a.velocity.linear - b.velocity.linear) < 1e-12);
+  CHECK(norm(a.velocity.angular - b.velocity.angular) < 1e-9);
+  CHECK(angle_between(a.pose.q, b.pose.q) < 1e-9);
+}
+
+TEST_CASE("near a field a body moves at most a quarter of a voxel a step, whatever the budget") {
+  for (const unsigned budget : {2u, 4u, 64u})
+    for (const double speed : {0.3, 0.7, 2.0, 9.0}) {
+      CAPTURE(budget);
+      CAPTURE(speed);
+      FlyingBall ball(speed, budget);
+      bool shortened = false;
+      std::uint32_t most = 0;
+      for (int i = 0; i < 30 && ball.body().pose.p.x < 40 * mm; ++i) {
+        const h6BodyState before = ball.body();
+        const h6FrameReport r = ball.step();
+        REQUIRE(r.substeps <= budget);
+        REQUIRE(moved(before, ball.body()) <= r.substeps * kStep * (1 + 1e-9));
+        shortened = shortened || (r.status & H6_SHORTENED);
+        most = std::max(most, r.substeps);
+      }
+      // A spinning point moves faster than the centre.
+      const bool enough = (speed + 50 * 5 * mm) * 1e-3 <= budget * kStep;
+      CHECK(shortened == !enough);
+      if (!enough) CHECK(most == budget);
+    }
+}
+
+TEST_CASE("with a budget of one step nothing is bounded") {
+  FlyingBall ball(9, 1);
+  const h6BodyState before = ball.body();
+  const h6FrameReport r = ball.step();
+  CHECK(r.substeps == 1);
+  CHECK((r.status & H6_SHORTENED) == 0);
+  CHECK(moved(before, ball.body()) == doctest::Approx(9 * mm));
+}
+
+TEST_CASE(
+    "a box that its hand holds directly meets the sheet that it jumps over without substeps") {
+  Sweep one(1), many(16);
+  h6DeviceCommand jumped{}, swept{};
+  one.step(1.5 * mm), many.step(1.5 * mm);
+  CHECK(one.step(-1.5 * mm, &jumped).max_depth == 0);
+  const h6FrameReport r = many.step(-1.5 * mm, &swept);
+  CHECK(r.substeps >= 12);
+  CHECK(r.max_depth > 0.01 * mm);
+  CHECK((r.status & H6_SHORTENED) == 0);
+  CHECK(jumped.wrench.force.z == 0);
+  CHECK(std::fabs(swept.wrench.force.z) > 0);
+  CHECK(same_bits(one.body().pose.q, many.body().pose.q));
+  CHECK(one.body().pose.p.z == many.body().pose.p.z);
+}
+
+TEST_CASE("a box that its hand holds directly stays behind when the budget ends, and catches up") {
+  Sweep few(2);
+  few.step(2 * mm);
+  double before = few.body().pose.p.z;
+  int late = 0;
+  for (int i = 0; i < 10; ++i) {
+    const h6FrameReport r = few.step(-2 * mm);
+    const double z = few.body().pose.p.z;
+    CHECK(before - z <= 2 * kStep * (1 + 1e-9));
+    late += (r.status & H6_SHORTENED) != 0;
+    before = z;
+  }
+  CHECK(late >= 7);
+  CHECK((h6GetFrame(few.session).status & H6_SHORTENED) == 0);
+  CHECK(few.body().pose.p.z == 3 * mm);
+}
+
+TEST_CASE("fast motion against a wall has the same bits on one thread and on two, and twice") {
+  std::vector<std::uint64_t> hashes[3];
+  int several = 0;
+  for (int run = 0; run < 3; ++run) {
+    BallInBowl scene(run == 1 ? 2 : 1, 6000);
+    scene.def.max_substeps = 8;
+    scene.bodies[1].velocity = {{2, 1, -1}, {0, 20, 0}};
+    scene.open();
+    for (int i = 0; i < 60; ++i) {
+      h6DeviceSample sample = scene.sample(7 * i);
+      sample.pose.p.x += 3 * mm * std::sin(0.9 * i);
+      h6Step(scene.session, &sample, nullptr);
+      hashes[run].push_back(h6GetFrame(scene.session).state_hash);
+      several += h6GetFrame(scene.session).substeps > 1;
+    }
+  }
+  CHECK(several > 10);
+  CHECK(hashes[0] == hashes[1]);
+  CHECK(hashes[0] == hashes[2]);
+}
+
+TEST_CASE("sixty thousand frames of wild motion run again to the bit") {
+  BoxOnFloor one, again;
+  one.def.max_substeps = again.def.max_substeps = 8;
+  one.open(), again.open();
+  long several = 0;
+  for (int i = 0; i < 60000; ++i) {
+    const h6DeviceSample sample = wild(i);
+    h6Step(one.session, &sample, nullptr);
+    h6Step(again.session, &sample, nullptr);
+    const h6FrameReport a = h6GetFrame(one.session), b = h6GetFrame(again.session);
+    several += a.substeps > 1;
+    if (a.state_hash == b.state_hash && a.substeps == b.substeps && a.status == b.status) continue;
+    CAPTURE(i);
+    REQUIRE(a.state_hash == b.state_hash);
+    REQUIRE(a.substeps == b.substeps);
+  }
+  CHECK(several > 1000);
+}
