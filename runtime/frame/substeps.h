@@ -8,9 +8,10 @@
 
 namespace h6 {
 
-// No point near a field moves farther than this in a step [voxel]: half of the thinnest sheet. In
-// the rear half of a sheet the gradient points to the far side.
-inline constexpr double kLongestStep = 0.25;
+// No point near a field moves farther than this in a step [voxel]. So it lands in the front half of
+// a sheet of half a voxel, with some room left for the spring. In the rear half the gradient points
+// to the far side.
+inline constexpr double kLongestStep = 0.2;
 
 // The steps of one frame.
 struct Substeps {

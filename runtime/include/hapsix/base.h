@@ -55,7 +55,7 @@ enum {
    * pairs sampled only coarse_points of each sixteen points. Raise the budget, lower the rate, or give
    * the shell fewer points. */
   H6_COARSE = 1u << 11,
-  /* A body near a field would have moved farther than a quarter of a voxel in a step, since the frame
+  /* A body near a field would have moved farther than a fifth of a voxel in a step, since the frame
    * had no steps left or the body gained speed too suddenly: all bodies were slowed down. Raise
    * h6SessionDef.max_substeps or the rate. */
   H6_SHORTENED = 1u << 12
