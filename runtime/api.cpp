@@ -86,6 +86,7 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   body.w = from(state->velocity.angular);
   if (body.translation_only) body.w.setZero();
   if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
+  body.step_rate.setZero();
   if (ShellBody* shell = find_shell(*session, index)) std::fill_n(shell->series_y, 6, 0.0);
   if (session->frame == 0) forget_relief(*session, index);
   forget_energy(*session, index);

@@ -128,8 +128,7 @@ void couple_and_step(h6Session& s, const Settings& set, bool last) {
     for (const Hand& hand : s.hands) {
       Body& body = s.bodies[hand.body];
       if (body.motion == Motion::quasi_static && hand.seen)
-        step_static(set.gradient, body, s.acting[hand.body], body.max_step / s.substeps.count,
-                    status);
+        step_static(set, body, s.acting[hand.body], body.max_step / s.substeps.count, status);
     }
     accelerate_bodies(set, s.bodies, s.acting, s.shells, s.islands, status);
     if (slow_down(s, set.dt)) status |= H6_SHORTENED;

@@ -58,6 +58,10 @@ void RunTally::late_frame(const h6FrameRecord& r) {
   late_speed2_ += speed * speed, ++late_;
   late_low_ = std::min(late_low_, r.report.max_depth_voxels);
   late_high_ = std::max(late_high_, r.report.max_depth_voxels);
+  for (double h6Vec3::*i : {&h6Vec3::x, &h6Vec3::y, &h6Vec3::z}) {
+    late_hand_low_.*i = std::min(late_hand_low_.*i, r.hand[0].pose.p.*i);
+    late_hand_high_.*i = std::max(late_hand_high_.*i, r.hand[0].pose.p.*i);
+  }
 }
 
 RunTotals RunTally::totals() const {
@@ -68,6 +72,7 @@ RunTotals RunTally::totals() const {
   if (late_) {
     out.late_speed = std::sqrt(late_speed2_ / static_cast<double>(late_));
     out.late_depth_swing = late_high_ - late_low_;
+    out.late_hand_swing = norm(late_hand_high_ - late_hand_low_);
   }
   return out;
 }

@@ -24,6 +24,7 @@ struct RunTotals {
   double force_jump = 0;                 // largest change of the contact force between frames [N]
   double late_speed = 0;                 // RMS speed of the body's centre, last 0.2 s [m/s]
   double late_depth_swing = 0;           // peak-to-peak depth over the last 0.2 s [voxel]
+  double late_hand_swing = 0;            // way across the first hand's motion, last 0.2 s [m]
   double max_force = 0, max_torque = 0;  // sent to the devices [N], [N m]
   h6Pose final_pose{}, hand_pose{};      // last pose of the first hand's body, and of that hand
   std::uint64_t state_hash = 0;
@@ -52,6 +53,7 @@ class RunTally {
   io::VerdictWatch verdict_;
   double late_from_;
   h6Vec3 contact_force_{};
+  h6Vec3 late_hand_low_{1e9, 1e9, 1e9}, late_hand_high_{-1e9, -1e9, -1e9};
   double contacts_ = 0, late_speed2_ = 0, late_low_ = 1e9, late_high_ = 0;
   std::uint64_t touching_ = 0, late_ = 0;
 };

@@ -31,6 +31,10 @@ struct Body : RigidState {
   double max_step = 0;           // quasi-static: the most that a point may move in a frame [m]
   // How much velocity the solver gave a free body in the last frame, before it was slowed down.
   Vec3 gained_v = Vec3::Zero(), gained_w = Vec3::Zero();
+  // Quasi-static: the coupling's damping over its stiffness [s], and the velocity of the last step,
+  // which this damper sees and contacts do not.
+  double lag = 0;
+  Vec6 step_rate = Vec6::Zero();
   double drag = 0;  // admittance hands: damping of the free body [N s/m]
 };
 

@@ -93,8 +93,12 @@ double admittance_damping(const h6HandDef& def, double mass) {
   return def.admittance_damping > 0 ? def.admittance_damping : std::max(mass / 0.02, 10.0);
 }
 
-void set_hand(Hand& hand, HandDevice& device, Body& body, const h6HandDef& def,
-              double contact_stiffness) {
+// Static coupling: a damper of this many frames times its spring, for a damping ratio of 1. It pays
+// for the delay of a loop whose commands come two frames late (METHOD.md, Sec. 4).
+constexpr double kLagFrames = 3;
+
+void set_hand(const Settings& set, Hand& hand, HandDevice& device, Body& body,
+              const h6HandDef& def) {
   hand.body = def.body;
   hand.mode = def.mode;
   hand.manipulandum_mass = def.manipulandum_mass;
@@ -115,13 +119,14 @@ void set_hand(Hand& hand, HandDevice& device, Body& body, const h6HandDef& def,
   h6CouplingDef& c = hand.coupling = def.coupling;
   if (c.rotational_stiffness == 0)
     c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
-  if (c.max_force == 0) c.max_force = contact_stiffness * c.max_depth_voxels * body.voxel;
+  if (c.max_force == 0) c.max_force = set.contact.stiffness * c.max_depth_voxels * body.voxel;
   if (c.max_torque == 0)
     c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
   if (hand.mode == H6_ADMITTANCE) body.drag += admittance_damping(def, body.mass);
   if (c.mode == H6_COUPLING_STATIC) body.motion = Motion::quasi_static;
   if (c.mode == H6_COUPLING_DIRECT) body.motion = Motion::held;
   body.max_step = c.max_step_voxels * body.voxel;
+  body.lag = c.damping_ratio * kLagFrames * set.dt;
   if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
   hand.manipulandum = body;
 }
@@ -324,8 +329,8 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
     set_body(s.bodies[i], def.bodies[i], voxel_of(s.bodies, static_cast<std::int32_t>(i), pairs));
   set_pairs(s, def, pairs, columns);
   for (std::size_t i = 0; i < n.hands; ++i)
-    set_hand(*new (&s.hands[i]) Hand(), *new (&s.devices[i]) HandDevice(),
-             s.bodies[def.hands[i].body], def.hands[i], s.settings.contact.stiffness);
+    set_hand(s.settings, *new (&s.hands[i]) Hand(), *new (&s.devices[i]) HandDevice(),
+             s.bodies[def.hands[i].body], def.hands[i]);
   const std::vector<Island> islands = islands_of(s.bodies, pairs);
   s.islands = s.islands.first(islands.size());
   std::copy(islands.begin(), islands.end(), s.islands.begin());

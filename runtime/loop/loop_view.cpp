@@ -64,8 +64,10 @@ bool LoopView::read(h6LoopView* out) {
 
 void take_over(h6Session& next, const h6Session& before) {
   H6_ASSERT(next.bodies.size() == before.bodies.size() && next.hands.size() == before.hands.size());
-  for (std::size_t i = 0; i < next.bodies.size(); ++i)
+  for (std::size_t i = 0; i < next.bodies.size(); ++i) {
     static_cast<RigidState&>(next.bodies[i]) = before.bodies[i];
+    next.bodies[i].step_rate = before.bodies[i].step_rate;
+  }
   for (std::size_t i = 0; i < next.hands.size(); ++i) {
     const Hand set = next.hands[i];
     Hand& hand = next.hands[i] = before.hands[i];

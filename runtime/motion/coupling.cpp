@@ -36,18 +36,21 @@ struct Link {
 // Their sum is saturated again.
 //
 // A quasi-static body takes the secant: the true derivative is singular along the pull, so free
-// motion would have no solution, while the secant leads to the pose at which the pull ends.
+// motion would have no solution, while the secant leads to the pose at which the pull ends. It has
+// no mass, and its lag behind the hand is damper over spring.
 Link link(const Spring& spring, const Vec3& stretch, const Vec3& rate, bool secant, bool exact) {
   const Vec3 pull = spring.k * stretch;
   const Saturated held = saturate(pull, spring.most);
   const double left = held.cut ? spring.most / pull.norm() : 1.0;
-  const double b = spring.b * std::sqrt(left);
+  const double b = spring.b * (secant ? left : std::sqrt(left));
   const Saturated sum = saturate(held.value + b * rate, spring.most);
+  const double kept = sum.cut ? spring.most / (held.value + b * rate).norm() : 1.0;
   Link out{sum.value, Mat3::Zero(), -(b * sum.P), held.cut || sum.cut};
-  if (secant)
-    out.K = -(spring.k * left) * Mat3::Identity();
-  else if (!exact)
-    out.K = -(spring.k * (sum.cut ? spring.most / (held.value + b * rate).norm() : 1.0)) * held.P;
+  if (secant) {
+    out.K = -(spring.k * left * kept) * Mat3::Identity();
+    out.D = -(b * kept) * Mat3::Identity();
+  } else if (!exact)
+    out.K = -(spring.k * kept) * held.P;
   else
     out.K = -spring.k * sum.P *
             (held.cut ? Mat3(held.P - (0.5 * b / pull.squaredNorm()) * rate * pull.transpose())
@@ -93,8 +96,11 @@ void couple_admittance(Hand& hand, const Body& body, LinearWrench& acting, h6Sta
 Pull pull_of(h6Gradient gradient, const h6CouplingDef& c, const Body& body,
              const RigidState& target, const RigidState& pulled) {
   const bool at_rest = c.mode == H6_COUPLING_STATIC;
-  const double zeta = at_rest ? 0 : c.damping_ratio;
-  const Spring forward{c.stiffness, 2 * zeta * std::sqrt(c.stiffness * body.mass), c.max_force};
+  // The damper of a spring, for a body with this inertia.
+  const auto damper = [&](double k, double inertia) {
+    return at_rest ? body.lag * k : 2 * c.damping_ratio * std::sqrt(k * inertia);
+  };
+  const Spring forward{c.stiffness, damper(c.stiffness, body.mass), c.max_force};
   const Link force =
       link(forward, target.x - pulled.x, target.v - pulled.v, at_rest, gradient == H6_EXACT);
   Pull pull;
@@ -107,7 +113,7 @@ Pull pull_of(h6Gradient gradient, const h6CouplingDef& c, const Body& body,
   if (body.translation_only) return pull;
 
   const double k = c.rotational_stiffness;
-  const Spring turning{k, 2 * zeta * std::sqrt(k * body.inertia.trace() / 3), c.max_torque};
+  const Spring turning{k, damper(k, body.inertia.trace() / 3), c.max_torque};
   const Vec3 theta = log_rotation(target.q * pulled.q.conjugate());
   const Link torque = link(turning, theta, target.w - pulled.w, at_rest, gradient == H6_EXACT);
   f.tail<3>() = torque.f;
@@ -148,12 +154,21 @@ void couple(const Settings& set, Hand& hand, const Body& body, LinearWrench& act
     hand.manipulandum = held_by(hand, hand.now, body);
   else
     step_manipulandum(set, hand, body, status);
-  const Pull pull = pull_of(set.gradient, hand.coupling, body, hand.manipulandum, body);
+  const bool steps = body.motion == Motion::quasi_static;
+  RigidState pulled = body;
+  if (steps) pulled.v = body.step_rate.head<3>(), pulled.w = body.step_rate.tail<3>();
+  const Pull pull = pull_of(set.gradient, hand.coupling, body, hand.manipulandum, pulled);
   if (pull.cut) status |= H6_COUPLING_SATURATED;
-  hand.wrench = pull.wrench.f;
-  acting.f += pull.wrench.f;
-  acting.K += pull.wrench.K;
-  acting.D += pull.wrench.D;
+  const auto& [f, K, D] = pull.wrench;
+  hand.wrench = f;
+  acting.f += f;
+  acting.K += K;
+  if (steps) {  // the damper resists the step dq, whose velocity is dq/h
+    acting.f -= D * body.step_rate;
+    acting.K += D / set.dt;
+  } else {
+    acting.D += D;
+  }
 }
 
 }  // namespace h6

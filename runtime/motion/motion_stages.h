@@ -46,7 +46,7 @@ void move_bodies(const Settings& set, std::span<Body> bodies, std::span<const Is
                  h6Status& status);
 // One step of a body without mass towards the pose in which its wrenches balance. No point moves
 // farther than `most` [m].
-void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, double most,
+void step_static(const Settings& set, Body& body, const LinearWrench& acting, double most,
                  h6Status& status);
 // Makes the command for the device: in impedance mode the reaction to the hand's wrench on the
 // body, in the admittance modes the pose of the body or the manipulandum. `command` may be null.

@@ -15,12 +15,13 @@ double reach(const Body& body, const Vec6& dq) {
 
 }  // namespace
 
-void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, double most,
+void step_static(const Settings& set, Body& body, const LinearWrench& acting, double most,
                  h6Status& status) {
   Mat6 A = -acting.K;
   Vec6 f = acting.f, dq;
+  body.step_rate.setZero();
   if (body.translation_only) hold_rotation(A, f, 0);
-  if (!solve_system(gradient, A, f, dq)) {
+  if (!solve_system(set.gradient, A, f, dq)) {
     status |= H6_SOLVE_FAILED;
     return;
   }
@@ -30,7 +31,10 @@ void step_static(h6Gradient gradient, Body& body, const LinearWrench& acting, do
   body.v.setZero();
   body.w.setZero();
   add_velocity(body, dq, body.translation_only);
-  if (!move_or_rest(body, 1, body.translation_only)) status |= H6_STATE_NOT_FINITE;
+  if (move_or_rest(body, 1, body.translation_only))
+    body.step_rate = dq / set.dt;
+  else
+    status |= H6_STATE_NOT_FINITE;
   body.v.setZero();
   body.w.setZero();
 }

@@ -105,8 +105,10 @@ constexpr Setting kCouplingRows[] = {
     number<&h6CouplingDef::rotational_stiffness>("rotational_stiffness", "N m/rad", 0,
                                                  not_negative(1e9),
                                                  "0: stiffness times (30 voxels) squared"),
-    number<&h6CouplingDef::damping_ratio>("damping_ratio", "", 1, between(0, 10),
-                                          "of the coupled body; 1 is critical"),
+    number<&h6CouplingDef::damping_ratio>(
+        "damping_ratio", "", 1, between(0, 10),
+        "dynamic: of the coupled body, 1 is critical; static: the damper is "
+        "this times three frames times the spring"),
     number<&h6CouplingDef::max_depth_voxels>(
         "max_depth_voxels", "voxel", 0.5, positive(1000),
         "x_max: the largest force is the contact stiffness times this depth"),

@@ -159,8 +159,8 @@ typedef enum h6Gradient {
 /* The coupling between a hand's manipulandum and its body (METHOD.md, Sec. 4). */
 typedef enum h6CouplingMode {
   H6_COUPLING_DYNAMIC = 0, /* a body with mass on a damped spring                                  */
-  H6_COUPLING_STATIC,      /* quasi-static: each frame one step towards the pose in which spring and
-                              contacts balance; no mass, no damping (Wan & McNeely 2003)           */
+  H6_COUPLING_STATIC,      /* quasi-static: each frame one step towards the pose in which coupling and
+                              contacts balance; no mass (Wan & McNeely 2003)                       */
   H6_COUPLING_DIRECT       /* none: the body is where the hand is, the hand feels its contacts     */
 } h6CouplingMode;
 
@@ -170,7 +170,8 @@ typedef struct h6CouplingDef {
   h6CouplingMode mode;
   double stiffness;           /* k_VC                                                       [N/m]  */
   double rotational_stiffness;/* 0: stiffness * (30 voxels)^2                           [N m/rad]  */
-  double damping_ratio;       /* of the coupled body, 0 .. 10                                      */
+  double damping_ratio;       /* 0 .. 10; dynamic: of the coupled body, 1 is critical; static: the
+                                 damper is this times three frames times the spring                */
   double max_depth_voxels;    /* x_max: the largest force is k * x_max, in voxels of the body      */
   double max_force;           /* 0: contact stiffness * x_max                                 [N]  */
   double max_torque;          /* 0: max_force * the body's radius                           [N m]  */

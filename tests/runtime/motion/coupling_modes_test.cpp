@@ -38,10 +38,12 @@ TEST_CASE("a quasi-static body rests where a dynamic one comes to rest") {
         CAPTURE(z);
         const auto [moving, felt_moving] = rest(H6_COUPLING_DYNAMIC, 6000);
         const auto [at_rest, felt_at_rest] = rest(H6_COUPLING_STATIC, 400);
-        CHECK(norm(moving.pose.p - at_rest.pose.p) < 1e-7);
-        CHECK(angle_between(moving.pose.q, at_rest.pose.q) < 1e-5);
+        // Shares of `global` jump with the number of contacts, so near each rest there are others.
+        const double loose = method == H6_METHOD_GLOBAL ? 3 : 1;
+        CHECK(norm(moving.pose.p - at_rest.pose.p) < 1e-7 * loose);
+        CHECK(angle_between(moving.pose.q, at_rest.pose.q) < 1e-5 * loose);
         CHECK(norm(felt_moving.force - felt_at_rest.force) < 1e-3);
-        CHECK(norm(felt_moving.torque - felt_at_rest.torque) < 1e-5);
+        CHECK(norm(felt_moving.torque - felt_at_rest.torque) < 1e-5 * loose);
         CHECK(norm(felt_at_rest.force) > 0.5);
       }
 }
@@ -106,27 +108,86 @@ TEST_CASE("in free space a quasi-static body reaches the hand, saturated and far
     }
 }
 
-TEST_CASE("within one step of the hand a free quasi-static body is there after one frame") {
-  BoxOnFloor scene;
-  scene.hand.coupling.mode = H6_COUPLING_STATIC;
-  scene.open();
-  scene.hold(pose(0.1 * mm, 0.2 * mm, 5.5 * mm), 1);
-  CHECK(norm(scene.body().pose.p - h6Vec3{0.1 * mm, 0.2 * mm, 5.5 * mm}) < 1e-12);
-}
-
-TEST_CASE("the wrench on a quasi-static body does not depend on its speed") {
-  // The same pose, reached at two speeds of the hand: the same wrench to the bit.
-  const auto felt_at = [](double speed) {
+TEST_CASE("a free quasi-static body comes a quarter nearer to the hand in each frame") {
+  const h6Vec3 target{0.1 * mm, 0.2 * mm, 5.5 * mm};
+  for (const double ratio : {0.0, 1.0}) {  // without damping it is there at once
     BoxOnFloor scene;
     scene.hand.coupling.mode = H6_COUPLING_STATIC;
+    scene.hand.coupling.damping_ratio = ratio;
     scene.open();
-    h6DeviceSample sample = hand_at(pose(0, 0, 4.9 * mm));
-    sample.velocity = {{speed, 0, -speed}, {0, speed, 0}};
-    return scene.hold(sample, 3).wrench;
-  };
-  const h6Wrench slow = felt_at(0), fast = felt_at(1);
-  CHECK(norm(slow.force) > 0);
-  CHECK(std::memcmp(&slow, &fast, sizeof slow) == 0);
+    double away = norm(scene.body().pose.p - target);
+    for (int i = 0; i < 10; ++i) {
+      scene.hold(h6Pose{target, {1, 0, 0, 0}}, 1);
+      away *= ratio == 0 ? 0 : 0.75;
+      CHECK(norm(scene.body().pose.p - target) == near(away).epsilon(1e-9));
+    }
+  }
+}
+
+TEST_CASE("a free quasi-static body that moves with the hand feels no damper") {
+  // What is felt is the way that the hand is ahead in each frame, and nothing else.
+  for (const double ratio : {0.0, 1.0}) {
+    BoxOnFloor scene;
+    scene.hand.coupling.mode = H6_COUPLING_STATIC;
+    scene.hand.coupling.damping_ratio = ratio;
+    scene.open();
+    h6DeviceCommand felt{};
+    for (int i = 0; i < 300; ++i) {
+      h6DeviceSample sample = hand_at(pose(0.05 * mm * i, 0, 50 * mm));
+      sample.velocity.linear.x = 0.05;
+      felt = scene.hold(sample, 1);
+    }
+    CHECK(felt.wrench.force.x == near(-1e3 * 0.05 * mm).epsilon(1e-6));
+  }
+}
+
+namespace {
+
+// A handle of 0.3 kg that a soft person presses onto a floor, and whose commands come late.
+struct LateHandle {
+  double z = 6 * mm, v = 0;
+  std::array<double, 3> force{};  // newest first
+  void move(double felt, int delay, double wanted) {
+    force = {felt, force[0], force[1]};
+    for (int i = 0; i < 10; ++i) {
+      v += 1e-4 / 0.3 * (force[static_cast<std::size_t>(delay)] + 400 * (wanted - z) - 8 * v);
+      z += 1e-4 * v;
+    }
+  }
+};
+
+// How far the handle still swings after two seconds of pressing 3 mm deep [m].
+double swing_of(double k_vc, int delay, double damping_ratio) {
+  BoxOnFloor scene;
+  scene.bodies[1].com = {0, 0, 0};
+  scene.def.contact.stiffness = 1e5;
+  scene.def.contact.method = H6_METHOD_GAUSS3;
+  scene.hand.coupling.mode = H6_COUPLING_STATIC;
+  scene.hand.coupling.stiffness = k_vc;
+  scene.hand.coupling.damping_ratio = damping_ratio;
+  scene.open();
+  LateHandle handle;
+  double low = 1, high = -1;
+  for (int i = 0; i < 2500; ++i) {
+    h6DeviceSample sample = hand_at(pose(0, 0, handle.z));
+    sample.velocity.linear.z = handle.v;
+    handle.move(scene.hold(sample, 1).wrench.force.z, delay,
+                std::max(2 * mm, 6 * mm - i * 1e-3 * 10 * mm));
+    if (i >= 2000) low = std::min(low, handle.z), high = std::max(high, handle.z);
+  }
+  return high - low;
+}
+
+}  // namespace
+
+TEST_CASE("a stiff quasi-static hand rests on a wall although its commands come late") {
+  for (const double k : {1e3, 5e3, 1e4, 1.5e4})
+    for (const int delay : {0, 1, 2}) {
+      CAPTURE(k);
+      CAPTURE(delay);
+      CHECK(swing_of(k, delay, 1) < 1e-6);
+    }
+  CHECK(swing_of(1e4, 2, 0) > 1e-4);  // the damper is what brings it to rest
 }
 
 TEST_CASE("before the first good sample a quasi-static and a direct body stay where they are") {
