@@ -41,7 +41,6 @@ bool strikes(const Contacts& c, const Pair& pair, const Vec6& u, double slow, Ma
 
 void stop_impacts(const Settings& set, std::span<const Body> bodies,
                   std::span<const ShellBody> shells, std::span<LinearWrench> acting) {
-  if (set.max_substeps == 1) return;
   for (const ShellBody& shell : shells)
     for (const Pair& pair : shell.pairs) {
       if (pair.begin == pair.end) continue;

@@ -33,8 +33,8 @@ void couple(const Settings& set, Hand& hand, const Body& body, LinearWrench& act
             h6Status& status);
 // Pseudo-admittance: one time step of the manipulandum between the driver's coupling and the body.
 void step_manipulandum(const Settings& set, Hand& hand, const Body& body, h6Status& status);
-// With substeps: adds damping to contacts that strike so fast that their springs would not stop
-// them.
+// Adds damping to contacts that strike so fast that their springs would not stop them. For frames
+// of several steps.
 void stop_impacts(const Settings& set, std::span<const Body> bodies,
                   std::span<const ShellBody> shells, std::span<LinearWrench> acting);
 // Adds the change of one time step to the velocities of all free bodies.
