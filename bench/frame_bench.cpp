@@ -61,8 +61,8 @@ Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6D
 // another code path.
 bool contacts_are_right(h6Session* session, const h6DeviceSample& held) {
   const h6Pose pose = h6GetBody(session, 1).pose;
-  std::vector<double> points, depth(alpha()->watched_points.size());
-  for (const h6Vec3& p : alpha()->watched_points) {
+  std::vector<double> points, depth(alpha()->watched_points().size());
+  for (const h6Vec3& p : alpha()->watched_points()) {
     const h6Vec3 q = place(pose, p);
     points.insert(points.end(), {q.x, q.y, q.z});
   }

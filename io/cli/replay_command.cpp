@@ -5,20 +5,18 @@
 //             --rows--> samples -> h6Step -> row <-- compared to the bit --> recorded row
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cinttypes>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "hapsix/vector.h"
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
 #include "io/record/recording.h"
-#include "io/run/histogram.h"
 #include "io/run/recorded_session.h"
 #include "io/run/run_scene.h"
+#include "io/run/run_tally.h"
 #include "kernels/targets.h"
 
 namespace h6::cli {
@@ -47,52 +45,39 @@ std::string hex(std::uint64_t value) {
 
 // Figures for a person who compares two runs.
 struct Figures {
-  std::uint64_t frames = 0;
-  double contacts = 0, max_depth_voxels = 0, max_force = 0, max_torque = 0;
-  std::uint32_t contacts_max = 0;
-  Histogram frame_us;
-  io::VerdictWatch verdict;
+  RunTally tally;
+  RunTotals totals;        // after judge()
   std::uint64_t hash = 0;  // a hash of all state hashes, in order
 
-  Figures(const io::LoadedScene& loaded, double rate)
-      : verdict(loaded.scene.verdict, loaded.watched_points,
-                loaded.bodies[static_cast<std::size_t>(loaded.hands[0].body)].com, rate) {}
+  Figures(const io::LoadedScene& loaded, double rate, double duration)
+      : tally(loaded, rate, duration) {}
 
   void add(const h6FrameRecord& r) {
-    const h6FrameReport& f = r.report;
-    ++frames;
-    contacts += f.contacts;
-    contacts_max = std::max(contacts_max, f.contacts);
-    max_depth_voxels = std::max(max_depth_voxels, f.max_depth_voxels);
-    frame_us.add(f.frame_us);
-    for (const h6DeviceCommand& c : r.command) {
-      max_force = std::max(max_force, norm(c.wrench.force));
-      max_torque = std::max(max_torque, norm(c.wrench.torque));
-    }
-    verdict.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
-                  (f.status & H6_STATE_NOT_FINITE) == 0);
-    hash = (hash ^ f.state_hash) * 0xd6e8feb86659fd93u;
+    tally.frame(r);
+    hash = (hash ^ r.report.state_hash) * 0xd6e8feb86659fd93u;
     hash ^= hash >> 32;
   }
+  void judge(const io::Progress& progress) { totals = tally.totals(progress); }
   ordered_json json() const {
-    return {
-        {"contacts",
-         {{"mean", frames ? contacts / static_cast<double>(frames) : 0}, {"max", contacts_max}}},
-        {"max_depth_voxels", max_depth_voxels},
-        {"max_force", max_force},
-        {"max_torque", max_torque},
-        {"verdict", io::verdict_name(verdict.verdict())},
-        {"frame_us",
-         {{"p50", frame_us.percentile(50)},
-          {"p99", frame_us.percentile(99)},
-          {"max", frame_us.max()}}},
-        {"hash", hex(hash)}};
+    const Histogram& frame_us = tally.times().frame_us;
+    return {{"contacts", {{"mean", totals.contacts_mean}, {"max", totals.contacts_max}}},
+            {"max_depth_voxels", totals.max_depth_voxels},
+            {"max_force", totals.max_force},
+            {"max_torque", totals.max_torque},
+            {"verdict", io::verdict_name(totals.verdict)},
+            {"remarks", remarks(totals)},
+            {"frame_us",
+             {{"p50", frame_us.percentile(50)},
+              {"p99", frame_us.percentile(99)},
+              {"max", frame_us.max()}}},
+            {"hash", hex(hash)}};
   }
   void print(const char* name, const std::string& method) const {
+    const Histogram& frame_us = tally.times().frame_us;
     std::printf("%-9s %-14s %-9s %8.1f %6u %8.3f %8.2f %8.1f %8.1f\n", name, method.c_str(),
-                io::verdict_name(verdict.verdict()),
-                frames ? contacts / static_cast<double>(frames) : 0, contacts_max, max_depth_voxels,
-                max_force, frame_us.percentile(50), frame_us.percentile(99));
+                io::verdict_name(totals.verdict), totals.contacts_mean, totals.contacts_max,
+                totals.max_depth_voxels, totals.max_force, frame_us.percentile(50),
+                frame_us.percentile(99));
   }
 };
 
@@ -119,8 +104,9 @@ class Replay {
 
   // Runs frame after frame. `as_recorded` gets the recorded rows, `now` the new ones.
   Outcome play() {
-    recorded_.emplace(session_->loaded(), head_.rate);
-    replayed_.emplace(session_->loaded(), head_.rate);
+    const double duration = static_cast<double>(frames_) / head_.rate;
+    recorded_.emplace(session_->loaded(), head_.rate, duration);
+    replayed_.emplace(session_->loaded(), head_.rate, duration);
     const io::Progress progress = console_.progress();
     std::uint64_t expected = 0;
     for (std::uint64_t at = 0; at < frames_ && !divergence; at += kPiece) {
@@ -139,6 +125,8 @@ class Replay {
                     static_cast<double>(expected) / static_cast<double>(frames_)))
         return Failure{"interrupted after " + std::to_string(expected) + " frames"};
     }
+    recorded_->judge(progress);
+    replayed_->judge(progress);
     return Done{};
   }
 
@@ -148,8 +136,8 @@ class Replay {
                      {"recorded_method", session_->recorded_method()},
                      {"method", session_->method()},
                      {"threads", session_->threads()},
-                     {"frames", replayed_->frames},
-                     {"seconds", static_cast<double>(replayed_->frames) / head_.rate},
+                     {"frames", replayed_->totals.frames},
+                     {"seconds", static_cast<double>(replayed_->totals.frames) / head_.rate},
                      {"recorded_simd_target", head_.simd_target},
                      {"simd_target", kernels::target_name()},
                      {"recorded_in_virtual_time", session_->run().virtual_time},
@@ -183,7 +171,7 @@ class Replay {
     replayed_->print("replayed", session_->method());
     if (options_.verify && !divergence)
       std::printf("\nevery one of %" PRIu64 " frames is the same to the bit: %s on %u thread%s\n",
-                  replayed_->frames, kernels::target_name(), session_->threads(),
+                  replayed_->totals.frames, kernels::target_name(), session_->threads(),
                   session_->threads() == 1 ? "" : "s");
   }
 

@@ -78,6 +78,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
                 depth_strip(*summary).c_str());
+    for (const std::string& remark : remarks(*summary)) std::printf("%s\n", remark.c_str());
     if (const std::string late = late_table(*summary); !late.empty())
       std::printf("\n%s", late.c_str());
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);

@@ -43,7 +43,7 @@ std::string table(const std::vector<RunSummary>& runs) {
           "stolen\n",
           width, "");
   for (const RunSummary& r : runs)
-    out += format("%-*s %-8s  %6.1f %5u %8.3f %6.2f %7.1f %7.1f %7.1f %4s %8s %7s\n", width,
+    out += format("%-*s %-9s %6.1f %5u %8.3f %6.2f %7.1f %7.1f %7.1f %4s %8s %7s\n", width,
                   r.method.c_str(), io::verdict_name(r.verdict), r.contacts_mean, r.contacts_max,
                   r.max_depth_voxels, r.max_force, r.frame_us.percentile(50),
                   r.frame_us.percentile(99), r.frame_us.max(), late(r, r.loop.late_compute).c_str(),

@@ -149,8 +149,8 @@ std::string markdown_report(const std::vector<SceneRow>& rows,
   if (!rows.empty()) {
     out +=
         "## Scenes\n\n"
-        "Each cell gives the verdict, which follows from the motion alone, and the deepest "
-        "contact in voxels. `through` is \"slides in\", \"pops\" or \"squeezes through\". "
+        "Each cell gives the verdict, which does not know the method, and the deepest contact in "
+        "voxels. `through` is \"slides in\", \"pops\" or \"squeezes through\". "
         "`global/1` is global scaling with n0 = 1. Common values: voxel 1 mm, m = 0.1 kg, h = 1 "
         "ms, k = 1e4 N/m, k_VC = 1e3 N/m critically damped, bound at half a voxel (5 N), 0.9 "
         "N·m/rad, contact damping 1 ms, implicit, unless the scene says otherwise.\n\n" +

@@ -49,7 +49,8 @@ struct RunFigures : RunTotals {
                               // parallel to N, and the rule uses r x N made unit
   std::string error;          // why the run failed; empty when it did not
   bool moved_on() const {     // the paper counts such a run as held
-    return error.empty() && (verdict == io::Verdict::held || verdict == io::Verdict::arrived);
+    return error.empty() && (verdict == io::Verdict::held || verdict == io::Verdict::untouched ||
+                             verdict == io::Verdict::arrived);
   }
 };
 

@@ -258,12 +258,12 @@ bool RayScene::meets(const Vec3& from, const Vec3& along) const {
   return ray.ray.tfar < 0;
 }
 
-double RayScene::free_way(const Vec3& from, const Vec3& along) const {
+RayScene::Hit RayScene::first(const Vec3& from, const Vec3& along) const {
   RayContext context;
   RTCRayHit ray = embree_->ray(from, along);
   intersect(embree_->scene, context, nullptr, ray);
-  const bool met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-  return met ? double(ray.ray.tfar) * embree_->half : std::numeric_limits<double>::infinity();
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  return {embree_->triangle[ray.hit.primID], double(ray.ray.tfar) * embree_->half};
 }
 
 double RayScene::reach() const { return 5 * embree_->half; }

@@ -55,8 +55,13 @@ class RayScene {
   // a ray through the edge itself (one in some million) may meet both: let several rays vote.
   void crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all) const;
   bool meets(const Vec3& from, const Vec3& along) const;
-  // The way to the first triangle that the ray meets; infinity where it meets none.
-  double free_way(const Vec3& from, const Vec3& along) const;
+  // The first triangle that the ray meets, and the way to it; infinity where it meets none.
+  struct Hit {
+    std::uint32_t triangle = kNoTriangle;
+    double t = std::numeric_limits<double>::infinity();
+  };
+  Hit first(const Vec3& from, const Vec3& along) const;
+  double free_way(const Vec3& from, const Vec3& along) const { return first(from, along).t; }
   // A ray this long that starts in the mesh's box ends beyond the box.
   double reach() const;
 

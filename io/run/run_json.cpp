@@ -64,6 +64,22 @@ ordered_json pose_json(const h6Pose& p, double scale) {
           {"q", {p.q.w, p.q.x, p.q.y, p.q.z}}};
 }
 
+// Lengths in the scene's units.
+ordered_json through_json(const PopThroughReport& r, double scale) {
+  ordered_json out{{"computed", r.left_out.empty()}, {"first", nullptr}};
+  if (const auto& p = r.first)
+    out["first"] = {{"time", p->time},
+                    {"frame", p->frame},
+                    {"free_time", p->free_time},
+                    {"body", p->body},
+                    {"point", p->point},
+                    {"obstacle", p->obstacle},
+                    {"triangle", p->triangle},
+                    {"part", p->part},
+                    {"place", {p->place.x * scale, p->place.y * scale, p->place.z * scale}}};
+  return out;
+}
+
 ordered_json stages_json(const RunSummary& s) {
   ordered_json stages = ordered_json::object();
   for (int i = 0; i < H6_STAGE_COUNT; ++i)
@@ -105,6 +121,14 @@ ordered_json assets_json(const io::LoadedScene& loaded) {
 
 }  // namespace
 
+std::vector<std::string> remarks(const RunTotals& run) {
+  std::vector<std::string> all;
+  if (run.through.first) all.push_back(sentence(*run.through.first));
+  all.insert(all.end(), run.through.left_out.begin(), run.through.left_out.end());
+  if (!run.left_behind.empty()) all.push_back(run.left_behind);
+  return all;
+}
+
 ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool virtual_time) {
   const double scale = 1 / io::metres(loaded.scene.unit);
   char hash[20];
@@ -118,6 +142,8 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
       {"contacts", {{"mean", s.contacts_mean}, {"max", s.contacts_max}}},
       {"max_depth_voxels", s.max_depth_voxels},
       {"verdict", io::verdict_name(s.verdict)},
+      {"pop_through", through_json(s.through, scale)},
+      {"remarks", remarks(s)},
       {"frame_us", spread(s.frame_us)},
       {"stage_us", stages_json(s)},
       {"wakeup_us", spread(s.wakeup_us)},

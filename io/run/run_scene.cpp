@@ -91,7 +91,7 @@ class LiveRun {
 
   // Writes the trace and ends the recording with the summary.
   Outcome finish() {
-    watch_.finish();
+    watch_.finish(progress_);
     if (run_.def.hand_count == 0) follow_first_moving_body();
     if (!options_.trace.empty())
       if (Outcome written = trace_.write(options_.trace); !written) return written;

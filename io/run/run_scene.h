@@ -48,6 +48,9 @@ Outcome check_options(const RunOptions& options);
 Result<RunSummary> run_scene(const io::LoadedScene& scene, const RunOptions& options,
                              const Console& console);
 
+// What a person should know of a run beside its figures: a sentence each.
+std::vector<std::string> remarks(const RunTotals& run);
+
 // The object that `run --json` prints, with lengths in the scene's units.
 nlohmann::ordered_json to_json(const RunSummary& summary, const io::LoadedScene& scene,
                                bool virtual_time);

@@ -4,13 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "hapsix/vector.h"
 
 namespace h6::cli {
 namespace {
 
-constexpr double kLate = 0.2;  // the same window as the verdict's [s]
+constexpr double kLate = 0.2;     // the same window as the verdict's [s]
+constexpr double kFarBehind = 3;  // [voxel]
 
 // The centre of mass of the body that the first hand holds.
 h6Vec3 watched_com(const io::LoadedScene& loaded) {
@@ -21,7 +23,9 @@ h6Vec3 watched_com(const io::LoadedScene& loaded) {
 }  // namespace
 
 RunTally::RunTally(const io::LoadedScene& loaded, double rate, double duration)
-    : verdict_(loaded.scene.verdict, loaded.watched_points, watched_com(loaded), rate),
+    : loaded_(loaded),
+      verdict_(loaded.scene.verdict, loaded.watched_points(), watched_com(loaded), rate),
+      through_(loaded),
       late_from_(duration - kLate) {}
 
 void RunTally::frame(const h6FrameRecord& r, const h6Vec3& contact_force) {
@@ -48,7 +52,9 @@ void RunTally::frame(const h6FrameRecord& r, const h6Vec3& contact_force) {
   out_.final_pose = r.body[0].pose;
   out_.hand_pose = r.hand[0].pose;
   out_.state_hash = f.state_hash;
+  contacts_last_ = f.contacts, status_last_ = f.status;
   if (r.time >= late_from_) late_frame(r);
+  through_.frame(r);
   verdict_.frame(r.time, r.hand[0].pose, r.hand[0].velocity, r.body[0], f.max_depth_voxels,
                  (f.status & H6_STATE_NOT_FINITE) == 0);
 }
@@ -64,9 +70,34 @@ void RunTally::late_frame(const h6FrameRecord& r) {
   }
 }
 
-RunTotals RunTally::totals() const {
+std::string RunTally::left_behind() const {
+  if (loaded_.hands.empty() || loaded_.field_voxels.empty()) return "";
+  const h6HandDef& hand = loaded_.hands[0];
+  const h6HandFilterDef& filter = hand.filter;
+  // Elsewhere the device's pose is not where the body is wanted.
+  const bool plain = hand.mode == H6_IMPEDANCE && filter.motion_scale == 1 &&
+                     filter.rotation_scale == 1 && !filter.relative && filter.clutch_buttons == 0;
+  if (!plain || !(status_last_ & H6_COUPLING_SATURATED) || !verdict_.hand_rests()) return "";
+  const double voxel = *std::min_element(loaded_.field_voxels.begin(), loaded_.field_voxels.end());
+  const double lag = verdict_.lag();
+  if (!(lag > kFarBehind * voxel)) return "";
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "'%.60s' ends %.3g mm (%.1f voxels) from its hand, which rests: the coupling pulls as "
+      "hard as it may, and ",
+      loaded_.scene.hands[0].body.c_str(), 1e3 * lag, lag / voxel);
+  return text + (contacts_last_ == 0 ? std::string("nothing touches")
+                 : contacts_last_ == 1
+                     ? std::string("one contact holds the part")
+                     : std::to_string(contacts_last_) + " contacts hold the part");
+}
+
+RunTotals RunTally::totals(const io::Progress& progress) const {
   RunTotals out = out_;
-  out.verdict = verdict_.verdict();
+  out.through = through_.judge(progress);
+  out.verdict = verdict_.verdict(out.through.first.has_value());
+  out.left_behind = left_behind();
   if (out.frames) out.contacts_mean = contacts_ / static_cast<double>(out.frames);
   if (touching_) out.touching_contacts_mean = contacts_ / static_cast<double>(touching_);
   if (late_) {

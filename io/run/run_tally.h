@@ -3,16 +3,22 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "hapsix/hapsix.h"
 #include "io/run/histogram.h"
+#include "io/run/through_watch.h"
 #include "io/scene/load_scene.h"
 #include "io/scene/verdict.h"
 
 namespace h6::cli {
 
 struct RunTotals {
-  io::Verdict verdict = io::Verdict::held;
+  io::Verdict verdict = io::Verdict::untouched;
+  PopThroughReport through;
+  // A sentence if the body ends more than three voxels from a hand that rests, with a coupling that
+  // pulls as hard as it may; else empty.
+  std::string left_behind;
   std::uint64_t frames = 0;
   h6Status status = 0;  // every bit that any frame had
   std::uint32_t contacts_max = 0;
@@ -42,20 +48,26 @@ class RunTally {
   RunTally(const io::LoadedScene& loaded, double rate, double duration);
   // `contact_force` acts on the first hand's body [N]. Only `force_jump` needs it.
   void frame(const h6FrameRecord& record, const h6Vec3& contact_force = {});
-  RunTotals totals() const;
+  // Looks for points that passed through, which may take a while.
+  RunTotals totals(const io::Progress& progress = {}) const;
   const RunTimes& times() const { return times_; }
 
  private:
   void late_frame(const h6FrameRecord& record);
+  std::string left_behind() const;
 
-  RunTotals out_;  // without the means, the late figures and the verdict
+  const io::LoadedScene& loaded_;
+  RunTotals out_;  // without the means, the late figures and all that is judged
   RunTimes times_;
   io::VerdictWatch verdict_;
+  ThroughWatch through_;
   double late_from_;
   h6Vec3 contact_force_{};
   h6Vec3 late_hand_low_{1e9, 1e9, 1e9}, late_hand_high_{-1e9, -1e9, -1e9};
   double contacts_ = 0, late_speed2_ = 0, late_low_ = 1e9, late_high_ = 0;
   std::uint64_t touching_ = 0, late_ = 0;
+  std::uint32_t contacts_last_ = 0;
+  h6Status status_last_ = 0;
 };
 
 }  // namespace h6::cli

@@ -31,10 +31,12 @@ void RunWatch::note(const std::string& what, const std::string& detail) {
   event({last_time_, what, "after frame " + std::to_string(frames_) + ": " + detail});
 }
 
-void RunWatch::finish() {
+void RunWatch::finish(const io::Progress& progress) {
   if (summary_.interrupted)
     event({last_time_, "interrupted", "by the user; every device was told to stop"});
-  static_cast<RunTotals&>(summary_) = tally_.totals();
+  static_cast<RunTotals&>(summary_) = tally_.totals(progress);
+  if (const auto& popped = summary_.through.first)
+    event({popped->time, "through", sentence(*popped)});
   static_cast<RunTimes&>(summary_) = tally_.times();
 }
 

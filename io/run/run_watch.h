@@ -16,7 +16,8 @@ class RunWatch {
   Outcome rows(const h6FrameRecord* rows, std::size_t count);
   // Adds an event that the frames do not show.
   void note(const std::string& what, const std::string& detail);
-  void finish();
+  // Judges the run, which may take a while.
+  void finish(const io::Progress& progress);
 
  private:
   void row(const h6FrameRecord& record);

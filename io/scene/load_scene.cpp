@@ -34,7 +34,7 @@ class Loader {
       def.coupling = out_.scene.coupling;
       out_.hands.push_back(def);
     }
-    watch_first_hand();
+    keep_points();
     return make_model();
   }
 
@@ -71,9 +71,10 @@ class Loader {
       Result<Mesh> mesh = read_mesh(source.mesh, unit);
       if (!mesh) return mesh.failure();
       out_.warnings.insert(out_.warnings.end(), mesh->remarks.begin(), mesh->remarks.end());
-      found = meshes_.emplace(key, std::make_unique<Mesh>(std::move(*mesh))).first;
+      out_.meshes.push_back(std::make_unique<const Mesh>(std::move(*mesh)));
+      found = meshes_.emplace(key, out_.meshes.back().get()).first;
     }
-    return static_cast<const Mesh*>(found->second.get());
+    return found->second;
   }
 
   // All fields or all shells. `index` maps the key of an asset to its place in `all`.
@@ -122,14 +123,22 @@ class Loader {
   }
 
   Result<int> field(const SceneBody& body) {
-    return obtain(body, *body.field, fields_, read_field, cached_field,
-                  [](const FieldData& data, LoadedAsset& asset) {
-                    asset.is_field = true;
-                    asset.voxel_size = data.voxel_size;
-                    asset.origin = data.origin;
-                    for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
-                    asset.bricks = data.brick_count();
-                  });
+    Result<int> index = obtain(body, *body.field, fields_, read_field, cached_field,
+                               [](const FieldData& data, LoadedAsset& asset) {
+                                 asset.is_field = true;
+                                 asset.voxel_size = data.voxel_size;
+                                 asset.origin = data.origin;
+                                 for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
+                                 asset.bricks = data.brick_count();
+                               });
+    if (!index || out_.field_meshes.size() == fields_.all.size()) return index;
+    out_.field_meshes.emplace_back();  // the field is new
+    out_.field_voxels.push_back(fields_.all.back().voxel_size);
+    if (!body.field->file.empty()) return index;
+    Result<const Mesh*> mesh = mesh_of(*body.field);
+    if (!mesh) return mesh.failure();
+    out_.field_meshes.back() = std::make_unique<FieldMesh>(**mesh);
+    return index;
   }
 
   Result<int> shell(const SceneBody& body) {
@@ -187,13 +196,13 @@ class Loader {
     return Done{};
   }
 
-  void watch_first_hand() {
-    if (out_.hands.empty()) return;
-    const int shell = out_.bodies[static_cast<std::size_t>(out_.hands[0].body)].shell;
-    if (shell < 0) return;
-    const ShellData& data = shells_.all[static_cast<std::size_t>(shell)];
-    for (std::size_t i = 0; i < data.size(); ++i)
-      out_.watched_points.push_back({data.x[i], data.y[i], data.z[i]});
+  void keep_points() {
+    for (const ShellData& data : shells_.all) {
+      std::vector<h6Vec3>& points = out_.shell_points.emplace_back();
+      points.reserve(data.size());
+      for (std::size_t i = 0; i < data.size(); ++i)
+        points.push_back({data.x[i], data.y[i], data.z[i]});
+    }
   }
 
   Outcome make_model() {
@@ -212,7 +221,7 @@ class Loader {
 
   LoadedScene& out_;
   const Progress& progress_;
-  std::map<std::string, std::unique_ptr<Mesh>> meshes_;
+  std::map<std::string, const Mesh*> meshes_;  // in out_.meshes
   std::map<const Mesh*, HashedMesh> hashes_;
   Kept<FieldData> fields_;
   Kept<ShellData> shells_;
@@ -224,6 +233,12 @@ int LoadedScene::body_index(const std::string& name) const {
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     if (scene.bodies[i].name == name) return static_cast<int>(i);
   return -1;
+}
+
+const std::vector<h6Vec3>& LoadedScene::watched_points() const {
+  static const std::vector<h6Vec3> none;
+  const int shell = hands.empty() ? -1 : bodies[static_cast<std::size_t>(hands[0].body)].shell;
+  return shell < 0 ? none : shell_points[static_cast<std::size_t>(shell)];
 }
 
 double LoadedScene::duration() const {

@@ -9,6 +9,7 @@
 #include "hapsix/hapsix.h"
 #include "hapsix/result.h"
 #include "io/file/progress.h"
+#include "io/scene/field_mesh.h"
 #include "io/scene/scene.h"
 
 namespace h6::io {
@@ -36,13 +37,19 @@ struct ModelDeleter {
 struct LoadedScene {
   Scene scene;
   std::unique_ptr<h6Model, ModelDeleter> model;
-  std::vector<h6BodyDef> bodies;       // in the order of scene.bodies
-  std::vector<h6HandDef> hands;        // in the order of scene.hands
-  std::vector<h6Vec3> watched_points;  // shell of the first hand's body, mesh frame [m]
+  std::vector<h6BodyDef> bodies;                  // in the order of scene.bodies
+  std::vector<h6HandDef> hands;                   // in the order of scene.hands
+  std::vector<std::vector<h6Vec3>> shell_points;  // of each shell of the model, mesh frame [m]
+  // The mesh of each field of the model; null for a field that came from a file. Some of the meshes
+  // are in `scene`, the others in `meshes`.
+  std::vector<std::unique_ptr<FieldMesh>> field_meshes;
+  std::vector<double> field_voxels;  // [m]
+  std::vector<std::unique_ptr<const Mesh>> meshes;
   std::vector<LoadedAsset> assets;
   std::vector<std::string> warnings;
 
   int body_index(const std::string& name) const;
+  const std::vector<h6Vec3>& watched_points() const;  // shell of the first hand's body
   double duration() const;  // of the scene; if it has none, of its longest path [s]
   // The result points at `bodies` and `hands`.
   h6SessionDef session_def() const;

@@ -73,12 +73,14 @@ const char* verdict_name(Verdict verdict) {
       return "through";
     case Verdict::chatters:
       return "chatters";
-    case Verdict::held:
-      return "held";
     case Verdict::arrived:
       return "arrived";
     case Verdict::stuck:
       return "stuck";
+    case Verdict::untouched:
+      return "untouched";
+    case Verdict::held:
+      return "held";
   }
   return "unknown";
 }
@@ -215,7 +217,8 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   peak_hand_speed2_ =
       std::max(peak_hand_speed2_, mean_speed2(hand_velocity.linear, hand_velocity.angular, hand.q));
 
-  through_ = through_ || entered(body.pose);
+  entered_ = entered_ || entered(body.pose);
+  touched_ = touched_ || max_depth_voxels > 0;
 
   watch_stillness(time, hand);
   // Take the speed from poses, so that it does not depend on the velocity of the integrator.
@@ -226,6 +229,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   window_.next = (window_.next + 1) % window_.speed2.size();
   window_.filled = std::min(window_.filled + 1, window_.speed2.size());
 
+  last_hand_ = hand;
   last_body_ = body;
   last_time_ = time;
   first_ = false;
@@ -239,13 +243,13 @@ bool VerdictWatch::arrived() const {
   return std::sqrt(dot(off, off)) <= rules_.tolerance && !turned;
 }
 
-Verdict VerdictWatch::verdict() const {
+Verdict VerdictWatch::verdict(bool popped_through) const {
   const double limit = kUnstableFactor * std::max(kLeastPeakSpeed, std::sqrt(peak_hand_speed2_));
   if (!finite_ || peak_speed2_ > limit * limit) return Verdict::unstable;
-  if (through_) return Verdict::through;
+  if (entered_ || popped_through) return Verdict::through;
   if (chattered_ || (!first_ && chatters_now(last_time_))) return Verdict::chatters;
-  if (!rules_.target) return Verdict::held;
-  return arrived() ? Verdict::arrived : Verdict::stuck;
+  if (rules_.target) return arrived() ? Verdict::arrived : Verdict::stuck;
+  return touched_ ? Verdict::held : Verdict::untouched;
 }
 
 }  // namespace h6::io

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// verdict.h - judges a run by its motion alone; it does not know the contact method.
+// verdict.h - judges a run. It does not know the contact method.
 //
 // A run gets the first verdict that applies, in this order:
 //   unstable  a state was not finite, or a body was faster than 100x the hand's peak speed. A peak
 //             below 10 mm/s counts as 10 mm/s, so that a hand at rest still allows small motions.
-//   through   a shell point or the centre of mass was in a forbidden box
+//   through   a shell point passed through the environment's mesh (pop_through.h, which the caller
+//             asks), or a shell point or the centre of mass was in a forbidden box
 //   chatters  the hand was still for at least 0.2 s, and in the last 0.2 s of that phase the RMS
 //             point speed was above 2 mm/s or the peak-to-peak depth above 0.1 voxel. Only the end
 //             of a phase is judged: the body may settle first, and a limit cycle stays to the end.
 //   arrived   the scene has a target, and the run ends there
 //   stuck     the scene has a target, and the run ends elsewhere
+//   untouched nothing was ever deeper than 0
 //   held      none of the others applies
 //
 // Speeds are root mean squares (RMS) over all shell points, so that rotation counts like
 // translation. Stillness is measured on the shell points as if they moved with the hand: the hand
 // is still while they stay within 0.02 mm (RMS) of their places at the start of the phase.
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -24,7 +27,7 @@
 
 namespace h6::io {
 
-enum class Verdict { unstable, through, chatters, held, arrived, stuck };
+enum class Verdict { unstable, through, chatters, arrived, stuck, untouched, held };
 const char* verdict_name(Verdict verdict);
 
 // Watches a run frame by frame. Its memory does not grow with the length of the run.
@@ -37,9 +40,14 @@ class VerdictWatch {
   // `hand_velocity` that of the mesh frame's origin.
   void frame(double time, const h6Pose& hand, const h6Velocity& hand_velocity,
              const h6BodyState& body, double max_depth_voxels, bool state_finite);
-  Verdict verdict() const;
+  Verdict verdict(bool popped_through = false) const;
+  // Whether the hand has been still for at least 0.2 s, and how far (RMS over the points) the body
+  // is from it [m]. Both mean the last frame.
+  bool hand_rests() const { return !first_ && last_time_ - still_since_ >= kRest; }
+  double lag() const { return first_ ? 0 : std::sqrt(mean_motion2(last_hand_, last_body_.pose)); }
 
  private:
+  static constexpr double kRest = 0.2 - 1e-6;  // [s]
   // Neighbouring points in one bounding sphere, mesh frame [m]. One test of the sphere can rule out
   // all of them.
   struct Cluster {
@@ -67,9 +75,10 @@ class VerdictWatch {
   double second_[6] = {};  // mean of p pT over the points, xx yy zz xy xz yz [m^2]
   double rate_;
   double peak_hand_speed2_ = 0, peak_speed2_ = 0;
-  bool finite_ = true, through_ = false, chattered_ = false, first_ = true;
+  bool finite_ = true, entered_ = false, touched_ = false, chattered_ = false, first_ = true;
   double still_since_ = 0, last_time_ = 0;
   h6Pose still_hand_{};  // pose of the hand at the start of the still phase
+  h6Pose last_hand_{};
   h6BodyState last_body_{};
   Window window_;
 };

@@ -106,7 +106,7 @@ TEST_CASE("a scene becomes a model, bodies and hands that a session takes") {
   const LoadedScene& l = **loaded;
   CHECK(l.bodies[1].com.x == h6::test::near(0.003));
   CHECK(l.bodies[1].inertia[2] == h6::test::near(0.1 / 3 * 2e-4).epsilon(1e-6));
-  CHECK(l.watched_points.size() == 500);
+  CHECK(l.watched_points().size() == 500);
   CHECK(l.duration() == h6::test::near(0.5));
   CHECK(l.assets.size() == 2);
   const h6SessionDef def = l.session_def();

@@ -38,7 +38,7 @@ struct Moment {
   h6Pose hand = at(0, 0, 0);
   h6Velocity hand_velocity{};
   h6BodyState body{at(0, 0, 0), {}};
-  double depth = 0;
+  double depth = 0.2;
   bool finite = true;
 };
 
@@ -80,8 +80,8 @@ Moment swinging(double t, double rms_speed) {
 }  // namespace
 
 TEST_CASE("every verdict has a name") {
-  for (const Verdict v : {Verdict::unstable, Verdict::through, Verdict::chatters, Verdict::held,
-                          Verdict::arrived, Verdict::stuck})
+  for (const Verdict v : {Verdict::unstable, Verdict::through, Verdict::chatters, Verdict::arrived,
+                          Verdict::stuck, Verdict::untouched, Verdict::held})
     CHECK(std::string(verdict_name(v)).size() >= 4);
   CHECK(std::string(verdict_name(Verdict::held)) == "held");
 }
@@ -90,8 +90,14 @@ TEST_CASE("a body that follows its hand and rests is held") {
   CHECK(judge(0.6, calm) == Verdict::held);
 }
 
-TEST_CASE("a run without frames is held, or stuck when it had a target") {
-  CHECK(judge(0, calm) == Verdict::held);
+TEST_CASE("a run that never touched is untouched, but one with a target is judged by it") {
+  const auto apart = [](double t) {
+    Moment m = calm(t);
+    m.depth = 0;
+    return m;
+  };
+  CHECK(judge(0.6, apart) == Verdict::untouched);
+  CHECK(judge(0, calm) == Verdict::untouched);
   SceneVerdict rules;
   rules.target = at(0, 0, 0);
   rules.tolerance = 1;

@@ -62,7 +62,7 @@ Ended pushed(const LoadedScene& loaded, int push, h6Method method) {
       h6CreateSession(loaded.model.get(), &def, nullptr), h6DestroySession);
   REQUIRE(session);
   const int tool = loaded.body_index("tool");
-  VerdictWatch watch(loaded.scene.verdict, loaded.watched_points,
+  VerdictWatch watch(loaded.scene.verdict, loaded.watched_points(),
                      loaded.bodies[static_cast<std::size_t>(tool)].com, loaded.scene.rate);
   Ended out{};
   for (int i = 0; i / loaded.scene.rate < path.back().t; ++i) {

@@ -239,7 +239,7 @@ TEST_CASE("the engine follows the way: the tool arrives, within one voxel of the
   REQUIRE_MESSAGE(session, error.message);
   const int tool = l.body_index("tool");
   const Path& path = scene.hands.front().path;
-  VerdictWatch watch(scene.verdict, l.watched_points, l.bodies[1].com, scene.rate);
+  VerdictWatch watch(scene.verdict, l.watched_points(), l.bodies[1].com, scene.rate);
   double farthest = 0;
   std::uint32_t contacts = 0;
   const int frames = static_cast<int>(path.back().t * scene.rate);
@@ -254,9 +254,9 @@ TEST_CASE("the engine follows the way: the tool arrives, within one voxel of the
     contacts = std::max(contacts, static_cast<std::uint32_t>(frame.contacts));
     watch.frame(t, sample.pose, sample.velocity, body, frame.max_depth_voxels,
                 (frame.status & H6_STATE_NOT_FINITE) == 0);
-    for (std::size_t k = 0; k < l.watched_points.size(); k += 50)
-      farthest = std::max(farthest, norm(place(body.pose, l.watched_points[k]) -
-                                         place(sample.pose, l.watched_points[k])));
+    for (std::size_t k = 0; k < l.watched_points().size(); k += 50)
+      farthest = std::max(farthest, norm(place(body.pose, l.watched_points()[k]) -
+                                         place(sample.pose, l.watched_points()[k])));
   }
   MESSAGE("the tool's points come no farther from the hand's than " << farthest / kMm << " mm");
   CHECK(contacts == 0);

@@ -63,7 +63,7 @@ void run(const LoadedScene& loaded, h6Method method, double seconds, Each&& each
 }
 
 Verdict verdict_of(const LoadedScene& loaded, h6Method method, double* deepest) {
-  VerdictWatch watch(loaded.scene.verdict, loaded.watched_points, {0, 0, 0}, loaded.scene.rate);
+  VerdictWatch watch(loaded.scene.verdict, loaded.watched_points(), {0, 0, 0}, loaded.scene.rate);
   *deepest = 0;
   run(loaded, method, loaded.duration(),
       [&](double t, const h6DeviceSample& hand, const h6BodyState& body, const h6FrameReport& f) {
