@@ -84,6 +84,7 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   set_mesh_pose(body, state->pose);
   body.v = from(state->velocity.linear);
   body.w = from(state->velocity.angular);
+  body.gained_v.setZero(), body.gained_w.setZero();
   if (body.translation_only) body.w.setZero();
   if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
   body.step_rate.setZero();

@@ -6,6 +6,7 @@
 //         each shell body against every field it can touch;            each hand     safety, always
 //         bodies side by side or one after the other
 //
+// From contacts to step, all of this runs several times a frame where a body is fast near a field.
 // The frame and all that it calls never allocate, lock, print, throw or wait. Slices of work may
 // run on the team's helper and are joined in index order, so any number of threads gives the same
 // bits.

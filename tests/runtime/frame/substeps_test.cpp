@@ -293,6 +293,24 @@ TEST_CASE("a box that its hand holds directly stays behind when the budget ends,
   CHECK(few.body().pose.p.z == 3 * mm);
 }
 
+TEST_CASE("a body that is put somewhere else does not remember the speed that it gained") {
+  BoxOnFloor fallen, fresh;
+  for (BoxOnFloor* box : {&fallen, &fresh}) {
+    box->def.hand_count = 0;
+    box->def.gravity = {0, 0, -300};
+    box->def.max_substeps = 16;
+    box->open();
+  }
+  h6Step(fallen.session, nullptr, nullptr);
+  const h6BodyState state{pose(0, 0, 5.5 * mm), {}};
+  for (BoxOnFloor* box : {&fallen, &fresh}) {
+    h6SetBody(box->session, 1, &state);
+    h6Step(box->session, nullptr, nullptr);
+    CHECK(h6GetFrame(box->session).substeps == 1);
+  }
+  CHECK(h6GetFrame(fallen.session).state_hash == h6GetFrame(fresh.session).state_hash);
+}
+
 TEST_CASE("fast motion against a wall has the same bits on one thread and on two, and twice") {
   std::vector<std::uint64_t> hashes[3];
   int several = 0;
