@@ -103,8 +103,9 @@ Scene alpha_shortcut() {
           " thick, hooked together. The hand slides the tool's loop along a strand of the other, "
           "through the gap between its crossing strands, which is only " +
           millimetres(alpha.gap) +
-          " wide, then twists and pulls with 20 N, 3.7 times the force for which half a voxel is "
-          "promised. Forbidden: a region that no point of the tool reaches while the loops are "
+          " wide, then twists and pulls with 20 N, 3.7 times the force that presses a lone contact "
+          "half a voxel deep. Forbidden: a region that no point of the tool reaches while the "
+          "loops are "
           "linked.",
       tool_with_tip_at(tip_over_strand(kStart)));
   scene.hands.push_back(path_hand("tool", shortcut_path()));

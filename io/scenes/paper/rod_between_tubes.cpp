@@ -12,8 +12,9 @@ namespace h6::io {
 Scene rod_between_tubes(const Sampling& sampling) {
   Scene scene = common_scene(
       "rod-between-tubes",
-      "A rod of 6 mm is pressed with up to 20 N, four times the force for which half a voxel is "
-      "promised, at the gap of 4 mm between two fixed tubes of 6 mm. Forbidden: beyond the gap.");
+      "A rod of 6 mm is pressed with up to 20 N, four times the force that presses a lone "
+      "contact half a voxel deep, at the gap of 4 mm between two fixed tubes of 6 mm. Forbidden: "
+      "beyond the gap.");
   // Four times the common stiffness for four times the force: the coupling saturates at the same 5
   // mm.
   scene.coupling.stiffness = 4e3;
