@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "hapsix/vector.h"
+#include "io/mesh/mesh_file.h"
 #include "io/view/envelope.h"
 #include "io/view/page.h"
 #include "io/view/scene_drawing.h"
@@ -66,6 +67,21 @@ std::string base64(const std::string& bytes) {
       out += i + k > bytes.size() ? '=' : digits[word >> (18 - 6 * k) & 63];
   }
   return out;
+}
+
+// Where and when a point first passed through the environment [m, s], from the summary of
+// `hapsix run`; null when none did or the summary does not say.
+ordered_json popped_through(const ordered_json& summary) {
+  try {
+    const ordered_json& first = summary.at("pop_through").at("first");
+    const Result<Unit> unit = unit_from_name(summary.at("units"));
+    if (first.is_null() || !unit) return nullptr;
+    ordered_json place = ordered_json::array();
+    for (const double p : first.at("place")) place.push_back(p * metres(*unit));
+    return {{"t", first.at("time").get<double>()}, {"place", place}};
+  } catch (const std::exception&) {
+    return nullptr;
+  }
 }
 
 }  // namespace
@@ -211,6 +227,7 @@ class ReportWriter {
         {{"label", r.label_},
          {"method", said("method")},
          {"verdict", said("verdict")},
+         {"through", popped_through(summary)},
          {"frames", r.seen_},
          {"contacts_mean", r.contacts_sum_ / frames},
          {"contacts_max", r.contacts_max_},

@@ -123,6 +123,12 @@ class Replay {
     this.strips.mark(this.at);
   }
 
+  // Once the shown run has passed through the environment, its first crossing stays marked.
+  private markCrossing() {
+    const through = this.packet.head.runs[this.run].through;
+    this.view.through(through && this.at >= through.t - 1e-6 ? through.place : null);
+  }
+
   // The last replay sample at or before the shown time; -1: there is none.
   private index(): number {
     const t = floats(this.packet, `replay_t${this.run}`);
@@ -176,6 +182,7 @@ class Replay {
       $('n-contacts').textContent = String(c.w.length);
       $('n-depth').textContent = c.d.length ? (Math.max(...c.d) / this.packet.head.voxel).toFixed(2) : '0';
     }
+    this.markCrossing();
     this.gauss.draw(c.n, c.t, c.w, this.view.camera.quaternion);
     this.view.render();
     requestAnimationFrame((t) => this.tick(t));
@@ -192,6 +199,7 @@ async function start() {
   let replay: Replay | null = null;
   const strips = new Strips($('strips'), head.runs.map((r: any) => r.label), 190, (t) => replay?.go(t));
   strips.show(head.runs.map((_: any, i: number) => ({ rows: floats(packet, `rows${i}`), width: 6 })));
+  strips.flag(head.runs.flatMap((r: any, i: number) => r.through ? [{ time: r.through.t, colour: colours[i % colours.length] }] : []));
   let view: View3D | null = null;
   try {
     view = new View3D($('space'));

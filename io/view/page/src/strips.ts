@@ -20,6 +20,7 @@ export const specs: StripSpec[] = [
 export class Strips {
   private plots: uPlot[] = [];
   private marker = Number.NaN;
+  private flags: { time: number; colour: string }[] = [];
 
   constructor(private where: HTMLElement, labels: string[], private height: number,
               private onTime?: (time: number) => void) {
@@ -68,6 +69,12 @@ export class Strips {
     this.plots.forEach((p) => p.redraw(false));
   }
 
+  // Times that stay marked.
+  flag(flags: { time: number; colour: string }[]) {
+    this.flags = flags;
+    this.plots.forEach((p) => p.redraw(false));
+  }
+
   private width() {  // of one column of the grid
     const columns = getComputedStyle(this.where).gridTemplateColumns.split(' ').length;
     return Math.max(160, Math.floor(this.where.clientWidth / columns) - 4);
@@ -85,17 +92,18 @@ export class Strips {
       g.lineTo(left + width, y);
       g.stroke();
     }
-    if (Number.isFinite(this.marker)) {
-      const x = u.valToPos(this.marker, 'x', true);
-      if (x >= left && x <= left + width) {
-        g.strokeStyle = '#f5f7fa';
-        g.setLineDash([]);
-        g.beginPath();
-        g.moveTo(x, top);
-        g.lineTo(x, top + height);
-        g.stroke();
-      }
-    }
+    const upright = (time: number, colour: string, dash: number[]) => {
+      const x = Number.isFinite(time) ? u.valToPos(time, 'x', true) : -1;
+      if (x < left || x > left + width) return;
+      g.strokeStyle = colour;
+      g.setLineDash(dash);
+      g.beginPath();
+      g.moveTo(x, top);
+      g.lineTo(x, top + height);
+      g.stroke();
+    };
+    for (const flag of this.flags) upright(flag.time, flag.colour, [3, 3]);
+    upright(this.marker, '#f5f7fa', []);
     g.restore();
   }
 }

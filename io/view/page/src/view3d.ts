@@ -53,6 +53,7 @@ export class View3D {
   private scene = new THREE.Scene();
   private arrows: THREE.InstancedMesh;
   private deepest: THREE.Mesh;
+  private crossing: THREE.Mesh;
   private ellipsoid: THREE.Mesh;
   private slice: THREE.Mesh | null = null;
   private environment: THREE.MeshStandardMaterial[] = [];
@@ -87,11 +88,15 @@ export class View3D {
       new THREE.MeshBasicMaterial({ color: '#ff3b30', depthTest: false, transparent: true }));
     this.deepest.renderOrder = 6;
     this.deepest.visible = false;
+    this.crossing = new THREE.Mesh(new THREE.OctahedronGeometry(1),
+      new THREE.MeshBasicMaterial({ color: '#ff4fd8', depthTest: false, transparent: true, wireframe: true }));
+    this.crossing.renderOrder = 7;
+    this.crossing.visible = false;
     this.ellipsoid = new THREE.Mesh(new THREE.SphereGeometry(1, 24, 16),
       new THREE.MeshBasicMaterial({ color: '#9fe8ff', wireframe: true, transparent: true, opacity: 0.22 }));
     this.ellipsoid.visible = false;
     this.ellipsoid.matrixAutoUpdate = false;
-    this.root.add(this.arrows, this.deepest, this.ellipsoid);
+    this.root.add(this.arrows, this.deepest, this.crossing, this.ellipsoid);
     this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
     this.orbit.enableDamping = true;
     new ResizeObserver(() => this.resize()).observe(where);
@@ -196,6 +201,14 @@ export class View3D {
       this.deepest.position.set(c.p[3 * deepest], c.p[3 * deepest + 1], c.p[3 * deepest + 2]);
       this.deepest.scale.setScalar(0.009 * this.radius);
     }
+  }
+
+  // Marks the place where a point passed through the environment; null: none.
+  through(place: number[] | null) {
+    this.crossing.visible = place !== null;
+    if (!place) return;
+    this.crossing.position.set(place[0], place[1], place[2]);
+    this.crossing.scale.setScalar(0.03 * this.radius);
   }
 
   // Draws the net stiffness (xx yy zz xy xz yz). An axis is 0.12 of the scene's radius at `full`, at
