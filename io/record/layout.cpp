@@ -69,6 +69,7 @@ const std::vector<Column>& columns() {
        "coarse_pairs", true},
       {"coarse_points", n32, 1, report + offsetof(h6FrameReport, coarse_points), 0, "of sixteen",
        "coarse_points", true},
+      {"substeps", n32, 1, report + offsetof(h6FrameReport, substeps), 0, "1", "substeps", true},
       {"missed_depth_voxels", real, 1, report + offsetof(h6FrameReport, missed_depth_voxels), 0,
        "voxel", "missed_depth_voxels", true},
       {"status", n32, 1, report + offsetof(h6FrameReport, status), 0, "bits of h6Status", "status"},

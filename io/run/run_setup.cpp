@@ -48,6 +48,7 @@ Outcome RunSetup::open_recording() {
   scene.integrator = def.integrator;
   scene.gradient = def.gradient;
   scene.rate = def.rate;
+  scene.max_substeps = def.max_substeps;
   scene.net_stiffness = def.net_stiffness;
   scene.hands = hands;
   io::RecordedRun how;

@@ -257,6 +257,7 @@ h6SessionDef LoadedScene::session_def() const {
   def.integrator = scene.integrator;
   def.gradient = scene.gradient;
   def.rate = scene.rate;
+  def.max_substeps = scene.max_substeps;
   def.net_stiffness = scene.net_stiffness;
   return def;
 }

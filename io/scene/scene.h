@@ -111,7 +111,8 @@ struct Scene {
   h6Integrator integrator = H6_IMPLICIT;
   h6Gradient gradient = H6_SYMMETRIC;
   double rate = 1000;
-  double duration = 0;         // [s]; 0 means until the longest path ends
+  double duration = 0;  // [s]; 0 means until the longest path ends
+  std::uint32_t max_substeps = h6DefaultSessionDef().max_substeps;
   bool net_stiffness = false;  // whether every frame reports the net stiffness
   std::vector<SceneHand> hands;
   SceneVerdict verdict;

@@ -287,6 +287,7 @@ const Setting kSceneRows[] = {
     same<&Scene::rate>(session_settings(), "rate"),
     h6::number<&Scene::duration>("duration", "s", 0, between(0, 1e6),
                                  "0: to the end of the longest path"),
+    same<&Scene::max_substeps>(session_settings(), "max_substeps"),
     same<&Scene::net_stiffness>(session_settings(), "net_stiffness"),
     list("hands", kHand, 0, H6_MAX_HANDS, "default none"),
     object("verdict", kVerdict, "what the run is judged by")};

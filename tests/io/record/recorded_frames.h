@@ -76,6 +76,7 @@ inline h6FrameRecord frame(std::uint64_t i, std::size_t hands = 1, double rate =
   fill(&r.cpu_us, 1);
   r.report.coarse_pairs = natural();
   r.report.coarse_points = natural();
+  r.report.substeps = natural();
   r.settings = natural();
   fill(&r.report.missed_depth_voxels, 1);
   for (std::size_t h = 0; h < hands; ++h) {
@@ -102,7 +103,8 @@ inline bool same(const h6FrameRecord& a, const h6FrameRecord& b) {
       equal(a.time, b.time) && equal(a.wakeup_us, b.wakeup_us) && a.late == b.late &&
       equal(a.late_us, b.late_us) && equal(a.cpu_us, b.cpu_us) &&
       a.report.coarse_pairs == b.report.coarse_pairs &&
-      a.report.coarse_points == b.report.coarse_points && a.settings == b.settings &&
+      a.report.coarse_points == b.report.coarse_points && a.report.substeps == b.report.substeps &&
+      a.settings == b.settings &&
       equal(a.report.missed_depth_voxels, b.report.missed_depth_voxels) &&
       a.report.frame == b.report.frame && a.report.status == b.report.status &&
       a.report.contacts == b.report.contacts && equal(a.report.max_depth, b.report.max_depth) &&

@@ -163,6 +163,7 @@ TEST_CASE("what a scene says of hands, bodies and telemetry reaches the session'
   scene.coupling.mode = H6_COUPLING_STATIC;
   scene.contact.passivity = true;
   scene.net_stiffness = true;
+  scene.max_substeps = 3;
   h6HandDef& hand = scene.hands[0].def;
   hand.mode = H6_PSEUDO_ADMITTANCE;
   hand.filter.motion_scale = 2, hand.filter.clutch_buttons = 4;
@@ -172,6 +173,7 @@ TEST_CASE("what a scene says of hands, bodies and telemetry reaches the session'
   REQUIRE_MESSAGE(loaded, loaded.error());
   const h6SessionDef def = (*loaded)->session_def();
   CHECK(def.net_stiffness);
+  CHECK(def.max_substeps == 3);
   CHECK(def.contact.passivity);
   CHECK(def.bodies[1].translation_only);
   CHECK(!def.bodies[0].translation_only);

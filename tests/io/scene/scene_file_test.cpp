@@ -104,6 +104,7 @@ TEST_CASE("every key arrives, lengths in metres") {
   CHECK(s.integrator == H6_EXPLICIT);
   CHECK(s.gradient == H6_EXACT);
   CHECK(s.rate == 2000);
+  CHECK(s.max_substeps == 5);
   CHECK(s.duration == 1.25);
   CHECK(s.contact.passivity);
   CHECK(s.coupling.mode == H6_COUPLING_STATIC);
@@ -320,6 +321,7 @@ TEST_CASE("every wrong value is refused with the path of its key") {
       {"/gradient", "[]", "gradient: must be one of"},
       {"/rate", "99", "rate: is 99 but must be at least 100 and at most 10000"},
       {"/rate", "10001", "rate"},
+      {"/max_substeps", "0", "max_substeps: is 0 but must be at least 1 and at most 64"},
       {"/duration", "-1", "duration"},
       {"/hands", "{}", "hands: must be a list"},
       {"/hands/0/body", "\"prat\"", "hands[0].body: there is no body \"prat\""},

@@ -102,7 +102,7 @@ inline Json full_scene() {
     "coupling": {"mode": "static", "stiffness": 1500, "rotational_stiffness": 0.7,
                  "damping_ratio": 0.8, "max_depth_voxels": 0.4, "max_force": 3, "max_torque": 0.2,
                  "max_step_voxels": 0.3},
-    "integrator": "explicit", "gradient": "exact", "rate": 2000, "duration": 1.25,
+    "integrator": "explicit", "gradient": "exact", "rate": 2000, "duration": 1.25, "max_substeps": 5,
     "net_stiffness": true,
     "hands": [{"body": "part", "device": "arm", "path": "hand.csv", "mode": "pseudo-admittance",
                "motion_scale": 2, "rotation_scale": 1.5, "force_scale": 0.5, "relative": true,
