@@ -293,6 +293,29 @@ TEST_CASE("a box that its hand holds directly stays behind when the budget ends,
   CHECK(few.body().pose.p.z == 3 * mm);
 }
 
+TEST_CASE("an impact takes energy and gives none, with either integrator") {
+  for (const h6Integrator integrator : {H6_IMPLICIT, H6_EXPLICIT}) {
+    CAPTURE(static_cast<int>(integrator));
+    BoxOnFloor box;
+    box.def.hand_count = 0;
+    box.def.integrator = integrator;
+    box.def.max_substeps = 16;
+    box.bodies[1].pose.p.z = 10 * mm;
+    box.bodies[1].velocity = {{0.2, 0, -1}, {}};
+    box.open();
+    double most = 0;
+    std::uint32_t contacts = 0;
+    for (int i = 0; i < 60; ++i) {
+      h6Step(box.session, nullptr, nullptr);
+      most = std::max(most, norm(box.body().velocity.linear));
+      contacts = std::max(contacts, h6GetFrame(box.session).contacts);
+    }
+    CHECK(contacts > 100);
+    CHECK(most < std::hypot(0.2, 1) * (1 + 1e-9));
+    CHECK(norm(box.body().velocity.linear) < 1);
+  }
+}
+
 TEST_CASE("a body that is put somewhere else does not remember the speed that it gained") {
   BoxOnFloor fallen, fresh;
   for (BoxOnFloor* box : {&fallen, &fresh}) {
