@@ -40,8 +40,8 @@ const Rooms& below() {
     room("runtime/model", {"contract", "kernels", "kernels/field", "sched", "runtime/base"});
     room("runtime/settings", {"contract", "runtime/model"});
     room("runtime/hand", {"contract", "runtime/base"});
-    room("runtime/contact", {"contract", "kernels", "kernels/contact", "kernels/weights", "sched",
-                             "runtime/base", "runtime/model"});
+    room("runtime/contact", {"contract", "kernels", "kernels/field", "kernels/contact",
+                             "kernels/weights", "sched", "runtime/base", "runtime/model"});
     room("runtime/motion", {"contract", "runtime/base", "runtime/hand", "runtime/contact"});
     room("runtime/frame", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/model",
                            "runtime/contact", "runtime/motion"});

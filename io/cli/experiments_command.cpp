@@ -19,7 +19,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> names;
-  std::string folder;
+  std::string folder, methods;
 };
 
 struct Chosen {
@@ -34,13 +34,8 @@ Result<Chosen> choose(const std::vector<std::string>& names) {
   for (const TableScene& s : table_scenes()) known.push_back(s.name);
   for (const StudyKind& s : studies()) known.push_back(s.name);
   for (const std::string& name : names)
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      const std::string like = nearest(name, known);
-      std::string list;
-      for (const std::string& k : known) list += (list.empty() ? "" : ", ") + k;
-      return Failure{"there is no experiment '" + name + "'" +
-                     (like.empty() ? "; there are " + list : ", did you mean '" + like + "'?")};
-    }
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return Failure{no_such("experiment", name, known)};
   const auto wanted = [&](const char* name) {
     return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
   };
@@ -67,7 +62,9 @@ int experiments_command(const Console& console, const Options& o) {
   if (!o.folder.empty())
     if (Outcome made = make_folder(o.folder); !made) return console.fail(made.error());
 
-  const std::vector<MethodColumn> columns = method_columns();
+  Result<std::vector<MethodColumn>> columns_of = columns_named(o.methods);
+  if (!columns_of) return console.fail(columns_of.error(), kUsage);
+  const std::vector<MethodColumn>& columns = *columns_of;
   const std::vector<SceneRow> rows = run_scene_table(chosen->scenes, columns, o.folder, console);
   if (!console.json && !rows.empty() && !interrupted.load()) {
     std::printf("%s\n", plain(scene_table(rows, columns)).c_str());
@@ -135,6 +132,8 @@ void add_experiments(CLI::App& app, Program& program) {
   experiments->add_option("NAME", o->names, list)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->option_text("NAME...");
+  experiments->add_option("--methods", o->methods, "Columns, default every method")
+      ->option_text("A,B,...");
   experiments
       ->add_option("-o,--output", o->folder,
                    "Folder for a report, EXPERIMENTS.md, and a recording of every run")

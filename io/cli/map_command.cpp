@@ -20,37 +20,11 @@ struct Options {
   MapOptions map;
 };
 
-std::vector<std::string> split(const std::string& list) {
-  std::vector<std::string> out;
-  std::stringstream in(list);
-  for (std::string word; std::getline(in, word, ',');) out.push_back(word);
-  return out;
-}
-
-std::string unknown(const char* what, const std::string& name,
-                    const std::vector<std::string>& known) {
-  const std::string like = nearest(name, known);
-  std::string list;
-  for (const std::string& k : known) list += (list.empty() ? "" : ", ") + k;
-  return std::string("there is no ") + what + " '" + name + "'" +
-         (like.empty() ? "; there are " + list : ", did you mean '" + like + "'?");
-}
-
 // `robust` comes first, because the others are compared with it.
 Outcome choose_methods(const std::string& list, std::vector<MethodColumn>& out) {
-  const std::vector<MethodColumn> known = method_columns();
-  std::vector<std::string> names, wanted = split(list);
-  for (const MethodColumn& column : known) names.push_back(column.name);
-  if (std::find(wanted.begin(), wanted.end(), "robust") == wanted.end())
-    wanted.insert(wanted.begin(), "robust");
-  std::stable_partition(wanted.begin(), wanted.end(),
-                        [](const std::string& name) { return name == "robust"; });
-  for (const std::string& name : wanted) {
-    const auto same = [&](const MethodColumn& column) { return column.name == name; };
-    const auto found = std::find_if(known.begin(), known.end(), same);
-    if (found == known.end()) return Failure{unknown("method", name, names)};
-    if (std::none_of(out.begin(), out.end(), same)) out.push_back(*found);
-  }
+  Result<std::vector<MethodColumn>> wanted = columns_named("robust," + list);
+  if (!wanted) return Failure{wanted.error()};
+  out = std::move(*wanted);
   return Done{};
 }
 
@@ -59,7 +33,8 @@ Outcome choose(Options& o) {
     o.map.methods = map_methods();
   else if (Outcome chosen = choose_methods(o.methods, o.map.methods); !chosen)
     return chosen;
-  o.map.scenes = split(o.scenes);
+  std::stringstream in(o.scenes);
+  for (std::string word; std::getline(in, word, ',');) o.map.scenes.push_back(word);
   if (!o.only.empty()) {
     const std::size_t colon = o.only.find(':');
     const std::string index = colon == std::string::npos ? "" : o.only.substr(colon + 1);
@@ -72,7 +47,7 @@ Outcome choose(Options& o) {
   const std::vector<std::string> known = map_scene_names();
   for (const std::string& name : o.map.scenes)
     if (std::find(known.begin(), known.end(), name) == known.end())
-      return Failure{unknown("scene", name, known)};
+      return Failure{no_such("scene", name, known)};
   return Done{};
 }
 

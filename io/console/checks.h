@@ -99,6 +99,16 @@ inline std::string nearest(const std::string& text, const std::vector<std::strin
   return best;
 }
 
+// "there is no method 'x', did you mean 'y'?", or else the list of all.
+inline std::string no_such(const std::string& what, const std::string& name,
+                           const std::vector<std::string>& known) {
+  const std::string like = nearest(name, known);
+  std::string list;
+  for (const std::string& k : known) list += (list.empty() ? "" : ", ") + k;
+  return "there is no " + what + " '" + name + "'" +
+         (like.empty() ? "; there are " + list : ", did you mean '" + like + "'?");
+}
+
 // The file must exist and be regular: a pipe would keep the reader waiting for ever.
 inline Outcome check_input(const std::string& file) {
   std::error_code error;

@@ -8,9 +8,11 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "hapsix/vector.h"
+#include "io/console/checks.h"
 #include "io/record/recording.h"
 
 namespace h6::cli {
@@ -71,6 +73,23 @@ std::vector<MethodColumn> method_columns() {
     if (name == "global") out.push_back({"global/1", name, 1});
     if (name == "gauss3" || name == "gauss6")
       out.push_back({name + "+facing", name + "+facing", 0});
+  }
+  return out;
+}
+
+Result<std::vector<MethodColumn>> columns_named(const std::string& list) {
+  const std::vector<MethodColumn> known = method_columns();
+  if (list.empty()) return known;
+  std::vector<std::string> names;
+  for (const MethodColumn& column : known) names.push_back(column.name);
+  std::vector<MethodColumn> out;
+  std::stringstream in(list);
+  for (std::string name; std::getline(in, name, ',');) {
+    if (name.empty()) continue;
+    const auto same = [&](const MethodColumn& column) { return column.name == name; };
+    const auto found = std::find_if(known.begin(), known.end(), same);
+    if (found == known.end()) return Failure{no_such("method", name, names)};
+    if (std::none_of(out.begin(), out.end(), same)) out.push_back(*found);
   }
   return out;
 }

@@ -24,6 +24,8 @@ struct MethodColumn {
 // Every method of the engine. The paper's two Gauss methods also come with the facing filter, and
 // `global` also comes with n0 = 1, which gives the Gauss methods' net stiffness on a flat wall.
 std::vector<MethodColumn> method_columns();
+// The columns of these names, separated by commas, each once; all for an empty list.
+Result<std::vector<MethodColumn>> columns_named(const std::string& list);
 
 struct RunChange {
   MethodColumn method;

@@ -5,6 +5,8 @@
 // Directions agree with the reference to a few 2^-24 times |r| over the length of the divisor.
 #include "kernels/contact/contact_columns.h"
 
+#include <cmath>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/contact/contact_columns.cpp"
 #include "kernels/simd.h"
@@ -54,6 +56,68 @@ void facing_simd(const ContactColumns& c, float edge, float* facing) {
     dot = hn::MulAdd(load_n(d, c.ny + i, live), load_n(d, c.gy + i, live), dot);
     dot = hn::MulAdd(load_n(d, c.nz + i, live), load_n(d, c.gz + i, live), dot);
     const auto share = hn::Min(hn::Max(hn::Mul(dot, per_edge), hn::Zero(d)), one);
+    store_n(share, d, facing + i, live);
+  }
+}
+
+// G and the lean towards it, of contacts with distances around them.
+struct Slope {
+  hn::Vec<DF> g[3], lean;
+};
+HWY_INLINE Slope slope_at(const ContactColumns& c, const Around* around, std::size_t i,
+                          std::size_t live) {
+  const DF d;
+  Slope s{{load_n(d, c.gx + i, live), load_n(d, c.gy + i, live), load_n(d, c.gz + i, live)},
+          hn::Set(d, kMostLean)};
+  if (!around) return s;
+  const Around& a = *around;
+  hn::Vec<DF> at[5];
+  for (int k = 0; k < 5; ++k) at[k] = load_n(d, a.at[k] + i, live);
+  const auto p = hn::Add(at[1], at[2]), m = hn::Add(at[3], at[4]);
+  const auto q = hn::Sub(at[1], at[2]), r = hn::Sub(at[3], at[4]);
+  const auto x = hn::Sub(p, m), y = hn::Add(q, r), z = hn::Sub(q, r);
+  const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+  const float reach = std::sqrt(3.0f) * a.step;
+  auto sure = hn::Sub(hn::Set(d, 2 * (a.band - reach)), hn::Mul(hn::Set(d, 2.0f), hn::Abs(at[0])));
+  sure = hn::Min(hn::Max(sure, zero), one);
+  const auto per_step = hn::Set(d, 1 / (4 * a.step));
+  for (int k = 0; k < 3; ++k) {
+    auto turned = hn::Mul(hn::Set(d, a.turn[3 * k]), x);
+    turned = hn::MulAdd(hn::Set(d, a.turn[3 * k + 1]), y, turned);
+    turned = hn::MulAdd(hn::Set(d, a.turn[3 * k + 2]), z, turned);
+    s.g[k] = hn::MulAdd(sure, hn::Sub(hn::Mul(turned, per_step), s.g[k]), s.g[k]);
+  }
+  const auto bend = hn::NegMulAdd(hn::Set(d, 4.0f), at[0], hn::Add(p, m));
+  const auto sharp = hn::Mul(sure, hn::Mul(bend, hn::Set(d, 1 / (2 * a.step * a.step * kSharp))));
+  s.lean = hn::Div(s.lean, hn::MulAdd(sharp, sharp, one));
+  return s;
+}
+
+void directions_simd(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
+                     float* facing) {
+  const DF d;
+  const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    const hn::Vec<DF> N[3] = {load_n(d, c.nx + i, live), load_n(d, c.ny + i, live),
+                              load_n(d, c.nz + i, live)};
+    const Slope s = slope_at(c, around, i, live);
+    auto dot = hn::Mul(N[0], s.g[0]);
+    dot = hn::MulAdd(N[1], s.g[1], dot);
+    dot = hn::MulAdd(N[2], s.g[2], dot);
+    auto share = hn::MulAdd(dot, hn::Set(d, -1 / kStillFacing), one);
+    share = hn::Min(hn::Max(share, zero), one);
+    const auto lean = hn::IfThenElseZero(hn::Gt(share, zero), s.lean);
+    hn::Vec<DF> to[3];
+    auto length2 = zero;
+    for (int k = 0; k < 3; ++k) {
+      to[k] = hn::MulAdd(lean, s.g[k], N[k]);
+      length2 = hn::MulAdd(to[k], to[k], length2);
+    }
+    const auto scale = hn::Div(one, hn::Sqrt(length2));
+    store_n(hn::Mul(to[0], scale), d, nx + i, live);
+    store_n(hn::Mul(to[1], scale), d, ny + i, live);
+    store_n(hn::Mul(to[2], scale), d, nz + i, live);
     store_n(share, d, facing + i, live);
   }
 }
@@ -124,6 +188,7 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(facing_simd);
+HWY_EXPORT(directions_simd);
 HWY_EXPORT(torque_simd);
 HWY_EXPORT(depths_simd);
 HWY_EXPORT(gap_simd);
@@ -131,6 +196,10 @@ HWY_EXPORT(loads_simd);
 
 void contact_facing(const ContactColumns& c, float edge, float* facing) {
   HWY_DYNAMIC_DISPATCH(facing_simd)(c, edge, facing);
+}
+void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
+                     float* facing) {
+  HWY_DYNAMIC_DISPATCH(directions_simd)(c, around, nx, ny, nz, facing);
 }
 void torque_directions(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                        float* tz) {

@@ -18,6 +18,30 @@ struct ContactColumns {
 void contact_facing(const ContactColumns& c, float edge, float* facing);
 void contact_facing_ref(const ContactColumns& c, float edge, float* facing);
 
+// The field around a contact: distances at the contact and at the corners of a tetrahedron about
+// it, contact + step (1 1 1), (1 -1 -1), (-1 1 -1), (-1 -1 1) along the field's axes      [voxel]
+struct Around {
+  const float* at[5];
+  float step;     // [voxel]
+  float band;     // farther from the surface than this a distance may be a bound [voxel]
+  float turn[9];  // field axes to the axes of the normals, row-major
+};
+inline constexpr float kMostLean = 3;          // of the direction towards the gradient
+inline constexpr float kSharp = 0.5f;          // curvature of the field that halves it [1/voxel]
+inline constexpr float kStillFacing = -0.25f;  // N.G at which a contact stops pushing
+
+// The direction in which a contact pushes, and its facing factor. METHOD.md, Sec. 3, "Firm".
+//   G   the slope over the tetrahedron, which does not jump between cells; g where `around` is null
+//       or distances may be bounds
+//   q   the curvature of the field, div G, over kSharp; 0 where `around` is null
+//   facing    = clamp(1 - N.G / kStillFacing, 0, 1)
+//   direction = N + kMostLean / (1 + q^2) G made unit; N where facing is 0
+// The direction may be written over N.
+void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
+                     float* facing);
+void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
+                         float* nz, float* facing);
+
 // T = (r x N) / sqrt(|r x N|^2 + l0^2): Xu & Barbic 2016, Eq. (10), with a floor l0 [m]. Without it
 // T is rounding noise of length 1 where r is parallel to N. T = 0 where the root is 0. With
 // lever > 0, Eq. (13): T = (r x N) / lever [m].

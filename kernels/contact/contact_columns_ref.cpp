@@ -26,6 +26,43 @@ void contact_facing_ref(const ContactColumns& c, float edge, float* facing) {
   }
 }
 
+void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
+                         float* nz, float* facing) {
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const double N[3] = {c.nx[i], c.ny[i], c.nz[i]};
+    double G[3] = {c.gx[i], c.gy[i], c.gz[i]}, lean = kMostLean;
+    if (around) {
+      const Around& a = *around;
+      double d[5];
+      for (int k = 0; k < 5; ++k) d[k] = a.at[k][i];
+      const double slope[3] = {(d[1] + d[2] - d[3] - d[4]) / (4 * double{a.step}),
+                               (d[1] - d[2] + d[3] - d[4]) / (4 * double{a.step}),
+                               (d[1] - d[2] - d[3] + d[4]) / (4 * double{a.step})};
+      const double curvature =
+          (d[1] + d[2] + d[3] + d[4] - 4 * d[0]) / (2 * double{a.step} * a.step);
+      const double reach = std::sqrt(3.0) * a.step;
+      const double sure = std::clamp(2 * (a.band - reach - std::fabs(d[0])), 0.0, 1.0);
+      for (int k = 0; k < 3; ++k) {
+        const double turned = double{a.turn[3 * k]} * slope[0] +
+                              double{a.turn[3 * k + 1]} * slope[1] +
+                              double{a.turn[3 * k + 2]} * slope[2];
+        G[k] += sure * (turned - G[k]);
+      }
+      const double q = sure * curvature / kSharp;
+      lean /= 1 + q * q;
+    }
+    const double dot = N[0] * G[0] + N[1] * G[1] + N[2] * G[2];
+    const double share = std::clamp(1 - dot / kStillFacing, 0.0, 1.0);
+    if (share == 0) lean = 0;
+    const double to[3] = {N[0] + lean * G[0], N[1] + lean * G[1], N[2] + lean * G[2]};
+    const double length = std::sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);
+    nx[i] = static_cast<float>(to[0] / length);
+    ny[i] = static_cast<float>(to[1] / length);
+    nz[i] = static_cast<float>(to[2] / length);
+    facing[i] = static_cast<float>(share);
+  }
+}
+
 void torque_directions_ref(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                            float* tz) {
   for (std::size_t i = 0; i < c.count; ++i) {

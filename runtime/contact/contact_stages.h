@@ -21,6 +21,8 @@ void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody
                     Lane& lane);
 // Whether the weighing of so many contacts is faster on two threads.
 bool worth_two_threads(const h6ContactDef& def, std::size_t count, Lane& lane);
+// `firm`: replaces N by the direction in which each contact pushes, and fills facing.
+void find_push_directions(std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Sums each pair's contacts into shell.sums.
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);

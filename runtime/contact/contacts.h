@@ -9,11 +9,11 @@ namespace h6 {
 
 struct Contacts {
   float* depth;          // penetration depth, > 0; `series`: <= 0 before a point touches [m]
-  float *nx, *ny, *nz;   // inward unit normal, world frame
+  float *nx, *ny, *nz;   // direction of the push: inward unit normal; `firm` leans it. World frame
   float *gx, *gy, *gz;   // unit gradient of the field, world frame, outward
   float *rx, *ry, *rz;   // arm from the centre of mass, world frame           [m]
   float *tx, *ty, *tz;   // torque direction T, world frame
-  float* facing;         // c = clamp(N.g / 0.25, 0, 1), or 1
+  float* facing;         // c = clamp(N.g / 0.25, 0, 1), or 1; `firm`: push_directions
   float* weight;         // share of the stiffness
   float* load;           // elastic force over k: weight * depth, or lambda (series) [m]
   float *slack, *kappa;  // `series`: kernels/weights/series_solve.h               [m], [1]

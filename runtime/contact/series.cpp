@@ -48,6 +48,7 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
   const Body& a = bodies[shell.body];
   Contacts& c = shell.contacts;
   const bool firm = set.contact.method == H6_METHOD_FIRM;
+  if (firm) find_push_directions(bodies, shell, lane);
   for (const Pair& pair : shell.pairs)
     if (firm) note_firmness(c, set.contact, bodies[pair.b].field->voxel, pair.begin, pair.end);
   fill_inner_stiffness(c, set.contact, a.voxel,

@@ -187,24 +187,10 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
   for (std::size_t i = 0; i < c.count; ++i) c.load[i] = c.weight[i] * c.depth[i];
 }
 
-void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
-                   std::size_t end) {
-  const float margin = static_cast<float>(def.margin_voxels * voxel);
-  const float scale = static_cast<float>(2 / voxel);
-  const float shallow = static_cast<float>(def.firmness_shallow);
-  const float rise = static_cast<float>(def.firmness - def.firmness_shallow);
-  for (std::size_t i = begin; i < end; ++i) {
-    const float way = std::clamp(scale * c.depth[i], 0.0f, 1.0f);
-    c.slack[i] = std::max(0.0f, c.depth[i] + margin);
-    c.kappa[i] = shallow + rise * way * way;
-  }
-}
-
 void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
                           sched::FrameTeam* team, void* scratch) {
   if (def.method == H6_METHOD_SERIES) return fill_facing(c, true, c.weight);
   const Rule rule = rule_of(def, voxel);
-  fill_facing(c, rule.facing, c.facing);
   fill_torque_directions(c, rule, 0);
   weigh_gauss(c, rule, c.slack, team, scratch);
   for (std::size_t i = 0; i < c.count; ++i) c.weight[i] *= c.kappa[i];

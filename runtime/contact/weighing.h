@@ -63,7 +63,8 @@ void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size
                    std::size_t end);
 // Writes to weight the stiffness of each contact inside the common spring, in units of k: the
 // facing factor; under `firm` its share of rho on the Gauss map, from slack and kappa. `voxel`: of
-// the body; `team` may be null; `scratch` as in weigh_columns, not used by `series`.
+// the body; `firm` reads facing; `team` may be null; `scratch` as in weigh_columns, not used by
+// `series`.
 void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
                           sched::FrameTeam* team, void* scratch);
 // Fills kappa (from weight, the inner stiffness), slack, load (from e) and weight. y holds the

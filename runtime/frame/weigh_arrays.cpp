@@ -205,7 +205,10 @@ int h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts
   Sums sums;
   if (series) {
     double y[6] = {};
-    if (contact->method == H6_METHOD_FIRM) note_firmness(c, *contact, voxel, 0, rows);
+    if (contact->method == H6_METHOD_FIRM) {
+      kernels::push_directions(kernel_columns(c, 0, rows), nullptr, c.nx, c.ny, c.nz, c.facing);
+      note_firmness(c, *contact, voxel, 0, rows);
+    }
     fill_inner_stiffness(c, *contact, voxel, nullptr, work.scratch);
     fill_series_gap(c, contact->damping, u, 0, rows);
     solve_series(c, *contact, lever, y);

@@ -70,13 +70,13 @@ constexpr Setting kContactRows[] = {
     number<&h6ContactDef::series_c>("series_c", "", 4, above(2, 1e6),
                                     "series, firm: the net stiffness is at most this times k"),
     number<&h6ContactDef::firmness>(
-        "firmness", "", 60, {1, kNoLimit, false, 1e6},
+        "firmness", "", 20, {1, kNoLimit, false, 1e6},
         "firm: stiffness of one direction of contact inside the common spring, in units of k, from "
         "half a voxel of depth on"),
-    number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 10, {1, kNoLimit, false, 1e6},
+    number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 4, {1, kNoLimit, false, 1e6},
                                             "firm: the same at the surface"),
     number<&h6ContactDef::margin_voxels>(
-        "margin_voxels", "voxel", 0.5, between(0, 2),
+        "margin_voxels", "voxel", 0.25, between(0, 2),
         "series, firm: points nearer than this take part before they touch"),
     number<&h6ContactDef::cluster_voxels>(
         "cluster_voxels", "voxel", 0.5, above(0.01, 100),

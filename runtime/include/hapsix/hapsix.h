@@ -216,7 +216,7 @@ H6_API size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity);
  * call that gives true. The loop never waits: frames that were not fetched are lost. World frame. */
 typedef struct h6ViewContact {
   float   position[3];         /*                                                             [m]  */
-  float   normal[3];           /* inward unit normal of the point                                  */
+  float   normal[3];           /* inward unit normal; `firm`: direction of the push                */
   float   torque_direction[3]; /* T                                                                */
   float   weight, depth;       /* share of the stiffness; > 0 inside                          [m]  */
   int32_t shell_body, field_body;

@@ -293,7 +293,7 @@ typedef struct h6BodyState { h6Pose pose; h6Velocity velocity; } h6BodyState;
 typedef struct h6Contacts {
   size_t          count;
   const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
-  const float*    nx; const float* ny; const float* nz; /* inward unit normal of the point         */
+  const float*    nx; const float* ny; const float* nz; /* inward unit normal; `firm`: of the push  */
   const float*    gx; const float* gy; const float* gz; /* unit gradient of the field, outward     */
   const float*    rx; const float* ry; const float* rz; /* arm: from the centre of mass       [m]  */
   const float*    tx; const float* ty; const float* tz; /* torque direction T                      */

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -104,6 +105,79 @@ TEST_CASE("contact_columns: SIMD agrees with the reference on every target, coun
       CHECK(got[6].padding_untouched());
     }
   });
+}
+
+namespace {
+
+// Distances of a plane or of a ball around contacts, in a field that is turned.
+struct AroundColumns {
+  std::vector<Column> at;
+  Around around{{}, 0.5f, 3.0f, {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  AroundColumns(std::size_t n, std::size_t shift) {
+    Random random(7 + n);
+    for (std::size_t k = 0; k < 5; ++k) at.emplace_back(n, shift + k);
+    for (std::size_t i = 0; i < n; ++i) {
+      double slope[3];
+      random.direction(slope);
+      const double here = random.uniform(-3, 0.5), bend = random.uniform(-1, 1);
+      const int corner[5][3] = {{0, 0, 0}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+      for (std::size_t k = 0; k < 5; ++k) {
+        double d = here + (k > 0 ? 0.5 * 0.25 * bend : 0);
+        for (int axis = 0; axis < 3; ++axis) d += 0.5 * corner[k][axis] * slope[axis];
+        at[k][i] = float(d);
+      }
+    }
+    for (std::size_t k = 0; k < 5; ++k) around.at[k] = at[k].begin();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("contact_columns: directions of push agree with the reference on every target") {
+  on_every_target([](const std::string&) {
+    for (std::size_t n = 0; n <= 67; ++n) {
+      Contacts c(n, n % 4);
+      AroundColumns a(n, n % 3);
+      for (const Around* around : std::initializer_list<const Around*>{nullptr, &a.around}) {
+        std::vector<Column> got, want;
+        for (std::size_t k = 0; k < 4; ++k) got.emplace_back(n, k), want.emplace_back(n, 0);
+        push_directions(c.view(), around, got[0].begin(), got[1].begin(), got[2].begin(),
+                        got[3].begin());
+        push_directions_ref(c.view(), around, want[0].begin(), want[1].begin(), want[2].begin(),
+                            want[3].begin());
+        // A direction may be the small difference of N and three times G.
+        for (std::size_t k = 0; k < 4; ++k) CHECK(worst(got[k], want[k], n, 5e-6) <= 1);
+        for (std::size_t i = 0; i < n; ++i) {
+          double length2 = 0, along = 0;
+          for (std::size_t k = 0; k < 3; ++k) {
+            length2 += double{got[k][i]} * got[k][i];
+            along += double{got[k][i]} * c.column[k][i];
+          }
+          CHECK(std::fabs(length2 - 1) < 1e-5);
+          CHECK(along > 0);  // never into the part
+        }
+      }
+    }
+  });
+}
+
+TEST_CASE(
+    "contact_columns: a push follows a flat field and a flat part, whichever is the flatter") {
+  const float n[3] = {1, 0, 0}, g[3] = {0, 0, 1}, zero[3] = {0, 0, 0};
+  const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, zero, zero, zero, 1};
+  const auto push_of = [&](double bend) {
+    float at[5], to[3], facing;
+    const double height[5] = {0, 0.5, -0.5, -0.5, 0.5};
+    for (int k = 0; k < 5; ++k) at[k] = float(-0.2 + height[k] + (k > 0 ? 0.125 * bend : 0));
+    const Around around{
+        {at, at + 1, at + 2, at + 3, at + 4}, 0.5f, 3.0f, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    push_directions_ref(one, &around, to, to + 1, to + 2, &facing);
+    CHECK(facing == 1);  // an edge without a normal along the push still pushes
+    return double{to[2]};
+  };
+  CHECK(push_of(0) > 0.94);  // a knife edge on a block: mostly along the block's gradient
+  CHECK(push_of(8) < 0.2);   // a block on a knife edge: mostly along the block's normal
+  for (double bend = 0; bend < 8; bend += 0.5) CHECK(push_of(bend + 0.5) < push_of(bend));
 }
 
 TEST_CASE("contact_columns: a torque direction is square to its normal, of length 1 without l0") {

@@ -172,7 +172,7 @@ TEST_CASE("a point that goes deeper than at the start pushes by the difference u
 TEST_CASE("under series a point keeps its relief up to the margin, where losing it is no jump") {
   TipOnFloor tip(0.8 * mm, H6_METHOD_SERIES);
   tip.start();
-  tip.at(-0.4 * mm);
+  tip.at(-0.2 * mm);
   CHECK(relieved(tip.scene.session) == 1);
   CHECK(tip.at(0.7 * mm) == 0);
   tip.at(-0.6 * mm);

@@ -241,7 +241,7 @@ TEST_CASE("series: at rest on a wall the net stiffness lies between k and c k") 
 }
 
 TEST_CASE("series: points within the margin take part but are not reported as touching") {
-  Box box(5.3 * mm);  // 0.3 voxel above the floor
+  Box box(5.2 * mm);  // 0.2 voxel above the floor
   box.open();
   h6Step(box.session, nullptr, nullptr);
   CHECK(h6GetFrame(box.session).contacts == 0);
@@ -249,12 +249,12 @@ TEST_CASE("series: points within the margin take part but are not reported as to
   const h6Contacts c = h6GetContacts(box.session, 1);
   REQUIRE(c.count == 144);
   for (std::size_t i = 0; i < c.count; ++i) {
-    CHECK(c.depth[i] == h6::test::near(-0.3 * mm).epsilon(0.01));
+    CHECK(c.depth[i] == h6::test::near(-0.2 * mm).epsilon(0.01));
     CHECK(c.weight[i] == 0);
     CHECK(c.load[i] == 0);
   }
-  Box narrow(5.3 * mm);
-  narrow.def.contact.margin_voxels = 0.2;
+  Box narrow(5.2 * mm);
+  narrow.def.contact.margin_voxels = 0.1;
   narrow.open();
   h6Step(narrow.session, nullptr, nullptr);
   CHECK(h6GetContacts(narrow.session, 1).count == 0);

@@ -102,6 +102,7 @@ TEST_CASE("the filter weighs a session's contacts as the session does") {
   Model model({def_of(field)}, {ball.def()});
   for (int m = 0; m < H6_METHOD_COUNT; ++m) {
     if (m == H6_METHOD_CLUSTER) continue;  // its rows are merged already
+    if (m == H6_METHOD_FIRM) continue;     // a session leans on distances that arrays do not have
     std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
     bodies[0].fixed = true, bodies[0].field = 0;
     bodies[1].shell = 0, bodies[1].pose = pose(0.9 * mm, 0, 0);

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// firm.cpp - what the rule `firm` knows of each contact: the direction in which it pushes, its
+// presence in the density, the stiffness of its direction. METHOD.md, Sec. 3.
+#include <algorithm>
+
+#include "kernels/field/sample_field.h"
+#include "runtime/contact/contact_stages.h"
+#include "runtime/contact/traverse_pair.h"
+#include "runtime/contact/weighing.h"
+
+namespace h6 {
+namespace {
+
+constexpr float kStep = 0.5f;  // half the edge of the cube about the tetrahedron [voxel]
+constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
+constexpr std::size_t kManySlices = 4;        // from here on two threads share them
+
+// Rows begin..end-1 of one pair. The distances go to columns that are filled later.
+void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, std::size_t begin,
+               std::size_t end) {
+  static constexpr float kCorner[5][3] = {{}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  float* const at[5] = {c.tx + begin, c.ty + begin, c.tz + begin, c.slack + begin, c.kappa + begin};
+  const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
+  kernels::Around around{{}, kStep, b.field->view.band, {}};
+  for (int k = 0; k < 5; ++k) {
+    kernels::Affine to = place;
+    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += kStep * kCorner[k][axis];
+    kernels::sample_field(b.field->view, to, arms, nullptr, arms.count, at[k], nullptr, nullptr,
+                          nullptr);
+    around.at[k] = at[k];
+  }
+  for (int k = 0; k < 9; ++k) around.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
+  kernels::push_directions(kernel_columns(c, begin, end), &around, c.nx + begin, c.ny + begin,
+                           c.nz + begin, c.facing + begin);
+}
+
+}  // namespace
+
+void find_push_directions(std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    const Pair& pair = shell.pairs[p];
+    if (pair.begin == pair.end) continue;
+    const std::size_t slices = (pair.end - pair.begin + kDirectionSlice - 1) / kDirectionSlice;
+    const auto push = [&](std::size_t i) {
+      const std::size_t begin = pair.begin + i * kDirectionSlice;
+      push_rows(shell.contacts, bodies[pair.b], shell.searches[p].arms, begin,
+                std::min(begin + kDirectionSlice, pair.end));
+    };
+    if (slices >= kManySlices) {
+      lane.team->for_slices(slices, push);
+    } else {
+      for (std::size_t i = 0; i < slices; ++i) push(i);
+    }
+  }
+}
+
+void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
+                   std::size_t end) {
+  const float margin = static_cast<float>(def.margin_voxels * voxel);
+  const float scale = static_cast<float>(2 / voxel);
+  const float shallow = static_cast<float>(def.firmness_shallow);
+  const float rise = static_cast<float>(def.firmness - def.firmness_shallow);
+  for (std::size_t i = begin; i < end; ++i) {
+    const float way = std::clamp(scale * c.depth[i], 0.0f, 1.0f);
+    c.slack[i] = std::max(0.0f, c.depth[i] + margin);
+    c.kappa[i] = shallow + rise * way * way;
+  }
+}
+
+}  // namespace h6
