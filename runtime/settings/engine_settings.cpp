@@ -211,7 +211,7 @@ constexpr Setting kSessionRows[] = {
     whole<&h6SessionDef::max_contacts>("max_contacts", 16384, between(1, 1e6),
                                        "of a shell body; storage is reserved once"),
     whole<&h6SessionDef::max_substeps>(
-        "max_substeps", 1, between(1, 64),
+        "max_substeps", 16, between(1, 64),
         "a frame takes up to this many steps, as many as keep every point near a field from moving "
         "farther than a fifth of a voxel in one"),
     flag<&h6SessionDef::net_stiffness>(

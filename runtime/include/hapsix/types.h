@@ -253,8 +253,9 @@ typedef struct h6SessionDef {
   h6Vec3       gravity;       /* default 0: the arm carries the part                      [m/s^2]  */
   size_t       max_contacts;  /* per shell body; storage is reserved once                          */
   uint32_t     max_substeps;  /* most steps that a frame takes so that no point near a field moves
-                                 farther than a fifth of a voxel in a step, 1 .. 64; 1: each
-                                 frame takes one step, however far it goes                         */
+                                 farther than a fifth of a voxel in a step, 1 .. 64; default
+                                 16. 1, and explicit steps: a frame takes one step, however far it
+                                 goes. METHOD.md, Sec. 8                                           */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
   double       frame_budget_us; /* anytime mode: a step that would take longer samples fewer points

@@ -35,6 +35,8 @@ TEST_CASE("a body of translations alone keeps its orientation to the bit and giv
     scene.hand.coupling.mode = way.mode;
     scene.def.integrator = way.integrator;
     scene.def.gradient = way.gradient;
+    // With substeps a direct body stays behind so fast a hand.
+    if (way.mode == H6_COUPLING_DIRECT) scene.def.max_substeps = 1;
     if (way.integrator == H6_EXPLICIT) scene.hand.coupling.damping_ratio = 0.1;
     scene.open();
     const h6Quat q = scene.body().pose.q;
