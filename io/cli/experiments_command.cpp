@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 
 #include "io/cli/commands.h"
@@ -103,12 +102,7 @@ int experiments_command(const Console& console, const Options& o) {
   if (!o.folder.empty()) {
     const std::string file = (std::filesystem::path(o.folder) / "EXPERIMENTS.md").string();
     const std::string text = markdown_report(rows, columns, done, seconds);
-    const Outcome written = io::write_aside(file, [&](const std::filesystem::path& place) {
-      std::ofstream out(place, std::ios::binary);
-      out << text;
-      out.close();
-      return out ? Outcome(Done{}) : Outcome(Failure{file + ": it cannot be written"});
-    });
+    const Outcome written = io::write_text_aside(file, text);
     if (!written) return console.fail(written.error());
     json["report"] = file;
     if (!console.json) std::printf("report: %s\n", file.c_str());

@@ -3,7 +3,6 @@
 // scene.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <sstream>
 
@@ -51,15 +50,6 @@ Outcome choose(Options& o) {
   return Done{};
 }
 
-Outcome write_text(const std::string& file, const std::string& text) {
-  return io::write_aside(file, [&](const std::filesystem::path& place) {
-    std::ofstream out(place, std::ios::binary);
-    out << text;
-    out.close();
-    return out ? Outcome(Done{}) : Outcome(Failure{file + ": it cannot be written"});
-  });
-}
-
 int map_command(const Console& console, Options& o) {
   if (Outcome chosen = choose(o); !chosen) return console.fail(chosen.error(), kUsage);
   for (const std::string& file : {o.csv, o.report})
@@ -70,10 +60,10 @@ int map_command(const Console& console, Options& o) {
   const MapReport report{o.map, scenes};
   if (!console.json) std::printf("%s", report.text(false).c_str());
   if (!o.csv.empty())
-    if (Outcome written = write_text(o.csv, report.csv()); !written)
+    if (Outcome written = io::write_text_aside(o.csv, report.csv()); !written)
       return console.fail(written.error());
   if (!o.report.empty())
-    if (Outcome written = write_text(o.report, report.text(true)); !written)
+    if (Outcome written = io::write_text_aside(o.report, report.text(true)); !written)
       return console.fail(written.error());
   console.result(report.json());
   const std::string error = report.first_error();

@@ -5,7 +5,6 @@
 // each recorded hand. If that is no longer possible, the report says so and omits the contacts.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -94,13 +93,7 @@ class Reporter {
         io::view::make_report(runs_, session_ ? &session_->loaded() : nullptr, about_);
     if (!html) return html.failure();
     bytes = html->size();
-    return io::write_aside(output, [&](const std::filesystem::path& place) -> Outcome {
-      std::ofstream out(place, std::ios::binary);
-      out << *html;
-      out.flush();
-      if (!out) return Failure{output + " could not be written: is the disk full?"};
-      return Done{};
-    });
+    return io::write_text_aside(output, *html);
   }
 
   std::size_t bytes = 0;

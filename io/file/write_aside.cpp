@@ -11,6 +11,7 @@
 #include <climits>
 #include <cstring>
 #include <exception>
+#include <fstream>
 #include <string>
 
 namespace h6::io {
@@ -183,6 +184,16 @@ Outcome write_aside(const fs::path& file, const std::function<Outcome(const fs::
     return Done{};
   }
   return cannot_write(file, "its folder is full of unfinished files, remove them");
+}
+
+Outcome write_text_aside(const fs::path& file, std::string_view text) {
+  return write_aside(file, [&](const fs::path& aside) -> Outcome {
+    std::ofstream out(aside, std::ios::binary);
+    out << text;
+    out.close();
+    if (!out) return Failure{file.string() + ": writing failed; is the disk full?"};
+    return Done{};
+  });
 }
 
 void remove_unfinished() noexcept {

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <string_view>
 
 #include "hapsix/result.h"
 
@@ -17,6 +18,9 @@ namespace h6::io {
 // Any number of threads may write aside at once; for the same `file` the last to finish wins.
 Outcome write_aside(const std::filesystem::path& file,
                     const std::function<Outcome(const std::filesystem::path&)>& write);
+
+// Writes `text` aside.
+Outcome write_text_aside(const std::filesystem::path& file, std::string_view text);
 
 // Removes the temporary files of every write_aside in flight in this process. Async-signal-safe: it
 // reads a fixed table and calls getpid and unlink only, so a program may call it from its handler

@@ -3,7 +3,6 @@
 //
 // It writes defaults too, so that the file holds everything that the run depends on.
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "io/file/write_aside.h"
@@ -196,14 +195,7 @@ Outcome export_scene(const Scene& scene, const std::filesystem::path& folder) {
       return Failure{folder.string() + ": cannot be made a folder; " + error.message()};
     const Json json = SceneWriter(scene, folder).write();
     // The scene file is written last, so that the files it names exist when it does.
-    return write_aside(folder / "scene.json", [&](const fs::path& aside) -> Outcome {
-      std::ofstream out(aside);
-      out << json.dump(2) << '\n';
-      out.close();
-      if (!out)
-        return Failure{(folder / "scene.json").string() + ": writing failed; is the disk full?"};
-      return Done{};
-    });
+    return write_text_aside(folder / "scene.json", json.dump(2) + '\n');
   } catch (const WriteFailed& failed) {
     return failed.failure;
   } catch (const std::exception& e) {

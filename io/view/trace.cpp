@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <string>
 
 #include "io/file/write_aside.h"
@@ -90,13 +89,7 @@ Outcome Trace::write(const std::filesystem::path& file) const {
         deadline, r.depth_voxels);
   }
   text += "\n]}\n";
-  return write_aside(file, [&](const std::filesystem::path& place) -> Outcome {
-    std::ofstream out(place, std::ios::binary);
-    out << text;
-    out.flush();
-    if (!out) return Failure{file.string() + ": the trace could not be written (disk full?)"};
-    return Done{};
-  });
+  return write_text_aside(file, text);
 }
 
 }  // namespace h6::io::view
