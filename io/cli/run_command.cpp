@@ -40,7 +40,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (view.on && options.virtual_time)
     return console.fail("--view shows a run in real time: leave --virtual-time out", kUsage);
   if (Outcome known = check_options(options); !known) return console.fail(known.error(), kUsage);
-  for (const std::string& file : {options.record, options.trace})
+  for (const std::string& file : {options.record, options.trace, options.overlap})
     if (!file.empty())
       if (Outcome place = check_output(file); !place) return console.fail(place.error());
   Result<io::Scene> scene = find_scene(name);
@@ -84,6 +84,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);
     if (!options.record.empty()) std::printf("recording: %s\n", options.record.c_str());
     if (!options.trace.empty()) std::printf("timeline: %s\n", options.trace.c_str());
+    if (!options.overlap.empty()) std::printf("overlap: %s\n", options.overlap.c_str());
   }
   if (!summary->interrupted) return kOk;
   console.log("hapsix: " + stopped);
@@ -138,6 +139,10 @@ void add_run(CLI::App& app, Program& program) {
                   "ui.perfetto.dev or chrome://tracing")
       ->option_text("FILE.json")
       ->check(ends_with(".json"));
+  run->add_option("--overlap", o->overlap,
+                  "The points that are inside another part at the start, one a row")
+      ->option_text("FILE.csv")
+      ->check(ends_with(".csv"));
   add_view_options(*run, *view);
   run->callback([&program, name, o, view] {
     program.work = [&program, name, o, view] {

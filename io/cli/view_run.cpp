@@ -129,6 +129,7 @@ class Viewer : public RunObserver {
     offset_ = {};
     state_.begin();
     state_.recording(setup.recorder != nullptr);
+    overlaps_ = setup.overlaps;
     next_ = Clock::now();
   }
 
@@ -139,6 +140,7 @@ class Viewer : public RunObserver {
     for (const ViewRequest& wish : wishes_.take(&refused))
       std::visit([this](const auto& w) { act(w); }, wish);
     if (!refused.empty()) server_->say(io::view::LiveState::note(refused));
+    tell_overlaps();
     h6LoopView view;
     if (h6ReadView(loop_, &view)) state_.contacts(view);
     if (Clock::now() >= next_ && state_.any() && server_->clients() > 0) {
@@ -155,6 +157,16 @@ class Viewer : public RunObserver {
   }
 
  private:
+  // Each page that opens is told what overlaps at the start.
+  void tell_overlaps() {
+    const std::size_t clients = server_->clients();
+    if (clients > greeted_ && !overlaps_.empty()) {
+      std::string text;
+      for (const PartOverlap& o : overlaps_) text += (text.empty() ? "" : "; ") + o.sentence;
+      server_->say(io::view::LiveState::note(text));
+    }
+    greeted_ = clients;
+  }
   void act(const io::view::Grab& grab) {
     wish_.held = grab.on;
     wish_.placed = false;
@@ -260,6 +272,8 @@ class Viewer : public RunObserver {
   std::shared_ptr<device::Steering> steering_;
   device::Steering::Wish wish_;
   h6Vec3 offset_{};
+  std::vector<PartOverlap> overlaps_;
+  std::size_t greeted_ = 0;  // open pages that know of `overlaps_`
   RunSetup* setup_ = nullptr;
   h6Loop* loop_ = nullptr;
   Note note_;

@@ -80,6 +80,21 @@ ordered_json through_json(const PopThroughReport& r, double scale) {
   return out;
 }
 
+// Lengths in the scene's units.
+ordered_json overlaps_json(const std::vector<PartOverlap>& overlaps, double scale) {
+  ordered_json all = ordered_json::array();
+  for (const PartOverlap& o : overlaps)
+    all.push_back({{"part", o.part},
+                   {"with", o.with},
+                   {"with_part", o.with_part},
+                   {"points", o.points},
+                   {"relieved", o.relieved},
+                   {"depth", o.depth * scale},
+                   {"depth_voxels", o.depth_voxels},
+                   {"place", {o.place.x * scale, o.place.y * scale, o.place.z * scale}}});
+  return all;
+}
+
 ordered_json stages_json(const RunSummary& s) {
   ordered_json stages = ordered_json::object();
   for (int i = 0; i < H6_STAGE_COUNT; ++i)
@@ -138,6 +153,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
       {"method", s.method},
       {"units", io::unit_name(loaded.scene.unit)},
       {"virtual_time", virtual_time},
+      {"start_overlap", overlaps_json(s.overlaps, scale)},
       {"frames", s.loop.frames},
       {"contacts", {{"mean", s.contacts_mean}, {"max", s.contacts_max}}},
       {"max_depth_voxels", s.max_depth_voxels},

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "io/file/write_aside.h"
 #include "io/run/run_observer.h"
 #include "io/run/run_setup.h"
 #include "io/run/run_watch.h"
@@ -37,6 +38,16 @@ Outcome open_session(const RunOptions& options, RunSetup& run) {
     return Failure{"the device '" + run.devices.real_time +
                    "' lives in real time: leave out --virtual-time"};
   return Done{};
+}
+
+// Says what overlaps at the start, and writes the points if they are wanted.
+Outcome tell_overlaps(const RunSetup& run, const RunOptions& options, const Console& console,
+                      RunSummary& summary) {
+  summary.overlaps = run.overlaps;
+  for (const PartOverlap& overlap : run.overlaps) console.log(overlap.sentence);
+  return options.overlap.empty()
+             ? Outcome(Done{})
+             : io::write_text_aside(options.overlap, overlap_csv(run.loaded, run.session.get()));
 }
 
 h6LoopDef loop_def(const RunOptions& options, const io::LoadedScene& loaded) {
@@ -160,6 +171,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
   summary.recording = options.record;
   summary.seconds = def.duration;
   summary.virtual_time = options.virtual_time;
+  if (Outcome told = tell_overlaps(run, options, console, summary); !told) return told.failure();
   const bool endless = options.observer && options.duration <= 0;  // the observer ends it
   if (endless) def.duration = 0;
 

@@ -9,6 +9,7 @@
 #include "io/console/console.h"
 #include "io/record/recording.h"
 #include "io/run/run_tally.h"
+#include "io/run/start_overlap.h"
 #include "io/scene/load_scene.h"
 
 namespace h6::cli {
@@ -25,6 +26,7 @@ struct RunOptions {
   double budget_us = 0;             // frame budget of the anytime mode [us]; 0 turns it off
   std::string record;               // file of the recording; empty for none
   std::string trace;                // .json timeline of the last seconds; empty for none
+  std::string overlap;              // .csv of the points that overlap at the start; or empty
   RunObserver* observer = nullptr;  // ends the run if `duration` is 0
   std::size_t view_contacts = 0;    // rows of contacts kept for the observer
 };
@@ -32,6 +34,7 @@ struct RunOptions {
 struct RunSummary : RunTotals, RunTimes {
   h6LoopReport loop{};
   std::string method;
+  std::vector<PartOverlap> overlaps;  // at the start
   std::vector<io::RecordingEvent> events;
   std::size_t events_dropped = 0;
   std::vector<float> depth_strip;  // deepest contact in each 1/60 of the run [voxel]

@@ -16,6 +16,8 @@ Outcome RunSetup::open() {
   h6Error error{};
   session.reset(h6CreateSession(loaded.model.get(), &def, &error));
   if (!session) return Failure{error.message};
+  overlaps = start_overlaps(loaded, def.contact, session.get());
+  if (Outcome good = check_start(overlaps, loaded.scene.unit); !good) return good;
   for (std::size_t i = 0; i < hands.size(); ++i) hands[i].def = hand_defs[i];
   Result<Hands> opened = open_hands(loaded, hands, session.get(), steering);
   if (!opened) return opened.failure();

@@ -10,6 +10,7 @@
 #include "hapsix/result.h"
 #include "io/record/recording.h"
 #include "io/run/hands.h"
+#include "io/run/start_overlap.h"
 #include "io/scene/load_scene.h"
 
 namespace h6::cli {
@@ -34,8 +35,10 @@ struct RunSetup {
   bool virtual_time = true;                    // for the recording's head
 
   SessionPtr session;
+  std::vector<PartOverlap> overlaps;  // at the start
   Hands devices;
   std::unique_ptr<io::Recorder> recorder;
+  // Fails for parts that start too deep in one another (check_start).
   Outcome open();
   // Computes the frame at r.time on this thread, as the haptic loop does, and fills the rest of
   // `r`.

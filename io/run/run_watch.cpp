@@ -41,6 +41,8 @@ void RunWatch::finish(const io::Progress& progress) {
 }
 
 void RunWatch::row(const h6FrameRecord& r) {
+  if (frames_ == 0)
+    for (const PartOverlap& o : summary_.overlaps) event({r.time, "overlap", o.sentence});
   ++frames_;
   tally_.frame(r);
   const auto bin = static_cast<std::size_t>(kStripBins * r.time / summary_.seconds);

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <map>
 
+#include "io/file/csv.h"
+
 namespace h6::cli {
 namespace {
 
@@ -138,12 +140,6 @@ std::string not_held(const MapScene& scene, int table, std::size_t method) {
     out +=
         (out.empty() ? "" : "; ") + std::string(kForceNames[how.first]) + " " + how.second + list;
   return out;
-}
-
-std::string quoted(const std::string& text) {  // for CSV
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
-  return out + "\"";
 }
 
 std::string method_list(const std::vector<MethodColumn>& methods) {
@@ -336,7 +332,7 @@ std::string MapReport::csv() const {
                           t == kEqualWall ? scene->stiffer[m] : 1.0, io::verdict_name(run.verdict),
                           run.held, run.depth, run.late_speed, run.late_depth_swing,
                           run.torque_noise);
-            out += text + (run.error.empty() ? "" : quoted(run.error)) + "\n";
+            out += text + (run.error.empty() ? "" : io::csv_quoted(run.error)) + "\n";
           }
   return out;
 }

@@ -19,8 +19,8 @@ void has(const Json& object, const std::vector<std::string>& keys) {
 }
 
 void is_a_run(const Json& run) {
-  has(run, {"frames", "contacts", "max_depth_voxels", "verdict", "pop_through", "remarks",
-            "frame_us", "stage_us", "deadline", "final_pose", "hand_pose", "max_force",
+  has(run, {"start_overlap", "frames", "contacts", "max_depth_voxels", "verdict", "pop_through",
+            "remarks", "frame_us", "stage_us", "deadline", "final_pose", "hand_pose", "max_force",
             "max_torque", "status_bits", "state_hash", "events"});
   has(run.value("contacts", Json()), {"mean", "max"});
   has(run.value("frame_us", Json()), {"p50", "p99", "p999", "max"});
