@@ -111,6 +111,11 @@ double PopThroughSearch::distance_at(const h6Vec3& x) const {
   return distance;
 }
 
+// Whether a triangle is nearer than a free point may be.
+bool PopThroughSearch::touches(const h6Vec3& x) const {
+  return rays_->nearest(x, kFree * voxel_).triangle != RayScene::kNoTriangle;
+}
+
 // A point in contact: moves its shadow over it, as far as the shadow can go.
 void PopThroughSearch::lift(Track& t, const h6Vec3& x, double d, const h6Vec3& out) {
   t.free = false;
@@ -119,8 +124,11 @@ void PopThroughSearch::lift(Track& t, const h6Vec3& x, double d, const h6Vec3& o
     const h6Vec3 shadow = x + (height * voxel_ - d) * out;
     // Inside a sheet the gradient may point along it, and deep inside it may be wrong.
     if (!(distance_at(shadow) > 0)) continue;
-    if (!t.judged) {  // it starts in contact, maybe inside
-      if (between(x, shadow)) continue;
+    // It starts in contact, maybe inside. Under an edge the rounded field may say that a shadow in
+    // the solid is outside, so the shadow must be free. Later a point that is inside comes under
+    // edges again, so it waits until it is free itself.
+    if (!t.judged) {
+      if (steps_ > 0 || height < kFree || touches(shadow) || between(x, shadow)) continue;
       t.judged = true, t.shadow = shadow;
       return;
     }
@@ -142,7 +150,7 @@ bool PopThroughSearch::frees(Track& t, const h6Vec3& x) {
   if (!open && !passes(t.shadow, x, wall)) {
     t.free = false;
     // A field rounds off sharp edges: a point under one may look free.
-    if (rays_->nearest(x, kFree * voxel_).triangle != RayScene::kNoTriangle) return true;
+    if (touches(x)) return true;
     if (!t.parted) t.triangle = wall->triangle, t.place = wall->place, t.crossed = steps_;
     t.parted = true;
     return false;

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // pop_through.h - finds the first shell point that passed through the environment's mesh.
 //
-//        . A         This is the god-object's rule (Zilles & Salisbury 1995), judged after the run.
-//   =====|=====      Each point has a shadow that stays on the free side. Where the point is free,
-//        . B         the shadow is the point. While the point is in contact, the shadow is the
-//        point
-//                    lifted out of the field along its gradient. The shadow moves only along
-// straight ways that meet no triangle. A point that is free where its shadow cannot come has popped
-// through: from A to B there is no way near the one that it took.
+//        . A
+//   =====|=====
+//        . B
+//
+// This is the god-object's rule (Zilles & Salisbury 1995), judged after the run. Each point has a
+// shadow that stays on the free side. Where the point is free, the shadow is the point. While the
+// point is in contact, the shadow is the point lifted out of the field along its gradient. The
+// shadow moves only along straight ways that meet no triangle. A point that is free where its
+// shadow cannot come has popped through: from A to B there is no way near the one that it took.
 //
 // A point keeps its shadow when it slides along a wall, at any depth, or dips in and comes out of
 // the same side. The shadow may step aside by half a voxel, so a point may cut the border of a
 // sheet by that much. For the same reason wires thinner than about a voxel cannot be seen. A point
-// that starts inside is not judged before it has once been free. Free means farther than 0.3 voxel
-// outside the field, and from all triangles.
+// that starts inside, or too near to an edge to tell, is not judged before it has once been free.
+// Free means farther than 0.3 voxel outside the field, and from all triangles.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -66,6 +68,7 @@ class PopThroughSearch {
 
   void sample(const h6Pose& pose);
   double distance_at(const h6Vec3& x) const;
+  bool touches(const h6Vec3& x) const;
   std::optional<Wall> between(const h6Vec3& from, const h6Vec3& to) const;
   bool passes(const h6Vec3& from, const h6Vec3& to, std::optional<Wall>& wall) const;
   void lift(Track& t, const h6Vec3& x, double d, const h6Vec3& out);

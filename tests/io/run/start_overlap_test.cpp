@@ -12,6 +12,7 @@
 #include <string>
 
 #include "hapsix/vector.h"
+#include "io/experiments/run.h"
 #include "io/run/run_setup.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
@@ -124,6 +125,24 @@ TEST_CASE("a start deeper than three voxels is refused by name, unless every dep
     REQUIRE(tight.overlaps.size() == 1);
     CHECK(tight.overlaps[0].depth_voxels > H6_DEEPEST_FIT);
     CHECK(tight.overlaps[0].relieved == 0);
+  }
+}
+
+TEST_CASE("a peg that is pulled out of its tight hole has passed through nothing") {
+  for (const double overlap : {0.2, 0.7, 1.6, 2.8}) {
+    CAPTURE(overlap);
+    const Loaded l = load(tight_peg(overlap * kMm));
+    RunChange change;
+    change.method = {"robust", "robust", 0};
+    const h6Pose start = l->scene.hands[0].path[0].pose;
+    const io::Path out_of_hole =
+        io::HandPath(start).move_by({0, 0, 40 * kMm}, 40 * kMm).wait(0.2).rows();
+    change.path = &out_of_hole;
+    const RunFigures out = run_experiment(*l, change);
+    CHECK(out.error == "");
+    CHECK(!out.through.first);
+    CHECK(out.verdict == io::Verdict::untouched);
+    CHECK(out.final_pose.p.z > start.p.z + 39 * kMm);
   }
 }
 

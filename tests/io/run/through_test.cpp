@@ -183,6 +183,21 @@ TEST_CASE("a point that starts inside is judged only after it has once been free
   CHECK_FALSE(walk(*thin, {mm(1, 2, 0.5), mm(1, 2, 10)}));
 }
 
+TEST_CASE("a point that starts in a tight fit and slides out over the edge is not through") {
+  for (const double f : {0.0, 0.2, 0.4, 0.6, 0.8}) {  // the edge lies elsewhere in its cell
+    const Loaded l = load(probe_and(io::box_mesh(mm(-20, -20, -20), mm(20 + f, 20, 20 + 2 * f))));
+    for (const double depth : {0.02, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.6, 2.9}) {
+      CAPTURE(f);
+      CAPTURE(depth);
+      const double x = 20 + f - depth;
+      for (const double start : {10.0, 19.0, 19.7, 19.9})
+        CHECK_FALSE(walk(*l, {mm(x, 2, start + 2 * f), mm(x, 2, 30)}));
+      CHECK_FALSE(walk(*l, {mm(x, 2, 10), mm(x, 2, 20 + 2 * f - depth), mm(x + 10, 2, 30)}));
+      CHECK(walk(*l, {mm(x, 2, 10), mm(x, 2, 30), mm(1, 2, 30), mm(1, 2, -30)}));  // once free
+    }
+  }
+}
+
 TEST_CASE("an obstacle that moves over a part that rests counts like a part that moves") {
   io::Scene scene = probe_and(sheet(10 * kMm, 6));
   scene.bodies[0].fixed = false;
