@@ -222,7 +222,8 @@ BENCHMARK(memory)
 
 [[maybe_unused]] const bool registered = [] {
   for (const bool socket : {false, true})
-    for (const h6Method method : {H6_METHOD_GAUSS6, H6_METHOD_ROBUST, H6_METHOD_SERIES})
+    for (const h6Method method :
+         {H6_METHOD_GAUSS6, H6_METHOD_ROBUST, H6_METHOD_SERIES, H6_METHOD_FIRM})
       for (const std::size_t contacts : {50, 120, 430, 1000, 10000})
         for (const unsigned threads : {1u, 2u})
           for (const bool cold : {false, true})

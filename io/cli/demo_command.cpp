@@ -66,7 +66,7 @@ int demo_command(const Console& console, DemoOptions o) {
   console.log(assets(**loaded));
   std::vector<RunSummary> runs;
   nlohmann::ordered_json json{{"scene", o.scene}, {"runs", nlohmann::ordered_json::array()}};
-  for (const char* method : {"global", "robust"}) {
+  for (const char* method : {"global", "firm"}) {
     o.run.method = method;
     o.run.record = (std::filesystem::path(o.folder) / (o.scene + "-" + method + ".h5")).string();
     console.log("running " + o.scene + " with '" + method + "' for " +

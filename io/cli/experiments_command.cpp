@@ -10,7 +10,6 @@
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
 #include "io/experiments/studies.h"
-#include "io/experiments/weighing.h"
 #include "io/file/write_aside.h"
 
 namespace h6::cli {
@@ -93,12 +92,6 @@ int experiments_command(const Console& console, const Options& o) {
         failed = std::string(row.scene->name) + ": " + run.error;
   }
   for (const Study& study : done) json["studies"][study.name] = study.json;
-  if (o.names.empty()) {  // this study needs the results of all scenes
-    done.push_back(weigh_series(rows, columns, done));
-    json[done.back().name] = done.back().json;
-    if (!console.json)
-      std::printf("%s\n%s\n", done.back().title.c_str(), plain(done.back().table).c_str());
-  }
   if (!o.folder.empty()) {
     const std::string file = (std::filesystem::path(o.folder) / "EXPERIMENTS.md").string();
     const std::string text = markdown_report(rows, columns, done, seconds);

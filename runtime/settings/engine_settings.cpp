@@ -46,7 +46,7 @@ constexpr Setting method_row(Setting row) {
 
 constexpr Setting kContactRows[] = {
     method_row(choice<&h6ContactDef::method>(
-        "method", kMethods, H6_METHOD_ROBUST,
+        "method", kMethods, H6_METHOD_FIRM,
         "none, global, cluster, gauss3, gauss6, robust, series or firm; the Gauss methods and "
         "robust "
         "also with pieces: +facing, +depth, +product, +cluster, +geodesic, +handles, +printed")),

@@ -125,7 +125,7 @@ typedef enum h6Fit {
 #define H6_DEEPEST_FIT 3.0
 
 typedef struct h6ContactDef {
-  h6Method method;          /* default robust                                                      */
+  h6Method method;          /* default firm                                                        */
   uint32_t pieces;          /* H6_PIECE_*; robust always has the first three                       */
   double   stiffness;       /* k, > 0                                                       [N/m]  */
   double   damping;         /* beta, >= 0: damping of a contact is beta * its stiffness       [s]  */

@@ -61,11 +61,13 @@ struct ThreeBowls : BallInBowl {
 
 TEST_CASE("a coarse frame has some of the full frame's contacts and bounds all it left out") {
   BallInBowl full(1);
+  full.def.contact.method = H6_METHOD_ROBUST;  // no margin, which coarse frames cannot bound
   full.open();
   std::map<int, double> bound;  // on points left out, less the deepest one [voxel]
   std::map<std::uint32_t, std::uint32_t> fewer[60];
   for (const std::uint32_t points : {1u, 2u, 4u, 8u}) {
     BallInBowl coarse(1);
+    coarse.def.contact.method = H6_METHOD_ROBUST;
     coarse.open();
     double tightest = HUGE_VAL;
     for (int i = 0; i < 60; ++i) {

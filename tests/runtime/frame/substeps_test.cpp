@@ -99,6 +99,7 @@ struct Thrust {
     def.bodies = bodies.data(), def.body_count = 2;
     def.hands = &hand, def.hand_count = 1;
     def.max_substeps = substeps;
+    def.contact.method = H6_METHOD_ROBUST;  // `firm` holds the balls without substeps
     h6Error error{};
     session = h6CreateSession(model.handle, &def, &error);
     REQUIRE_MESSAGE(session, error.message);

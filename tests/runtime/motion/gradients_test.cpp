@@ -184,6 +184,7 @@ struct Assembly {
     shell.pairs = pairs, shell.sums = sums;
     set.gradient = H6_EXACT;
     set.contact = h6DefaultContactDef();
+    set.contact.method = H6_METHOD_ROBUST;
     set.contact.stiffness = scene.k, set.contact.damping = scene.beta;
     set.contact.series_c = scene.c;
   }
