@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
+#include "tests/support/analytic.h"
 #include "tests/support/near.h"
 
 namespace {
@@ -153,4 +155,68 @@ TEST_CASE("a point that enters the margin changes nothing") {
   CHECK(after.weight.back() == 0);
   CHECK(after.wrench.force.z == h6::test::near(before.wrench.force.z).epsilon(1e-6));
   CHECK((after.K - before.K).norm() <= 1e-5 * before.K.norm());
+}
+
+namespace {
+
+// A tool that its hand pushes down onto a floor at z = 0 with `force` [N]; returns how deep its tip
+// is at the end [m].
+double pushed_depth(h6::test::ShellArrays tool, h6Method method, double force) {
+  h6::test::FieldArrays floor = h6::test::sample_analytic(
+      [](double, double, double z) { return z; }, {-32 * mm, -32 * mm, -24 * mm}, mm, 8, 8, 8);
+  h6::test::Model model({h6::test::def_of(floor)}, {tool.def()});
+  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
+  bodies[0].fixed = true, bodies[0].field = 0;
+  bodies[1].shell = 0, bodies[1].pose = h6::test::pose(0.3 * mm, 0.2 * mm, 1 * mm);
+  h6HandDef hand = h6DefaultHandDef();
+  hand.body = 1;
+  hand.coupling.max_force = force;
+  h6SessionDef def = h6DefaultSessionDef();
+  def.bodies = bodies.data(), def.body_count = 2;
+  def.hands = &hand, def.hand_count = 1;
+  def.contact.method = method;
+  h6Error error{};
+  h6Session* session = h6CreateSession(model.handle, &def, &error);
+  REQUIRE_MESSAGE(session, error.message);
+  for (int i = 0; i < 3000; ++i) {
+    const double z = std::max(1 - 0.01 * i, -8.0) * mm;
+    const h6DeviceSample sample = h6::test::hand_at(h6::test::pose(0.3 * mm, 0.2 * mm, z));
+    h6Step(session, &sample, nullptr);
+  }
+  const double depth = -h6GetBody(session, 1).pose.p.z;
+  h6DestroySession(session);
+  return depth;
+}
+
+// A wedge whose edge lies along x at z = 0; its faces lean by `angle` from the vertical.
+h6::test::ShellArrays knife_edge(double angle) {
+  h6::test::ShellArrays s;
+  for (const double side : {-1.0, 1.0})
+    for (int i = -10; i <= 10; ++i)
+      for (int j = 0; j <= 20; ++j)
+        s.add(0.5 * mm * i, side * 0.5 * mm * j * std::sin(angle), 0.5 * mm * j * std::cos(angle),
+              0, -side * std::cos(angle), std::sin(angle));
+  return s;
+}
+
+// The side of a needle along z, with no point at its tip.
+h6::test::ShellArrays needle(double radius) {
+  h6::test::ShellArrays s;
+  for (int ring = 0; ring <= 20; ++ring)
+    for (int i = 0; i < 8; ++i) {
+      const double a = 0.785398163 * i, x = std::cos(a), y = std::sin(a);
+      s.add(radius * x, radius * y, 0.5 * mm * ring, -x, -y, 0);
+    }
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("a knife edge and a needle, which have no normal along a push, are held") {
+  CHECK(pushed_depth(knife_edge(0.1), H6_METHOD_FIRM, 1.25) < 0.5 * mm);
+  CHECK(pushed_depth(needle(0.15 * mm), H6_METHOD_FIRM, 1.25) < 0.5 * mm);
+  CHECK(pushed_depth(needle(0.15 * mm), H6_METHOD_ROBUST, 1.25) > 2 * mm);
+  // Along N an edge gives way by the angle of its faces.
+  CHECK(pushed_depth(knife_edge(0.1), H6_METHOD_ROBUST, 1.25) >
+        5 * pushed_depth(knife_edge(0.1), H6_METHOD_FIRM, 1.25));
 }
