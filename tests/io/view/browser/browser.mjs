@@ -27,13 +27,16 @@ export class Browser {
   static async open(program, { webgl = true } = {}) {
     const b = new Browser();
     b.folder = mkdtempSync(join(tmpdir(), 'hapsix-view-'));
-    // Software GL: the machine may have no graphics card. /dev/shm may be small.
+    // Software GL: the machine may have no graphics card. /dev/shm may be small. `detached` makes a process
+    // group of its own, so that close() also ends the helper processes: they write to the folder.
     b.process = spawn(program, ['--headless=new', '--no-sandbox', '--disable-dev-shm-usage',
       ...(webgl ? ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']
         : ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis']),
       '--hide-scrollbars', '--no-first-run', '--disable-extensions', '--disable-background-networking',
       '--window-size=1280,860', '--remote-debugging-port=0', `--user-data-dir=${b.folder}`,
-      'about:blank'], { stdio: 'ignore' });
+      'about:blank'], { stdio: 'ignore', detached: true });
+    for (const signal of ['SIGINT', 'SIGTERM'])
+      process.once(signal, () => { process.kill(-b.process.pid, 'SIGKILL'); process.exit(1); });
     const file = join(b.folder, 'DevToolsActivePort');
     await until(() => existsSync(file) && readFileSync(file, 'utf8').includes('\n'), 'Chromium starts');
     const port = readFileSync(file, 'utf8').split('\n')[0];
@@ -83,7 +86,7 @@ export class Browser {
   }
   async close() {
     this.socket.close();
-    this.process.kill('SIGKILL');
+    process.kill(-this.process.pid, 'SIGKILL');
     await new Promise((done) => (this.process.exitCode !== null || this.process.signalCode !== null ? done() : this.process.on('exit', done)));
     rmSync(this.folder, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
   }
