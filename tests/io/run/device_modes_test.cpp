@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs scenes with a simulated arm in every device mode, with and without delay.
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -17,6 +14,7 @@
 #include "io/run/run_setup.h"
 #include "io/scene/scene_settings.h"
 #include "io/scenes/scenes.h"
+#include "tests/io/load.h"
 #include "tests/support/near.h"
 
 using namespace h6;
@@ -24,15 +22,6 @@ using namespace h6::cli;
 using h6::test::near;
 
 namespace {
-
-// Gives this run a cache folder of its own.
-struct PrivateCache {
-  std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("hapsix-modes-" + std::to_string(getpid()));
-  PrivateCache() { setenv("HAPSIX_CACHE", folder.c_str(), 1); }
-  ~PrivateCache() { std::filesystem::remove_all(folder); }
-};
-const PrivateCache cache;
 
 // A box of 10 mm height on a wall. The person who presses it aims 3 mm below the surface.
 const io::LoadedScene& pressed_box() {
@@ -42,9 +31,7 @@ const io::LoadedScene& pressed_box() {
     end.p.z = 2e-3;
     scene.hands[0].path = {{0, start}, {0.05, start}, {0.35, end}};
     scene.duration = 2;
-    auto made = io::load_scene(std::move(scene));
-    if (!made) FAIL(made.error());
-    return std::move(*made);
+    return h6::test::load(std::move(scene));
   }();
   return *loaded;
 }

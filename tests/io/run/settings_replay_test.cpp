@@ -3,16 +3,15 @@
 // the same frame, or says why the recording does not allow that.
 #include <doctest/doctest.h>
 #include <hdf5.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 
 #include "io/run/recorded_session.h"
 #include "io/run/run_setup.h"
 #include "io/scenes/scenes.h"
+#include "tests/io/load.h"
 
 using namespace h6;
 using namespace h6::cli;
@@ -21,30 +20,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Gives this run a folder of its own for bakes and recordings.
-struct PrivateFolder {
-  fs::path path = fs::temp_directory_path() / ("hapsix-settings-" + std::to_string(getpid()));
-  PrivateFolder() {
-    fs::create_directories(path);
-    setenv("HAPSIX_CACHE", path.c_str(), 1);
-  }
-  ~PrivateFolder() { fs::remove_all(path); }
-};
-const PrivateFolder folder;
-
 const io::LoadedScene& pressed_box() {
-  static const std::unique_ptr<io::LoadedScene> loaded = [] {
-    auto made = io::load_scene(*io::make_scene("box-on-wall"));
-    if (!made) FAIL(made.error());
-    return std::move(*made);
-  }();
+  static const auto loaded = h6::test::load(*io::make_scene("box-on-wall"));
   return *loaded;
 }
 
 // Records a run as the live view does, with other settings after 300, 600 and 601 frames.
 fs::path recorded(const std::string& name, bool tell = true) {
   RunSetup run(pressed_box());
-  run.record = folder.path / name;
+  run.record = h6::test::private_cache.folder / name;
   const Outcome opened = run.open();
   if (!opened) FAIL(opened.error());
   std::uint32_t settings = 0;

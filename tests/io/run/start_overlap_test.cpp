@@ -2,11 +2,9 @@
 // start_overlap_test.cpp - a run names the parts that overlap at its start, and refuses those whose
 // depth the field does not know.
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -16,32 +14,18 @@
 #include "io/run/run_setup.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
+#include "tests/io/load.h"
 
 using namespace h6;
 using namespace h6::cli;
+using h6::test::load;
 using io::kMm;
 
 namespace {
 
 namespace fs = std::filesystem;
 
-struct PrivateCache {
-  fs::path folder = fs::temp_directory_path() / ("hapsix-overlap-" + std::to_string(getpid()));
-  PrivateCache() {
-    fs::create_directories(folder);
-    setenv("HAPSIX_CACHE", folder.c_str(), 1);
-  }
-  ~PrivateCache() { fs::remove_all(folder); }
-};
-const PrivateCache cache;
-
 using Loaded = std::unique_ptr<io::LoadedScene>;
-
-Loaded load(io::Scene scene) {
-  auto made = io::load_scene(std::move(scene));
-  if (!made) FAIL(made.error());
-  return std::move(*made);
-}
 
 // The peg in its hole of 10.3 mm, in voxels of 1 mm; its side overlaps the hole by `overlap`.
 io::Scene tight_peg(double overlap) {
@@ -109,7 +93,7 @@ TEST_CASE("a start deeper than three voxels is refused by name, unless every dep
     CAPTURE(overlap);
     const Loaded l = load(tight_peg(overlap * kMm));
     RunSetup run(*l);
-    run.record = (cache.folder / "deep.h5").string();
+    run.record = (h6::test::private_cache.folder / "deep.h5").string();
     const Outcome opened = run.open();
     CHECK(static_cast<bool>(opened) == (overlap < H6_DEEPEST_FIT));
     if (opened) continue;

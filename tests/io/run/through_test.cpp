@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // through_test.cpp - which points popped through a mesh: on paths that are given, and in runs.
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <random>
 #include <string>
@@ -17,29 +14,16 @@
 #include "io/run/through_watch.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
+#include "tests/io/load.h"
 
 using namespace h6;
 using namespace h6::cli;
+using h6::test::load;
 using io::kMm;
 
 namespace {
 
-namespace fs = std::filesystem;
-
-struct PrivateCache {
-  fs::path folder = fs::temp_directory_path() / ("hapsix-through-" + std::to_string(getpid()));
-  PrivateCache() { setenv("HAPSIX_CACHE", folder.c_str(), 1); }
-  ~PrivateCache() { fs::remove_all(folder); }
-};
-const PrivateCache cache;
-
 using Loaded = std::unique_ptr<io::LoadedScene>;
-
-Loaded load(io::Scene scene) {
-  auto made = io::load_scene(std::move(scene));
-  if (!made) FAIL(made.error());
-  return std::move(*made);
-}
 
 // Squares of `size` in the plane z = 0, two triangles each: n x n of them around the origin.
 io::Mesh sheet(double size, int n) {

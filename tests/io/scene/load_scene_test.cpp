@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests loading a scene: mass properties, shared assets, and error sentences that name the body.
 #include <doctest/doctest.h>
-#include <unistd.h>
 #include "tests/support/near.h"
 
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <string>
 #include <utility>
 
 #include "io/scene/load_scene.h"
 #include "io/scene/mass.h"
 #include "io/scenes/scenes.h"
+#include "tests/io/private_cache.h"
 
 using namespace h6;
 using namespace h6::io;
@@ -37,15 +35,6 @@ Mesh box(Vec3 half, Vec3 at, bool inside_out = false) {
     for (auto& t : m.triangles) std::swap(t[1], t[2]);
   return m;
 }
-
-// Gives this run a cache folder of its own.
-struct PrivateCache {
-  std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("hapsix-load-" + std::to_string(getpid()));
-  PrivateCache() { setenv("HAPSIX_CACHE", folder.c_str(), 1); }
-  ~PrivateCache() { std::filesystem::remove_all(folder); }
-};
-const PrivateCache cache;
 
 Scene two_boxes() {
   Scene scene;

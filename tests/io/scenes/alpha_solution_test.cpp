@@ -2,13 +2,10 @@
 // alpha_solution_test.cpp - the puzzle has a solution: the tests prove it on the geometry, then run
 // the scene.
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +14,7 @@
 #include "io/scene/verdict.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
+#include "tests/io/private_cache.h"
 #include "tests/support/near.h"
 #include "tests/support/sanitized.h"
 
@@ -28,14 +26,6 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr std::uint32_t kSides = 12;
 constexpr double kTick = 0.005;  // [s]
-
-struct PrivateCache {
-  std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("hapsix-solution-" + std::to_string(getpid()));
-  PrivateCache() { setenv("HAPSIX_CACHE", folder.c_str(), 1); }
-  ~PrivateCache() { std::filesystem::remove_all(folder); }
-};
-const PrivateCache cache;
 
 Scene solution() {
   Result<Scene> scene = make_scene("alpha-solution");
