@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// frame_bench.cpp - times whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold.
+// frame_bench.cpp - times whole frames on the alpha puzzle: frame/alpha/METHOD/threads:N/warm|cold,
+// and frame/alpha/firm+friction.
 //
 // The hand pushes the tool into the gap until it has the wanted contacts and then holds it. Before
 // a time is reported, the frame's contacts are compared with a brute-force test of all points.
@@ -42,9 +43,11 @@ h6DeviceSample sample_at(double t) {
 }
 
 // Follows the scene's hand until the tool has `contacts` contacts, or to the end of the path.
-Session pushed_in(h6Method method, unsigned threads, std::uint32_t contacts, h6DeviceSample* held) {
+Session pushed_in(h6Method method, double friction, unsigned threads, std::uint32_t contacts,
+                  h6DeviceSample* held) {
   h6SessionDef def = alpha()->session_def();
   def.contact.method = method;
+  def.contact.friction = friction;
   def.threads = threads;
   Session session(h6CreateSession(alpha()->model.get(), &def, nullptr));
   for (int i = 0; session && i < static_cast<int>(1000 * alpha()->duration()); ++i) {
@@ -87,10 +90,10 @@ void flush_caches() {
   benchmark::DoNotOptimize(memory.data());
 }
 
-void frame(benchmark::State& state, h6Method method, unsigned threads, bool cold) {
+void frame(benchmark::State& state, h6Method method, double friction, unsigned threads, bool cold) {
   if (!alpha()) return state.SkipWithError("the alpha could not be baked");
   h6DeviceSample held{};
-  Session session = pushed_in(method, threads, 100, &held);
+  Session session = pushed_in(method, friction, threads, 100, &held);
   if (!session) return state.SkipWithError("no session");
   if (!contacts_are_right(session.get(), held))
     return state.SkipWithError("contacts differ from brute force");
@@ -121,18 +124,22 @@ void frame(benchmark::State& state, h6Method method, unsigned threads, bool cold
     state.counters[std::string(h6StageName(static_cast<h6Stage>(stage))) + "_us"] = sum / n;
 }
 
+void add(const std::string& rule, h6Method method, double friction, unsigned threads, bool cold) {
+  const std::string name =
+      "frame/alpha/" + rule + "/threads:" + std::to_string(threads) + (cold ? "/cold" : "/warm");
+  benchmark::RegisterBenchmark(name.c_str(), frame, method, friction, threads, cold)
+      ->UseManualTime()
+      ->Unit(benchmark::kMicrosecond)
+      ->Iterations(cold ? 300 : 5000);
+}
+
 [[maybe_unused]] const bool registered = [] {
-  for (int m = 0; m < H6_METHOD_COUNT; ++m)
-    for (const unsigned threads : {1u, 2u})
-      for (const bool cold : {false, true}) {
-        const auto method = static_cast<h6Method>(m);
-        const std::string name = std::string("frame/alpha/") + h6MethodName(method) +
-                                 "/threads:" + std::to_string(threads) + (cold ? "/cold" : "/warm");
-        benchmark::RegisterBenchmark(name.c_str(), frame, method, threads, cold)
-            ->UseManualTime()
-            ->Unit(benchmark::kMicrosecond)
-            ->Iterations(cold ? 300 : 5000);
-      }
+  for (const bool cold : {false, true}) {
+    for (int m = 0; m < H6_METHOD_COUNT; ++m)
+      for (const unsigned threads : {1u, 2u})
+        add(h6MethodName(static_cast<h6Method>(m)), static_cast<h6Method>(m), 0, threads, cold);
+    add("firm+friction", H6_METHOD_FIRM, 0.3, 1, cold);
+  }
   return true;
 }();
 

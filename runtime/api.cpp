@@ -33,6 +33,7 @@ std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
   // In the other modes the manipulandum follows from the sample.
   for (const Hand& hand : s.hands)
     if (hand.mode == H6_PSEUDO_ADMITTANCE) mix_state(hand.manipulandum);
+  for (const FrictionSpring& spring : s.frictions) mix(spring.q.data(), 6);
   for (std::size_t h = 0; h < s.hands.size(); ++h) {
     const h6DeviceSample& in = samples[h];
     mix(&in.pose.p.x, 7);
@@ -41,6 +42,11 @@ std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
     if (s.hands[h].mode != H6_IMPEDANCE) mix(&in.wrench.force.x, 6);
   }
   return hash;
+}
+
+void forget_friction(h6Session& s, std::int32_t body) {
+  for (std::size_t i = 0; i < s.frictions.size(); ++i)
+    if (s.pairs[i].a == body || s.pairs[i].b == body) s.frictions[i] = {};
 }
 
 namespace {
@@ -88,8 +94,9 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   if (body.translation_only) body.w.setZero();
   if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
   body.step_rate.setZero();
-  if (ShellBody* shell = find_shell(*session, index)) std::fill_n(shell->series_y, 6, 0.0);
   if (session->frame == 0) forget_relief(*session, index);
+  // An obstacle that a program moves drags along what rests on it.
+  if (!body.fixed) forget_friction(*session, index);
   forget_energy(*session, index);
   for (Hand& hand : session->hands)
     if (hand.body == index) hand.manipulandum = body;

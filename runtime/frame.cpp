@@ -89,7 +89,10 @@ void note_depths(std::span<const Body> bodies, const ShellBody& shell, h6FrameRe
 // that weighed them has them in its cache.
 void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   Stopwatch watch{lane.report, lane.tick_ns, sched::ticks()};
-  watch.timed(H6_STAGE_TRAVERSE, [&] { traverse(set, bodies, shell, lane); });
+  watch.timed(H6_STAGE_TRAVERSE, [&] {
+    look_ahead(set, bodies, shell);
+    traverse(set, bodies, shell, lane);
+  });
   const std::int64_t since = watch.last;
   watch.timed(H6_STAGE_CONTACTS, [&] {
     gather_contacts(bodies, shell, lane);
@@ -98,8 +101,11 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
   watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(set, bodies, shell, lane); });
   // The time includes the contacts stage, because its columns come back from the helper's cache.
   lane.weighing.took(watch.ns_since(since));
-  if (uses_series(set.contact)) return;
-  watch.timed(H6_STAGE_WRENCH, [&] { sum_contacts(set, bodies, shell, lane); });
+  if (uses_series(set.contact) && shell.frictions.empty()) return;
+  watch.timed(H6_STAGE_WRENCH, [&] {
+    if (!uses_series(set.contact)) sum_contacts(set, bodies, shell, lane);
+    sum_friction(set, bodies, shell, lane);
+  });
 }
 
 // Finds the wrench on every body at its present pose.

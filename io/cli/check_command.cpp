@@ -29,7 +29,7 @@ struct CheckOptions {
   std::string units = "m", field;
   io::FieldBake bake;
   bool verify = false;
-  double stiffness = h6DefaultContactDef().stiffness;
+  double stiffness = 1e4;
   io::ExactCheckOptions exact;
 };
 
@@ -310,7 +310,7 @@ int check_command(const Console& console, CheckOptions& o) {
       Result<std::vector<Subject>> found = subjects_of_scene(*scene);
       if (!found) return console.fail(found.error());
       subjects = std::move(*found);
-      stiffness = scene->contact.stiffness;
+      if (scene->contact.stiffness > 0) stiffness = scene->contact.stiffness;
     } else {
       Result<io::Mesh> mesh = io::read_mesh(file, *unit);
       if (!mesh) return console.fail(mesh.error());

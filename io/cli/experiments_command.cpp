@@ -25,7 +25,7 @@ struct Chosen {
   std::vector<const StudyKind*> studies;
 };
 
-// Finds the scenes and studies of these names. Without names it returns all of them.
+// Finds the scenes and studies of these names. Without names it returns all but the long studies.
 Result<Chosen> choose(const std::vector<std::string>& names) {
   Chosen out;
   std::vector<std::string> known;
@@ -40,7 +40,7 @@ Result<Chosen> choose(const std::vector<std::string>& names) {
   for (const TableScene& s : table_scenes())
     if (wanted(s.name)) out.scenes.push_back(&s);
   for (const StudyKind& s : studies())
-    if (wanted(s.name)) out.studies.push_back(&s);
+    if (wanted(s.name) && !(names.empty() && s.long_run)) out.studies.push_back(&s);
   return out;
 }
 
@@ -57,11 +57,11 @@ int experiments_command(const Console& console, const Options& o) {
   const auto start = std::chrono::steady_clock::now();
   Result<Chosen> chosen = choose(o.names);
   if (!chosen) return console.fail(chosen.error(), kUsage);
+  Result<std::vector<MethodColumn>> columns_of = columns_named(o.methods);
+  if (!columns_of) return console.fail(columns_of.error(), kUsage);
   if (!o.folder.empty())
     if (Outcome made = make_folder(o.folder); !made) return console.fail(made.error());
 
-  Result<std::vector<MethodColumn>> columns_of = columns_named(o.methods);
-  if (!columns_of) return console.fail(columns_of.error(), kUsage);
   const std::vector<MethodColumn>& columns = *columns_of;
   const std::vector<SceneRow> rows = run_scene_table(chosen->scenes, columns, o.folder, console);
   if (!console.json && !rows.empty() && !interrupted.load()) {
@@ -115,7 +115,8 @@ void add_experiments(CLI::App& app, Program& program) {
   auto o = std::make_shared<Options>();
   std::string list = "Scenes and studies, default all:";
   for (const TableScene& s : table_scenes()) list += std::string(" ") + s.name;
-  for (const StudyKind& s : studies()) list += std::string(" ") + s.name;
+  for (const StudyKind& s : studies())
+    list += std::string(" ") + s.name + (s.long_run ? " (only by name)" : "");
   experiments->add_option("NAME", o->names, list)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->option_text("NAME...");

@@ -85,6 +85,14 @@ bool open_browser(const std::string& address) {
   return true;
 }
 
+// The contact settings as the engine uses them.
+h6ContactDef in_use(const io::LoadedScene& loaded, h6ContactDef contact) {
+  h6SessionDef def = loaded.session_def();
+  def.contact = contact;
+  contact.stiffness = h6StiffnessFor(loaded.model.get(), &def);
+  return contact;
+}
+
 class Viewer : public RunObserver {
  public:
   Viewer(const io::LoadedScene& loaded, const ViewOptions& options, const Console& console)
@@ -101,7 +109,7 @@ class Viewer : public RunObserver {
     server_ = std::move(*server);
     contact_ = contact;
     coupling_ = coupling;
-    state_.settings(contact_, coupling_);
+    state_.settings(in_use(loaded_, contact_), coupling_);
     std::vector<std::string> remarks;
     server_->greet(state_.scene_message(remarks));
     console_.warn(remarks);
@@ -222,7 +230,7 @@ class Viewer : public RunObserver {
     (void)setup_->session.release();  // the next line destroys it as `old`
     h6DestroySession(old);
     setup_->session = std::move(next);
-    state_.settings(contact_, coupling_);
+    state_.settings(in_use(loaded_, contact_), coupling_);
     note_("settings", io::settings_text(contact_, coupling_));
   }
   void act(const io::view::SetPace& set) {

@@ -27,10 +27,7 @@ Study study_pushes(const std::vector<MethodColumn>& columns, const Console& cons
       "N, and k times half a voxel. The table gives how many of the 20 pushes get through, and "
       "the least, median and greatest depth of their deepest contacts in voxels. \"Through\" "
       "means that a point of the tool was where it cannot be while the loops are linked, "
-      "whatever the direction. A legitimate way out would show as a pass without deep contact. "
-      "Verdicts are the same on "
-      "AVX-512, AVX2 and SCALAR; on SSE4 and SSSE3 push 8 at 20 N chatters where it is held "
-      "elsewhere, under gauss3 and gauss3+facing (1,148 verdicts compared).";
+      "whatever the direction. A legitimate way out would show as a pass without deep contact.";
   const io::Scene scene = io::alpha_pushes();
   auto loaded = io::load_scene(scene);
   if (!loaded) return out;

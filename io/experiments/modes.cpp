@@ -104,6 +104,10 @@ std::string gain_text(Gain gain, const io::LoadedScene& loaded, int steps) {
   return (steps < kSteps ? "" : "≥ ") + number(gain_value(gain, loaded, steps), 0);
 }
 
+bool compared(const std::string& method) {
+  return method == "robust" || method == "series" || method == "firm";
+}
+
 struct Row {
   const Mode* mode;
   std::size_t method;
@@ -136,8 +140,7 @@ Study study_modes(const std::vector<MethodColumn>& columns, const Console& conso
   std::vector<Row> rows;
   for (const Mode& mode : kModes)
     for (std::size_t m = 0; m < columns.size(); ++m)
-      if (columns[m].name == "robust" || columns[m].name == "series")
-        rows.push_back({&mode, m, {}, {}});
+      if (compared(columns[m].name)) rows.push_back({&mode, m, {}, {}});
   std::vector<std::function<void()>> jobs;
   for (Row& row : rows)
     for (int delay = 0; delay < kDelays; ++delay) {

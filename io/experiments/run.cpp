@@ -91,6 +91,7 @@ Result<std::vector<MethodColumn>> columns_named(const std::string& list) {
     if (found == known.end()) return Failure{no_such("method", name, names)};
     if (std::none_of(out.begin(), out.end(), same)) out.push_back(*found);
   }
+  if (out.empty()) return Failure{"'" + list + "' names no method"};
   return out;
 }
 

@@ -8,6 +8,7 @@ const std::vector<StudyKind>& studies() {
       {"global", "where the paper says global scaling fails", study_global},
       {"two-planes", "Fig. 4: stiffness of two inclined planes", study_two_planes},
       {"alpha-pushes", "Fig. 8: the alpha pushed in many ways", study_pushes},
+      {"forced-paths", "a starter motor forced through its engine bay", study_forced_paths, true},
       {"modes", "Fig. 13: device modes and delay", study_modes},
       {"stability", "largest stable stiffness", study_stability},
       {"resampling", "other samplings of the shell", study_sampling},

@@ -10,6 +10,7 @@ struct StudyKind {
   const char* name;
   const char* about;
   Study (*run)(const std::vector<MethodColumn>& columns, const Console& console);
+  bool long_run = false;  // takes minutes, so it runs only when it is named
 };
 const std::vector<StudyKind>& studies();
 
@@ -25,6 +26,8 @@ Study study_share(const std::vector<MethodColumn>& columns, const Console& conso
 Study study_global(const std::vector<MethodColumn>& columns, const Console& console);
 // alpha.cpp
 Study study_pushes(const std::vector<MethodColumn>& columns, const Console& console);
+// forced_paths.cpp
+Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console& console);
 // smoothness.cpp
 Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_ripple(const std::vector<MethodColumn>& columns, const Console& console);

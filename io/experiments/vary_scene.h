@@ -22,7 +22,7 @@ struct Variation {
                     // serves the scene's own force and the push
 };
 
-// What a drawn variation changes beside the push: everything at once, or one thing.
+// A drawn variation changes the push, and beside it everything at once or one thing.
 enum class Vary { all, voxel, shift, turn, sampling, mass, speed, step };
 inline constexpr int kVaryCount = 8;
 const char* vary_name(Vary kind);

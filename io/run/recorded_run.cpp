@@ -181,9 +181,11 @@ std::string settings_text(const h6ContactDef& contact, const h6CouplingDef& coup
                       {"max_depth_voxels", coupling.max_depth_voxels},
                       {"max_force", coupling.max_force},
                       {"max_torque", coupling.max_torque}};
-  char text[160];
-  std::snprintf(text, sizeof text, "method %s, stiffness %.0f N/m, saturation %.2f voxels ",
-                h6MethodName(contact.method), contact.stiffness, coupling.max_depth_voxels);
+  char stiffness[40] = "from the scene", text[160];
+  if (contact.stiffness > 0)
+    std::snprintf(stiffness, sizeof stiffness, "%.0f N/m", contact.stiffness);
+  std::snprintf(text, sizeof text, "method %s, stiffness %s, saturation %.2f voxels ",
+                h6MethodName(contact.method), stiffness, coupling.max_depth_voxels);
   return text + exact.dump();
 }
 

@@ -51,7 +51,7 @@ Outcome check_options(const RunOptions& options);
 Result<RunSummary> run_scene(const io::LoadedScene& scene, const RunOptions& options,
                              const Console& console);
 
-// What a person should know of a run beside its figures: a sentence each.
+// These sentences tell a person about a run beside its figures.
 std::vector<std::string> remarks(const RunTotals& run);
 
 // The object that `run --json` prints, with lengths in the scene's units.

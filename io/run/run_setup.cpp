@@ -14,6 +14,11 @@ RunSetup::RunSetup(const io::LoadedScene& scene)
 
 Outcome RunSetup::open() {
   h6Error error{};
+  for (std::size_t i = 0; i < hands.size(); ++i) {  // a simulated arm knows its delay
+    if (hands[i].device != "arm" || !hands[i].arm || hand_defs[i].delay_frames > 0) continue;
+    hand_defs[i].delay_frames = static_cast<std::uint32_t>(hands[i].arm->delay_frames);
+    hand_defs[i].delay_known = true;
+  }
   session.reset(h6CreateSession(loaded.model.get(), &def, &error));
   if (!session) return Failure{error.message};
   overlaps = start_overlaps(loaded, def.contact, session.get());

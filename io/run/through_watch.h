@@ -61,7 +61,7 @@ class ThroughWatch {
   std::vector<std::string> left_out_;
 };
 
-// What a person should know of it, in one sentence.
+// Tells a person about it in one sentence.
 std::string sentence(const PopThrough& found);
 
 }  // namespace h6::cli

@@ -69,7 +69,7 @@ HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uin
   const auto keep = hn::And(live, hn::Le(distance, hn::Add(reach, hn::Set(d, c.margin))));
   const std::size_t kept = hn::CountTrue(d, keep);
   if (clearance != nullptr) {
-    const VF left = hn::Sub(clearance_of(hn::Sub(distance, hn::Set(d, c.margin)), c.wide), scaled);
+    const VF left = hn::Sub(clearance_of(distance, c.wide), scaled);
     const auto held = hn::And(keep, hn::Gt(left, hn::Zero(d)));
     store_n(hn::IfThenElse(held, hn::Zero(d), left), d, clearance, lanes.live);
   }

@@ -25,8 +25,9 @@ inline constexpr float cull_reach(float s, bool wide) {
   return (s < kShortReach && !wide ? kSqrt3 * s : s + kSqrt3) + kReachRounding;
 }
 
-// The distance that a point which samples `distance` above the margin can certainly move without
-// coming within the margin: the inverse of cull_reach. Negative when the point may touch already.
+// The distance that a point which samples `distance` can certainly move without touching: the
+// inverse of cull_reach. Negative when the point may touch already. It grows by no more than
+// `distance` does, so a point stays outside of a margin m for cull_clearance(distance) - m.
 inline constexpr float cull_clearance(float distance, bool wide) {
   const float d = distance - kReachRounding;
   const float long_form = d - kSqrt3;
@@ -42,8 +43,8 @@ inline constexpr float cull_clearance(float distance, bool wide) {
 //     distance(r) <= cull_reach(radius[r] * radius_scale, wide) + margin        [voxels]
 // with the distance of sample_field. Returns the number of survivors; rows past them are
 // unspecified. When `clearance` (room for `count`) is not null, entry k is how far the shell may
-// move in the field's frame before sphere rows[k] may hold a contact:
-// cull_clearance(distance - margin) - radius, which is <= 0 for survivors.
+// move in the field's frame before a point of sphere rows[k] may touch:
+// cull_clearance(distance) - radius, but at most 0 for survivors.
 std::size_t cull_spheres(const FieldView& field, const Affine& to_field, const SpheresView& spheres,
                          float radius_scale, bool wide, float margin, const std::uint32_t* rows,
                          std::uint32_t first, std::size_t count, std::uint32_t* survivors,

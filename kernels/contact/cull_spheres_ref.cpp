@@ -20,7 +20,7 @@ std::size_t cull_spheres_ref(const FieldView& field, const Affine& to_field,
     const float reach = cull_reach(radius, wide);
     const bool keep = distance <= reach + margin;
     if (clearance != nullptr) {
-      const float left = cull_clearance(distance - margin, wide) - radius;
+      const float left = cull_clearance(distance, wide) - radius;
       clearance[k] = keep && left > 0 ? 0.0f : left;
     }
     if (keep) survivors[written++] = row;

@@ -105,7 +105,9 @@ struct Linker {
 };
 
 void copy_row(Contacts& c, std::size_t from, std::size_t to) {
-  each_column(c, [&](auto* column) { column[to] = column[from]; });
+  each_column(c, [&](auto* column) {
+    if (column) column[to] = column[from];
+  });
 }
 
 // Updates means weighted by depth. `weight` holds the sum of depths, `facing` the largest so far.

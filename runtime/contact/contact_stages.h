@@ -11,10 +11,14 @@ inline constexpr std::size_t kSumSlice = 1024;  // contacts summed at a time; sl
 
 // ---- these may run side by side for several shell bodies: each writes only its own body and lane
 
+// `series`, `firm`: notes how far points may be carried ahead: PairSearch::ahead,
+// PairSearch::margin.
+void look_ahead(const Settings& set, std::span<const Body> bodies, ShellBody& shell);
 // Finds the shell points that touch a field: rows of the last level with a distance below zero, or
-// (series) below the margin. If there are too many, it keeps the deepest.
+// below the pair's margin. If there are too many, it keeps the deepest.
 void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
-// Fills depth, normal, gradient and arm of each contact.
+// Fills depth, normal, gradient and arm of each contact. Points that neither touch nor can carry
+// load are left out.
 void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Shares the stiffness among all contacts of the shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
@@ -22,10 +26,14 @@ void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody
 // Whether the weighing of so many contacts is faster on two threads.
 bool worth_two_threads(const h6ContactDef& def, std::size_t count, Lane& lane);
 // `firm`: replaces N by the direction in which each contact pushes, and fills facing.
-void find_push_directions(std::span<const Body> bodies, ShellBody& shell, Lane& lane);
+void find_push_directions(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                          Lane& lane);
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Sums each pair's contacts into shell.sums.
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
+// Stretches the friction springs by the motion since the last step, lets them slip, and sums their
+// wrenches into shell.frictions. It reads the normal loads of all contacts.
+void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 
 // ---- this runs for one shell body after the other, in order
 
@@ -52,6 +60,9 @@ void spread_series(const Settings& set, const Sides& sides, Pair& pair,
                    const kernels::WrenchSum& sum);
 void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                  std::span<LinearWrench> acting);
+// Adds a pair's friction to the wrenches on both bodies, and to the blocks between them.
+void add_friction(const Settings& set, const Sides& sides, Pair& pair,
+                  const FrictionSpring& spring);
 // Adds to the derivatives how an elastic wrench f on a changes as its arms and normals turn.
 void add_geometric_terms(const Sides& sides, Pair& pair, const Vec6& f);
 

@@ -19,6 +19,7 @@ struct Contacts {
   float *slack, *kappa;  // `series`: kernels/weights/series_solve.h               [m], [1]
   std::uint32_t* point;  // index into the shell's points
   std::int32_t* field_body;
+  std::uint32_t* cell;  // of the shell; null: nothing is known of cells
   std::size_t count, capacity;
 };
 
@@ -30,6 +31,7 @@ void each_column(Contacts& c, F&& f) {
     f(*column);
   f(c.point);
   f(c.field_body);
+  f(c.cell);
 }
 
 inline void take_columns(Contacts& c, Arena& arena, std::size_t capacity) {

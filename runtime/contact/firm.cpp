@@ -11,18 +11,23 @@
 namespace h6 {
 namespace {
 
-constexpr float kStep = 0.5f;  // half the edge of the cube about the tetrahedron [voxel]
+constexpr float kStep = 0.5f;     // half the edge of the cube about the tetrahedron [voxel]
+constexpr double kPresent = 0.1;  // the depth from which a contact counts in full [voxel]
 constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
 constexpr std::size_t kManySlices = 4;        // from here on two threads share them
 
-// Rows begin..end-1 of one pair. The distances go to columns that are filled later.
-void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, std::size_t begin,
-               std::size_t end) {
+// Rows begin..end-1 of one pair. The distances go to columns that are filled later. `shifted`:
+// depths have relief or play in them.
+void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool shifted,
+               std::size_t begin, std::size_t end) {
   static constexpr float kCorner[5][3] = {{}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   float* const at[5] = {c.tx + begin, c.ty + begin, c.tz + begin, c.slack + begin, c.kappa + begin};
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
   kernels::Around around{{}, kStep, b.field->view.band, {}};
-  for (int k = 0; k < 5; ++k) {
+  const float per_voxel = static_cast<float>(-1 / b.field->voxel);
+  for (std::size_t i = begin; i < end && !shifted; ++i) c.tx[i] = per_voxel * c.depth[i];
+  around.at[0] = at[0];
+  for (int k = shifted ? 0 : 1; k < 5; ++k) {
     kernels::Affine to = place;
     for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += kStep * kCorner[k][axis];
     kernels::sample_field(b.field->view, to, arms, nullptr, arms.count, at[k], nullptr, nullptr,
@@ -36,14 +41,16 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, std::si
 
 }  // namespace
 
-void find_push_directions(std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+void find_push_directions(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                          Lane& lane) {
   for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
     const Pair& pair = shell.pairs[p];
     if (pair.begin == pair.end) continue;
     const std::size_t slices = (pair.end - pair.begin + kDirectionSlice - 1) / kDirectionSlice;
+    const bool shifted = shell.searches[p].fit.count > 0 || set.contact.fit_offset > 0;
     const auto push = [&](std::size_t i) {
       const std::size_t begin = pair.begin + i * kDirectionSlice;
-      push_rows(shell.contacts, bodies[pair.b], shell.searches[p].arms, begin,
+      push_rows(shell.contacts, bodies[pair.b], shell.searches[p].arms, shifted, begin,
                 std::min(begin + kDirectionSlice, pair.end));
     };
     if (slices >= kManySlices) {
@@ -56,13 +63,13 @@ void find_push_directions(std::span<const Body> bodies, ShellBody& shell, Lane& 
 
 void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
                    std::size_t end) {
-  const float margin = static_cast<float>(def.margin_voxels * voxel);
+  const float full = static_cast<float>(kPresent * voxel);
   const float scale = static_cast<float>(2 / voxel);
   const float shallow = static_cast<float>(def.firmness_shallow);
   const float rise = static_cast<float>(def.firmness - def.firmness_shallow);
   for (std::size_t i = begin; i < end; ++i) {
     const float way = std::clamp(scale * c.depth[i], 0.0f, 1.0f);
-    c.slack[i] = std::max(0.0f, c.depth[i] + margin);
+    c.slack[i] = std::clamp(std::max(c.depth[i], c.slack[i]), 0.0f, full);
     c.kappa[i] = shallow + rise * way * way;
   }
 }

@@ -4,6 +4,7 @@
 #include "hapsix/hapsix.h"
 #include "kernels/contact/contact_wrench.h"
 #include "runtime/contact/anytime.h"
+#include "runtime/contact/friction.h"
 #include "runtime/contact/share_gate.h"
 #include "runtime/contact/weighing.h"
 #include "sched/frame_team.h"
@@ -30,6 +31,7 @@ struct Scratch {
   char* weigh = nullptr;                    // weigh_scratch_bytes(max_contacts) bytes, or null
   std::size_t* slice_count = nullptr;       // (slices of groups) how many points touch
   kernels::WrenchSum* slice_sum = nullptr;  // (slices of contacts)
+  FrictionScratch friction;
 };
 
 struct Lane {

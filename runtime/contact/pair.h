@@ -12,6 +12,7 @@
 #include "runtime/contact/body.h"
 #include "runtime/contact/contacts.h"
 #include "runtime/contact/fit.h"
+#include "runtime/contact/friction.h"
 
 namespace h6 {
 
@@ -39,6 +40,9 @@ struct alignas(64) PairSearch {
   std::size_t first = 0, candidates = 0;  // this frame's rows among the candidates
   int found_by = 0;                       // the thread whose scratch holds them
   float missed = 0;  // after a coarse traversal: no point that was left out is deeper [voxel]
+  // `series`, `firm`: the common spring and damping may carry points towards the field by this
+  // screw (v [m], w) about a's centre of mass, world frame; none comes farther than margin [voxel].
+  float ahead[6] = {}, margin = 0;
   // No point of a group can touch before the distance travelled exceeds the group's expiry. A
   // block's expiry is the least of its groups' expiries.
   float *group_expiry = nullptr, *block_expiry = nullptr;
@@ -53,8 +57,8 @@ struct alignas(64) PairSearch {
   CullBypass pick_rows;          // decides whether to test single points of groups
   kernels::Affine last_place{};  // from the shell to the field, in the last traversal
   kernels::Affine anchor{};      // a place that the shell has stayed near to since
-  kernels::Affine arms{};        // maps contact arms [m] to voxels, as the contacts were made
   PairFit fit;
+  kernels::Affine arms{};  // maps contact arms [m] to voxels, as the contacts were made
 };
 
 // A pair whose bodies both move: how the motion of one changes the wrench on the other.
@@ -84,7 +88,7 @@ struct alignas(64) Pair {
   Vec6 relief = Vec6::Zero();  // what may be taken away from f
 };
 
-static_assert(sizeof(Pair) <= 512 && sizeof(PairSearch) <= 320);
+static_assert(sizeof(Pair) <= 512 && sizeof(PairSearch) <= 384);
 
 // The energy port between one shell body's contacts and the fields: passivity.h.
 struct ContactPort {
@@ -97,8 +101,9 @@ struct ContactPort {
 struct alignas(64) ShellBody {
   std::int32_t body = -1;
   std::span<Pair> pairs;
-  std::span<PairSearch> searches;      // (pairs)
-  std::span<kernels::WrenchSum> sums;  // (pairs) over this frame's contacts
+  std::span<PairSearch> searches;       // (pairs)
+  std::span<kernels::WrenchSum> sums;   // (pairs) over this frame's contacts
+  std::span<FrictionSpring> frictions;  // (pairs), or none without friction
   Contacts contacts{};
   double series_y[6] = {};  // `series`: the spring's last extension, from which the solver starts
   ContactPort port;

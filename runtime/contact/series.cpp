@@ -15,6 +15,32 @@
 #include "runtime/contact/weighing.h"
 
 namespace h6 {
+namespace {
+
+// The spring's last extension, times this, must cover its next one.
+constexpr double kAhead = 2;
+
+}  // namespace
+
+void look_ahead(const Settings& set, std::span<const Body> bodies, ShellBody& shell) {
+  const double most = uses_series(set.contact) ? set.contact.margin_voxels : 0.0;
+  const Body& a = bodies[shell.body];
+  Eigen::Map<Vec6> y(shell.series_y);
+  if (!y.allFinite()) y.setZero();  // after a run that was unstable
+  Vec6 spring = kAhead * y;
+  spring.tail<3>() /= series_lever(a.radius, a.voxel);
+  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
+    PairSearch& search = shell.searches[p];
+    search.margin = 0;
+    if (!(most > 0)) continue;
+    const Body& b = bodies[shell.pairs[p].b];
+    const Vec6 way = spring + set.contact.damping * pair_velocity(a, b);
+    for (int k = 0; k < 6; ++k) search.ahead[k] = static_cast<float>(way[k]);
+    const double reach = (way.head<3>().norm() + way.tail<3>().norm() * a.radius) / b.field->voxel;
+    // A point loses its relief where it takes no part, so that must not depend on the spring.
+    search.margin = static_cast<float>(search.fit.count == 0 && reach < most ? reach : most);
+  }
+}
 
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end) {
   kernels::series_gap(kernel_columns(c, begin, end), c.depth + begin, beta, u.data(),
@@ -48,9 +74,15 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
   const Body& a = bodies[shell.body];
   Contacts& c = shell.contacts;
   const bool firm = set.contact.method == H6_METHOD_FIRM;
-  if (firm) find_push_directions(bodies, shell, lane);
-  for (const Pair& pair : shell.pairs)
-    if (firm) note_firmness(c, set.contact, bodies[pair.b].field->voxel, pair.begin, pair.end);
+  if (firm) find_push_directions(set, bodies, shell, lane);
+  for (std::size_t p = 0; firm && p < shell.pairs.size(); ++p) {
+    const Pair& pair = shell.pairs[p];
+    const Vec6 ahead =
+        Eigen::Map<const Eigen::Matrix<float, 6, 1>>(shell.searches[p].ahead).cast<double>();
+    kernels::series_gap(kernel_columns(c, pair.begin, pair.end), c.depth + pair.begin, 1,
+                        ahead.data(), c.slack + pair.begin);
+    note_firmness(c, set.contact, bodies[pair.b].field->voxel, pair.begin, pair.end);
+  }
   fill_inner_stiffness(c, set.contact, a.voxel,
                        worth_two_threads(set.contact, c.count, lane) ? lane.team : nullptr,
                        firm ? lane.scratch->weigh : nullptr);

@@ -9,6 +9,9 @@
 
 namespace h6 {
 
+// Stiffness of a contact between light bodies, where no definition sets one [N/m].
+inline constexpr double kLeastStiffness = 1e4;
+
 struct Settings {
   h6ContactDef contact{};
   h6Integrator integrator = H6_IMPLICIT;

@@ -138,6 +138,8 @@ void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& 
     }
   }
   if (series) join_series(set, bodies, shell, acting);
+  for (std::size_t i = 0; i < shell.frictions.size(); ++i)
+    add_friction(set, sides_of(shell.pairs[i], bodies, acting), shell.pairs[i], shell.frictions[i]);
 }
 
 }  // namespace h6

@@ -13,6 +13,7 @@
 
 #include "kernels/contact/cull_spheres.h"
 #include "kernels/contact/expiry.h"
+#include "kernels/contact/keep_loadable.h"
 #include "sched/clock.h"
 
 namespace h6 {
@@ -51,11 +52,6 @@ kernels::Affine shell_to_field(const Body& a, const Body& b) {
   return affine;
 }
 
-// The distance up to which points are found [voxel]. `series` also needs points about to touch.
-float margin_of(const h6ContactDef& contact) {
-  return uses_series(contact) ? static_cast<float>(contact.margin_voxels) : 0.0f;
-}
-
 constexpr float kSlack = 1e-3f;  // [voxel]
 constexpr std::size_t kFewGroups =
     4;  // testing so few groups of a block is cheaper than testing its sphere
@@ -86,6 +82,16 @@ struct Search {
     return kernels::cull_spheres(
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
+  }
+  // Of `groups`, keeps those of which a point may touch after the way `now`, or may carry load.
+  std::size_t loadable(const float* expiry, float now, const float ahead[6], std::uint32_t* groups,
+                       std::size_t count) const {
+    const Tier& tier = shell.groups;
+    const Bundles& normals = shell.normals;
+    return kernels::loadable_groups(
+        {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count},
+        {normals.nx.data, normals.ny.data, normals.nz.data, normals.spread.data}, ahead, margin,
+        expiry, now, groups, count, groups);
   }
   // Evaluates the samples in `vectors`. Rows in `out` are rows of the shell.
   std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
@@ -118,15 +124,15 @@ struct Search {
   }
 };
 
-Search search_of(const Settings& set, const Body& a, const Body& b, bool cold) {
+Search search_of(const Settings& set, const Body& a, const Body& b, float margin, bool cold) {
   const Field& field = *b.field;
-  const float margin = margin_of(set.contact);
-  // The short form of culling is proved for margins of up to half a voxel.
+  // The short form of culling is proved for margins of up to half a voxel. Margins change from
+  // frame to frame and remembered expiries must stay valid, so the largest margin decides.
   return {field.view,
           *a.shell,
           shell_to_field(a, b),
           static_cast<float>(1.0 / field.voxel),
-          field.wide || margin > 0.5f,
+          field.wide || set.contact.margin_voxels > 0.5,
           margin,
           cold};
 }
@@ -176,6 +182,7 @@ double motion_bound(const kernels::Affine& from, const kernels::Affine& to, doub
 // shell moves to and fro around its anchor.
 struct Way {
   float now;   // travelled up to the anchor, plus the distance from there
+  float far;   // that, and the margin of this frame
   float from;  // travelled up to the anchor, less that distance; clearances found here add to it
 };
 
@@ -214,7 +221,8 @@ Way travel(PairSearch& pair, Search& search) {
               HUGE_VALF);
   }
   pair.last_place = search.place;
-  return {static_cast<float>(pair.travelled + away), static_cast<float>(pair.travelled - away)};
+  const float now = static_cast<float>(pair.travelled + away);
+  return {now, now + search.margin, static_cast<float>(pair.travelled - away)};
 }
 
 // Samples some points of each group of `blocks` blocks, and bounds how deep the others may be.
@@ -291,7 +299,7 @@ std::size_t bits_of(unsigned rows) {
 void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& search,
                  std::size_t groups, const Way& way) {
   const auto until = [&](float distance) {
-    return expiry_of(way, kernels::cull_clearance(distance - search.margin, search.wide));
+    return expiry_of(way, kernels::cull_clearance(distance, search.wide));
   };
   if (!(search.near > 0)) {
     for (std::size_t k = 0; k < groups; ++k) {
@@ -330,22 +338,38 @@ void prefetch_groups(const Shell& shell, const TraverseScratch& t, std::size_t g
   }
 }
 
+struct Screw {
+  float m[6];
+};
+
+// pair.ahead about the shell's centre, in its axes: v in voxels, w in voxels a metre.
+Screw ahead_of_shell(const Body& a, const Body& b, const PairSearch& pair) {
+  const Eigen::Map<const Eigen::Matrix<float, 6, 1>> ahead(pair.ahead);
+  const Mat3 turn = a.R.transpose() / b.field->voxel;
+  const Vec3 w = ahead.tail<3>().cast<double>(), arm = a.R * (a.shell->centre - a.com);
+  const Vec3 v = turn * (ahead.head<3>().cast<double>() + w.cross(arm)), spin = turn * w;
+  Screw screw;
+  for (int k = 0; k < 3; ++k)
+    screw.m[k] = static_cast<float>(v[k]), screw.m[3 + k] = static_cast<float>(spin[k]);
+  return screw;
+}
+
 // `complete` becomes false where the traversal is coarse.
 std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                         TraverseScratch& t, Lane& lane, std::size_t used, bool shared,
                         bool& complete) {
   const Shell& shell = *a.shell;
   Anytime& anytime = *lane.anytime;
-  Search search = search_of(set, a, b, lane.cold);
+  Search search = search_of(set, a, b, pair.margin, lane.cold);
   const Way way = travel(pair, search);
   pair.sampled = 0;
   pair.missed = 0;
 
   std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16,
-                                        way.now, t.open_blocks);
+                                        way.far, t.open_blocks);
   if (blocks == 0) return 0;
   const auto expired_groups = [&] {
-    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, way.now, t.frontier);
+    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, way.far, t.frontier);
   };
   std::size_t count = expired_groups();
   if (count > kFewGroups * blocks && pair.cull_blocks.worth(blocks)) {
@@ -367,6 +391,9 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
     return touch_coarsely(search, pair, t, anytime, blocks, used);
   };
   if (is_coarse_anyway(anytime, pair, used, blocks)) return coarsely();
+  if (search.margin > 0 && pair.fit.count == 0)
+    count = search.loadable(pair.group_expiry, way.now, ahead_of_shell(a, b, pair).m, t.frontier,
+                            count);
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
   prefetch_groups(shell, t, groups, search.cold);
   if (must_be_coarse(anytime, pair, used, blocks, groups)) {
@@ -375,7 +402,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
     return coarsely();
   }
   if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
-  choose_rows(pair, t, search, groups, way.now);
+  choose_rows(pair, t, search, groups, way.far);
   const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(search, t, lane, groups, used, shared);
   learn_sampling(anytime, groups, groups, found, since);
@@ -394,7 +421,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
 double clearance(const Settings& set, const Body& a, const Body& b, double enough,
                  TraverseScratch& t) {
   const Shell& shell = *a.shell;
-  const Search search = search_of(set, a, b, false);
+  const Search search = search_of(set, a, b, 0, false);
   const float far = static_cast<float>(enough) + kSlack;
   float least = HUGE_VALF;
   search.cull(shell.blocks, nullptr, shell.blocks.count, t.survivors, t.clearance);
@@ -416,12 +443,18 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
   bool complete = true;
-  const std::size_t found = search_pair(set, a, b, pair, t, lane, used, shared, complete);
+  std::size_t found = search_pair(set, a, b, pair, t, lane, used, shared, complete);
+  const kernels::Touching candidates = candidates_from(t, used);
   pair.fit.deepest = 0;
-  if (pair.fit.count == 0 && !(set.contact.fit_offset > 0)) return found;
-  const FitRule rule{static_cast<float>(set.contact.fit_offset / b.field->voxel),
-                     margin_of(set.contact)};
-  return relieve(pair.fit, candidates_from(t, used), found, rule, complete);
+  if (pair.fit.count > 0 || set.contact.fit_offset > 0) {
+    const FitRule rule{static_cast<float>(set.contact.fit_offset / b.field->voxel), pair.margin};
+    found = relieve(pair.fit, candidates, found, rule, complete);
+  }
+  if (!(pair.margin > 0)) return found;
+  const Shell& s = *a.shell;
+  return kernels::keep_loadable(
+      {s.x.data, s.y.data, s.z.data, s.nx.data, s.ny.data, s.nz.data, s.point.data}, candidates,
+      found, ahead_of_shell(a, b, pair).m);
 }
 
 }  // namespace h6

@@ -21,7 +21,7 @@ inline constexpr std::size_t kWorthSharing = 80;
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared);
 
-// The way that no point of shell body a can come nearer to field body b than its margin [voxel],
+// The way that no point of shell body a can touch field body b [voxel],
 // from the spheres of blocks; where that is under `enough`, from the spheres of groups. It follows
 // from the poses alone: what the traversal remembers can depend on threads and on the clock.
 double clearance(const Settings& set, const Body& a, const Body& b, double enough,

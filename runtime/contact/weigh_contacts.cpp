@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/weights/cell_items.h"
 #include "kernels/weights/gauss_few.h"
+#include "kernels/weights/gauss_memory.h"
 #include "kernels/weights/gauss_sweep.h"
 #include "kernels/weights/gauss_tree.h"
 #include "runtime/contact/contact_stages.h"
@@ -127,24 +129,48 @@ bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sch
   return true;
 }
 
-// `presence`: how much each contact counts in the density, where the rule asks for it.
-void weigh_gauss(Contacts& c, const Rule& rule, const float* presence, sched::FrameTeam* team,
-                 void* scratch) {
-  const kernels::DirectionsView view{c.nx,
-                                     c.ny,
-                                     c.nz,
-                                     c.tx,
-                                     c.ty,
-                                     c.tz,
-                                     rule.facing ? c.facing : nullptr,
-                                     rule.depth ? presence : nullptr,
-                                     c.count};
-  if (c.count < kTwoThreads) team = nullptr;
-  if (c.count <= kWorthSorting)
-    kernels::gauss_weights_few(view, rule.hat, rule.widths, c.weight);
-  else if (!weigh_with_sweep(view, rule, team, scratch, c.weight))
-    weigh_with_tree(view, rule, team, scratch, c.weight);
+void weigh_view(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
+                void* scratch, float* weight) {
+  if (view.count < kTwoThreads) team = nullptr;
+  if (view.count <= kWorthSorting)
+    kernels::gauss_weights_few(view, rule.hat, rule.widths, weight);
+  else if (!weigh_with_sweep(view, rule, team, scratch, weight))
+    weigh_with_tree(view, rule, team, scratch, weight);
+}
+
+void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
+  weigh_view({c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, rule.facing ? c.facing : nullptr,
+              rule.depth ? c.depth : nullptr, c.count},
+             rule, team, scratch, c.weight);
   if (rule.printed) weigh_as_printed(c, rule);
+}
+
+kernels::CellItems take_items(kernels::GaussColumns& columns, std::size_t contacts,
+                              float** weight) {
+  const std::size_t room = kernels::cell_items_room(contacts);
+  kernels::CellItems items{};
+  for (float*& column : items.direction) columns.take(column, room);
+  columns.take(items.share, room);
+  columns.take(*weight, room);
+  return items;
+}
+
+// `firm`: c.slack holds how much each contact counts; c.load is not filled yet and serves as
+// scratch.
+void weigh_cells(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
+  if (!c.cell)
+    return weigh_view({c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, rule, team,
+                      scratch, c.weight);
+  kernels::GaussColumns columns = kernels::GaussColumns::in(scratch);
+  float* item_weight = nullptr;
+  const kernels::CellItems items = take_items(columns, c.count, &item_weight);
+  const kernels::CellContacts contacts{
+      {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, c.cell, c.field_body};
+  const auto& d = items.direction;
+  const std::size_t count = kernels::list_cell_items(contacts, rule.widths, items, c.load);
+  weigh_view({d[0], d[1], d[2], d[3], d[4], d[5], nullptr, items.share, count}, rule, team,
+             columns.at + columns.used, item_weight);
+  kernels::weigh_by_items(contacts, c.load, items.share, item_weight, c.weight);
 }
 
 // Clusters never mix fields: a merged contact belongs to one pair.
@@ -166,8 +192,13 @@ void merge_clusters(const Settings& set, std::span<const Body> bodies, ShellBody
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
   const Rule rule = rule_of(def, 1.0);
   if (!rule.gauss) return 0;
-  return std::max(kernels::gauss_tree_bytes(count, rule.hat),
-                  kernels::gauss_sweep_bytes(count, rule.hat));
+  kernels::GaussColumns items{nullptr};
+  float* weight;
+  const bool firm = def.method == H6_METHOD_FIRM;
+  if (firm) take_items(items, count, &weight);
+  const std::size_t rows = firm ? kernels::cell_items_room(count) : count;
+  return items.block_bytes() + std::max(kernels::gauss_tree_bytes(rows, rule.hat),
+                                        kernels::gauss_sweep_bytes(rows, rule.hat));
 }
 
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
@@ -176,7 +207,7 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
   fill_facing(c, rule.facing, c.facing);
   fill_torque_directions(c, rule, lever);
   if (rule.gauss) {
-    weigh_gauss(c, rule, c.depth, team, scratch);
+    weigh_gauss(c, rule, team, scratch);
   } else {
     const double n = static_cast<double>(c.count);
     const float w = def.method == H6_METHOD_GLOBAL && n > def.global_n0
@@ -192,7 +223,7 @@ void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
   if (def.method == H6_METHOD_SERIES) return fill_facing(c, true, c.weight);
   const Rule rule = rule_of(def, voxel);
   fill_torque_directions(c, rule, 0);
-  weigh_gauss(c, rule, c.slack, team, scratch);
+  weigh_cells(c, rule, team, scratch);
   for (std::size_t i = 0; i < c.count; ++i) c.weight[i] *= c.kappa[i];
 }
 

@@ -57,8 +57,9 @@ inline double series_lever(double radius, double voxel) { return radius > voxel 
 
 // Writes e of rows begin..end-1 to load: the depth less the damping at the relative velocity u.
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end);
-// `firm`: notes in slack how much rows begin..end-1 count in the density, margin + depth, and in
-// kappa the stiffness rho of their direction. `voxel`: of their field [m].
+// `firm`: notes in slack how much rows begin..end-1 count in the density, and in kappa the
+// stiffness rho of their direction. slack holds the depth that each would have if it were carried
+// ahead. `voxel`: of their field [m].
 void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
                    std::size_t end);
 // Writes to weight the stiffness of each contact inside the common spring, in units of k: the

@@ -55,12 +55,36 @@ Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) 
 
 // The smallest voxel of the fields that body i can touch, and of its own field if others touch it
 // [m].
-double voxel_of(std::span<const Body> bodies, std::int32_t i, std::span<const h6PairDef> pairs) {
+double voxel_of(const h6Model& model, const h6SessionDef& def, std::int32_t i,
+                std::span<const h6PairDef> pairs) {
   double voxel = HUGE_VAL;
   for (const h6PairDef& p : pairs)
     if (p.shell_body == i || p.field_body == i)
-      voxel = std::min(voxel, bodies[p.field_body].field->voxel);
+      voxel = std::min(voxel, model.fields[def.bodies[p.field_body].field].voxel);
   return voxel < HUGE_VAL ? voxel : 1e-3;
+}
+
+// A default contact carries this many times the weight at a depth of one voxel, and has at least
+// this natural frequency under any mass [rad/s] (METHOD.md, Sec. 4).
+constexpr double kWeights = 4, kContactFrequency = 100;
+
+// The default stiffness, and the part of it that sets the coupling's force: a heavy part wants a
+// stiff wall, but no strong hand.
+struct Stiffness {
+  double contact, force;
+};
+Stiffness stiffness_for(const h6Model& model, const h6SessionDef& def,
+                        std::span<const h6PairDef> pairs) {
+  if (def.contact.stiffness > 0) return {def.contact.stiffness, def.contact.stiffness};
+  Stiffness k{kLeastStiffness, kLeastStiffness};
+  for (const h6PairDef& p : pairs)
+    for (const std::int32_t i : {p.shell_body, p.field_body}) {
+      if (def.bodies[i].fixed) continue;
+      const double mass = def.bodies[i].mass, voxel = voxel_of(model, def, i, pairs);
+      k.force = std::max(k.force, kWeights * mass * from(def.gravity).norm() / voxel);
+      k.contact = std::max({k.contact, k.force, kContactFrequency * kContactFrequency * mass});
+    }
+  return k;
 }
 
 void set_body(Body& body, const h6BodyDef& def, double voxel) {
@@ -93,12 +117,30 @@ double admittance_damping(const h6HandDef& def, double mass) {
   return def.admittance_damping > 0 ? def.admittance_damping : std::max(mass / 0.02, 10.0);
 }
 
+// Turning as fast as the body moves, for any size of the body.
+double default_rotational_stiffness(double k, const Body& body) {
+  const double lever2 = 900 * body.voxel * body.voxel;
+  return k * std::max(lever2, body.inertia.trace() / (3 * body.mass));
+}
+
+// Dynamic coupling: a light body has no inertia that would keep it from jumping when a contact
+// comes or goes, so its damper is at least this many frames times its spring, up to one frame times
+// the contacts' stiffness, which would stop it in a frame (METHOD.md, Sec. 4). Rotation gets the
+// same share more.
+constexpr double kLightFrames = 10;
+
+double more_damping(const Settings& set, const h6CouplingDef& c, double mass) {
+  if (set.integrator == H6_EXPLICIT) return 1;  // an explicit step could not hold it
+  const double least = set.dt * std::min(kLightFrames * c.stiffness, set.contact.stiffness);
+  return std::max(1.0, least / (2 * std::sqrt(c.stiffness * mass)));
+}
+
 // Static coupling: a damper of this many frames times its spring, for a damping ratio of 1. It pays
 // for the delay of a loop whose commands come two frames late (METHOD.md, Sec. 4).
 constexpr double kLagFrames = 3;
 
-void set_hand(const Settings& set, Hand& hand, HandDevice& device, Body& body,
-              const h6HandDef& def) {
+void set_hand(const Settings& set, double force_stiffness, Hand& hand, HandDevice& device,
+              Body& body, const h6HandDef& def) {
   hand.body = def.body;
   hand.mode = def.mode;
   hand.manipulandum_mass = def.manipulandum_mass;
@@ -116,10 +158,11 @@ void set_hand(const Settings& set, Hand& hand, HandDevice& device, Body& body,
   set_rating(device, unknown);
   device.passivity = def.passivity;
   device.port.set(com);
+  device.port.set_delay(def.delay_frames, def.delay_known);
   h6CouplingDef& c = hand.coupling = def.coupling;
   if (c.rotational_stiffness == 0)
-    c.rotational_stiffness = c.stiffness * 900 * body.voxel * body.voxel;
-  if (c.max_force == 0) c.max_force = set.contact.stiffness * c.max_depth_voxels * body.voxel;
+    c.rotational_stiffness = default_rotational_stiffness(c.stiffness, body);
+  if (c.max_force == 0) c.max_force = force_stiffness * c.max_depth_voxels * body.voxel;
   if (c.max_torque == 0)
     c.max_torque = c.max_force * (body.radius > 0 ? body.radius : 30 * body.voxel);
   if (hand.mode == H6_ADMITTANCE) body.drag += admittance_damping(def, body.mass);
@@ -127,6 +170,7 @@ void set_hand(const Settings& set, Hand& hand, HandDevice& device, Body& body,
   if (c.mode == H6_COUPLING_DIRECT) body.motion = Motion::held;
   body.max_step = c.max_step_voxels * body.voxel;
   body.lag = c.damping_ratio * kLagFrames * set.dt;
+  if (c.mode == H6_COUPLING_DYNAMIC) c.damping_ratio *= more_damping(set, c, body.mass);
   if (body.motion != Motion::dynamic) body.v.setZero(), body.w.setZero();
   hand.manipulandum = body;
 }
@@ -238,6 +282,8 @@ void take_scratch(Scratch& scratch, Arena& arena, const Sizes& n, const Settings
   scratch.weigh = weighing ? arena.take<char>(weighing) : nullptr;
   scratch.slice_count = arena.take<std::size_t>(n.groups / kTouchSlice + 1);
   scratch.slice_sum = arena.take<kernels::WrenchSum>(set.max_contacts / kSumSlice + 1);
+  const std::size_t rubbing = set.contact.friction > 0 ? set.max_contacts : 0;
+  scratch.friction = {arena.take<double>(rubbing), arena.take<double>(rubbing)};
 }
 
 // Called twice: with an empty arena to count bytes, then with memory to take it.
@@ -249,6 +295,7 @@ void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
   s.hands = take<Hand>(arena, n.hands);
   s.devices = take<HandDevice>(arena, n.hands);
   s.islands = take<Island>(arena, n.bodies);
+  s.frictions = take<FrictionSpring>(arena, s.settings.contact.friction > 0 ? n.pairs : 0);
   columns = {arena.take<PairSearch>(n.pairs),      arena.take<kernels::WrenchSum>(n.pairs),
              arena.take<BetweenBodies>(n.between), arena.take<BetweenFields>(n.of_fields),
              arena.take<float>(n.all_groups),      arena.take<float>(n.all_blocks),
@@ -276,6 +323,7 @@ void set_pairs(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef>
     Pair& pair = *new (&s.pairs[i]) Pair();
     PairSearch& search = *new (&searches[i]) PairSearch();
     new (&sums[i]) kernels::WrenchSum();
+    if (!s.frictions.empty()) new (&s.frictions[i]) FrictionSpring();
     pair.a = pairs[i].shell_body;
     pair.b = pairs[i].field_body;
     if (both_move(def, pairs[i])) pair.between = new (to.between++) BetweenBodies();
@@ -298,6 +346,7 @@ void set_pairs(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef>
     shell->pairs = s.pairs.subspan(first, count);
     shell->searches = {searches + first, count};
     shell->sums = {sums + first, count};
+    if (!s.frictions.empty()) shell->frictions = s.frictions.subspan(first, count);
   }
   s.anytime.pairs = {searches, pairs.size()};
 }
@@ -326,10 +375,13 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
       body.field = &s.model->fields[field];
   }
   for (std::size_t i = 0; i < n.bodies; ++i)
-    set_body(s.bodies[i], def.bodies[i], voxel_of(s.bodies, static_cast<std::int32_t>(i), pairs));
+    set_body(s.bodies[i], def.bodies[i],
+             voxel_of(*s.model, def, static_cast<std::int32_t>(i), pairs));
+  const Stiffness k = stiffness_for(*s.model, def, pairs);
+  s.settings.contact.stiffness = k.contact;
   set_pairs(s, def, pairs, columns);
   for (std::size_t i = 0; i < n.hands; ++i)
-    set_hand(s.settings, *new (&s.hands[i]) Hand(), *new (&s.devices[i]) HandDevice(),
+    set_hand(s.settings, k.force, *new (&s.hands[i]) Hand(), *new (&s.devices[i]) HandDevice(),
              s.bodies[def.hands[i].body], def.hands[i]);
   const std::vector<Island> islands = islands_of(s.bodies, pairs);
   s.islands = s.islands.first(islands.size());
@@ -346,6 +398,16 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
 using namespace h6;
 
 extern "C" {
+
+double h6StiffnessFor(const h6Model* model, const h6SessionDef* def) {
+  h6Error error;
+  if (!model || !def || !check_session(*model, *def, &error)) return 0;
+  try {
+    return stiffness_for(*model, *def, pairs_of(*def)).contact;
+  } catch (const std::exception&) {  // no memory for the pairs
+    return 0;
+  }
+}
 
 h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Error* error) {
   if (!model || !def) return fail(error, "a session needs a model and a definition"), nullptr;

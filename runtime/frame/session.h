@@ -25,6 +25,7 @@ struct h6Session {
   std::span<h6::LinearWrench> acting;  // (bodies) the wrench on each in this frame
   std::span<h6::Pair> pairs;           // the pairs of one shell body are neighbours
   std::span<h6::ShellBody> shells;
+  std::span<h6::FrictionSpring> frictions;  // (pairs), or none without friction
   std::span<h6::Hand> hands;
   std::span<h6::HandDevice> devices;  // (hands)
   std::span<h6::Island> islands;
@@ -51,6 +52,9 @@ inline ShellBody* find_shell(const h6Session& s, std::int32_t body) {
     if (shell.body == body) return &shell;
   return nullptr;
 }
+
+// Lets go of the friction springs of every pair with this body.
+void forget_friction(h6Session& s, std::int32_t body);
 
 std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples);
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands);

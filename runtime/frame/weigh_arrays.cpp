@@ -22,6 +22,7 @@ struct Work {
 
 void lay_out(Work& work, Arena& arena, std::size_t count) {
   take_columns(work.contacts, arena, count);
+  work.contacts.cell = nullptr;
   work.cluster = {arena.take<std::uint32_t>(count), arena.take<std::uint32_t>(count),
                   arena.take<std::uint64_t>(count)};
   work.source = arena.take<std::uint32_t>(count);
@@ -181,12 +182,14 @@ extern "C" {
 
 size_t h6WeighScratchBytes(size_t count) { return bytes_of(count); }
 
-int h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts, double voxel,
+int h6WeighContacts(const h6ContactDef* given, const h6ContactArrays* contacts, double voxel,
                     double lever, float* weights, h6Wrench* wrench, double* stiffness,
                     double* damping, h6Error* error) {
-  if (!contact || !contacts) return fail(error, "a contact definition and contacts are needed"), -1;
+  if (!given || !contacts) return fail(error, "a contact definition and contacts are needed"), -1;
   const h6ContactArrays& in = *contacts;
-  if (!check_arrays(*contact, in, voxel, lever, error)) return -1;
+  h6ContactDef contact = *given;
+  if (contact.stiffness == 0) contact.stiffness = kLeastStiffness;
+  if (!check_arrays(contact, in, voxel, lever, error)) return -1;
   const std::size_t bytes = bytes_of(in.count);
   const Block block(in, bytes);
   if (!block) return fail(error, "no memory for %zu contacts", in.count), -1;
@@ -194,30 +197,32 @@ int h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts
   Arena arena(block.aligned(), bytes - kAlignment);
   lay_out(work, arena, in.count);
 
-  const bool series = uses_series(*contact), exact = in.form == H6_EXACT;
+  const bool series = uses_series(contact), exact = in.form == H6_EXACT;
   Vec6 u = Vec6::Zero();
   if (in.velocity) u << from(in.velocity->linear), from(in.velocity->angular);
   Contacts& c = work.contacts;
   fill_rows(in, series, work);
   const std::size_t rows = c.count;
-  if (uses_clusters(*contact))
-    c.count = cluster_contacts(c, 0, rows, 0, contact->cluster_voxels * voxel, work.cluster);
+  if (uses_clusters(contact))
+    c.count = cluster_contacts(c, 0, rows, 0, contact.cluster_voxels * voxel, work.cluster);
   Sums sums;
   if (series) {
     double y[6] = {};
-    if (contact->method == H6_METHOD_FIRM) {
+    if (contact.method == H6_METHOD_FIRM) {
       kernels::push_directions(kernel_columns(c, 0, rows), nullptr, c.nx, c.ny, c.nz, c.facing);
-      note_firmness(c, *contact, voxel, 0, rows);
+      const float margin = static_cast<float>(contact.margin_voxels * voxel);
+      for (std::size_t i = 0; i < rows; ++i) c.slack[i] = c.depth[i] + margin;
+      note_firmness(c, contact, voxel, 0, rows);
     }
-    fill_inner_stiffness(c, *contact, voxel, nullptr, work.scratch);
-    fill_series_gap(c, contact->damping, u, 0, rows);
-    solve_series(c, *contact, lever, y);
-    sums = sum_series_weighted(c, *contact, lever, exact);
+    fill_inner_stiffness(c, contact, voxel, nullptr, work.scratch);
+    fill_series_gap(c, contact.damping, u, 0, rows);
+    solve_series(c, contact, lever, y);
+    sums = sum_series_weighted(c, contact, lever, exact);
   } else {
-    weigh_columns(c, *contact, voxel, lever, nullptr, work.scratch);
-    sums = sum_weighted(c, *contact, u, exact);
+    weigh_columns(c, contact, voxel, lever, nullptr, work.scratch);
+    sums = sum_weighted(c, contact, u, exact);
   }
-  if (weights) hand_out_weights(in, rows, uses_clusters(*contact), work, weights);
+  if (weights) hand_out_weights(in, rows, uses_clusters(contact), work, weights);
   if (wrench) *wrench = {to(Vec3(sums.f.head<3>())), to(Vec3(sums.f.tail<3>()))};
   if (stiffness) store_row_major(sums.K, stiffness);
   if (damping) store_row_major(sums.D, damping);

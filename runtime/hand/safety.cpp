@@ -279,8 +279,18 @@ h6DeviceCommand OutputGuard::finished(h6DeviceCommand command, h6Status* status)
   return command;
 }
 
+// A share falls at once, and never rises so fast that the wrench changes by more than the slew
+// limit. With the former share it cannot, since the wrench before the share obeys the limit.
+double OutputGuard::share_of(WrenchShare* rule, const Vec3& force, const Vec3& torque,
+                             double dt) const {
+  const double share = rule ? rule->share(force, torque) : 1;
+  const bool jumps = (share * force - share_ * force_).norm() > limits_.force_rate * dt ||
+                     (share * torque - share_ * torque_).norm() > limits_.torque_rate * dt;
+  return share > share_ && jumps ? share_ : share;
+}
+
 h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, const h6Velocity& hand, double dt,
-                                  h6Status* status) {
+                                  h6Status* status, WrenchShare* rule) {
   h6DeviceCommand out{};
   out.pose.q.w = 1;
   Vec3 force = from(wanted.force), torque = from(wanted.torque);
@@ -324,8 +334,15 @@ h6DeviceCommand OutputGuard::pass(const h6Wrench& wanted, const h6Velocity& hand
     torque *= limits_.power / power;
     note_cause(H6_CAUSE_POWER);
   }
+  share_ = share_of(rule, force, torque, dt);
   force_ = force;
   torque_ = torque;
+  if (share_ < 1) {
+    *status |= H6_PASSIVITY;
+    note_cause(H6_CAUSE_PASSIVITY);
+    force *= share_;
+    torque *= share_;
+  }
   out.wrench = {to(force), to(torque)};
   return finished(out, status);
 }

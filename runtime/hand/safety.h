@@ -13,6 +13,7 @@
 //   slew     against the last output                          -> SLEWED
 //   ceiling  gain times the rating: a slow slew must not delay a decay
 //   power    given to the hand                                -> POWER
+//   share    of a passivity controller, which only takes away -> PASSIVITY
 //
 // In the admittance modes clamp and slew act on the pose and its velocity (SPEED), the gain scales
 // the allowed speed, and a latched output stays where it was last sent. METHOD.md, "The safety
@@ -50,6 +51,16 @@ struct AboveRating {
 };
 AboveRating above_rating(const h6DeviceCapabilities& capabilities, const h6SafetyDef& def);
 
+// What may only take away from a wrench, and does so at once.
+class WrenchShare {
+ public:
+  // The share that may go out, 0 .. 1. Called once a frame with what the chain would send.
+  virtual double share(const Vec3& force, const Vec3& torque) = 0;
+
+ protected:
+  ~WrenchShare() = default;
+};
+
 class OutputGuard {
  public:
   void set_limits(const SafetyLimits& limits) { limits_ = limits; }
@@ -82,8 +93,9 @@ class OutputGuard {
   h6HandSafety report() const;
 
   // The wrench that may be sent in a frame of `dt` seconds, with the causes of a difference; sets
-  // status bits. `hand`: its velocity at the point that torques are about.
-  h6DeviceCommand pass(const h6Wrench& wanted, const h6Velocity& hand, double dt, h6Status* status);
+  // status bits. `hand`: its velocity at the point that torques are about. `rule`: may be null.
+  h6DeviceCommand pass(const h6Wrench& wanted, const h6Velocity& hand, double dt, h6Status* status,
+                       WrenchShare* rule = nullptr);
 
   // The pose and velocity that may be sent in the admittance modes. Both are limited in speed; the
   // origin of the mesh frame never goes farther out of the workspace than it is. `device`: the
@@ -93,6 +105,7 @@ class OutputGuard {
 
  private:
   void suffer(h6Cause cause, double seconds);
+  double share_of(WrenchShare* rule, const Vec3& force, const Vec3& torque, double dt) const;
   void rise(double dt);
   void fall(double seconds);
   h6DeviceCommand finished(h6DeviceCommand command, h6Status* status);
@@ -106,9 +119,11 @@ class OutputGuard {
   double speed_ = 0;    // of the hand [m/s]
   double grace_ = 0;    // rest of the first frame of trouble, which changes nothing [s]
   double trouble_ = 0;  // length of the present trouble after that frame [s]
-  h6Cause falling_ = H6_CAUSE_NONE;                    // why the gain falls in this frame
-  Vec3 force_ = Vec3::Zero(), torque_ = Vec3::Zero();  // sent in the last frame
-  Vec3 x_ = Vec3::Zero();                              // pose sent in the last frame, once moving_
+  h6Cause falling_ = H6_CAUSE_NONE;  // why the gain falls in this frame
+  // Of the last frame: share_ times these were sent.
+  Vec3 force_ = Vec3::Zero(), torque_ = Vec3::Zero();
+  double share_ = 1;
+  Vec3 x_ = Vec3::Zero();  // pose sent in the last frame, once moving_
   Quat q_ = Quat::Identity();
   bool moving_ = false;
 

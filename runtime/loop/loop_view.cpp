@@ -62,6 +62,14 @@ bool LoopView::read(h6LoopView* out) {
   return true;
 }
 
+// Pairs that both sessions have keep their stretch.
+static void take_over_friction(h6Session& next, const h6Session& before) {
+  for (std::size_t i = 0; i < next.frictions.size(); ++i)
+    for (std::size_t k = 0; k < before.frictions.size(); ++k)
+      if (next.pairs[i].a == before.pairs[k].a && next.pairs[i].b == before.pairs[k].b)
+        next.frictions[i] = before.frictions[k];
+}
+
 void take_over(h6Session& next, const h6Session& before) {
   H6_ASSERT(next.bodies.size() == before.bodies.size() && next.hands.size() == before.hands.size());
   for (std::size_t i = 0; i < next.bodies.size(); ++i) {
@@ -76,12 +84,14 @@ void take_over(h6Session& next, const h6Session& before) {
     hand.driver_stiffness = set.driver_stiffness;
     hand.driver_damping = set.driver_damping;
     HandDevice& device = next.devices[i];
-    const bool passivity = device.passivity;
+    const HandDevice own = device;
     device = before.devices[i];
-    device.passivity = passivity;
-    if (!passivity) device.port.forget();
+    device.passivity = own.passivity;
+    device.port.same_delay(own.port);
+    if (!own.passivity) device.port.forget();
   }
   take_over_relief(next, before);
+  take_over_friction(next, before);
   next.anytime.no_clock = before.anytime.no_clock;
   next.report = before.report;
   next.frame = before.frame;

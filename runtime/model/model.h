@@ -37,6 +37,11 @@ struct Tier {
   Column<float> x, y, z, radius;  // (count, rounded up to whole blocks of 16)
 };
 
+// The normals of each group's points: all within `spread` of their mean.
+struct Bundles {
+  Column<float> nx, ny, nz, spread;  // (groups, rounded up to whole blocks of 16)
+};
+
 // Eight points of each group: what is sampled where time is short. The first is the nearest to the
 // group's centre, each of the others the farthest from those before it. The first points of a
 // block's groups stand next to each other, then their second ones: vector 8 b + j has those of
@@ -60,7 +65,11 @@ struct Shell {
   std::size_t points = 0;             // rows; columns repeat the last one up to a whole block
   Column<float> x, y, z, nx, ny, nz;  // normals point inward
   Column<std::uint32_t> point;        // of the definition
+  // Points of a group that face one way and lie near each other are a cell: rows of equal numbers,
+  // one behind the other. METHOD.md, Sec. 3, "Firm".
+  Column<std::uint32_t> cell;
   Tier groups, blocks;
+  Bundles normals;  // of groups
   Samples samples;
   Buffer<char> memory;  // of all columns: together they lie on few pages
   std::size_t bytes() const { return memory.count; }

@@ -146,6 +146,48 @@ void make_tier(const Shell& shell, std::size_t rows, Tier& tier) {
       (*column)[i] = (*column)[tier.count - 1];
 }
 
+constexpr double kCellNormals = 0.02;   // of a cell differ by less than this
+constexpr double kCellSize = 1.0 / 16;  // no point is farther from the cell's first one [radius]
+
+// Sorts the rows of each group by cells: the first row that has none yet takes in all that are like
+// it.
+void make_cells(const h6ShellDef& def, std::size_t n, double radius, std::uint32_t* rows,
+                std::uint32_t* cell) {
+  const auto like = [&](std::uint32_t a, std::uint32_t b) {
+    const double turn =
+        std::hypot(def.nx[a] - def.nx[b], def.ny[a] - def.ny[b], def.nz[a] - def.nz[b]);
+    const double gap = std::hypot(def.x[a] - def.x[b], def.y[a] - def.y[b], def.z[a] - def.z[b]);
+    return turn < kCellNormals && gap < kCellSize * radius;
+  };
+  std::uint32_t number = 0;
+  for (std::size_t first = 0; first < n; first += kGroupRows) {
+    const std::size_t end = std::min(n, first + kGroupRows);
+    for (std::size_t i = first; i < end; ++number) {
+      const std::uint32_t seed = rows[i];
+      std::size_t next = i + 1;
+      for (std::size_t k = next; k < end; ++k)
+        if (like(rows[k], seed)) std::swap(rows[next++], rows[k]);
+      for (; i < next; ++i) cell[i] = number;
+    }
+  }
+}
+
+void bundle_normals(const Shell& shell, Bundles& bundles) {
+  for (std::size_t g = 0; g < bundles.spread.count; ++g) {
+    const std::size_t first = std::min(g, shell.groups.count - 1) * kGroupRows;
+    const std::size_t end = std::min(first + kGroupRows, shell.points);
+    const auto normal = [&](std::size_t i) { return Vec3(shell.nx[i], shell.ny[i], shell.nz[i]); };
+    Vec3 mean = Vec3::Zero();
+    for (std::size_t i = first; i < end; ++i) mean += normal(i);
+    const Eigen::Vector3f n = (mean / static_cast<double>(end - first)).cast<float>();
+    double spread = 0;
+    for (std::size_t i = first; i < end; ++i)
+      spread = std::max(spread, (normal(i) - n.cast<double>()).norm());
+    bundles.nx[g] = n.x(), bundles.ny[g] = n.y(), bundles.nz[g] = n.z();
+    bundles.spread[g] = static_cast<float>(spread * 1.000001 + 1e-6);
+  }
+}
+
 void take_samples(const Shell& shell, Samples& samples) {
   for (Column<float>& reach : samples.reach) std::fill_n(reach.data, shell.blocks.count, 0.0f);
   const auto place = [&](std::size_t r) { return Vec3(shell.x[r], shell.y[r], shell.z[r]); };
@@ -187,9 +229,13 @@ void lay_out(Shell& shell, Arena& arena) {
     for (Column<float>* column : {&tier->x, &tier->y, &tier->z, &tier->radius})
       column->take(arena, (tier->count + 15) / 16 * 16);
   }
+  Bundles& normals = shell.normals;
+  for (Column<float>* column : {&normals.nx, &normals.ny, &normals.nz, &normals.spread})
+    column->take(arena, shell.groups.x.count);
   for (Column<float>* column : {&shell.x, &shell.y, &shell.z, &shell.nx, &shell.ny, &shell.nz})
     column->take(arena, padded);
   shell.point.take(arena, padded);
+  shell.cell.take(arena, padded);
   Samples& samples = shell.samples;
   for (Column<float>* column : {&samples.x, &samples.y, &samples.z})
     column->take(arena, shell.blocks.count * kGroupRows * Samples::kOfGroup);
@@ -218,7 +264,6 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
   split_at_medians(rows, 0, n, kBlockRows, axes);
   for (std::size_t first = 0; first < n; first += kBlockRows)
     split_at_medians(rows, first, std::min(n, first + kBlockRows), kGroupRows, axes);
-  for (std::size_t i = n; i < padded; ++i) rows[i] = rows[n - 1];
 
   Vec3 low = Vec3::Constant(HUGE_VAL), high = -low;
   for (std::size_t i = 0; i < n; ++i) {
@@ -227,6 +272,13 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     high = high.cwiseMax(p);
   }
   shell->centre = 0.5 * (low + high);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3 p(def.x[i], def.y[i], def.z[i]);
+    shell->radius = std::max(shell->radius, (p - shell->centre).norm());
+  }
+  make_cells(def, n, shell->radius, rows, shell->cell.data);
+  for (std::size_t i = n; i < padded; ++i)
+    rows[i] = rows[n - 1], shell->cell[i] = shell->cell[n - 1];
   for (std::size_t i = 0; i < padded; ++i) {
     const std::uint32_t p = rows[i];
     const Vec3 q = Vec3(def.x[p], def.y[p], def.z[p]) - shell->centre;
@@ -234,10 +286,10 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     shell->y[i] = static_cast<float>(q.y());
     shell->z[i] = static_cast<float>(q.z());
     shell->nx[i] = def.nx[p], shell->ny[i] = def.ny[p], shell->nz[i] = def.nz[p];
-    shell->radius = std::max(shell->radius, q.norm());
   }
   make_tier(*shell, kGroupRows, shell->groups);
   make_tier(*shell, kBlockRows, shell->blocks);
+  bundle_normals(*shell, shell->normals);
   take_samples(*shell, shell->samples);
   return true;
 }

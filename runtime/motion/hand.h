@@ -34,7 +34,6 @@ struct HandDevice {
   // The caller sets these for the next frame.
   bool lost = false;   // the device could not be read or written
   double overdue = 0;  // how much too late the next command comes [s]
-  h6Wrench told{};     // the last command's wrench
   bool passivity = false;
   HandPort port;
 };

@@ -88,7 +88,8 @@ void send(HandDevice& device, Hand& hand, Body& body, double dt, h6DeviceCommand
       status |= H6_PASSIVITY;
       guard.note_cause(H6_CAUSE_PASSIVITY);
     }
-    passed = guard.pass(told, hand_velocity(device, body), dt, &status);
+    passed = guard.pass(told, hand_velocity(device, body), dt, &status,
+                        device.passivity ? &device.port : nullptr);
     passed.pose = mesh_pose(body, hand.manipulandum);
   } else {
     RigidState& state = hand.mode == H6_PSEUDO_ADMITTANCE ? hand.manipulandum : body;

@@ -162,7 +162,7 @@ bool touches(std::span<const ShellBody> shells, std::int32_t body) {
 
 }  // namespace
 
-void HandPort::move(const h6Pose& pose, const h6Wrench& wrench) {
+void HandPort::move(const h6Pose& pose, std::span<const h6Wrench> wrenches) {
   if (placed_) {
     const Quat q = from(pose.q), before = from(pose_.q);
     const Vec3 moved = from(pose.p) + q * com_ - from(pose_.p) - before * com_,
@@ -171,18 +171,53 @@ void HandPort::move(const h6Pose& pose, const h6Wrench& wrench) {
     turn_change_ = std::max(turn_change_, (turned - turned_).norm());
     moved_ = moved;
     turned_ = turned;
-    energy_ += from(wrench.force).dot(moved_) + from(wrench.torque).dot(turned_);
+    double least = HUGE_VAL;
+    for (const h6Wrench& w : wrenches)
+      least = std::min(least, from(w.force).dot(moved_) + from(w.torque).dot(turned_));
+    energy_ += least;
     if (!std::isfinite(energy_)) energy_ = 0;
   }
   pose_ = pose;
   placed_ = true;
 }
 
-// Takes energy from the hand along its motion. Returns whether it changed the wrench.
-bool HandPort::add_damper(Vec3& force, Vec3& torque, double max_force, double max_torque,
-                          double dt) const {
+void HandPort::move(const h6Pose& pose) {
+  h6Wrench acted[kMostDelay + 1];
+  std::size_t count = 0;
+  for (std::uint32_t i = known_delay_ ? delay_ : 0; i <= delay_; ++i) {
+    const h6Wrench& f = sent_[i];
+    acted[count++] = {{-f.force.x, -f.force.y, -f.force.z},
+                      {-f.torque.x, -f.torque.y, -f.torque.z}};
+  }
+  move(pose, {acted, count});
+}
+
+void HandPort::sent(const h6Wrench& felt) {
+  for (std::uint32_t i = kMostDelay; i > 0; --i) sent_[i] = sent_[i - 1];
+  sent_[0] = felt;
+}
+
+HandPort::Outlook HandPort::outlook(const Vec3& force, const Vec3& torque) const {
+  return {force.dot(moved_) + torque.dot(turned_),
+          0.5 * (force.norm() * move_change_ + torque.norm() * turn_change_)};
+}
+
+// E less what the commands on their way to the hand may still take out.
+double HandPort::available() const {
+  double left = energy_;
+  for (std::uint32_t i = 0; i < delay_; ++i) {
+    const Outlook o = outlook(from(sent_[i].force), from(sent_[i].torque));
+    left -= std::max(0.0, o.out + 2 * (delay_ - i) * o.doubt);
+  }
+  return left;
+}
+
+bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double dt) {
+  frame_ = dt;
+  if (!known_) return false;
+  Vec3 force = from(felt.force), torque = from(felt.torque);
   // The felt wrench acts on the hand, so its work leaves the engine.
-  const double deficit = force.dot(moved_) + torque.dot(turned_) - energy_;
+  const double deficit = outlook(force, torque).out - available();
   // The ratio of the bounds is the lever that makes force and torque comparable.
   const double lever = max_torque / max_force;
   const double way = moved_.squaredNorm() + lever * lever * turned_.squaredNorm();
@@ -194,47 +229,38 @@ bool HandPort::add_damper(Vec3& force, Vec3& torque, double max_force, double ma
   torque -= damper * lever * lever * turned_;
   shorten(force, force_bound);
   shorten(torque, torque_bound);
+  felt = {to(force), to(torque)};
   return true;
 }
 
-// The share of the wrench, 0 .. 1, with which the next motion cannot take out more than the port
-// has.
+// The share of the wrench, 0 .. 1, with which the motion that it meets cannot take out more than
+// the port has by then.
 double HandPort::share_for(const Vec3& force, const Vec3& torque) const {
-  const double out = force.dot(moved_) + torque.dot(turned_);
-  // The next motion differs from the last one by up to the changes seen lately: the wrench then
-  // takes out between out - 2 doubt and out + 2 doubt.
-  const double doubt = 0.5 * (force.norm() * move_change_ + torque.norm() * turn_change_);
-  if (energy_ >= std::max(out, 0.0) || out <= -2 * doubt) return 1;
-  const double room = energy_ + doubt;
-  return room > 0 ? room / (std::max(out, 0.0) + doubt) : 0;
+  const Outlook o = outlook(force, torque);
+  const double has = available();
+  // That motion differs from the last one by up to the changes seen lately, in every frame until
+  // then: the wrench takes out between out - 2 doubt and out + 2 doubt times these frames.
+  if (has >= std::max(o.out, 0.0) || o.out <= -2.0 * (1 + delay_) * o.doubt) return 1;
+  const double room = has + o.doubt;
+  return room > 0 ? room / (std::max(o.out, 0.0) + o.doubt) : 0;
 }
 
-bool HandPort::damp(h6Wrench& felt, double max_force, double max_torque, double dt) {
-  if (!known_) return false;
-  Vec3 force = from(felt.force), torque = from(felt.torque);
-  bool changed = add_damper(force, torque, max_force, max_torque, dt);
+double HandPort::share(const Vec3& force, const Vec3& torque) {
+  if (!known_) return 1;
   // The share falls at once and rises slowly. A share that rises in one frame is felt as a click,
   // and it would follow a tremor up and down.
-  share_ = std::min(share_for(force, torque), share_ + dt / kMemory);
-  const double held = std::max(0.0, 1 - dt / kMemory);
+  share_ = std::min(share_for(force, torque), share_ + frame_ / kMemory);
+  const double held = std::max(0.0, 1 - frame_ / kMemory);
   move_change_ *= held;
   turn_change_ *= held;
-  if (share_ < 1) {
-    force *= share_;
-    torque *= share_;
-    changed = true;
-  }
-  if (changed) felt = {to(force), to(torque)};
-  return changed;
+  return share_;
 }
 
 void observe_hand(const Settings& set, std::span<const Body> bodies,
                   std::span<const ShellBody> shells, const Hand& hand, HandDevice& device) {
   if (!device.passivity || !hand.seen || hand.mode != H6_IMPEDANCE) return;
-  const h6Wrench& f = device.told;
   HandPort& port = device.port;
-  port.move(device.filter.device().pose,
-            {{-f.force.x, -f.force.y, -f.force.z}, {-f.torque.x, -f.torque.y, -f.torque.z}});
+  port.move(device.filter.device().pose);
   const bool touching = touches(shells, hand.body);
   if (port.known() && (touching || !set.gravity.isZero(0))) return;
   const double stored = device.filter.power_scale() * stored_energy(hand, bodies[hand.body]);
@@ -249,7 +275,7 @@ bool damp_hand(HandDevice& device, const Hand& hand, h6Wrench& felt, double dt) 
 }
 
 void note_command(HandDevice& device, const Hand& hand, const h6DeviceCommand& command) {
-  device.told = command.wrench;
+  device.port.sent(command.wrench);
   if (!device.passivity || hand.mode == H6_IMPEDANCE) return;
   if (!device.port.known()) device.port.start(0);
   device.port.move(command.pose, hand.clutched ? h6Wrench{} : device.filter.device().wrench);

@@ -50,8 +50,9 @@ constexpr Setting kContactRows[] = {
         "none, global, cluster, gauss3, gauss6, robust, series or firm; the Gauss methods and "
         "robust "
         "also with pieces: +facing, +depth, +product, +cluster, +geodesic, +handles, +printed")),
-    number<&h6ContactDef::stiffness>("stiffness", "N/m", 1e4, positive(1e9),
-                                     "k, the stiffness of one contact alone"),
+    number<&h6ContactDef::stiffness>(
+        "stiffness", "N/m", 0, not_negative(1e9),
+        "k, the stiffness of one contact alone; 0: from mass, weight and voxel, at least 1e4"),
     number<&h6ContactDef::damping>("damping", "s", 1e-3, not_negative(1),
                                    "beta, the damping of a contact is beta times its stiffness"),
     number<&h6ContactDef::global_n0>(
@@ -77,7 +78,7 @@ constexpr Setting kContactRows[] = {
                                             "firm: the same at the surface"),
     number<&h6ContactDef::margin_voxels>(
         "margin_voxels", "voxel", 0.25, between(0, 2),
-        "series, firm: points nearer than this take part before they touch"),
+        "series, firm: no point farther than this takes part before it touches"),
     number<&h6ContactDef::cluster_voxels>(
         "cluster_voxels", "voxel", 0.5, above(0.01, 100),
         "cluster, +cluster: contacts nearer than this are one contact"),
@@ -89,7 +90,10 @@ constexpr Setting kContactRows[] = {
         "push until the point has once been free; tight: every depth pushes")),
     quiet(number<&h6ContactDef::fit_offset>(
         "fit_offset", "m", 0, not_negative(kNoLimit),
-        "play: every depth counts less by this, at most 3 voxels of each field"))};
+        "play: every depth counts less by this, at most 3 voxels of each field")),
+    quiet(number<&h6ContactDef::friction>(
+        "friction", "", 0, between(0, 10),
+        "mu, the coefficient of Coulomb friction with stiction; 0: no friction"))};
 constexpr SettingTable kContact = settings_of("h6ContactDef", kContactRows);
 
 constexpr Choice kCouplingModes[] = {{"dynamic", H6_COUPLING_DYNAMIC},
@@ -104,10 +108,11 @@ constexpr Setting kCouplingRows[] = {
                                       "k_VC, of the virtual coupling"),
     number<&h6CouplingDef::rotational_stiffness>("rotational_stiffness", "N m/rad", 0,
                                                  not_negative(1e9),
-                                                 "0: stiffness times (30 voxels) squared"),
+                                                 "0: stiffness times the larger of (30 voxels) "
+                                                 "squared and inertia over mass"),
     number<&h6CouplingDef::damping_ratio>(
         "damping_ratio", "", 1, between(0, 10),
-        "dynamic: of the coupled body, 1 is critical; static: the damper is "
+        "dynamic: of the coupled body, 1 is critical, light bodies get more; static: the damper is "
         "this times three frames times the spring"),
     number<&h6CouplingDef::max_depth_voxels>(
         "max_depth_voxels", "voxel", 0.5, positive(1000),
@@ -192,6 +197,10 @@ constexpr Setting kHandRows[] = {
                                            "admittance: of the free body; 0: derived"),
     flag<&h6HandDef::passivity>(
         "passivity", "observe the energy that leaves through this hand and damp what was not paid"),
+    quiet(whole<&h6HandDef::delay_frames>(
+        "delay_frames", 0, between(0, 2),
+        "for passivity: the device applies a command at most this many frames late")),
+    flag<&h6HandDef::delay_known>("delay_known", "the delay is always exactly delay_frames"),
     quiet(object<&h6HandDef::safety>(
         "safety", kSafety,
         "limits of what goes to the device, each at most the device's own rating"))};

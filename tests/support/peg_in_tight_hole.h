@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "hapsix/hapsix.h"
-#include "tests/support/analytic.h"
+#include "tests/support/one_part.h"
 
 namespace h6::test {
 
@@ -40,34 +40,12 @@ inline ShellArrays peg_points(double radius) {
   return s;
 }
 
-struct PegInTightHole {
-  FieldArrays block = sample_analytic(hole_distance, {-16e-3, -16e-3, -20e-3}, kFitVoxel, 8, 8, 9);
-  ShellArrays peg;
-  Model model;
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
-
+struct PegInTightHole : OnePart {
   explicit PegInTightHole(double overlap_voxels, h6Method method = H6_METHOD_ROBUST)
-      : peg(peg_points(kHoleRadius + overlap_voxels * kFitVoxel)),
-        model({def_of(block)}, {peg.def()}) {
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0;
-    hand.body = 1;
+      : OnePart(sample_analytic(hole_distance, {-16e-3, -16e-3, -20e-3}, kFitVoxel, 8, 8, 9),
+                peg_points(kHoleRadius + overlap_voxels * kFitVoxel)) {
     hand.safety.soft_start = 0;
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
     def.contact.method = method;
-  }
-  ~PegInTightHole() { h6DestroySession(session); }
-  PegInTightHole(const PegInTightHole&) = delete;
-  PegInTightHole& operator=(const PegInTightHole&) = delete;
-  void open() {
-    h6Error error;
-    h6DestroySession(session);
-    session = h6CreateSession(model.handle, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
   }
   h6DeviceCommand step(const h6Pose& where) {
     const h6DeviceSample sample = hand_at(where);

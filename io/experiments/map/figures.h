@@ -33,7 +33,8 @@ GroupFigures group_figures(const std::vector<const MapScene*>& scenes, int table
                            std::size_t method);
 PairFigures pair_figures(const std::vector<const MapScene*>& scenes, int table, std::size_t method);
 
-// What an interval says about a share of half, or about a ratio of one.
+// The verdict of an interval: whether it lies above a half (or a ratio of one), below it, or
+// around.
 enum class Sign { fewer, open, more };
 Sign sign_of(std::size_t more, std::size_t fewer);
 Sign sign_of_ratio(const std::vector<double>& ratios);

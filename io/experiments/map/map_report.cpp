@@ -163,7 +163,7 @@ std::string change_text(const Variation& v) {
   return text;
 }
 
-// What happened in one variation, run by run.
+// Lists the runs of one variation.
 TextTable one_variation(const MapVariation& v, const std::vector<MethodColumn>& methods) {
   TextTable out = {{"stiffness", "force", "[N]"}};
   for (const MethodColumn& m : methods) out[0].push_back(m.name);

@@ -27,7 +27,7 @@ typedef struct h6Loop h6Loop;
 /* Defaults. A def that was not made by its default function is not valid. */
 H6_API h6ModelDef    h6DefaultModelDef(void);
 H6_API h6BodyDef     h6DefaultBodyDef(void);    /* at the origin, at rest, 0.1 kg, no shell, no field */
-H6_API h6ContactDef  h6DefaultContactDef(void); /* robust, 1e4 N/m, beta 1e-3 s                      */
+H6_API h6ContactDef  h6DefaultContactDef(void); /* firm, k derived from the part, beta 1e-3 s        */
 H6_API h6CouplingDef h6DefaultCouplingDef(void);/* 1e3 N/m, critically damped, half a voxel          */
 H6_API h6SafetyDef   h6DefaultSafetyDef(void);  /* the device's ratings, soft start of 0.1 s         */
 H6_API h6HandDef     h6DefaultHandDef(void);
@@ -64,6 +64,10 @@ H6_API size_t   h6ModelBytes(const h6Model* model);
 H6_API int h6SampleField(const h6Model* model, int32_t field, const double* points, size_t count,
                          double* distance, double* gradient, uint8_t* exact);
 
+/* The contact stiffness that a session of this definition has: contact.stiffness, or what is derived
+ * where that is 0 (METHOD.md, Sec. 4, "Defaults from the scene"). 0: the definition is not valid [N/m]. */
+H6_API double     h6StiffnessFor(const h6Model* model, const h6SessionDef* def);
+
 /* The model must outlive the session. */
 H6_API h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Error* error);
 H6_API void       h6DestroySession(h6Session* session);
@@ -90,7 +94,8 @@ H6_API bool   h6RestartFit(h6Session* session, h6Error* error);
 /* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. An
  * overlap that it makes pushes in full, since programs move obstacles with it. A point that has relief
  * keeps it unless it is free now; before the first step all points of the body lose it. To make the new
- * place a start, call h6RestartFit. */
+ * place a start, call h6RestartFit. Friction springs of a free body begin anew, unstretched; a fixed
+ * body, an obstacle that a program moves, drags along what rests on it. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
@@ -235,7 +240,8 @@ H6_API void   h6SetPace(h6Loop* loop, double pace);
 /* Changes settings while the loop runs: `next` has the same model, bodies, hands and rate. Between two
  * frames it takes over poses, velocities, hands and the state of their safety chains; other history is
  * forgotten (coherence, warm starts). A point keeps the relief that it has left, if its start in `next`
- * overlaps too and `next` relieves. Filters and safety limits of the hands stay as they were.
+ * overlaps too and `next` relieves. Friction springs stay stretched where both have friction. Filters
+ * and safety limits of the hands stay as they were.
  * Returns the previous session, which the caller destroys; or NULL with `error` filled, and nothing
  * has changed. Waits for the frame in progress. One thread at a time may call it, not the haptic
  * thread. */

@@ -127,7 +127,9 @@ typedef enum h6Fit {
 typedef struct h6ContactDef {
   h6Method method;          /* default firm                                                        */
   uint32_t pieces;          /* H6_PIECE_*; robust always has the first three                       */
-  double   stiffness;       /* k, > 0                                                       [N/m]  */
+  double   stiffness;       /* k of one contact; 0: from mass, weight and voxel of the bodies that may
+                               touch (h6StiffnessFor), at least 1e4; h6WeighContacts, which knows
+                               none of these, takes 1e4                                     [N/m]  */
   double   damping;         /* beta, >= 0: damping of a contact is beta * its stiffness       [s]  */
   double   global_n0;       /* `global`: number of contacts above which they share, >= 1           */
   double   epsilon;         /* `gauss3`, `gauss6`: half-width of the density hat, (0, 2]           */
@@ -139,8 +141,8 @@ typedef struct h6ContactDef {
   double   firmness;        /* `firm`: rho, stiffness of one direction of contact inside the common
                                spring, in units of k, from half a voxel of depth on; 1 .. 1e6      */
   double   firmness_shallow; /* `firm`: the same at the surface, 1 .. 1e6                          */
-  double   margin_voxels;   /* `series`, `firm`: points nearer than this take part before they touch,
-                               0 .. 2 voxels of the field                                          */
+  double   margin_voxels;   /* `series`, `firm`: no point farther than this takes part before it
+                               touches, 0 .. 2 voxels of the field                                 */
   double   cluster_voxels;  /* `cluster`, `+cluster`: contacts nearer than this are one, in (0.01,
                                100] voxels                                                         */
   bool     passivity;       /* observe the work of each shell body's contacts and damp energy that
@@ -148,6 +150,8 @@ typedef struct h6ContactDef {
   h6Fit    fit;             /* of sessions; h6WeighContacts does not read it                       */
   double   fit_offset;      /* play: of sessions, every depth counts less by this, 0 .. 3 voxels of
                                each field                                                     [m]  */
+  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none; of
+                               sessions, h6WeighContacts does not read it. METHOD.md, Sec. 9       */
 } h6ContactDef;
 
 typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
@@ -169,9 +173,11 @@ typedef enum h6CouplingMode {
 typedef struct h6CouplingDef {
   h6CouplingMode mode;
   double stiffness;           /* k_VC                                                       [N/m]  */
-  double rotational_stiffness;/* 0: stiffness * (30 voxels)^2                           [N m/rad]  */
-  double damping_ratio;       /* 0 .. 10; dynamic: of the coupled body, 1 is critical; static: the
-                                 damper is this times three frames times the spring                */
+  double rotational_stiffness;/* 0: stiffness times the larger of (30 voxels)^2 and the mean inertia
+                                 over the mass                                          [N m/rad]  */
+  double damping_ratio;       /* 0 .. 10; dynamic: of the coupled body, 1 is critical, with a least
+                                 damper for light bodies (METHOD.md, Sec. 4); static: the damper is
+                                 this times three frames times the spring                          */
   double max_depth_voxels;    /* x_max: the largest force is k * x_max, in voxels of the body      */
   double max_force;           /* 0: contact stiffness * x_max                                 [N]  */
   double max_torque;          /* 0: max_force * the body's radius                           [N m]  */
@@ -238,6 +244,9 @@ typedef struct h6HandDef {
   bool            passivity;          /* observe the energy that leaves through this hand; damp the
                                          wrench, or send a share of it, where more would leave
                                          than was put in (Hannaford & Ryu 2002)                    */
+  uint32_t        delay_frames;       /* for passivity: a command acts on the hand at most this many
+                                         frames late, 0 .. 2; default 0                            */
+  bool            delay_known;        /* ... and always exactly this many                          */
   h6SafetyDef     safety;   /* of the output to the device                                         */
 } h6HandDef;
 
@@ -287,10 +296,10 @@ typedef struct h6ContactArrays {
 
 typedef struct h6BodyState { h6Pose pose; h6Velocity velocity; } h6BodyState;
 
-/* The contacts of one shell body in the last frame. Columns of `count` rows, valid until the next
- * step. World frame. With clusters a row is a cluster: means weighted by depth, and the index of its
- * deepest point. Under `series`, rows with depth <= 0 are about to touch: weight 0, load >= 0. Depths
- * are those that push: relief and fit_offset are taken off. */
+/* The contacts of one shell body in the last frame, without friction. Columns of `count` rows, valid
+ * until the next step. World frame. With clusters a row is a cluster: means weighted by depth, and the
+ * index of its deepest point. Under `series`, rows with depth <= 0 are about to touch: weight 0,
+ * load >= 0. Depths are those that push: relief and fit_offset are taken off. */
 typedef struct h6Contacts {
   size_t          count;
   const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
@@ -327,7 +336,8 @@ typedef struct h6FrameReport {
   double   max_depth_voxels;          /* the same in voxels of its field                           */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
-  uint64_t state_hash;                /* of poses and velocities after the step and of the samples */
+  uint64_t state_hash;                /* of poses and velocities after the step, of the samples, and
+                                         of the friction springs where there is friction           */
   uint32_t series_iterations;         /* `series`: most Newton steps of any shell body             */
   double   series_residual;           /* `series`: largest gradient left, over c * the largest e   */
   /* With h6SessionDef.net_stiffness: extreme eigenvalues of S J^T w k J S over all shell bodies'

@@ -139,3 +139,16 @@ TEST_CASE("an experiment that does not exist is told, with the nearest name") {
   CHECK(blocked.code == 1);
   CHECK(blocked.err.find("taken") != std::string::npos);
 }
+
+TEST_CASE("wrong methods are told before a folder is made") {
+  Sandbox box;
+  const auto told = [&](const char* methods, const std::string& words) {
+    const Ended ended =
+        run(box, {"experiments", "cone-in-gap", "--methods", methods, "-o", "figures"});
+    CHECK(ended.code == 2);
+    CHECK_MESSAGE(ended.err.find(words) != std::string::npos, ended.err);
+  };
+  told("robst", "did you mean 'robust'?");
+  told(",", "',' names no method");
+  CHECK(box.files().empty());
+}

@@ -138,7 +138,7 @@ TEST_CASE("the overlap at the start is told point by point, whatever the fit") {
     CHECK(pairs[0].depth == near(1.6 * kFitVoxel).epsilon(0.05));
     CHECK(points[pairs[0].deepest].depth == pairs[0].depth);
     for (const h6OverlapPoint& p : points) {
-      CHECK(p.position.x == near(peg.peg.x[p.point]));
+      CHECK(p.position.x == near(peg.shell.x[p.point]));
       const bool side = std::hypot(p.position.x, p.position.y) > kHoleRadius + 1.59 * kFitVoxel;
       if (side && p.position.z < -2 * kFitVoxel)  // above, interpolation rounds the hole's edge off
         CHECK(p.depth == near(1.6 * kFitVoxel).epsilon(0.05));

@@ -240,24 +240,49 @@ TEST_CASE("series: at rest on a wall the net stiffness lies between k and c k") 
   }
 }
 
-TEST_CASE("series: points within the margin take part but are not reported as touching") {
-  Box box(5.2 * mm);  // 0.2 voxel above the floor
-  box.open();
-  h6Step(box.session, nullptr, nullptr);
-  CHECK(h6GetFrame(box.session).contacts == 0);
-  CHECK(h6GetFrame(box.session).max_depth == 0);
-  const h6Contacts c = h6GetContacts(box.session, 1);
-  REQUIRE(c.count == 144);
-  for (std::size_t i = 0; i < c.count; ++i) {
-    CHECK(c.depth[i] == h6::test::near(-0.2 * mm).epsilon(0.01));
-    CHECK(c.weight[i] == 0);
-    CHECK(c.load[i] == 0);
+TEST_CASE("series: a point takes part before it touches only where it can carry load") {
+  // 0.1 voxel above the floor; damping makes an approach by 0.15 m/s count 0.15 voxel ahead.
+  const auto first_frame = [](double speed, double margin) {
+    Box box(5.1 * mm);
+    box.def.contact.margin_voxels = margin;
+    box.open();
+    const h6BodyState state{pose(0, 0, 5.1 * mm), {{0, 0, speed}, {0, 0, 0}}};
+    h6SetBody(box.session, 1, &state);
+    h6Step(box.session, nullptr, nullptr);
+    CHECK(h6GetFrame(box.session).contacts == 0);
+    CHECK(h6GetFrame(box.session).max_depth == 0);
+    const h6Contacts c = h6GetContacts(box.session, 1);
+    for (std::size_t i = 0; i < c.count; ++i) {
+      CHECK(c.depth[i] == h6::test::near(-0.1 * mm).epsilon(0.01));
+      CHECK(c.weight[i] == 0);
+      CHECK(c.load[i] > 0);
+    }
+    return c.count;
+  };
+  CHECK(first_frame(-0.15, 0.25) == 144);
+  CHECK(first_frame(-0.15, 0.05) == 0);
+  CHECK(first_frame(0, 0.25) == 0);
+  CHECK(first_frame(0.15, 0.25) == 0);
+}
+
+TEST_CASE("series and firm find contacts again after a state that was not finite") {
+  for (const h6Method method : {H6_METHOD_SERIES, H6_METHOD_FIRM}) {
+    Box box(4.9 * mm);
+    box.def.contact.method = method;
+    box.open();
+    for (const double wild : {1e300, std::nan("")}) {
+      const h6BodyState state{pose(0, 0, 4.9 * mm), {{0, 0, wild}, {wild, 0, 0}}};
+      h6SetBody(box.session, 1, &state);
+      h6Step(box.session, nullptr, nullptr);
+    }
+    const h6BodyState rest{pose(0, 0, 4.9 * mm), {}};
+    h6SetBody(box.session, 1, &rest);
+    h6Step(box.session, nullptr, nullptr);
+    const h6Contacts c = h6GetContacts(box.session, 1);
+    CHECK(c.count == 144);
+    for (std::size_t i = 0; i < c.count; ++i) CHECK(c.load[i] > 0);
+    CHECK(std::isfinite(h6GetBody(box.session, 1).pose.p.z));
   }
-  Box narrow(5.2 * mm);
-  narrow.def.contact.margin_voxels = 0.1;
-  narrow.open();
-  h6Step(narrow.session, nullptr, nullptr);
-  CHECK(h6GetContacts(narrow.session, 1).count == 0);
 }
 
 TEST_CASE("series: beyond the band distances are bounds, and no contact is made of them") {

@@ -124,6 +124,17 @@ constexpr Mode kModes[] = {
      }},
     {"passivity", [](BallInBowl& s) { s.hand.passivity = s.def.contact.passivity = true; }},
     {"net stiffness", [](BallInBowl& s) { s.def.net_stiffness = true; }},
+    {"friction",
+     [](BallInBowl& s) {
+       s.def.contact.friction = 0.3;
+       s.def.gradient = H6_EXACT;
+     }},
+    {"friction of clusters",
+     [](BallInBowl& s) {
+       s.def.contact.friction = 0.3;
+       s.def.contact.pieces = H6_PIECE_CLUSTER;
+     },
+     6000},
     {"filter",
      [](BallInBowl& s) {
        s.hand.filter.motion_scale = 1.2, s.hand.filter.force_scale = 0.9;
@@ -234,6 +245,7 @@ bool forbid_calls() {
 [[noreturn]] void run_forbidden(int result, unsigned threads, long frames, bool break_it) {
   BallInBowl scene(threads, 24000);
   scene.hand.passivity = scene.def.contact.passivity = true;
+  scene.def.contact.friction = 0.3;
   scene.open();
   std::vector<h6DeviceSample> samples;
   for (int i = 0; i < 1000; ++i) samples.push_back(scene.sample(i));

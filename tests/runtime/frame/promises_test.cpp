@@ -16,6 +16,7 @@
 #include "hapsix/vector.h"
 #include "tests/support/analytic.h"
 #include "tests/support/near.h"
+#include "tests/support/one_part.h"
 
 using namespace h6::test;
 
@@ -23,33 +24,9 @@ namespace {
 
 constexpr double mm = 1e-3;
 
-// A fixed field and a body with a shell, which a hand may hold.
-struct Scene {
-  FieldArrays field;
-  ShellArrays shell;
-  Model model;
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
-
-  Scene(FieldArrays f, ShellArrays s)
-      : field(std::move(f)), shell(std::move(s)), model({def_of(field)}, {shell.def()}) {
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0;
-    hand.body = 1;
-    def.bodies = bodies.data(), def.body_count = 2;
-  }
-  ~Scene() { h6DestroySession(session); }
-  Scene(const Scene&) = delete;
-  Scene& operator=(const Scene&) = delete;
-  void hold() { def.hands = &hand, def.hand_count = 1; }
-  void open() {
-    h6DestroySession(session);
-    h6Error error;
-    session = h6CreateSession(model.handle, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
-  }
+// The part stands where a test puts it.
+struct Scene : OnePart {
+  Scene(FieldArrays f, ShellArrays s) : OnePart(std::move(f), std::move(s)) { def.hand_count = 0; }
   h6Contacts at(const h6Pose& pose) {
     const h6BodyState state{pose, {}};
     h6SetBody(session, 1, &state);
@@ -163,7 +140,7 @@ void check_too_weak(h6CouplingMode mode, h6Gradient gradient, h6Method method, d
   scene.hand.coupling.mode = mode;
   scene.hand.coupling.max_force = bound;
   scene.hand.coupling.max_torque = 1e-2 * bound;
-  scene.hold();
+  scene.def.hand_count = 1;
   scene.open();
   CAPTURE(bound);
   CAPTURE(static_cast<int>(mode));
@@ -222,7 +199,7 @@ TEST_CASE("under any samples the body stays finite and the last good pose counts
   for (const h6DeviceSample& sample : bad) {
     Scene scene(floor_field(), bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12));
     scene.bodies[1].pose = pose(0, 0, 20 * mm);
-    scene.hold();
+    scene.def.hand_count = 1;
     scene.open();
     h6DeviceCommand felt;
     // Before the first good sample there is no hand.
@@ -244,7 +221,7 @@ TEST_CASE("poses and velocities near the largest numbers leave the state finite"
   for (const double far : {1e6, 1e150, 1e300}) {
     Scene scene(floor_field(), bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12));
     scene.bodies[1].pose = pose(0, 0, 20 * mm);
-    scene.hold();
+    scene.def.hand_count = 1;
     scene.open();
     CAPTURE(far);
     for (int i = 0; i < 50; ++i) {

@@ -8,6 +8,7 @@
 
 #include "tests/support/ball_in_bowl.h"
 #include "tests/support/box_on_floor.h"
+#include "tests/support/one_part.h"
 #include "tests/support/sanitized.h"
 
 using namespace h6::test;
@@ -79,32 +80,16 @@ ShellArrays whole_box(double half, int n) {
 }
 
 // A tool that its hand drives at an obstacle in the plane z = 0 and 12 mm beyond, and holds there.
-struct Thrust {
-  FieldArrays field;
-  ShellArrays shell;
-  Model model;
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
-
+struct Thrust : OnePart {
   Thrust(const Distance& obstacle, ShellArrays tool, unsigned substeps, double depth)
-      : field(sample_analytic(obstacle, {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8)),
-        shell(std::move(tool)),
-        model({def_of(field)}, {shell.def()}) {
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0, bodies[1].pose = pose(0, 0, 20 * mm);
-    hand.body = 1;
+      : OnePart(sample_analytic(obstacle, {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8),
+                std::move(tool)) {
+    bodies[1].pose = pose(0, 0, 20 * mm);
     hand.coupling.max_depth_voxels = depth;
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
     def.max_substeps = substeps;
     def.contact.method = H6_METHOD_ROBUST;  // `firm` holds the balls without substeps
-    h6Error error{};
-    session = h6CreateSession(model.handle, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
+    open();
   }
-  ~Thrust() { h6DestroySession(session); }
   // Whether the tool, about 4 mm large around its centre, comes out on the other side.
   bool passes(const h6Pose& start, const h6Vec3& along, double speed) {
     const h6Velocity velocity{speed * along, {}};

@@ -24,7 +24,7 @@ struct ThreeBalls : BallInBowl {
   FieldArrays round = sample_analytic(
       [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 20 * kMm; },
       {-32 * kMm, -32 * kMm, -32 * kMm}, kMm, 8, 8, 8);
-  Model both{{def_of(bowl), def_of(round)}, {ball.def()}};
+  Model both{{def_of(field), def_of(round)}, {shell.def()}};
   std::array<h6BodyDef, kHands + 1> all{h6DefaultBodyDef(), h6DefaultBodyDef(), h6DefaultBodyDef(),
                                         h6DefaultBodyDef()};
   std::array<h6HandDef, kHands> hands{hand, hand, hand};

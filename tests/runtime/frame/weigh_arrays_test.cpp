@@ -400,7 +400,7 @@ TEST_CASE("no contacts give no wrench, every output may be left out, and wrong i
   h6ContactDef bad = good;
   bad.series_c = 2;
   CHECK(Answer(bad, in).code == -1);
-  for (const double wrong : {0.0, -1e4, static_cast<double>(NAN), HUGE_VAL}) {
+  for (const double wrong : {-1e4, static_cast<double>(NAN), HUGE_VAL}) {
     bad = good, bad.stiffness = wrong;
     CHECK(Answer(bad, in).code == -1);
   }

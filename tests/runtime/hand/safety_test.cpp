@@ -109,6 +109,40 @@ TEST_CASE("nothing but safe commands comes out of any stream of wrenches") {
   }
 }
 
+TEST_CASE("a share takes away at once, gives back within the slew limit, and never adds") {
+  struct Random final : WrenchShare {
+    std::mt19937 random{5};
+    double now = 1;
+    double share(const Vec3&, const Vec3&) override {
+      if (random() % 4 == 0) now = random() % 3 == 0 ? 0 : random() % 1000 * 1e-3;
+      return now;
+    }
+  } rule;
+  Chain chain(rating(8, 0.5));
+  const SafetyLimits limits = chain.guard.limits();
+  std::mt19937 random(6);
+  h6Wrench wanted{}, last{};
+  int falls = 0;
+  for (int frame = 0; frame < 20000; ++frame) {
+    if (random() % 10 == 0) {
+      for (double* v : {&wanted.force.x, &wanted.force.y, &wanted.force.z, &wanted.torque.x})
+        *v = random() % 2000 * 1e-2 - 10;
+    }
+    chain.begin();
+    const h6Wrench out = chain.guard.pass(wanted, kStill, kFrame, &chain.status, &rule).wrench;
+    REQUIRE(norm(out.force) <= limits.force * (1 + 1e-12));
+    REQUIRE(norm(out.torque) <= limits.torque * (1 + 1e-12));
+    // Nearer than a slew to something between zero and the last force.
+    const double step = limits.force_rate * kFrame * (1 + 1e-9);
+    const double along = dot(out.force, last.force) / std::max(dot(last.force, last.force), 1e-300);
+    const h6Vec3 nearest = std::clamp(along, 0.0, 1.0) * last.force;
+    REQUIRE(norm(out.force - nearest) <= step);
+    falls += norm(out.force - last.force) > step;
+    last = out;
+  }
+  CHECK(falls > 100);
+}
+
 TEST_CASE("a wrench inside the limits passes untouched") {
   Chain chain(rating(100, 10));
   const h6Wrench wanted{{1, -2, 0.5}, {0.1, 0.2, 0}};

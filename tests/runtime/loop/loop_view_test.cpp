@@ -134,7 +134,7 @@ TEST_CASE("another session goes on where the previous one was, with its own sett
   Running run(scene);
   const double before = run.view_after(0.5).bodies[1].p.z;
   h6SessionDef softer = scene.def;
-  softer.contact.stiffness = scene.def.contact.stiffness / 10;
+  softer.contact.stiffness = h6StiffnessFor(scene.model.handle, &scene.def) / 10;
   h6Session* next = h6CreateSession(scene.model.handle, &softer, nullptr);
   REQUIRE(next);
   std::vector<h6FrameRecord> rows(2000);

@@ -172,7 +172,6 @@ TEST_CASE("an invalid session is refused with a sentence that names the value") 
       {[](Scene& s) { s.def.contact.epsilon_normal = 0; }, "epsilon_normal"},
       {[](Scene& s) { s.def.contact.epsilon_torque = 0; }, "epsilon_torque"},
       {[](Scene& s) { s.def.contact.epsilon = NAN; }, "epsilon"},
-      {[](Scene& s) { s.def.contact.stiffness = 0; }, "stiffness"},
       {[](Scene& s) { s.def.contact.torque_length = -1e-3; }, "torque_length"},
       {[](Scene& s) { s.def.contact.global_n0 = 0.5; }, "global_n0"},
       {[](Scene& s) { s.def.contact.series_c = 2; }, "series_c"},

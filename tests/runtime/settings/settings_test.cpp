@@ -89,7 +89,7 @@ TEST_CASE("the sentence has name, range, unit and value") {
     return std::string(error.message);
   };
   CHECK(said([](h6ContactDef& d) { d.stiffness = -1; }) ==
-        "contact stiffness must be above 0 N/m, it is -1");
+        "contact stiffness must be 0 N/m or more, it is -1");
   CHECK(said([](h6ContactDef& d) { d.damping = -1; }) ==
         "contact damping must be 0 s or more, it is -1");
   CHECK(said([](h6ContactDef& d) { d.epsilon = 3; }) ==
