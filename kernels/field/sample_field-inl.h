@@ -47,12 +47,15 @@ using D4 = hn::CappedTag<std::int32_t, 4>;
 using V4 = hn::Vec<D4>;
 constexpr std::size_t kFours = hn::MaxLanes(DF()) / 4;
 
+// hn::Set would copy the lane to all four, which is one more instruction.
+HWY_INLINE hn::Vec<hn::CappedTag<std::int32_t, 1>> one_of(const void* a) {
+  const std::int32_t value = load_32(a);
+  return hn::Load(hn::CappedTag<std::int32_t, 1>(), &value);
+}
 HWY_INLINE V4 four_of(const void* a, const void* b, const void* c, const void* e) {
-  const D4 d;
-  const hn::RepartitionToWide<D4> d2;
-  const V4 ab = hn::InterleaveLower(d, hn::Set(d, load_32(a)), hn::Set(d, load_32(b)));
-  const V4 ce = hn::InterleaveLower(d, hn::Set(d, load_32(c)), hn::Set(d, load_32(e)));
-  return hn::BitCast(d, hn::InterleaveLower(d2, hn::BitCast(d2, ab), hn::BitCast(d2, ce)));
+  const hn::Half<D4> half;
+  return hn::Combine(D4(), hn::Combine(half, one_of(e), one_of(c)),
+                     hn::Combine(half, one_of(b), one_of(a)));
 }
 
 template <class D>

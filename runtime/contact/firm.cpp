@@ -3,6 +3,7 @@
 // presence in the density, the stiffness of its direction. METHOD.md, Sec. 3.
 #include <algorithm>
 
+#include "kernels/field/sample_corners.h"
 #include "kernels/field/sample_field.h"
 #include "runtime/contact/contact_stages.h"
 #include "runtime/contact/traverse_pair.h"
@@ -11,7 +12,6 @@
 namespace h6 {
 namespace {
 
-constexpr float kStep = 0.5f;     // half the edge of the cube about the tetrahedron [voxel]
 constexpr double kPresent = 0.1;  // the depth from which a contact counts in full [voxel]
 constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
 constexpr std::size_t kManySlices = 4;        // from here on two threads share them
@@ -20,20 +20,16 @@ constexpr std::size_t kManySlices = 4;        // from here on two threads share 
 // depths have relief or play in them.
 void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool shifted,
                std::size_t begin, std::size_t end) {
-  static constexpr float kCorner[5][3] = {{}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
   float* const at[5] = {c.tx + begin, c.ty + begin, c.tz + begin, c.slack + begin, c.kappa + begin};
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
-  kernels::Around around{{}, kStep, b.field->view.band, {}};
   const float per_voxel = static_cast<float>(-1 / b.field->voxel);
   for (std::size_t i = begin; i < end && !shifted; ++i) c.tx[i] = per_voxel * c.depth[i];
-  around.at[0] = at[0];
-  for (int k = shifted ? 0 : 1; k < 5; ++k) {
-    kernels::Affine to = place;
-    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += kStep * kCorner[k][axis];
-    kernels::sample_field(b.field->view, to, arms, nullptr, arms.count, at[k], nullptr, nullptr,
+  if (shifted)
+    kernels::sample_field(b.field->view, place, arms, nullptr, arms.count, at[0], nullptr, nullptr,
                           nullptr);
-    around.at[k] = at[k];
-  }
+  kernels::sample_corners(b.field->view, place, arms, at + 1);
+  kernels::Around around{
+      {at[0], at[1], at[2], at[3], at[4]}, kernels::kCornerStep, b.field->view.band, {}};
   for (int k = 0; k < 9; ++k) around.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
   kernels::push_directions(kernel_columns(c, begin, end), &around, c.nx + begin, c.ny + begin,
                            c.nz + begin, c.facing + begin);
