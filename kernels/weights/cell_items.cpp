@@ -2,6 +2,8 @@
 // cell_items.cpp - the SIMD twin of cell_items_ref.cpp: a cell is a few vectors.
 #include "kernels/weights/cell_items.h"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/weights/cell_items.cpp"
 #include "kernels/simd.h"
@@ -10,6 +12,7 @@
 // After foreach_target.h.
 #include "hwy/highway.h"
 #include "kernels/compress-inl.h"
+#include "kernels/fold-inl.h"
 #include "kernels/tail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -19,8 +22,23 @@ using DF = hn::CappedTag<float, kCellMost>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 
+// The length of a cell is random, so a loop over its rows is mispredicted; masks are not.
 HWY_INLINE std::size_t end_of(const CellContacts& c, std::size_t begin) {
+  const hn::RebindToUnsigned<DF> du;
+  const hn::RebindToSigned<DF> di;
   std::size_t i = begin + 1;
+  if (HWY_LIKELY(i + kCellMost <= c.contacts.count)) {
+    const auto cell = hn::Set(du, c.cell[begin]);
+    const auto field = hn::Set(di, c.field[begin]);
+    for (std::size_t rows = 0; rows < kCellMost; rows += kLanes, i += kLanes) {
+      const auto other_cell = hn::Ne(hn::LoadU(du, c.cell + i), cell);
+      const auto other_field = hn::Ne(hn::LoadU(di, c.field + i), field);
+      const auto others =
+          hn::Or(hn::RebindMask(DF(), other_cell), hn::RebindMask(DF(), other_field));
+      const std::intptr_t first = hn::FindFirstTrue(DF(), others);
+      if (first >= 0) return i + static_cast<std::size_t>(first);
+    }
+  }
   while (i < c.contacts.count && c.cell[i] == c.cell[begin] && c.field[i] == c.field[begin]) ++i;
   return i;
 }
@@ -50,20 +68,22 @@ HWY_INLINE VF share_of(const CellContacts& c, std::size_t i, std::size_t live) {
 HWY_INLINE float mean_of(const CellContacts& c, const Columns& column, const float* part,
                          std::size_t begin, std::size_t end, float mean[6]) {
   const DF d;
-  VF sum[6], all = hn::Zero(d);
+  VF sum[8];  // directions, shares, nothing
   for (VF& s : sum) s = hn::Zero(d);
   for (std::size_t i = begin; i < end; i += kLanes) {
     const std::size_t live = end - i;
     VF share = share_of(c, i, live);
     if (part != nullptr) share = hn::Mul(share, load_n(d, part + i, live));
-    all = hn::Add(all, share);
+    sum[6] = hn::Add(sum[6], share);
     for (int k = 0; k < 6; ++k)
       sum[k] = hn::MulAdd(share, read(column.k[k], i, c.contacts.count), sum[k]);
   }
-  const float total = hn::GetLane(hn::SumOfLanes(d, all));
-  if (!(total > 0)) return 0;
-  for (int k = 0; k < 6; ++k) mean[k] = hn::GetLane(hn::SumOfLanes(d, sum[k])) / total;
-  return total;
+  HWY_ALIGN float total[8] = {};
+  add_four_sums(d, sum, total);
+  add_four_sums(d, sum + 4, total + 4);
+  if (!(total[6] > 0)) return 0;
+  for (int k = 0; k < 6; ++k) mean[k] = total[k] / total[6];
+  return total[6];
 }
 
 // Returns whether all contacts belong to the cell wholly.
@@ -116,60 +136,82 @@ std::size_t list_simd(const CellContacts& c, const GaussWidths& widths, const Ce
   const float per_square[2] = {1 / (widths.normal * widths.normal),
                                1 / (widths.torque * widths.torque)};
   std::size_t count = 0;
+  const auto add = [&](const float* direction, float share) {
+    for (int k = 0; k < 6; ++k) items.direction[k][count] = direction[k];
+    items.share[count] = share;
+    count += share > 0;
+  };
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
     end = end_of(c, begin);
     float mean[6];
-    float share = mean_of(c, column, nullptr, begin, end, mean);
-    for (std::size_t i = begin; i < end; ++i) part[i] = 1;
-    if (!(share > 0)) continue;
-    const bool whole =
-        end - begin == 1 || fill_part(column, c.contacts.count, per_square, mean, begin, end, part);
-    if (!whole) share = mean_of(c, column, part, begin, end, mean);
-    if (share > 0) {
-      for (int k = 0; k < 6; ++k) items.direction[k][count] = mean[k];
-      items.share[count++] = share;
+    if (end - begin == 1) {
+      part[begin] = 1;
+      for (int k = 0; k < 6; ++k) mean[k] = column.k[k][begin];
+      add(mean, c.contacts.facing[begin] * c.contacts.depth[begin]);
+      continue;
     }
+    float share = mean_of(c, column, nullptr, begin, end, mean);
+    if (!(share > 0)) {
+      std::fill(part + begin, part + end, 1.0f);
+      continue;
+    }
+    const bool whole = fill_part(column, c.contacts.count, per_square, mean, begin, end, part);
+    if (!whole) share = mean_of(c, column, part, begin, end, mean);
+    add(mean, share);
     if (!whole) count = list_alone(c, column, part, begin, end, items, count);
   }
   return count;
 }
 
+// The densities of contacts that are parts of a cell's item and items of their own; `at`: the first
+// of these. Returns the item behind the last.
+HWY_INLINE std::size_t weigh_parts(const CellContacts& c, const float* part, std::size_t begin,
+                                   std::size_t end, float of_cell, const float* item_share,
+                                   const float* item_weight, std::size_t at, float* weight) {
+  for (std::size_t i = begin; i < end; ++i) {
+    const float share = c.contacts.facing[i] * c.contacts.depth[i];
+    const bool stands_alone = (1 - part[i]) * share > 0;
+    const float alone = stands_alone ? item_share[at] / item_weight[at] : 0;
+    at += stands_alone;
+    weight[i] =
+        share > 0 ? c.contacts.facing[i] * share / (part[i] * of_cell + (1 - part[i]) * alone) : 0;
+  }
+  return at;
+}
+
 void weigh_simd(const CellContacts& c, const float* part, const float* item_share,
                 const float* item_weight, float* weight) {
   const DF d;
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   std::size_t at = 0;
-  const auto density = [&] {
-    const float phi = item_share[at] / item_weight[at];
-    ++at;
-    return phi;
-  };
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
     end = end_of(c, begin);
-    bool joined = false, whole = true;
-    for (std::size_t i = begin; i < end; i += kLanes) {
-      const std::size_t live = end - i;
-      const VF share = share_of(c, i, live), p = load_n(d, part + i, live);
-      joined = joined || !hn::AllFalse(d, hn::Gt(hn::Mul(p, share), hn::Zero(d)));
-      whole = whole &&
-              hn::AllFalse(d, hn::Gt(hn::Mul(hn::Sub(hn::Set(d, 1.0f), p), share), hn::Zero(d)));
-    }
-    const float of_cell = joined ? density() : 0;
-    if (whole) {
-      const VF per = hn::Set(d, joined ? 1 / of_cell : 0);
-      for (std::size_t i = begin; i < end; i += kLanes) {
-        const std::size_t live = end - i;
-        const VF w =
-            hn::Mul(hn::Mul(load_n(d, c.contacts.facing + i, live), per), share_of(c, i, live));
-        store_n(w, d, weight + i, live);
-      }
+    if (end - begin == 1) {
+      const float share = c.contacts.facing[begin] * c.contacts.depth[begin];
+      weight[begin] =
+          share > 0 ? c.contacts.facing[begin] * share * item_weight[at] / item_share[at] : 0;
+      at += share > 0;
       continue;
     }
-    for (std::size_t i = begin; i < end; ++i) {
-      const float share = c.contacts.facing[i] * c.contacts.depth[i];
-      const float alone = (1 - part[i]) * share > 0 ? density() : 0;
-      weight[i] = share > 0
-                      ? c.contacts.facing[i] * share / (part[i] * of_cell + (1 - part[i]) * alone)
-                      : 0;
+    auto joined = hn::FirstN(d, 0), parted = joined;
+    for (std::size_t i = begin; i < end; i += kLanes) {
+      const std::size_t live = end - i;
+      const VF share = share_of(c, i, live), p = read(part, i, c.contacts.count);
+      joined = hn::Or(joined, hn::Gt(hn::Mul(p, share), zero));
+      parted = hn::Or(parted, hn::Gt(hn::Mul(hn::Sub(one, p), share), zero));
+    }
+    const bool has_item = !hn::AllFalse(d, joined);
+    const float of_cell = has_item ? item_share[at] / item_weight[at] : 0;
+    at += has_item;
+    if (HWY_UNLIKELY(!hn::AllFalse(d, parted))) {
+      at = weigh_parts(c, part, begin, end, of_cell, item_share, item_weight, at, weight);
+      continue;
+    }
+    const VF per = hn::Set(d, has_item ? 1 / of_cell : 0);
+    for (std::size_t i = begin; i < end; i += kLanes) {
+      const std::size_t live = end - i;
+      const VF facing = read(c.contacts.facing, i, c.contacts.count);
+      store_n(hn::Mul(hn::Mul(facing, per), share_of(c, i, live)), d, weight + i, live);
     }
   }
 }
