@@ -17,7 +17,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-using DF = hn::CappedTag<float, 16>;
+using DF = hn::CappedTag<float, kBlock>;
 using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 
@@ -73,27 +73,27 @@ std::size_t keep_simd(const ShellColumns& shell, const Touching& rows, std::size
 }
 
 std::size_t groups_simd(const SpheresView& groups, const BundlesView& normals, const float ahead[6],
-                        float most, const float* expiry, float now, const std::uint32_t* rows,
-                        std::size_t count, std::uint32_t* survivors) {
+                        float most, const float* expiry, float now, const std::uint32_t* blocks,
+                        std::size_t count, float* reach, std::uint32_t* survivors) {
   const DF d;
   const DI di;
   const std::size_t lanes = hn::Lanes(d);
   const VF turn = hn::Set(d, std::hypot(ahead[3], ahead[4], ahead[5]));
   std::size_t kept = 0;
-  for (std::size_t k = 0; k < count; k += lanes) {
-    const std::size_t live = HWY_MIN(lanes, count - k);
-    const auto g = load_n(di, reinterpret_cast<const std::int32_t*>(rows) + k, live);
-    const auto at = [&](const float* column) HWY_ATTR { return hn::GatherIndex(d, column, g); };
+  for (std::size_t k = 0; k < kBlock * count; k += lanes) {
+    const std::size_t g = kBlock * blocks[k / kBlock] + k % kBlock;
+    const auto at = [&](const float* column) HWY_ATTR { return hn::LoadU(d, column + g); };
     const Way way(ahead, at(groups.x), at(groups.y), at(groups.z));
     const VF towards = hn::Neg(way.along(at(normals.nx), at(normals.ny), at(normals.nz)));
     const VF size = hn::Sqrt(way.along(way.q[0], way.q[1], way.q[2]));
-    const VF reach = hn::Add(hn::Add(towards, hn::Mul(at(normals.spread), size)),
-                             hn::Mul(turn, at(groups.radius)));
-    const VF margin = hn::Min(hn::Set(d, most), hn::Max(hn::Zero(d), reach));
-    const auto keep =
-        hn::And(hn::Le(at(expiry), hn::Add(hn::Set(d, now), margin)), hn::FirstN(d, live));
-    store_n(compress(di, g, hn::RebindMask(di, keep)), di,
-            reinterpret_cast<std::int32_t*>(survivors) + kept, live);
+    const VF most_here = hn::Add(hn::Add(towards, hn::Mul(at(normals.spread), size)),
+                                 hn::Mul(turn, at(groups.radius)));
+    const VF here = hn::Min(hn::Set(d, most), hn::Max(hn::Zero(d), most_here));
+    hn::StoreU(here, d, reach + g);
+    const auto keep = hn::Le(at(expiry), hn::Add(hn::Set(d, now), here));
+    const auto index = hn::Add(hn::Iota(di, 0), hn::Set(di, static_cast<std::int32_t>(g)));
+    hn::StoreU(compress(di, index, hn::RebindMask(di, keep)), di,
+               reinterpret_cast<std::int32_t*>(survivors) + kept);
     kept += hn::CountTrue(d, keep);
   }
   return kept;
@@ -114,10 +114,10 @@ std::size_t keep_loadable(const ShellColumns& shell, const Touching& rows, std::
 }
 std::size_t loadable_groups(const SpheresView& groups, const BundlesView& normals,
                             const float ahead[6], float most, const float* expiry, float now,
-                            const std::uint32_t* rows, std::size_t count,
+                            const std::uint32_t* blocks, std::size_t count, float* reach,
                             std::uint32_t* survivors) {
-  return HWY_DYNAMIC_DISPATCH(groups_simd)(groups, normals, ahead, most, expiry, now, rows, count,
-                                           survivors);
+  return HWY_DYNAMIC_DISPATCH(groups_simd)(groups, normals, ahead, most, expiry, now, blocks, count,
+                                           reach, survivors);
 }
 
 }  // namespace h6::kernels

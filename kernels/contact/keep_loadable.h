@@ -6,6 +6,7 @@
 // opposes q can come into touch so. METHOD.md, Sec. 3. Everything is in the shell's axes, v in
 // [voxel], w in [voxel/m].
 #pragma once
+#include "kernels/contact/expiry.h"
 #include "kernels/contact/touch_groups.h"
 
 namespace h6::kernels {
@@ -22,17 +23,19 @@ std::size_t keep_loadable_ref(const ShellColumns& shell, const Touching& rows, s
 struct BundlesView {
   const float *nx, *ny, *nz, *spread;
 };
-// Of the groups rows[0..count-1], writes to `survivors` (may be `rows` itself), in order, those of
+// Writes to `survivors`, in order, the groups 16 b + i of the blocks b = blocks[0..count-1] of
 // which a point can carry load after the way `now` [voxel]:
-//     expiry <= now + min(most, max(0, -n.q + spread |q| + |w| radius))
-// with q at the centre of the group's sphere.
-// Returns their number.
+//     expiry <= now + reach,   reach = min(most, max(0, -n.q + spread |q| + |w| radius))
+// with q at the centre of the group's sphere. No point of a group farther than its reach can carry
+// load; reach[g] is written for all groups of the blocks. Columns are readable to whole blocks,
+// `survivors` has room for 16 count. Returns the number of survivors.
 std::size_t loadable_groups(const SpheresView& groups, const BundlesView& normals,
                             const float ahead[6], float most, const float* expiry, float now,
-                            const std::uint32_t* rows, std::size_t count, std::uint32_t* survivors);
+                            const std::uint32_t* blocks, std::size_t count, float* reach,
+                            std::uint32_t* survivors);
 std::size_t loadable_groups_ref(const SpheresView& groups, const BundlesView& normals,
                                 const float ahead[6], float most, const float* expiry, float now,
-                                const std::uint32_t* rows, std::size_t count,
+                                const std::uint32_t* blocks, std::size_t count, float* reach,
                                 std::uint32_t* survivors);
 
 }  // namespace h6::kernels

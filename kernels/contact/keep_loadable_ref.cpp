@@ -33,17 +33,18 @@ std::size_t keep_loadable_ref(const ShellColumns& s, const Touching& rows, std::
 
 std::size_t loadable_groups_ref(const SpheresView& groups, const BundlesView& normals,
                                 const float ahead[6], float most, const float* expiry, float now,
-                                const std::uint32_t* rows, std::size_t count,
+                                const std::uint32_t* blocks, std::size_t count, float* reach,
                                 std::uint32_t* survivors) {
   const float turn = std::hypot(ahead[3], ahead[4], ahead[5]);
   std::size_t kept = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::uint32_t g = rows[k];
+  for (std::size_t k = 0; k < kBlock * count; ++k) {
+    const auto g = static_cast<std::uint32_t>(kBlock * blocks[k / kBlock] + k % kBlock);
     const Way way(ahead, groups.x[g], groups.y[g], groups.z[g]);
     const float towards = -way.along(normals.nx[g], normals.ny[g], normals.nz[g]);
     const float size = std::sqrt(way.along(way.q[0], way.q[1], way.q[2]));
-    const float reach = towards + normals.spread[g] * size + turn * groups.radius[g];
-    if (expiry[g] <= now + std::min(most, std::max(0.0f, reach))) survivors[kept++] = g;
+    const float most_here = towards + normals.spread[g] * size + turn * groups.radius[g];
+    reach[g] = std::min(most, std::max(0.0f, most_here));
+    if (expiry[g] <= now + reach[g]) survivors[kept++] = g;
   }
   return kept;
 }

@@ -29,7 +29,7 @@ constexpr std::size_t kAhead = 4;  // batches, when the field is in the caches; 
 
 struct Stage {
   static constexpr std::size_t kRoom = (kStaged + 1) * kGroup;
-  HWY_ALIGN float x[kRoom], y[kRoom], z[kRoom], distance[kRoom];
+  HWY_ALIGN float x[kRoom], y[kRoom], z[kRoom], distance[kRoom], limit[kRoom];
   HWY_ALIGN std::int32_t row[kRoom];
   std::size_t first[kStaged + 1];  // staged point of each group; then the number of points
 };
@@ -43,7 +43,8 @@ struct Ring {
 
 // The last batch is filled up with the first point.
 HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* groups,
-                             const std::uint16_t* rows, std::size_t count, Stage& stage) {
+                             const std::uint16_t* rows, std::size_t count, float limit,
+                             const float* reach, Stage& stage) {
   const DF d;
   const DI di;
   const VI iota = hn::Iota(di, 0), bit = hn::Shl(hn::Set(di, 1), iota);
@@ -52,20 +53,22 @@ HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* grou
     stage.first[k] = n;
     const std::size_t first = kGroup * groups[k];
     std::uint32_t looked = rows[k];
+    const VF here = hn::Set(d, reach != nullptr ? reach[groups[k]] : limit);
     if (HWY_UNLIKELY(first + kGroup > points.count))
       looked &= first < points.count ? (1u << (points.count - first)) - 1 : 0u;
     for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
-      const auto here = hn::TestBit(hn::Set(di, static_cast<std::int32_t>(looked >> i)), bit);
+      const auto chosen = hn::TestBit(hn::Set(di, static_cast<std::int32_t>(looked >> i)), bit);
       const auto put = [&](const float* from, float* to) HWY_ATTR {
         const VF v = hn::LoadU(d, from + first + i);
-        hn::StoreU(compress(d, v, hn::RebindMask(d, here)), d, to + n);
+        hn::StoreU(compress(d, v, hn::RebindMask(d, chosen)), d, to + n);
       };
       put(points.x, stage.x);
       put(points.y, stage.y);
       put(points.z, stage.z);
       const VI row = hn::Add(iota, hn::Set(di, static_cast<std::int32_t>(first + i)));
-      hn::StoreU(compress(di, row, here), di, stage.row + n);
-      n += hn::CountTrue(di, here);
+      hn::StoreU(compress(di, row, chosen), di, stage.row + n);
+      hn::StoreU(here, d, stage.limit + n);
+      n += hn::CountTrue(di, chosen);
     }
   }
   stage.first[count] = n;
@@ -78,8 +81,13 @@ HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* grou
 struct WholeGroups {
   const PointsView& points;
   const std::uint32_t* groups;
+  float limit;
+  const float* reach;
   float* least;
 
+  VF limit_of(std::size_t batch, std::size_t) const {
+    return hn::Set(DF(), reach != nullptr ? reach[groups[batch]] : limit);
+  }
   std::size_t first(std::size_t batch) const { return kGroup * groups[batch]; }
   VF x(std::size_t at) const { return hn::LoadU(DF(), points.x + at); }
   VF y(std::size_t at) const { return hn::LoadU(DF(), points.y + at); }
@@ -97,6 +105,7 @@ struct StagedPoints {
   Stage& stage;
   std::size_t number;
 
+  VF limit_of(std::size_t, std::size_t at) const { return hn::Load(DF(), stage.limit + at); }
   std::size_t first(std::size_t batch) const { return kGroup * batch; }
   VF x(std::size_t at) const { return hn::Load(DF(), stage.x + at); }
   VF y(std::size_t at) const { return hn::Load(DF(), stage.y + at); }
@@ -244,7 +253,7 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
       points.keep(at, s.distance);
       smallest = hn::Min(smallest, s.distance);
       // A whole vector is written in any case: a branch would be mispredicted too often.
-      auto touching = hn::Lt(s.distance, hn::Set(d, limit));
+      auto touching = hn::Lt(s.distance, points.limit_of(k, at));
       if (HWY_UNLIKELY(!ring.plain[k % kRing]) && limit > 0 && !hn::AllFalse(d, touching))
         touching = hn::Or(hn::Lt(s.distance, hn::Zero(d)),
                           hn::And(touching, in_bricks(field, to_field, points, at)));
@@ -300,13 +309,14 @@ std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
                               std::size_t count, float limit, bool cold, const GroupLook& look,
                               const Touching& out) {
   if (look.rows == nullptr)
-    return sample_batches(field, to_field, WholeGroups{points, groups, look.least}, count, limit,
+    return sample_batches(field, to_field,
+                          WholeGroups{points, groups, limit, look.reach, look.least}, count, limit,
                           cold, out, 0);
   std::size_t written = 0;
   Stage stage;
   for (std::size_t done = 0; done < count; done += kStaged) {
     const std::size_t some = HWY_MIN(kStaged, count - done);
-    stage_points(points, groups + done, look.rows + done, some, stage);
+    stage_points(points, groups + done, look.rows + done, some, limit, look.reach, stage);
     const std::size_t staged = stage.first[some];
     written = sample_batches(field, to_field, StagedPoints{stage, staged},
                              (staged + kGroup - 1) / kGroup, limit, cold, out, written);

@@ -23,6 +23,8 @@ struct GroupLook {
   std::uint16_t* near_rows;
   float* rest;
   float near;  // [voxel]
+  // reach[g]: the limit of the points of group g, at most `limit`; null: `limit` for all.
+  const float* reach = nullptr;
 };
 inline constexpr std::uint16_t kAllRows = 0xffff;
 inline constexpr float kNearLeast = 3;

@@ -35,6 +35,7 @@ std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
   for (std::size_t k = 0; k < count; ++k) {
     const unsigned rows = look.rows ? look.rows[k] : kAllRows;
     float distance[kGroup], least = kNone;
+    const float here = look.reach ? look.reach[groups[k]] : limit;
     for (std::size_t i = 0; i < kGroup; ++i) {
       distance[i] = kNone;
       const auto row = static_cast<std::uint32_t>(kGroup * groups[k] + i);
@@ -42,8 +43,8 @@ std::size_t touch_groups_ref(const FieldView& field, const Affine& to_field,
       float gx, gy, gz;
       sample_field_ref(field, to_field, points, &row, 1, &distance[i], &gx, &gy, &gz);
       least = std::min(least, distance[i]);
-      const bool sampled = limit > 0 && in_brick(field, to_field, points, row);
-      if (!(distance[i] < (sampled ? limit : 0))) continue;
+      const bool sampled = here > 0 && in_brick(field, to_field, points, row);
+      if (!(distance[i] < (sampled ? here : 0))) continue;
       out.row[written] = row;
       out.distance[written] = distance[i];
       out.gx[written] = gx, out.gy[written] = gy, out.gz[written] = gz;

@@ -19,6 +19,7 @@ struct TraverseScratch {
   float* clearance = nullptr;                               // (groups) [voxel]
   std::uint16_t *rows = nullptr, *near_rows = nullptr;      // (groups)
   float* rest = nullptr;                                    // (groups) [voxel]
+  float* reach = nullptr;                                   // (groups) of the shell [voxel]
   std::uint32_t* candidate = nullptr;                       // (capacity) rows of the shell
   float* candidate_distance = nullptr;                      // (capacity) [voxel]
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;  // (capacity)

@@ -73,9 +73,10 @@ struct Search {
   kernels::Affine place;
   float scale;  // voxels per metre
   bool wide;
-  float margin;    // [voxel]
-  bool cold;       // other programs have used the caches
-  float near = 0;  // points are sampled up to this distance; 0: all points of a group [voxel]
+  float margin;          // [voxel]
+  bool cold;             // other programs have used the caches
+  float near = 0;        // points are sampled up to this distance; 0: all points of a group [voxel]
+  bool reaches = false;  // TraverseScratch::reach says how far each group's points may be
 
   std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
                    std::uint32_t* survivors, float* clearance) const {
@@ -83,15 +84,16 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         wide, margin, rows, 0, count, survivors, clearance);
   }
-  // Of `groups`, keeps those of which a point may touch after the way `now`, or may carry load.
-  std::size_t loadable(const float* expiry, float now, const float ahead[6], std::uint32_t* groups,
-                       std::size_t count) const {
+  // Writes to t.frontier the groups of t.open_blocks of which a point may touch after the way
+  // `now`, or may carry load.
+  std::size_t loadable(const float* expiry, float now, const float ahead[6], std::size_t blocks,
+                       const TraverseScratch& t) const {
     const Tier& tier = shell.groups;
     const Bundles& normals = shell.normals;
     return kernels::loadable_groups(
         {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count},
         {normals.nx.data, normals.ny.data, normals.nz.data, normals.spread.data}, ahead, margin,
-        expiry, now, groups, count, groups);
+        expiry, now, t.open_blocks, blocks, t.reach, t.frontier);
   }
   // Evaluates the samples in `vectors`. Rows in `out` are rows of the shell.
   std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
@@ -115,12 +117,12 @@ struct Search {
   // Samples `count` groups of t.survivors from `first` on.
   std::size_t touch(const TraverseScratch& t, std::size_t first, std::size_t count,
                     const kernels::Touching& out) const {
-    return kernels::touch_groups(field, place,
-                                 {shell.x.data, shell.y.data, shell.z.data, shell.points},
-                                 t.survivors + first, count, margin, cold,
-                                 {near > 0 ? t.rows + first : nullptr, t.clearance + first,
-                                  t.near_rows + first, t.rest + first, near},
-                                 out);
+    return kernels::touch_groups(
+        field, place, {shell.x.data, shell.y.data, shell.z.data, shell.points}, t.survivors + first,
+        count, margin, cold,
+        {near > 0 ? t.rows + first : nullptr, t.clearance + first, t.near_rows + first,
+         t.rest + first, near, reaches ? t.reach : nullptr},
+        out);
   }
 };
 
@@ -391,9 +393,9 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
     return touch_coarsely(search, pair, t, anytime, blocks, used);
   };
   if (is_coarse_anyway(anytime, pair, used, blocks)) return coarsely();
-  if (search.margin > 0 && pair.fit.count == 0)
-    count = search.loadable(pair.group_expiry, way.now, ahead_of_shell(a, b, pair).m, t.frontier,
-                            count);
+  search.reaches = search.margin > 0 && pair.fit.count == 0;
+  if (search.reaches)
+    count = search.loadable(pair.group_expiry, way.now, ahead_of_shell(a, b, pair).m, blocks, t);
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
   prefetch_groups(shell, t, groups, search.cold);
   if (must_be_coarse(anytime, pair, used, blocks, groups)) {

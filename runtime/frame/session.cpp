@@ -267,6 +267,7 @@ void take_traversal(TraverseScratch& t, Arena& arena, const Sizes& n, std::size_
   t.open_blocks = arena.take<std::uint32_t>(n.blocks);
   t.clearance = arena.take<float>(n.groups);
   t.rest = arena.take<float>(n.groups);
+  t.reach = arena.take<float>(n.groups);
   t.rows = arena.take<std::uint16_t>(n.groups);
   t.near_rows = arena.take<std::uint16_t>(n.groups);
   t.candidate = arena.take<std::uint32_t>(t.capacity);

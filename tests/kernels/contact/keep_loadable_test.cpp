@@ -82,12 +82,14 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
   constexpr std::size_t kGroups = 400;
   std::vector<std::vector<float>> tier(4, std::vector<float>(kGroups)), bundle = tier;
   std::vector<float> expiry(kGroups);
-  std::vector<std::uint32_t> rows;
+  std::vector<std::uint32_t> blocks, rows;
   std::vector<bool> needed(kGroups);
   constexpr float kMost = 0.25f;
   const float way[6] = {0.1f, -0.2f, 0.05f, 4, 2, -6};  // [voxel], [voxel/m]
   for (std::uint32_t g = 0; g < kGroups; ++g) {
-    if (g % 7 != 3) rows.push_back(g);
+    if (g / 16 % 7 == 3) continue;
+    if (g % 16 == 0) blocks.push_back(g / 16);
+    rows.push_back(g);
     double axis[3], away[3], n[3];
     random.direction(axis);
     for (int k = 0; k < 3; ++k) tier[k][g] = float(random.uniform(-0.05, 0.05));
@@ -116,22 +118,27 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
   const SpheresView spheres{tier[0].data(), tier[1].data(), tier[2].data(), tier[3].data(),
                             kGroups};
   const BundlesView normals{bundle[0].data(), bundle[1].data(), bundle[2].data(), bundle[3].data()};
+  std::vector<float> farthest(kGroups, -1);
   std::vector<std::uint32_t> want(rows.size());
-  want.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), 10, rows.data(),
-                                  rows.size(), want.data()));
-  for (const std::uint32_t g : rows)
+  want.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), 10, blocks.data(),
+                                  blocks.size(), farthest.data(), want.data()));
+  for (const std::uint32_t g : rows) {
     if (needed[g] || expiry[g] <= 10) CHECK(std::find(want.begin(), want.end(), g) != want.end());
+    CHECK(farthest[g] >= 0);
+    CHECK(farthest[g] <= kMost);
+  }
   CHECK(want.size() > rows.size() / 2);
   CHECK(want.size() < rows.size() * 9 / 10);
   on_every_target([&](const std::string&) {
-    for (std::size_t n = 0; n <= rows.size(); n += n < 67 ? 1 : 61) {
-      std::vector<std::uint32_t> got(rows.begin(), rows.begin() + std::ptrdiff_t(n)), exact(n);
-      exact.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), 10, rows.data(),
-                                       n, exact.data()));
-      // The list may be overwritten.
-      got.resize(loadable_groups(spheres, normals, way, kMost, expiry.data(), 10, got.data(), n,
-                                 got.data()));
+    for (std::size_t n = 0; n <= blocks.size(); ++n) {
+      std::vector<std::uint32_t> got(16 * n), exact(16 * n);
+      std::vector<float> reach(kGroups, -1), reach_ref = reach;
+      exact.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), 10,
+                                       blocks.data(), n, reach_ref.data(), exact.data()));
+      got.resize(loadable_groups(spheres, normals, way, kMost, expiry.data(), 10, blocks.data(), n,
+                                 reach.data(), got.data()));
       CHECK(got == exact);
+      CHECK(reach == reach_ref);
     }
   });
 }

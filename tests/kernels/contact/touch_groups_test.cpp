@@ -28,8 +28,8 @@ struct Learnt {
   std::vector<float> least, rest;
   std::vector<std::uint16_t> near_rows;
   explicit Learnt(std::size_t n) : least(n), rest(n), near_rows(n) {}
-  GroupLook columns(const std::uint16_t* rows) {
-    return {rows, least.data(), near_rows.data(), rest.data(), 0.3f};
+  GroupLook columns(const std::uint16_t* rows, const float* reach) {
+    return {rows, least.data(), near_rows.data(), rest.data(), 0.3f, reach};
   }
 };
 
@@ -81,22 +81,26 @@ TEST_CASE("touch_groups: SIMD finds the same points as the reference, and writes
       std::vector<std::uint32_t> list;
       for (std::uint32_t g = 0; g < groups; ++g)
         if (g % 3 != 1) list.push_back(g);
-      for (const float limit : {0.0f, 0.5f, 4.0f}) {
+      for (const float limit : {0.0f, 0.5f, 4.0f, -4.0f}) {
+        const bool each = limit < 0;  // every group has a reach of its own
+        std::vector<float> reach(groups);
+        for (float& r : reach) r = float(std::max(0.0, random.uniform(-2, 4)));
         Hits got(16 * list.size()), want(16 * list.size());
         // All points of some groups, some of others, none of a few.
         std::vector<std::uint16_t> rows(list.size());
         for (std::size_t k = 0; k < rows.size(); ++k)
           rows[k] = k % 2 ? kAllRows : std::uint16_t(k % 8 ? random.below(65536) : 0);
-        const bool some = limit > 0;
+        const bool some = limit > 0 || (each && count % 3 > 0);
         Learnt learnt(list.size()), learnt_want(list.size());
-        const GroupLook look = learnt.columns(some ? rows.data() : nullptr);
-        const GroupLook look_want = learnt_want.columns(look.rows);
+        const GroupLook look =
+            learnt.columns(some ? rows.data() : nullptr, each ? reach.data() : nullptr);
+        const GroupLook look_want = learnt_want.columns(look.rows, look.reach);
         const std::size_t n =
-            touch_groups_ref(field.view(), kIdentity, points, list.data(), list.size(), limit,
-                             false, look_want, want.columns());
+            touch_groups_ref(field.view(), kIdentity, points, list.data(), list.size(),
+                             std::fabs(limit), false, look_want, want.columns());
         const bool cold = count % 2 == 1;  // changes only the prefetches
-        REQUIRE(touch_groups(field.view(), kIdentity, points, list.data(), list.size(), limit, cold,
-                             look, got.columns()) == n);
+        REQUIRE(touch_groups(field.view(), kIdentity, points, list.data(), list.size(),
+                             std::fabs(limit), cold, look, got.columns()) == n);
         for (std::size_t i = 0; i < n; ++i) {
           CHECK(got.row[i] == want.row[i]);
           CHECK(got.row[i] < count);
