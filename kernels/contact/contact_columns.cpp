@@ -122,6 +122,22 @@ void directions_simd(const ContactColumns& c, const Around* around, float* nx, f
   }
 }
 
+void firmness_simd(const float* depth, std::size_t count, const Firmness& f, float* present,
+                   float* stiffness) {
+  const DF d;
+  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), full = hn::Set(d, f.full);
+  const auto per_way = hn::Set(d, 1 / f.half_voxel);
+  const auto shallow = hn::Set(d, f.shallow), rise = hn::Set(d, f.rise);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const std::size_t live = count - i;
+    const auto deep = load_n(d, depth + i, live);
+    const auto way = hn::Min(hn::Max(hn::Mul(deep, per_way), zero), one);
+    const auto there = hn::Max(hn::Max(deep, load_n(d, present + i, live)), zero);
+    store_n(hn::Min(there, full), d, present + i, live);
+    store_n(hn::MulAdd(hn::Mul(rise, way), way, shallow), d, stiffness + i, live);
+  }
+}
+
 void torque_simd(const ContactColumns& c, float l0, float lever, float* tx, float* ty, float* tz) {
   const DF d;
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), l2 = hn::Set(d, l0 * l0);
@@ -189,6 +205,7 @@ namespace h6::kernels {
 
 HWY_EXPORT(facing_simd);
 HWY_EXPORT(directions_simd);
+HWY_EXPORT(firmness_simd);
 HWY_EXPORT(torque_simd);
 HWY_EXPORT(depths_simd);
 HWY_EXPORT(gap_simd);
@@ -200,6 +217,10 @@ void contact_facing(const ContactColumns& c, float edge, float* facing) {
 void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
                      float* facing) {
   HWY_DYNAMIC_DISPATCH(directions_simd)(c, around, nx, ny, nz, facing);
+}
+void firmness(const float* depth, std::size_t count, const Firmness& f, float* present,
+              float* stiffness) {
+  HWY_DYNAMIC_DISPATCH(firmness_simd)(depth, count, f, present, stiffness);
 }
 void torque_directions(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                        float* tz) {

@@ -42,6 +42,19 @@ void push_directions(const ContactColumns& c, const Around* around, float* nx, f
 void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
                          float* nz, float* facing);
 
+// How much each contact counts in the density, and the stiffness rho of its direction. METHOD.md,
+// Sec. 3, "Firm".
+//   present   = clamp(max(depth, present), 0, full)                    [m]
+//   stiffness = shallow + rise clamp(depth / half_voxel, 0, 1)^2
+struct Firmness {
+  float full, half_voxel;  // [m]
+  float shallow, rise;
+};
+void firmness(const float* depth, std::size_t count, const Firmness& f, float* present,
+              float* stiffness);
+void firmness_ref(const float* depth, std::size_t count, const Firmness& f, float* present,
+                  float* stiffness);
+
 // T = (r x N) / sqrt(|r x N|^2 + l0^2): Xu & Barbic 2016, Eq. (10), with a floor l0 [m]. Without it
 // T is rounding noise of length 1 where r is parallel to N. T = 0 where the root is 0. With
 // lever > 0, Eq. (13): T = (r x N) / lever [m].

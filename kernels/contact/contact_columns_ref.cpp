@@ -63,6 +63,15 @@ void push_directions_ref(const ContactColumns& c, const Around* around, float* n
   }
 }
 
+void firmness_ref(const float* depth, std::size_t count, const Firmness& f, float* present,
+                  float* stiffness) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float way = std::clamp(depth[i] / f.half_voxel, 0.0f, 1.0f);
+    present[i] = std::clamp(std::max(depth[i], present[i]), 0.0f, f.full);
+    stiffness[i] = f.shallow + f.rise * way * way;
+  }
+}
+
 void torque_directions_ref(const ContactColumns& c, float l0, float lever, float* tx, float* ty,
                            float* tz) {
   for (std::size_t i = 0; i < c.count; ++i) {

@@ -59,15 +59,10 @@ void find_push_directions(const Settings& set, std::span<const Body> bodies, She
 
 void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,
                    std::size_t end) {
-  const float full = static_cast<float>(kPresent * voxel);
-  const float scale = static_cast<float>(2 / voxel);
-  const float shallow = static_cast<float>(def.firmness_shallow);
-  const float rise = static_cast<float>(def.firmness - def.firmness_shallow);
-  for (std::size_t i = begin; i < end; ++i) {
-    const float way = std::clamp(scale * c.depth[i], 0.0f, 1.0f);
-    c.slack[i] = std::clamp(std::max(c.depth[i], c.slack[i]), 0.0f, full);
-    c.kappa[i] = shallow + rise * way * way;
-  }
+  const kernels::Firmness f{static_cast<float>(kPresent * voxel), static_cast<float>(voxel / 2),
+                            static_cast<float>(def.firmness_shallow),
+                            static_cast<float>(def.firmness - def.firmness_shallow)};
+  kernels::firmness(c.depth + begin, end - begin, f, c.slack + begin, c.kappa + begin);
 }
 
 }  // namespace h6

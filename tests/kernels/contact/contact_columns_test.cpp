@@ -107,6 +107,26 @@ TEST_CASE("contact_columns: SIMD agrees with the reference on every target, coun
   });
 }
 
+TEST_CASE("contact_columns: firmness agrees with the reference on every target and count") {
+  constexpr Firmness kRule{1e-4f, 5e-4f, 4, 16};
+  on_every_target([&](const std::string&) {
+    for (std::size_t n = 0; n <= 67; ++n) {
+      Random random(30 + n);
+      Column depth(n, n % 4), got(n, 1), want(n, 2), rho(n, 3), rho_want(n, 0);
+      for (std::size_t i = 0; i < n; ++i) {
+        depth[i] = float(random.uniform(-1e-4, 7e-4));
+        got[i] = want[i] = float(random.uniform(-2e-4, 3e-4));
+      }
+      firmness(depth.begin(), n, kRule, got.begin(), rho.begin());
+      firmness_ref(depth.begin(), n, kRule, want.begin(), rho_want.begin());
+      CHECK(same_bits(got.begin(), want.begin(), n));
+      for (std::size_t i = 0; i < n; ++i) CHECK(std::fabs(rho[i] - rho_want[i]) < 1e-4f);
+      CHECK(got.padding_untouched());
+      CHECK(rho.padding_untouched());
+    }
+  });
+}
+
 namespace {
 
 // Distances of a plane or of a ball around contacts, in a field that is turned.
