@@ -78,7 +78,7 @@ NearestLimit LimitOf(const float* distance, std::size_t count, std::size_t k) {
   return {float_of(yes), below};
 }
 
-std::size_t KeepRows(const Touching& p, std::size_t begin, std::size_t end, float limit,
+std::size_t KeepRows(const Touching& p, float* key, std::size_t begin, std::size_t end, float limit,
                      std::size_t& ties, std::size_t to) {
   const DF d;
   const DU du;
@@ -86,7 +86,7 @@ std::size_t KeepRows(const Touching& p, std::size_t begin, std::size_t end, floa
   const VF at = hn::Set(d, limit);
   std::size_t i = begin;
   for (; i + lanes <= end; i += lanes) {
-    const VF v = hn::LoadU(d, p.distance + i);
+    const VF v = hn::LoadU(d, key + i);
     auto keep = hn::Lt(v, at);
     const auto equal = hn::Eq(v, at);
     if (HWY_UNLIKELY(!hn::AllFalse(d, equal))) {
@@ -97,15 +97,17 @@ std::size_t KeepRows(const Touching& p, std::size_t begin, std::size_t end, floa
     }
     // A whole vector is stored, over rows that were read already: to <= i.
     const auto row = hn::LoadU(du, p.row + i);
+    const VF distance = hn::LoadU(d, p.distance + i);
     const VF x = hn::LoadU(d, p.gx + i), y = hn::LoadU(d, p.gy + i), z = hn::LoadU(d, p.gz + i);
-    hn::StoreU(compress(d, v, keep), d, p.distance + to);
+    hn::StoreU(compress(d, v, keep), d, key + to);
+    hn::StoreU(compress(d, distance, keep), d, p.distance + to);
     hn::StoreU(compress(du, row, hn::RebindMask(du, keep)), du, p.row + to);
     hn::StoreU(compress(d, x, keep), d, p.gx + to);
     hn::StoreU(compress(d, y, keep), d, p.gy + to);
     hn::StoreU(compress(d, z, keep), d, p.gz + to);
     to += hn::CountTrue(d, keep);
   }
-  return to - first + keep_nearest_ref(p, i, end, limit, ties, to);
+  return to - first + keep_nearest_ref(p, key, i, end, limit, ties, to);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE
@@ -120,9 +122,9 @@ HWY_EXPORT(KeepRows);
 NearestLimit nearest_limit(const float* distance, std::size_t count, std::size_t k) {
   return HWY_DYNAMIC_DISPATCH(LimitOf)(distance, count, k);
 }
-std::size_t keep_nearest(const Touching& points, std::size_t begin, std::size_t end, float limit,
-                         std::size_t& ties, std::size_t to) {
-  return HWY_DYNAMIC_DISPATCH(KeepRows)(points, begin, end, limit, ties, to);
+std::size_t keep_nearest(const Touching& points, float* key, std::size_t begin, std::size_t end,
+                         float limit, std::size_t& ties, std::size_t to) {
+  return HWY_DYNAMIC_DISPATCH(KeepRows)(points, key, begin, end, limit, ties, to);
 }
 
 }  // namespace h6::kernels

@@ -14,15 +14,16 @@ NearestLimit nearest_limit_ref(const float* distance, std::size_t count, std::si
                                            [&](float d) { return d < limit; }))};
 }
 
-std::size_t keep_nearest_ref(const Touching& p, std::size_t begin, std::size_t end, float limit,
-                             std::size_t& ties, std::size_t to) {
+std::size_t keep_nearest_ref(const Touching& p, float* key, std::size_t begin, std::size_t end,
+                             float limit, std::size_t& ties, std::size_t to) {
   const std::size_t first = to;
   for (std::size_t i = begin; i < end; ++i) {
-    const float d = p.distance[i];
-    if (d > limit || (d == limit && ties == 0)) continue;
-    ties -= d == limit;
+    const float k = key[i];
+    if (k > limit || (k == limit && ties == 0)) continue;
+    ties -= k == limit;
     p.row[to] = p.row[i];
-    p.distance[to] = d;
+    p.distance[to] = p.distance[i];
+    key[to] = k;
     p.gx[to] = p.gx[i], p.gy[to] = p.gy[i], p.gz[to] = p.gz[i];
     ++to;
   }

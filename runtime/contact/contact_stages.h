@@ -15,7 +15,7 @@ inline constexpr std::size_t kSumSlice = 1024;  // contacts summed at a time; sl
 // PairSearch::margin.
 void look_ahead(const Settings& set, std::span<const Body> bodies, ShellBody& shell);
 // Finds the shell points that touch a field: rows of the last level with a distance below zero, or
-// below the pair's margin. If there are too many, it keeps the deepest.
+// below the pair's margin. If there are too many, every place and direction keeps its deepest.
 void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Fills depth, normal, gradient and arm of each contact. Points that neither touch nor can carry
 // load are left out.

@@ -2,6 +2,7 @@
 // find_contacts.cpp - finds the points of a shell body that are inside fields, pair by pair, and
 // makes contacts from them.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 
@@ -35,21 +36,81 @@ kernels::Affine arms_to_field(const Body& a, const Body& b) {
   return affine;
 }
 
-// Keeps the `most` deepest of the candidates of `pairs`, rows up to `count`, in their order. Of
-// equal depths the first ones stay. Returns the row behind the last.
-std::size_t keep_deepest(const TraverseScratch& t, std::size_t count, std::size_t most,
-                         std::span<PairSearch> pairs) {
+// Of the candidates of `pairs`, rows up to `count`, keeps the `most` with the least keys, in their
+// order. Of equal keys the first ones stay. Returns the row behind the last.
+std::size_t keep_least(const TraverseScratch& t, float* key, std::size_t count, std::size_t most,
+                       std::span<PairSearch> pairs) {
   std::size_t n = pairs[0].first;
   const kernels::Touching all = candidates_from(t, 0);
-  const kernels::NearestLimit at = kernels::nearest_limit(all.distance + n, count - n, most);
+  const kernels::NearestLimit at = kernels::nearest_limit(key + n, count - n, most);
   std::size_t ties = most - at.below;
   for (PairSearch& pair : pairs) {
     const std::size_t begin = pair.first, end = begin + pair.candidates;
     pair.first = n;
-    pair.candidates = kernels::keep_nearest(all, begin, end, at.limit, ties, n);
+    pair.candidates = kernels::keep_nearest(all, key, begin, end, at.limit, ties, n);
     n += pair.candidates;
   }
   return n;
+}
+
+// Ranks of candidates: a place's deepest ones, a cell's, all others; by depth within each. Keys of
+// two ranks differ by more than depths do.
+constexpr float kRank = 128, kDeepest = 60;  // [voxel]
+
+void raise_rank(const TraverseScratch& t, std::size_t i, int ranks) {
+  const float depth = std::clamp(t.candidate_distance[i], -kDeepest, kDeepest);
+  t.key[i] = std::min(t.key[i], depth - kRank * static_cast<float>(ranks));
+}
+
+// One of 24 sectors of directions, by the largest component and the signs of all: no two directions
+// of a sector are more than 60 degrees apart.
+std::size_t sector_of(const Shell& shell, std::uint32_t row) {
+  const float n[3] = {shell.nx[row], shell.ny[row], shell.nz[row]};
+  std::size_t largest = 0, signs = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (std::fabs(n[k]) > std::fabs(n[largest])) largest = k;
+    signs += std::size_t{n[k] < 0} << k;
+  }
+  return 8 * largest + signs;
+}
+
+// The deepest row of each cell is raised, and that of each block and sector of normals.
+void rank_candidates(const Shell& shell, const TraverseScratch& t, std::size_t begin,
+                     std::size_t end) {
+  constexpr std::size_t kNone = SIZE_MAX;
+  std::array<std::size_t, 24> of_block;
+  of_block.fill(kNone);
+  std::size_t of_cell = kNone;
+  const auto deepest = [&](std::size_t i, std::size_t& best) {
+    if (best == kNone || t.candidate_distance[i] < t.candidate_distance[best]) best = i;
+  };
+  const auto end_block = [&] {
+    for (std::size_t& best : of_block)
+      if (best != kNone) raise_rank(t, best, 2), best = kNone;
+  };
+  const auto end_cell = [&] {
+    if (of_cell != kNone) raise_rank(t, of_cell, 1), of_cell = kNone;
+  };
+  for (std::size_t i = begin; i < end; ++i) {
+    const std::uint32_t row = t.candidate[i], last = i > begin ? t.candidate[i - 1] : row;
+    if (row / kBlockRows != last / kBlockRows) end_block();
+    if (shell.cell[row] != shell.cell[last]) end_cell();
+    t.key[i] = std::clamp(t.candidate_distance[i], -kDeepest, kDeepest);
+    deepest(i, of_block[sector_of(shell, row)]);
+    deepest(i, of_cell);
+  }
+  end_block();
+  end_cell();
+}
+
+// Keeps `most` of the candidates of `pairs`, rows up to `count`, so that every place and direction
+// keeps its deepest ones: METHOD.md, Sec. 6. It does not matter whether pairs are dropped from one
+// after the other or all at once. Returns the row behind the last.
+std::size_t keep_most(const Shell& shell, const TraverseScratch& t, std::size_t count,
+                      std::size_t most, std::span<PairSearch> pairs) {
+  for (const PairSearch& pair : pairs)
+    rank_candidates(shell, t, pair.first, pair.first + pair.candidates);
+  return keep_least(t, t.key, count, most, pairs);
 }
 
 // If there is no time for more, keeps only a few of the coarse pairs' candidates. Returns how many
@@ -60,7 +121,7 @@ std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, std::span<PairS
   if (pairs.empty()) return used;
   const std::size_t coarse = used - pairs[0].first;
   if (coarse <= Anytime::kFew || !must_be_few(anytime, all[0], used)) return used;
-  used = keep_deepest(t, used, Anytime::kFew, pairs);
+  used = keep_least(t, t.candidate_distance, used, Anytime::kFew, pairs);
   float least = -HUGE_VALF;  // the largest distance kept; no dropped point is deeper
   for (std::size_t i = pairs[0].first; i < used; ++i)
     least = std::max(least, t.candidate_distance[i]);
@@ -80,7 +141,7 @@ std::size_t traverse_in_order(const Settings& set, std::span<const Body> bodies,
                                     lane, used, false);
     used += pair.candidates;
     if (used > most) {
-      used = keep_deepest(t, used, most, shell.searches.first(p + 1));
+      used = keep_most(*bodies[shell.body].shell, t, used, most, shell.searches.first(p + 1));
       lane.report.status |= H6_CONTACTS_DROPPED;
     }
   }
@@ -153,7 +214,7 @@ void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shel
   if (!shell.pairs_shared) used = traverse_in_order(set, bodies, shell, lane);
   used = keep_few(*lane.anytime, t, shell.searches, used);
   if (used > most) {
-    keep_deepest(t, used, most, shell.searches);
+    keep_most(*bodies[shell.body].shell, t, used, most, shell.searches);
     lane.report.status |= H6_CONTACTS_DROPPED;
   }
   if (timed) shell.traverse_ns = static_cast<double>(sched::now_ns() - since);

@@ -22,6 +22,7 @@ struct TraverseScratch {
   float* reach = nullptr;                                   // (groups) of the shell [voxel]
   std::uint32_t* candidate = nullptr;                       // (capacity) rows of the shell
   float* candidate_distance = nullptr;                      // (capacity) [voxel]
+  float* key = nullptr;                                     // (capacity) decides which to drop
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;  // (capacity)
   std::size_t used = 0, capacity = 0;                                         // candidates
 };

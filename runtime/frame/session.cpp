@@ -271,7 +271,8 @@ void take_traversal(TraverseScratch& t, Arena& arena, const Sizes& n, std::size_
   t.rows = arena.take<std::uint16_t>(n.groups);
   t.near_rows = arena.take<std::uint16_t>(n.groups);
   t.candidate = arena.take<std::uint32_t>(t.capacity);
-  for (float** column : {&t.candidate_distance, &t.gradient_x, &t.gradient_y, &t.gradient_z})
+  for (float** column :
+       {&t.candidate_distance, &t.key, &t.gradient_x, &t.gradient_y, &t.gradient_z})
     *column = arena.take<float>(t.capacity);
 }
 

@@ -29,7 +29,8 @@ extern "C" {
 typedef uint32_t h6Status;
 enum {
   H6_OK = 0,
-  /* More points touched than max_contacts: the deepest were kept. Raise h6SessionDef.max_contacts. */
+  /* More points touched than max_contacts: the deepest of every place and direction were kept, then
+     the deepest of the others. Raise h6SessionDef.max_contacts. */
   H6_CONTACTS_DROPPED = 1u << 0,
   /* A hand sent a pose that is not finite: its last good pose was used. */
   H6_HAND_NOT_FINITE = 1u << 1,

@@ -87,14 +87,34 @@ TEST_CASE("keep_nearest: as many as were asked for, the first of equals, in thei
           std::size_t ties = k - at.below, left = ties;
           // In two ranges, as two pairs of bodies have them.
           const std::size_t middle = count / 3;
-          std::size_t n = keep_nearest(fast.view(), 0, middle, at.limit, ties, 0);
-          n += keep_nearest(fast.view(), middle, count, at.limit, ties, n);
+          std::size_t n =
+              keep_nearest(fast.view(), fast.column[0].data(), 0, middle, at.limit, ties, 0);
+          n += keep_nearest(fast.view(), fast.column[0].data(), middle, count, at.limit, ties, n);
           CHECK(n == k);
           CHECK(ties == 0);
-          CHECK(keep_nearest_ref(exact.view(), 0, count, at.limit, left, 0) == k);
+          CHECK(keep_nearest_ref(exact.view(), exact.column[0].data(), 0, count, at.limit, left,
+                                 0) == k);
           fast.cut(k), exact.cut(k);
           CHECK(fast == exact);
           CHECK(std::is_sorted(fast.row.begin(), fast.row.end()));
         }
+  });
+}
+
+TEST_CASE("keep_nearest: a key of its own decides, and goes with its row") {
+  on_every_target([](const std::string&) {
+    for (std::size_t count = 1; count <= 67; ++count) {
+      Points p(count, 0, 200 + count);
+      std::vector<float> key(count);
+      for (std::size_t i = 0; i < count; ++i) key[i] = -p.column[0][i];
+      const std::size_t k = (count + 1) / 2;
+      const NearestLimit at = nearest_limit(key.data(), count, k);
+      std::size_t ties = k - at.below;
+      REQUIRE(keep_nearest(p.view(), key.data(), 0, count, at.limit, ties, 0) == k);
+      for (std::size_t i = 0; i < k; ++i) {
+        CHECK(key[i] == -p.column[0][i]);
+        CHECK(key[i] <= at.limit);
+      }
+    }
   });
 }
