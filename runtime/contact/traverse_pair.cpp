@@ -420,22 +420,33 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
 
 }  // namespace
 
-double clearance(const Settings& set, const Body& a, const Body& b, double enough,
+double clearance(const Settings& set, const Body& a, const Body& b, double enough, double little,
                  TraverseScratch& t) {
   const Shell& shell = *a.shell;
   const Search search = search_of(set, a, b, 0, false);
   const float far = static_cast<float>(enough) + kSlack;
-  float least = HUGE_VALF;
   search.cull(shell.blocks, nullptr, shell.blocks.count, t.survivors, t.clearance);
-  std::size_t groups = 0;
-  for (std::size_t block = 0; block < shell.blocks.count; ++block) {
-    if (!(t.clearance[block] < far)) {
-      least = std::min(least, t.clearance[block]);
-      continue;
-    }
+  const auto add_groups = [&](std::size_t block, std::size_t groups) {
     const std::size_t end = std::min(16 * block + 16, shell.groups.count);
     for (std::size_t g = 16 * block; g < end; ++g)
       t.frontier[groups++] = static_cast<std::uint32_t>(g);
+    return groups;
+  };
+  // A part that touches is soon found: its nearest block holds a group that is near.
+  const float* const nearest = std::min_element(t.clearance, t.clearance + shell.blocks.count);
+  if (*nearest < far) {
+    const std::size_t groups = add_groups(static_cast<std::size_t>(nearest - t.clearance), 0);
+    search.cull(shell.groups, t.frontier, groups, t.survivors, t.rest);
+    const float found = *std::min_element(t.rest, t.rest + groups) - kSlack;
+    if (found <= little) return found;
+  }
+  float least = HUGE_VALF;
+  std::size_t groups = 0;
+  for (std::size_t block = 0; block < shell.blocks.count; ++block) {
+    if (t.clearance[block] < far)
+      groups = add_groups(block, groups);
+    else
+      least = std::min(least, t.clearance[block]);
   }
   search.cull(shell.groups, t.frontier, groups, t.survivors, t.clearance);
   for (std::size_t k = 0; k < groups; ++k) least = std::min(least, t.clearance[k]);

@@ -21,10 +21,11 @@ inline constexpr std::size_t kWorthSharing = 80;
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared);
 
-// The way that no point of shell body a can touch field body b [voxel],
-// from the spheres of blocks; where that is under `enough`, from the spheres of groups. It follows
-// from the poses alone: what the traversal remembers can depend on threads and on the clock.
-double clearance(const Settings& set, const Body& a, const Body& b, double enough,
+// The way that no point of shell body a can touch field body b [voxel], from the spheres of blocks;
+// where that is under `enough`, from the spheres of groups. Where it is no more than `little`, any
+// number up to `little` may be returned. It follows from the poses alone: what the traversal
+// remembers can depend on threads and on the clock.
+double clearance(const Settings& set, const Body& a, const Body& b, double enough, double little,
                  TraverseScratch& t);
 
 kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);

@@ -50,8 +50,8 @@ double gain(const Body& body, const Body& a) {
 // How far the pair's points may go in one step if they would go `way` [voxel].
 double allowed(h6Session& s, const Pair& pair, double way) {
   if (way <= kLongestStep) return way;
-  const double clear =
-      clearance(s.settings, s.bodies[pair.a], s.bodies[pair.b], way, s.lanes.scratch[0].traverse);
+  const double clear = clearance(s.settings, s.bodies[pair.a], s.bodies[pair.b], way, kLongestStep,
+                                 s.lanes.scratch[0].traverse);
   return std::min(way, std::max(clear, kLongestStep));
 }
 
