@@ -43,6 +43,22 @@ HWY_INLINE std::size_t end_of(const CellContacts& c, std::size_t begin) {
   return i;
 }
 
+// The number of contacts from `begin` on, the first of its cell, that are alone in their cells; up
+// to a vector.
+HWY_INLINE std::size_t lone_from(const CellContacts& c, std::size_t begin) {
+  const hn::RebindToUnsigned<DF> du;
+  const hn::RebindToSigned<DF> di;
+  const std::size_t count = c.contacts.count;
+  if (HWY_UNLIKELY(begin + kLanes + 1 > count))
+    return begin + 1 == count || c.cell[begin] != c.cell[begin + 1] ||
+           c.field[begin] != c.field[begin + 1];
+  const auto cells = hn::Eq(hn::LoadU(du, c.cell + begin), hn::LoadU(du, c.cell + begin + 1));
+  const auto fields = hn::Eq(hn::LoadU(di, c.field + begin), hn::LoadU(di, c.field + begin + 1));
+  const auto more = hn::And(hn::RebindMask(DF(), cells), hn::RebindMask(DF(), fields));
+  const std::intptr_t first = hn::FindFirstTrue(DF(), more);
+  return first < 0 ? kLanes : static_cast<std::size_t>(first);
+}
+
 struct Columns {
   const float* k[6];
   HWY_INLINE explicit Columns(const DirectionsView& v) : k{v.nx, v.ny, v.nz, v.tx, v.ty, v.tz} {}
@@ -111,6 +127,19 @@ HWY_INLINE bool fill_part(const Columns& column, std::size_t count, const float 
   return whole;
 }
 
+// Lists the contacts from i on with a share. Whole vectors are stored: the columns have room for a
+// cell more than they need. Returns the item behind the last.
+HWY_INLINE std::size_t list_some(const CellContacts& c, const Columns& column, std::size_t i,
+                                 VF share, const CellItems& items, std::size_t count) {
+  const DF d;
+  const auto some = hn::Gt(share, hn::Zero(d));
+  for (int k = 0; k < 6; ++k)
+    hn::StoreU(compress(d, read(column.k[k], i, c.contacts.count), some), d,
+               items.direction[k] + count);
+  hn::StoreU(compress(d, share, some), d, items.share + count);
+  return count + hn::CountTrue(d, some);
+}
+
 HWY_INLINE std::size_t list_alone(const CellContacts& c, const Columns& column, const float* part,
                                   std::size_t begin, std::size_t end, const CellItems& items,
                                   std::size_t count) {
@@ -118,14 +147,7 @@ HWY_INLINE std::size_t list_alone(const CellContacts& c, const Columns& column, 
   for (std::size_t i = begin; i < end; i += kLanes) {
     const std::size_t live = end - i;
     const VF rest = hn::Sub(hn::Set(d, 1.0f), load_n(d, part + i, live));
-    const VF alone = hn::Mul(rest, share_of(c, i, live));
-    const auto some = hn::Gt(alone, hn::Zero(d));
-    // Whole vectors are stored: the columns have room for a cell more than they need.
-    for (int k = 0; k < 6; ++k)
-      hn::StoreU(compress(d, load_n(d, column.k[k] + i, live), some), d,
-                 items.direction[k] + count);
-    hn::StoreU(compress(d, alone, some), d, items.share + count);
-    count += hn::CountTrue(d, some);
+    count = list_some(c, column, i, hn::Mul(rest, share_of(c, i, live)), items, count);
   }
   return count;
 }
@@ -136,20 +158,15 @@ std::size_t list_simd(const CellContacts& c, const GaussWidths& widths, const Ce
   const float per_square[2] = {1 / (widths.normal * widths.normal),
                                1 / (widths.torque * widths.torque)};
   std::size_t count = 0;
-  const auto add = [&](const float* direction, float share) {
-    for (int k = 0; k < 6; ++k) items.direction[k][count] = direction[k];
-    items.share[count] = share;
-    count += share > 0;
-  };
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
-    end = end_of(c, begin);
-    float mean[6];
-    if (end - begin == 1) {
-      part[begin] = 1;
-      for (int k = 0; k < 6; ++k) mean[k] = column.k[k][begin];
-      add(mean, c.contacts.facing[begin] * c.contacts.depth[begin]);
+    if (const std::size_t lone = lone_from(c, begin)) {
+      end = begin + lone;
+      store_n(hn::Set(DF(), 1.0f), DF(), part + begin, lone);
+      count = list_some(c, column, begin, share_of(c, begin, lone), items, count);
       continue;
     }
+    end = end_of(c, begin);
+    float mean[6];
     float share = mean_of(c, column, nullptr, begin, end, mean);
     if (!(share > 0)) {
       std::fill(part + begin, part + end, 1.0f);
@@ -157,7 +174,9 @@ std::size_t list_simd(const CellContacts& c, const GaussWidths& widths, const Ce
     }
     const bool whole = fill_part(column, c.contacts.count, per_square, mean, begin, end, part);
     if (!whole) share = mean_of(c, column, part, begin, end, mean);
-    add(mean, share);
+    for (int k = 0; k < 6; ++k) items.direction[k][count] = mean[k];
+    items.share[count] = share;
+    count += share > 0;
     if (!whole) count = list_alone(c, column, part, begin, end, items, count);
   }
   return count;
@@ -179,20 +198,40 @@ HWY_INLINE std::size_t weigh_parts(const CellContacts& c, const float* part, std
   return at;
 }
 
+// Contacts that are alone in their cells, up to a vector of them; `at`: the first one's item.
+// Returns the item behind the last.
+HWY_INLINE std::size_t weigh_lone(const CellContacts& c, std::size_t begin, std::size_t end,
+                                  const float* item_share, const float* item_weight, std::size_t at,
+                                  float* weight) {
+  const DF d;
+  const std::size_t live = end - begin;
+  const VF share = share_of(c, begin, live);
+  if (HWY_LIKELY(hn::CountTrue(d, hn::Gt(share, hn::Zero(d))) == live)) {
+    const VF per = hn::Div(load_n(d, item_weight + at, live), load_n(d, item_share + at, live));
+    const VF facing = read(c.contacts.facing, begin, c.contacts.count);
+    store_n(hn::Mul(hn::Mul(facing, share), per), d, weight + begin, live);
+    return at + live;
+  }
+  for (std::size_t i = begin; i < end; ++i) {
+    const float facing = c.contacts.facing[i], own = facing * c.contacts.depth[i];
+    weight[i] = own > 0 ? facing * own * item_weight[at] / item_share[at] : 0;
+    at += own > 0;
+  }
+  return at;
+}
+
 void weigh_simd(const CellContacts& c, const float* part, const float* item_share,
                 const float* item_weight, float* weight) {
   const DF d;
   const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   std::size_t at = 0;
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
-    end = end_of(c, begin);
-    if (end - begin == 1) {
-      const float share = c.contacts.facing[begin] * c.contacts.depth[begin];
-      weight[begin] =
-          share > 0 ? c.contacts.facing[begin] * share * item_weight[at] / item_share[at] : 0;
-      at += share > 0;
+    if (const std::size_t lone = lone_from(c, begin)) {
+      end = begin + lone;
+      at = weigh_lone(c, begin, end, item_share, item_weight, at, weight);
       continue;
     }
+    end = end_of(c, begin);
     auto joined = hn::FirstN(d, 0), parted = joined;
     for (std::size_t i = begin; i < end; i += kLanes) {
       const std::size_t live = end - i;
