@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // sample_field_bench.cpp - distance and gradient at n points: "near" all in bricks, "mixed" within
-// 20 voxels of the surface. The set stays in cache between runs when it fits.
+// 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_corners":
+// four distances about each of n points near the surface.
 #include "kernels/field/sample_field.h"
 
 #include <memory>
 
 #include "bench/kernels/field_bench.h"
+#include "kernels/field/sample_corners.h"
 
 namespace {
 
@@ -27,18 +29,33 @@ void call(const Kernel& kernel, const Data& d, std::vector<float>* out) {
          nullptr, d.points.x.size(), out[0].data(), out[1].data(), out[2].data(), out[3].data());
 }
 
+template <class Kernel>
+void call_corners(const Kernel& kernel, const Data& d, std::vector<float>* out) {
+  float* const at[4] = {out[0].data(), out[1].data(), out[2].data(), out[3].data()};
+  kernel(ball_field().view(), test::kIdentity,
+         PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
+         at);
+}
+
+bool agrees(const Data& d) {
+  for (int k = 0; k < 4; ++k)
+    for (std::size_t i = 0; i < d.out[k].size(); ++i)
+      if (!(std::fabs(d.out[k][i] - d.want[k][i]) <= 1e-4f)) return false;
+  return true;
+}
+
 Case make(std::size_t n, double spread) {
   auto d = std::make_shared<Data>(n, spread);
   call(sample_field_ref, *d, d->want);
   return {[=] { call(sample_field, *d, d->out); }, [=] { call(sample_field_ref, *d, d->out); },
-          [=] {
-            for (int k = 0; k < 4; ++k) {
-              for (std::size_t i = 0; i < n; ++i) {
-                if (!(std::fabs(d->out[k][i] - d->want[k][i]) <= 1e-4f)) return false;
-              }
-            }
-            return true;
-          }};
+          [=] { return agrees(*d); }};
+}
+
+Case make_corners(std::size_t n) {
+  auto d = std::make_shared<Data>(n, 1.5);
+  call_corners(sample_corners_ref, *d, d->want);
+  return {[=] { call_corners(sample_corners, *d, d->out); },
+          [=] { call_corners(sample_corners_ref, *d, d->out); }, [=] { return agrees(*d); }};
 }
 
 const bool registered = [] {
@@ -48,6 +65,8 @@ const bool registered = [] {
           [=, spread = spread] { return make(n, spread); });
     }
   }
+  for (std::size_t n : {64, 1024, 16384})
+    add("kernels/sample_corners/n:" + std::to_string(n), n, [=] { return make_corners(n); });
   return true;
 }();
 
