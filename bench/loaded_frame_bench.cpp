@@ -17,6 +17,7 @@
 
 #include "hapsix/vector.h"
 #include "tests/support/analytic.h"
+#include "tests/support/part_on_field.h"
 
 namespace {
 
@@ -40,34 +41,20 @@ ShellArrays piston(std::size_t points) {
   return shell;
 }
 
-struct Loaded {
-  FieldArrays field;
-  ShellArrays shell;
-  Model model;
-  std::array<h6BodyDef, 2> bodies{h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  h6SessionDef def = h6DefaultSessionDef();
-  h6Session* session = nullptr;
+struct Loaded : PartOnField {
   bool flat;
 
   Loaded(bool is_flat, std::size_t points)
-      : field(sample_analytic(
-            [is_flat](double x, double y, double z) {
-              return is_flat ? z : kRadius - std::hypot(x, y);
-            },
-            {-40 * kVoxel, -40 * kVoxel, -40 * kVoxel}, kVoxel, 10, 10, 10)),
-        shell(is_flat ? bottom_face(30 * kVoxel, 30 * kVoxel, 0, side(points), side(points))
-                      : piston(points)),
-        model({def_of(field)}, {shell.def()}),
+      : PartOnField(sample_analytic(
+                        [is_flat](double x, double y, double z) {
+                          return is_flat ? z : kRadius - std::hypot(x, y);
+                        },
+                        {-40 * kVoxel, -40 * kVoxel, -40 * kVoxel}, kVoxel, 10, 10, 10),
+                    is_flat ? bottom_face(30 * kVoxel, 30 * kVoxel, 0, side(points), side(points))
+                            : piston(points)),
         flat(is_flat) {
-    bodies[0].fixed = true, bodies[0].field = 0;
-    bodies[1].shell = 0;
-    hand.body = 1;
-    def.bodies = bodies.data(), def.body_count = 2;
-    def.hands = &hand, def.hand_count = 1;
     def.contact.fit = H6_FIT_TIGHT;
   }
-  ~Loaded() { h6DestroySession(session); }
   static int side(std::size_t points) {
     return static_cast<int>(std::lround(std::sqrt(static_cast<double>(points))));
   }

@@ -59,7 +59,8 @@ Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console
       "The hand leads the starter motor of 56,823 points part of the way into the bay and then "
       "pulls it by up to 60 mm to five random places, turning it by up to 0.5 rad, with the force "
       "of half a voxel. The table gives how many paths end with points that passed through a "
-      "mesh, how many come to rest, how many go deeper than half a voxel, and the least, median "
+      "mesh, how many come to rest, how many go deeper than half a voxel, how many could not run, "
+      "and the least, median "
       "and greatest depth of their deepest contacts in voxels.";
   auto scene = io::make_scene("engine-bay");
   if (!scene) return out;
@@ -79,13 +80,15 @@ Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console
     });
   run_jobs(jobs, console, "paths");
 
-  out.table = {{"method", "through", "at rest", "deeper than 0.5", "depth", "frame p50, p99 [us]"}};
+  out.table = {{"method", "through", "at rest", "deeper than 0.5", "failed", "depth",
+                "frame p50, p99 [µs]"}};
   for (std::size_t m = 0; m < columns.size(); ++m) {
-    int through = 0, held = 0, deep = 0;
+    int through = 0, held = 0, deep = 0, failed = 0;
     std::vector<double> depths, p50, p99;
     nlohmann::ordered_json each = nlohmann::ordered_json::array();
     for (int i = 0; i < kPaths; ++i) {
       const RunFigures& run = runs[m * kPaths + static_cast<std::size_t>(i)];
+      failed += !run.error.empty();
       through += run.verdict == io::Verdict::through;
       held += run.moved_on();
       deep += run.max_depth_voxels > 0.5;
@@ -100,11 +103,13 @@ Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console
     const double median = 0.5 * (depths[kPaths / 2 - 1] + depths[kPaths / 2]);
     out.table.push_back(
         {columns[m].name, std::to_string(through), std::to_string(held), std::to_string(deep),
+         std::to_string(failed),
          number(depths.front(), 2) + ", " + number(median, 2) + ", " + number(depths.back(), 2),
          number(p50[kPaths / 2], 0) + ", " + number(p99[kPaths / 2], 0)});
     out.json[columns[m].name] = {{"through", through},
                                  {"at_rest", held},
                                  {"deeper_than_half_a_voxel", deep},
+                                 {"failed", failed},
                                  {"of", kPaths},
                                  {"least", depths.front()},
                                  {"median", median},

@@ -14,11 +14,11 @@ inline constexpr std::size_t kSumSlice = 1024;  // contacts summed at a time; sl
 // `series`, `firm`: notes how far points may be carried ahead: PairSearch::ahead,
 // PairSearch::margin.
 void look_ahead(const Settings& set, std::span<const Body> bodies, ShellBody& shell);
-// Finds the shell points that touch a field: rows of the last level with a distance below zero, or
-// below the pair's margin. If there are too many, every place and direction keeps its deepest.
+// Finds the shell points that touch a field, rows of the last level with a distance below zero, and
+// those within the pair's margin that can carry load. If there are too many, every place and
+// direction keeps its deepest.
 void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
-// Fills depth, normal, gradient and arm of each contact. Points that neither touch nor can carry
-// load are left out.
+// Fills depth, normal, gradient and arm of each contact.
 void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Shares the stiffness among all contacts of the shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,

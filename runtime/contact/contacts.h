@@ -19,7 +19,7 @@ struct Contacts {
   float *slack, *kappa;  // `series`: kernels/weights/series_solve.h               [m], [1]
   std::uint32_t* point;  // index into the shell's points
   std::int32_t* field_body;
-  std::uint32_t* cell;  // of the shell; null: nothing is known of cells
+  std::uint32_t* cell;  // `firm`: Shell::cell; null: every contact is on its own
   std::size_t count, capacity;
 };
 

@@ -260,7 +260,8 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
     if (found.candidates > 0) found.arms = arms_to_field(a, b);
     std::fill_n(c.field_body + first, found.candidates, pair.b);
     const std::uint32_t* const row = lane.scratch->traverse.candidate + found.first;
-    for (std::size_t i = 0; i < found.candidates; ++i) c.cell[first + i] = points.cell[row[i]];
+    for (std::size_t i = 0; c.cell && i < found.candidates; ++i)
+      c.cell[first + i] = points.cell[row[i]];
     pair.begin = first;
     pair.end = c.count;
   }

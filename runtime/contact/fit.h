@@ -19,7 +19,7 @@ struct PairFit {
   float deepest = 0;  // true depth of the deepest candidate in the last traversal [voxel]
 };
 
-// What the contact settings say of every point of a pair.
+// The contact settings that hold for every point of a pair.
 struct FitRule {
   float offset;  // added to every distance [voxel]
   float margin;  // points nearer than this take part [voxel]

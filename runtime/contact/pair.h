@@ -34,7 +34,7 @@ struct CullBypass {
   }
 };
 
-// What the search for a pair's contacts remembers from frame to frame: METHOD.md, Sec. 6. Distances
+// The memory of the search for a pair's contacts, from frame to frame: METHOD.md, Sec. 6. Distances
 // travelled and expiries are in voxels of the field.
 struct alignas(64) PairSearch {
   std::size_t first = 0, candidates = 0;  // this frame's rows among the candidates

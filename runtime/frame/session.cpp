@@ -305,6 +305,7 @@ void lay_out(h6Session& s, PairColumns& columns, Arena& arena, const Sizes& n) {
   for (std::size_t i = 0; i < n.shells; ++i) {
     Contacts contacts{};
     take_columns(contacts, arena, s.settings.max_contacts);
+    if (s.settings.contact.method != H6_METHOD_FIRM) contacts.cell = nullptr;
     // While counting there is no memory for the objects.
     if (s.shells.data()) (new (&s.shells[i]) ShellBody{})->contacts = contacts;
   }

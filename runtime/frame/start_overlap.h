@@ -9,7 +9,7 @@
 
 namespace h6 {
 
-// What was measured, and the columns that the pairs' PairFit point into, in one block of memory.
+// The measured overlap, and the columns that the pairs' PairFit point into, in one block of memory.
 // Without an overlap there is none.
 struct StartOverlap {
   h6Overlap* pairs = nullptr;  // those that overlap

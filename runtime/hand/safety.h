@@ -51,7 +51,7 @@ struct AboveRating {
 };
 AboveRating above_rating(const h6DeviceCapabilities& capabilities, const h6SafetyDef& def);
 
-// What may only take away from a wrench, and does so at once.
+// A rule that may only take away from a wrench, and does so at once.
 class WrenchShare {
  public:
   // The share that may go out, 0 .. 1. Called once a frame with what the chain would send.
@@ -120,7 +120,7 @@ class OutputGuard {
   double grace_ = 0;    // rest of the first frame of trouble, which changes nothing [s]
   double trouble_ = 0;  // length of the present trouble after that frame [s]
   h6Cause falling_ = H6_CAUSE_NONE;  // why the gain falls in this frame
-  // Of the last frame: share_ times these were sent.
+  // The last frame sent share_ times these.
   Vec3 force_ = Vec3::Zero(), torque_ = Vec3::Zero();
   double share_ = 1;
   Vec3 x_ = Vec3::Zero();  // pose sent in the last frame, once moving_

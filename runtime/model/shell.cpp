@@ -146,7 +146,7 @@ void make_tier(const Shell& shell, std::size_t rows, Tier& tier) {
       (*column)[i] = (*column)[tier.count - 1];
 }
 
-constexpr double kCellNormals = 0.02;   // of a cell differ by less than this
+constexpr double kCellNormals = 0.02;   // no normal is farther from the cell's first one
 constexpr double kCellSize = 1.0 / 16;  // no point is farther from the cell's first one [radius]
 
 // Sorts the rows of each group by cells: the first row that has none yet takes in all that are like

@@ -37,7 +37,7 @@ class HandPort final : public WrenchShare {
   void move(const h6Pose& pose, std::span<const h6Wrench> wrenches);
   // The same under the reaction to the sent commands that may have acted.
   void move(const h6Pose& pose);
-  // What was sent to the hand in this frame.
+  // Notes the wrench that was sent to the hand in this frame.
   void sent(const h6Wrench& felt);
   // Starts to observe with E = `stored`, the energy that the engine holds already [J].
   void start(double stored) {
@@ -61,7 +61,7 @@ class HandPort final : public WrenchShare {
   double energy() const { return energy_; }
 
  private:
-  // What a wrench on the hand takes out of the engine if the next motion is like the last one, and
+  // The energy that a wrench on the hand takes out if the next motion is like the last one, and
   // half of how much more or less it may be, one frame later [J].
   struct Outlook {
     double out, doubt;

@@ -95,7 +95,9 @@ H6_API bool   h6RestartFit(h6Session* session, h6Error* error);
  * overlap that it makes pushes in full, since programs move obstacles with it. A point that has relief
  * keeps it unless it is free now; before the first step all points of the body lose it. To make the new
  * place a start, call h6RestartFit. Friction springs of a free body begin anew, unstretched; a fixed
- * body, an obstacle that a program moves, drags along what rests on it. */
+ * body, an obstacle that a program moves, drags along what rests on it. The common spring of `series`
+ * and `firm` keeps its extension, which decides which points take part before they touch in the next
+ * step. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // light_parts_test.cpp - parts of 10 mg to 10 g come to rest in the paper's scenes.
 //
-// What they hold there hangs on a few contacts that come and go; only inertia or the coupling's
+// Their hold hangs on a few contacts that come and go; only inertia or the coupling's
 // damper keeps a part from jumping then (METHOD.md, Sec. 4).
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a report tells its page about a run that popped through.
+// Tests the data of a report's page about a run that popped through.
 #include <doctest/doctest.h>
 
 #include <cstdint>

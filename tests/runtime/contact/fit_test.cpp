@@ -17,7 +17,7 @@ using namespace h6::test;
 
 namespace {
 
-// What a hand feels and a body does along a path.
+// The force on a hand and the motion of a body along a path.
 struct Travel {
   double speed = 0;    // greatest of the body [m/s]
   double apart = 0;    // greatest distance between hand and body [m]

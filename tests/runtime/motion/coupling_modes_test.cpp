@@ -125,7 +125,7 @@ TEST_CASE("a free quasi-static body comes a quarter nearer to the hand in each f
 }
 
 TEST_CASE("a free quasi-static body that moves with the hand feels no damper") {
-  // What is felt is the way that the hand is ahead in each frame, and nothing else.
+  // The hand feels how far it is ahead in each frame, and nothing else.
   for (const double ratio : {0.0, 1.0}) {
     BoxOnFloor scene;
     scene.hand.coupling.mode = H6_COUPLING_STATIC;

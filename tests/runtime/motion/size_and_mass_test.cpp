@@ -30,7 +30,7 @@ double to_box(double x, double y, double z, double hx, double hy, double hz) {
 
 enum class Ground { floor, plates };
 
-// What a box lies on, for voxels of this size. Plates: one under a third of it, and a small one
+// The ground under a box, for voxels of this size. Plates: one under a third of it, and a small one
 // under its far end.
 FieldArrays ground(Ground kind, double v) {
   const h6Vec3 origin = {-64 * v, -64 * v, -32 * v};
@@ -149,7 +149,7 @@ TEST_CASE("a part of any size and mass that is pressed on a wall or lies there i
 
 namespace {
 
-// What a session makes of its zeros: a part on a floor with voxels of 1 mm, in a hand.
+// A session that derives its zeros: a part on a floor with voxels of 1 mm, in a hand.
 struct InUse {
   double contact;
   h6CouplingDef coupling;
@@ -188,7 +188,7 @@ TEST_CASE(
   // The weight sinks a quarter of a voxel, and the hand can lift it.
   CHECK(in_use(500, 9.81).contact * 0.25e-3 == near(500 * 9.81));
   CHECK(in_use(500, 9.81).coupling.max_force == near(2 * 500 * 9.81));
-  // What is set stays.
+  // A value that is set stays.
   for (const double mass : {1e-4, 0.1, 500.0}) {
     CHECK(in_use(mass, 9.81, 2e3).contact == 2e3);
     CHECK(in_use(mass, 9.81, 2e3).coupling.max_force == near(2e3 * 0.5e-3));
