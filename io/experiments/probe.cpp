@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/experiments/probe.h"
 
+#include <numbers>
+
+#include "io/experiments/vary_scene.h"
+
 namespace h6::cli {
 
 io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points) {
@@ -16,6 +20,18 @@ io::Scene posed_scene(const std::string& name, io::Mesh obstacle, io::PointCloud
   body.shell->bake.levels = 3;
   scene.bodies.push_back(std::move(body));
   return scene;
+}
+
+io::Scene turned_scene(const std::string& name, io::Mesh obstacle, io::PointCloud points) {
+  io::Scene scene = posed_scene(name, std::move(obstacle), std::move(points));
+  turn_lattice(scene.bodies[0], turn_by({0.37, 0.61, 0.23}));
+  return scene;
+}
+
+io::Mesh ridge() {
+  const io::Mesh upright = io::prism_mesh({0, 0, 0}, 4 * kMm, -40 * kMm, 40 * kMm, 256);
+  const h6Quat lie = turn_by({0, std::numbers::pi / 2, 0});
+  return io::moved(upright, {{0, 0, -4 * kMm}, lie});
 }
 
 io::Mesh plate(double from_x, double to_x) {

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "io/experiments/probe.h"
-#include "io/experiments/vary_scene.h"
 
 namespace h6::cli {
 
@@ -68,20 +67,6 @@ Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& 
 // ---- torque ripple on baked fields -------------------------------------------------------------
 
 namespace {
-
-// The obstacle's surface crosses the lattice at all angles, as the surfaces of machine parts do.
-io::Scene ripple_scene(io::Mesh obstacle, io::PointCloud points) {
-  io::Scene scene = posed_scene("ripple", std::move(obstacle), std::move(points));
-  turn_lattice(scene.bodies[0], turn_by({0.37, 0.61, 0.23}));
-  return scene;
-}
-
-// A ridge along x: a cylinder of radius 4 mm with 256 sides, its top at z = 0.
-io::Mesh ridge() {
-  const io::Mesh upright = io::prism_mesh({0, 0, 0}, 4 * kMm, -40 * kMm, 40 * kMm, 256);
-  const h6Quat lie = turn_by({0, std::numbers::pi / 2, 0});
-  return io::moved(upright, {{0, 0, -4 * kMm}, lie});
-}
 
 io::Mesh fine_bowl() {
   constexpr int kRings = 48;
@@ -195,17 +180,17 @@ Study study_ripple(const std::vector<MethodColumn>& columns, const Console& cons
   };
   const io::Mesh hole = io::block_with_hole(15 * kMm, 50 * kMm, 6 * kMm, 48 * kMm, 256);
   std::vector<Way> ways;
-  ways.push_back(
-      {"box on a plane", ripple_scene(plate(-40 * kMm, 40 * kMm), bottom(20, 20)), [](double t) {
-         return h6Pose{{(20 * t - 10) * kMm, 0, 4.6 * kMm}, {1, 0, 0, 0}};
-       }});
-  ways.push_back({"box on a ridge", ripple_scene(ridge(), bottom(20, 20)), [](double t) {
+  ways.push_back({"box on a plane",
+                  turned_scene("ripple", plate(-40 * kMm, 40 * kMm), bottom(20, 20)), [](double t) {
                     return h6Pose{{(20 * t - 10) * kMm, 0, 4.6 * kMm}, {1, 0, 0, 0}};
                   }});
-  ways.push_back({"peg in a hole", ripple_scene(hole, peg()), [](double t) {
+  ways.push_back({"box on a ridge", turned_scene("ripple", ridge(), bottom(20, 20)), [](double t) {
+                    return h6Pose{{(20 * t - 10) * kMm, 0, 4.6 * kMm}, {1, 0, 0, 0}};
+                  }});
+  ways.push_back({"peg in a hole", turned_scene("ripple", hole, peg()), [](double t) {
                     return h6Pose{{0.4 * kMm, 0, (-35 + 20 * t) * kMm}, {1, 0, 0, 0}};
                   }});
-  ways.push_back({"ball in a bowl", ripple_scene(fine_bowl(), ball(500)), [](double t) {
+  ways.push_back({"ball in a bowl", turned_scene("ripple", fine_bowl(), ball(500)), [](double t) {
                     return h6Pose{{0, 0, -0.2 * kMm}, turn_by({0, 0, 2 * t})};
                   }});
   out.table = head("surface", columns);

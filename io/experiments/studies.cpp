@@ -18,6 +18,7 @@ const std::vector<StudyKind>& studies() {
       {"ripple", "force and torque ripple on baked fields", study_ripple},
       {"net-stiffness", "net stiffness against sampling", study_net_stiffness},
       {"energy", "energy of a cycle and of a bounce", study_energy},
+      {"loops", "net work of random closed loops", study_loops},
       {"plate-share", "Fig. 7: how few contacts are still heard", study_share},
       {"time", "Fig. 6: time against the number of contacts", study_time},
   };

@@ -38,6 +38,8 @@ Study study_two_planes(const std::vector<MethodColumn>& columns, const Console& 
 Study study_modes(const std::vector<MethodColumn>& columns, const Console& console);
 // energy.cpp
 Study study_energy(const std::vector<MethodColumn>& columns, const Console& console);
+// loops.cpp
+Study study_loops(const std::vector<MethodColumn>& columns, const Console& console);
 // time.cpp
 Study study_time(const std::vector<MethodColumn>& columns, const Console& console);
 

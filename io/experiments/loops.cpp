@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// loops.cpp - the net work of the contacts over random closed loops.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <random>
+
+#include "io/experiments/probe.h"
+
+namespace h6::cli {
+namespace {
+
+constexpr int kLoops = 30, kLoopSteps = 3000, kWaves = 3;
+constexpr double kLoopTurn = 0.03;  // size of the turns [rad]
+
+// Motion along the six directions: a random Fourier series of three waves in each.
+class Loop {
+ public:
+  // `size`: of the translations [m].
+  Loop(int index, const h6Vec3& size) {
+    std::mt19937_64 engine(static_cast<std::uint64_t>(index) + 1);
+    const double most[6] = {size.x, size.y, size.z, kLoopTurn, kLoopTurn, kLoopTurn};
+    for (int d = 0; d < 6; ++d)
+      for (int w = 0; w < kWaves; ++w)
+        for (double& factor : factors_[d][w])
+          factor = most[d] * (static_cast<double>(engine() >> 11) * 0x1p-52 - 1) / (w + 1);
+  }
+  // u = 0 .. 1 is once around.
+  h6Pose at(const h6Vec3& centre, double u) const {
+    double way[6] = {};
+    for (int d = 0; d < 6; ++d)
+      for (int w = 0; w < kWaves; ++w) {
+        const double angle = 2 * std::numbers::pi * (w + 1) * u;
+        way[d] += factors_[d][w][0] * std::cos(angle) + factors_[d][w][1] * std::sin(angle);
+      }
+    return {centre + h6Vec3{way[0], way[1], way[2]}, turn_by({way[3], way[4], way[5]})};
+  }
+
+ private:
+  double factors_[6][kWaves][2];
+};
+
+// The contacts' net work over the loop, divided by the greatest work that they gave or took on the
+// way; 0 where nothing touches. The body's frame is at its centre of mass.
+double net_work(const io::LoadedScene& loaded, const MethodColumn& method, const Loop& loop,
+                const h6Vec3& centre) {
+  Probe probe(loaded, method);
+  if (!probe) return 0;
+  double work = 0, least = 0, most = 0;
+  h6Pose last = loop.at(centre, 0);
+  h6Wrench f0 = elastic_wrench(probe.at(last), kProbeStiffness);
+  for (int i = 1; i <= kLoopSteps; ++i) {
+    const h6Pose next = loop.at(centre, static_cast<double>(i) / kLoopSteps);
+    const h6Wrench f1 = elastic_wrench(probe.at(next), kProbeStiffness);
+    work += 0.5 * dot(f0.force + f1.force, next.p - last.p) +
+            0.5 * dot(f0.torque + f1.torque, turn(last.q, next.q));
+    least = std::min(least, work), most = std::max(most, work);
+    last = next, f0 = f1;
+  }
+  return most > least ? work / (most - least) : 0;
+}
+
+struct Place {
+  const char* name;
+  io::Scene scene;
+  h6Vec3 centre, size;  // of the loops [m]
+};
+
+std::vector<Place> places() {
+  const io::Mesh hole = io::block_with_hole(15 * kMm, 50 * kMm, 6.2 * kMm, 48 * kMm, 256);
+  io::PointCloud peg;
+  io::add_cylinder_side(peg, 6 * kMm, 10 * kMm, 38, 20);
+  const h6Vec3 over = {2 * kMm, 2 * kMm, 0.3 * kMm}, inside = {0.3 * kMm, 0.3 * kMm, 3 * kMm};
+  std::vector<Place> out;
+  out.push_back({"box on a plane",
+                 turned_scene("plane", plate(-40 * kMm, 40 * kMm), bottom(20, 20)),
+                 {0, 0, 4.8 * kMm},
+                 over});
+  out.push_back(
+      {"box on a ridge", turned_scene("ridge", ridge(), bottom(20, 20)), {0, 0, 4.8 * kMm}, over});
+  out.push_back({"peg in a hole", turned_scene("hole", hole, peg), {0, 0, -25 * kMm}, inside});
+  return out;
+}
+
+}  // namespace
+
+Study study_loops(const std::vector<MethodColumn>& columns, const Console& console) {
+  Study out;
+  out.title = "Random closed loops";
+  out.about =
+      "A body is led around 30 random closed loops in six dimensions, at most some 0.6 voxels "
+      "deep: a box of 20 mm (400 points) on a plane and on a ridge of 4 mm radius, and a peg of 6 "
+      "mm (760 points) in a hole of 6.2. The fields' lattices are turned by 0.75 rad against the "
+      "surfaces. The table gives the contacts' net work over a loop, relative to the range of "
+      "work on the way: the root mean square over the loops, and the largest. A conservative "
+      "force gives 0.";
+  std::vector<Place> all = places();
+  std::vector<std::array<double, kLoops>> found(all.size() * columns.size());
+  std::vector<std::unique_ptr<io::LoadedScene>> scenes;
+  for (Place& place : all) {
+    auto loaded = io::load_scene(std::move(place.scene));
+    if (!loaded) return out;
+    scenes.push_back(std::move(*loaded));
+  }
+  std::vector<std::function<void()>> jobs;
+  for (std::size_t at = 0; at < found.size(); ++at)
+    for (int i = 0; i < kLoops; ++i)
+      jobs.push_back([&, at, i] {
+        const Place& place = all[at / columns.size()];
+        found[at][static_cast<std::size_t>(i)] =
+            net_work(*scenes[at / columns.size()], columns[at % columns.size()],
+                     Loop(i, place.size), place.centre);
+      });
+  run_jobs(jobs, console, "loops");
+  out.table = head("surface", columns);
+  for (std::size_t at = 0; at < found.size(); ++at) {
+    const std::string name = all[at / columns.size()].name;
+    if (at % columns.size() == 0) out.table.push_back({name});
+    double sum = 0, most = 0;
+    for (const double w : found[at]) sum += w * w / kLoops, most = std::max(most, std::fabs(w));
+    out.table.back().push_back(number(std::sqrt(sum), 3) + ", " + number(most, 3));
+    out.json[name][columns[at % columns.size()].name] = {{"rms", std::sqrt(sum)}, {"most", most}};
+  }
+  return out;
+}
+
+}  // namespace h6::cli
