@@ -42,7 +42,8 @@ class FrameTeam {
         const_cast<void*>(static_cast<const void*>(&body)));
   }
   unsigned threads() const;
-  // The time that the helper worked since begin_frame [ns]. Call it on the haptic thread, between runs.
+  // The time that the helper worked since begin_frame [ns]. Call it on the haptic thread, between
+  // runs.
   struct HelperWork {
     std::int64_t first = 0;  // when its first slice began
     std::int64_t busy = 0;   // time in slices
