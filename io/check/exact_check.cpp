@@ -38,10 +38,12 @@ struct Tally {
     node.add(o.node), between.add(o.between), gap.add(o.gap), inside_gap.add(o.inside_gap),
         corner.add(o.corner), deep.add(o.deep);
     excess = std::max(excess, o.excess), lost += o.lost;
-    for (const auto count : {&ExactCheck::buried, &ExactCheck::nearer, &ExactCheck::voted,
-                             &ExactCheck::doubtful, &ExactCheck::drained, &ExactCheck::filled,
-                             &ExactCheck::enclosed, &ExactCheck::far, &ExactCheck::far_wrong})
+    for (const auto count :
+         {&ExactCheck::buried, &ExactCheck::nearer, &ExactCheck::voted, &ExactCheck::doubtful,
+          &ExactCheck::solid, &ExactCheck::drained, &ExactCheck::filled, &ExactCheck::enclosed,
+          &ExactCheck::far, &ExactCheck::far_wrong})
       sum.*count += o.sum.*count;
+    if (o.sum.leak_depth > sum.leak_depth) sum.leak_depth = o.sum.leak_depth, sum.leak = o.sum.leak;
   }
 };
 
@@ -253,9 +255,11 @@ class Check {
       return;
     }
     ++t.sum.voted;
+    t.sum.solid += says == RayVotes::Side::inside;
     if (inside == (says == RayVotes::Side::inside)) return;
     if (!inside) {
       ++t.sum.drained;
+      if (u > t.sum.leak_depth) t.sum.leak_depth = u, t.sum.leak = p;
       return;
     }
     const bool out = u > room() && leads_out(p, dice);

@@ -37,7 +37,10 @@ struct ExactCheck {
   // crosses the mesh an odd number of times, or leaves more closed pieces than it enters. A vote
   // counts if at least nine in ten rays agree.
   std::size_t voted = 0, doubtful = 0;
-  std::size_t drained = 0;   // the field says outside, rays say inside: wrong if the mesh is closed
+  std::size_t solid = 0;     // votes for inside
+  std::size_t drained = 0;   // the field says outside, rays say inside
+  Vec3 leak{};               // the drained place deepest inside the mesh [m]
+  double leak_depth = 0;     // its distance from the mesh [voxel]
   std::size_t filled = 0;    // the field says inside, rays found a way out: wrong if closed
   std::size_t enclosed = 0;  // the field says inside, rays outside, no way out was found: cavities
   // In places without samples: the engine's lower bound of the distance [voxel].
@@ -49,11 +52,14 @@ struct ExactCheck {
   double far_gap = 0, corner_gap = 0, inside_gap = 0;
 
   std::size_t wrong_sides() const { return drained + filled; }
-  // Whether the field is right. The sides of a soup are not judged, because rays may leak through
-  // it.
+  // Whether the outside runs into a solid through cracks or holes of its mesh. In the three real
+  // soups that were tried, rays found no place inside that the field calls outside; two votes in a
+  // thousand are allowed.
+  bool drains() const { return !closed && 500 * drained > solid; }
+  // Whether the field is right. In a soup only drains() judges sides: a sheet has no inside.
   bool agrees() const {
     return worst_node < 1e-3 && far_wrong == 0 && 20 * deep <= nodes &&
-           (!closed || wrong_sides() == 0);
+           (closed ? wrong_sides() == 0 : !drains());
   }
 };
 

@@ -74,6 +74,7 @@ ordered_json exact_json(const io::ExactCheck& c) {
           {"sides", c.voted},
           {"sides_doubtful", c.doubtful},
           {"sides_drained", c.drained},
+          {"drains", c.drains()},
           {"sides_filled", c.filled},
           {"sides_enclosed", c.enclosed},
           {"far", c.far},
@@ -86,8 +87,8 @@ ordered_json exact_json(const io::ExactCheck& c) {
           {"far_inside_gap_mean", c.inside_gap}};
 }
 
-void print(const ordered_json& m, const Subject& s, const io::Walls& walls, const io::FieldPlan& p,
-           double stiffness) {
+void print(const ordered_json& m, const Subject& s, const io::Walls& walls,
+           const io::FieldPlan& p) {
   std::printf("%s: %zu triangles, %s; voxel %.4g mm", s.name.c_str(),
               m["triangles"].get<std::size_t>(), m["closed"].get<bool>() ? "closed" : "a soup",
               1e3 * p.voxel_size);
@@ -117,6 +118,9 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls, cons
     std::printf(
         "  sheets  %.3g %% of the area is on sheets, which hold nothing: %.3g voxels thick\n",
         100 * walls.sheets, 2 * p.offset / p.voxel_size);
+}
+
+void print_force(const ordered_json& m, double stiffness) {
   if (m["holding_force_N"].is_number())
     std::printf("  force   at %.4g N/m, %.3g N and less cannot push through\n", stiffness,
                 m["holding_force_N"].get<double>());
@@ -173,6 +177,18 @@ std::vector<std::string> warnings_of(const Subject& s, const io::MeshAudit& a,
   return out;
 }
 
+// Says that the outside runs into the solid, and where.
+std::string leak_sentence(const io::ExactCheck& c) {
+  char text[256];
+  std::snprintf(
+      text, sizeof text,
+      "the outside runs into the solid through its cracks or holes: of %zu places that "
+      "rays find inside, the field has %zu outside, the deepest at (%.4g, %.4g, %.4g) mm; "
+      "no force holds there. Close the mesh, or bake with --seal",
+      c.solid, c.drained, 1e3 * c.leak.x, 1e3 * c.leak.y, 1e3 * c.leak.z);
+  return text;
+}
+
 struct Verified {
   bool asked = false, bad = false;
 };
@@ -224,9 +240,12 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
   m["holding_force_N"] =
       known ? ordered_json(holding_force(stiffness, thin, p.offset)) : ordered_json();
   m["warnings"] = warnings;
-  if (!console.json) print(m, s, *walls, p, stiffness);
+  if (!console.json) print(m, s, *walls, p);
 
-  if (o.field.empty() && !o.verify) return m;
+  if (o.field.empty() && !o.verify) {
+    if (!console.json) print_force(m, stiffness);
+    return m;
+  }
   if (o.field.empty()) {
     field = io::bake_field(s.mesh, s.bake, nullptr, console.progress());
     if (!field) return Failure{s.name + ": " + field.error()};
@@ -238,8 +257,12 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
   if (!c) return Failure{s.name + ": " + c.error()};
   m["field"] = exact_json(*c);
   verified.asked = true;
-  verified.bad |= c->closed && !c->agrees();
-  if (!console.json) print(*c);
+  verified.bad |= !c->agrees();
+  if (c->drains()) {
+    m["holding_force_N"] = nullptr;
+    console.warn({leak_sentence(*c)});
+  }
+  if (!console.json) print_force(m, stiffness), print(*c);
   return m;
 }
 
