@@ -2,14 +2,11 @@
 #include "io/cli/view_run.h"
 
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <deque>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -20,6 +17,7 @@
 #include "io/console/checks.h"
 #include "io/run/recorded_run.h"
 #include "io/run/run_observer.h"
+#include "io/view/browser.h"
 #include "io/view/live_state.h"
 #include "io/view/page.h"
 #include "io/view/view_request.h"
@@ -66,25 +64,6 @@ class Wishes {
   std::string refused_;
 };
 
-// Opens the user's browser, if there is one; it outlives this program.
-bool open_browser(const std::string& address) {
-  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
-  const pid_t child = fork();
-  if (child < 0) return false;
-  if (child == 0) {
-    if (fork() == 0) {
-      setsid();
-      if (!std::freopen("/dev/null", "w", stdout) || !std::freopen("/dev/null", "w", stderr))
-        _exit(1);
-      execlp("xdg-open", "xdg-open", address.c_str(), static_cast<char*>(nullptr));
-    }
-    _exit(0);
-  }
-  int status;
-  waitpid(child, &status, 0);
-  return true;
-}
-
 // The contact settings as the engine uses them.
 h6ContactDef in_use(const io::LoadedScene& loaded, h6ContactDef contact) {
   h6SessionDef def = loaded.session_def();
@@ -113,7 +92,7 @@ class Viewer : public RunObserver {
     std::vector<std::string> remarks;
     server_->greet(state_.scene_message(remarks));
     console_.warn(remarks);
-    const bool shown = options_.open && open_browser(server_->address());
+    const bool shown = options_.open && browser_.open(server_->address());
     console_.log("view: " + server_->address() + (shown ? "" : "  (open it in a browser here)"));
     return Done{};
   }
@@ -274,6 +253,7 @@ class Viewer : public RunObserver {
   const Console& console_;
   io::view::LiveState state_;
   Wishes wishes_;
+  io::view::Browser browser_;
   std::unique_ptr<io::view::ViewServer> server_;  // last: its thread calls the members above
   h6ContactDef contact_{};
   h6CouplingDef coupling_{};

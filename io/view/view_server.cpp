@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdio>
 #include <deque>
+#include <list>
 #include <optional>
 #include <random>
 #include <set>
@@ -68,7 +69,9 @@ struct ViewServer::Body {
   ServerOptions options;
   std::string page, port_text;
   Receive receive;
-  std::size_t connections = 0;  // declared before io: io's destructor runs handlers that count down
+  // These two are declared before io: io's destructor runs handlers that change them.
+  std::size_t connections = 0;
+  std::list<Connection*> silent;  // their requests are not whole yet; the oldest comes first
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
   Message greeting;
@@ -167,8 +170,12 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
  public:
   Connection(Body& body, tcp::socket socket) : body_(body), stream_(std::move(socket)) {
     ++body_.connections;
+    place_ = body_.silent.insert(body_.silent.end(), this);
   }
-  ~Connection() { --body_.connections; }
+  ~Connection() {
+    heard();
+    --body_.connections;
+  }
 
   void start() {
     parser_.emplace();
@@ -177,12 +184,22 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
     stream_.expires_after(kRequestTime);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code failed, std::size_t) {
+                       self->heard();
                        if (!failed) return self->answer();
                        if (failed != http::error::end_of_stream) ++self->body_.refused_count;
                      });
   }
+  // Ends the wait for its request: another needs its place.
+  void give_way() {
+    heard();
+    stream_.cancel();
+  }
 
  private:
+  void heard() {
+    if (place_) body_.silent.erase(*place_);
+    place_.reset();
+  }
   void answer() {
     const auto& request = parser_->get();
     const std::string_view target = view_of(request.target());
@@ -237,6 +254,7 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
   }
 
   Body& body_;
+  std::optional<std::list<Connection*>::iterator> place_;  // in `silent`
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{16384};
   std::optional<http::request_parser<http::empty_body>> parser_;
@@ -247,10 +265,14 @@ void ViewServer::Body::accept() {
   acceptor.async_accept([this](error_code failed, tcp::socket socket) {
     if (failed == asio::error::operation_aborted) return;
     if (!failed) {
-      if (connections < options.max_connections)
-        std::make_shared<Connection>(*this, std::move(socket))->start();
-      else
+      // A whole request arrives at once from a browser: the longest wait is the least honest one.
+      const bool full = connections >= options.max_connections;
+      if (full && silent.empty()) {
         ++refused_count;  // the socket closes when it goes out of scope
+      } else {
+        if (full) silent.front()->give_way();
+        std::make_shared<Connection>(*this, std::move(socket))->start();
+      }
     }
     accept();
   });

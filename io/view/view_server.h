@@ -8,7 +8,8 @@
 // carry the token, which only the printed address has; the Host header must be this address, so a
 // foreign name that resolves here fails; a WebSocket must come from this page's Origin. A client
 // too slow for the live messages misses some. A client that stops reading or sends too long a text
-// is closed; the others do not notice. The server works on its own thread, so a caller that
+// is closed; the others do not notice. Where too many connections wait with half a request, the one
+// that waits longest gives way to the next. The server works on its own thread, so a caller that
 // publishes never waits for a client.
 #pragma once
 #include <cstddef>

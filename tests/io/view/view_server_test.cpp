@@ -296,11 +296,24 @@ TEST_CASE("clients and connections beyond the limits are refused") {
   const Line third(s.port);
   third.send(s.upgrade("/live?token=" + s.token, "http://" + s.host()));
   CHECK(status(third.read(1000, nullptr, 64)) == 503);
-  // Silent connections hold their places until they time out; until then others are refused.
+  // A silent connection gives its place to the next.
   std::vector<std::unique_ptr<Line>> idle;
   for (int i = 0; i < 40; ++i) idle.push_back(std::make_unique<Line>(s.port));
   CHECK(soon([&] { return s.server->refused() > 20; }));
   CHECK(s.server->clients() == 2);
+}
+
+TEST_CASE("silent connections, and half requests, do not keep the page from its user") {
+  const Server s;  // it takes 32 connections
+  std::vector<std::unique_ptr<Line>> idle;
+  for (int i = 0; i < 100; ++i) {
+    idle.push_back(std::make_unique<Line>(s.port));
+    if (i % 2) idle.back()->send("GET / HTTP/1.1\r\nHost: ");
+  }
+  CHECK(soon([&] { return s.server->refused() >= 68; }));
+  for (int i = 0; i < 20; ++i) CHECK(status(s.get("/?token=" + s.token, s.host())) == 200);
+  const Client page(s);
+  CHECK(soon([&] { return s.server->clients() == 1; }));
 }
 
 TEST_CASE("a port in use gives one sentence") {
