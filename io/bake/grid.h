@@ -73,8 +73,9 @@ struct Surface {
   Large<std::array<std::uint32_t, 3>> triangles;
   Large<std::int32_t> part;    // (triangles) or empty
   Large<std::int32_t> source;  // (triangles) index in the mesh; -1: a plug of plug_holes
-  Vec3 low{}, high{};          // [m]
-  std::size_t duplicates = 0, flat = 0;
+  std::vector<std::array<std::uint32_t, 3>> flat;  // those left out for want of area
+  Vec3 low{}, high{};                              // [m]
+  std::size_t duplicates = 0;
   std::size_t open_edges = 0;  // edges of one face
   std::size_t odd_edges = 0;   // edges of an odd number of faces
   bool closed = false;         // every edge has an even number of faces
@@ -216,11 +217,6 @@ struct Reached {
 };
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads);
-// pockets.cpp: the candidates that the outside reaches after all, through gaps finer than a voxel.
-std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                                const std::vector<RowNodes>& candidates, const Masks& wet,
-                                unsigned threads);
-
 class Chains;  // chains.h
 
 // inside.cpp: the rows that the field needs, and the data beside u that their signed distances

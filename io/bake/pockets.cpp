@@ -2,156 +2,321 @@
 // pockets.cpp - outside nodes at the bottom of grooves narrower than a voxel.
 //
 // Triangles cross all edges from such a node to its neighbours, so the flood cannot reach it. Each
-// candidate is judged alone. The parity of crossings towards reached nodes rejects nearly all (odd:
-// the tip of a solid). Then a reached node in plain view decides, and at last a walk of a few
-// voxels on a lattice eight times finer.
-#include <algorithm>
+// candidate is judged alone, by lines to the reached nodes in view. A line that crosses a closed
+// component of the mesh an odd number of times rejects the node: that component holds it in.
+// Nearly all candidates are tips of solids, and this is true of them even where solids overlap. A
+// line that crosses nothing accepts the node. Else a walk of a few voxels on a lattice eight times
+// finer decides. Its reach does not depend on the other nodes, so each node walks once.
+#include "io/bake/pockets.h"
 
-#include "io/bake/grid.h"
+#include <algorithm>
+#include <numeric>
+
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
-namespace {
-
-constexpr int kView = 2;  // nodes along each axis; a row knows all triangles so far
-constexpr int kFine = 8;  // steps a voxel
-constexpr int kSide = 2 * kView * kFine + 1;
 
 struct Facet {
   Vec3 a, e, f;  // corner and two edges
+  std::uint32_t component;
 };
 
-// Whether p + t d, t in [0, 1], meets the triangle (T. Moeller, B. Trumbore, 1997). Touching
-// counts.
-bool meets(const Vec3& p, const Vec3& d, const Facet& t) {
+namespace {
+
+constexpr int kView = 2;  // nodes along each axis; a row knows all triangles so far
+constexpr int kAcross = 2 * kView + 1;
+constexpr int kFine = 8;                      // steps a voxel
+constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
+constexpr int kLooks = 5;                     // lines that vote; one may graze an edge
+
+// The place in [0, 1] where p + t d meets the triangle (T. Moeller, B. Trumbore, 1997), or a
+// negative number. Touching counts.
+double meets(const Vec3& p, const Vec3& d, const Facet& t) {
   constexpr double kTouch = 1e-7;
   const Vec3 h = cross(d, t.f);
   const double det = dot(t.e, h);
-  if (det == 0) return false;
+  if (det == 0) return -1;
   const Vec3 s = p - t.a, q = cross(s, t.e);
   const double u = dot(s, h) / det, v = dot(d, q) / det, w = dot(t.f, q) / det;
-  return u >= -kTouch && v >= -kTouch && u + v <= 1 + kTouch && w >= 0 && w <= 1;
+  return u >= -kTouch && v >= -kTouch && u + v <= 1 + kTouch && w >= 0 && w <= 1 ? w : -1;
 }
 
-class View {
+// Numbers the triangles by the pieces of the mesh that share no vertex.
+std::vector<std::uint32_t> components(const Surface& surface) {
+  std::vector<std::uint32_t> parent(surface.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](std::uint32_t v) {
+    for (; parent[v] != v; v = parent[v]) parent[v] = parent[parent[v]];
+    return v;
+  };
+  const auto join = [&](const std::array<std::uint32_t, 3>& t) {
+    const std::uint32_t r = root(t[0]);
+    parent[root(t[1])] = r;
+    parent[root(t[2])] = r;
+  };
+  for (const auto& t : surface.triangles) join(t);
+  for (const auto& t : surface.flat) join(t);
+  std::vector<std::uint32_t> out(surface.triangles.size());
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = root(surface.triangles[i][0]);
+  return out;
+}
+
+// The facets that cross a line, counted by component.
+class Crossed {
  public:
-  View(const Surface& surface, const Grid& grid, const NarrowBand& band, const Masks& wet)
-      : surface_(surface), grid_(grid), band_(band), wet_(wet) {}
-
-  // The facets near the nodes of a row.
-  std::vector<Facet> facets_of(std::size_t row) const {
-    const Tiles& tiles = band_.tiles;
-    const std::array<int, 3> brick = grid_.place(band_.cell[row]);
-    const std::size_t tile = tiles.of(brick);
-    std::vector<Facet> facets;
-    for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
-      if (!(tiles.near[i] >> Tiles::bit(brick) & 1)) continue;
-      const auto& t = surface_.triangles[tiles.triangle[i]];
-      const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
-                 &c = surface_.vertices[t[2]];
-      facets.push_back({a, b - a, c - a});
-    }
-    return facets;
+  void clear() { counts_.clear(); }
+  void add(std::uint32_t component) {
+    for (auto& [name, count] : counts_)
+      if (name == component) {
+        ++count;
+        return;
+      }
+    counts_.emplace_back(component, 1);
   }
-
-  bool reaches_outside(const std::vector<Facet>& facets, const std::array<int, 3>& p) const {
-    const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
-    const std::vector<Facet> near = facets_near(facets, eye);
-    int odd = 0, looks = 0;
-    for (int i = 0; i < 125; ++i) {
-      const std::array<int, 3> d = {i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2};
-      if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > grid_.reach() * grid_.reach()) continue;
-      if (!is_wet({p[0] + d[0], p[1] + d[1], p[2] + d[2]})) continue;
-      const Vec3 way{double(d[0]), double(d[1]), double(d[2])};
-      const auto hits = std::count_if(near.begin(), near.end(),
-                                      [&](const Facet& t) { return meets(eye, way, t); });
-      if (hits == 0) return true;
-      odd += hits % 2;
-      if (++looks == 5 && odd > 2) return false;
-    }
-    return looks > 0 && 2 * odd <= looks && walks_outside(near, p);
+  bool none() const { return counts_.empty(); }
+  bool some_odd() const {
+    return std::any_of(counts_.begin(), counts_.end(), [](const auto& c) { return c.second % 2; });
   }
 
  private:
-  bool is_wet(const std::array<int, 3>& n) const {
-    for (std::size_t k = 0; k < 3; ++k)
-      if (n[k] < 0 || n[k] >= 8 * grid_.bricks[k]) return false;
-    const std::int32_t r = band_.row[grid_.cell(n[0] / 8, n[1] / 8, n[2] / 8)];
-    return r >= 0 &&
-           wet_[std::size_t(r)].get(std::size_t(((n[2] & 7) * 8 + (n[1] & 7)) * 8 + (n[0] & 7)));
-  }
-
-  // Searches breadth first, from the middle of a cube of fine steps, for a reached node in it.
-  bool walks_outside(const std::vector<Facet>& near, const std::array<int, 3>& p) const {
-    std::vector<std::uint8_t> seen(kSide * kSide * kSide, 0);
-    std::vector<int> queue{int(seen.size() / 2)};
-    seen[std::size_t(queue[0])] = 1;
-    for (std::size_t at = 0; at < queue.size(); ++at) {
-      const int q[3] = {queue[at] % kSide, queue[at] / kSide % kSide, queue[at] / kSide / kSide};
-      if (q[0] % kFine == 0 && q[1] % kFine == 0 && q[2] % kFine == 0 &&
-          is_wet({p[0] + q[0] / kFine - kView, p[1] + q[1] / kFine - kView,
-                  p[2] + q[2] / kFine - kView}))
-        return true;
-      const Vec3 from{p[0] + double(q[0]) / kFine - kView, p[1] + double(q[1]) / kFine - kView,
-                      p[2] + double(q[2]) / kFine - kView};
-      for (int way = 0; way < 6; ++way) {
-        const int axis = way / 2, step = way % 2 ? 1 : -1;
-        if (q[axis] + step < 0 || q[axis] + step >= kSide) continue;
-        const int to = queue[at] + step * (axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide);
-        if (seen[std::size_t(to)]) continue;
-        double d[3] = {0, 0, 0};
-        d[axis] = double(step) / kFine;
-        if (std::any_of(near.begin(), near.end(), [&](const Facet& t) {
-              return meets(from, {d[0], d[1], d[2]}, t);
-            }))
-          continue;
-        seen[std::size_t(to)] = 1;
-        queue.push_back(to);
-      }
-    }
-    return false;
-  }
-
-  static std::vector<Facet> facets_near(const std::vector<Facet>& facets, const Vec3& eye) {
-    std::vector<Facet> near;
-    const auto apart = [](double p, double e, double f, double at) {
-      return p + std::min({0.0, e, f}) > at + kView || p + std::max({0.0, e, f}) < at - kView;
-    };
-    for (const Facet& t : facets)
-      if (!apart(t.a.x, t.e.x, t.f.x, eye.x) && !apart(t.a.y, t.e.y, t.f.y, eye.y) &&
-          !apart(t.a.z, t.e.z, t.f.z, eye.z))
-        near.push_back(t);
-    return near;
-  }
-
-  const Surface& surface_;
-  const Grid& grid_;
-  const NarrowBand& band_;
-  const Masks& wet_;
+  std::vector<std::pair<std::uint32_t, int>> counts_;
 };
+
+// Fine steps in the view of a node. A row of lattice points along x is a word.
+class Lattice {
+ public:
+  Lattice(const std::vector<Facet>& facets, const Vec3& eye)
+      : low_(eye - Vec3{kView, kView, kView}) {
+    for (const Facet& t : facets)
+      for (int axis = 0; axis < 3; ++axis) cut(t, axis);
+  }
+
+  // The grid nodes that fine steps from the middle reach, by View's numbers.
+  InView walk() {
+    std::vector<int> queue;
+    const auto wet = [&](int y, int z, std::uint64_t points) {
+      std::uint64_t& row = reached_[row_of(y, z)];
+      if ((points & ~row) == 0) return;
+      row |= points;
+      queue.push_back(z * kSide + y);
+    };
+    wet(kSide / 2, kSide / 2, std::uint64_t{1} << kSide / 2);
+    while (!queue.empty()) {
+      const int y = queue.back() % kSide, z = queue.back() / kSide;
+      queue.pop_back();
+      const std::size_t at = row_of(y, z);
+      std::uint64_t& row = reached_[at];
+      for (std::uint64_t last = 0; last != row;) {
+        last = row;
+        row |= (row & ~cut_[0][at]) << 1 & kRow;
+        row |= row >> 1 & ~cut_[0][at];
+      }
+      if (y + 1 < kSide) wet(y + 1, z, row & ~cut_[1][at]);
+      if (y > 0) wet(y - 1, z, row & ~cut_[1][row_of(y - 1, z)]);
+      if (z + 1 < kSide) wet(y, z + 1, row & ~cut_[2][at]);
+      if (z > 0) wet(y, z - 1, row & ~cut_[2][row_of(y, z - 1)]);
+    }
+    InView nodes;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const int x = int(i) % kAcross, y = int(i) / kAcross % kAcross,
+                z = int(i) / kAcross / kAcross;
+      nodes[i] = reached_[row_of(y * kFine, z * kFine)] >> (x * kFine) & 1;
+    }
+    return nodes;
+  }
+
+ private:
+  static constexpr std::uint64_t kRow = (std::uint64_t{1} << kSide) - 1;
+  static std::size_t row_of(int y, int z) { return std::size_t(z * kSide + y); }
+
+  // Cuts the steps along an axis that a facet crosses.
+  void cut(const Facet& t, int axis) {
+    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+    int first[3], last[3];
+    for (const int k : {i, j}) {
+      const double a = component(t.a, k) - component(low_, k), e = component(t.e, k),
+                   f = component(t.f, k), slack = 1e-6;
+      first[k] = int(std::max(0.0, std::ceil(kFine * (a + std::min({0.0, e, f}) - slack))));
+      last[k] = int(std::min(kSide - 1.0, std::floor(kFine * (a + std::max({0.0, e, f}) + slack))));
+    }
+    double along[3] = {0, 0, 0};
+    along[axis] = 2 * kView;
+    for (int p = first[i]; p <= last[i]; ++p)
+      for (int q = first[j]; q <= last[j]; ++q) {
+        double from[3] = {0, 0, 0};
+        from[i] = double(p) / kFine;
+        from[j] = double(q) / kFine;
+        const double at =
+            meets(low_ + Vec3{from[0], from[1], from[2]}, {along[0], along[1], along[2]}, t);
+        if (at < 0) continue;
+        int point[3];
+        point[i] = p, point[j] = q;
+        // A hit at a point cuts the steps on both sides of it.
+        const double step = at * (kSide - 1), touch = 1e-9;
+        for (int k = std::max(0, int(std::ceil(step - 1 - touch)));
+             k <= std::min(kSide - 2, int(std::floor(step + touch))); ++k) {
+          point[axis] = k;
+          cut_[axis][row_of(point[1], point[2])] |= std::uint64_t{1} << point[0];
+        }
+      }
+  }
+
+  Vec3 low_;
+  // Bit x of row (y, z): the step from the point along each axis is cut; the point is reached.
+  std::array<std::array<std::uint64_t, kSide * kSide>, 3> cut_{};
+  std::array<std::uint64_t, kSide * kSide> reached_{};
+};
+
+// The facets within the view of a node.
+std::vector<Facet> facets_near(const std::vector<Facet>& facets, const Vec3& eye) {
+  std::vector<Facet> near;
+  const auto apart = [](double p, double e, double f, double at) {
+    return p + std::min({0.0, e, f}) > at + kView || p + std::max({0.0, e, f}) < at - kView;
+  };
+  for (const Facet& t : facets)
+    if (!apart(t.a.x, t.e.x, t.f.x, eye.x) && !apart(t.a.y, t.e.y, t.f.y, eye.y) &&
+        !apart(t.a.z, t.e.z, t.f.z, eye.z))
+      near.push_back(t);
+  return near;
+}
+
+// The step from the middle of a view to its i-th node.
+std::array<int, 3> step_to(std::size_t i) {
+  return {int(i) % kAcross - kView, int(i) / kAcross % kAcross - kView,
+          int(i) / kAcross / kAcross - kView};
+}
+
+// The nodes of a view, nearest first: short lines cross little.
+std::array<std::size_t, kInView> nearest_first() {
+  std::array<std::size_t, kInView> order;
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [](std::size_t a, std::size_t b) {
+    const auto squared = [](const std::array<int, 3>& d) {
+      return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    };
+    return squared(step_to(a)) < squared(step_to(b));
+  });
+  return order;
+}
 
 }  // namespace
 
-std::vector<RowNodes> reachable(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                                const std::vector<RowNodes>& candidates, const Masks& wet,
-                                unsigned threads) {
-  std::vector<RowNodes> seen(candidates);
-  const View view(surface, grid, band, wet);
-  sched::parallel_for(candidates.size(), threads, [&](std::size_t i) {
-    const std::size_t r = candidates[i].row;
-    const std::array<int, 3> place = grid.place(band.cell[r]);
-    const std::vector<Facet> facets = view.facets_of(r);
-    seen[i].nodes = NodeMask{};
-    for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t bits = candidates[i].nodes.z[z]; bits != 0; bits &= bits - 1) {
-        const int n = std::countr_zero(bits);
-        if (view.reaches_outside(
-                facets, {8 * place[0] + n % 8, 8 * place[1] + n / 8, 8 * place[2] + int(z)}))
-          seen[i].nodes.set(64 * z + std::size_t(n));
+static_assert(kInView == kAcross * kAcross * kAcross);
+
+Pockets::Pockets(const Surface& surface, const Grid& grid, const NarrowBand& band,
+                 const std::vector<RowNodes>& candidates, unsigned threads)
+    : surface_(surface), grid_(grid), band_(band), threads_(threads) {
+  if (!candidates.empty()) component_ = components(surface);
+  for (const RowNodes& row : candidates) {
+    rows_.push_back({row.row, {}});
+    for (std::size_t n = 0; n < kBrickSamples; ++n)
+      if (row.nodes.get(n)) rows_.back().nodes.push_back({std::uint16_t(n), false, {}});
+  }
+}
+
+std::vector<RowNodes> Pockets::reached(const Masks& wet) {
+  std::vector<RowNodes> out(rows_.size());
+  sched::parallel_for(rows_.size(), threads_,
+                      [&](std::size_t i) { out[i] = judge(rows_[i], wet); });
+  std::erase_if(out, [](const RowNodes& row) { return !row.nodes.any(); });
+  std::erase_if(rows_, [](const Row& row) { return row.nodes.empty(); });
+  return out;
+}
+
+// Finds the nodes that are reached, and drops those and the nodes that are inside.
+RowNodes Pockets::judge(Row& row, const Masks& wet) const {
+  RowNodes found{row.row, {}};
+  const std::array<int, 3> brick = grid_.place(band_.cell[row.row]);
+  std::vector<Facet> facets;  // near the nodes of the row
+  std::erase_if(row.nodes, [&](Node& node) {
+    if (wet[row.row].get(node.place)) return true;
+    const std::array<int, 3> p = {8 * brick[0] + node.place % 8, 8 * brick[1] + node.place / 8 % 8,
+                                  8 * brick[2] + node.place / 64};
+    const InView view = wet_about(p, wet);
+    if (view.none()) return false;
+    if (!node.walked) {
+      if (facets.empty()) facets = facets_of(row.row);
+      const Side side = look(facets, p, view, node);
+      if (side != Side::unknown) {
+        if (side == Side::outside) found.nodes.set(node.place);
+        return true;
       }
+    }
+    if ((node.linked & view).none()) return false;
+    found.nodes.set(node.place);
+    return true;
   });
-  std::erase_if(seen, [](const RowNodes& row) { return !row.nodes.any(); });
-  return seen;
+  return found;
+}
+
+// The facets near the nodes of a row.
+std::vector<Facet> Pockets::facets_of(std::size_t row) const {
+  const Tiles& tiles = band_.tiles;
+  const std::array<int, 3> brick = grid_.place(band_.cell[row]);
+  const std::size_t tile = tiles.of(brick);
+  std::vector<Facet> facets;
+  for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
+    if (!(tiles.near[i] >> Tiles::bit(brick) & 1)) continue;
+    const std::uint32_t triangle = tiles.triangle[i];
+    const auto& t = surface_.triangles[triangle];
+    const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
+               &c = surface_.vertices[t[2]];
+    facets.push_back({a, b - a, c - a, component_[triangle]});
+  }
+  return facets;
+}
+
+// The reached nodes in the view of a node.
+InView Pockets::wet_about(const std::array<int, 3>& p, const Masks& wet) const {
+  InView view;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const std::array<int, 3> d = step_to(i);
+    if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > grid_.reach() * grid_.reach()) continue;
+    std::array<int, 3> n;
+    bool in = true;
+    for (std::size_t k = 0; k < 3; ++k) {
+      n[k] = p[k] + d[k];
+      in = in && n[k] >= 0 && n[k] < 8 * grid_.bricks[k];
+    }
+    const std::int32_t r = in ? band_.row[grid_.cell(n[0] / 8, n[1] / 8, n[2] / 8)] : -1;
+    view[i] = r >= 0 &&
+              wet[std::size_t(r)].get(std::size_t(((n[2] & 7) * 8 + (n[1] & 7)) * 8 + (n[0] & 7)));
+  }
+  return view;
+}
+
+// Looks along lines to the reached nodes in view; where they do not decide, lets the node walk.
+Pockets::Side Pockets::look(const std::vector<Facet>& facets, const std::array<int, 3>& p,
+                            const InView& view, Node& node) const {
+  static const std::array<std::size_t, kInView> order = nearest_first();
+  const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
+  const std::vector<Facet> near = facets_near(facets, eye);
+  Crossed crossed;
+  int odd = 0, looks = 0;
+  for (const std::size_t i : order) {
+    if (!view[i]) continue;
+    const std::array<int, 3> d = step_to(i);
+    crossed.clear();
+    for (const Facet& t : near)
+      if (meets(eye, {double(d[0]), double(d[1]), double(d[2])}, t) >= 0) crossed.add(t.component);
+    if (crossed.none()) return Side::outside;
+    if (looks < kLooks) {
+      ++looks;
+      odd += crossed.some_odd();
+      if (2 * odd > kLooks) return Side::inside;
+    }
+  }
+  if (2 * odd > looks) return Side::unknown;
+  node.walked = true;
+  node.linked = Lattice(near, eye).walk();
+  for (std::size_t i = 0; i < kInView; ++i) {
+    const std::array<int, 3> d = step_to(i);
+    const Vec3 way{double(d[0]), double(d[1]), double(d[2])};
+    if (!node.linked[i] && !view[i])
+      node.linked[i] = std::none_of(near.begin(), near.end(),
+                                    [&](const Facet& t) { return meets(eye, way, t) >= 0; });
+  }
+  return Side::unknown;
 }
 
 }  // namespace h6::io::bake

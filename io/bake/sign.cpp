@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "io/bake/flood.h"
+#include "io/bake/pockets.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -80,14 +81,10 @@ void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& b
   Masks dry(band.rows());
   sched::parallel_for(dry.size(), threads,
                       [&](std::size_t r) { dry[r] = free[r] & ~outside.wet()[r]; });
-  std::vector<RowNodes> left = cramped_nodes(grid, band, dry, threads);
+  Pockets pockets(surface, grid, band, cramped_nodes(grid, band, dry, threads), threads);
   constexpr int kRounds = 8;  // down a groove, a few voxels at a time
-  for (int i = 0; i < kRounds; ++i) {
-    for (RowNodes& row : left) row.nodes = row.nodes & ~outside.wet()[row.row];
-    std::erase_if(left, [](const RowNodes& row) { return !row.nodes.any(); });
-    if (!outside.from_nodes(reachable(surface, grid, band, left, outside.wet(), threads), 1))
-      return;
-  }
+  for (int i = 0; i < kRounds; ++i)
+    if (!outside.from_nodes(pockets.reached(outside.wet()), 1)) return;
 }
 
 }  // namespace

@@ -162,7 +162,8 @@ Outcome check_indices(const Mesh& mesh, unsigned threads) {
 // The findings in a slice of triangles.
 struct Slice {
   std::size_t not_finite = kNone;  // first triangle with such a coordinate
-  std::size_t duplicates = 0, flat = 0, kept = 0;
+  std::size_t duplicates = 0, kept = 0;
+  std::vector<Triangle> flat;
   double low[3] = {kHuge, kHuge, kHuge}, high[3] = {-kHuge, -kHuge, -kHuge};
 };
 
@@ -181,7 +182,7 @@ std::vector<Slice> sift(const Mesh& mesh, const std::vector<std::uint8_t>& dupli
     for (const Vec3& p : corner)
       if (!std::isfinite(p.x + p.y + p.z)) slice.not_finite = std::min(slice.not_finite, i);
     if (!has_area(corner[0], corner[1], corner[2])) {
-      ++slice.flat;
+      slice.flat.push_back(t);
       return;
     }
     for (const Vec3& p : corner) {
@@ -213,7 +214,7 @@ Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads) {
       return Failure{"triangle " + std::to_string(slice.not_finite) +
                      " has a coordinate that is not finite"};
     surface.duplicates += slice.duplicates;
-    surface.flat += slice.flat;
+    surface.flat.insert(surface.flat.end(), slice.flat.begin(), slice.flat.end());
     kept += std::exchange(slice.kept, kept);  // from here on: place of its first triangle
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], slice.low[k]);

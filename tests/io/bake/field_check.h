@@ -175,6 +175,13 @@ class Judge {
     return votes >= 3;
   }
 
+  // The triangles that a ray crosses.
+  std::size_t hits(Vec3 p, Vec3 direction) const {
+    std::size_t hits = 0;
+    count_hits(0, p, direction, hits);
+    return hits;
+  }
+
   // Generalised winding number: the sum of solid angles over 4 pi. All triangles.
   double winding(Vec3 p) const {
     double sum = 0;

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sides of nodes that are cut off from all their neighbours: in crevices and in thin solids.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "io/bake/bake_field.h"
+#include "tests/io/bake/field_check.h"
+
+using namespace field_check;
+using h6::io::bake_field;
+using h6::io::FieldBake;
+
+namespace {
+
+// A closed tube with flat ends.
+Mesh rod(double length, double radius) {
+  const int around = 10;
+  const auto at = [&](double s, double t) {
+    const double a = 2 * M_PI * (t < 1 ? t : 0);
+    return Vec3{length * (s - 0.5), radius * std::cos(a), radius * std::sin(a)};
+  };
+  Mesh mesh = patch(6, around, at);
+  for (const double end : {0.0, 1.0})
+    add(mesh, patch(1, around, [&](double s, double t) {
+          const Vec3 rim = at(end, t);
+          return Vec3{rim.x, s * rim.y, s * rim.z};
+        }));
+  return h6::io::weld(mesh);
+}
+
+// Rods of 0.8 to 4 voxels, many of which overlap.
+std::vector<Mesh> pile_of_rods(double voxel, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<Mesh> rods;
+  for (int i = 0; i < 60; ++i)
+    rods.push_back(shifted(turned(rod(1.2, voxel * random(0.4, 2)), random(0, 6), random(0, 6)),
+                           {random(-0.3, 0.3), random(-0.3, 0.3), random(-0.3, 0.3)}));
+  return rods;
+}
+
+Vec3 direction(Random& random) {
+  Vec3 d;
+  do d = {random(-1, 1), random(-1, 1), random(-1, 1)};
+  while (norm(d) > 1 || norm(d) < 0.1);
+  return (1 / norm(d)) * d;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "pockets: where thin solids overlap, no node in one is outside, and no node with free view is "
+    "inside") {
+  for (const std::uint64_t seed : {1}) {
+    FieldBake options;
+    options.voxel_size = 1.0 / 64;
+    options.threads = 2;
+    const std::vector<Mesh> rods = pile_of_rods(options.voxel_size, seed);
+    Mesh all;
+    for (const Mesh& mesh : rods) add(all, mesh);
+    std::vector<Judge> judges;
+    for (const Mesh& mesh : rods) judges.emplace_back(mesh);
+    const Judge judge(all);
+    const auto field = bake_field(all, options, nullptr);
+    REQUIRE(field);
+    CHECK(field->sign_mode == "closed");
+    Random random(9);
+    std::size_t count = 0;
+    std::size_t leaked = 0, inside = 0, twice = 0, shut = 0, outside = 0;
+    for_nodes(*field, [&](std::array<int, 3> n, double d) {
+      const Vec3 p = node_position(*field, n);
+      if (std::fabs(d) > options.voxel_size || std::fabs(d) < 1e-4 * options.voxel_size) return;
+      if (d > 0 && count++ % 4 != 0) return;
+      std::size_t in = 0;
+      for (const Judge& one : judges) in += one.inside_by_parity(p, random);
+      inside += in > 0;
+      twice += in > 1;
+      leaked += in > 0 && d > 0;
+      if (in > 0 || d > 0) {
+        outside += in == 0;
+        return;
+      }
+      for (int look = 0; look < 100; ++look)
+        if (judge.hits(p, direction(random)) == 0) {
+          ++shut;
+          break;
+        }
+    });
+    CAPTURE(seed);
+    CHECK(inside > 2000);
+    CHECK(twice > 200);
+    CHECK(outside > 3000);
+    CHECK(leaked == 0);
+    CHECK(shut == 0);
+  }
+}
