@@ -14,6 +14,7 @@
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
 #include "io/record/recording.h"
+#include "io/record/seal.h"
 #include "io/run/recorded_session.h"
 #include "io/run/run_scene.h"
 #include "io/run/run_tally.h"
@@ -33,7 +34,7 @@ struct ReplayOptions {
 struct Divergence {
   std::uint64_t frame;
   double time;
-  io::RowDifference where;
+  std::optional<io::RowDifference> where;  // nothing: only the seal differs
   std::uint64_t recorded_hash, replayed_hash;
 };
 
@@ -92,6 +93,9 @@ class Replay {
     Result<io::Recording> recording = io::read_recording(options_.file, none);
     if (!recording) return recording.failure();
     head_ = recording->head;
+    columns_ = recording->columns;
+    sealed_ = std::find(columns_.begin(), columns_.end(), "seal") != columns_.end();
+    seal_.emplace(head_.hands, columns_);
     frames_ = recording->frame_count;
     if (!recording->remark.empty()) remarks.push_back(recording->remark);
     Result<std::unique_ptr<RecordedSession>> opened =
@@ -112,14 +116,17 @@ class Replay {
     for (std::uint64_t at = 0; at < frames_ && !divergence; at += kPiece) {
       const Result<io::Recording> piece = io::read_recording(options_.file, {at, kPiece});
       if (!piece) return piece.failure();
-      for (const h6FrameRecord& row : piece->frames) {
+      for (std::size_t i = 0; i < piece->frames.size(); ++i) {
+        const h6FrameRecord& row = piece->frames[i];
         if (row.report.frame != expected) return gap(expected, row.report.frame);
         ++expected;
         const Result<const h6FrameRecord*> now = session_->step(row);
         if (!now) return now.failure();
         recorded_->add(row);
         replayed_->add(**now);
-        if (options_.verify && !same(row, **now)) break;
+        if (!options_.verify) continue;
+        const std::uint64_t seal = seal_->next(row);
+        if (!same(row, **now, !sealed_ || piece->seals[i] == seal)) break;
       }
       if (!progress("replaying " + session_->loaded().scene.name,
                     static_cast<double>(expected) / static_cast<double>(frames_)))
@@ -146,9 +153,11 @@ class Replay {
                      {"replayed", replayed_->json()}};
     if (!options_.verify) return out;
     out["same"] = !divergence;
+    out["sealed"] = sealed_;
     out["divergence"] = nullptr;
     if (divergence) {
-      const io::RowDifference& d = divergence->where;
+      const io::RowDifference d =
+          divergence->where.value_or(io::RowDifference{"seal", "seal", 0, 0, 0});
       out["divergence"] = {{"frame", divergence->frame},
                            {"time", divergence->time},
                            {"column", d.column},
@@ -170,14 +179,24 @@ class Replay {
     recorded_->print("recorded", session_->recorded_method());
     replayed_->print("replayed", session_->method());
     if (options_.verify && !divergence)
-      std::printf("\nevery one of %" PRIu64 " frames is the same to the bit: %s on %u thread%s\n",
-                  replayed_->totals.frames, kernels::target_name(), session_->threads(),
-                  session_->threads() == 1 ? "" : "s");
+      std::printf(
+          "\nevery one of %" PRIu64
+          " frames is the same to the bit: %s on %u thread%s\n"
+          "computed again: contacts, depths, stiffness, poses, velocities, commands, causes, "
+          "states, status\n%s: the hand's samples, deadlines and measured times\n",
+          replayed_->totals.frames, kernels::target_name(), session_->threads(),
+          session_->threads() == 1 ? "" : "s",
+          sealed_ ? "sealed, and unchanged since" : "neither computed nor sealed (an older file)");
   }
 
   // Describes the divergence in a sentence.
   std::string sentence() const {
-    const io::RowDifference& d = divergence->where;
+    if (!divergence->where)
+      return "frame " + std::to_string(divergence->frame) + " (" + number(divergence->time, 4) +
+             " s) was changed after it was recorded: its seal does not fit, while all that can be "
+             "computed again is the same, so a sample of the hand, a deadline or a measured time "
+             "differs";
+    const io::RowDifference& d = *divergence->where;
     char text[400];
     std::snprintf(
         text, sizeof text,
@@ -200,12 +219,11 @@ class Replay {
  private:
   static constexpr std::uint64_t kPiece = 4096;
 
-  bool same(const h6FrameRecord& row, const h6FrameRecord& now) {
-    // Neither times nor the safety chain's reaction to a late frame are part of the state.
-    if (!io::first_difference(row, now, head_.hands, false)) return true;
+  bool same(const h6FrameRecord& row, const h6FrameRecord& now, bool seal_fits) {
+    const auto where = io::first_difference(row, now, head_.hands, columns_);
+    if (!where && seal_fits) return true;
     divergence =
-        Divergence{row.report.frame, row.time, *io::first_difference(row, now, head_.hands, true),
-                   row.report.state_hash, now.report.state_hash};
+        Divergence{row.report.frame, row.time, where, row.report.state_hash, now.report.state_hash};
     return false;
   }
 
@@ -222,6 +240,9 @@ class Replay {
   const ReplayOptions& options_;
   io::RecordingHead head_;
   std::uint64_t frames_ = 0;
+  std::vector<std::string> columns_;  // in the file
+  bool sealed_ = false;
+  std::optional<io::RowSeal> seal_;
   std::unique_ptr<RecordedSession> session_;
   std::optional<Figures> recorded_, replayed_;
 };
@@ -266,8 +287,10 @@ void add_replay(CLI::App& app, Program& program) {
   replay->add_option("--threads", o->threads, "1 or 2; default as recorded")
       ->option_text("N")
       ->check(whole_within(1, 2));
-  replay->add_flag("--verify", o->verify,
-                   "Compare every frame with the recorded one; exit 1 at the first that differs");
+  replay->add_flag(
+      "--verify", o->verify,
+      "Compute every number of every frame again, and check the seal of the others; exit 1 at "
+      "the first frame that differs");
   replay->callback([&program, o] {
     program.work = [&program, o] { return replay_command(program.console, *o); };
   });

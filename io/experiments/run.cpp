@@ -126,7 +126,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
   for (std::uint64_t i = 0; i < frames && !interrupted.load(); ++i) {
     h6FrameRecord& r = rows.emplace_back();
     r = {};
-    r.time = static_cast<double>(i) / def.rate;
+    r.time = static_cast<double>(i) * (1 / def.rate);  // as the haptic loop counts
     if (Outcome done = run.step(r); !done) return out.error = done.error(), out;
     const h6Contacts contacts =
         has_shell ? h6GetContacts(run.session.get(), first.body) : h6Contacts{};

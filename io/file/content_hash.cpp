@@ -10,6 +10,10 @@ Hash128 hash_bytes(const void* bytes, std::size_t size) {
   return {hash.low64, hash.high64};
 }
 
+std::uint64_t hash_on(std::uint64_t before, const void* bytes, std::size_t size) {
+  return XXH3_64bits_withSeed(bytes, size, before);
+}
+
 std::string hex(const Hash128& hash) {
   std::string text;
   for (const std::uint64_t half : {hash.high, hash.low})

@@ -16,6 +16,8 @@ struct Hash128 {
 };
 
 Hash128 hash_bytes(const void* bytes, std::size_t size);
+// Continues a running hash: XXH3 with 64 bits, seeded with the hash before.
+std::uint64_t hash_on(std::uint64_t before, const void* bytes, std::size_t size);
 std::string hex(const Hash128& hash);  // 32 digits, the most significant first, as xxh128sum
 
 }  // namespace h6::io

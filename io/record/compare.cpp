@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // compare.cpp - the first difference of two rows of a recording.
+#include <algorithm>
 #include <cstring>
 #include <sstream>
 
@@ -10,10 +11,33 @@ namespace {
 
 using namespace recording;
 
-const Column* column_named(const char* name) {
-  for (const Column& column : columns())
-    if (std::strcmp(column.name, name) == 0) return &column;
-  return nullptr;
+// These bits of the status follow from times and from devices.
+constexpr h6Status kGiven = H6_LATE | H6_DEVICE_LOST;
+
+bool among(const std::vector<std::string>& names, const char* name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// What a replay computes, in the order of a frame.
+const std::vector<const Column*>& computed() {
+  static const std::vector<const Column*> all = [] {
+    std::vector<const Column*> found;
+    for (const char* name :
+         {"t", "frame", "contacts", "max_depth", "max_depth_voxels", "missed_depth_voxels",
+          "net_stiffness", "coarse_pairs", "coarse_points", "substeps", "body_pose",
+          "body_velocity", "wrench", "command_pose", "cause", "causes", "state", "status", "hash"})
+      for (const Column& column : columns())
+        if (std::strcmp(column.name, name) == 0) found.push_back(&column);
+    return found;
+  }();
+  return all;
+}
+
+// Whether a column follows from the inputs of the safety chain.
+bool by_safety(const Column& column) {
+  return column.offset >= offsetof(h6FrameRecord, command) &&
+         column.offset < offsetof(h6FrameRecord, safety_input) && column.per_hand() &&
+         std::strncmp(column.name, "body", 4) != 0;
 }
 
 std::string label(const Column& column, std::size_t cell) {
@@ -40,27 +64,30 @@ double number_at(Cell cell, const std::byte* at) {
   return value;
 }
 
+const std::byte* cells(const h6FrameRecord& row, const Column& column, std::size_t hand) {
+  return reinterpret_cast<const std::byte*>(&row) + column.offset + hand * column.stride;
+}
+
 }  // namespace
 
-std::optional<RowDifference> first_difference(const h6FrameRecord& a, const h6FrameRecord& b,
-                                              std::size_t hands, bool commands) {
-  static const Column* const order[] = {
-      column_named("contacts"),      column_named("max_depth"),    column_named("max_depth_voxels"),
-      column_named("net_stiffness"), column_named("body_pose"),    column_named("body_velocity"),
-      column_named("wrench"),        column_named("command_pose"), column_named("hash")};
-  std::vector<std::byte> one, two;
-  for (const Column* column : order) {
-    const bool told = column->offset >= offsetof(h6FrameRecord, command) &&
-                      column->offset < offsetof(h6FrameRecord, command) + sizeof a.command;
-    if (told && !commands) continue;
-    pack(*column, hands, &a, 1, one);
-    pack(*column, hands, &b, 1, two);
+std::optional<RowDifference> first_difference(const h6FrameRecord& recorded,
+                                              const h6FrameRecord& replayed, std::size_t hands,
+                                              const std::vector<std::string>& present) {
+  const bool safety = among(present, "safety_asked") && among(present, "overdue");
+  h6FrameRecord now = replayed;
+  now.report.status =
+      static_cast<h6Status>((now.report.status & ~kGiven) | (recorded.report.status & kGiven));
+  for (const Column* column : computed()) {
+    if ((by_safety(*column) || std::strcmp(column->name, "status") == 0) && !safety) continue;
     const std::size_t bytes = cell_bytes(column->cell);
-    for (std::size_t i = 0; i * bytes < one.size(); ++i) {
-      if (std::memcmp(&one[i * bytes], &two[i * bytes], bytes) == 0) continue;
-      return RowDifference{column->name, label(*column, i % column->width), i / column->width,
-                           number_at(column->cell, &one[i * bytes]),
-                           number_at(column->cell, &two[i * bytes])};
+    for (std::size_t h = 0; h < (column->per_hand() ? hands : 1); ++h) {
+      const std::byte *a = cells(recorded, *column, h), *b = cells(now, *column, h);
+      if (std::memcmp(a, b, column->width * bytes) == 0 || !among(present, column->name)) continue;
+      std::size_t i = 0;
+      while (std::memcmp(a + i * bytes, b + i * bytes, bytes) == 0) ++i;
+      return RowDifference{column->name, label(*column, i), h,
+                           number_at(column->cell, a + i * bytes),
+                           number_at(column->cell, b + i * bytes)};
     }
   }
   return std::nullopt;

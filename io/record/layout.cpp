@@ -75,6 +75,7 @@ const std::vector<Column>& columns() {
       {"status", n32, 1, report + offsetof(h6FrameReport, status), 0, "bits of h6Status", "status"},
       {"hash", n64, 1, report + offsetof(h6FrameReport, state_hash), 0, "1", "hash"},
       {"frame", n64, 1, report + offsetof(h6FrameReport, frame), 0, "1", "frame"},
+      {"seal", n64, 1, 0, 0, "hash of this row and the seal before", "seal", true, true},
   };
   return all;
 }
@@ -145,11 +146,17 @@ void unpack(const Column& column, std::size_t hands, const std::byte* from, std:
 }
 
 std::vector<std::byte> pack_chunks(std::size_t hands, std::size_t chunk_rows,
-                                   const h6FrameRecord* from, std::size_t count) {
+                                   const h6FrameRecord* from, const std::uint64_t* seals,
+                                   std::size_t count) {
   std::vector<std::byte> out(columns().size() * sizeof(std::uint32_t)), rows, shuffled;
   for (std::size_t i = 0; i < columns().size(); ++i) {
     const Column& column = columns()[i];
-    pack(column, hands, from, count, rows);
+    if (column.apart) {
+      rows.resize(count * sizeof *seals);
+      std::memcpy(rows.data(), seals, rows.size());
+    } else {
+      pack(column, hands, from, count, rows);
+    }
     rows.resize(chunk_rows * row_bytes(column, hands));  // zeros where rows are still to come
     shuffle(rows, cell_bytes(column.cell), shuffled);
     const auto bytes = static_cast<std::uint32_t>(deflate(shuffled, out));

@@ -38,6 +38,7 @@ struct Column {
   const char* units;
   const char* labels;  // of the cells in a row, separated by blanks
   bool later = false;  // older recordings lack it and get zeros
+  bool apart = false;  // no part of h6FrameRecord: the seals
   bool per_hand() const { return stride != 0; }
 };
 
@@ -52,16 +53,17 @@ hid_t cell_type(Cell cell);  // as on disk; a constant of the library, do not cl
 std::vector<hsize_t> shape(const Column& column, hsize_t rows, std::size_t hands);
 std::size_t row_bytes(const Column& column, std::size_t hands);
 
-// To and from the packed rows of a dataset.
+// To and from the packed rows of a dataset; not for columns that stand apart.
 void pack(const Column& column, std::size_t hands, const h6FrameRecord* from, std::size_t count,
           std::vector<std::byte>& out);
 void unpack(const Column& column, std::size_t hands, const std::byte* from, std::size_t count,
             h6FrameRecord* out);
 
 // The payload of a LogKind::rows record: the chunk of each column with `count` rows, filled up
-// with zeros to `chunk_rows`.
+// with zeros to `chunk_rows`. `seals` has one number a row.
 std::vector<std::byte> pack_chunks(std::size_t hands, std::size_t chunk_rows,
-                                   const h6FrameRecord* from, std::size_t count);
+                                   const h6FrameRecord* from, const std::uint64_t* seals,
+                                   std::size_t count);
 struct Span {
   const std::byte* from;
   std::size_t bytes;

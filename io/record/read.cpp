@@ -82,21 +82,24 @@ bool means_something(const char* column, const std::vector<std::byte>& packed) {
   return true;
 }
 
-Outcome read_column(const Source& source, const Column& column, const Stored& stored,
-                    std::size_t hands, hsize_t first, std::vector<h6FrameRecord>& frames) {
+Outcome read_column(const Source& source, const Column& column, const Stored& stored, hsize_t first,
+                    Recording& out) {
   std::vector<std::byte> packed;
   // Pieces end where chunks end, so that each chunk is inflated once.
   const hsize_t piece =
       std::max<hsize_t>(1, rows_at_once / std::max<hsize_t>(1, stored.chunk_rows)) *
       std::max<hsize_t>(1, stored.chunk_rows);
-  const hsize_t end = first + frames.size();
+  const hsize_t end = first + out.frames.size();
   for (hsize_t row = first; row < end;) {
     const hsize_t count = std::min(piece - row % piece, end - row);
     if (Outcome read = read_rows(source, stored, row, count, packed); !read) return read;
     if (!means_something(column.name, packed))
       return source.wrong("/frames/" + std::string(column.name) +
                           " has a number that means nothing");
-    unpack(column, hands, packed.data(), count, frames.data() + (row - first));
+    if (column.apart)
+      std::memcpy(out.seals.data() + (row - first), packed.data(), packed.size());
+    else
+      unpack(column, out.head.hands, packed.data(), count, out.frames.data() + (row - first));
     row += count;
   }
   return Done{};
@@ -147,9 +150,8 @@ Outcome read_frames(const Source& source, FrameRange range, Recording& out) {
   for (std::size_t i = 0; i < open->size(); ++i) {
     if (!(*open)[i].dataset.ok()) continue;
     out.columns.push_back(columns()[i].name);
-    if (Outcome read =
-            read_column(source, columns()[i], (*open)[i], out.head.hands, first, out.frames);
-        !read)
+    if (columns()[i].apart) out.seals.resize(wanted);
+    if (Outcome read = read_column(source, columns()[i], (*open)[i], first, out); !read)
       return read;
   }
   return Done{};

@@ -14,6 +14,7 @@
 
 #include "io/record/layout.h"
 #include "io/record/log.h"
+#include "io/record/seal.h"
 #include "io/record/to_hdf5.h"
 
 namespace h6::io {
@@ -94,7 +95,8 @@ struct Recorder::Body {
       : file(std::move(place)),
         log_name(part_of(file)),
         hands(hand_count),
-        chunk_rows(static_cast<std::size_t>(std::clamp(rate / 4, 16.0, 4096.0))) {}
+        chunk_rows(static_cast<std::size_t>(std::clamp(rate / 4, 16.0, 4096.0))),
+        seal(hand_count) {}
 
   const fs::path file, log_name;
   const std::size_t hands, chunk_rows;  // a chunk takes a quarter of a second, within bounds
@@ -102,6 +104,8 @@ struct Recorder::Body {
   std::uint64_t log_end = 0;  // [bytes]
 
   std::vector<h6FrameRecord> rows;  // of the chunk that is not full yet
+  std::vector<std::uint64_t> seals;
+  RowSeal seal;
   std::uint64_t first = 0;          // number of rows[0]
   std::size_t logged = 0;           // number of `rows` that are in the log
   Clock::time_point waiting_since;  // of the oldest row that is not
@@ -148,6 +152,7 @@ Outcome Recorder::Body::create(const RecordingHead& head) {
     return refuse(file, std::strerror(error));
   }
   rows.reserve(chunk_rows);
+  seals.reserve(chunk_rows);
   open = true;
   return Done{};
 }
@@ -164,11 +169,13 @@ Outcome Recorder::Body::add(const h6FrameRecord* records, std::size_t count) {
     const std::size_t part = std::min(count, chunk_rows - rows.size());
     if (rows.size() == logged) waiting_since = Clock::now();
     rows.insert(rows.end(), records, records + part);
+    for (std::size_t i = 0; i < part; ++i) seals.push_back(seal.next(records[i]));
     records += part, count -= part;
     if (rows.size() < chunk_rows) break;
     if (Outcome written = write_rows(); !written) return written;
     first += chunk_rows;
     rows.clear();
+    seals.clear();
     logged = 0;
   }
   if (rows.size() == logged) return Done{};
@@ -184,7 +191,7 @@ Outcome Recorder::Body::write_rows() {
   record.count = static_cast<std::uint32_t>(rows.size());
   logged = rows.size();
   logged_until = rows.back().time;
-  return write(record, pack_chunks(hands, chunk_rows, rows.data(), rows.size()));
+  return write(record, pack_chunks(hands, chunk_rows, rows.data(), seals.data(), rows.size()));
 }
 
 Outcome Recorder::Body::write_event(const RecordingEvent& event) {

@@ -9,7 +9,7 @@
 // disk.
 //
 // /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, net_stiffness,
-// stage_us, frame_us, wakeup_us, settings, substeps} (n) or (n, width), /frames/{hand_pose,
+// stage_us, frame_us, wakeup_us, settings, substeps, seal} (n) or (n, width), /frames/{hand_pose,
 // hand_velocity, hand_wrench, buttons, sequence, body_pose, body_velocity, wrench, command_pose,
 // cause, causes, state, safety_asked, overdue} (n, hands) or (n, hands, width), with units and
 // column names as attributes; /config, /events/{t, what, detail}, /summary. Numbers are read back
@@ -82,6 +82,7 @@ struct Recording {
   std::uint64_t frame_count = 0;  // in the file; `frames` has those of the range asked for
   // Of /frames in the file. Older files lack some; `frames` has zeros there.
   std::vector<std::string> columns;
+  std::vector<std::uint64_t> seals;  // one for each of `frames`; empty where the file has none
 };
 
 // A frame takes over 2 kB in memory: long recordings can be read in pieces.
@@ -94,16 +95,20 @@ struct FrameRange {
 // the log into a temporary file and reads that.
 Result<Recording> read_recording(const std::filesystem::path& file, FrameRange range = {});
 
-// The first number in which two rows of one frame differ, in the order in which a frame computes
-// them: contacts, depths, bodies, commands to the hands, the hash. Times and status are left out.
+// The first number that a replay computes and that differs from the recorded one, in the order in
+// which a frame computes them: time, contacts, depths, bodies, commands to the hands, states of the
+// devices, status, the hash. Inputs, measured times, and the bits of status that depend on them
+// (late, device lost) cannot be computed.
 struct RowDifference {
   std::string column, cell;  // "body_pose", "qz"
   std::size_t hand = 0;      // of columns with one row a hand
   double a = 0, b = 0;       // as numbers; of hashes only the leading digits
 };
-// `commands` false leaves out the commands to the hands, which depend on deadlines too.
-std::optional<RowDifference> first_difference(const h6FrameRecord& a, const h6FrameRecord& b,
-                                              std::size_t hands, bool commands);
+// `columns`: of the recording; only these are compared. Without the inputs of the safety chain
+// (older recordings), commands and states are left out.
+std::optional<RowDifference> first_difference(const h6FrameRecord& recorded,
+                                              const h6FrameRecord& replayed, std::size_t hands,
+                                              const std::vector<std::string>& columns);
 
 // Turns the log that a killed run left beside `file` into `file`; an older file there is kept as
 // FILE.before (.before-2, ...). A log that is cut off or damaged gives the frames before that

@@ -3,6 +3,7 @@
 #include "io/run/recorded_session.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "kernels/targets.h"
 
@@ -121,17 +122,38 @@ Outcome RecordedSession::change_settings(const std::string& detail) {
   return Done{};
 }
 
+// Where the devices were stopped while a frame was computed, the loop sent another command. Only
+// the recorded cause tells that; the command itself follows from it.
+void RecordedSession::hold_back(const h6FrameRecord& recorded) {
+  for (std::size_t h = 0; h < hands_; ++h) {
+    const h6DeviceCommand& told = recorded.command[h];
+    h6DeviceCommand& command = now_.command[h];
+    if (told.cause != H6_CAUSE_STOPPED && told.cause != H6_CAUSE_WATCHDOG) continue;
+    if (command.cause == told.cause && command.causes == told.causes &&
+        std::memcmp(&command.pose, &told.pose, sizeof told.pose) == 0)
+      continue;
+    command.wrench = {};
+    command.velocity = {};
+    if (hand_defs_[h].mode != H6_IMPEDANCE && any_sent_) command.pose = sent_[h];
+    command.cause = told.cause;
+    command.causes |= 1u << told.cause;
+  }
+}
+
 Result<const h6FrameRecord*> RecordedSession::step(const h6FrameRecord& recorded) {
   if (Outcome followed = follow_settings(recorded); !followed) return followed.failure();
   set_faults(recorded);
   now_ = {};
-  now_.time = recorded.time;
   now_.settings = recorded.settings;
   std::copy(std::begin(recorded.hand), std::end(recorded.hand), now_.hand);
   // In the recorded run the clock decided how much the anytime mode left out.
   h6SetCoarse(session_.get(), recorded.report.coarse_pairs, recorded.report.coarse_points);
   h6Step(session_.get(), now_.hand, now_.command);
+  hold_back(recorded);
+  for (std::size_t h = 0; h < hands_; ++h) sent_[h] = recorded.command[h].pose;
+  any_sent_ = true;
   now_.report = h6GetFrame(session_.get());
+  now_.time = static_cast<double>(now_.report.frame) * (1 / def_.rate);
   for (std::size_t h = 0; h < hands_; ++h) {
     now_.body[h] = h6GetBody(session_.get(), loaded_->hands[h].body);
     now_.state[h] = h6GetSafety(session_.get(), static_cast<std::int32_t>(h)).state;

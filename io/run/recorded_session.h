@@ -46,6 +46,7 @@ class RecordedSession {
  private:
   RecordedSession() = default;
   void set_faults(const h6FrameRecord& recorded);
+  void hold_back(const h6FrameRecord& recorded);
   Outcome follow_settings(const h6FrameRecord& recorded);
   Outcome change_settings(const std::string& detail);
   io::RecordedRun run_;
@@ -61,6 +62,8 @@ class RecordedSession {
   unsigned threads_ = 1;
   std::string method_, recorded_method_;
   bool latched_ = false;
+  h6Pose sent_[H6_MAX_HANDS] = {};  // the poses of the recorded commands before
+  bool any_sent_ = false;
   h6FrameRecord now_{};
 };
 

@@ -40,7 +40,10 @@ Outcome RunSetup::step(h6FrameRecord& r) {
   for (std::size_t h = 0; h < devices.devices.size(); ++h) {
     const h6Device& device = devices.devices[h];
     good = device.write(device.self, r.time, &r.command[h]) == 0 && good;
+    const auto hand = static_cast<std::int32_t>(h);
     r.body[h] = h6GetBody(session.get(), hand_defs[h].body);
+    r.state[h] = h6GetSafety(session.get(), hand).state;
+    r.safety_input[h] = h6GetSafetyInput(session.get(), hand);
   }
   r.report = h6GetFrame(session.get());
   return good ? Outcome(Done{}) : Outcome(Failure{"a device was lost"});

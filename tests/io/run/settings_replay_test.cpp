@@ -51,7 +51,7 @@ fs::path recorded(const std::string& name, bool tell = true) {
         REQUIRE(run.recorder->event({time, "settings", "after frame 299: " + text}));
     }
     h6FrameRecord row{};
-    row.time = time = i / run.def.rate;
+    row.time = time = i * (1 / run.def.rate);
     row.settings = settings;
     REQUIRE(run.step(row));
     REQUIRE(run.recorder->frames(&row, 1));
@@ -75,7 +75,7 @@ Replayed replay(const fs::path& file, const std::string& method = "") {
   for (const h6FrameRecord& row : recording->frames) {
     const auto now = (*session)->step(row);
     if (!now) return out.stopped = now.error(), out;
-    if (method.empty() && io::first_difference(row, **now, 1, true)) return out;
+    if (method.empty() && io::first_difference(row, **now, 1, recording->columns)) return out;
     ++out.frames;
   }
   return out;
