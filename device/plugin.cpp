@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,6 +16,9 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <functional>
+#include <future>
+#include <thread>
 
 namespace h6::device {
 namespace {
@@ -26,6 +30,23 @@ static_assert(int{H6_PLUGIN_IMPEDANCE} == int{H6_IMPEDANCE} &&
 void to(const h6Vec3& v, double* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 h6Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 void to(const h6Quat& q, double* out) { out[0] = q.w, out[1] = q.x, out[2] = q.y, out[3] = q.z; }
+
+using Clock = std::chrono::steady_clock;
+constexpr double kCloseTime = 5;  // most that stop and close may take at the end [s]
+
+// Calls `work` on a thread of its own and waits for its end, at most `seconds`. False when it is
+// not over by then: nothing can end a thread from outside, so it is left to itself until the
+// process ends. Hence `work` must own all that it uses. An exception of `work` is thrown again
+// here.
+bool ends_within(double seconds, std::function<void()> work) {
+  std::packaged_task<void()> task(std::move(work));
+  std::future<void> over = task.get_future();
+  std::thread(std::move(task)).detach();
+  if (over.wait_for(std::chrono::duration<double>(seconds)) != std::future_status::ready)
+    return false;
+  over.get();
+  return true;
+}
 
 // A loaded library and its table of functions; no device is open yet.
 struct Loaded {
@@ -124,6 +145,7 @@ std::string try_it(const PluginFile& file, const h6Pose& home, const h6Vec3& gri
 
 [[noreturn]] void be_the_child(int answer_to, const PluginFile& file, const h6Pose& home,
                                const h6Vec3& grip) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // a plug-in that hangs does not outlive this program
   for (const int number : {SIGINT, SIGTERM, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT})
     signal(number, SIG_DFL);
   const rlimit none{0, 0};
@@ -139,14 +161,11 @@ std::string try_it(const PluginFile& file, const h6Pose& home, const h6Vec3& gri
   _exit(0);
 }
 
-// Reads the pipe to its end, or 10,000 bytes; false when `patience` [s] runs out first.
-bool listen(int from, double patience, std::string& heard) {
-  const auto end =
-      std::chrono::steady_clock::now() + std::chrono::milliseconds(std::lround(1e3 * patience));
+// Reads the pipe to its end, or 10,000 bytes; false at `end`.
+bool listen(int from, Clock::time_point end, std::string& heard) {
   char bytes[512];
   for (;;) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
-        end - std::chrono::steady_clock::now());
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
     pollfd wait{from, POLLIN, 0};
     const int ready = left.count() < 0 ? 0 : poll(&wait, 1, static_cast<int>(left.count()));
     if (ready < 0 && errno == EINTR) continue;
@@ -157,6 +176,25 @@ bool listen(int from, double patience, std::string& heard) {
     heard.append(bytes, static_cast<std::size_t>(n));
     if (heard.size() > 10000) return true;
   }
+}
+
+// Waits for the end of `child`, which may close its pipe and go on; kills it at `end` and returns
+// false.
+bool over(pid_t child, Clock::time_point end, int& status) {
+  for (bool in_time = true;;) {
+    const pid_t gone = waitpid(child, &status, in_time ? WNOHANG : 0);
+    if (gone == child || (gone < 0 && errno != EINTR)) return in_time;
+    if (gone < 0) continue;
+    in_time = Clock::now() < end;
+    if (!in_time) kill(child, SIGKILL);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+std::string seconds_text(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g s", seconds);
+  return text;
 }
 
 Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, double patience) {
@@ -171,20 +209,16 @@ Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, do
   }
   close(ends[1]);
   std::string heard;
-  const bool in_time = child > 0 && listen(ends[0], patience, heard);
+  const auto end = Clock::now() + std::chrono::milliseconds(std::lround(1e3 * patience));
+  bool in_time = child > 0 && listen(ends[0], end, heard);
   close(ends[0]);
   if (child < 0)
     return Failure{file.path + ": cannot be tried out, no process (" + std::strerror(errno) + ")"};
-  if (!in_time) kill(child, SIGKILL);
   int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (!in_time) {
-    char seconds[32];
-    std::snprintf(seconds, sizeof seconds, "%g", patience);
-    return Failure{file.path + ": its open did not end within " + seconds +
-                   " s: it hangs, or waits for a device that is not there"};
-  }
+  in_time = over(child, in_time ? end : Clock::now(), status) && in_time;
+  if (!in_time)
+    return Failure{file.path + ": its open did not end within " + seconds_text(patience) +
+                   ": it hangs, or waits for a device that is not there"};
   if (heard == "+") return Done{};
   if (!heard.empty()) return Failure{heard.substr(1)};
   if (WIFSIGNALED(status))
@@ -192,6 +226,41 @@ Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, do
                    "): a fault of the plug-in"};
   return Failure{file.path + ": ended the process while it was opened (exit code " +
                  std::to_string(WEXITSTATUS(status)) + ")"};
+}
+
+// What a thread that hangs in the plug-in keeps alive.
+struct Opening {
+  PluginFile file;
+  h6Pose home;
+  h6Vec3 grip;
+  h6PluginCapabilities capabilities{};
+  Loaded loaded;
+  void* device = nullptr;
+  std::string wrong;
+};
+
+Result<std::shared_ptr<Opening>> open_here(const PluginFile& file, const h6Pose& home,
+                                           const h6Vec3& grip, double patience) {
+  auto o = std::make_shared<Opening>(Opening{file, home, grip, {}, {}, nullptr, ""});
+  const bool in_time = ends_within(patience, [o] {
+    Result<Loaded> loaded = load(o->file.path);
+    if (!loaded) {
+      o->wrong = loaded.error();
+      return;
+    }
+    o->loaded = *loaded;
+    Result<void*> opened = open_in(*loaded->plugin, o->file, o->home, o->grip, o->capabilities);
+    if (opened)
+      o->device = *opened;
+    else
+      o->wrong = opened.error();
+  });
+  if (!in_time)
+    return Failure{file.path + ": its open did not end within " + seconds_text(patience) +
+                   " the second time: it cannot be opened again after a close"};
+  if (o->wrong.empty()) return o;
+  if (o->loaded.library) dlclose(o->loaded.library);
+  return Failure{o->wrong};
 }
 
 }  // namespace
@@ -203,24 +272,26 @@ Result<std::unique_ptr<PluginDevice>> PluginDevice::open(const PluginFile& file,
   if (!std::filesystem::exists(file.path, ignored))
     return Failure{file.path + ": there is no such file"};
   if (Outcome good = probe(file, home, grip, patience); !good) return good.failure();
-  Result<Loaded> loaded = load(file.path);
-  if (!loaded) return loaded.failure();
-  std::unique_ptr<PluginDevice> made(new PluginDevice);
-  made->library_ = loaded->library;
-  Result<void*> opened = open_in(*loaded->plugin, file, home, grip, made->capabilities_);
+  const Result<std::shared_ptr<Opening>> opened = open_here(file, home, grip, patience);
   if (!opened) return opened.failure();
-  made->plugin_ = loaded->plugin;
-  made->device_ = *opened;
-  if (loaded->plugin->about) made->about_ = loaded->plugin->about;
+  const Opening& o = **opened;
+  std::unique_ptr<PluginDevice> made(new PluginDevice);
+  made->library_ = o.loaded.library;
+  made->plugin_ = o.loaded.plugin;
+  made->device_ = o.device;
+  made->capabilities_ = o.capabilities;
+  if (o.loaded.plugin->about) made->about_ = o.loaded.plugin->about;
   return made;
 }
 
 PluginDevice::~PluginDevice() {
-  if (plugin_) {
-    plugin_->stop(device_);
-    plugin_->close(device_);
-  }
-  if (library_) dlclose(library_);
+  if (!plugin_) return;
+  // A library that hangs in its close stays loaded until the process ends.
+  (void)ends_within(kCloseTime, [plugin = plugin_, device = device_, library = library_] {
+    plugin->stop(device);
+    plugin->close(device);
+    dlclose(library);
+  });
 }
 
 int PluginDevice::read(double time, h6DeviceSample& out) {

@@ -4,6 +4,10 @@
 //   probe  in a child process: load, open, read once, close. A crash or a hang ends only the child,
 //          and the user gets a sentence
 //   open   in this process, only after the probe succeeded
+//
+// No wait for a plug-in is without a limit: a hung probe is killed, and what hangs in this process
+// is left to a thread that ends with it. `read` and `write` are called as they are, in the haptic
+// thread; the run gives up on a thread that does not come back from them (io/run/run_scene.cpp).
 #pragma once
 #include <memory>
 #include <string>
@@ -23,9 +27,10 @@ struct PluginFile {
 
 class PluginDevice {
  public:
-  // `home` and `grip` as in h6PluginStart. A probe that takes longer than `patience` counts as hung
-  // [s]. Fails with a sentence when there is no such file, when it is no plug-in or one for another
-  // version, when its open fails, crashes or hangs, or when its capabilities make no sense.
+  // `home` and `grip` as in h6PluginStart. A probe or an open that takes longer than `patience`
+  // counts as hung [s]. Fails with a sentence when there is no such file, when it is no plug-in or
+  // one for another version, when its open fails, crashes or hangs, or when its capabilities make
+  // no sense.
   static Result<std::unique_ptr<PluginDevice>> open(const PluginFile& file, const h6Pose& home,
                                                     const h6Vec3& grip, double patience = 10);
   ~PluginDevice();

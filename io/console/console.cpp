@@ -22,12 +22,17 @@ std::atomic<bool> interrupted{false};
 
 namespace {
 
+constexpr unsigned kHookTime = 5;  // most that a hook may take; then the process is killed [s]
 std::atomic<void (*)(void*)> signal_hook{nullptr};
 std::atomic<void*> signal_context{nullptr};
 
 // The first signal asks the work to end; a second one cleans up and exits at once.
 void on_signal(int number) {
-  if (auto hook = signal_hook.load()) hook(signal_context.load());
+  if (auto hook = signal_hook.load()) {
+    alarm(kHookTime);  // it stops devices, in the code of plug-ins too
+    hook(signal_context.load());
+    alarm(0);
+  }
   if (interrupted.exchange(true)) {
     io::remove_unfinished();
     _exit(128 + number);

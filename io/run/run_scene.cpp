@@ -3,6 +3,9 @@
 #include "io/run/run_scene.h"
 
 #include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -21,6 +24,7 @@ struct LoopDeleter {
 };
 
 constexpr double kTraceSeconds = 10;
+constexpr double kSilence = 10;  // [s] without a frame, after which the hands are given up
 
 Outcome open_session(const RunOptions& options, RunSetup& run) {
   h6SessionDef& def = run.def;
@@ -67,6 +71,7 @@ class LiveRun {
       : run_(run),
         options_(options),
         summary_(summary),
+        console_(console),
         watch_(run.loaded, run.def.rate, summary, run.recorder.get()),
         trace_(static_cast<std::size_t>(kTraceSeconds * run.def.rate)),
         progress_(options.observer ? io::Progress{} : console.progress()) {}
@@ -90,7 +95,12 @@ class LiveRun {
     while (h6LoopRunning(loop_.get())) {
       drain();
       if (options_.observer && !options_.observer->turn()) h6RequestStop(loop_.get());
-      std::this_thread::sleep_for(std::chrono::milliseconds(options_.virtual_time ? 1 : 5));
+      const int turn = options_.virtual_time ? 1 : 5;
+      std::this_thread::sleep_for(std::chrono::milliseconds(turn));
+      // Turns are counted, not time: a program that was stopped goes on after it.
+      silent_ += 1e-3 * turn;
+      if (options_.observer && !interrupted.load()) silent_ = 0;  // it may pause
+      if (silent_ > kSilence) give_up();
     }
     summary_.loop = h6JoinLoop(loop_.get());
     set_signal_hook(nullptr, nullptr);
@@ -114,6 +124,7 @@ class LiveRun {
  private:
   void drain() {
     while (const std::size_t n = h6ReadRecords(loop_.get(), rows_.data(), rows_.size())) {
+      silent_ = 0;
       if (recorded_) recorded_ = watch_.rows(rows_.data(), n);
       if (options_.observer) options_.observer->rows(rows_.data(), n);
       if (!options_.trace.empty()) trace_.add(rows_.data(), n);
@@ -123,6 +134,21 @@ class LiveRun {
     if (recorded_ && run_.recorder)
       recorded_ = run_.recorder->frames(nullptr, 0);  // writes rows that are old enough to disk
     if (!recorded_) h6RequestStop(loop_.get());
+  }
+
+  // The haptic thread hangs in a device. Nothing can end it, so the process ends, after the
+  // recording.
+  [[noreturn]] void give_up() {
+    set_signal_hook(nullptr, nullptr);
+    run_.recorder.reset();
+    std::string names;
+    for (const h6Device& device : run_.devices.devices)
+      names += (names.empty() ? "'" : ", '") + std::string(device.capabilities.name) + "'";
+    const int code = console_.fail("the device " + names + " has not answered for " +
+                                   std::to_string(std::lround(kSilence)) +
+                                   " s: its driver hangs, and the run ends without it");
+    std::fflush(nullptr);
+    std::_Exit(code);
   }
 
   // Without a hand, the rows hold no body.
@@ -138,10 +164,12 @@ class LiveRun {
   RunSetup& run_;
   const RunOptions& options_;
   RunSummary& summary_;
+  const Console& console_;
   RunWatch watch_;
   io::view::Trace trace_;
   io::Progress progress_;
   std::vector<h6FrameRecord> rows_ = std::vector<h6FrameRecord>(256);
+  double silent_ = 0;          // [s] since the last row
   Outcome recorded_ = Done{};  // after a failure the run ends and no more rows are watched
   std::unique_ptr<h6Loop, LoopDeleter> loop_;
 };

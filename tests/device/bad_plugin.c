@@ -9,15 +9,44 @@
 
 #include "hapsix/device_plugin.h"
 
-enum { NOTHING, ABI, SIZE, CRASH, HANG, LEAVES, MODES, RATING, REFUSES, SILENT, NO_READ };
+enum {
+  NOTHING,
+  ABI,
+  SIZE,
+  CRASH,
+  HANG,
+  LEAVES,
+  MODES,
+  RATING,
+  REFUSES,
+  SILENT,
+  NO_READ,
+  ASLEEP, /* closes all descriptors, then hangs */
+  AGAIN,  /* hangs when it is opened a second time; its first option is a file that tells */
+  CLOSES, /* hangs in its close, after more than one read */
+  STUCK   /* hangs in its 50th read */
+};
+
+static int reads = 0;
+static void hang(void) {
+  for (;;) sleep(1);
+}
 
 static int open_it(const h6PluginStart* start, h6PluginCapabilities* can, void** device,
                    char* error, size_t size) {
-  (void)start;
   if (WRONG == CRASH) raise(SIGSEGV);
   if (WRONG == LEAVES) exit(7);
-  if (WRONG == HANG)
-    for (;;) sleep(1);
+  if (WRONG == HANG) hang();
+  if (WRONG == ASLEEP) {
+    for (int i = 0; i < 1024; ++i) close(i);
+    hang();
+  }
+  if (WRONG == AGAIN) {
+    const char* mark = start->options[0].value;
+    FILE* before = fopen(mark, "r");
+    if (before) hang();
+    fclose(fopen(mark, "w"));
+  }
   if (WRONG == REFUSES) {
     memset(error, 'x', size); /* without an end */
     memcpy(error, "the cable is not plugged in", 27);
@@ -33,7 +62,9 @@ static int open_it(const h6PluginStart* start, h6PluginCapabilities* can, void**
   return 0;
 }
 static int read_it(void* device, double time, h6PluginSample* sample) {
-  (void)device, (void)time, (void)sample;
+  (void)device, (void)time;
+  sample->orientation[0] = 1;
+  if (++reads == 50 && WRONG == STUCK) hang();
   return 0;
 }
 static int write_it(void* device, double time, const h6PluginCommand* command) {
@@ -41,6 +72,10 @@ static int write_it(void* device, double time, const h6PluginCommand* command) {
   return 0;
 }
 static void end_it(void* device) { (void)device; }
+static void close_it(void* device) {
+  (void)device;
+  if (WRONG == CLOSES && reads > 1) hang();
+}
 
 #ifdef NO_SYMBOL
 const h6DevicePluginV1 another_name
@@ -55,4 +90,4 @@ const h6DevicePluginV1 h6_device_plugin_v1
        write_it,
        end_it,
        NULL,
-       end_it};
+       close_it};

@@ -101,6 +101,16 @@ TEST_CASE("an open that crashes, ends the process or hangs costs a sentence and 
   says(sentence("bad_crash"), "while it was opened");
   says(sentence("bad_leaves"), "exit code 7");
   says(sentence("bad_hang", 0.3), "did not end within 0.3 s");
+  says(sentence("bad_asleep", 0.3), "did not end within 0.3 s");
+}
+
+TEST_CASE("a plug-in that hangs when it is opened again is left alone after its time") {
+  const std::string mark = std::filesystem::temp_directory_path() / "hapsix-opened-once";
+  std::filesystem::remove(mark);
+  const auto opened = PluginDevice::open({in("bad_again"), {{"mark", mark}}}, home, {}, 0.3);
+  std::filesystem::remove(mark);
+  REQUIRE(!opened);
+  says(opened.error(), "the second time");
 }
 
 TEST_CASE(

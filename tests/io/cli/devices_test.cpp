@@ -220,3 +220,21 @@ TEST_CASE("whatever a bad operator does, a run ends by itself and sends finite, 
     CHECK(json["fault"] != "none");
   }
 }
+
+TEST_CASE("a plug-in that hangs in a read or in its close does not hang the run") {
+  Sandbox box;
+  const Ended stuck = run(box, {"run", "box-on-wall", "--device",
+                                "plugin:" + plugins + "bad_stuck.so", "--record", "a.h5"});
+  CHECK(stuck.in_time);
+  CHECK(stuck.code == 1);
+  CHECK(stuck.err.find("has not answered for 10 s") != std::string::npos);
+  // The last read did not come back, so its frame is missing.
+  const Json kept = result_of(box, {"info", "a.h5"});
+  CHECK(kept["whole"] == false);
+  CHECK(kept["frames"] == 49);
+
+  const Ended closes = run(box, {"run", "box-on-wall", "--duration", "0.2", "--device",
+                                 "plugin:" + plugins + "bad_closes.so"});
+  CHECK(closes.in_time);
+  CHECK(closes.code == 0);
+}
