@@ -71,6 +71,21 @@ std::string millimetres(double metres) {
   return text;
 }
 
+void warn_of_gaps(const bake::Surface& surface, const bake::GapWeld& welded,
+                  FieldBakeReport& report) {
+  if (!surface.closed)
+    report.warnings.push_back(
+        "the mesh is not closed: " + plural(surface.odd_edges, "edge has", "edges have") +
+        " an odd number of faces (" + std::to_string(surface.open_edges) +
+        " have one); it is taken as a soup" +
+        (welded.left > 0 ? "; welding its vertices would leave " + std::to_string(welded.left)
+                         : ""));
+  else if (welded.vertices > 0)
+    report.warnings.push_back(plural(welded.vertices, "vertex", "vertices") +
+                              " of open edges were welded to others up to " +
+                              millimetres(welded.widest) + " away; this closes the mesh");
+}
+
 void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Inside& inside,
           double seal, FieldBakeReport& report) {
   auto& out = report.warnings;
@@ -78,10 +93,6 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
     out.push_back(plural(surface.duplicates, "triangle is", "triangles are") +
                   " there twice and counted once");
   const double offset = grid.offset * grid.voxel;
-  if (!surface.closed)
-    out.push_back("the mesh is not closed: " + plural(surface.odd_edges, "edge has", "edges have") +
-                  " an odd number of faces (" + std::to_string(surface.open_edges) +
-                  " have one); it is taken as a soup");
   if (offset > 0)
     out.push_back("the surface is moved out by " + millimetres(offset) + ": open sheets become " +
                   millimetres(2 * offset) + " thick, wires as much thicker, and gaps below " +
@@ -107,6 +118,18 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
     out.push_back("walls thinner than a voxel (" + millimetres(grid.voxel) + ") at " +
                   plural(inside.thin_edges, "place", "places") +
                   " are no obstacles there; bake with more voxels, or with an offset");
+}
+
+// Closes gaps of a share of the voxel.
+Outcome weld(const Mesh& mesh, const FieldBake& options, bake::Surface& surface,
+             bake::GapWeld& welded) {
+  if (!(options.weld >= 0 && options.weld <= 1))
+    return Failure{"vertices are welded within 0 to 1 voxel"};
+  if (surface.closed || options.weld == 0) return Done{};
+  const Result<bake::Grid> grid = bake::choose_grid(surface, options, true);
+  if (!grid) return grid.failure();
+  weld_gaps(mesh, options.weld * grid->voxel, options.threads, surface, welded);
+  return Done{};
 }
 
 // Finds the bricks near the surface and their distances.
@@ -142,6 +165,8 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   Result<Surface> prepared = prepare_surface(mesh, options.threads);
   if (!prepared) return prepared.failure();
   Surface& surface = *prepared;
+  GapWeld welded;
+  if (const Outcome done = weld(mesh, options, surface, welded); !done) return done.failure();
   const bool sealed = surface.closed && options.sign == SignMode::automatic;
   Result<Grid> grid = choose_grid(surface, options, sealed);
   if (!grid) return grid.failure();
@@ -191,6 +216,9 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
     report->stages = steps.stages();
     report->closed = surface.closed;
     report->sealed_area = double(plugs) * grid->voxel * grid->voxel;
+    report->welded = welded.left == 0 ? welded.vertices : 0;
+    report->weld_widest = welded.left == 0 ? welded.widest : 0;
+    warn_of_gaps(surface, welded, *report);
     warn(surface, *grid, inside, options.seal, *report);
   }
   return field;

@@ -28,6 +28,10 @@ struct FieldBake {
   // does not drain. Also closes gaps narrower than this that lead to anything deeper; concave
   // corners stay open. Has no effect on closed meshes.
   double seal = 0;
+  // Welds vertices of open edges that are nearer than this to each other, where it closes the mesh
+  // [voxel], 0 .. 1; 0: only equal ones. A hundredth moves the surface less than the samples are
+  // off between nodes, and is a thousand times the rounding of an STL.
+  double weld = 0.01;
   double band_voxels = 3;  // cells nearer than this to the surface get samples, 1 .. 8
   int padding_voxels = 8;  // empty cells around the mesh
   // Moves the nodes against the mesh, whose centre they share else [voxel], each -0.5 .. 0.5. For
@@ -40,6 +44,8 @@ struct FieldBake {
 struct FieldBakeReport {
   bool closed = false;
   double sealed_area = 0;             // [m^2] put across holes
+  std::size_t welded = 0;             // vertices, moved by `weld`
+  double weld_widest = 0;             // [m] farthest that one of them moved
   std::vector<std::string> warnings;  // a sentence each
   // Wall time of the stages, in the order of work.
   struct Stage {

@@ -76,11 +76,20 @@ struct Surface {
   std::vector<std::array<std::uint32_t, 3>> flat;  // those left out for want of area
   Vec3 low{}, high{};                              // [m]
   std::size_t duplicates = 0;
-  std::size_t open_edges = 0;  // edges of one face
-  std::size_t odd_edges = 0;   // edges of an odd number of faces
-  bool closed = false;         // every edge has an even number of faces
+  std::size_t open_edges = 0;            // edges of one face
+  std::size_t odd_edges = 0;             // edges of an odd number of faces
+  bool closed = false;                   // every edge has an even number of faces
+  std::vector<std::uint8_t> odd_vertex;  // (vertices) 1: of an odd edge; empty if there is none
 };
 Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
+// gaps.cpp: moves vertices of odd edges to others within `tolerance` [m] if this closes the mesh.
+struct GapWeld {
+  std::size_t vertices = 0;  // moved
+  double widest = 0;         // [m]
+  std::size_t left = 0;      // odd edges that would be left; > 0: no vertex was moved
+};
+void weld_gaps(const Mesh& mesh, double tolerance, unsigned threads, Surface& surface,
+               GapWeld& welded);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
 

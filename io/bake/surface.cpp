@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // surface.cpp - the triangles that count, whether they close, and the grid around them.
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <utility>
 
@@ -40,8 +41,8 @@ struct Item {
   std::uint32_t vertex, what;
 };
 
-// Calls `each(range, begin, end)` for the items of every vertex that has some, in the order of
-// triangles. Ranges of vertices, which fit the cache, run in parallel. `make(i, add)` calls
+// Calls `each(range, vertex, begin, end)` for the items of every vertex that has some, in the order
+// of triangles. Ranges of vertices, which fit the cache, run in parallel. `make(i, add)` calls
 // add(item) for the items of triangle i; it is called twice and must repeat itself.
 constexpr std::size_t kRanges = 128;
 template <class Make, class Each>
@@ -78,7 +79,7 @@ void by_vertex(std::size_t vertices, std::size_t triangles, unsigned threads, Ma
       sorted[next[items[i].vertex - low]++] = items[i].what;
     std::uint32_t begin = 0;
     for (std::size_t v = 0; v + 1 < next.size(); ++v) {
-      if (next[v] != begin) each(k, sorted.data() + begin, sorted.data() + next[v]);
+      if (next[v] != begin) each(k, low + v, sorted.data() + begin, sorted.data() + next[v]);
       begin = next[v];
     }
   });
@@ -93,7 +94,7 @@ std::vector<std::uint8_t> find_duplicates(const Mesh& mesh, unsigned threads) {
     add(Item{std::min({t[0], t[1], t[2]}), std::uint32_t(i)});
   };
   by_vertex(mesh.vertices.size(), count, threads, lowest,
-            [&](std::size_t, const std::uint32_t* begin, const std::uint32_t* end) {
+            [&](std::size_t, std::size_t, const std::uint32_t* begin, const std::uint32_t* end) {
               if (end - begin < 2) return;
               thread_local std::vector<std::pair<Triangle, std::uint32_t>> fan;
               fan.clear();
@@ -119,13 +120,17 @@ void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, u
     for (std::size_t k = 0; k < 3; ++k)
       add(Item{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
   };
+  std::vector<std::uint8_t> odd(mesh.vertices.size(), 0);
   by_vertex(mesh.vertices.size(), mesh.triangles.size(), threads, edges,
-            [&](std::size_t range, std::uint32_t* begin, std::uint32_t* end) {
+            [&](std::size_t range, std::size_t vertex, std::uint32_t* begin, std::uint32_t* end) {
               std::sort(begin, end);
               for (std::uint32_t* next; begin != end; begin = next) {
                 next = std::find_if(begin, end, [&](std::uint32_t v) { return v != *begin; });
                 found[range].open += next - begin == 1;
-                found[range].odd += std::size_t(next - begin) % 2;
+                if ((next - begin) % 2 == 0) continue;
+                ++found[range].odd;
+                std::atomic_ref(odd[vertex]).store(1, std::memory_order_relaxed);
+                std::atomic_ref(odd[*begin]).store(1, std::memory_order_relaxed);
               }
             });
   for (const Count& c : found) {
@@ -133,6 +138,7 @@ void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, u
     surface.odd_edges += c.odd;
   }
   surface.closed = surface.odd_edges == 0;
+  if (!surface.closed) surface.odd_vertex = std::move(odd);
 }
 
 std::string number(double value) {

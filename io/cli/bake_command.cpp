@@ -152,6 +152,8 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                     {"sign_mode", field->sign_mode},
                     {"offset", field->offset},
                     {"sealed_area", report.sealed_area},
+                    {"welded", report.welded},
+                    {"weld_widest", report.weld_widest},
                     {"warnings", report.warnings}};
   console.result(json);
   if (!console.json) {
@@ -255,6 +257,12 @@ void add_field(CLI::App* bake, Program& program) {
                    "Closes holes of an open mesh up to this width; default 0: none")
       ->option_text("WIDTH")
       ->check(number_within(0, 1e6));
+  field
+      ->add_option("--weld", f->bake.weld,
+                   "Welds vertices of open edges this near to each other, if this closes the mesh: "
+                   "a share of the voxel, 0 to 1; default 0.01")
+      ->option_text("SHARE")
+      ->check(number_within(0, 1));
   field->add_flag("--no-compression", f->no_compression, "Larger file, faster to load");
   field->callback([&program, f] {
     program.work = [&program, f] { return bake_field_command(program.console, *f); };

@@ -145,7 +145,10 @@ class ObjReader {
 
 }  // namespace
 
-Mesh read_obj(const MeshSource& source) {
+Mesh read_obj(const MeshSource& whole) {
+  // Some programs write the zero that ends a string.
+  MeshSource source = whole;
+  source.bytes = source.bytes.substr(0, source.bytes.find_last_not_of('\0') + 1);
   if (source.bytes.substr(0, 4096).find('\0') != std::string_view::npos)
     source.fail("this is not text, so no OBJ; was another file renamed?");
   return ObjReader(source).read();

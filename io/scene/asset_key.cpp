@@ -66,6 +66,7 @@ void add_options(ListHash& list, const FieldBake& options) {
   list.value(options.sign);
   list.value(options.cavities);
   list.value(options.seal);
+  list.value(options.weld);
   list.value(options.band_voxels);
   list.value(options.padding_voxels);
   if (norm(options.shift) == 0) return;  // so that keys are those of before there was a shift

@@ -93,6 +93,9 @@ constexpr Setting kFieldBakeRows[] = {
     choice<&FieldBake::cavities>("cavities", kCavities, "what enclosed hollows are"),
     quiet(number<&FieldBake::seal>("seal", "m", not_negative(kNoLimit),
                                    "holes of an open mesh up to this width are closed; 0: none")),
+    number<&FieldBake::weld>("weld", "voxel", between(0, 1),
+                             "vertices of open edges this near to each other are welded if this "
+                             "closes the mesh"),
     number<&FieldBake::band_voxels>("band_voxels", "voxel", between(1, 64),
                                     "every cell nearer than this to the surface gets samples"),
     whole<&FieldBake::padding_voxels>("padding_voxels", between(1, 256),

@@ -85,6 +85,18 @@ TEST_CASE("every format, packed or not, gives the same mesh bit for bit") {
   }
 }
 
+TEST_CASE("an OBJ may end with the zeros of a string, but have none inside") {
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const auto plain = parse_mesh(text, "a.obj");
+  REQUIRE(plain);
+  for (const std::size_t zeros : {1, 3}) {
+    const auto ended = parse_mesh(text + std::string(zeros, '\0'), "a.obj");
+    REQUIRE_MESSAGE(ended, ended.error());
+    CHECK(samples::same_bits(*ended, *plain));
+  }
+  CHECK_FALSE(parse_mesh(text.substr(0, 8) + std::string(1, '\0') + text.substr(8), "a.obj"));
+}
+
 TEST_CASE("equal corners are one vertex, in order of appearance, and minus zero is zero") {
   const auto mesh = parse_mesh(
       "v 9 9 9\nv 1 0 0\nv 0 0 0\nv 0 1 0\nv -0 0 -0\nv 0 -1 -0\nf 2 4 3\nf 5 6 2\n", "a.obj");

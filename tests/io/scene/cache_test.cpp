@@ -153,6 +153,7 @@ TEST_CASE("every parameter and every part of the mesh makes another key, threads
   field([](FieldBake& o) { o.sign = SignMode::flood; });
   field([](FieldBake& o) { o.cavities = Cavities::hollow; });
   field([](FieldBake& o) { o.seal = 1e-3; });
+  field([](FieldBake& o) { o.weld = 0.1; });
   field([](FieldBake& o) { o.band_voxels = 4; });
   field([](FieldBake& o) { o.padding_voxels = 9; });
   field([](FieldBake& o) { o.shift = {0.25, 0, 0}; });
