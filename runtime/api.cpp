@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <span>
 
 #include "runtime/frame/session.h"
 
@@ -61,6 +62,19 @@ void forget_energy(h6Session& s, std::int32_t body) {
     if (s.hands[h].body == body) s.devices[h].port.forget();
 }
 
+// The rows of an index that a caller gave, or null.
+template <class T>
+T* at(std::span<T> rows, std::int32_t i) {
+  return i >= 0 && static_cast<std::size_t>(i) < rows.size() ? &rows[static_cast<std::size_t>(i)]
+                                                             : nullptr;
+}
+Body* body_at(const h6Session* s, std::int32_t i) {
+  return s ? at(std::span<Body>(s->bodies), i) : nullptr;
+}
+HandDevice* device_at(const h6Session* s, std::int32_t i) {
+  return s ? at(std::span<HandDevice>(s->devices), i) : nullptr;
+}
+
 }  // namespace
 
 }  // namespace h6
@@ -70,23 +84,32 @@ using namespace h6;
 extern "C" {
 
 h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands) {
+  if (!session) return H6_OUTPUT_FAULT;
+  const std::size_t hands = session->hands.size();
+  if (hands && !samples) {
+    if (commands) std::fill_n(commands, hands, h6DeviceCommand{});
+    return H6_OUTPUT_FAULT;
+  }
   return frame(*session, samples, commands);
 }
 
 void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points) {
+  if (!session) return;
   session->anytime.forced = pairs;
   session->anytime.forced_points = std::bit_floor(std::min(points, 8u));
 }
 
 h6BodyState h6GetBody(const h6Session* session, int32_t index) {
-  H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->bodies.size());
-  const Body& body = session->bodies[index];
+  const Body* found = body_at(session, index);
+  if (!found) return {{{}, {1, 0, 0, 0}}, {}};
+  const Body& body = *found;
   return {mesh_pose(body), {to(body.v), to(body.w)}};
 }
 
 void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
-  H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->bodies.size());
-  Body& body = session->bodies[index];
+  Body* found = body_at(session, index);
+  if (!found || !state || !usable(state->pose, state->velocity)) return;
+  Body& body = *found;
   set_mesh_pose(body, state->pose);
   body.v = from(state->velocity.linear);
   body.w = from(state->velocity.angular);
@@ -103,50 +126,66 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
 }
 
 h6Contacts h6GetContacts(const h6Session* session, int32_t index) {
-  H6_ASSERT(index >= 0 && static_cast<std::size_t>(index) < session->bodies.size());
-  const ShellBody* shell = find_shell(*session, index);
+  const ShellBody* shell = body_at(session, index) ? find_shell(*session, index) : nullptr;
   const Contacts c = shell ? shell->contacts : Contacts{};
   return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx,     c.gy,    c.gz,         c.rx,
           c.ry,    c.rz,    c.tx, c.ty, c.tz, c.weight, c.point, c.field_body, c.load};
 }
 
-h6FrameReport h6GetFrame(const h6Session* session) { return session->report; }
-h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) {
-  return session->hands[hand].coupling;
+h6FrameReport h6GetFrame(const h6Session* session) {
+  return session ? session->report : h6FrameReport{};
 }
-double h6GetVoxel(const h6Session* session, int32_t body) { return session->bodies[body].voxel; }
+h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand) {
+  return device_at(session, hand) ? session->hands[static_cast<std::size_t>(hand)].coupling
+                                  : h6CouplingDef{};
+}
+double h6GetVoxel(const h6Session* session, int32_t body) {
+  const Body* found = body_at(session, body);
+  return found ? found->voxel : 0;
+}
 
 void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities) {
-  set_rating(session->devices[hand], *capabilities);
+  HandDevice* device = device_at(session, hand);
+  if (device && capabilities) set_rating(*device, *capabilities);
 }
 void h6Fault(h6Session* session, h6Cause cause) {
+  if (!session || cause <= H6_CAUSE_NONE || cause >= H6_CAUSE_COUNT) return;
   for (HandDevice& device : session->devices) device.guard.fault(cause);
 }
 void h6Arm(h6Session* session) {
+  if (!session) return;
   for (HandDevice& device : session->devices) device.guard.arm();
 }
 void h6Rearm(h6Session* session) { h6Arm(session); }
 void h6Disarm(h6Session* session) {
+  if (!session) return;
   for (HandDevice& device : session->devices) device.guard.disarm();
 }
 void h6LoseDevice(h6Session* session, int32_t hand) {
-  session->devices[hand].lost = true;
+  HandDevice* device = device_at(session, hand);
+  if (!device) return;
+  device->lost = true;
   h6Fault(session, H6_CAUSE_DEVICE_LOST);
 }
 void h6NoteInterval(h6Session* session, double seconds) {
+  if (!session) return;
   for (HandDevice& device : session->devices) note_interval(device, session->settings.dt, seconds);
 }
 h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand) {
-  return session->devices[hand].guard.input();
+  const HandDevice* device = device_at(session, hand);
+  return device ? device->guard.input() : h6SafetyInput{};
 }
 void h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input) {
-  HandDevice& to = session->devices[hand];
+  HandDevice* device = device_at(session, hand);
+  if (!device || !input) return;
+  HandDevice& to = *device;
   to.guard.repeat(input->asked);
   to.lost = (input->asked & H6_ASKED_LOST) != 0;
-  to.overdue = input->overdue > 0 ? input->overdue : 0;
+  to.overdue = input->overdue > 0 ? std::min(input->overdue, kMost) : 0;
 }
 h6HandSafety h6GetSafety(const h6Session* session, int32_t hand) {
-  return session->devices[hand].guard.report();
+  const HandDevice* device = device_at(session, hand);
+  return device ? device->guard.report() : h6HandSafety{};
 }
 
 }  // extern "C"

@@ -6,6 +6,7 @@
 #pragma once
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <new>
@@ -77,11 +78,16 @@ struct Buffer {
 
 class Arena {
  public:
-  Arena() = default;  // counts only
+  static constexpr std::size_t kTooMuch = SIZE_MAX / 4;  // used() of what cannot be counted
+  Arena() = default;                                     // counts only
   Arena(void* memory, std::size_t bytes) : base_(static_cast<char*>(memory)), capacity_(bytes) {}
   template <class T>
   T* take(std::size_t n) {
     const std::size_t at = (used_ + kAlignment - 1) & ~(kAlignment - 1);
+    if (at < used_ || n > (kTooMuch - std::min(at, kTooMuch)) / sizeof(T)) {
+      used_ = kTooMuch;  // no allocator gives that
+      return nullptr;
+    }
     used_ = at + n * sizeof(T);
     if (!base_) return nullptr;
     H6_ASSERT(used_ <= capacity_);

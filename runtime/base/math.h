@@ -68,10 +68,16 @@ inline bool finite(const h6Velocity& u) {
 inline bool finite(const h6Wrench& f) {
   return from(f.force).allFinite() && from(f.torque).allFinite();
 }
-// Both are finite, and the quaternion can be normalised.
+// What comes from outside stays within this [m, m/s, rad/s, N, N m], so that nothing overflows.
+inline constexpr double kMost = 1e6;
+inline bool within(const h6Vec3& v, double most = kMost) {
+  return std::abs(v.x) <= most && std::abs(v.y) <= most && std::abs(v.z) <= most;
+}
+// Both are within bounds, and the quaternion can be normalised.
 inline bool usable(const h6Pose& pose, const h6Velocity& u) {
   const double n = from(pose.q).norm();
-  return finite(pose) && finite(u) && n > 0.5 && n < 2.0;
+  return within(pose.p) && within(u.linear) && within(u.angular) && n > 0.5 && n < 2.0;
 }
+inline bool usable(const h6Wrench& f) { return within(f.force) && within(f.torque); }
 
 }  // namespace h6

@@ -52,8 +52,9 @@ using namespace h6;
 
 extern "C" void h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
                                int32_t* triangle) {
+  if (!session || shell_body < 0 || static_cast<std::size_t>(shell_body) >= session->bodies.size())
+    return;
   const h6Session& s = *session;
-  H6_ASSERT(shell_body >= 0 && static_cast<std::size_t>(shell_body) < s.bodies.size());
   const ShellBody* shell = find_shell(s, shell_body);
   if (!shell) return;
   for (std::size_t p = 0; p < shell->pairs.size(); ++p) {

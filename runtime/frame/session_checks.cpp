@@ -4,6 +4,8 @@
 #include "runtime/frame/session_checks.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <bitset>
 #include <cmath>
 
 #include "runtime/settings/engine_settings.h"
@@ -15,6 +17,8 @@ bool check_contact(const h6ContactDef& def, h6Error* error) {
 }
 
 namespace {
+
+constexpr double kLeastGyration = 1e-7;  // [m]
 
 // "hand 0: ", "hand 0: coupling "
 struct Where {
@@ -33,8 +37,14 @@ bool check_inertia(const h6BodyDef& b, std::size_t i, h6Error* error) {
            fail(error, "body %zu: a moving body without a shell needs an inertia", i);
   Mat3 I;
   I << v[0], v[3], v[4], v[3], v[1], v[5], v[4], v[5], v[2];
-  return Eigen::LLT<Mat3>(I).info() == Eigen::Success ||
-         fail(error, "body %zu: its inertia is not positive definite", i);
+  if (Eigen::LLT<Mat3>(I).info() != Eigen::Success)
+    return fail(error, "body %zu: its inertia is not positive definite", i);
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(I, Eigen::EigenvaluesOnly);
+  const double least = std::sqrt(axes.eigenvalues()[0] / b.mass),
+               most = std::sqrt(axes.eigenvalues()[2] / b.mass);
+  return (least >= kLeastGyration && most <= kMost) ||
+         fail(error, "body %zu: its inertia means radii of gyration of %g to %g m, not %g to %g", i,
+              least, most, kLeastGyration, kMost);
 }
 
 bool check_body(const h6Model& model, h6BodyDef b, std::size_t i, h6Error* error) {
@@ -43,7 +53,8 @@ bool check_body(const h6Model& model, h6BodyDef b, std::size_t i, h6Error* error
     for (double& v : b.inertia) v = 0;
   }
   if (!check_settings(body_settings(), &b, Where("body", i).text, error)) return false;
-  if (!finite(b.velocity)) return fail(error, "body %zu: its velocity is not finite", i);
+  if (!usable(b.pose, b.velocity) || !within(b.com))
+    return fail(error, "body %zu: its place, com or velocity is not within %g m and m/s", i, kMost);
   if (b.shell < -1 || b.shell >= static_cast<std::int64_t>(model.shell_count))
     return fail(error, "body %zu: shell %d, but the model has %zu", i, b.shell, model.shell_count);
   if (b.field < -1 || b.field >= static_cast<std::int64_t>(model.field_count))
@@ -62,6 +73,23 @@ bool check_pair(const h6SessionDef& def, std::size_t i, h6Error* error) {
     return fail(error, "pair %zu: body %d has no shell", i, p.shell_body);
   if (def.bodies[p.field_body].field < 0)
     return fail(error, "pair %zu: body %d has no field", i, p.field_body);
+  return true;
+}
+
+bool check_pairs(const h6SessionDef& def, h6Error* error) {
+  constexpr std::size_t most = H6_MAX_BODIES * (H6_MAX_BODIES - 1);
+  if (def.pair_count && !def.pairs) return fail(error, "pairs are counted but not given");
+  if (def.pair_count > most)
+    return fail(error, "%zu bodies have at most %zu pairs, not %zu", std::size_t{H6_MAX_BODIES},
+                most, def.pair_count);
+  std::bitset<H6_MAX_BODIES * H6_MAX_BODIES> seen;
+  for (std::size_t i = 0; i < def.pair_count; ++i) {
+    if (!check_pair(def, i, error)) return false;
+    const h6PairDef& p = def.pairs[i];
+    const auto at = static_cast<std::size_t>(p.shell_body * H6_MAX_BODIES + p.field_body);
+    if (seen[at]) return fail(error, "pair %zu is listed before", i);
+    seen[at] = true;
+  }
   return true;
 }
 
@@ -114,13 +142,12 @@ bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error
     return fail(error, "a session needs 1 to %d bodies, it has %zu", H6_MAX_BODIES, def.body_count);
   if (def.hand_count > H6_MAX_HANDS || (def.hand_count && !def.hands))
     return fail(error, "a session has at most %d hands", H6_MAX_HANDS);
-  if (def.pair_count && !def.pairs) return fail(error, "pairs are counted but not given");
+  if (!within(def.gravity, 1e4)) return fail(error, "gravity is not within 1e4 m/s^2");
   if (!check_settings(session_settings(), &def, "", error) || !check_contact(def.contact, error))
     return false;
   for (std::size_t i = 0; i < def.body_count; ++i)
     if (!check_body(model, def.bodies[i], i, error)) return false;
-  for (std::size_t i = 0; i < def.pair_count; ++i)
-    if (!check_pair(def, i, error)) return false;
+  if (!check_pairs(def, error)) return false;
   for (std::size_t i = 0; i < def.hand_count; ++i)
     if (!check_hand(def, i, error)) return false;
   return true;

@@ -217,7 +217,9 @@ using namespace h6;
 extern "C" {
 
 size_t h6GetOverlaps(const h6Session* session, h6Overlap* out, size_t capacity) {
+  if (!session) return 0;
   const StartOverlap& all = session->overlap;
+  if (!out) capacity = 0;
   for (std::size_t i = 0; i < std::min(capacity, all.pair_count); ++i) {
     out[i] = all.pairs[i];
     out[i].relieved = static_cast<std::uint32_t>(search_of(*session, out[i]).fit.count);
@@ -226,8 +228,10 @@ size_t h6GetOverlaps(const h6Session* session, h6Overlap* out, size_t capacity) 
 }
 
 size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, size_t capacity) {
+  if (!session) return 0;
   const h6Session& s = *session;
   const StartOverlap& all = s.overlap;
+  if (!out) capacity = 0;
   const std::size_t count = std::min(capacity, all.point_count);
   std::copy_n(all.points, count, out);
   std::size_t row = 0;
@@ -245,6 +249,7 @@ size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, size_t 
 }
 
 bool h6RestartFit(h6Session* session, h6Error* error) {
+  if (!session) return fail(error, "no session was given");
   try {
     return measure_overlap(*session, error);
   } catch (const std::exception& e) {

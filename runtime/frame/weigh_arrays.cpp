@@ -12,6 +12,8 @@
 namespace h6 {
 namespace {
 
+constexpr std::size_t kMostContacts = 1000000;
+
 // The memory that a call needs, in one block.
 struct Work {
   Contacts contacts{};
@@ -81,7 +83,8 @@ bool check_rows(const h6ContactArrays& in, bool series, double lever, h6Error* e
 bool check_arrays(const h6ContactDef& def, const h6ContactArrays& in, double voxel, double lever,
                   h6Error* error) {
   if (!check_contact(def, error)) return false;
-  if (in.count > 1000000) return fail(error, "at most 1000000 contacts, there are %zu", in.count);
+  if (in.count > kMostContacts)
+    return fail(error, "at most %zu contacts, there are %zu", kMostContacts, in.count);
   if (in.count && (!in.normals || !in.arms || !in.depths))
     return fail(error, "contacts need normals, arms and depths");
   if (!(voxel > 0 && std::isfinite(voxel)) || !(lever > 0 && std::isfinite(lever)))
@@ -180,7 +183,7 @@ using namespace h6;
 
 extern "C" {
 
-size_t h6WeighScratchBytes(size_t count) { return bytes_of(count); }
+size_t h6WeighScratchBytes(size_t count) { return count <= kMostContacts ? bytes_of(count) : 0; }
 
 int h6WeighContacts(const h6ContactDef* given, const h6ContactArrays* contacts, double voxel,
                     double lever, float* weights, h6Wrench* wrench, double* stiffness,

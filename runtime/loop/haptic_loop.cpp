@@ -376,15 +376,19 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
 }
 
 size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity) {
-  return loop->ring ? loop->ring->pop(out, capacity) : 0;
+  return loop && out && loop->ring ? loop->ring->pop(out, capacity) : 0;
 }
-bool h6ReadView(h6Loop* loop, h6LoopView* out) { return loop->view && loop->view->read(out); }
+bool h6ReadView(h6Loop* loop, h6LoopView* out) {
+  return loop && out && loop->view && loop->view->read(out);
+}
 
 void h6SetPace(h6Loop* loop, double pace) {
+  if (!loop) return;
   loop->pace.store(pace >= 0 && pace <= 1 ? pace : 1, std::memory_order_relaxed);
 }
 
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
+  if (!loop) return fail(error, "no loop was given"), nullptr;
   if (!may_take_over(next, *loop->session, error)) return nullptr;
   if (const int core = loop->core; core >= 0) next->team->set_realtime(loop->helper_priority, core);
   loop->offered.store(next, std::memory_order_release);
@@ -397,17 +401,25 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   }
 }
 
-bool h6LoopRunning(const h6Loop* loop) { return loop->thread->running(); }
-void h6RequestStop(h6Loop* loop) { loop->stop.store(true, std::memory_order_relaxed); }
-void h6ArmLoop(h6Loop* loop) { loop->request.store(kArm); }
-void h6DisarmLoop(h6Loop* loop) { loop->request.store(kDisarm); }
+bool h6LoopRunning(const h6Loop* loop) { return loop && loop->thread->running(); }
+void h6RequestStop(h6Loop* loop) {
+  if (loop) loop->stop.store(true, std::memory_order_relaxed);
+}
+void h6ArmLoop(h6Loop* loop) {
+  if (loop) loop->request.store(kArm);
+}
+void h6DisarmLoop(h6Loop* loop) {
+  if (loop) loop->request.store(kDisarm);
+}
 void h6HaltLoop(h6Loop* loop) {
+  if (!loop) return;
   loop->gate.halt();
   h6RequestStop(loop);
 }
 void h6HaltAll(void) { sched::halt_all(); }
 
 h6LoopReport h6JoinLoop(h6Loop* loop) {
+  if (!loop) return {};
   loop->thread->join();
   loop->gate.stop_all();
   loop->session->team->set_realtime(0, -1);

@@ -22,6 +22,8 @@ bool fail(h6Error* error, const char* format, ...) {
 
 namespace {
 
+constexpr std::size_t kMostParts = 65536;  // fields, and shells, of a model
+
 template <class T>
 T* make_array(const h6Allocator& allocator, std::size_t count) {
   T* array = static_cast<T*>(allocate(allocator, count * sizeof(T)));
@@ -39,6 +41,9 @@ void drop_array(const h6Allocator& allocator, T* array, std::size_t count) {
 bool fill(h6Model& model, const h6ModelDef& def, h6Error* error) {
   if ((def.field_count && !def.fields) || (def.shell_count && !def.shells))
     return fail(error, "the model definition counts fields or shells but points at none");
+  if (def.field_count > kMostParts || def.shell_count > kMostParts)
+    return fail(error, "a model has at most %zu fields and %zu shells, not %zu and %zu", kMostParts,
+                kMostParts, def.field_count, def.shell_count);
   model.fields = make_array<Field>(def.allocator, def.field_count);
   if (def.field_count && !model.fields)
     return fail(error, "no memory for %zu fields", def.field_count);
@@ -83,6 +88,7 @@ void h6DestroyModel(h6Model* model) {
 }
 
 size_t h6ModelBytes(const h6Model* model) {
+  if (!model) return 0;
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < model->field_count; ++i) bytes += model->fields[i].bytes();
   for (std::size_t i = 0; i < model->shell_count; ++i) bytes += model->shells[i].bytes();
@@ -91,7 +97,9 @@ size_t h6ModelBytes(const h6Model* model) {
 
 int h6SampleField(const h6Model* model, int32_t index, const double* points, size_t count,
                   double* distance, double* gradient, uint8_t* exact) {
-  if (!model || index < 0 || static_cast<std::size_t>(index) >= model->field_count) return -1;
+  if (!model || index < 0 || static_cast<std::size_t>(index) >= model->field_count ||
+      (count && (!points || !distance)))
+    return -1;
   const Field& field = model->fields[index];
   const float scale = static_cast<float>(1.0 / field.voxel);
   // Points relative to the field's first node, in double: float then loses nothing that matters.

@@ -12,8 +12,6 @@ namespace h6 {
 namespace {
 
 bool check_points(const h6ShellDef& def, h6Error* error) {
-  if (def.point_count == 0 || def.point_count > UINT32_MAX / 2)
-    return fail(error, "a shell needs 1 to 2147483647 points, this one has %zu", def.point_count);
   const float* columns[] = {def.x, def.y, def.z, def.nx, def.ny, def.nz};
   for (const float* column : columns)
     if (!column) return fail(error, "x y z and nx ny nz must all be given");
@@ -30,6 +28,8 @@ bool check_points(const h6ShellDef& def, h6Error* error) {
 // Each level's nodes are the children of the level before, each once, and the last level holds
 // every point once. So traversal reaches each point exactly once.
 bool check_tree(const h6ShellDef& def, h6Error* error) {
+  if (def.point_count == 0 || def.point_count > UINT32_MAX / 2)
+    return fail(error, "a shell needs 1 to 2147483647 points, this one has %zu", def.point_count);
   if (def.level_count < 1 || def.level_count > 32 || !def.level_first || !def.node_point ||
       !def.node_radius || !def.node_first_child || !def.node_child_count)
     return fail(error, "a shell needs 1 to 32 levels and all node arrays");
@@ -247,7 +247,7 @@ void lay_out(Shell& shell, Arena& arena) {
 
 bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
                    h6Error* error) {
-  if (!check_points(def, error) || !check_tree(def, error) || !check_spheres(def, error))
+  if (!check_tree(def, error) || !check_points(def, error) || !check_spheres(def, error))
     return false;
   const std::size_t n = shell->points = def.point_count;
   const std::size_t padded = (n + kBlockRows - 1) / kBlockRows * kBlockRows;

@@ -3,6 +3,7 @@
 //
 //   sample -> watch -> finite? -> filter -> the frame's hand ... wrench or motion -> filter ->
 //   safety -> command
+#include <algorithm>
 #include <utility>
 
 #include "runtime/motion/motion_stages.h"
@@ -39,7 +40,7 @@ void set_rating(HandDevice& device, const h6DeviceCapabilities& capabilities) {
 }
 
 void note_interval(HandDevice& device, double dt, double seconds) {
-  device.overdue = seconds > 2 * dt ? seconds - dt : 0;
+  device.overdue = seconds > 2 * dt ? std::min(seconds, kMost) - dt : 0;
 }
 
 void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSample& given,
@@ -58,7 +59,7 @@ void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSamp
   if (device.watch.frozen()) sample.velocity = {};
   if (hand.mode == H6_IMPEDANCE) {
     sample.wrench = {};
-  } else if (!finite(given.wrench)) {
+  } else if (!usable(given.wrench)) {
     status |= H6_HAND_NOT_FINITE;
     sample.wrench = {};
   }

@@ -18,7 +18,7 @@ constexpr SettingTable kPose = settings_of("h6Pose", kPoseRows);
 
 constexpr Setting kBodyRows[] = {
     flag<&h6BodyDef::fixed>("fixed", "the body never moves; its mass and inertia are not read"),
-    number<&h6BodyDef::mass>("mass", "kg", 0.1, positive(1e6), "of the whole body"),
+    number<&h6BodyDef::mass>("mass", "kg", 0.1, between(1e-6, 1e6), "of the whole body"),
     flag<&h6BodyDef::translation_only>("translation_only",
                                        "3-DoF: the body never turns and feels no torque"),
     plain<&h6BodyDef::com>("com", Kind::vec3, "m", "centre of mass, mesh frame"),
@@ -51,12 +51,12 @@ constexpr Setting kContactRows[] = {
         "robust "
         "also with pieces: +facing, +depth, +product, +cluster, +geodesic, +handles, +printed")),
     number<&h6ContactDef::stiffness>(
-        "stiffness", "N/m", 0, not_negative(1e9),
+        "stiffness", "N/m", 0, between(0, 1e9),
         "k, the stiffness of one contact alone; 0: from mass, weight and voxel, at least 1e4"),
-    number<&h6ContactDef::damping>("damping", "s", 1e-3, not_negative(1),
+    number<&h6ContactDef::damping>("damping", "s", 1e-3, between(0, 1),
                                    "beta, the damping of a contact is beta times its stiffness"),
     number<&h6ContactDef::global_n0>(
-        "global_n0", "", 10, {1, kNoLimit, false, 1e6},
+        "global_n0", "", 10, between(1, 1e6),
         "global: number of contacts from which the stiffness is shared"),
     number<&h6ContactDef::epsilon>("epsilon", "", 0.01, above(0, 2),
                                    "gauss3, gauss6: half-width of the density hat"),
@@ -71,10 +71,10 @@ constexpr Setting kContactRows[] = {
     number<&h6ContactDef::series_c>("series_c", "", 4, above(2, 1e6),
                                     "series, firm: the net stiffness is at most this times k"),
     number<&h6ContactDef::firmness>(
-        "firmness", "", 20, {1, kNoLimit, false, 1e6},
+        "firmness", "", 20, between(1, 1e6),
         "firm: stiffness of one direction of contact inside the common spring, in units of k, from "
         "half a voxel of depth on"),
-    number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 4, {1, kNoLimit, false, 1e6},
+    number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 4, between(1, 1e6),
                                             "firm: the same at the surface"),
     number<&h6ContactDef::margin_voxels>(
         "margin_voxels", "voxel", 0.25, between(0, 2),
@@ -104,10 +104,10 @@ constexpr Setting kCouplingRows[] = {
         "mode", kCouplingModes, H6_COUPLING_DYNAMIC,
         "dynamic: a body with mass on a damped spring; static: each frame one step towards "
         "balance, without mass; direct: no coupling, the body is where the hand is"),
-    number<&h6CouplingDef::stiffness>("stiffness", "N/m", 1e3, positive(1e9),
+    number<&h6CouplingDef::stiffness>("stiffness", "N/m", 1e3, above(0, 1e9),
                                       "k_VC, of the virtual coupling"),
     number<&h6CouplingDef::rotational_stiffness>("rotational_stiffness", "N m/rad", 0,
-                                                 not_negative(1e9),
+                                                 between(0, 1e9),
                                                  "0: stiffness times the larger of (30 voxels) "
                                                  "squared and inertia over mass"),
     number<&h6CouplingDef::damping_ratio>(
@@ -115,24 +115,24 @@ constexpr Setting kCouplingRows[] = {
         "dynamic: of the coupled body, 1 is critical, light bodies get more; static: the damper is "
         "this times three frames times the spring"),
     number<&h6CouplingDef::max_depth_voxels>(
-        "max_depth_voxels", "voxel", 0.5, positive(1000),
+        "max_depth_voxels", "voxel", 0.5, above(0, 1000),
         "x_max: the largest force is the contact stiffness times this depth"),
-    number<&h6CouplingDef::max_force>("max_force", "N", 0, not_negative(1e6),
+    number<&h6CouplingDef::max_force>("max_force", "N", 0, between(0, 1e6),
                                       "largest force; 0: from max_depth_voxels"),
-    number<&h6CouplingDef::max_torque>("max_torque", "N m", 0, not_negative(1e6),
+    number<&h6CouplingDef::max_torque>("max_torque", "N m", 0, between(0, 1e6),
                                        "largest torque; 0: max_force times the body's radius"),
-    number<&h6CouplingDef::max_step_voxels>("max_step_voxels", "voxel", 0.5, positive(1000),
+    number<&h6CouplingDef::max_step_voxels>("max_step_voxels", "voxel", 0.5, above(0, 1000),
                                             "static: no point moves farther than this in a frame")};
 constexpr SettingTable kCoupling = settings_of("h6CouplingDef", kCouplingRows);
 
 constexpr Setting kFilterRows[] = {
     number<&h6HandFilterDef::motion_scale>(
-        "motion_scale", "", 1, positive(1e6),
+        "motion_scale", "", 1, between(1e-6, 1e6),
         "metres in the scene for one metre of the device; a path is the device's"),
-    number<&h6HandFilterDef::rotation_scale>("rotation_scale", "", 1, positive(1e6),
+    number<&h6HandFilterDef::rotation_scale>("rotation_scale", "", 1, between(1e-6, 1e6),
                                              "radians in the scene for one radian of the device"),
     number<&h6HandFilterDef::force_scale>(
-        "force_scale", "", 1, positive(1e6),
+        "force_scale", "", 1, between(1e-6, 1e6),
         "newtons at the device for one newton in the scene; torques alike"),
     flag<&h6HandFilterDef::relative>(
         "relative", "the first sample takes the body where it is, wherever the device is"),
@@ -142,24 +142,24 @@ constexpr Setting kFilterRows[] = {
 constexpr SettingTable kFilter = settings_of("h6HandFilterDef", kFilterRows);
 
 constexpr Setting kSafetyRows[] = {
-    number<&h6SafetyDef::max_force>("max_force", "N", 0, not_negative(1e4),
+    number<&h6SafetyDef::max_force>("max_force", "N", 0, between(0, 1e4),
                                     "largest force; 0: the device's rating"),
-    number<&h6SafetyDef::max_torque>("max_torque", "N m", 0, not_negative(1e3),
+    number<&h6SafetyDef::max_torque>("max_torque", "N m", 0, between(0, 1e3),
                                      "largest torque; 0: the device's rating"),
-    number<&h6SafetyDef::max_force_rate>("max_force_rate", "N/s", 0, not_negative(1e7),
+    number<&h6SafetyDef::max_force_rate>("max_force_rate", "N/s", 0, between(0, 1e7),
                                          "slew limit of the force; 0: the device's"),
-    number<&h6SafetyDef::max_torque_rate>("max_torque_rate", "N m/s", 0, not_negative(1e6),
+    number<&h6SafetyDef::max_torque_rate>("max_torque_rate", "N m/s", 0, between(0, 1e6),
                                           "slew limit of the torque; 0: the device's"),
-    number<&h6SafetyDef::max_power>("max_power", "W", 0, not_negative(1e5),
+    number<&h6SafetyDef::max_power>("max_power", "W", 0, between(0, 1e5),
                                     "largest power given to the hand; 0: max_force at 1 m/s"),
-    number<&h6SafetyDef::max_speed>("max_speed", "m/s", 0, not_negative(100),
+    number<&h6SafetyDef::max_speed>("max_speed", "m/s", 0, between(0, 100),
                                     "admittance modes: of the motion sent; 0: the device's"),
     number<&h6SafetyDef::derate_speed>(
-        "derate_speed", "m/s", 0, not_negative(100),
+        "derate_speed", "m/s", 0, between(0, 100),
         "of the hand: from here on the force falls linearly, to nothing at cut_speed; 0: half of "
         "cut_speed"),
     number<&h6SafetyDef::cut_speed>(
-        "cut_speed", "m/s", 0, not_negative(100),
+        "cut_speed", "m/s", 0, between(0, 100),
         "of the hand: the output becomes zero, latched; 0: twice the device's max_velocity, at "
         "most 5 m/s"),
     number<&h6SafetyDef::soft_start>("soft_start", "s", 0.1, between(0, 10),
@@ -186,14 +186,14 @@ constexpr Setting kHandRows[] = {
         "pseudo-admittance: the wrench of the driver's own coupling in, the manipulandum's pose "
         "out"),
     object<&h6HandDef::filter>("", kFilter, "indexing and scaling of motion"),
-    number<&h6HandDef::manipulandum_mass>("manipulandum_mass", "kg", 0.1, positive(1e6),
+    number<&h6HandDef::manipulandum_mass>("manipulandum_mass", "kg", 0.1, between(1e-6, 1e6),
                                           "pseudo-admittance: of what the hand holds"),
-    number<&h6HandDef::driver_stiffness>("driver_stiffness", "N/m", 0, not_negative(1e5),
+    number<&h6HandDef::driver_stiffness>("driver_stiffness", "N/m", 0, between(0, 1e5),
                                          "pseudo-admittance: of the driver's coupling; 0: the "
                                          "arm's own, not known to the engine"),
-    number<&h6HandDef::driver_damping>("driver_damping", "N s/m", 0, not_negative(50),
+    number<&h6HandDef::driver_damping>("driver_damping", "N s/m", 0, between(0, 50),
                                        "pseudo-admittance: of the driver's coupling"),
-    number<&h6HandDef::admittance_damping>("admittance_damping", "N s/m", 0, not_negative(1e6),
+    number<&h6HandDef::admittance_damping>("admittance_damping", "N s/m", 0, between(0, 1e6),
                                            "admittance: of the free body; 0: derived"),
     flag<&h6HandDef::passivity>(
         "passivity", "observe the energy that leaves through this hand and damp what was not paid"),

@@ -37,7 +37,7 @@ typedef struct h6DeviceCapabilities {
                                it, and the watchdog ignores it                                     */
 } h6DeviceCapabilities;
 
-/* A device's input: where the hand holds the mesh frame of its body. */
+/* Where the hand holds the mesh frame of its body. Beyond 1e6 m, m/s, rad/s or N a sample is bad. */
 typedef struct h6DeviceSample {
   h6Pose     pose;     /* world frame                                                              */
   h6Velocity velocity; /* of the mesh frame's origin, world frame                                  */

@@ -7,8 +7,8 @@
  *   h6StartLoop(session, devices, ...)           a real-time thread that does it at the rate
  *
  * Nothing here opens a file or names a device. A step never allocates, locks, prints, throws or
- * waits. Create functions return NULL and fill `error` (which may be NULL) when they fail.
- */
+ * waits. Create functions return NULL and fill `error` (which may be NULL) when they fail. For a NULL,
+ * a -1 or an index past the end a function gives NULL, -1 or zeros, and changes nothing. */
 #ifndef HAPSIX_H
 #define HAPSIX_H
 
@@ -46,7 +46,7 @@ H6_API h6SessionDef  h6DefaultSessionDef(void); /* implicit, 1000 Hz, 16384 cont
 H6_API int    h6WeighContacts(const h6ContactDef* contact, const h6ContactArrays* contacts,
                               double voxel, double lever, float* weights, h6Wrench* wrench,
                               double* stiffness, double* damping, h6Error* error);
-H6_API size_t h6WeighScratchBytes(size_t count);
+H6_API size_t h6WeighScratchBytes(size_t count); /* 0: more than 1000000 contacts, the most */
 
 /* "none", "global", ...; NULL when out of range. And back: 0 when the name is known. */
 H6_API const char* h6MethodName(h6Method method);
@@ -72,7 +72,7 @@ H6_API double     h6StiffnessFor(const h6Model* model, const h6SessionDef* def);
 H6_API h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Error* error);
 H6_API void       h6DestroySession(h6Session* session);
 
-/* One frame of 1/rate seconds: samples of each hand in, a wrench for each hand out. */
+/* One frame of 1/rate seconds: samples of each hand in, a wrench for each out. NULL: H6_OUTPUT_FAULT. */
 H6_API h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
 /* For the next step only: traverses the last `pairs` pairs coarsely, with `points` of each sixteen

@@ -76,7 +76,7 @@ typedef struct h6BodyDef {
   h6Pose     pose;       /* mesh frame -> world at the start                                       */
   h6Velocity velocity;   /* of the centre of mass, at the start                                    */
   bool       fixed;      /* never moves; mass and inertia are not read                             */
-  double     mass;       /* > 0                                                              [kg]  */
+  double     mass;       /* 1e-6 .. 1e6                                                      [kg]  */
   h6Vec3     com;        /* centre of mass, mesh frame                                        [m]  */
   double     inertia[6]; /* xx yy zz xy xz yz about com, mesh axes; all zero: from the shell's
                             points, each an equal share of the mass                       [kg m^2] */

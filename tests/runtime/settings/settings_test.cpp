@@ -89,9 +89,9 @@ TEST_CASE("the sentence has name, range, unit and value") {
     return std::string(error.message);
   };
   CHECK(said([](h6ContactDef& d) { d.stiffness = -1; }) ==
-        "contact stiffness must be 0 N/m or more, it is -1");
+        "contact stiffness must be in 0..1000000000 N/m, it is -1");
   CHECK(said([](h6ContactDef& d) { d.damping = -1; }) ==
-        "contact damping must be 0 s or more, it is -1");
+        "contact damping must be in 0..1 s, it is -1");
   CHECK(said([](h6ContactDef& d) { d.epsilon = 3; }) ==
         "contact epsilon must be in (0, 2], it is 3");
   CHECK(said([](h6ContactDef& d) { d.margin_voxels = 3; }) ==
