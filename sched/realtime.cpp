@@ -81,24 +81,33 @@ void touch_stack() {
   for (std::size_t i = 0; i < sizeof page; i += 4096) page[i] = 0;
 }
 
+// The last core that taskset and cgroup leave to this thread, because the first one serves most
+// interrupts; -1: none is known.
+int last_of(const cpu_set_t& allowed) {
+  for (int core = CPU_SETSIZE - 1; core >= 0; --core)
+    if (CPU_ISSET(core, &allowed)) return core;
+  return -1;
+}
+
 }  // namespace
 
 RealtimeGrant request_realtime(const RealtimeRequest& request) {
   RealtimeGrant grant;
-  const int cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
-  // The last core, because the first one serves most interrupts.
-  const int core = request.core >= 0 ? request.core : cores - 1;
-  cpu_set_t set;
+  cpu_set_t allowed, set;
+  CPU_ZERO(&allowed);
+  pthread_getaffinity_np(pthread_self(), sizeof allowed, &allowed);
+  const int core = request.core >= 0 ? request.core : last_of(allowed);
+  const bool may = core >= 0 && core < CPU_SETSIZE && CPU_ISSET(core, &allowed);
   CPU_ZERO(&set);
-  if (core < CPU_SETSIZE) CPU_SET(core, &set);
-  int refused = core < cores ? pthread_setaffinity_np(pthread_self(), sizeof set, &set) : EINVAL;
+  if (may) CPU_SET(core, &set);
+  int refused = may ? pthread_setaffinity_np(pthread_self(), sizeof set, &set) : EINVAL;
   grant.pinned = refused == 0;
   grant.core = grant.pinned ? core : -1;
   if (grant.pinned)
     append(grant, "pinned to core %d. ", core);
   else
-    append(grant, "not pinned to core %d (%s): choose one of 0..%d. ", core, std::strerror(refused),
-           cores - 1);
+    append(grant, "not pinned to core %d (%s): choose one that 'taskset' and the cgroup allow. ",
+           core, std::strerror(refused));
 
   sched_param parameters{};
   parameters.sched_priority = request.priority;

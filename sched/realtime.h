@@ -6,7 +6,7 @@
 namespace h6::sched {
 
 struct RealtimeRequest {
-  int core = -1;      // -1: the machine's last core
+  int core = -1;      // -1: the last one that the thread may use
   int priority = 80;  // SCHED_FIFO, 1 .. 99
 };
 

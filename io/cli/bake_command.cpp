@@ -162,9 +162,9 @@ int bake_field_command(const Console& console, FieldOptions& o) {
         "%s: %d x %d x %d nodes, voxel %.4g %s, %zu bricks, %.1f MB\n"
         "  %zu triangles, %s; sign mode %s, offset %.4g %s; read %.2f s, baked %.2f s, wrote %.2f "
         "s\n",
-        o.common.out.c_str(), 8 * field->bricks[0], 8 * field->bricks[1], 8 * field->bricks[2],
-        field->voxel_size / unit_m, o.common.units.c_str(), field->brick_count(),
-        1e-6 * static_cast<double>(bytes), input->audit.triangles,
+        printable(o.common.out).c_str(), 8 * field->bricks[0], 8 * field->bricks[1],
+        8 * field->bricks[2], field->voxel_size / unit_m, o.common.units.c_str(),
+        field->brick_count(), 1e-6 * static_cast<double>(bytes), input->audit.triangles,
         report.closed ? "closed" : "not closed", field->sign_mode.c_str(), field->offset / unit_m,
         o.common.units.c_str(), input->seconds, baked, written);
   }
@@ -219,7 +219,7 @@ int bake_shell_command(const Console& console, ShellOptions& o) {
     std::printf(
         "%s: %zu points on %zu levels, %.1f MB\n"
         "  %zu triangles, %s; read %.2f s, baked %.2f s, wrote %.2f s\n",
-        o.common.out.c_str(), shell->size(), shell->level_points.size(),
+        printable(o.common.out).c_str(), shell->size(), shell->level_points.size(),
         1e-6 * static_cast<double>(bytes), input->audit.triangles,
         input->audit.closed ? "closed" : "not closed", input->seconds, baked, written);
   return kOk;

@@ -89,7 +89,7 @@ ordered_json exact_json(const io::ExactCheck& c) {
 
 void print(const ordered_json& m, const Subject& s, const io::Walls& walls,
            const io::FieldPlan& p) {
-  std::printf("%s: %zu triangles, %s; voxel %.4g mm", s.name.c_str(),
+  std::printf("%s: %zu triangles, %s; voxel %.4g mm", printable(s.name).c_str(),
               m["triangles"].get<std::size_t>(), m["closed"].get<bool>() ? "closed" : "a soup",
               1e3 * p.voxel_size);
   if (p.offset > 0) std::printf(", moved out by %.4g mm", 1e3 * p.offset);
@@ -301,13 +301,13 @@ Result<ordered_json> clearances(const Console& console, const io::Scene& scene, 
     const double voxels = (*gap - m["offset"].get<double>()) / m["voxel_size"].get<double>();
     list.push_back({{"shell", b.name}, {"distance_m", *gap}, {"voxels", voxels}});
     if (!console.json)
-      std::printf("  start   %s is %.3g mm away: %.3g voxels from contact\n", b.name.c_str(),
-                  1e3 * *gap, voxels);
+      std::printf("  start   %s is %.3g mm away: %.3g voxels from contact\n",
+                  printable(b.name).c_str(), 1e3 * *gap, voxels);
   }
   return list;
 }
 
-int check_command(const Console& console, CheckOptions& o) {
+int check_command(const Console& console, CheckOptions& o, bool outside) {
   const Result<io::Unit> unit = io::unit_from_name(o.units);
   if (!unit) return console.fail(unit.error(), kUsage);
   if (!o.field.empty() && o.files.size() > 1)
@@ -327,7 +327,7 @@ int check_command(const Console& console, CheckOptions& o) {
     double stiffness = o.stiffness;
     std::optional<io::Scene> scene;
     if (file.ends_with(".json")) {
-      Result<io::Scene> read = io::read_scene(file);
+      Result<io::Scene> read = io::read_scene(file, outside);
       if (!read) return console.fail(read.error());
       scene = std::move(*read);
       Result<std::vector<Subject>> found = subjects_of_scene(*scene);
@@ -407,7 +407,9 @@ void add_check(CLI::App& app, Program& program) {
       ->option_text("N")
       ->check(whole_within(0, 1024));
   check->callback([&program, o] {
-    program.work = [&program, o] { return check_command(program.console, *o); };
+    program.work = [&program, o] {
+      return check_command(program.console, *o, program.allow_outside);
+    };
   });
 }
 

@@ -14,6 +14,7 @@ namespace h6::cli {
 // The work of the chosen subcommand; returns the program's exit code.
 struct Program {
   Console console;
+  bool allow_outside = false;  // scene files may name files outside their folder
   std::function<int()> work;
 };
 

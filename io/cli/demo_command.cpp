@@ -29,7 +29,8 @@ void print(const std::vector<RunSummary>& runs, bool virtual_time) {
     std::printf("\ndeepest contact over time, %s [voxel]\n%s", run.method.c_str(),
                 depth_strip(run).c_str());
   if (!virtual_time) std::printf("\nreal time: %s\n", runs.back().loop.granted);
-  for (const RunSummary& run : runs) std::printf("recording: %s\n", run.recording.c_str());
+  for (const RunSummary& run : runs)
+    std::printf("recording: %s\n", printable(run.recording).c_str());
 }
 
 // Writes the report. A program built without the page's files writes none, but the demo still runs.

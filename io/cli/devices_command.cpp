@@ -76,10 +76,11 @@ int list_devices(const Console& console) {
   }
   std::printf("\nSpaceMouse:\n");
   for (const ordered_json& cap : found) {
-    std::printf("  %-30s %s, %s\n", cap["device"].get<std::string>().c_str(),
-                cap["product"].get<std::string>().c_str(), cap["path"].get<std::string>().c_str());
+    std::printf("  %-30s %s, %s\n", printable(cap["device"].get<std::string>()).c_str(),
+                printable(cap["product"].get<std::string>()).c_str(),
+                printable(cap["path"].get<std::string>()).c_str());
     if (!cap["usable"].get<bool>())
-      std::printf("    cannot be used: %s\n", cap["trouble"].get<std::string>().c_str());
+      std::printf("    cannot be used: %s\n", printable(cap["trouble"].get<std::string>()).c_str());
   }
   if (!trouble.empty()) std::printf("  %s\n", trouble.c_str());
   return kOk;
@@ -213,7 +214,7 @@ int devices_command(const Console& console, DevicesOptions o) {
     std::printf("%s: %u in, %u out, %g N, %g N m\n", opened->device.capabilities.name,
                 opened->device.capabilities.dof_in, opened->device.capabilities.dof_out,
                 opened->device.capabilities.max_force, opened->device.capabilities.max_torque);
-    if (!opened->about.empty()) std::printf("%s\n", opened->about.c_str());
+    if (!opened->about.empty()) std::printf("%s\n", printable(opened->about).c_str());
   }
   // The signal handler stops the motors at once. The view ends after that.
   set_signal_hook(

@@ -51,10 +51,10 @@ void print(const ordered_json& object) {
   for (const auto& [key, value] : object.items()) {
     const bool list = value.is_array() && !value.empty() && value.front().is_object();
     if (!list)
-      std::printf("%-18s %s\n", key.c_str(), text_of(value).c_str());
+      std::printf("%-18s %s\n", key.c_str(), printable(text_of(value)).c_str());
     else
       for (std::size_t i = 0; i < value.size(); ++i)
-        std::printf("%-18s %s\n", i == 0 ? key.c_str() : "", text_of(value[i]).c_str());
+        std::printf("%-18s %s\n", i == 0 ? key.c_str() : "", printable(text_of(value[i])).c_str());
   }
 }
 
@@ -169,8 +169,8 @@ Result<ordered_json> recording_info(const Console& console, const std::string& f
   return json;
 }
 
-Result<ordered_json> scene_info(const std::string& file) {
-  Result<io::Scene> s = io::read_scene(file);
+Result<ordered_json> scene_info(const std::string& file, bool outside) {
+  Result<io::Scene> s = io::read_scene(file, outside);
   if (!s) return s.failure();
   ordered_json bodies = ordered_json::array(), hands = ordered_json::array();
   for (const io::SceneBody& b : s->bodies)
@@ -213,7 +213,8 @@ Result<ordered_json> ply_info(const Console& console, const std::string& file, i
   return has_faces(file) ? mesh_info(console, file, unit) : shell_info(file);
 }
 
-int info_command(const Console& console, const std::string& file, const std::string& units) {
+int info_command(const Console& console, const std::string& file, const std::string& units,
+                 bool outside) {
   Result<io::Unit> unit = io::unit_from_name(units);
   if (!unit) return console.fail(unit.error(), kUsage);
   if (Outcome there = check_recording(file); !there) return console.fail(there.error());
@@ -225,7 +226,7 @@ int info_command(const Console& console, const std::string& file, const std::str
   else if (ending == ".h5" || ending == ".part")
     facts = recording_info(console, file);
   else if (ending == ".json")
-    facts = scene_info(file);
+    facts = scene_info(file, outside);
   else if (ending == ".csv")
     facts = path_info(file, *unit);
   else if (ending == ".ply")
@@ -269,7 +270,7 @@ void add_info(CLI::App& app, Program& program) {
       if (file->empty())
         return program.console.fail(
             "info needs a FILE, --schema or --settings; 'hapsix info --help' tells more", kUsage);
-      return info_command(program.console, *file, *units);
+      return info_command(program.console, *file, *units, program.allow_outside);
     };
   });
 }

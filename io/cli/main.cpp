@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // main.cpp - the program hapsix: parses and dispatches; exits with 0 (done), 1 (failed) or 2 (wrong
 // usage).
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cstring>
+#include <exception>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "hapsix/base.h"
 #include "io/cli/commands.h"
@@ -71,9 +76,36 @@ std::string version() {
   return text;
 }
 
+// Packages make threads before main begins, and one that gets none ends the process without a word
+// for the user. So this runs before them all and says what is wrong; main takes it away again.
+std::terminate_handler former_handler = nullptr;
+bool json_wanted = false;
+
+[[noreturn]] void no_start() {
+  static const char said[] =
+      "the program cannot start: the system gives it no thread or no memory; raise 'ulimit -u' and "
+      "'ulimit -v', or end other programs";
+  const auto put = [](int to, const char* text) { (void)!write(to, text, std::strlen(text)); };
+  put(STDERR_FILENO, "hapsix: "), put(STDERR_FILENO, said), put(STDERR_FILENO, "\n");
+  if (json_wanted)
+    put(STDOUT_FILENO, "{\n  \"error\": \""), put(STDOUT_FILENO, said),
+        put(STDOUT_FILENO, "\"\n}\n");
+  _exit(h6::cli::kFailed);
+}
+
+#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+void before_packages(int argc, char** argv, char**) {
+  for (int i = 1; i < argc; ++i) json_wanted = json_wanted || std::strcmp(argv[i], "--json") == 0;
+  former_handler = std::set_terminate(no_start);
+}
+__attribute__((section(".preinit_array"), used)) void (*const first)(int, char**,
+                                                                     char**) = before_packages;
+#endif
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (former_handler) std::set_terminate(former_handler);
   CLI::App app{"hapsix - 6-DoF haptic rendering of contact between complex parts", "hapsix"};
   app.require_subcommand(1);
   app.fallthrough();
@@ -83,6 +115,8 @@ int main(int argc, char** argv) {
   app.footer("Every command takes --json. Exit code: 0 done, 1 failed, 2 wrong usage.");
   Program program;
   app.add_flag("--json", program.console.json, "One JSON object on stdout, messages on stderr");
+  app.add_flag("--allow-outside", program.allow_outside,
+               "Scene files may name files outside their folder");
   app.set_version_flag("--version", version);
   add_bake(app, program);
   add_check(app, program);
@@ -115,6 +149,11 @@ int main(int argc, char** argv) {
   install_signal_handlers();
   try {
     return program.console.finish(program.work());
+  } catch (const std::system_error& e) {
+    if (e.code() != std::errc::resource_unavailable_try_again)
+      return program.console.fail(std::string("unexpected: ") + e.what());
+    return program.console.fail(
+        "the system gives no thread: raise 'ulimit -u', or end other programs");
   } catch (const std::bad_alloc&) {
     return program.console.fail(
         "out of memory: use a larger voxel, fewer points or a smaller file");

@@ -148,7 +148,7 @@ int report_command(const Console& console, const ReportOptions& o) {
   if (!bytes) return console.fail(bytes.error());
   console.result({{"report", o.output}, {"recordings", o.files}, {"bytes", *bytes}});
   if (!console.json)
-    std::printf("%s: %zu recording%s, %.1f MB; open it in a browser\n", o.output.c_str(),
+    std::printf("%s: %zu recording%s, %.1f MB; open it in a browser\n", printable(o.output).c_str(),
                 o.files.size(), o.files.size() == 1 ? "" : "s", 1e-6 * static_cast<double>(*bytes));
   return kOk;
 }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "device/device_spec.h"
 #include "io/cli/commands.h"
 #include "io/cli/tables.h"
 #include "io/cli/view_run.h"
@@ -19,7 +20,7 @@ namespace h6::cli {
 namespace {
 
 // Reads a scene file, or makes the generated scene of that name.
-Result<io::Scene> find_scene(const std::string& name) {
+Result<io::Scene> find_scene(const std::string& name, bool outside) {
   const bool is_file = std::filesystem::exists(name);
   std::vector<std::string> known;
   for (const io::SceneName& scene : io::scene_names()) known.push_back(scene.name);
@@ -32,18 +33,30 @@ Result<io::Scene> find_scene(const std::string& name) {
                                  : ", did you mean '" + like + "'?")};
   }
   if (Outcome there = check_input(name); !there) return there.failure();
-  return io::read_scene(name);
+  return io::read_scene(name, outside);
+}
+
+// A scene may come from a stranger: the script or recording that it names as a hand lies below its
+// folder.
+Outcome stays_inside(const io::Scene& scene, const io::SceneHand& hand, bool outside) {
+  if (outside || scene.file.empty()) return Done{};
+  const Result<device::DeviceSpec> spec = device::parse_device_spec(hand.device);
+  if (!spec) return spec.failure();
+  if (spec->target.empty() || io::lies_below(spec->target, scene.file)) return Done{};
+  return Failure{"hand of '" + hand.body + "': \"" + spec->target +
+                 "\" lies outside the folder of the scene file: move it there, or give "
+                 "--allow-outside if you trust the scene"};
 }
 
 int run_command(const Console& console, const std::string& name, const RunOptions& options,
-                const ViewOptions& view) {
+                const ViewOptions& view, bool outside) {
   if (view.on && options.virtual_time)
     return console.fail("--view shows a run in real time: leave --virtual-time out", kUsage);
   if (Outcome known = check_options(options); !known) return console.fail(known.error(), kUsage);
   for (const std::string& file : {options.record, options.trace, options.overlap})
     if (!file.empty())
       if (Outcome place = check_output(file); !place) return console.fail(place.error());
-  Result<io::Scene> scene = find_scene(name);
+  Result<io::Scene> scene = find_scene(name, outside);
   if (!scene) return console.fail(scene.error());
   if (options.device.empty())
     for (const io::SceneHand& hand : scene->hands) {
@@ -53,6 +66,8 @@ int run_command(const Console& console, const std::string& name, const RunOption
           0)  // a plug-in is code, and the scene may come from a stranger
         return console.fail(name + ": hand of '" + hand.body +
                             "': a scene does not load plug-ins by itself, give it with --device");
+      if (Outcome near = stays_inside(*scene, hand, outside); !near)
+        return console.fail(name + ": " + near.error());
     }
   auto loaded = [&] {
     const EndsAtOnce asked(console, name + ": cancelled");
@@ -78,13 +93,14 @@ int run_command(const Console& console, const std::string& name, const RunOption
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
                 depth_strip(*summary).c_str());
-    for (const std::string& remark : remarks(*summary)) std::printf("%s\n", remark.c_str());
+    for (const std::string& remark : remarks(*summary))
+      std::printf("%s\n", printable(remark).c_str());
     if (const std::string late = late_table(*summary); !late.empty())
       std::printf("\n%s", late.c_str());
     if (!options.virtual_time) std::printf("\nreal time: %s\n", summary->loop.granted);
-    if (!options.record.empty()) std::printf("recording: %s\n", options.record.c_str());
-    if (!options.trace.empty()) std::printf("timeline: %s\n", options.trace.c_str());
-    if (!options.overlap.empty()) std::printf("overlap: %s\n", options.overlap.c_str());
+    if (!options.record.empty()) std::printf("recording: %s\n", printable(options.record).c_str());
+    if (!options.trace.empty()) std::printf("timeline: %s\n", printable(options.trace).c_str());
+    if (!options.overlap.empty()) std::printf("overlap: %s\n", printable(options.overlap).c_str());
   }
   if (!summary->interrupted) return kOk;
   console.log("hapsix: " + stopped);
@@ -146,7 +162,7 @@ void add_run(CLI::App& app, Program& program) {
   add_view_options(*run, *view);
   run->callback([&program, name, o, view] {
     program.work = [&program, name, o, view] {
-      return run_command(program.console, *name, *o, *view);
+      return run_command(program.console, *name, *o, *view, program.allow_outside);
     };
   });
 }

@@ -27,7 +27,7 @@ int export_command(const Console& console, const std::string& name, const std::s
   if (Outcome done = io::export_scene(*scene, folder); !done) return console.fail(done.error());
   const std::string file = (std::filesystem::path(folder) / "scene.json").string();
   console.result({{"scene", name}, {"file", file}});
-  if (!console.json) std::printf("%s\n", file.c_str());
+  if (!console.json) std::printf("%s\n", printable(file).c_str());
   return kOk;
 }
 

@@ -89,7 +89,8 @@ void write_all(int to, const std::string& text) {
 EndsAtOnce::EndsAtOnce(const Console& console, const std::string& sentence) {
   static std::string error,
       result;  // the handler must not allocate, nor find these strings destroyed
-  error = (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("hapsix: " + sentence) + "\n";
+  error =
+      (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("hapsix: " + printable(sentence)) + "\n";
   result = console.json ? Console::text({{"error", sentence}}, 2) + "\n" : "";
   set_signal_hook(
       [](void*) {
@@ -103,7 +104,58 @@ EndsAtOnce::EndsAtOnce(const Console& console, const std::string& sentence) {
 
 EndsAtOnce::~EndsAtOnce() { set_signal_hook(nullptr, nullptr); }
 
-void Console::log(const std::string& text) const { std::fprintf(stderr, "%s\n", text.c_str()); }
+namespace {
+
+// The bytes of the UTF-8 character at `at`, and its code; 0 where there is none.
+std::size_t character(const std::string& text, std::size_t at, std::uint32_t& code) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(at);
+  const std::size_t bytes = lead < 0x80                   ? 1
+                            : lead >= 0xF0 && lead < 0xF5 ? 4
+                            : lead >= 0xE0 && lead < 0xF0 ? 3
+                            : lead >= 0xC2 && lead < 0xE0 ? 2
+                                                          : 0;
+  if (bytes == 0 || at + bytes > text.size()) return 0;
+  code = bytes == 1 ? lead : lead & (0x7Fu >> bytes);
+  for (std::size_t i = 1; i < bytes; ++i) {
+    if ((byte(at + i) & 0xC0) != 0x80) return 0;
+    code = code << 6 | (byte(at + i) & 0x3Fu);
+  }
+  return bytes;
+}
+
+bool harmless(std::uint32_t code) {
+  if (code == '\n' || code == '\t') return true;
+  const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
+  const bool turns = code == 0x200E || code == 0x200F || code == 0x61C ||
+                     (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
+  return !control && !turns && code != 0x2028 && code != 0x2029;
+}
+
+}  // namespace
+
+std::string printable(const std::string& text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    std::uint32_t code = 0;
+    const std::size_t bytes = character(text, at, code);
+    if (bytes > 0 && harmless(code)) {
+      out.append(text, at, bytes);
+      at += bytes;
+      continue;
+    }
+    for (const std::size_t end = at + std::max<std::size_t>(bytes, 1); at < end; ++at) {
+      char escaped[8];
+      std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<unsigned char>(text[at]));
+      out += escaped;
+    }
+  }
+  return out;
+}
+
+void Console::log(const std::string& text) const {
+  std::fprintf(stderr, "%s\n", printable(text).c_str());
+}
 
 void Console::warn(const std::vector<std::string>& sentences) const {
   for (const std::string& s : sentences) log("warning: " + s);
@@ -166,7 +218,7 @@ struct Bar {
     constexpr int width = 20;
     const int full = static_cast<int>(width * share);
     const double worked = std::chrono::duration<double>(now - began).count();
-    std::fprintf(stderr, "\r\033[K%-28.28s [%s%s] %3.0f %%%s", what.c_str(),
+    std::fprintf(stderr, "\r\033[K%-28.28s [%s%s] %3.0f %%%s", printable(what).c_str(),
                  std::string(full, '#').c_str(), std::string(width - full, ' ').c_str(),
                  100 * share, time_left(worked, share).c_str());
     std::fflush(stderr);

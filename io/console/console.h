@@ -53,6 +53,11 @@ extern std::atomic<bool> interrupted;
 void install_signal_handlers();
 void set_signal_hook(void (*hook)(void*), void* context);
 
+// `text` with its control characters escaped, "\x1b", because names come from files, and a terminal
+// obeys such characters. Line feeds and tabs stay; so do letters of every script. Bytes that are
+// not UTF-8 and characters that turn the direction of writing are escaped too.
+std::string printable(const std::string& text);
+
 std::string number(double value, int digits);
 
 }  // namespace h6::cli

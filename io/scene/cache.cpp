@@ -6,6 +6,9 @@
 // both succeed, and the second file replaces an equal one.
 #include "io/scene/cache.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cstdlib>
 #include <system_error>
 
@@ -22,6 +25,13 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
+// Another user could put wrong assets into a file or folder of theirs.
+bool is_own(const fs::path& place) {
+  struct stat found {};
+  return stat(place.c_str(), &found) == 0 && found.st_uid == geteuid() &&
+         (found.st_mode & S_IWOTH) == 0;
+}
+
 // The cache file of a key. Empty if there is no cache folder.
 fs::path cached_file(const std::string& key, const char* ending, Cached& cached) {
   const fs::path folder = cache_folder();
@@ -29,6 +39,13 @@ fs::path cached_file(const std::string& key, const char* ending, Cached& cached)
     cached.warnings.push_back(
         "There is no folder for baked assets, so this one is not kept: set "
         "HAPSIX_CACHE to a folder.");
+    return {};
+  }
+  std::error_code error;
+  if (fs::exists(folder, error) && !is_own(folder)) {
+    cached.warnings.push_back("The cache " + folder.string() +
+                              " is another user's, or open to all, so it is not used: set "
+                              "HAPSIX_CACHE to a folder of your own.");
     return {};
   }
   return folder / (key + ending);
@@ -46,7 +63,9 @@ bool is_it(const Result<Data>& read, const std::string& key, const fs::path& fil
 template <class Write>
 void store(const fs::path& file, Cached& cached, const Write& write) {
   std::error_code error;
-  fs::create_directories(file.parent_path(), error);  // if this fails, `write` reports it
+  // If this fails, `write` reports it.
+  if (fs::create_directories(file.parent_path(), error))
+    fs::permissions(file.parent_path(), fs::perms::owner_all, error);
   if (const Outcome kept = write(file); !kept) {
     cached.warnings.push_back("The baked asset is not kept in the cache. " + kept.error());
   }
@@ -60,7 +79,12 @@ Result<Data> through_cache(const std::string& key, const char* ending, bool keep
   cached.hit = cached.rebuilt = false;
   cached.file = cached_file(key, ending, cached);
   std::error_code error;
-  if (!cached.file.empty() && fs::exists(cached.file, error)) {
+  if (!cached.file.empty() && fs::exists(cached.file, error) && !is_own(cached.file)) {
+    cached.warnings.push_back("A file of the cache is another user's, so it is baked again: " +
+                              cached.file.string());
+    cached.rebuilt = true;
+    fs::remove(cached.file, error);  // what replaced it would keep its permissions
+  } else if (!cached.file.empty() && fs::exists(cached.file, error)) {
     Result<Data> found = read(cached.file);
     if (is_it(found, key, cached.file, cached)) {
       cached.hit = true;

@@ -5,6 +5,7 @@
 //   check_scene_json  checks every key, its kind and its range            (check.cpp)
 //   read_settings     copies values into the members of their rows        (setting_json.cpp)
 //   SceneReader       resolves names of bodies and files, and reads rows without a member
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -25,7 +26,8 @@ constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
 // Makes a Scene from JSON. check_scene_json must have accepted it, so kinds and ranges are right.
 class SceneReader {
  public:
-  explicit SceneReader(const fs::path& file) : folder_(file.parent_path()) {}
+  SceneReader(const fs::path& file, bool outside)
+      : folder_(file.parent_path()), scene_file_(file), outside_(outside) {}
   // Reads the scene of a recording, whose files need not exist.
   SceneReader() : recorded_(true) {}
 
@@ -46,6 +48,10 @@ class SceneReader {
   fs::path existing(const Json& o, const char* key, const std::string& at) const {
     const std::string name = o[key].get<std::string>();
     const fs::path file = folder_ / fs::path(name);  // an absolute name replaces the folder
+    if (!recorded_ && !outside_ && !lies_below(file, scene_file_))
+      throw Complaint{inside(at, key), "\"" + shown(name) +
+                                           "\" lies outside the folder of the scene file: move it "
+                                           "there, or give --allow-outside if you trust the scene"};
     std::error_code error;
     if (!recorded_ && !fs::is_regular_file(file, error))
       throw Complaint{
@@ -138,8 +144,8 @@ class SceneReader {
     read_settings(o["target"], target_settings(), &verdict, scale_);
   }
 
-  fs::path folder_;
-  bool recorded_ = false;
+  fs::path folder_, scene_file_;
+  bool recorded_ = false, outside_ = false;
   Scene scene_;
   double scale_ = 1;  // metres in one unit of the scene
 };
@@ -177,10 +183,20 @@ Result<Scene> parse(const std::string& text, const std::string& name, SceneReade
 
 }  // namespace
 
-Result<Scene> read_scene(const fs::path& file) {
+bool lies_below(const fs::path& file, const fs::path& scene) {
+  std::error_code failed;
+  const fs::path folder = fs::canonical(fs::absolute(scene, failed).parent_path(), failed);
+  if (failed) return false;
+  const fs::path place = fs::weakly_canonical(fs::absolute(file, failed), failed);
+  if (failed) return false;
+  return std::mismatch(folder.begin(), folder.end(), place.begin(), place.end()).first ==
+         folder.end();
+}
+
+Result<Scene> read_scene(const fs::path& file, bool outside) {
   const Result<std::string> text = read_text(file);
   if (!text) return text.failure();
-  Result<Scene> scene = parse(*text, file.string(), SceneReader(file));
+  Result<Scene> scene = parse(*text, file.string(), SceneReader(file, outside));
   if (!scene) return scene;
   if (scene->name.empty()) scene->name = file.stem().string();
   scene->file = file;

@@ -6,11 +6,14 @@
 namespace h6::io {
 
 // Reads a scene file and the hand paths it names. It does not read the meshes, but they must exist.
-// Relative file names start at the folder of the scene file. An error is one sentence that names
-// the file and the place: line and column where the text is not JSON, the path of the key
+// Relative file names start at the folder of the scene file. A scene may come from a stranger, so
+// its files must lie below that folder, unless `outside`. An error is one sentence that names the
+// file and the place: line and column where the text is not JSON, the path of the key
 // ("bodies[1].shell.voxels") where a key or value is wrong, the line of a bad path row. For an
 // unknown key it also names the nearest known key.
-Result<Scene> read_scene(const std::filesystem::path& file);
+Result<Scene> read_scene(const std::filesystem::path& file, bool outside = false);
+// Whether `file` lies below the folder of `scene`, symbolic links followed.
+bool lies_below(const std::filesystem::path& file, const std::filesystem::path& scene);
 
 // The CSV columns are `t,x,y,z,qw,qx,qy,qz`, with time in seconds and lengths in `unit`. The reader
 // skips a header line, blank lines and # comments. It normalises quaternions within 0.001 of unit

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Deadlines are absolute, late frames have one cause, denormals are flushed only in scope.
 #include <doctest/doctest.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <atomic>
@@ -195,6 +197,28 @@ TEST_CASE("the granted real-time support is described in words") {
   CHECK(text.find("SCHED_FIFO") != std::string::npos);
   CHECK(text.find("memory") != std::string::npos);
   if (!grant.fifo) CHECK(text.find("limits.conf") != std::string::npos);
+}
+
+TEST_CASE("the core is one that taskset leaves, and another one is not taken") {
+  cpu_set_t before, one;
+  REQUIRE(pthread_getaffinity_np(pthread_self(), sizeof before, &before) == 0);
+  int first = 0;
+  while (!CPU_ISSET(first, &before)) ++first;
+  CPU_ZERO(&one);
+  CPU_SET(first, &one);
+  REQUIRE(pthread_setaffinity_np(pthread_self(), sizeof one, &one) == 0);  // threads inherit it
+  for (const int asked : {-1, first, first + 1}) {
+    RealtimeGrant grant;
+    PeriodicThreadOptions options;
+    options.request.core = asked;
+    PeriodicThread thread(
+        options, {[&](const RealtimeGrant& g) { grant = g; },
+                  [](std::uint64_t, const TickTiming&, double) { return false; }, nullptr});
+    thread.join();
+    CHECK(grant.core == (asked > first ? -1 : first));
+    if (asked > first) CHECK(std::string(grant.text).find("taskset") != std::string::npos);
+  }
+  REQUIRE(pthread_setaffinity_np(pthread_self(), sizeof before, &before) == 0);
 }
 
 TEST_CASE("denormals are zero in scope and unchanged after it") {

@@ -65,7 +65,8 @@ json run(const fs::path& scene, const std::string& method, double duration = 0) 
   const fs::path out = workplace() / "out.json", log = workplace() / "log.txt";
   std::ostringstream command;
   command << "HAPSIX_CACHE='" << (workplace() / "cache").string() << "' '" << HAPSIX_PROGRAM
-          << "' run '" << scene.string() << "' --json --virtual-time --method " << method;
+          << "' run '" << scene.string() << "' --allow-outside --json --virtual-time --method "
+          << method;
   if (duration > 0) command << " --duration " << duration;
   command << " > '" << out.string() << "' 2> '" << log.string() << "'";
   const int code = std::system(command.str().c_str());

@@ -249,6 +249,31 @@ TEST_CASE("a damaged or foreign file is baked again, says so, and is then good")
   CHECK(field_run().hit);
 }
 
+TEST_CASE("a cache of another user, or open to all, is not used") {
+  const CacheFolder folder;
+  const fs::path file = shell_run().file;
+  const fs::path place = file.parent_path();
+  const fs::perms before = fs::status(place).permissions();
+  fs::permissions(place, fs::perms::others_write, fs::perm_options::add);
+  const Cached open = shell_run();
+  CHECK_FALSE(open.hit);
+  REQUIRE(open.warnings.size() == 1);
+  CHECK(open.warnings[0].find("open to all") != std::string::npos);
+  fs::permissions(place, before);
+  CHECK(shell_run().hit);
+  fs::permissions(file, fs::perms::others_write, fs::perm_options::add);
+  CHECK_FALSE(shell_run().hit);  // baked again, and its own from now on
+  CHECK(shell_run().hit);
+  if (geteuid() != 0) return;  // only root can give files away
+  for (const fs::path& given : {file, place}) {
+    REQUIRE(chown(given.c_str(), 65534, 65534) == 0);
+    const Cached foreign = shell_run();
+    CHECK_FALSE(foreign.hit);
+    CHECK(foreign.warnings.size() == 1);
+    CHECK(chown(given.c_str(), 0, 0) == 0);
+  }
+}
+
 TEST_CASE("a cache that cannot be written is a warning, not an error") {
   const CacheFolder folder;
   overwrite(folder.root / "file", "in the way");

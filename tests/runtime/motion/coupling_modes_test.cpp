@@ -256,8 +256,7 @@ TEST_CASE("a direct hand feels the contacts of its own pose, in the same frame")
   }
 }
 
-TEST_CASE(
-    "a direct body stays, at rest, while its hand sends no numbers, or huge ones") {
+TEST_CASE("a direct body stays, at rest, while its hand sends no numbers, or huge ones") {
   BoxOnFloor scene;
   scene.hand.coupling.mode = H6_COUPLING_DIRECT;
   scene.open();
