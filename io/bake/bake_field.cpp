@@ -8,8 +8,11 @@
 
 #include <algorithm>
 #include <new>
+#include <optional>
+#include <utility>
 
 #include "io/bake/grid.h"
+#include "io/bake/holes.h"
 #include "sched/clock.h"
 #include "sched/parallel_for.h"
 
@@ -87,7 +90,7 @@ void warn_of_gaps(const bake::Surface& surface, const bake::GapWeld& welded,
 }
 
 void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Inside& inside,
-          double seal, FieldBakeReport& report) {
+          double seal, SignMode sign, FieldBakeReport& report) {
   auto& out = report.warnings;
   if (surface.duplicates > 0)
     out.push_back(plural(surface.duplicates, "triangle is", "triangles are") +
@@ -98,15 +101,7 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
                   millimetres(2 * offset) + " thick, wires as much thicker, and gaps below " +
                   millimetres(2 * offset) + " close; more voxels make this smaller");
   if (surface.closed && seal > 0) out.push_back("the mesh is closed: there is no hole to seal");
-  if (report.sealed_area > 0) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "holes and gaps narrower than %s that lead deeper than that were closed: "
-                  "%.4g mm2 in all",
-                  millimetres(seal).c_str(), report.sealed_area * 1e6);
-    out.push_back(text);
-  }
-  if (!surface.closed && grid.offset < 0.5)
+  if (!surface.closed && grid.offset < 0.5 && sign != SignMode::winding)
     out.push_back(
         "the offset is below half a voxel and the mesh is open: the outside leaks in "
         "through every hole");
@@ -156,6 +151,115 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
   return Done{};
 }
 
+// The holes and cracks of an open mesh.
+struct Openings {
+  std::optional<bake::Winding> winding;  // of a mesh that is wound like a solid
+  std::size_t plugs = 0;                 // facets put across
+  std::vector<bake::Hole> sealed;        // widest first
+  std::optional<bake::Hole> leak;
+};
+
+// Shuts the holes that the winding knows, and plugs those with room for a plug.
+Outcome shut_by_winding(const FieldBake& options, const bake::Steps& steps, bake::Surface& surface,
+                        bake::Grid& grid, bake::NarrowBand& band, Openings& openings) {
+  using namespace bake;
+  constexpr double kWidest = 32;  // [voxel]
+  const unsigned threads = options.threads;
+  const bool any_width = options.sign == SignMode::winding && options.seal == 0;
+  Doors doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads);
+  while (any_width && doors.leak && grid.seal < kWidest) {
+    const double reach = grid.reach();
+    grid.seal *= 2;
+    if (grid.reach() > reach)
+      if (const Outcome done = measure(surface, grid, threads, steps, 0.3, 0.35, band); !done)
+        return done;
+    doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads);
+  }
+  const Plugs plugs(grid, band, doors.before, doors.shut);
+  openings.sealed = plugs.holes();
+  openings.leak = doors.leak;
+  const double reach = grid.reach(), width = std::exchange(grid.seal, 0);
+  // With an offset, plugs alone keep the outside out. Without one, narrow cracks need none.
+  const bool keep_shut = grid.offset < 0.5;
+  openings.plugs = plugs.put(keep_shut ? 0.75 : 0, surface);
+  const bool again = openings.plugs > 0 || grid.reach() < reach;
+  if (again)
+    if (const Outcome done = measure(surface, grid, threads, steps, 0.35, 0.6, band); !done)
+      return done;
+  if (!keep_shut) return Done{};
+  if (again) doors = shut_doors(surface, *openings.winding, grid, band, width, threads);
+  remove(doors.shut, threads, band.free);
+  return Done{};
+}
+
+// Distances and crossings of the surface, with its holes closed as far as was asked.
+Outcome measure_sealed(const FieldBake& options, const bake::Steps& steps, bake::Surface& surface,
+                       bake::Grid& grid, bake::NarrowBand& band, Openings& openings) {
+  using namespace bake;
+  const unsigned threads = options.threads;
+  const bool by_winding = options.sign == SignMode::winding && !surface.closed;
+  if (by_winding && options.seal == 0) grid.seal = 2;  // the first that is tried
+  if (!surface.closed && grid.seal > 0) openings.winding.emplace(surface, threads);
+  if (openings.winding && !openings.winding->trusted()) openings.winding.reset();
+  if (by_winding && !openings.winding)
+    return Failure{
+        "the triangles are not wound like a solid: they are sheets or face both ways; let the sign "
+        "be found by flood"};
+  const double measured = grid.seal > 0 ? 0.3 : 0.6;
+  if (const Outcome done = measure(surface, grid, threads, steps, 0.05, measured, band); !done)
+    return done;
+  if (openings.winding) return shut_by_winding(options, steps, surface, grid, band, openings);
+  if (grid.seal == 0) return Done{};
+  openings.plugs = plug_holes(grid, band, threads, surface, openings.sealed);
+  const double reach = grid.reach();
+  grid.seal = 0;
+  if (openings.plugs == 0 && grid.reach() == reach) return Done{};
+  return measure(surface, grid, threads, steps, 0.35, 0.6, band);
+}
+
+// Finds the way in where a solid drains.
+void look_for_leak(const bake::Surface& surface, const bake::Grid& grid,
+                   const bake::NarrowBand& band, const bake::Reached& reached, unsigned threads,
+                   Openings& openings) {
+  if (surface.closed || openings.leak) return;
+  if (!openings.winding) {
+    openings.winding.emplace(surface, threads);
+    if (!openings.winding->trusted()) return;
+  }
+  openings.leak = bake::find_leak(surface, *openings.winding, grid, band, reached, threads);
+}
+
+void warn_of_holes(const bake::Grid& grid, const Openings& openings, const FieldBake& options,
+                   FieldBakeReport& report) {
+  const auto in_metres = [&](const bake::Hole& h) {
+    return FieldBakeReport::Hole{grid.origin() + grid.voxel * h.place, h.width * grid.voxel};
+  };
+  const auto about = [](const FieldBakeReport::Hole& h) {
+    char text[120];
+    std::snprintf(text, sizeof text, "about %.3g mm wide at (%.4g, %.4g, %.4g) mm", 1e3 * h.width,
+                  1e3 * h.place.x, 1e3 * h.place.y, 1e3 * h.place.z);
+    return std::string(text);
+  };
+  for (const bake::Hole& h : openings.sealed) report.sealed.push_back(in_metres(h));
+  if (openings.leak) report.leaks.push_back(in_metres(*openings.leak));
+  if (!report.sealed.empty()) {
+    char area[40];
+    std::snprintf(area, sizeof area, "%.4g mm2", report.sealed_area * 1e6);
+    report.warnings.push_back(plural(report.sealed.size(), "hole was", "holes were") + " closed, " +
+                              area + " in all; the widest is " + about(report.sealed.front()));
+  }
+  if (openings.leak)
+    report.warnings.push_back(
+        "the outside runs into the solid through an opening " + about(report.leaks.front()) +
+        (options.seal > 0 ? ", which is wider than the seal: nothing holds inside; seal wider"
+         : options.sign == SignMode::winding
+             ? ", which is too wide to be closed: nothing holds inside; mend the mesh"
+             : ": nothing holds inside; bake with --seal, or with --sign winding"));
+  else if (options.seal > 0 && report.sealed.empty() && !report.closed)
+    report.warnings.push_back("no hole up to " + millimetres(options.seal) +
+                              " was found that leads into a solid: nothing was sealed");
+}
+
 Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                                const Progress& progress) {
   using namespace bake;
@@ -167,7 +271,7 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   Surface& surface = *prepared;
   GapWeld welded;
   if (const Outcome done = weld(mesh, options, surface, welded); !done) return done.failure();
-  const bool sealed = surface.closed && options.sign == SignMode::automatic;
+  const bool sealed = surface.closed && options.sign != SignMode::flood;
   Result<Grid> grid = choose_grid(surface, options, sealed);
   if (!grid) return grid.failure();
   const unsigned threads = options.threads;
@@ -176,21 +280,13 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   NarrowBand band;
   const bool parts = !surface.part.empty() && mesh.part_names.size() > 1;
   if (!parts) surface.part.clear();
-  const double measured = grid->seal > 0 ? 0.3 : 0.6;
-  if (const Outcome done = measure(surface, *grid, threads, steps, 0.05, measured, band); !done)
+  Openings openings;
+  if (const Outcome done = measure_sealed(options, steps, surface, *grid, band, openings); !done)
     return done.failure();
-  std::size_t plugs = 0;
-  if (grid->seal > 0) {
-    plugs = plug_holes(*grid, band, threads, surface);
-    const double reach = grid->reach();
-    grid->seal = 0;
-    if (plugs > 0 || grid->reach() < reach)
-      if (const Outcome done = measure(surface, *grid, threads, steps, 0.35, 0.6, band); !done)
-        return done.failure();
-  }
 
   if (!steps.tell("flood", 0.6)) return cancelled;
   const Reached reached = flood(surface, *grid, band, options.cavities, threads);
+  look_for_leak(surface, *grid, band, reached, threads, openings);
   Large<std::uint32_t>().swap(band.tiles.triangle);
   Large<std::uint64_t>().swap(band.tiles.near);
   Inside inside;
@@ -202,7 +298,7 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   field.bricks = grid->bricks;
   field.band = grid->band * grid->voxel;
   field.offset = grid->offset * grid->voxel;
-  field.sign_mode = sealed ? "closed" : "flood";
+  field.sign_mode = sealed ? "closed" : options.sign == SignMode::winding ? "winding" : "flood";
   field.triangles = mesh.triangles.size();
   if (!band.part.empty()) field.part_names = mesh.part_names;
   if (!steps.tell("samples", 0.8)) return cancelled;
@@ -215,11 +311,12 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   if (report) {
     report->stages = steps.stages();
     report->closed = surface.closed;
-    report->sealed_area = double(plugs) * grid->voxel * grid->voxel;
+    report->sealed_area = double(openings.plugs) * grid->voxel * grid->voxel;
+    warn_of_holes(*grid, openings, options, *report);
     report->welded = welded.left == 0 ? welded.vertices : 0;
     report->weld_widest = welded.left == 0 ? welded.widest : 0;
     warn_of_gaps(surface, welded, *report);
-    warn(surface, *grid, inside, options.seal, *report);
+    warn(surface, *grid, inside, options.seal, options.sign, *report);
   }
   return field;
 }

@@ -11,7 +11,10 @@
 
 namespace h6::io {
 
-enum class SignMode { automatic, flood };
+// `automatic`: closed meshes by `flood` without an offset, others by `flood` with one. `flood`: all
+// that the outside cannot reach is inside. `winding`: a solid with cracks and holes is closed where
+// its winding number passes one half, without an offset.
+enum class SignMode { automatic, flood, winding };
 // Regions that the outside cannot reach. `solid` fills them all. `hollow` counts the fewest walls
 // on any way from outside and leaves a region empty where that number is even: a ball inside a
 // hollow ball is solid again. But parts that overlap become hollow where they overlap, so `hollow`
@@ -24,9 +27,10 @@ struct FieldBake {
   double offset = -1;     // sigma [m]; < 0: automatic (0 for closed meshes, else 0.9 voxel)
   SignMode sign = SignMode::automatic;
   Cavities cavities = Cavities::solid;
-  // > 0: closes holes of an open mesh up to this width [m], so that a part with missing triangles
-  // does not drain. Also closes gaps narrower than this that lead to anything deeper; concave
-  // corners stay open. Has no effect on closed meshes.
+  // > 0: closes holes and cracks of an open mesh up to this width [m], so that a part with missing
+  // triangles does not drain. Where the mesh is wound like a solid, these are the ways into it;
+  // else gaps narrower than this that lead to anything deeper, while concave corners stay open. Has
+  // no effect on closed meshes. Under `winding`, 0 is any width up to 32 voxels.
   double seal = 0;
   // Welds vertices of open edges that are nearer than this to each other, where it closes the mesh
   // [voxel], 0 .. 1; 0: only equal ones. A hundredth moves the surface less than the samples are
@@ -43,7 +47,13 @@ struct FieldBake {
 // The report of a bake for its user.
 struct FieldBakeReport {
   bool closed = false;
-  double sealed_area = 0;             // [m^2] put across holes
+  double sealed_area = 0;  // [m^2] put across holes
+  struct Hole {
+    h6Vec3 place;  // [m]
+    double width;  // [m] of a ball that can pass, give or take a voxel
+  };
+  std::vector<Hole> sealed;           // widest first
+  std::vector<Hole> leaks;            // none, or one that is open and drains the solid
   std::size_t welded = 0;             // vertices, moved by `weld`
   double weld_widest = 0;             // [m] farthest that one of them moved
   std::vector<std::string> warnings;  // a sentence each

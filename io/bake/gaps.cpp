@@ -68,15 +68,16 @@ class Nearby {
 
 void weld_gaps(const Mesh& mesh, double tolerance, unsigned threads, Surface& surface,
                GapWeld& welded) {
-  const std::size_t rim =
-      std::size_t(std::count(surface.odd_vertex.begin(), surface.odd_vertex.end(), 1));
+  std::vector<std::uint8_t> is_odd(surface.vertices.size(), 0);
+  for (const auto& edge : surface.odd) is_odd[edge[0]] = is_odd[edge[1]] = 1;
+  const std::size_t rim = std::size_t(std::count(is_odd.begin(), is_odd.end(), 1));
   Mesh closer;
   std::vector<std::uint32_t> twin(surface.vertices.size());
   Nearby nearby(rim, surface.low, tolerance);
   GapWeld found;
   for (std::uint32_t v = 0; v < twin.size(); ++v) {
     twin[v] = v;
-    if (!surface.odd_vertex[v]) continue;
+    if (!is_odd[v]) continue;
     twin[v] = nearby.find_or_add(v, surface.vertices);
     if (twin[v] == v) continue;
     ++found.vertices;

@@ -76,10 +76,10 @@ struct Surface {
   std::vector<std::array<std::uint32_t, 3>> flat;  // those left out for want of area
   Vec3 low{}, high{};                              // [m]
   std::size_t duplicates = 0;
-  std::size_t open_edges = 0;            // edges of one face
-  std::size_t odd_edges = 0;             // edges of an odd number of faces
-  bool closed = false;                   // every edge has an even number of faces
-  std::vector<std::uint8_t> odd_vertex;  // (vertices) 1: of an odd edge; empty if there is none
+  std::size_t open_edges = 0;                     // edges of one face
+  std::size_t odd_edges = 0;                      // edges of an odd number of faces
+  bool closed = false;                            // every edge has an even number of faces
+  std::vector<std::array<std::uint32_t, 2>> odd;  // edges of an odd number of faces, in order
 };
 Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
 // gaps.cpp: moves vertices of odd edges to others within `tolerance` [m] if this closes the mesh.
@@ -216,8 +216,12 @@ void cross_tile(const Surface& surface, const Grid& grid, std::size_t tile,
 
 // seal.cpp: adds facets across holes up to grid.seal wide and returns how many; each is a square
 // voxel.
-std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads,
-                       Surface& surface);
+struct Hole {
+  Vec3 place;    // [voxel] in its middle
+  double width;  // [voxel] of a ball that can pass, give or take a voxel
+};
+std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned threads, Surface& surface,
+                       std::vector<Hole>& holes);
 
 // sign.cpp: the set R that the outside reaches without entering u <= offset or crossing a triangle.
 struct Reached {

@@ -4,7 +4,7 @@
 // Hilbert's curve keeps neighbours together, but eight successive triangles on it may still lie
 // around an edge or across faces. So every run of 512 is halved until eights are left, each time
 // along the axis that gives the smallest boxes. A search then looks at a third fewer leaves.
-#include "io/bake/leaves.h"
+#include "io/bake/tree.h"
 
 #include <algorithm>
 #include <utility>

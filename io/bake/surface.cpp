@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // surface.cpp - the triangles that count, whether they close, and the grid around them.
 #include <algorithm>
-#include <atomic>
 #include <cstdio>
 #include <utility>
 
@@ -112,6 +111,7 @@ void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, u
                  Surface& surface) {
   struct alignas(64) Count {
     std::size_t open = 0, odd = 0;
+    std::vector<std::array<std::uint32_t, 2>> edges;
   };
   std::array<Count, kRanges> found;
   const auto edges = [&](std::size_t i, auto&& add) {
@@ -120,7 +120,6 @@ void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, u
     for (std::size_t k = 0; k < 3; ++k)
       add(Item{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
   };
-  std::vector<std::uint8_t> odd(mesh.vertices.size(), 0);
   by_vertex(mesh.vertices.size(), mesh.triangles.size(), threads, edges,
             [&](std::size_t range, std::size_t vertex, std::uint32_t* begin, std::uint32_t* end) {
               std::sort(begin, end);
@@ -129,16 +128,15 @@ void count_edges(const Mesh& mesh, const std::vector<std::uint8_t>& duplicate, u
                 found[range].open += next - begin == 1;
                 if ((next - begin) % 2 == 0) continue;
                 ++found[range].odd;
-                std::atomic_ref(odd[vertex]).store(1, std::memory_order_relaxed);
-                std::atomic_ref(odd[*begin]).store(1, std::memory_order_relaxed);
+                found[range].edges.push_back({std::uint32_t(vertex), *begin});
               }
             });
   for (const Count& c : found) {
     surface.open_edges += c.open;
     surface.odd_edges += c.odd;
+    surface.odd.insert(surface.odd.end(), c.edges.begin(), c.edges.end());
   }
   surface.closed = surface.odd_edges == 0;
-  if (!surface.closed) surface.odd_vertex = std::move(odd);
 }
 
 std::string number(double value) {
@@ -281,7 +279,8 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
                           surface.high.z - surface.low.z};
   const double longest = std::max({side[0], side[1], side[2]});
   const bool automatic = options.offset < 0;
-  const double auto_offset = sealed ? 0.0 : 0.9;  // [voxel]
+  const bool winding = options.sign == SignMode::winding;
+  const double auto_offset = sealed || winding ? 0.0 : 0.9;  // [voxel]
   const double margin = grid.band + 2 + (automatic ? auto_offset : 0.0);
   const double extra = automatic ? 0.0 : options.offset;  // [m], on each side
   const double seal = sealed ? 0.0 : options.seal;        // [m]; a ball of it passes all around
@@ -303,7 +302,7 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
     return Failure{"the offset of " + number(options.offset) + " m is " + number(grid.offset) +
                    " voxels; at most 64 are possible: choose larger voxels"};
   grid.seal = seal / grid.voxel;
-  if (grid.seal > 0 && grid.offset < 0.6)
+  if (grid.seal > 0 && grid.offset < 0.6 && !winding)
     return Failure{"sealing holes needs an offset of at least 0.6 voxel (" +
                    number(0.6 * grid.voxel) + " m)"};
   if (grid.seal > 32)

@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "io/bake/leaves.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {

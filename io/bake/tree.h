@@ -8,6 +8,10 @@
 
 namespace h6::io::bake {
 
+// leaves.cpp: all triangles, in an order in which runs of 8, 64 and 512 have small boxes around
+// them.
+Large<std::uint32_t> order_for_leaves(const Surface& surface, unsigned threads);
+
 // A tree without pointers: each level is an array, a leaf has eight triangles, a node has eight
 // leaves or nodes, and the triangles follow Hilbert's curve. The distance it finds does not depend
 // on where a search starts. io/mesh/ray_scene.h says when to use which of the two searches.

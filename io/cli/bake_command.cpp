@@ -107,8 +107,20 @@ struct FieldOptions {
   bool no_compression = false;
 };
 
+// The widest of them, with places and widths in metres.
+ordered_json holes_json(const std::vector<io::FieldBakeReport::Hole>& holes) {
+  constexpr std::size_t kMost = 100;
+  ordered_json places = ordered_json::array();
+  for (std::size_t i = 0; i < std::min(holes.size(), kMost); ++i)
+    places.push_back({{"place", {holes[i].place.x, holes[i].place.y, holes[i].place.z}},
+                      {"width", holes[i].width}});
+  return {{"count", holes.size()}, {"widest", places}};
+}
+
 int bake_field_command(const Console& console, FieldOptions& o) {
-  o.bake.sign = o.sign == "flood" ? io::SignMode::flood : io::SignMode::automatic;
+  o.bake.sign = o.sign == "flood"     ? io::SignMode::flood
+                : o.sign == "winding" ? io::SignMode::winding
+                                      : io::SignMode::automatic;
   o.bake.cavities = o.cavities == "hollow" ? io::Cavities::hollow : io::Cavities::solid;
   o.bake.threads = o.common.threads;
   Result<io::Unit> unit = io::unit_from_name(o.common.units);
@@ -152,6 +164,8 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                     {"sign_mode", field->sign_mode},
                     {"offset", field->offset},
                     {"sealed_area", report.sealed_area},
+                    {"sealed", holes_json(report.sealed)},
+                    {"leaks", holes_json(report.leaks)},
                     {"welded", report.welded},
                     {"weld_widest", report.weld_widest},
                     {"warnings", report.warnings}};
@@ -245,10 +259,11 @@ void add_field(CLI::App* bake, Program& program) {
       ->check(number_within(0, 1e6));
   field
       ->add_option("--sign", f->sign,
-                   "How the inside is found: flood (all that the outside cannot reach) or auto "
-                   "(default; flood only where the mesh is open)")
+                   "How the inside is found: flood (all that the outside cannot reach), winding (a "
+                   "solid with cracks and holes is closed across them) or auto (default; flood "
+                   "with an offset where the mesh is open)")
       ->option_text("MODE")
-      ->check(one_of({"auto", "flood"}));
+      ->check(one_of({"auto", "flood", "winding"}));
   field->add_option("--cavities", f->cavities, "Enclosed hollows: solid (default) or hollow")
       ->option_text("MODE")
       ->check(one_of({"solid", "hollow"}));

@@ -79,7 +79,8 @@ const Setting kMeshRow =
     by_hand("mesh", Kind::text, "triangle mesh (STL, OBJ, PLY, glTF, COLLADA, .gz) to bake");
 
 constexpr Choice kSigns[] = {{"auto", static_cast<int>(SignMode::automatic)},
-                             {"flood", static_cast<int>(SignMode::flood)}};
+                             {"flood", static_cast<int>(SignMode::flood)},
+                             {"winding", static_cast<int>(SignMode::winding)}};
 constexpr Choice kCavities[] = {{"solid", static_cast<int>(Cavities::solid)},
                                 {"hollow", static_cast<int>(Cavities::hollow)}};
 constexpr Setting kFieldBakeRows[] = {

@@ -108,7 +108,7 @@ TEST_CASE("seal: a box with a hole drains without it and holds with it") {
     CHECK(report.sealed_area > 0.8 * open * open);
     CHECK(report.sealed_area < 3 * width * width);
     CHECK(std::any_of(report.warnings.begin(), report.warnings.end(), [](const std::string& w) {
-      return w.find("were closed") != std::string::npos;
+      return w.find("closed, ") != std::string::npos;
     }));
   }
 }

@@ -150,7 +150,7 @@ TEST_CASE("options out of range are wrong usage, told before the mesh is read") 
   refused(box, with(shell, "--spacing", "0"), 2, {"--spacing", "above 0"});
   refused(box, with(shell, "--levels", "17"), 2, {"--levels", "1 to 16"});
   refused(box, with(field, "--units", "furlong"), 2, {"--units", "furlong", "m, mm, cm or in"});
-  refused(box, with(field, "--sign", "maybe"), 2, {"--sign", "auto or flood"});
+  refused(box, with(field, "--sign", "maybe"), 2, {"--sign", "auto, flood or winding"});
   refused(box, with(field, "--threads", "-1"), 2, {"--threads"});
   refused(box, with(with(field, "--voxels", "64"), "--voxel-size", "1"), 2,
           {"--voxels", "--voxel-size"});
