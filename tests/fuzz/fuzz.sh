@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# fuzz.sh [TARGET] [SECONDS] - runs build/fuzz/tests/hapsix_fuzz on one target, or on all in turn.
+# Seeds: tests/fuzz/corpus. What it learns stays in build/fuzz/corpus; findings go to
+# build/fuzz/findings and belong into tests/fuzz/findings/TARGET once they are mended.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+program=${HAPSIX_FUZZER:-build/fuzz/tests/hapsix_fuzz}
+all=$(ls tests/fuzz/corpus)
+case "${1:-}" in ""|[0-9]*) targets=$all ;; *) targets=$1; shift ;; esac
+seconds=${1:-60}
+each=$((seconds / $(echo $targets | wc -w)))
+[ "$each" -ge 1 ] || each=1
+export ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1
+found=0
+printf '%-10s %12s %10s %9s %9s\n' target executions coverage features findings
+for target in $targets; do
+  [ -d "tests/fuzz/corpus/$target" ] || { echo "fuzz: no target '$target': $(echo $all)" >&2; exit 2; }
+  learnt=build/fuzz/corpus/$target kept=build/fuzz/findings/$target log=build/fuzz/$target.log
+  mkdir -p "$learnt" "$kept"
+  HAPSIX_FUZZ=$target "$program" -max_total_time="$each" -timeout=20 -rss_limit_mb=4000 \
+    -print_final_stats=1 -artifact_prefix="$kept/" "$learnt" "tests/fuzz/corpus/$target" \
+    >"$log" 2>&1 || true
+  runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
+  edges=$(grep -o 'cov: [0-9]*' "$log" | tail -n 1 | cut -c6-) || true
+  features=$(grep -o 'ft: [0-9]*' "$log" | tail -n 1 | cut -c5-) || true
+  count=$(find "$kept" -type f | wc -l)
+  found=$((found + count))
+  printf '%-10s %12s %10s %9s %9s\n' "$target" "${runs:-0}" "${edges:--}" "${features:--}" "$count"
+  # A target that ran nothing has said why.
+  [ "${runs:-0}" -gt 0 ] || { tail -n 5 "$log" >&2; found=$((found + 1)); }
+done
+[ "$found" = 0 ] || { echo "fuzz: findings in build/fuzz/findings, words in build/fuzz/*.log" >&2; exit 1; }

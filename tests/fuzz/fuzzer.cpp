@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// fuzzer.cpp - libFuzzer's door to the target that HAPSIX_FUZZ names.
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+
+#include "tests/fuzz/targets.h"
+
+namespace {
+const h6::fuzz::Target* target = nullptr;
+}
+
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+  const char* name = std::getenv("HAPSIX_FUZZ");
+  target = h6::fuzz::find_target(name ? name : "");
+  if (target) return 0;
+  std::fprintf(stderr, "HAPSIX_FUZZ names none of:");
+  for (const h6::fuzz::Target& t : h6::fuzz::targets()) std::fprintf(stderr, " %s", t.name);
+  std::fprintf(stderr, "\n");
+  std::exit(2);
+}
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  target->take({reinterpret_cast<const char*>(bytes), size});
+  return 0;
+}

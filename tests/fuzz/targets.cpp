@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/fuzz/targets.h"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "device/device_spec.h"
+#include "device/scripted_hand.h"
+#include "device/spacemouse_report.h"
+#include "io/field/field_file.h"
+#include "io/field/raw_field.h"
+#include "io/file/gunzip.h"
+#include "io/mesh/mesh.h"
+#include "io/mesh/mesh_file.h"
+#include "io/record/recording.h"
+#include "io/scene/scene_file.h"
+#include "io/shell/shell_file.h"
+#include "io/view/view_request.h"
+
+namespace h6::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Every refusal is one sentence that a terminal can show.
+void check_sentence(const std::string& sentence) {
+  promise(!sentence.empty() && sentence.size() < 5000, "an error is one sentence");
+}
+
+template <const char* Name>
+void take_mesh(std::string_view bytes) {
+  const auto mesh = io::parse_mesh(std::string(bytes), Name);
+  if (!mesh) return check_sentence(mesh.error());
+  promise(!mesh->triangles.empty(), "a mesh has triangles");
+  for (const auto& t : mesh->triangles)
+    for (const auto v : t) promise(v < mesh->vertices.size(), "a triangle names vertices");
+  for (const auto& p : mesh->vertices)
+    promise(std::abs(p.x) <= 1e6 && std::abs(p.y) <= 1e6 && std::abs(p.z) <= 1e6,
+            "vertices lie within 1e6 m");
+}
+constexpr char kStl[] = "m.stl", kObj[] = "m.obj", kPly[] = "m.ply", kGltf[] = "m.gltf",
+               kGlb[] = "m.glb", kDae[] = "m.dae", kGz[] = "m.stl.gz";
+
+void take_shell(std::string_view bytes) {
+  const auto shell = io::parse_shell(bytes, "s.ply");
+  if (!shell) return check_sentence(shell.error());
+  promise(shell->size() > 0, "a shell has points");
+}
+
+void take_field(std::string_view bytes) {
+  const auto field = io::read_raw_field(as_file(bytes, "f.field"));
+  if (!field) check_sentence(field.error());
+}
+
+void take_vdb(std::string_view bytes) {
+  const auto field = io::read_field(as_file(bytes, "f.vdb"));
+  if (!field) check_sentence(field.error());
+}
+
+void take_scene(std::string_view bytes) {
+  const auto text = io::read_scene_text(std::string(bytes), "scene.json");
+  if (!text) check_sentence(text.error());
+  const auto file = io::read_scene(as_file(bytes, "scene.json"));
+  if (!file) check_sentence(file.error());
+}
+
+void take_path(std::string_view bytes) {
+  const auto path = io::read_path(as_file(bytes, "p.csv"), io::Unit::mm);
+  if (!path) return check_sentence(path.error());
+  promise(!path->empty(), "a path has rows");
+  double last = -1e300;
+  for (const auto& row : *path) {
+    promise(std::isfinite(row.t) && row.t >= last, "times rise");
+    last = row.t;
+    promise(std::isfinite(row.pose.p.x + row.pose.p.y + row.pose.p.z), "positions are finite");
+  }
+}
+
+void take_script(std::string_view bytes) {
+  const auto script =
+      device::read_hand_script(std::string(bytes), 1e-3, {{0, 0, 0}, {1, 0, 0, 0}}, {});
+  if (!script) check_sentence(script.error());
+}
+
+void take_spec(std::string_view bytes) {
+  const auto spec = device::parse_device_spec(std::string(bytes));
+  if (!spec) return check_sentence(spec.error());
+  device::OptionReader read(*spec);
+  double number = 1;
+  unsigned long long whole = 1;
+  bool yes = false;
+  read.number("speed", 0, 10, number), read.whole("seed", 100, whole), read.yes_no("on", yes);
+  (void)read.finish();
+  promise(number >= 0 && number <= 10 && whole <= 100, "options stay in their ranges");
+}
+
+void take_hid(std::string_view bytes) {
+  const auto* from = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  const std::size_t cut = bytes.empty() ? 0 : from[0] % (bytes.size() + 1);
+  const auto layout = device::layout_of_descriptor({from, cut});
+  device::SpaceMouseState state;
+  for (std::size_t at = cut; at < bytes.size(); at += 13)
+    (void)device::take_report({from + at, std::min<std::size_t>(13, bytes.size() - at)}, layout,
+                              state);
+}
+
+void take_gz(std::string_view bytes) {
+  const auto text = io::gunzip(bytes, "x.gz");
+  if (!text) check_sentence(text.error());
+}
+
+void take_request(std::string_view bytes) {
+  const auto request = io::view::parse_request(bytes);
+  if (!request) return check_sentence(request.error());
+  if (const auto* move = std::get_if<io::view::MoveHand>(&*request)) {
+    const h6Pose& p = move->pose;
+    const double n = std::sqrt(p.q.w * p.q.w + p.q.x * p.q.x + p.q.y * p.q.y + p.q.z * p.q.z);
+    promise(std::fabs(p.p.x) <= 1e3 && std::fabs(n - 1) < 1e-9, "a hand has a pose");
+  }
+}
+
+void read_recording(const std::string& file) {
+  const auto recording = io::read_recording(file, {0, 5000});
+  if (!recording) return check_sentence(recording.error());
+  promise(recording->frames.size() <= recording->frame_count, "no more frames than there are");
+  promise(recording->seals.empty() || recording->seals.size() == recording->frames.size(),
+          "a seal for each frame");
+}
+void take_recording(std::string_view bytes) { read_recording(as_file(bytes, "r.h5")); }
+void take_log(std::string_view bytes) {
+  const std::string log = as_file(bytes, "l.h5.part");
+  const std::string file = log.substr(0, log.size() - 5);
+  std::error_code ignored;
+  fs::remove(file, ignored);
+  read_recording(file);
+  fs::remove(file, ignored);
+}
+
+constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},    {"obj", take_mesh<kObj>},
+                               {"ply", take_mesh<kPly>},    {"gltf", take_mesh<kGltf>},
+                               {"glb", take_mesh<kGlb>},    {"dae", take_mesh<kDae>},
+                               {"mesh_gz", take_mesh<kGz>}, {"gz", take_gz},
+                               {"shell", take_shell},       {"field", take_field},
+                               {"vdb", take_vdb},           {"scene", take_scene},
+                               {"path", take_path},         {"script", take_script},
+                               {"device", take_spec},       {"hid", take_hid},
+                               {"request", take_request},   {"recording", take_recording},
+                               {"log", take_log},           {"contract", take_contract}};
+
+}  // namespace
+
+std::span<const Target> targets() { return kTargets; }
+
+const Target* find_target(std::string_view name) {
+  for (const Target& target : kTargets)
+    if (name == target.name) return &target;
+  return nullptr;
+}
+
+void broken(const char* promise) {
+  std::fprintf(stderr, "a promise is broken: %s\n", promise);
+  std::abort();
+}
+
+std::string as_file(std::string_view bytes, const char* name) {
+  struct Folder {
+    fs::path path;
+    Folder() {
+      std::string made =
+          fs::is_directory("/dev/shm") ? "/dev/shm/hapsix-fuzz-XXXXXX" : "/tmp/hapsix-fuzz-XXXXXX";
+      if (!mkdtemp(made.data())) broken("there is a folder for files");
+      path = made;
+    }
+    ~Folder() {
+      std::error_code ignored;
+      fs::remove_all(path, ignored);
+    }
+  };
+  static const Folder folder;
+  const fs::path file = folder.path / name;
+  std::ofstream(file, std::ios::binary | std::ios::trunc)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  return file;
+}
+
+}  // namespace h6::fuzz
