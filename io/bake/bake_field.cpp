@@ -166,14 +166,15 @@ Outcome shut_by_winding(const FieldBake& options, const bake::Steps& steps, bake
   constexpr double kWidest = 32;  // [voxel]
   const unsigned threads = options.threads;
   const bool any_width = options.sign == SignMode::winding && options.seal == 0;
-  Doors doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads);
+  Sides known;
+  Doors doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads, known);
   while (any_width && doors.leak && grid.seal < kWidest) {
     const double reach = grid.reach();
     grid.seal *= 2;
     if (grid.reach() > reach)
       if (const Outcome done = measure(surface, grid, threads, steps, 0.3, 0.35, band); !done)
         return done;
-    doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads);
+    doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads, known);
   }
   const Plugs plugs(grid, band, doors.before, doors.shut);
   openings.sealed = plugs.holes();
@@ -187,7 +188,7 @@ Outcome shut_by_winding(const FieldBake& options, const bake::Steps& steps, bake
     if (const Outcome done = measure(surface, grid, threads, steps, 0.35, 0.6, band); !done)
       return done;
   if (!keep_shut) return Done{};
-  if (again) doors = shut_doors(surface, *openings.winding, grid, band, width, threads);
+  if (again) doors = shut_doors(surface, *openings.winding, grid, band, width, threads, known);
   remove(doors.shut, threads, band.free);
   return Done{};
 }

@@ -63,16 +63,25 @@ Masks near_rims(const Surface& surface, const Grid& grid, const NarrowBand& band
 
 // Those of the nodes that lie in the solid.
 Masks in_solid(const Winding& winding, const Grid& grid, const NarrowBand& band, const Masks& nodes,
-               unsigned threads) {
+               unsigned threads, Sides& known) {
   Masks in(nodes.size());
+  Sides now{band.row, Masks(nodes.size()), Masks(nodes.size())};
   sched::parallel_for(nodes.size(), threads, [&](std::size_t r) {
-    in[r] = NodeMask{};
+    const std::int32_t last = known.row.empty() ? -1 : known.row[band.cell[r]];
+    NodeMask& solid = now.solid[r];
+    NodeMask& asked = now.asked[r];
+    solid = last < 0 ? NodeMask{} : known.solid[std::size_t(last)];
+    asked = last < 0 ? NodeMask{} : known.asked[std::size_t(last)];
+    const NodeMask ask = nodes[r] & ~asked;
     for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t bits = nodes[r].z[z]; bits != 0; bits &= bits - 1) {
+      for (std::uint64_t bits = ask.z[z]; bits != 0; bits &= bits - 1) {
         const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
-        if (winding.inside(place_of(grid, band, r, n))) in[r].set(n);
+        if (winding.inside(place_of(grid, band, r, n))) solid.set(n);
       }
+    asked = asked | nodes[r];
+    in[r] = solid & nodes[r];
   });
+  known = std::move(now);
   return in;
 }
 
@@ -115,11 +124,11 @@ std::optional<Hole> door(const Grid& grid, const NarrowBand& band, const Masks& 
 }  // namespace
 
 Doors shut_doors(const Surface& surface, const Winding& winding, const Grid& grid,
-                 const NarrowBand& band, double width, unsigned threads) {
+                 const NarrowBand& band, double width, unsigned threads, Sides& known) {
   Doors doors;
   // A node of the solid beside a hole is within a voxel of the hole's middle.
   const Masks near = near_rims(surface, grid, band, width / 2 + 1.75, threads);
-  const Masks solid = in_solid(winding, grid, band, near, threads);
+  const Masks solid = in_solid(winding, grid, band, near, threads, known);
   doors.shut = solid;
   Masks reached;
   const auto flood_again = [&] {
@@ -137,7 +146,7 @@ Doors shut_doors(const Surface& surface, const Winding& winding, const Grid& gri
   const Masks behind = in_solid(
       winding, grid, band,
       for_rows(band, threads, [&](std::size_t r) { return around[r] & ~near[r] & reached[r]; }),
-      threads);
+      threads, known);
   // A hole a little wider has room on both sides of its middle.
   const double level = width / 2 + 0.25;
   const Masks beside = neighbours(
@@ -167,7 +176,8 @@ std::optional<Hole> find_leak(const Surface& surface, const Winding& winding, co
   Masks near = near_rims(surface, grid, band, grid.offset + 2, threads);
   sched::parallel_for(near.size(), threads,
                       [&](std::size_t r) { near[r] = near[r] & reached.node[r]; });
-  const Masks solid = in_solid(winding, grid, band, near, threads);
+  Sides known;
+  const Masks solid = in_solid(winding, grid, band, near, threads, known);
   remove(solid, threads, near);
   return door(grid, band, near, solid, threads);
 }

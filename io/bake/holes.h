@@ -15,10 +15,15 @@ struct Doors {
   Masks before;              // (rows) nodes outside, before these, that are reached
   std::optional<Hole> leak;  // a hole that is wider than asked, through which the solid drains
 };
+// The nodes whose side is known already, for another band of the same grid.
+struct Sides {
+  std::vector<std::int32_t> row;  // (cells), of the masks; empty: nothing is known
+  Masks asked, solid;             // (rows)
+};
 // Shuts holes and cracks up to `width` [voxel] wide. Needs the mesh's odd edges, and rows to half
 // the width from the surface. What lies behind a wider hole stays open.
 Doors shut_doors(const Surface& surface, const Winding& winding, const Grid& grid,
-                 const NarrowBand& band, double width, unsigned threads);
+                 const NarrowBand& band, double width, unsigned threads, Sides& known);
 
 // Takes some nodes out of a set.
 void remove(const Masks& some, unsigned threads, Masks& from);

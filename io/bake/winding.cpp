@@ -10,7 +10,7 @@ namespace h6::io::bake {
 namespace {
 
 constexpr std::size_t kFan = 8;
-constexpr double kFar = 3;  // radii from which a cluster is a dipole
+constexpr double kFar = 2;  // radii from which a cluster is a dipole
 
 std::array<float, 3> floats(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
 Vec3 doubles(const std::array<float, 3>& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
@@ -67,15 +67,26 @@ Winding::Winding(const Surface& surface, unsigned threads)
   look_at_surface();
 }
 
-// A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", 1983.
-double Winding::of_triangle(std::uint32_t triangle, const Vec3& p) const {
+// Half the solid angle of the triangle turns the sum (A. van Oosterom, J. Strackee, "The solid
+// angle of a plane triangle", 1983). It is less than half a turn, so the side of the real axis
+// before and after tells a full turn, and one arc tangent serves all triangles.
+void Winding::turn(std::uint32_t triangle, const Vec3& p, Turns& sum) const {
   const auto& t = surface_.triangles[triangle];
   const Vec3 a = surface_.vertices[t[0]] - p, b = surface_.vertices[t[1]] - p,
              c = surface_.vertices[t[2]] - p;
   const double la = norm(a), lb = norm(b), lc = norm(c);
-  return std::atan2(dot(a, cross(b, c)),
-                    la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb) /
-         (2 * std::numbers::pi);
+  const double y = dot(a, cross(b, c)),
+               x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+  const double length2 = x * x + y * y;
+  if (!(length2 > 1e-200)) return;  // p is on the triangle's rim
+  const double scale = 1 / std::sqrt(length2);
+  const double before = sum.y, cosine = x * scale, sine = y * scale;
+  sum.y = sum.x * sine + before * cosine;
+  sum.x = sum.x * cosine - before * sine;
+  if (y >= 0)
+    sum.full += before >= 0 && sum.y < 0;
+  else
+    sum.full -= before < 0 && sum.y >= 0;
 }
 
 double Winding::at(const Vec3& p) const {
@@ -86,6 +97,7 @@ double Winding::at(const Vec3& p) const {
   int depth = 0;
   stack[depth++] = {std::uint32_t(level_.size()) - 1, 0};
   double sum = 0;
+  Turns turns;
   while (depth > 0) {
     const Entry e = stack[--depth];
     const Cluster& cluster = level_[e.level][e.cluster];
@@ -98,13 +110,13 @@ double Winding::at(const Vec3& p) const {
     const std::size_t first = kFan * e.cluster;
     if (e.level == 0) {
       for (std::size_t k = first; k < std::min(count_, first + kFan); ++k)
-        sum += of_triangle(triangle_[k], p);
+        turn(triangle_[k], p, turns);
       continue;
     }
     const std::size_t end = std::min(level_[e.level - 1].size(), first + kFan);
     for (std::size_t k = first; k < end; ++k) stack[depth++] = {e.level - 1, std::uint32_t(k)};
   }
-  return sum;
+  return sum + turns.full + std::atan2(turns.y, turns.x) / (2 * std::numbers::pi);
 }
 
 void Winding::look_at_surface() {

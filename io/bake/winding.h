@@ -14,7 +14,7 @@ class Winding {
   Winding(const Surface& surface, unsigned threads);
 
   // The solid angle of all triangles around p over 4 pi: 1 inside a closed mesh that is wound
-  // outwards, 0 outside, and in between near holes. Off by 0.02 at most.
+  // outwards, 0 outside, and in between near holes. Off by 0.05 at most.
   double at(const Vec3& p) const;
   // Whether p is more inside than outside. Meshes wound inwards are as good.
   bool inside(const Vec3& p) const { return turn_ * at(p) > 0.5; }
@@ -28,7 +28,11 @@ class Winding {
     float radius;
     std::array<float, 3> dipole;  // sum of area normals over 4 pi
   };
-  double of_triangle(std::uint32_t triangle, const Vec3& p) const;
+  struct Turns {
+    double x = 1, y = 0;  // the last turn, begun
+    int full = 0;
+  };
+  void turn(std::uint32_t triangle, const Vec3& p, Turns& sum) const;
   void look_at_surface();
 
   const Surface& surface_;
