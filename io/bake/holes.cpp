@@ -22,12 +22,21 @@ Vec3 place_of(const Grid& grid, const NarrowBand& band, std::size_t row, std::si
           8.0 * at[2] + double(n / 64)};
 }
 
+// Triangles without area may lie anywhere, as no box is made for them.
+bool within(const Grid& grid, const Vec3& p) {
+  for (int k = 0; k < 3; ++k)
+    if (!(component(p, k) >= 0 && component(p, k) <= 8.0 * grid.bricks[std::size_t(k)] - 1))
+      return false;
+  return true;
+}
+
 // Sets the node nearest to every voxel of the odd edges.
 Masks rim_nodes(const Surface& surface, const Grid& grid, const NarrowBand& band) {
   Masks rim(band.rows());
   std::fill(rim.begin(), rim.end(), NodeMask{});
   for (const auto& edge : surface.odd) {
     const Vec3 &a = surface.vertices[edge[0]], &b = surface.vertices[edge[1]];
+    if (!within(grid, a) || !within(grid, b)) continue;
     const int steps = std::max(1, int(std::ceil(norm(b - a))));
     for (int i = 0; i <= steps; ++i) {
       const Vec3 p = a + (double(i) / steps) * (b - a);

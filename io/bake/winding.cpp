@@ -120,7 +120,7 @@ double Winding::at(const Vec3& p) const {
 }
 
 void Winding::look_at_surface() {
-  constexpr std::size_t kLooks = 500;
+  constexpr std::size_t kLooks = 200;
   constexpr double kNear = 0.2, kMost = 0.8;
   const std::size_t stride = std::max<std::size_t>(1, count_ / kLooks);
   std::size_t looks = 0, outwards = 0, inwards = 0;

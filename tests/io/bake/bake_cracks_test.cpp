@@ -219,6 +219,21 @@ TEST_CASE("cracks: a hole too wide for the seal stays open, is named, and nothin
   }
 }
 
+TEST_CASE("cracks: a line of a triangle far beyond the solid is no hole of it") {
+  Random random(10);
+  Mesh mesh = holed(solids()[0], 6 * kVoxel, random);
+  FieldBakeReport report;
+  const FieldData alone = must_bake(mesh, options_for(SignMode::winding), &report);
+  const auto base = std::uint32_t(mesh.vertices.size());
+  for (const double x : {1e6, 1e6 + 1, 1e6 + 2}) mesh.vertices.push_back({x, x, -x});
+  mesh.triangles.push_back({base, base + 1, base + 2});
+  for (const SignMode sign : {SignMode::winding, SignMode::automatic})
+    must_bake(mesh, options_for(sign), &report);
+  const FieldData both = must_bake(mesh, options_for(SignMode::winding), &report);
+  REQUIRE(alone.samples.size() == both.samples.size());
+  CHECK(std::memcmp(alone.samples.data(), both.samples.data(), 4 * alone.samples.size()) == 0);
+}
+
 TEST_CASE("cracks: a closed mesh by winding is the closed mesh, and threads change no bit") {
   Random random(9);
   const Mesh solid = solids()[1];
