@@ -13,7 +13,6 @@
 namespace h6::cli {
 namespace {
 
-constexpr int kPaths = 50;
 constexpr int kPulls = 5;
 constexpr double kReach = 0.06;  // longest pull [m]
 constexpr double kTurn = 0.5;    // largest turn [rad]
@@ -29,8 +28,8 @@ h6Vec3 in_ball(std::mt19937_64& engine) {
 
 // The hand follows the scene's path up to somewhere on the way in. From there it pulls and turns
 // the part five times, each time from the same place.
-io::Path forced_path(const io::Path& way_in, double arrival, int index) {
-  std::mt19937_64 engine(static_cast<std::uint64_t>(index) + 1);
+io::Path forced_path(const io::Path& way_in, double arrival, std::size_t index) {
+  std::mt19937_64 engine(index + 1);
   const double part = 0.4 + 0.6 * static_cast<double>(engine() >> 11) * 0x1p-53;
   io::HandPath hand(way_in.front().pose);
   for (int i = 1; i <= 40; ++i) {
@@ -52,9 +51,11 @@ double arrival_of(const io::Path& path) { return 0.5 * path.back().t; }
 
 }  // namespace
 
-Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console& console) {
+Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console& console,
+                         std::size_t count) {
   Study out;
-  out.title = "The starter motor forced on 50 paths through the engine bay";
+  out.title =
+      "The starter motor forced on " + std::to_string(count) + " paths through the engine bay";
   out.about =
       "The hand leads the starter motor of 56,823 points part of the way into the bay and then "
       "pulls it by up to 60 mm to five random places, turning it by up to 0.5 rad, with the force "
@@ -68,14 +69,15 @@ Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console
   if (!loaded) return out;
   const io::Path& way_in = (*loaded)->scene.hands[0].path;
   std::vector<io::Path> paths;
-  for (int i = 0; i < kPaths; ++i) paths.push_back(forced_path(way_in, arrival_of(way_in), i));
-  std::vector<RunFigures> runs(columns.size() * kPaths);
+  for (std::size_t i = 0; i < count; ++i)
+    paths.push_back(forced_path(way_in, arrival_of(way_in), i));
+  std::vector<RunFigures> runs(columns.size() * count);
   std::vector<std::function<void()>> jobs;
   for (std::size_t at = 0; at < runs.size(); ++at)
     jobs.push_back([&, at] {
       RunChange change;
-      change.method = columns[at / kPaths];
-      change.path = &paths[at % kPaths];
+      change.method = columns[at / count];
+      change.path = &paths[at % count];
       runs[at] = run_experiment(**loaded, change);
     });
   run_jobs(jobs, console, "paths");
@@ -86,8 +88,8 @@ Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console
     int through = 0, held = 0, deep = 0, failed = 0;
     std::vector<double> depths, p50, p99;
     nlohmann::ordered_json each = nlohmann::ordered_json::array();
-    for (int i = 0; i < kPaths; ++i) {
-      const RunFigures& run = runs[m * kPaths + static_cast<std::size_t>(i)];
+    for (std::size_t i = 0; i < count; ++i) {
+      const RunFigures& run = runs[m * count + i];
       failed += !run.error.empty();
       through += run.verdict == io::Verdict::through;
       held += run.moved_on();
@@ -100,17 +102,17 @@ Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console
     }
     std::sort(depths.begin(), depths.end());
     std::sort(p50.begin(), p50.end()), std::sort(p99.begin(), p99.end());
-    const double median = 0.5 * (depths[kPaths / 2 - 1] + depths[kPaths / 2]);
+    const double median = 0.5 * (depths[(count - 1) / 2] + depths[count / 2]);
     out.table.push_back(
         {columns[m].name, std::to_string(through), std::to_string(held), std::to_string(deep),
          std::to_string(failed),
          number(depths.front(), 2) + ", " + number(median, 2) + ", " + number(depths.back(), 2),
-         number(p50[kPaths / 2], 0) + ", " + number(p99[kPaths / 2], 0)});
+         number(p50[count / 2], 0) + ", " + number(p99[count / 2], 0)});
     out.json[columns[m].name] = {{"through", through},
                                  {"at_rest", held},
                                  {"deeper_than_half_a_voxel", deep},
                                  {"failed", failed},
-                                 {"of", kPaths},
+                                 {"of", count},
                                  {"least", depths.front()},
                                  {"median", median},
                                  {"greatest", depths.back()},

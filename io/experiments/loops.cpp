@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // loops.cpp - the net work of the contacts over random closed loops.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -12,15 +11,15 @@
 namespace h6::cli {
 namespace {
 
-constexpr int kLoops = 30, kLoopSteps = 3000, kWaves = 3;
+constexpr int kLoopSteps = 3000, kWaves = 3;
 constexpr double kLoopTurn = 0.03;  // size of the turns [rad]
 
 // Motion along the six directions: a random Fourier series of three waves in each.
 class Loop {
  public:
   // `size`: of the translations [m].
-  Loop(int index, const h6Vec3& size) {
-    std::mt19937_64 engine(static_cast<std::uint64_t>(index) + 1);
+  Loop(std::size_t index, const h6Vec3& size) {
+    std::mt19937_64 engine(index + 1);
     const double most[6] = {size.x, size.y, size.z, kLoopTurn, kLoopTurn, kLoopTurn};
     for (int d = 0; d < 6; ++d)
       for (int w = 0; w < kWaves; ++w)
@@ -86,18 +85,20 @@ std::vector<Place> places() {
 
 }  // namespace
 
-Study study_loops(const std::vector<MethodColumn>& columns, const Console& console) {
+Study study_loops(const std::vector<MethodColumn>& columns, const Console& console,
+                  std::size_t loops) {
   Study out;
   out.title = "Random closed loops";
   out.about =
-      "A body is led around 30 random closed loops in six dimensions, at most some 0.6 voxels "
+      "A body is led around " + std::to_string(loops) +
+      " random closed loops in six dimensions, at most some 0.6 voxels "
       "deep: a box of 20 mm (400 points) on a plane and on a ridge of 4 mm radius, and a peg of 6 "
       "mm (760 points) in a hole of 6.2. The fields' lattices are turned by 0.75 rad against the "
       "surfaces. The table gives the contacts' net work over a loop, relative to the range of "
       "work on the way: the root mean square over the loops, and the largest. A conservative "
       "force gives 0.";
   std::vector<Place> all = places();
-  std::vector<std::array<double, kLoops>> found(all.size() * columns.size());
+  std::vector<std::vector<double>> found(all.size() * columns.size(), std::vector<double>(loops));
   std::vector<std::unique_ptr<io::LoadedScene>> scenes;
   for (Place& place : all) {
     auto loaded = io::load_scene(std::move(place.scene));
@@ -106,12 +107,11 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
   }
   std::vector<std::function<void()>> jobs;
   for (std::size_t at = 0; at < found.size(); ++at)
-    for (int i = 0; i < kLoops; ++i)
+    for (std::size_t i = 0; i < loops; ++i)
       jobs.push_back([&, at, i] {
         const Place& place = all[at / columns.size()];
-        found[at][static_cast<std::size_t>(i)] =
-            net_work(*scenes[at / columns.size()], columns[at % columns.size()],
-                     Loop(i, place.size), place.centre);
+        found[at][i] = net_work(*scenes[at / columns.size()], columns[at % columns.size()],
+                                Loop(i, place.size), place.centre);
       });
   run_jobs(jobs, console, "loops");
   out.table = head("surface", columns);
@@ -119,7 +119,8 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
     const std::string name = all[at / columns.size()].name;
     if (at % columns.size() == 0) out.table.push_back({name});
     double sum = 0, most = 0;
-    for (const double w : found[at]) sum += w * w / kLoops, most = std::max(most, std::fabs(w));
+    for (const double w : found[at])
+      sum += w * w / static_cast<double>(loops), most = std::max(most, std::fabs(w));
     out.table.back().push_back(number(std::sqrt(sum), 3) + ", " + number(most, 3));
     out.json[name][columns[at % columns.size()].name] = {{"rms", std::sqrt(sum)}, {"most", most}};
   }

@@ -26,8 +26,9 @@ Study study_share(const std::vector<MethodColumn>& columns, const Console& conso
 Study study_global(const std::vector<MethodColumn>& columns, const Console& console);
 // alpha.cpp
 Study study_pushes(const std::vector<MethodColumn>& columns, const Console& console);
-// forced_paths.cpp
-Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console& console);
+// forced_paths.cpp: `count` seeded paths, at least 1; the first ones do not depend on it
+Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console& console,
+                         std::size_t count);
 // smoothness.cpp
 Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_ripple(const std::vector<MethodColumn>& columns, const Console& console);
@@ -38,8 +39,9 @@ Study study_two_planes(const std::vector<MethodColumn>& columns, const Console& 
 Study study_modes(const std::vector<MethodColumn>& columns, const Console& console);
 // energy.cpp
 Study study_energy(const std::vector<MethodColumn>& columns, const Console& console);
-// loops.cpp
-Study study_loops(const std::vector<MethodColumn>& columns, const Console& console);
+// loops.cpp: `loops` seeded loops on each surface, at least 1
+Study study_loops(const std::vector<MethodColumn>& columns, const Console& console,
+                  std::size_t loops);
 // time.cpp
 Study study_time(const std::vector<MethodColumn>& columns, const Console& console);
 
