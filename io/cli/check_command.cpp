@@ -251,7 +251,7 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
     if (!field) return Failure{s.name + ": " + field.error()};
   }
   io::ExactCheckOptions exact = o.exact;
-  exact.sealed = s.bake.seal > 0;
+  exact.sealed = s.bake.seal > 0 || field->sign_mode == "winding";
   exact.threads = o.bake.threads;
   const Result<io::ExactCheck> c = io::check_exactly(s.mesh, *field, exact, console.progress());
   if (!c) return Failure{s.name + ": " + c.error()};

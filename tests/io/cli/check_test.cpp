@@ -102,6 +102,24 @@ TEST_CASE(
   for (const Json& m : all["meshes"]) CHECK(m["triangles"].get<int>() > 0);
 }
 
+TEST_CASE("a field that was closed by winding agrees with its mesh of holes, and names them") {
+  Sandbox box;
+  std::vector<Facet> ball = sphere_facets(50, 20);
+  ball.erase(ball.begin() + std::ptrdiff_t(ball.size()) / 2,
+             ball.begin() + std::ptrdiff_t(ball.size()) / 2 + 4);
+  spill(box.file("ball.stl"), stl(ball));
+  const Json baked = result_of(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--units", "mm",
+                                     "--voxels", "96", "--sign", "winding"});
+  CHECK(baked["closed"] == false);
+  CHECK(baked["sign_mode"] == "winding");
+  CHECK(baked["offset"] == 0);
+  CHECK(baked["leaks"]["count"] == 0);
+  CHECK(baked["sealed"]["count"].get<int>() > 0);
+  const Json checked =
+      result_of(box, {"check", "ball.stl", "--field", "ball.vdb", "--units", "mm"});
+  CHECK(checked["agrees"] == true);
+}
+
 TEST_CASE("how far a scene's shells are from its fields at the start is told in voxels") {
   Sandbox box;
   spill(box.file("cube.stl"), stl(box_facets(10)));
