@@ -10,7 +10,8 @@
 namespace h6::kernels {
 
 // A field in its hot layout. One table entry a brick of 8 x 8 x 8 unit cells:
-//   >= 0  row in `bricks`: 9 x 9 x 9 nodes, x fastest, int16 in 1/1024 voxel; the last layer
+//   >= 0  row in `bricks`, plus kRefined where cells of the brick have finer samples: 9 x 9 x 9
+//   nodes, x fastest, int16 in 1/1024 voxel; the last layer
 //         repeats the neighbours' first. Distances there are samples, trilinear between nodes.
 //   <  0  no samples. Row -1 - entry in `far`: bounds of |d| at the 8 corners of the cell, x
 //         fastest, int16 in 1/32 voxel, with the sign of the side; all 0 where nothing is known. At
@@ -22,13 +23,25 @@ namespace h6::kernels {
 //
 //        table (bx*by*bz)       bricks                       far
 //        [ 0][-1][-2][ 1] ...   [729 int16, padded][...]     [8 int16][8 int16]...
+//
+// Refined bricks have the first rows. The same row of `cuts` starts with an int32, a unit of 32
+// int16 in `fine`, and has one code for each cell, x fastest, from kCutHead on: 0, or the number of
+// units from there times 2, plus 1 where the cell is cut into quarters. In `fine`, a cell cut into
+// f = 2 or 4 has its (f + 1)^3 nodes, x fastest, in 1/(1024 f) voxel, in one unit or in four.
 struct FieldView {
   std::int32_t size[3];       // bricks along x, y, z; nodes 0 .. 8*size - 1
   const std::int32_t* table;  // (size z * y * x), x fastest
   const std::int16_t* bricks;
   const std::int16_t* far;
   float band = 0;  // no point of a far cell is nearer to the surface [voxel]
+  const std::uint16_t* cuts = nullptr;
+  const std::int16_t* fine = nullptr;
 };
+inline constexpr std::int32_t kRefined = 1 << 30;
+inline std::int32_t row_of(std::int32_t entry) { return entry & ~kRefined; }  // entry >= 0
+inline constexpr int kCutHead = 32, kCutStride = kCutHead + 512;  // uint16 a refined brick
+inline constexpr int kFineUnit = 32;                              // int16
+inline constexpr int kHalfUnits = 1, kQuarterUnits = 4;
 inline constexpr int kBrickNodes = 9 * 9 * 9;
 inline constexpr int kBrickStride = 736;  // int16 a brick; a multiple of 32 bytes
 // Gathers address bricks by a 32-bit byte offset, so a field may have this many (2.1 GB), no more.

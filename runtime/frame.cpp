@@ -81,7 +81,7 @@ void note_depths(std::span<const Body> bodies, const ShellBody& shell, h6FrameRe
     report.contacts += static_cast<std::uint32_t>(depths.inside);
     report.max_depth = std::max<double>(report.max_depth, depths.deepest);
     report.max_depth_voxels =
-        std::max(report.max_depth_voxels, depths.deepest / bodies[pair.b].field->voxel);
+        std::max(report.max_depth_voxels, depths.deepest / bodies[pair.b].field->finest);
   }
 }
 

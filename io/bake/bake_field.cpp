@@ -7,12 +7,14 @@
 #include "io/bake/bake_field.h"
 
 #include <algorithm>
+#include <cmath>
 #include <new>
 #include <optional>
 #include <utility>
 
 #include "io/bake/grid.h"
 #include "io/bake/holes.h"
+#include "io/field/refine.h"
 #include "sched/clock.h"
 #include "sched/parallel_for.h"
 
@@ -38,17 +40,18 @@ bool Steps::run(const std::string& what, double from, double to, std::size_t cou
 }
 
 void Steps::clock(const std::string& what) const {
-  if (!stages_.empty() && stages_.back().name == what) return;
+  auto& stages = clock_->stages;
+  if (!stages.empty() && stages.back().name == what) return;
   const std::int64_t now = sched::now_ns();
-  if (!stages_.empty()) stages_.back().seconds += 1e-9 * double(now - since_ns_);
-  since_ns_ = now;
-  stages_.push_back({what, 0});
+  if (!stages.empty()) stages.back().seconds += 1e-9 * double(now - clock_->since_ns);
+  clock_->since_ns = now;
+  stages.push_back({what, 0});
 }
 
 std::vector<FieldBakeReport::Stage> Steps::stages() const {
   clock("");
   std::vector<FieldBakeReport::Stage> sum;  // a stage entered twice counts once
-  for (const FieldBakeReport::Stage& s : stages_) {
+  for (const FieldBakeReport::Stage& s : clock_->stages) {
     if (s.name.empty()) continue;
     const auto same = std::find_if(sum.begin(), sum.end(),
                                    [&](const auto& other) { return other.name == s.name; });
@@ -121,9 +124,13 @@ Outcome weld(const Mesh& mesh, const FieldBake& options, bake::Surface& surface,
   if (!(options.weld >= 0 && options.weld <= 1))
     return Failure{"vertices are welded within 0 to 1 voxel"};
   if (surface.closed || options.weld == 0) return Done{};
-  const Result<bake::Grid> grid = bake::choose_grid(surface, options, true);
-  if (!grid) return grid.failure();
-  weld_gaps(mesh, options.weld * grid->voxel, options.threads, surface, welded);
+  double voxel = 2 * options.tolerance;
+  if (voxel == 0) {
+    const Result<bake::Grid> grid = bake::choose_grid(surface, options, true);
+    if (!grid) return grid.failure();
+    voxel = grid->voxel;
+  }
+  weld_gaps(mesh, options.weld * voxel, options.threads, surface, welded);
   return Done{};
 }
 
@@ -261,64 +268,107 @@ void warn_of_holes(const bake::Grid& grid, const Openings& openings, const Field
                               " was found that leads into a solid: nothing was sealed");
 }
 
+// A field of the surface, which is in grid coordinates and gains the facets that seal it. Without
+// `far` its far grid stays empty.
+Result<FieldData> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldBake& options,
+                               bool far, const bake::Steps& steps, FieldBakeReport* report) {
+  using namespace bake;
+  const Failure cancelled{"cancelled"};
+  const unsigned threads = options.threads;
+  NarrowBand band;
+  Openings openings;
+  if (const Outcome done = measure_sealed(options, steps, surface, grid, band, openings); !done)
+    return done.failure();
+
+  if (!steps.tell("flood", 0.6)) return cancelled;
+  const Reached reached = flood(surface, grid, band, options.cavities, threads);
+  if (report) look_for_leak(surface, grid, band, reached, threads, openings);
+  Large<std::uint32_t>().swap(band.tiles.triangle);
+  Large<std::uint64_t>().swap(band.tiles.near);
+  Inside inside;
+  if (!look_inside(grid, band, reached, threads, steps, inside)) return cancelled;
+
+  FieldData field;
+  field.origin = grid.origin();
+  field.voxel_size = grid.voxel;
+  field.bricks = grid.bricks;
+  field.band = grid.band * grid.voxel;
+  field.offset = grid.offset * grid.voxel;
+  if (!steps.tell("samples", 0.8)) return cancelled;
+  write_samples(grid, band, reached, inside, threads, field);
+  inside.chains.reset();
+  if (far)
+    if (const Outcome done =
+            far_distances(surface, grid, band, reached, threads, steps, field.far_grid);
+        !done)
+      return done.failure();
+  if (report) {
+    report->sealed_area = double(openings.plugs) * grid.voxel * grid.voxel;
+    warn_of_holes(grid, openings, options, *report);
+    warn(surface, grid, inside, options.seal, options.sign, *report);
+  }
+  return field;
+}
+
+// Two bakes that share nodes: coarse bricks everywhere, fine ones where those miss the tolerance.
+Result<FieldData> bake_to_tolerance(bake::Surface& surface, const FieldBake& options, bool sealed,
+                                    const bake::Steps& steps, FieldBakeReport* report) {
+  using namespace bake;
+  Result<TwoGrids> grids = choose_two_grids(surface, options, sealed);
+  if (!grids) return grids.failure();
+  to_grid(surface, grids->fine, options.threads);
+  Result<FieldData> fine =
+      bake_on_grid(surface, grids->fine, options, true, steps.part(0, 0.6), report);
+  if (!fine) return fine.failure();
+  Surface coarse_surface = surface;  // with what seals it
+  for (Vec3& v : coarse_surface.vertices) v = (1.0 / kCut) * v;
+  FieldBake magnitudes = options;  // the sides are those of the fine bake
+  if (!sealed) magnitudes.sign = SignMode::flood;
+  Result<FieldData> coarse =
+      bake_on_grid(coarse_surface, grids->coarse, magnitudes, false, steps.part(0.6, 0.8), nullptr);
+  if (!coarse) return coarse.failure();
+  if (!steps.tell("refine", 0.8)) return Failure{"cancelled"};
+  return refine(*coarse, *fine, options.tolerance, options.threads);
+}
+
 Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                                const Progress& progress) {
   using namespace bake;
   const Steps steps(progress);
-  const Failure cancelled{"cancelled"};
-  if (!steps.tell("surface", 0)) return cancelled;
+  if (!(options.tolerance >= 0) || !std::isfinite(options.tolerance))
+    return Failure{"the tolerance must be a positive length"};
+  if (options.tolerance > 0 && options.voxel_size > 0)
+    return Failure{"a field takes a tolerance or a voxel size, not both"};
+  if (!steps.tell("surface", 0)) return Failure{"cancelled"};
   Result<Surface> prepared = prepare_surface(mesh, options.threads);
   if (!prepared) return prepared.failure();
   Surface& surface = *prepared;
   GapWeld welded;
   if (const Outcome done = weld(mesh, options, surface, welded); !done) return done.failure();
-  const bool sealed = surface.closed && options.sign != SignMode::flood;
-  Result<Grid> grid = choose_grid(surface, options, sealed);
-  if (!grid) return grid.failure();
-  const unsigned threads = options.threads;
-  to_grid(surface, *grid, threads);
-
-  NarrowBand band;
-  const bool parts = !surface.part.empty() && mesh.part_names.size() > 1;
-  if (!parts) surface.part.clear();
-  Openings openings;
-  if (const Outcome done = measure_sealed(options, steps, surface, *grid, band, openings); !done)
-    return done.failure();
-
-  if (!steps.tell("flood", 0.6)) return cancelled;
-  const Reached reached = flood(surface, *grid, band, options.cavities, threads);
-  look_for_leak(surface, *grid, band, reached, threads, openings);
-  Large<std::uint32_t>().swap(band.tiles.triangle);
-  Large<std::uint64_t>().swap(band.tiles.near);
-  Inside inside;
-  if (!look_inside(*grid, band, reached, threads, steps, inside)) return cancelled;
-
-  FieldData field;
-  field.origin = grid->origin();
-  field.voxel_size = grid->voxel;
-  field.bricks = grid->bricks;
-  field.band = grid->band * grid->voxel;
-  field.offset = grid->offset * grid->voxel;
-  field.sign_mode = sealed ? "closed" : options.sign == SignMode::winding ? "winding" : "flood";
-  field.triangles = mesh.triangles.size();
-  if (!band.part.empty()) field.part_names = mesh.part_names;
-  if (!steps.tell("samples", 0.8)) return cancelled;
-  write_samples(*grid, band, reached, inside, threads, field);
-  inside.chains.reset();
-  if (const Outcome far =
-          far_distances(surface, *grid, band, reached, threads, steps, field.far_grid);
-      !far)
-    return far.failure();
   if (report) {
-    report->stages = steps.stages();
     report->closed = surface.closed;
-    report->sealed_area = double(openings.plugs) * grid->voxel * grid->voxel;
-    warn_of_holes(*grid, openings, options, *report);
     report->welded = welded.left == 0 ? welded.vertices : 0;
     report->weld_widest = welded.left == 0 ? welded.widest : 0;
     warn_of_gaps(surface, welded, *report);
-    warn(surface, *grid, inside, options.seal, options.sign, *report);
   }
+  const bool sealed = surface.closed && options.sign != SignMode::flood;
+  if (mesh.part_names.size() < 2) surface.part.clear();
+  const bool parts = !surface.part.empty();
+  Result<FieldData> field{FieldData{}};
+  if (options.tolerance > 0) {
+    field = bake_to_tolerance(surface, options, sealed, steps, report);
+  } else {
+    Result<Grid> grid = choose_grid(surface, options, sealed);
+    if (!grid) return grid.failure();
+    to_grid(surface, *grid, options.threads);
+    field = bake_on_grid(surface, *grid, options, true, steps, report);
+  }
+  if (!field) return field;
+  field->sign_mode = sealed ? "closed" : options.sign == SignMode::winding ? "winding" : "flood";
+  field->triangles = mesh.triangles.size();
+  field->tolerance = options.tolerance;
+  if (parts) field->part_names = mesh.part_names;
+  if (report) report->stages = steps.stages();
   return field;
 }
 

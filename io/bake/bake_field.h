@@ -24,7 +24,11 @@ enum class Cavities { solid, hollow };
 struct FieldBake {
   int voxels = 256;       // cells on the longest padded side, 16 .. 2048
   double voxel_size = 0;  // [m] replaces `voxels` when > 0
-  double offset = -1;     // sigma [m]; < 0: automatic (0 for closed meshes, else 0.9 voxel)
+  // > 0: the largest error [m] within 12 tolerances of the surface, in place of voxels: coarse
+  // voxels of 8 tolerances, cut into 2 or 4 where they would miss it. The cut ones decide about
+  // sides, holes and the automatic offset.
+  double tolerance = 0;
+  double offset = -1;  // sigma [m]; < 0: automatic (0 for closed meshes, else 0.9 voxel)
   SignMode sign = SignMode::automatic;
   Cavities cavities = Cavities::solid;
   // > 0: closes holes and cracks of an open mesh up to this width [m], so that a part with missing

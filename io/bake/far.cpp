@@ -26,7 +26,7 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr double kSlack = 1e-4;  // [voxel] error of float distances near the surface
+constexpr double kFloatError = 1e-4;  // [voxel] error of float distances near the surface
 
 // The part of node (8a, 8b, 8c) that is known without a search. Nodes past the last brick are
 // outside.
@@ -48,9 +48,9 @@ Known look_up(const Grid& grid, const NarrowBand& band, const Reached& reached, 
 // least sqrt(u^2 - offset^2) away: it can be nearer than u only through a crack narrower than
 // 2 offset, and the crack is that far away.
 double bound(double u, double offset, bool inside) {
-  const double certain = u - kSlack - 1e-6 * u;
+  const double certain = u - kFloatError - 1e-6 * u;
   if (!inside) return std::max(0.0, certain - offset);
-  if (u <= offset) return std::max(0.0, offset - u - kSlack);
+  if (u <= offset) return std::max(0.0, offset - u - kFloatError);
   return std::sqrt(std::max(0.0, certain * certain - offset * offset));
 }
 
@@ -84,7 +84,7 @@ class Nodes {
     const std::size_t i = at(a, b, c);
     const int odd = (a & 1) | (b & 1) << 1 | (c & 1) << 2;
     node_[i].nearest = TriangleTree::kNone;
-    const double away = known >= 0 ? std::max(0.0, known - kSlack - 1e-6 * known)
+    const double away = known >= 0 ? std::max(0.0, known - kFloatError - 1e-6 * known)
                         : odd == 0 ? even(a, b, c)
                                    : between(a, b, c, odd);
     node_[i].away = std::nextafter(float(away), 0.0f);

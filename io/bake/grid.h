@@ -91,6 +91,13 @@ struct GapWeld {
 void weld_gaps(const Mesh& mesh, double tolerance, unsigned threads, Surface& surface,
                GapWeld& welded);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
+// For a field with a tolerance: two grids that begin at the same node. The error of trilinear
+// interpolation is at most half a voxel, where the field folds back on itself half way between two
+// nodes. So fine voxels of twice the tolerance keep it.
+struct TwoGrids {
+  Grid coarse, fine;
+};
+Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& options, bool sealed);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
 
 // One bit for each node of a brick: word z, bit 8*y + x.
@@ -191,16 +198,27 @@ class Steps {
            const std::function<void(std::size_t)>& body) const;
   bool tell(const std::string& what, double done) const {
     clock(what);
-    return !progress_ || progress_(what, done);
+    return !progress_ || progress_(what, from_ + (to_ - from_) * done);
+  }
+  // The same steps within a part of the whole; they share the clock.
+  Steps part(double from, double to) const {
+    Steps steps = *this;
+    steps.from_ = from;
+    steps.to_ = to;
+    return steps;
   }
   // The time from now on belongs to stage `what`.
   void clock(const std::string& what) const;
   std::vector<FieldBakeReport::Stage> stages() const;
 
  private:
+  struct Clock {
+    std::vector<FieldBakeReport::Stage> stages;  // the last one runs
+    std::int64_t since_ns = 0;
+  };
   const Progress& progress_;
-  mutable std::vector<FieldBakeReport::Stage> stages_;  // the last one runs
-  mutable std::int64_t since_ns_ = 0;
+  std::shared_ptr<Clock> clock_ = std::make_shared<Clock>();
+  double from_ = 0, to_ = 1;
 };
 
 // bins.cpp: fills tiles, cells and rows. Fails, with a sentence, when there are too many.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/bake/grid.h"
+#include "io/field/refine.h"
 #include "kernels/views.h"
 
 namespace h6::io {
@@ -73,7 +74,14 @@ class Bricks {
 Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const FieldBake& options) {
   bake::Surface box;
   box.low = audit.low, box.high = audit.high;
-  const Result<bake::Grid> grid = bake::choose_grid(box, options, audit.closed);
+  FieldBake coarse = options;
+  if (options.tolerance > 0) {
+    const double fine = 2 * options.tolerance;
+    coarse.voxel_size = kCut * fine;
+    const bool bare = audit.closed || options.sign == SignMode::winding;
+    if (options.offset < 0) coarse.offset = bare ? 0 : 0.9 * fine;
+  }
+  const Result<bake::Grid> grid = bake::choose_grid(box, coarse, audit.closed);
   if (!grid) return grid.failure();
   FieldPlan plan;
   plan.voxel_size = grid->voxel, plan.offset = grid->offset * grid->voxel;
@@ -93,6 +101,8 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
   const std::size_t cells = grid->cells();
   plan.bytes =
       plan.brick_count * 512 * sizeof(float) + cells * (sizeof(std::int32_t) + sizeof(float));
+  // While it bakes, a field with a tolerance is also there in fine voxels, on the same area.
+  if (options.tolerance > 0) plan.bytes *= 1 + kCut * kCut;
   plan.engine_bytes = plan.brick_count * kernels::kBrickStride * sizeof(std::int16_t) +
                       (cells - plan.brick_count) * 8 * sizeof(std::int16_t) +
                       cells * sizeof(std::int32_t);

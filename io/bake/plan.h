@@ -11,11 +11,11 @@
 namespace h6::io {
 
 struct FieldPlan {
-  double voxel_size = 0, offset = 0;     // as the bake will choose them [m]
+  double voxel_size = 0, offset = 0;     // as the bake will choose them [m]; the coarse voxel
   std::array<std::int32_t, 3> bricks{};  // along x, y, z
   std::size_t brick_count = 0;           // bricks with samples, mostly within a tenth
   std::size_t bytes = 0;                 // of the field in memory
-  std::size_t engine_bytes = 0;          // of the field in the engine's layout
+  std::size_t engine_bytes = 0;          // of the field in the engine's layout, without finer cells
   double seconds = 0;                    // a rough guess, for two threads of a server of 2023
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "io/bake/grid.h"
+#include "io/field/refine.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -319,6 +320,46 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
     grid.bricks[k] = std::max(1, int(std::ceil(nodes / 8 - 1e-9)));
   }
   return grid;
+}
+
+Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& options, bool sealed) {
+  const double voxel = 2 * options.tolerance;  // the fine one
+  FieldBake o = options;
+  o.voxel_size = kCut * voxel;
+  const bool winding = options.sign == SignMode::winding;
+  if (o.offset < 0) o.offset = sealed || winding ? 0 : 0.9 * voxel;
+  // Holes are sealed on the fine grid; the coarse one only makes room for it.
+  o.seal = 0;
+  if (!sealed && options.seal > 0)
+    o.padding_voxels += int(std::min(64.0, std::ceil(options.seal / o.voxel_size))) + 2;
+  Result<Grid> coarse = choose_grid(surface, o, sealed);
+  if (!coarse) return coarse.failure();
+  TwoGrids two{*coarse, *coarse};
+  for (std::size_t k = 0; k < 3; ++k) two.fine.bricks[k] = kCut * coarse->bricks[k];
+  const int most = *std::max_element(two.fine.bricks.begin(), two.fine.bricks.end());
+  char text[200];
+  if (most > kMaxBricksOnSide) {
+    std::snprintf(text, sizeof text,
+                  "a tolerance of %.4g m takes %d nodes on a side, 2048 are possible: choose at "
+                  "least %.4g m",
+                  options.tolerance, 8 * most, 1.1 * options.tolerance * most / kMaxBricksOnSide);
+    return Failure{text};
+  }
+  two.fine.voxel = voxel;
+  const Vec3 origin = coarse->origin();
+  two.fine.centre = {origin.x + voxel * two.fine.middle(0), origin.y + voxel * two.fine.middle(1),
+                     origin.z + voxel * two.fine.middle(2)};
+  two.fine.band = std::min(6.0, kCut * coarse->band);
+  two.fine.offset = kCut * coarse->offset;
+  two.fine.seal = sealed ? 0 : options.seal / voxel;
+  if (two.fine.seal > 32 || (two.fine.seal > 0 && two.fine.offset < 0.6 && !winding)) {
+    std::snprintf(text, sizeof text,
+                  "with a tolerance of %.4g m, holes up to %.4g m can be sealed, with an offset of "
+                  "at least %.4g m",
+                  options.tolerance, 32 * voxel, 0.6 * voxel);
+    return Failure{text};
+  }
+  return two;
 }
 
 void to_grid(Surface& surface, const Grid& grid, unsigned threads) {

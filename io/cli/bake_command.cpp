@@ -127,6 +127,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   if (!unit) return console.fail(unit.error(), kUsage);
   // Lengths on the command line are in the mesh's unit.
   o.bake.voxel_size *= io::metres(*unit);
+  o.bake.tolerance *= io::metres(*unit);
   if (o.bake.offset > 0) o.bake.offset *= io::metres(*unit);
   o.bake.seal *= io::metres(*unit);
 
@@ -159,6 +160,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                     {"voxel_size", field->voxel_size},
                     {"dims", {8 * field->bricks[0], 8 * field->bricks[1], 8 * field->bricks[2]}},
                     {"bricks", field->brick_count()},
+                    {"fine_cells", {field->half_count(), field->quarter_count()}},
                     {"triangles", input->audit.triangles},
                     {"closed", report.closed},
                     {"sign_mode", field->sign_mode},
@@ -251,6 +253,14 @@ void add_field(CLI::App* bake, Program& program) {
   field->add_option("--voxel-size", f->bake.voxel_size, "Edge of a voxel, instead of --voxels")
       ->option_text("S")
       ->excludes(voxels)
+      ->check(number_above(0));
+  field
+      ->add_option("--tolerance", f->bake.tolerance,
+                   "Largest error of the distance near the surface, instead of --voxels: voxels of "
+                   "8 tolerances, cut into 2 or 4 where they would miss it")
+      ->option_text("S")
+      ->excludes(voxels)
+      ->excludes("--voxel-size")
       ->check(number_above(0));
   field
       ->add_option("--offset", f->bake.offset,

@@ -27,13 +27,21 @@ struct FieldData {
   // (brick_count) or empty: the mesh's triangle nearest to the middle of the brick; -1 when a
   // sealed hole is nearer.
   std::vector<std::int32_t> triangle;
+  // Finer samples of single cells, as in h6FieldDef; all empty where no brick is refined.
+  std::vector<std::int32_t> refined;     // (brick_count) row in fine_index, rising; -1: none
+  std::vector<std::int32_t> fine_index;  // (refined bricks x 512) see h6FieldDef
+  Samples halves;                        // (half_count x 27) [m]
+  Samples quarters;                      // (quarter_count x 125) [m]
   // How the bake made the field.
   double offset = 0;       // sigma [m]; 0 on closed meshes
   std::string sign_mode;   // "closed" or "flood"; "given" by another program
   std::string input_hash;  // of the mesh and the options of the bake
   std::size_t triangles = 0;
+  double tolerance = 0;  // that the bake was asked for [m]; 0: none
 
   std::size_t brick_count() const { return samples.size() / 512; }
+  std::size_t half_count() const { return halves.size() / 27; }
+  std::size_t quarter_count() const { return quarters.size() / 125; }
   h6FieldDef def() const;  // points into this object
 };
 

@@ -127,7 +127,7 @@ Result<FieldData> read_field(const std::filesystem::path& file) {
   const Result<std::optional<std::int32_t>> format = scan_vdb(file);
   if (!format) return format.failure();
   // The format is checked before the seal, which another version may compute differently.
-  if (*format && **format != kFieldFormat)
+  if (*format && !reads_format(**format))
     return Failure{name + " was written by another version of hapsix: bake it again"};
   try {
     return read_sealed(file);

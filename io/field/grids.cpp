@@ -6,6 +6,8 @@
 //   part      Int32Grid, one voxel for a brick; only where the mesh has parts
 //   triangle  Int32Grid, one voxel for a brick; -1 where a sealed hole is nearest
 //
+// and, where cells have finer samples, the grids of fine_grids.cpp.
+//
 // The rest of FieldData is metadata of `distance`, named hapsix_*. Leaves run z fastest, bricks x.
 #include "io/field/grids.h"
 
@@ -36,20 +38,12 @@ double units_per_metre(const FieldData& field) {
   return units;
 }
 
-openvdb::math::Transform::Ptr make_transform(const FieldData& field, double spacing) {
-  const double u = units_per_metre(field);
-  auto transform = openvdb::math::Transform::createLinearTransform(u * spacing);
-  transform->postTranslate(
-      openvdb::Vec3d(u * field.origin.x, u * field.origin.y, u * field.origin.z));
-  return transform;
-}
-
 Place nodes_of(const FieldData& f) { return {{f.bricks[0] + 1, f.bricks[1] + 1, f.bricks[2] + 1}}; }
 
 FloatGrid::Ptr far_grid(const FieldData& field) {
   auto grid = FloatGrid::create(float(field.band));
   grid->setName("far");
-  grid->setTransform(make_transform(field, 8 * field.voxel_size));
+  grid->setTransform(transform_of(field, 8 * field.voxel_size));
   const Place nodes = nodes_of(field);
   auto access = grid->getAccessor();
   for (std::size_t i = 0; i < field.far_grid.size(); ++i) {
@@ -64,7 +58,7 @@ Int32Grid::Ptr brick_grid(const FieldData& field, const char* name,
                           const std::vector<std::int32_t>& value) {
   auto grid = Int32Grid::create(-1);
   grid->setName(name);
-  grid->setTransform(make_transform(field, 8 * field.voxel_size));
+  grid->setTransform(transform_of(field, 8 * field.voxel_size));
   const Place cells{field.bricks};
   auto access = grid->getAccessor();
   for (std::size_t c = 0; c < field.brick_index.size(); ++c) {
@@ -81,14 +75,17 @@ FloatGrid::Ptr empty_distance_grid(const FieldData& field) {
   auto grid = FloatGrid::create(float(field.band));
   grid->setName("distance");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  grid->setTransform(make_transform(field, field.voxel_size));
-  grid->insertMeta(key("format"), openvdb::Int32Metadata(kFieldFormat));
+  grid->setTransform(transform_of(field, field.voxel_size));
+  grid->insertMeta(key("format"),
+                   openvdb::Int32Metadata(field.refined.empty() ? kFieldFormat : kRefinedFormat));
   grid->insertMeta(key("bricks"), openvdb::Vec3IMetadata(openvdb::Vec3i(field.bricks.data())));
   grid->insertMeta(key("origin"), openvdb::Vec3DMetadata(openvdb::Vec3d(
                                       field.origin.x, field.origin.y, field.origin.z)));
   grid->insertMeta(key("voxel_size"), openvdb::DoubleMetadata(field.voxel_size));
   grid->insertMeta(key("band"), openvdb::DoubleMetadata(field.band));
   grid->insertMeta(key("offset"), openvdb::DoubleMetadata(field.offset));
+  if (field.tolerance > 0)
+    grid->insertMeta(key("tolerance"), openvdb::DoubleMetadata(field.tolerance));
   grid->insertMeta(key("sign_mode"), openvdb::StringMetadata(field.sign_mode));
   grid->insertMeta(key("units_per_metre"), openvdb::DoubleMetadata(units_per_metre(field)));
   grid->insertMeta(key("input_hash"), openvdb::StringMetadata(field.input_hash));
@@ -191,13 +188,15 @@ bool take_head(const FloatGrid& grid, FieldData& f) {
   openvdb::Vec3d origin;
   openvdb::Int64 triangles = 0;
   std::int32_t format = 0, parts = 0;
-  const bool whole = take(grid, "format", format) && format == kFieldFormat &&
+  const bool whole = take(grid, "format", format) && reads_format(format) &&
                      take(grid, "bricks", bricks) && take(grid, "origin", origin) &&
                      take(grid, "voxel_size", f.voxel_size) && take(grid, "band", f.band) &&
                      take(grid, "offset", f.offset) && take(grid, "sign_mode", f.sign_mode) &&
                      take(grid, "input_hash", f.input_hash) && take(grid, "triangles", triangles) &&
                      triangles >= 0 && take(grid, "parts", parts) && parts >= 0;
   if (!whole) return false;
+  if (take(grid, "tolerance", f.tolerance) && !(f.tolerance > 0 && std::isfinite(f.tolerance)))
+    return false;
   f.triangles = std::size_t(triangles);
   f.origin = {origin.x(), origin.y(), origin.z()};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -248,10 +247,19 @@ FloatGrid::Ptr own_distance(const openvdb::GridPtrVec& grids) {
 
 }  // namespace
 
+openvdb::math::Transform::Ptr transform_of(const FieldData& field, double spacing) {
+  const double u = units_per_metre(field);
+  auto transform = openvdb::math::Transform::createLinearTransform(u * spacing);
+  transform->postTranslate(
+      openvdb::Vec3d(u * field.origin.x, u * field.origin.y, u * field.origin.z));
+  return transform;
+}
+
 openvdb::GridPtrVec grids_of(const FieldData& field) {
   openvdb::GridPtrVec grids{distance_grid(field), far_grid(field)};
   if (!field.part.empty()) grids.push_back(brick_grid(field, "part", field.part));
   if (!field.triangle.empty()) grids.push_back(brick_grid(field, "triangle", field.triangle));
+  add_fine_grids(field, grids);
   return grids;
 }
 
@@ -266,7 +274,8 @@ std::optional<FieldData> field_of(const openvdb::GridPtrVec& grids) {
   const std::int64_t any = std::numeric_limits<std::int32_t>::max();
   const std::int64_t parts = f.part_names.empty() ? any : std::int64_t(f.part_names.size()) - 1;
   if (!take_far(*far, f) || !take_bricks(part.get(), f, 0, parts, f.part) ||
-      !take_bricks(triangle.get(), f, -1, std::int64_t(f.triangles) - 1, f.triangle))
+      !take_bricks(triangle.get(), f, -1, std::int64_t(f.triangles) - 1, f.triangle) ||
+      !take_fine_grids(grids, f))
     return {};
   return f;
 }

@@ -17,7 +17,9 @@
 
 namespace h6::io {
 
-inline constexpr std::int32_t kFieldFormat = 3;  // hapsix_format; 3: sealed by XXH3
+// hapsix_format. 3: sealed by XXH3. 4: the same with finer samples, which readers of 3 would lose.
+inline constexpr std::int32_t kFieldFormat = 3, kRefinedFormat = 4;
+inline bool reads_format(std::int32_t f) { return f == kFieldFormat || f == kRefinedFormat; }
 
 // Numbers the cells of a box of bricks, or the nodes of its far grid, x fastest.
 struct Place {
@@ -43,6 +45,16 @@ openvdb::GridPtrVec grids_of(const FieldData& field);
 std::optional<FieldData> field_of(const openvdb::GridPtrVec& grids);
 // Whether hapsix wrote one of the grids, in any version of its format.
 bool are_ours(const openvdb::GridPtrVec& grids);
+
+// The transform of a grid whose nodes are `spacing` [m] apart.
+openvdb::math::Transform::Ptr transform_of(const FieldData& field, double spacing);
+
+// ---- fine_grids.cpp: the finer samples of fields of hapsix ----------------------------------
+
+void add_fine_grids(const FieldData& field, openvdb::GridPtrVec& grids);
+// Takes them into a field that has its bricks. False where they are not whole; true where the grids
+// have none.
+bool take_fine_grids(const openvdb::GridPtrVec& grids, FieldData& field);
 
 // ---- scan.cpp: checks a file before OpenVDB allocates by its lengths ------------------------
 

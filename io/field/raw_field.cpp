@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // raw_field.cpp - one page with the head, then the arrays one after the other: samples,
-// brick_index, far_grid, part, triangle, texts. Blocks of the arrays are hashed while they are
-// written or read, by all threads; the head comes last, with a hash of itself and of the blocks'
-// hashes.
+// brick_index, far_grid, part, triangle, the finer samples, texts. Blocks of the arrays are hashed
+// while they are written or read, by all threads; the head comes last, with a hash of itself and of
+// the blocks' hashes.
 #include "io/field/raw_field.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace h6::io {
 namespace {
 
 constexpr std::size_t kHashed = std::size_t{4} << 20;
-constexpr std::string_view kFieldMagic = "hapsix cached field ", kVersion = "1\n";
+constexpr std::string_view kFieldMagic = "hapsix cached field ", kVersion = "2\n";
 
 struct Head {
   char magic[24] = {};
@@ -35,12 +35,14 @@ struct Head {
   std::uint64_t triangles = 0;
   std::uint64_t brick_count = 0, part_count = 0, triangle_count = 0, text_bytes = 0;
   Hash128 hash;
-  char rest[kDirectPage - 144] = {};
+  std::uint64_t refined_count = 0, fine_index_count = 0, halves_count = 0, quarters_count = 0;
+  double tolerance = 0;
+  char rest[kDirectPage - 184] = {};
 };
 static_assert(sizeof(Head) == kDirectPage);
 
 // The arrays of a file in their order. Only a reader writes through them.
-using Pieces = std::array<std::span<char>, 6>;
+using Pieces = std::array<std::span<char>, 10>;
 
 template <class T, class A>
 std::span<char> bytes_of(const std::vector<T, A>& values) {
@@ -49,8 +51,9 @@ std::span<char> bytes_of(const std::vector<T, A>& values) {
 }
 
 Pieces pieces_of(const FieldData& f, const std::vector<char>& text) {
-  return {bytes_of(f.samples), bytes_of(f.brick_index), bytes_of(f.far_grid),
-          bytes_of(f.part),    bytes_of(f.triangle),    bytes_of(text)};
+  return {bytes_of(f.samples),  bytes_of(f.brick_index), bytes_of(f.far_grid),   bytes_of(f.part),
+          bytes_of(f.triangle), bytes_of(f.refined),     bytes_of(f.fine_index), bytes_of(f.halves),
+          bytes_of(f.quarters), bytes_of(text)};
 }
 
 std::uint64_t total(const Pieces& pieces) {
@@ -135,6 +138,11 @@ Head head_of(const FieldData& f, std::size_t text_bytes) {
   head.brick_count = f.brick_count();
   head.part_count = f.part.size();
   head.triangle_count = f.triangle.size();
+  head.refined_count = f.refined.size();
+  head.fine_index_count = f.fine_index.size();
+  head.halves_count = f.halves.size();
+  head.quarters_count = f.quarters.size();
+  head.tolerance = f.tolerance;
   head.text_bytes = text_bytes;
   return head;
 }
@@ -176,13 +184,17 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
     cells *= std::uint64_t(n);
     nodes *= std::uint64_t(n) + 1;
   }
-  if (std::max({head.brick_count, head.part_count, head.triangle_count}) > cells ||
-      head.text_bytes > bytes)
+  if (std::max({head.brick_count, head.part_count, head.triangle_count, head.refined_count}) >
+          cells ||
+      std::max({head.text_bytes, head.fine_index_count, head.halves_count, head.quarters_count}) >
+          bytes)
     return std::nullopt;
-  const std::uint64_t announced = head.brick_count * 512 * sizeof(float) +
-                                  cells * sizeof(std::int32_t) + nodes * sizeof(float) +
-                                  (head.part_count + head.triangle_count) * sizeof(std::int32_t) +
-                                  head.text_bytes;
+  const std::uint64_t announced =
+      head.brick_count * 512 * sizeof(float) + cells * sizeof(std::int32_t) +
+      nodes * sizeof(float) +
+      (head.part_count + head.triangle_count + head.refined_count + head.fine_index_count) *
+          sizeof(std::int32_t) +
+      (head.halves_count + head.quarters_count) * sizeof(float) + head.text_bytes;
   if (announced != bytes) return std::nullopt;
   FieldData f;
   f.origin = {head.origin[0], head.origin[1], head.origin[2]};
@@ -196,6 +208,11 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
   f.far_grid.resize(std::size_t(nodes));
   f.part.resize(std::size_t(head.part_count));
   f.triangle.resize(std::size_t(head.triangle_count));
+  f.refined.resize(std::size_t(head.refined_count));
+  f.fine_index.resize(std::size_t(head.fine_index_count));
+  f.halves.resize(std::size_t(head.halves_count));
+  f.quarters.resize(std::size_t(head.quarters_count));
+  f.tolerance = head.tolerance;
   text.resize(std::size_t(head.text_bytes));
   return f;
 }

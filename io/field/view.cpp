@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/field/view.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "hapsix/vector.h"
 
 namespace h6::io {
 
@@ -47,6 +50,21 @@ bool FieldView::corners(const std::array<std::int32_t, 3>& cell, float out[8]) c
   return true;
 }
 
+const float* FieldView::finer(const std::array<std::int32_t, 3>& cell, int& factor) const {
+  std::size_t brick = 0, local = 0;
+  for (std::size_t k = 3; k-- > 0;) {
+    brick = brick * std::size_t(field_.bricks[k]) + std::size_t(cell[k] >> 3);
+    local = local * 8 + std::size_t(cell[k] & 7);
+  }
+  const std::int32_t row = field_.brick_index[brick];
+  const std::int32_t refined = row < 0 ? -1 : field_.refined[std::size_t(row)];
+  const std::int32_t i = refined < 0 ? 0 : field_.fine_index[512 * std::size_t(refined) + local];
+  factor = i > 0 ? 2 : 4;
+  if (i == 0) return nullptr;
+  return i > 0 ? &field_.halves[27 * std::size_t(i - 1)]
+               : &field_.quarters[125 * std::size_t(-1 - i)];
+}
+
 bool FieldView::distance(const Vec3& g, double& d, Vec3* gradient) const {
   const double place[3] = {g.x, g.y, g.z};
   std::array<std::int32_t, 3> cell{};
@@ -58,11 +76,22 @@ bool FieldView::distance(const Vec3& g, double& d, Vec3* gradient) const {
   }
   float corner[8];
   if (!corners(cell, corner)) return false;
-  d = trilinear(corner, at, gradient) / field_.voxel_size;
-  if (gradient) {
-    const double h = field_.voxel_size;
-    *gradient = {gradient->x / h, gradient->y / h, gradient->z / h};
+  int factor = 1;
+  if (const float* fine = field_.refined.empty() ? nullptr : finer(cell, factor)) {
+    const int side = factor + 1;
+    int low[3];
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(int(at[k] * factor), factor - 1);
+      at[k] = at[k] * factor - low[k];
+    }
+    for (int i = 0; i < 8; ++i)
+      corner[i] =
+          fine[((low[2] + (i >> 2)) * side + low[1] + (i >> 1 & 1)) * side + low[0] + (i & 1)];
+  } else {
+    factor = 1;
   }
+  d = trilinear(corner, at, gradient) / field_.voxel_size;
+  if (gradient) *gradient = (factor / field_.voxel_size) * *gradient;
   return true;
 }
 

@@ -26,10 +26,13 @@ class FieldView {
 
   // Trilinear [voxel]. False where a corner has no sample, far from the surface.
   bool distance(const Vec3& g, double& d, Vec3* gradient = nullptr) const;
-  // The eight corners of a cell [m], x fastest; false where one has no sample.
+  // The eight corners of a cell [m], x fastest, without finer samples; false where one has none.
   bool corners(const std::array<std::int32_t, 3>& cell, float out[8]) const;
 
  private:
+  // The finer samples of a cell, and how many intervals they cut a voxel into; null: none.
+  const float* finer(const std::array<std::int32_t, 3>& cell, int& factor) const;
+
   const FieldData& field_;
 };
 

@@ -69,6 +69,7 @@ void add_options(ListHash& list, const FieldBake& options) {
   list.value(options.weld);
   list.value(options.band_voxels);
   list.value(options.padding_voxels);
+  if (options.tolerance > 0) list.value(options.tolerance);
   if (norm(options.shift) == 0) return;  // so that keys are those of before there was a shift
   for (const double s : {options.shift.x, options.shift.y, options.shift.z}) list.value(s);
 }

@@ -87,6 +87,9 @@ constexpr Setting kFieldBakeRows[] = {
     whole<&FieldBake::voxels>("voxels", between(16, 2048), "cells on the longest padded side"),
     in_place_of("voxels", number<&FieldBake::voxel_size>("voxel_size", "m", positive(kNoLimit),
                                                          "size of a cell, instead of voxels")),
+    in_place_of("voxels",
+                number<&FieldBake::tolerance>("tolerance", "m", positive(kNoLimit),
+                                              "largest error near the surface, instead of voxels")),
     quiet(number<&FieldBake::offset>(
         "offset", "m", not_negative(kNoLimit),
         "sigma, how far the surface is pushed out; default 0 for closed meshes, else 0.9 voxel")),

@@ -16,25 +16,25 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
 // cull_reach of every lane.
-HWY_INLINE VF reach_of(VF s, bool wide) {
+HWY_INLINE VF reach_of(VF s, const Reach& r) {
   const DF d;
-  const VF long_form = hn::Add(s, hn::Set(d, kSqrt3));
-  const VF short_form = hn::Mul(s, hn::Set(d, kSqrt3));
-  const auto near = hn::Lt(s, hn::Set(d, wide ? 0.0f : kShortReach));
+  const VF long_form = hn::Add(s, hn::Set(d, r.error));
+  const VF short_form = hn::Mul(s, hn::Set(d, r.slope));
+  const auto near = hn::Lt(s, hn::Set(d, r.below));
   const VF reach = hn::Add(hn::IfThenElse(near, short_form, long_form), hn::Set(d, kReachRounding));
   return hn::IfThenElseZero(hn::Gt(s, hn::Zero(d)), reach);
 }
 
 // cull_clearance of every lane.
-HWY_INLINE VF clearance_of(VF distance, bool wide) {
+HWY_INLINE VF clearance_of(VF distance, const Reach& r) {
   const DF d;
   const VF left = hn::Sub(distance, hn::Set(d, kReachRounding));
-  const VF long_form = hn::Sub(left, hn::Set(d, kSqrt3));
-  if (wide) return long_form;
-  const VF short_form = hn::Mul(left, hn::Set(d, 1.0f / kSqrt3));
-  const VF edge = hn::Set(d, kShortReach);
+  const VF long_form = hn::Sub(left, hn::Set(d, r.error));
+  if (!(r.below > 0)) return long_form;
+  const VF short_form = hn::Mul(left, hn::Set(d, 1.0f / r.slope));
+  const VF edge = hn::Set(d, r.below);
   const VF far_form =
-      hn::IfThenElse(hn::Gt(long_form, edge), long_form, hn::Set(d, kShortReach - 1e-4f));
+      hn::IfThenElse(hn::Gt(long_form, edge), long_form, hn::Set(d, r.below - 1e-4f));
   return hn::IfThenElse(hn::Lt(short_form, edge), short_form, far_form);
 }
 
@@ -43,7 +43,7 @@ struct Culling {
   const Affine& to_field;
   const SpheresView& spheres;
   float radius_scale;
-  bool wide;
+  const Reach& reach;
   float margin;
 };
 
@@ -64,12 +64,12 @@ HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uin
                        affine_row(c.to_field.m[2], px, py, pz), distance, gx, gy, gz);
 
   const VF scaled = hn::Mul(radius, hn::Set(d, c.radius_scale));
-  const VF reach = reach_of(scaled, c.wide);
+  const VF reach = reach_of(scaled, c.reach);
   const auto live = hn::FirstN(d, lanes.live);
   const auto keep = hn::And(live, hn::Le(distance, hn::Add(reach, hn::Set(d, c.margin))));
   const std::size_t kept = hn::CountTrue(d, keep);
   if (clearance != nullptr) {
-    const VF left = hn::Sub(clearance_of(distance, c.wide), scaled);
+    const VF left = hn::Sub(clearance_of(distance, c.reach), scaled);
     const auto held = hn::And(keep, hn::Gt(left, hn::Zero(d)));
     store_n(hn::IfThenElse(held, hn::Zero(d), left), d, clearance, lanes.live);
   }
@@ -86,14 +86,14 @@ HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uin
 }
 
 std::size_t cull_spheres_simd(const FieldView& field, const Affine& to_field,
-                              const SpheresView& spheres, float radius_scale, bool wide,
+                              const SpheresView& spheres, float radius_scale, const Reach& reach,
                               float margin, const std::uint32_t* rows, std::uint32_t first,
                               std::size_t count, std::uint32_t* survivors, float* clearance) {
   // A run of rows is treated as columns that start at its first row.
   const std::size_t skip = rows == nullptr ? first : 0;
   const SpheresView from{spheres.x + skip, spheres.y + skip, spheres.z + skip,
                          spheres.radius + skip, spheres.count - skip};
-  const Culling culling{field, to_field, from, radius_scale, wide, margin};
+  const Culling culling{field, to_field, from, radius_scale, reach, margin};
   const std::size_t width = hn::Lanes(DF());
   std::size_t written = 0;
   for (std::size_t k = 0; k < count; k += width) {
@@ -113,10 +113,10 @@ namespace h6::kernels {
 HWY_EXPORT(cull_spheres_simd);
 
 std::size_t cull_spheres(const FieldView& field, const Affine& to_field, const SpheresView& spheres,
-                         float radius_scale, bool wide, float margin, const std::uint32_t* rows,
-                         std::uint32_t first, std::size_t count, std::uint32_t* survivors,
-                         float* clearance) {
-  return HWY_DYNAMIC_DISPATCH(cull_spheres_simd)(field, to_field, spheres, radius_scale, wide,
+                         float radius_scale, const Reach& reach, float margin,
+                         const std::uint32_t* rows, std::uint32_t first, std::size_t count,
+                         std::uint32_t* survivors, float* clearance) {
+  return HWY_DYNAMIC_DISPATCH(cull_spheres_simd)(field, to_field, spheres, radius_scale, reach,
                                                  margin, rows, first, count, survivors, clearance);
 }
 

@@ -6,7 +6,7 @@
 namespace h6::kernels {
 
 std::size_t cull_spheres_ref(const FieldView& field, const Affine& to_field,
-                             const SpheresView& spheres, float radius_scale, bool wide,
+                             const SpheresView& spheres, float radius_scale, const Reach& reach,
                              float margin, const std::uint32_t* rows, std::uint32_t first,
                              std::size_t count, std::uint32_t* survivors, float* clearance) {
   const PointsView centres{spheres.x, spheres.y, spheres.z, spheres.count};
@@ -17,10 +17,9 @@ std::size_t cull_spheres_ref(const FieldView& field, const Affine& to_field,
     sample_field_ref(field, to_field, centres, &row, 1, &distance, nullptr, nullptr, nullptr);
     // Xu & Barbic 2016, Sec. 3, with the error of interpolation.
     const float radius = spheres.radius[row] * radius_scale;
-    const float reach = cull_reach(radius, wide);
-    const bool keep = distance <= reach + margin;
+    const bool keep = distance <= cull_reach(radius, reach) + margin;
     if (clearance != nullptr) {
-      const float left = cull_clearance(distance, wide) - radius;
+      const float left = cull_clearance(distance, reach) - radius;
       clearance[k] = keep && left > 0 ? 0.0f : left;
     }
     if (keep) survivors[written++] = row;

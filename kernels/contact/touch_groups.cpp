@@ -38,7 +38,7 @@ struct Ring {
   HWY_ALIGN std::int32_t slot[kRing][kGroup];  // index in the table, then byte offset in bricks
   HWY_ALIGN std::int32_t node[kRing][kGroup];
   HWY_ALIGN float fraction[3][kRing][kGroup];
-  bool plain[kRing];  // all points lie in bricks; other batches take the general path
+  bool plain[kRing];  // all points lie in plain bricks; other batches take the general path
 };
 
 // The last batch is filled up with the first point.
@@ -160,13 +160,13 @@ HWY_INLINE void look_up(const FieldView& field, std::size_t k, bool cold, Ring& 
         continue;
       }
       const std::int16_t* const node =
-          field.bricks + std::ptrdiff_t{entry} * kBrickStride + ring.node[k][i];
+          field.bricks + std::ptrdiff_t{row_of(entry)} * kBrickStride + ring.node[k][i];
       hwy::Prefetch(node + 5);
       hwy::Prefetch(node + 86);
     }
   for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di)) {
     const VI entry = gather_entries(field.table, ring.slot[k] + i);
-    ring.plain[k] = ring.plain[k] && hn::AllFalse(di, hn::Lt(entry, hn::Zero(di)));
+    ring.plain[k] = ring.plain[k] && hn::AllTrue(di, is_plain(entry));
     hn::Store(near_offset(entry, hn::Load(di, ring.node[k] + i)), di, ring.slot[k] + i);
   }
 }

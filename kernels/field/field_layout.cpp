@@ -23,6 +23,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace h6::kernels {
 namespace {
@@ -73,8 +74,8 @@ FarBound far_bound(const h6FieldDef& def, const Cell& c) {
   return bound;
 }
 
-std::int16_t round_near(double voxels) {
-  const double q = std::nearbyint(voxels / kNearQuantum);
+std::int16_t round_near(double voxels, double quantum = kNearQuantum) {
+  const double q = std::nearbyint(voxels / quantum);
   return static_cast<std::int16_t>(std::clamp(q, -kInt16Max, kInt16Max));
 }
 
@@ -148,12 +149,25 @@ class BrickNodes {
   bool in_grid_[3] = {};
 };
 
+// The entries of a brick in def.fine_index, one a cell; null where it is not refined.
+const std::int32_t* finer_cells(const h6FieldDef& def, std::size_t slot) {
+  const std::int32_t brick = def.brick_index[slot];
+  const std::int32_t row = brick < 0 || def.refined == nullptr ? -1 : def.refined[brick];
+  return row < 0 ? nullptr : def.fine_index + std::size_t{512} * row;
+}
+
+int units_of(std::int32_t cell) { return cell == 0 ? 0 : cell > 0 ? kHalfUnits : kQuarterUnits; }
+
 }  // namespace
 
 FieldLayoutSize field_layout_size(const h6FieldDef& def) {
-  FieldLayoutSize size{0, 0};
+  FieldLayoutSize size{0, 0, 0, 0};
   for (std::size_t slot = 0; slot < slot_count(def); ++slot) {
     ++(def.brick_index[slot] >= 0 ? size.bricks : size.far_cells);
+    const std::int32_t* finer = finer_cells(def, slot);
+    if (finer == nullptr) continue;
+    ++size.refined;
+    for (int c = 0; c < 512; ++c) size.fine_units += units_of(finer[c]);
   }
   return size;
 }
@@ -165,7 +179,31 @@ float layout_band(const h6FieldDef& def) {
 void layout_table(const h6FieldDef& def, std::int32_t* table) {
   std::int32_t bricks = 0, far_cells = 0;
   for (std::size_t slot = 0; slot < slot_count(def); ++slot) {
+    if (finer_cells(def, slot) != nullptr) table[slot] = kRefined | bricks++;
+  }
+  for (std::size_t slot = 0; slot < slot_count(def); ++slot) {
+    if (finer_cells(def, slot) != nullptr) continue;
     table[slot] = def.brick_index[slot] >= 0 ? bricks++ : -1 - far_cells++;
+  }
+}
+
+void layout_cuts(const h6FieldDef& def, const std::int32_t* table, std::uint16_t* cuts) {
+  std::int32_t first = 0;
+  for (std::size_t slot = 0; slot < slot_count(def); ++slot) {
+    const std::int32_t* finer = finer_cells(def, slot);
+    if (finer == nullptr) continue;
+    std::uint16_t* out = cuts + std::ptrdiff_t{kCutStride} * row_of(table[slot]);
+    std::fill_n(out, kCutHead, std::uint16_t{0});
+    const std::int32_t before = first - 1;  // so that no code is 0
+    std::memcpy(out, &before, sizeof before);
+    std::int32_t at = 1;
+    for (int c = 0; c < 512; ++c) {
+      const int units = units_of(finer[c]);
+      out[kCutHead + c] =
+          units == 0 ? std::uint16_t{0} : static_cast<std::uint16_t>(2 * at + (finer[c] < 0));
+      at += units;
+    }
+    first += at - 1;
   }
 }
 
@@ -182,13 +220,33 @@ void layout_cell(const h6FieldDef& def, const std::int32_t* table, std::size_t s
     return;
   }
   const BrickNodes nodes(def, cell);
-  std::int16_t* out = bricks + kBrickStride * entry;
+  std::int16_t* out = bricks + kBrickStride * std::ptrdiff_t{row_of(table[slot])};
   for (int z = 0; z < 9; ++z) {
     for (int y = 0; y < 9; ++y) {
       for (int x = 0; x < 9; ++x) *out++ = round_near(nodes.at(x, y, z));
     }
   }
   std::fill_n(out, kBrickStride - kBrickNodes, std::int16_t{0});
+}
+
+void layout_fine(const h6FieldDef& def, const std::int32_t* table, const std::uint16_t* cuts,
+                 std::size_t slot, std::int16_t* fine) {
+  const std::int32_t* finer = finer_cells(def, slot);
+  if (finer == nullptr) return;
+  const std::uint16_t* codes = cuts + std::ptrdiff_t{kCutStride} * row_of(table[slot]);
+  std::int32_t first;
+  std::memcpy(&first, codes, sizeof first);
+  for (int c = 0; c < 512; ++c) {
+    const std::int32_t cell = finer[c];
+    if (cell == 0) continue;
+    const int factor = cell > 0 ? 2 : 4, nodes = cell > 0 ? 27 : 125;
+    const float* from = cell > 0 ? def.halves + std::ptrdiff_t{27} * (cell - 1)
+                                 : def.quarters + std::ptrdiff_t{125} * (-1 - cell);
+    std::int16_t* out = fine + std::ptrdiff_t{kFineUnit} * (first + (codes[kCutHead + c] >> 1));
+    for (int n = 0; n < nodes; ++n)
+      out[n] = round_near(from[n] / def.voxel_size, kNearQuantum / factor);
+    std::fill_n(out + nodes, kFineUnit * units_of(cell) - nodes, std::int16_t{0});
+  }
 }
 
 }  // namespace h6::kernels

@@ -14,19 +14,26 @@ namespace h6::kernels {
 struct FieldLayoutSize {
   std::size_t bricks;
   std::size_t far_cells;
+  std::size_t refined;     // bricks with finer samples
+  std::size_t fine_units;  // of kFineUnit int16
 };
 FieldLayoutSize field_layout_size(const h6FieldDef& def);
 
 // FieldView::band: the band of the definition, reduced by the rounding of float.
 float layout_band(const h6FieldDef& def);
 
-// Fills table (one entry a brick): rows in order of the table for both kinds.
+// Fills table (one entry a brick): rows in order of the table, those of refined bricks first.
 void layout_table(const h6FieldDef& def, std::int32_t* table);
+// Fills cuts (refined x kCutStride): where the finer samples of each cell lie.
+void layout_cuts(const h6FieldDef& def, const std::int32_t* table, std::uint16_t* cuts);
 
 // Packs the brick or far cell of table entry `cell`. Nodes of the apron that no brick holds belong
 // to cells wholly outside the band; they get sign * max(band, far bound). Distances are clamped to
 // the range of int16.
 void layout_cell(const h6FieldDef& def, const std::int32_t* table, std::size_t cell,
                  std::int16_t* bricks, std::int16_t* far);
+// Packs the finer samples of table entry `cell`, if it has any, to their place in `fine`.
+void layout_fine(const h6FieldDef& def, const std::int32_t* table, const std::uint16_t* cuts,
+                 std::size_t cell, std::int16_t* fine);
 
 }  // namespace h6::kernels

@@ -26,7 +26,7 @@ struct Batch {
   HWY_ALIGN float fraction[3][2][kBatch];  // axis, below or above the point
   HWY_ALIGN std::int32_t slot[4][kBatch];  // index in the table
   HWY_ALIGN std::int32_t node[4][kBatch];  // then byte offset in the bricks
-  bool plain[kBatch];                      // of a vector's first point: all corners lie in bricks
+  bool plain[kBatch];  // of a vector's first point: all corners lie in plain bricks
 };
 
 // The two places of an axis for a vector of points.
@@ -75,16 +75,16 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
 
 HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i, Batch& batch) {
   const DI di;
-  auto far = hn::FirstN(di, 0);
+  auto other = hn::FirstN(di, 0);
   HWY_UNROLL(4)
   for (int c = 0; c < 4; ++c) {
     const VI entry = gather_entries(field.table, batch.slot[c] + i);
-    const auto beyond = hn::Lt(entry, hn::Zero(di));
-    far = hn::Or(far, beyond);
+    const auto beyond = hn::Not(is_plain(entry));
+    other = hn::Or(other, beyond);
     const VI offset = near_offset(entry, hn::Load(di, batch.node[c] + i));
     hn::Store(hn::IfThenZeroElse(beyond, offset), di, batch.node[c] + i);
   }
-  batch.plain[i] = batch.plain[i] && hn::AllFalse(di, hn::And(far, hn::FirstN(di, live)));
+  batch.plain[i] = batch.plain[i] && hn::AllFalse(di, hn::And(other, hn::FirstN(di, live)));
 }
 
 HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::size_t live,
@@ -104,7 +104,7 @@ HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::si
   }
 }
 
-// Points with a corner in a far cell or outside the grid.
+// Points with a corner in a far cell, in a refined brick or outside the grid.
 HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
                               const PointsView& points, std::size_t k, float* const at[4]) {
   const DF d;

@@ -105,6 +105,22 @@ HWY_INLINE void gather_pairs(const std::int16_t* pool, const std::int32_t* at,
 #endif
 }
 
+// The int32 at each byte offset of `pool`.
+HWY_INLINE VI gather_at(const void* pool, const std::int32_t* at) {
+  const DI di;
+  const char* const bytes = static_cast<const char*>(pool);
+#if HWY_TARGET == HWY_SCALAR
+  return hn::Set(di, load_32(bytes + at[0]));
+#else
+  V4 four[kFours];
+  HWY_UNROLL(4)
+  for (std::size_t k = 0; k < kFours; ++k)
+    four[k] = four_of(bytes + at[4 * k], bytes + at[4 * k + 1], bytes + at[4 * k + 2],
+                      bytes + at[4 * k + 3]);
+  return join_fours(di, four);
+#endif
+}
+
 // Bytes from a cell's first corner to the next row and to the next plane, in a brick and in a far
 // cell.
 constexpr int kNearCorners[4] = {0, 2 * 9, 2 * 81, 2 * 90};
@@ -256,9 +272,70 @@ HWY_INLINE VF far_bound(const VF low[4], const VF step[4], VF x, VF y, VF z, VF 
 }
 
 // Byte offsets of the first corners in the pool of bricks.
-HWY_INLINE VI near_offset(VI entry, VI node) {
+HWY_INLINE VI near_offset(VI row, VI node) {
   const DI di;
-  return hn::Add(hn::Mul(entry, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node));
+  return hn::Add(hn::Mul(row, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node));
+}
+
+// Entries of bricks without finer samples.
+HWY_INLINE hn::Mask<DI> is_plain(VI entry) {
+  const DI di;
+  return hn::And(hn::Gt(entry, hn::Set(di, -1)), hn::Lt(entry, hn::Set(di, kRefined)));
+}
+
+// The place of a point along one axis of a cell that is cut into `factor`.
+struct FineAxis {
+  VI low;
+  VF fraction;
+};
+HWY_INLINE FineAxis split_cell(VF fraction, VF factor) {
+  const DF d;
+  const VF scaled = hn::Mul(fraction, factor);
+  const VF low =
+      hn::Min(hn::ConvertTo(d, hn::ConvertTo(DI(), scaled)), hn::Sub(factor, hn::Set(d, 1.0f)));
+  return {hn::ConvertTo(DI(), low), hn::Sub(scaled, low)};
+}
+
+// Puts the finer samples of cells that have any in the place of the brick's: corners, fractions and
+// quantum. The slope per voxel needs no change, since finer samples have a finer quantum.
+HWY_INLINE void take_finer(const FieldView& field, VI row, hn::Mask<DI> refined, Axis& x, Axis& y,
+                           Axis& z, VI (&pair)[4], VF& quantum) {
+  const DF d;
+  const DI di;
+  HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
+  const VI cell = hn::Add(x.cell, hn::Add(hn::ShiftLeft<3>(y.cell), hn::ShiftLeft<6>(z.cell)));
+  const VI record = hn::IfThenElseZero(refined, hn::Mul(row, hn::Set(di, 2 * kCutStride)));
+  hn::Store(hn::Add(record, hn::IfThenElseZero(refined, hn::Add(hn::Set(di, 2 * kCutHead),
+                                                                hn::ShiftLeft<1>(cell)))),
+            di, at);
+  const VI code =
+      hn::IfThenElseZero(refined, hn::And(gather_at(field.cuts, at), hn::Set(di, 0xffff)));
+  const auto cut = hn::Ne(code, hn::Zero(di));
+  if (hn::AllFalse(di, cut)) return;
+  hn::Store(record, di, at);
+  const VI unit = hn::Add(gather_at(field.cuts, at), hn::ShiftRight<1>(code));
+  const auto quarter = hn::Ne(hn::And(code, hn::Set(di, 1)), hn::Zero(di));
+  const VF factor = hn::IfThenElse(hn::RebindMask(d, quarter), hn::Set(d, 4.0f), hn::Set(d, 2.0f));
+  const VI side = hn::IfThenElse(quarter, hn::Set(di, 5), hn::Set(di, 3));
+  const FineAxis fx = split_cell(x.fraction, factor), fy = split_cell(y.fraction, factor),
+                 fz = split_cell(z.fraction, factor);
+  const VI node = hn::Add(fx.low, hn::Mul(side, hn::Add(fy.low, hn::Mul(side, fz.low))));
+  const VI first = hn::Add(hn::Mul(unit, hn::Set(di, 2 * kFineUnit)), hn::ShiftLeft<1>(node));
+  const VI line = hn::ShiftLeft<1>(side), plane = hn::Mul(line, side);
+  const VI behind[4] = {hn::Zero(di), line, plane, hn::Add(line, plane)};
+  HWY_UNROLL(4)
+  for (int k = 0; k < 4; ++k) {
+    hn::Store(hn::IfThenElseZero(cut, hn::Add(first, behind[k])), di, at);
+    pair[k] = hn::IfThenElse(cut, gather_at(field.fine, at), pair[k]);
+  }
+  const auto cut_f = hn::RebindMask(d, cut);
+  x.fraction = hn::IfThenElse(cut_f, fx.fraction, x.fraction);
+  y.fraction = hn::IfThenElse(cut_f, fy.fraction, y.fraction);
+  z.fraction = hn::IfThenElse(cut_f, fz.fraction, z.fraction);
+  quantum = hn::IfThenElse(cut_f,
+                           hn::Mul(quantum, hn::IfThenElse(hn::RebindMask(d, quarter),
+                                                           hn::Set(d, 0.25f), hn::Set(d, 0.5f))),
+                           quantum);
 }
 
 // Interpolates pairs along x, then along y and z, at fractions of the cell.
@@ -310,8 +387,11 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
   VF quantum = hn::Set(d, kNearQuantum);
   VF slope = quantum;
   if (!hn::AllTrue(di, far)) {
-    hn::Store(hn::IfThenZeroElse(far, near_offset(entry, cell.node)), di, at);
+    const VI row = hn::And(entry, hn::Set(di, ~kRefined));
+    hn::Store(hn::IfThenZeroElse(far, near_offset(row, cell.node)), di, at);
     gather_pairs(field.bricks, at, kNearCorners, pair);
+    const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
+    if (!hn::AllFalse(di, refined)) take_finer(field, row, refined, x, y, z, pair, quantum);
   } else {
     pair[0] = pair[1] = pair[2] = pair[3] = hn::Zero(di);
   }

@@ -8,7 +8,7 @@ namespace h6::kernels {
 // For k in 0..count-1, `to_field` maps point rows[k] (k itself when rows is null) of `points` to
 // the field. distance[k] is in voxels; gx/gy/gz[k] is its gradient per voxel in field axes, not
 // normalised. The gradient columns may all be null.
-//   in a brick        trilinear sample; its exact derivative
+//   in a brick        trilinear sample, of the finest nodes there are; its exact derivative
 //   in a far cell     a bound with the sign of the side (views.h): 0 <= |distance| <= true |d|;
 //                     the derivative of the interpolated corners
 //   outside the grid  hypot(distance to the grid, value at the nearest grid point when positive)

@@ -2,6 +2,7 @@
 // sample_field_ref.cpp - the specification of sample_field, one point at a time.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "kernels/field/sample_field.h"
@@ -42,6 +43,36 @@ Sample sample_near(const std::int16_t* brick, const std::int32_t cell[3], const 
     corner[k] = kNearQuantum * brick[(z * 9 + y) * 9 + x];
   }
   return trilinear(corner, t);
+}
+
+// The nodes of a cell cut into 2 or 4; null where the cell keeps the samples of its brick.
+const std::int16_t* finer_nodes(const FieldView& field, std::int32_t row,
+                                const std::int32_t cell[3], int& factor) {
+  const std::uint16_t* codes = field.cuts + std::ptrdiff_t{kCutStride} * row;
+  const std::uint16_t code = codes[kCutHead + (cell[2] * 8 + cell[1]) * 8 + cell[0]];
+  if (code == 0) return nullptr;
+  std::int32_t first;
+  std::memcpy(&first, codes, sizeof first);
+  factor = (code & 1) != 0 ? 4 : 2;
+  return field.fine + std::ptrdiff_t{kFineUnit} * (first + (code >> 1));
+}
+
+Sample sample_finer(const std::int16_t* nodes, int factor, const float t[3]) {
+  const int side = factor + 1;
+  std::int32_t low[3];
+  float s[3], corner[8];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float scaled = t[axis] * static_cast<float>(factor);
+    low[axis] = std::min(static_cast<std::int32_t>(scaled), factor - 1);
+    s[axis] = scaled - static_cast<float>(low[axis]);
+  }
+  for (int k = 0; k < 8; ++k) {
+    const int x = low[0] + (k & 1), y = low[1] + (k >> 1 & 1), z = low[2] + (k >> 2);
+    corner[k] = kNearQuantum * nodes[(z * side + y) * side + x];  // fine voxels
+  }
+  Sample found = trilinear(corner, s);
+  found.value /= static_cast<float>(factor);  // voxels; the slope is the same
+  return found;
 }
 
 // J of views.h, from the squares at the corners and their trilinear value.
@@ -101,7 +132,13 @@ Sample sample_inside(const FieldView& field, const float q[3]) {
   const std::int32_t entry = field.table[slot];
   if (entry < 0)
     return sample_far(field.far + 8 * (std::ptrdiff_t{-1} - entry), field.band, cell, t);
-  return sample_near(field.bricks + std::ptrdiff_t{kBrickStride} * entry, cell, t);
+  const std::int32_t row = row_of(entry);
+  if (entry != row) {
+    int factor = 1;
+    if (const std::int16_t* nodes = finer_nodes(field, row, cell, factor))
+      return sample_finer(nodes, factor, t);
+  }
+  return sample_near(field.bricks + std::ptrdiff_t{kBrickStride} * row, cell, t);
 }
 
 Sample sample_anywhere(const FieldView& field, const float p[3]) {

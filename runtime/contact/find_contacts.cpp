@@ -218,10 +218,13 @@ void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shel
     lane.report.status |= H6_CONTACTS_DROPPED;
   }
   if (timed) shell.traverse_ns = static_cast<double>(sched::now_ns() - since);
-  for (const PairSearch& pair : shell.searches) {
-    lane.report.missed_depth_voxels =
-        std::max<double>(lane.report.missed_depth_voxels, pair.missed);
-    lane.report.fit_depth_voxels = std::max<double>(lane.report.fit_depth_voxels, pair.fit.deepest);
+  for (std::size_t p = 0; p < shell.searches.size(); ++p) {
+    const PairSearch& pair = shell.searches[p];
+    const Field& field = *bodies[shell.pairs[p].b].field;
+    const double cut = field.voxel / field.finest;
+    h6FrameReport& report = lane.report;
+    report.missed_depth_voxels = std::max(report.missed_depth_voxels, cut * pair.missed);
+    report.fit_depth_voxels = std::max(report.fit_depth_voxels, cut * pair.fit.deepest);
   }
 }
 

@@ -81,7 +81,7 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
         Eigen::Map<const Eigen::Matrix<float, 6, 1>>(shell.searches[p].ahead).cast<double>();
     kernels::series_gap(kernel_columns(c, pair.begin, pair.end), c.depth + pair.begin, 1,
                         ahead.data(), c.slack + pair.begin);
-    note_firmness(c, set.contact, bodies[pair.b].field->voxel, pair.begin, pair.end);
+    note_firmness(c, set.contact, bodies[pair.b].field->finest, pair.begin, pair.end);
   }
   fill_inner_stiffness(c, set.contact, a.voxel,
                        worth_two_threads(set.contact, c.count, lane) ? lane.team : nullptr,

@@ -71,8 +71,8 @@ struct Search {
   const kernels::FieldView& field;
   const Shell& shell;
   kernels::Affine place;
-  float scale;  // voxels per metre
-  bool wide;
+  float scale;           // voxels per metre
+  kernels::Reach reach;  // of the field's samples
   float margin;          // [voxel]
   bool cold;             // other programs have used the caches
   float near = 0;        // points are sampled up to this distance; 0: all points of a group [voxel]
@@ -82,7 +82,7 @@ struct Search {
                    std::uint32_t* survivors, float* clearance) const {
     return kernels::cull_spheres(
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
-        wide, margin, rows, 0, count, survivors, clearance);
+        reach, margin, rows, 0, count, survivors, clearance);
   }
   // Writes to t.frontier the groups of t.open_blocks of which a point may touch after the way
   // `now`, or may carry load.
@@ -126,15 +126,22 @@ struct Search {
   }
 };
 
-Search search_of(const Settings& set, const Body& a, const Body& b, float margin, bool cold) {
-  const Field& field = *b.field;
+// How far samples of a field may mislead culling.
+kernels::Reach reach_of(const Settings& set, const Field& field) {
+  const kernels::Reach reach =
+      field.steepest > 0 ? kernels::refined_reach(field.steepest) : kernels::Reach{};
   // The short form of culling is proved for margins of up to half a voxel. Margins change from
   // frame to frame and remembered expiries must stay valid, so the largest margin decides.
+  return field.wide || set.contact.margin_voxels > 0.5 ? kernels::wide_reach(reach) : reach;
+}
+
+Search search_of(const Settings& set, const Body& a, const Body& b, float margin, bool cold) {
+  const Field& field = *b.field;
   return {field.view,
           *a.shell,
           shell_to_field(a, b),
           static_cast<float>(1.0 / field.voxel),
-          field.wide || set.contact.margin_voxels > 0.5,
+          reach_of(set, field),
           margin,
           cold};
 }
@@ -248,7 +255,8 @@ std::size_t touch_coarsely(const Search& search, PairSearch& pair, TraverseScrat
       const float reach = search.scale * samples.reach[tier][t.open_blocks[k]];
       const float least = *std::min_element(t.clearance + k * each, t.clearance + (k + 1) * each);
       // The long form is needed, because cells far inside hold no samples.
-      pair.missed = std::max(pair.missed, kernels::cull_reach(reach, true) - least);
+      pair.missed = std::max(pair.missed,
+                             kernels::cull_reach(reach, kernels::wide_reach(search.reach)) - least);
     }
   } while (must_be_coarser(anytime, pair, used, found, blocks));
   return found;
@@ -301,7 +309,7 @@ std::size_t bits_of(unsigned rows) {
 void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& search,
                  std::size_t groups, const Way& way) {
   const auto until = [&](float distance) {
-    return expiry_of(way, kernels::cull_clearance(distance, search.wide));
+    return expiry_of(way, kernels::cull_clearance(distance, search.reach));
   };
   if (!(search.near > 0)) {
     for (std::size_t k = 0; k < groups; ++k) {

@@ -20,8 +20,9 @@ std::int32_t brick_of(const kernels::FieldView& field, const float (&at)[3]) {
     if (!(at[k] >= 0 && at[k] <= static_cast<float>(8 * field.size[k]))) return -1;
     brick[k] = std::min(static_cast<std::int32_t>(at[k]) / 8, field.size[k] - 1);
   }
-  return std::max(-1,
-                  field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]]);
+  const std::int32_t entry =
+      field.table[(brick[2] * field.size[1] + brick[1]) * field.size[0] + brick[0]];
+  return entry < 0 ? -1 : kernels::row_of(entry);
 }
 
 void name_rows(const Contacts& c, const Field& field, const Pair& pair, const kernels::Affine& arms,

@@ -60,7 +60,7 @@ double voxel_of(const h6Model& model, const h6SessionDef& def, std::int32_t i,
   double voxel = HUGE_VAL;
   for (const h6PairDef& p : pairs)
     if (p.shell_body == i || p.field_body == i)
-      voxel = std::min(voxel, model.fields[def.bodies[p.field_body].field].voxel);
+      voxel = std::min(voxel, model.fields[def.bodies[p.field_body].field].finest);
   return voxel < HUGE_VAL ? voxel : 1e-3;
 }
 

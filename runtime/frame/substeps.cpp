@@ -47,12 +47,16 @@ double gain(const Body& body, const Body& a) {
   return body.gained_v.norm() + body.gained_w.norm() * lever;
 }
 
+// The longest step near a field [its voxel].
+double longest_step(const Field& field) { return kLongestStep * field.finest / field.voxel; }
+
 // How far the pair's points may go in one step if they would go `way` [voxel].
 double allowed(h6Session& s, const Pair& pair, double way) {
-  if (way <= kLongestStep) return way;
-  const double clear = clearance(s.settings, s.bodies[pair.a], s.bodies[pair.b], way, kLongestStep,
+  const double longest = longest_step(*s.bodies[pair.b].field);
+  if (way <= longest) return way;
+  const double clear = clearance(s.settings, s.bodies[pair.a], s.bodies[pair.b], way, longest,
                                  s.lanes.scratch[0].traverse);
-  return std::min(way, std::max(clear, kLongestStep));
+  return std::min(way, std::max(clear, longest));
 }
 
 }  // namespace
@@ -66,8 +70,8 @@ Substeps plan_substeps(h6Session& s) {
     const double way =
         (free_motion(a, b, dt) + dt * (gain(a, a) + gain(b, a)) + held_motion(s, pair)) /
         b.field->voxel;
-    if (way > needed * kLongestStep && allowed(s, pair, way) < way)
-      needed = std::ceil(way / kLongestStep);
+    const double longest = longest_step(*b.field);
+    if (way > needed * longest && allowed(s, pair, way) < way) needed = std::ceil(way / longest);
   }
   for (Body& body : s.bodies) body.gained_v.setZero(), body.gained_w.setZero();
   const double most = s.settings.max_substeps;
@@ -86,7 +90,7 @@ bool slow_down(h6Session& s, double dt) {
     const double held = held_motion(s, pair) / s.substeps.needed;
     const double moved = free_motion(a, b, dt) / b.field->voxel;
     const double way = moved + held / b.field->voxel;
-    if (way > kLongestStep && moved > 0)
+    if (way > longest_step(*b.field) && moved > 0)
       share = std::min(share, std::max(0.0, 1 - (way - allowed(s, pair, way)) / moved));
   }
   if (!(share < 1)) return false;

@@ -9,15 +9,19 @@
 namespace h6 {
 
 struct Field {
-  Vec3 origin;        // node (0,0,0), mesh frame [m]
-  double voxel = 0;   // [m]
-  bool wide = false;  // its band is under 3 voxels: culling uses the long form (cull_spheres.h)
+  Vec3 origin;         // node (0,0,0), mesh frame [m]
+  double voxel = 0;    // [m]
+  double finest = 0;   // its finest samples are this far apart [m]: what depths are measured in
+  bool wide = false;   // its band is under 3 voxels: culling uses the long form (cull_spheres.h)
+  float steepest = 0;  // slope of finer samples, at least 1; 0: there are none (cull_spheres.h)
   kernels::FieldView view{};
   Buffer<std::int32_t> table;
-  Buffer<std::int16_t> bricks, far;
+  Buffer<std::int16_t> bricks, far, fine;
+  Buffer<std::uint16_t> cuts;
   Buffer<std::int32_t> part, triangle;  // (bricks) or empty
   std::size_t bytes() const {
-    return (table.count + part.count + triangle.count) * 4 + (bricks.count + far.count) * 2;
+    return (table.count + part.count + triangle.count) * 4 +
+           (bricks.count + far.count + fine.count + cuts.count) * 2;
   }
 };
 

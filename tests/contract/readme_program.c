@@ -8,7 +8,13 @@ int main(void) { /* a floor at z = 4 mm in one brick of 1 mm cells; a part of on
   uint32_t row[2] = {0, 1};
   for (int i = 0; i < 512; ++i) d[i] = 1e-3f * (float)(i / 64 - 4);
   for (int i = 0; i < 8; ++i) far_grid[i] = d[i < 4 ? 0 : 511];
-  h6FieldDef floor = {{0, 0, 0}, 1e-3, {1, 1, 1}, &brick, d, 1, far_grid, 1e-3, NULL, NULL};
+  h6FieldDef floor = {.voxel_size = 1e-3,
+                      .bricks = {1, 1, 1},
+                      .brick_index = &brick,
+                      .samples = d,
+                      .brick_count = 1,
+                      .far_grid = far_grid,
+                      .band = 1e-3};
   h6ShellDef tip = {1, &zero, &zero, &zero, &zero, &zero, &up, NULL, 1, row, row, &zero, row, row};
   h6ModelDef parts = {.fields = &floor, .field_count = 1, .shells = &tip, .shell_count = 1};
   h6Model* model = h6CreateModel(&parts, NULL);

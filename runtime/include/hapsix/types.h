@@ -40,6 +40,21 @@ typedef struct h6FieldDef {
                                   has all of its 8 nodes in bricks                             [m] */
   const int32_t* part;         /* (brick_count) nearest part of the mesh, or NULL                  */
   const int32_t* triangle;     /* (brick_count) nearest triangle of the mesh, -1: none; or NULL    */
+  /* Finer samples in single cells where the voxel is too coarse (creases, thin walls). Cell (i,j,k)
+   * of a brick lies between its nodes (i,j,k) and (i+1,j+1,k+1); the last ones end at nodes of the
+   * next bricks. A cell keeps the brick's own samples, or has its own at half or quarter voxels, all
+   * of its faces included. The field is continuous only if nodes on a face, edge or corner that a
+   * coarser cell shares lie on that cell's interpolation. Wherever a voxel of a body or field is a
+   * measure of depth or speed, that is the finest spacing of nodes.                              */
+  const int32_t* refined;      /* (brick_count) row in `fine_index`, -1: not refined; or NULL      */
+  const int32_t* fine_index;   /* (refined_count x 8 x 8 x 8), x fastest, one a cell: 0: the brick's
+                                  own samples; h > 0: row h - 1 of `halves`; q < 0: row -1 - q of
+                                  `quarters`                                                       */
+  size_t         refined_count;
+  const float*   halves;       /* (half_count x 3 x 3 x 3), x fastest: signed distance         [m] */
+  size_t         half_count;
+  const float*   quarters;     /* (quarter_count x 5 x 5 x 5), x fastest: signed distance      [m] */
+  size_t         quarter_count;
 } h6FieldDef;
 
 /* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs
@@ -333,7 +348,7 @@ typedef struct h6FrameReport {
   uint32_t contacts;                  /* points that touch, over all shell bodies                  */
   double   max_depth;                 /* depth of the deepest contact, without its relief and the
                                          fit_offset; 0 without contacts                       [m]  */
-  double   max_depth_voxels;          /* the same in voxels of its field                           */
+  double   max_depth_voxels;          /* the same in voxels of its field: its finest node spacing  */
   double   stage_us[H6_STAGE_COUNT];
   double   frame_us;
   uint64_t state_hash;                /* of poses and velocities after the step, of the samples, and

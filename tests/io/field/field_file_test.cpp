@@ -17,6 +17,8 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "io/field/field_file.h"
 #include "tests/io/field/field_samples.h"
@@ -55,14 +57,34 @@ TEST_CASE("field_file: a field comes back to the bit, compressed or not") {
   field.samples[7] = -0.0f;
   field.far_grid[3] = -0.0f;
   field.far_grid[4] = float(field.band);
+  const FieldData finer = refined();
   for (Compression c : {Compression::none, Compression::blosc}) {
-    const fs::path file = folder.path / "field.vdb";
-    const h6::Outcome written = write_field(file, field, c);
-    REQUIRE_MESSAGE(written, written.error());
-    const auto back = read_field(file);
-    REQUIRE_MESSAGE(back, back.error());
-    check_same(field, *back);
-    CHECK(folder.files() == 1);
+    for (const FieldData* f : {&std::as_const(field), &finer}) {
+      const fs::path file = folder.path / "field.vdb";
+      const h6::Outcome written = write_field(file, *f, c);
+      REQUIRE_MESSAGE(written, written.error());
+      const auto back = read_field(file);
+      REQUIRE_MESSAGE(back, back.error());
+      check_same(*f, *back);
+      CHECK(folder.files() == 1);
+    }
+  }
+}
+
+TEST_CASE("field_file: a finer sample that is missing, not finite or of no brick is damage") {
+  const Folder folder;
+  const fs::path file = folder.path / "field.vdb";
+  const FieldData field = refined();
+  FieldData infinite = field;
+  infinite.quarters[62] = HUGE_VALF;  // in the middle of a cell, so of that cell alone
+  REQUIRE(write_field(file, infinite));
+  CHECK(error_of(file).find("damaged") != std::string::npos);
+  for (const char* missing : {"distance_2", "distance_4"}) {
+    REQUIRE(write_field(file, field));
+    openvdb::GridPtrVec grids = read_with_openvdb(file);
+    std::erase_if(grids, [&](const auto& grid) { return grid->getName() == missing; });
+    openvdb::io::File(file.string()).write(grids);
+    CHECK(error_of(file).find("damaged") != std::string::npos);
   }
 }
 

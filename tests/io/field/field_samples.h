@@ -40,6 +40,16 @@ inline FieldData baked(int voxels = 48) {
   return *field;
 }
 
+inline FieldData refined() {
+  FieldBake options;
+  options.tolerance = 2e-4;
+  auto field = bake_field(turned(l_shape(0.02), 0.4, 0.3), options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  REQUIRE(field->half_count() > 0);
+  REQUIRE(field->quarter_count() > 0);
+  return *field;
+}
+
 template <class Array>
 bool same(const Array& a, const Array& b) {
   return a.size() == b.size() &&
@@ -55,6 +65,11 @@ inline void check_same(const FieldData& a, const FieldData& b) {
   CHECK(same(a.far_grid, b.far_grid));
   CHECK(same(a.part, b.part));
   CHECK(same(a.triangle, b.triangle));
+  CHECK(same(a.refined, b.refined));
+  CHECK(same(a.fine_index, b.fine_index));
+  CHECK(same(a.halves, b.halves));
+  CHECK(same(a.quarters, b.quarters));
+  CHECK(a.tolerance == b.tolerance);
   CHECK(a.part_names == b.part_names);
   CHECK(a.band == b.band);
   CHECK(a.offset == b.offset);

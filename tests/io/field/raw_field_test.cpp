@@ -37,7 +37,8 @@ TEST_CASE("raw_field: fields of one block, of many and of none come back to the 
   REQUIRE(large.samples.size() * sizeof(float) > 2 * kBlock);
   const FieldData wide = scattered(112);
   REQUIRE(wide.brick_index.size() * sizeof(std::int32_t) > kBlock);
-  for (const FieldData* field : {&std::as_const(odd), &none, &large, &wide}) {
+  const FieldData finer = refined();
+  for (const FieldData* field : {&std::as_const(odd), &none, &large, &wide, &finer}) {
     const h6::Outcome written = write_raw_field(file, *field);
     REQUIRE_MESSAGE(written, written.error());
     const auto back = read_raw_field(file);
@@ -106,7 +107,7 @@ TEST_CASE(
   CHECK(error_of(file).find("no field of the cache") != std::string::npos);
   REQUIRE(write_raw_field(file, baked()));
   std::string bytes = bytes_of(file);
-  bytes[bytes.find('1')] = '7';
+  bytes[bytes.find('\n') - 1] = '7';
   put(file, bytes);
   CHECK(error_of(file).find("another version of hapsix") != std::string::npos);
   CHECK(error_of(folder.path / "none.field").find("No such file") != std::string::npos);

@@ -43,12 +43,13 @@ Spheres random_spheres(std::size_t n, std::size_t shift, std::uint64_t seed) {
 }
 
 // The survivors, and whether nothing past `count` was written.
-std::vector<std::uint32_t> cull(const AnalyticField& field, Spheres& s, float scale, bool wide,
-                                float margin, const std::uint32_t* rows, std::uint32_t first,
-                                std::size_t count, std::vector<float>* clearance = nullptr) {
+std::vector<std::uint32_t> cull(const AnalyticField& field, Spheres& s, float scale,
+                                const Reach& reach, float margin, const std::uint32_t* rows,
+                                std::uint32_t first, std::size_t count,
+                                std::vector<float>* clearance = nullptr) {
   std::vector<std::uint32_t> out(count + 64, 0xdeadbeef);
   Column d(count, 1);
-  const std::size_t n = cull_spheres(field.view(), kIdentity, s.view(), scale, wide, margin, rows,
+  const std::size_t n = cull_spheres(field.view(), kIdentity, s.view(), scale, reach, margin, rows,
                                      first, count, out.data(), clearance ? d.begin() : nullptr);
   REQUIRE(n <= count);
   CHECK(std::count(out.begin() + count, out.end(), 0xdeadbeef) == 64);
@@ -66,7 +67,7 @@ struct Hunt {
       -1e9;  // largest (distance at the centre - margin) / reach over spheres with a contact
 };
 
-Hunt hunt(const AnalyticField& field, double low, double high, bool wide, float margin,
+Hunt hunt(const AnalyticField& field, double low, double high, const Reach& reach, float margin,
           std::uint64_t seed) {
   Random random(seed);
   Hunt h;
@@ -104,8 +105,8 @@ Hunt hunt(const AnalyticField& field, double low, double high, bool wide, float 
     Spheres sphere(1, 0);
     sphere.x[0] = centre[0], sphere.y[0] = centre[1], sphere.z[0] = centre[2];
     sphere.radius[0] = float(s / 4);  // radius_scale 4: another unit
-    h.lost += cull(field, sphere, 4.0f, wide, margin, nullptr, 0, 1).empty();
-    h.worst_use = std::max(h.worst_use, (double{distance} - margin) / cull_reach(float(s), wide));
+    h.lost += cull(field, sphere, 4.0f, reach, margin, nullptr, 0, 1).empty();
+    h.worst_use = std::max(h.worst_use, (double{distance} - margin) / cull_reach(float(s), reach));
   }
   return h;
 }
@@ -116,7 +117,7 @@ TEST_CASE("cull_spheres: SIMD agrees with the reference on every target, count a
   const AnalyticField& field = clutter_field();
   on_every_target([&](const std::string&) {
     for (std::size_t n = 0; n <= 67; ++n) {
-      for (bool wide : {false, true}) {
+      for (const Reach& reach : {Reach{}, wide_reach({}), refined_reach(2.5f)}) {
         Spheres s = random_spheres(n + 9, n % 5, 50 + n);
         Random random(n);
         std::vector<std::uint32_t> rows(n), want(n);
@@ -125,13 +126,13 @@ TEST_CASE("cull_spheres: SIMD agrees with the reference on every target, count a
                                           static_cast<const std::uint32_t*>(rows.data())}) {
           const std::uint32_t first = list ? 0 : 9;
           want.resize(n);
-          want.resize(cull_spheres_ref(field.view(), kIdentity, s.view(), 0.5f, wide, 0.25f, list,
+          want.resize(cull_spheres_ref(field.view(), kIdentity, s.view(), 0.5f, reach, 0.25f, list,
                                        first, n, want.data(), nullptr));
-          CHECK(cull(field, s, 0.5f, wide, 0.25f, list, first, n) == want);
+          CHECK(cull(field, s, 0.5f, reach, 0.25f, list, first, n) == want);
           std::vector<float> clearance, wanted(n);
-          CHECK(cull(field, s, 0.5f, wide, 0.25f, list, first, n, &clearance) == want);
+          CHECK(cull(field, s, 0.5f, reach, 0.25f, list, first, n, &clearance) == want);
           std::vector<std::uint32_t> ignored(n + 1);
-          cull_spheres_ref(field.view(), kIdentity, s.view(), 0.5f, wide, 0.25f, list, first, n,
+          cull_spheres_ref(field.view(), kIdentity, s.view(), 0.5f, reach, 0.25f, list, first, n,
                            ignored.data(), wanted.data());
           for (std::size_t k = 0; k < n; ++k)
             CHECK(std::fabs(clearance[k] - wanted[k]) < 1e-3f * (1 + std::fabs(wanted[k])));
@@ -147,8 +148,8 @@ TEST_CASE("cull_spheres: survivors may overwrite the rows they came from") {
     Spheres s = random_spheres(333, 1, 9);
     std::vector<std::uint32_t> rows(333);
     for (std::uint32_t i = 0; i < 333; ++i) rows[i] = (i * 101) % 333;
-    const auto want = cull(field, s, 1.0f, false, 0.0f, rows.data(), 0, rows.size());
-    const std::size_t n = cull_spheres(field.view(), kIdentity, s.view(), 1.0f, false, 0.0f,
+    const auto want = cull(field, s, 1.0f, Reach{}, 0.0f, rows.data(), 0, rows.size());
+    const std::size_t n = cull_spheres(field.view(), kIdentity, s.view(), 1.0f, Reach{}, 0.0f,
                                        rows.data(), 0, rows.size(), rows.data(), nullptr);
     rows.resize(n);
     CHECK(rows == want);
@@ -170,7 +171,7 @@ TEST_CASE("cull_spheres: a point survives exactly when it samples within the mar
                      1, &d, nullptr, nullptr, nullptr);
         if (d <= margin) want.push_back(i);
       }
-      CHECK(cull(field, s, 1.0f, false, margin, nullptr, 0, s.count) == want);
+      CHECK(cull(field, s, 1.0f, Reach{}, margin, nullptr, 0, s.count) == want);
     }
   });
 }
@@ -190,7 +191,7 @@ TEST_CASE("cull_spheres: no culled sphere holds a point that samples within the 
   for (const auto& c : cases) {
     CAPTURE(c.low);
     CAPTURE(c.high);
-    const Hunt h = hunt(field, c.low, c.high, c.wide, c.margin, ++seed);
+    const Hunt h = hunt(field, c.low, c.high, c.wide ? wide_reach({}) : Reach{}, c.margin, ++seed);
     CHECK(h.contacts > 1000);
     CHECK(h.lost == 0);
     CHECK(h.worst_use <= 1.0);
@@ -203,7 +204,7 @@ TEST_CASE("cull_spheres: what is clearly apart from every obstacle is culled") {
   const AnalyticField& field = clutter_field();
   on_every_target([&](const std::string&) {
     Spheres s = random_spheres(2000, 0, 15);
-    const auto kept = cull(field, s, 1.0f, false, 0.0f, nullptr, 0, s.count);
+    const auto kept = cull(field, s, 1.0f, Reach{}, 0.0f, nullptr, 0, s.count);
     for (std::uint32_t i : kept) {
       const double d = field.distance({s.x[i], s.y[i], s.z[i]});
       // Bounds are a few voxels low, see field_layout; the rest is the reach.
@@ -222,7 +223,7 @@ TEST_CASE("cull_spheres: a sphere that is not finite is culled") {
       if (i % 2) s.y[i] = std::numeric_limits<float>::quiet_NaN();
       if (i % 4 == 2) s.radius[i] = std::numeric_limits<float>::quiet_NaN();
     }
-    const auto kept = cull(field, s, 1.0f, false, 0.0f, nullptr, 0, s.count);
+    const auto kept = cull(field, s, 1.0f, Reach{}, 0.0f, nullptr, 0, s.count);
     for (std::uint32_t i : kept) CHECK(i % 2 == 0);
     CHECK(kept.size() >= 10);
   });
@@ -234,11 +235,12 @@ TEST_CASE(
   Random random(3);
   for (int i = 0; i < 200000; ++i) {
     const auto distance = float(random.uniform(-1, 20));
-    const bool wide = i % 2 != 0;
-    const float clear = cull_clearance(distance, wide);
-    if (clear > 0) CHECK(distance > cull_reach(clear * (1 - 1e-6f), wide) - 1e-5f);
+    const Reach reach = i % 2 != 0 ? wide_reach({}) : i % 4 != 0 ? refined_reach(2.3f) : Reach{};
+    const float clear = cull_clearance(distance, reach);
+    if (clear > 0) CHECK(distance > cull_reach(clear * (1 - 1e-6f), reach) - 1e-5f);
     const float more = std::max(clear, 0.0f) + 0.01f;
     // Between its two forms the reach has a step.
-    if (wide || more < 1.59f || more > 1.62f) CHECK(distance <= cull_reach(more, wide) + 1e-5f);
+    if (more < reach.below - 0.01f || more > reach.below + 0.02f)
+      CHECK(distance <= cull_reach(more, reach) + 1e-5f);
   }
 }

@@ -64,8 +64,10 @@ TEST_CASE("expiry: SIMD finds the same indices and the same least values on ever
   });
 }
 
-TEST_CASE("touch_groups: SIMD finds the same points as the reference, and writes nothing beyond") {
-  const AnalyticField field(16, 17, 18, clutter);
+namespace {
+
+// Points in `field`, by the kernel and by its reference.
+void touch_alike(const AnalyticField& field) {
   on_every_target([&](const std::string&) {
     for (std::size_t count : {1, 15, 16, 17, 40, 333, 999}) {
       Random random(count);
@@ -118,6 +120,16 @@ TEST_CASE("touch_groups: SIMD finds the same points as the reference, and writes
       }
     }
   });
+}
+
+}  // namespace
+
+TEST_CASE("touch_groups: SIMD finds the same points as the reference, and writes nothing beyond") {
+  touch_alike(AnalyticField(16, 17, 18, clutter));
+}
+
+TEST_CASE("touch_groups: SIMD finds the same points where cells have finer samples") {
+  touch_alike(AnalyticField(16, 17, 18, clutter, 3.0, 0.001, 1.0, scattered_cut));
 }
 
 TEST_CASE("make_contacts: SIMD agrees with the reference on every target and count") {

@@ -44,9 +44,13 @@ inline double clutter(const Point& p) {
 
 class AnalyticField {
  public:
-  // `bound_share`: the far grid holds the true distance times a factor from [bound_share, 1].
+  // Into how many parts the cell that begins at these nodes is cut: 1, 2 or 4.
+  using Cut = std::function<int(int, int, int)>;
+  // `bound_share`: the far grid holds the true distance times a factor from [bound_share, 1]. Finer
+  // samples are exact, so the field jumps where a cut cell meets another.
   AnalyticField(std::int32_t bx, std::int32_t by, std::int32_t bz, const Distance& distance,
-                double band = 3.0, double voxel = 0.001, double bound_share = 1.0)
+                double band = 3.0, double voxel = 0.001, double bound_share = 1.0,
+                const Cut& cut = {})
       : distance_(distance) {
     def_ = h6FieldDef{};
     def_.voxel_size = voxel;
@@ -69,6 +73,7 @@ class AnalyticField {
     def_.samples = samples_.data();
     def_.brick_count = samples_.size() / 512;
     def_.far_grid = far_.data();
+    if (cut) add_finer(cut);
     lay_out();
   }
   AnalyticField(const AnalyticField&) = delete;
@@ -79,7 +84,9 @@ class AnalyticField {
             table_.data(),
             bricks_.data(),
             far_nodes_.data(),
-            layout_band(def_)};
+            layout_band(def_),
+            cuts_.data(),
+            fine_.data()};
   }
   double distance(const Point& p) const { return distance_(p); }
   double last(int axis) const { return 8.0 * def_.bricks[axis] - 1; }
@@ -104,23 +111,67 @@ class AnalyticField {
         }
   }
 
+  void add_finer(const Cut& cut) {
+    const std::int32_t bx = def_.bricks[0], by = def_.bricks[1];
+    refined_.resize(def_.brick_count);
+    for (std::size_t slot = 0; slot < index_.size(); ++slot) {
+      if (index_[slot] < 0) continue;
+      const int at[3] = {int(slot) % bx, int(slot) / bx % by, int(slot) / bx / by};
+      std::vector<std::int32_t> cells;
+      for (int c = 0; c < 512; ++c)
+        cells.push_back(
+            cut_cell(cut, 8 * at[0] + c % 8, 8 * at[1] + c / 8 % 8, 8 * at[2] + c / 64));
+      const bool any = std::any_of(cells.begin(), cells.end(), [](auto c) { return c != 0; });
+      refined_[std::size_t(index_[slot])] = any ? std::int32_t(fine_index_.size() / 512) : -1;
+      if (any) fine_index_.insert(fine_index_.end(), cells.begin(), cells.end());
+    }
+    def_.refined = refined_.data();
+    def_.fine_index = fine_index_.data();
+    def_.refined_count = fine_index_.size() / 512;
+    def_.halves = halves_.data(), def_.half_count = halves_.size() / 27;
+    def_.quarters = quarters_.data(), def_.quarter_count = quarters_.size() / 125;
+  }
+  std::int32_t cut_cell(const Cut& cut, int x, int y, int z) {
+    const int factor = cut(x, y, z), side = factor + 1;
+    if (factor == 1) return 0;
+    std::vector<float>& to = factor == 2 ? halves_ : quarters_;
+    for (int n = 0; n < side * side * side; ++n)
+      to.push_back(float(def_.voxel_size * distance_({x + double(n % side) / factor,
+                                                      y + double(n / side % side) / factor,
+                                                      z + double(n / side / side) / factor})));
+    return factor == 2 ? std::int32_t(halves_.size() / 27) : -std::int32_t(quarters_.size() / 125);
+  }
+
   void lay_out() {
     const FieldLayoutSize size = field_layout_size(def_);
     table_.resize(index_.size());
     bricks_.assign(size.bricks * kBrickStride, 0x7fff);
     far_nodes_.assign(size.far_cells * 8, 0x7fff);
     layout_table(def_, table_.data());
+    cuts_.assign(size.refined * kCutStride + 2, 0x7fff);
+    fine_.assign((size.fine_units + 1) * kFineUnit, 0x7fff);
+    layout_cuts(def_, table_.data(), cuts_.data());
     for (std::size_t slot = 0; slot < index_.size(); ++slot) {
       layout_cell(def_, table_.data(), slot, bricks_.data(), far_nodes_.data());
+      layout_fine(def_, table_.data(), cuts_.data(), slot, fine_.data());
     }
   }
 
   Distance distance_;
   h6FieldDef def_;
-  std::vector<std::int32_t> index_, table_;
-  std::vector<float> samples_, far_;
-  std::vector<std::int16_t> bricks_, far_nodes_;
+  std::vector<std::int32_t> index_, table_, refined_, fine_index_;
+  std::vector<float> samples_, far_, halves_, quarters_;
+  std::vector<std::int16_t> bricks_, far_nodes_, fine_;
+  std::vector<std::uint16_t> cuts_;
 };
+
+// Cells near the surface of the clutter, cut into 1, 2 and 4 as if by chance.
+inline int scattered_cut(int x, int y, int z) {
+  if (std::fabs(clutter({x + 0.5, y + 0.5, z + 0.5})) > 2.5) return 1;
+  const std::uint32_t mixed =
+      std::uint32_t(x * 73856093) ^ std::uint32_t(y * 19349663) ^ std::uint32_t(z * 83492791);
+  return 1 << (mixed >> 9) % 3;
+}
 
 inline constexpr Affine kIdentity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 

@@ -23,6 +23,11 @@ const AnalyticField& clutter_field() {
   return field;
 }
 
+const AnalyticField& refined_field() {
+  static const AnalyticField field(16, 17, 18, clutter, 3.0, 0.001, 1.0, scattered_cut);
+  return field;
+}
+
 struct Points {
   Points(std::size_t n, std::size_t shift)
       : x(n, shift), y(n, shift + 1), z(n, shift + 2), count(n) {}
@@ -82,10 +87,11 @@ void agree(const AnalyticField& field, const Affine& a, Points& p, const std::ui
       grid = grid && std::fabs(q[i]) > 1e-3 && std::fabs(q[i] - field.last(i)) > 1e-3;
       q[i] = std::min(std::max(q[i], 0.0), field.last(i));
     }
-    if (to_faces(q, 8) < 1e-3 && grid) continue;
+    const bool refined = field.def().refined != nullptr;
+    if (to_faces(q, refined ? 1 : 8) < 1e-3 && grid) continue;
     worst = std::max(worst, std::fabs(double{got.distance[k]} - want.distance[k]) /
                                 std::max(1.0, double{want.distance[k]}));
-    if (!grid || to_faces(q, 1) < 1e-3) continue;
+    if (!grid || to_faces(q, refined ? 0.25 : 1) < 1e-3) continue;
     for (Column Samples::*g : {&Samples::gx, &Samples::gy, &Samples::gz}) {
       worst_slope = std::max(worst_slope, std::fabs(double{(got.*g)[k]} - (want.*g)[k]));
     }
@@ -130,6 +136,51 @@ TEST_CASE("sample_field: SIMD agrees with the reference on every target, count a
     }
     agree(field, kIdentity, p, nullptr, p.count);
   });
+}
+
+TEST_CASE("sample_field: SIMD agrees with the reference where cells have finer samples") {
+  const AnalyticField& field = refined_field();
+  REQUIRE(field.def().half_count > 10000);
+  REQUIRE(field.def().quarter_count > 10000);
+  on_every_target([&](const std::string&) {
+    Random random(2);
+    for (std::size_t n = 1; n <= 67; ++n) {
+      Points p(n, n % 5);
+      for (std::size_t i = 0; i < n; ++i)
+        p.set(i, random.uniform(-5, 132), random.uniform(-5, 140), random.uniform(-5, 148));
+      agree(field, kTurned, p, nullptr, n);
+    }
+    Points p(20000, 3);
+    for (std::size_t i = 0; i < p.count; ++i) {
+      // Near a sphere's surface, where every cell is cut by chance; and at its last node, too.
+      p.set(i, random.uniform(16, 64), random.uniform(16, 64), random.uniform(16, 64));
+    }
+    agree(field, kIdentity, p, nullptr, p.count);
+  });
+}
+
+TEST_CASE("sample_field: a cut cell is right to the curvature of its own samples") {
+  const AnalyticField plain(8, 8, 8, [](const Point& p) { return sphere(p, {30, 31, 32}, 9.0); });
+  for (const int factor : {2, 4}) {
+    const AnalyticField cut(
+        8, 8, 8,
+        [](const Point& p) {
+          return sphere(p, {30, 31, 32}, 9.0);
+        },
+        3.0, 0.001, 1.0, [&](int, int, int) { return factor; });
+    Random random(3);
+    double worst = 0, worst_plain = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const Point p{random.uniform(18, 42), random.uniform(18, 42), random.uniform(18, 42)};
+      if (std::fabs(plain.distance(p)) > 2.5) continue;
+      worst = std::max(worst, std::fabs(distance_at(cut, p.x, p.y, p.z) - plain.distance(p)));
+      worst_plain =
+          std::max(worst_plain, std::fabs(distance_at(plain, p.x, p.y, p.z) - plain.distance(p)));
+    }
+    // The error falls with the square of the spacing, down to the rounding of samples.
+    CHECK(worst_plain > 0.02);
+    CHECK(worst < worst_plain / (factor * factor) + 1e-3);
+  }
 }
 
 TEST_CASE("sample_field: a point's sample does not depend on where in the call it stands") {

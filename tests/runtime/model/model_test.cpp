@@ -10,6 +10,7 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"
@@ -108,6 +109,84 @@ TEST_CASE("an invalid field is refused with a sentence that names the entry") {
   refused([](auto& a, auto&) { a.far[3] = nan_f; }, "far_grid[3]");
   refused([](auto&, auto& d) { d.far_grid = nullptr; }, "far_grid");
   refused([](auto&, auto& d) { d.band = -1; }, "band");
+}
+
+namespace {
+
+// Some finer samples: cell 5 of the first brick cut into halves, cell 6 into quarters.
+struct Finer {
+  std::vector<std::int32_t> refined, index;
+  std::vector<float> halves = std::vector<float>(27, 1e-3f),
+                     quarters = std::vector<float>(125, 2e-3f);
+  explicit Finer(std::size_t bricks) : refined(bricks, -1), index(512) {
+    refined[0] = 0;
+    index[5] = 1, index[6] = -1;
+  }
+  void give(h6FieldDef& d) const {
+    d.refined = refined.data(), d.fine_index = index.data(), d.refined_count = 1;
+    d.halves = halves.data(), d.half_count = 1;
+    d.quarters = quarters.data(), d.quarter_count = 1;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("invalid finer samples are refused with a sentence that names the entry") {
+  const auto refused = [](const std::function<void(Finer&, h6FieldDef&)>& spoil, const char* word) {
+    FieldArrays arrays = ball_field();
+    h6FieldDef def = def_of(arrays);
+    Finer finer(def.brick_count);
+    finer.give(def);
+    REQUIRE(complaint(&def, nullptr).empty());
+    spoil(finer, def);
+    const std::string text = complaint(&def, nullptr);
+    CHECK_MESSAGE(says(text, word), text);
+  };
+  refused([](auto& f, auto&) { f.refined[1] = 1; }, "refined[1]");
+  refused([](auto& f, auto&) { f.refined[1] = -2; }, "refined[1]");
+  refused([](auto& f, auto&) { f.index[7] = 2; }, "fine_index[7]");
+  refused([](auto& f, auto&) { f.index[8] = -2; }, "fine_index[8]");
+  refused([](auto& f, auto&) { f.index[9] = INT32_MIN; }, "fine_index[9]");
+  refused([](auto& f, auto&) { f.halves[26] = nan_f; }, "halves[26]");
+  refused([](auto& f, auto&) { f.quarters[3] = nan_f; }, "quarters[3]");
+  refused([](auto&, auto& d) { d.fine_index = nullptr; }, "fine_index");
+  refused([](auto&, auto& d) { d.quarters = nullptr; }, "quarters");
+  refused([](auto&, auto& d) { d.refined_count = SIZE_MAX; }, "too many");
+  refused([](auto&, auto& d) { d.half_count = SIZE_MAX / 27; }, "too many");
+}
+
+TEST_CASE("a cell with finer samples gives these back, and its neighbours keep their own") {
+  FieldArrays arrays = ball_field();
+  h6FieldDef def = def_of(arrays);
+  std::size_t cell = 0;  // of the first brick
+  while (def.brick_index[cell] != 0) ++cell;
+  const int at[3] = {int(cell % 8), int(cell / 8 % 8), int(cell / 64)};
+  Finer finer(def.brick_count);
+  for (int n = 0; n < 125; ++n) finer.quarters[std::size_t(n)] = float(1e-5 * n);
+  finer.give(def);
+  h6ModelDef model_def = h6DefaultModelDef();
+  model_def.fields = &def, model_def.field_count = 1;
+  h6Model* model = h6CreateModel(&model_def, nullptr);
+  REQUIRE(model);
+  const auto sample = [&](double x, double y, double z) {  // voxels from the brick's first node
+    const double p[3] = {def.origin.x + (8 * at[0] + x) * mm, def.origin.y + (8 * at[1] + y) * mm,
+                         def.origin.z + (8 * at[2] + z) * mm};
+    double d = 0;
+    std::uint8_t exact = 0;
+    CHECK(h6SampleField(model, 0, p, 1, &d, nullptr, &exact) == 0);
+    CHECK(exact == 1);
+    return d;
+  };
+  for (int n = 0; n < 125; ++n) {  // off the faces, where a neighbour may answer
+    const double e = 1e-4;
+    const double x = 6 + std::clamp(n % 5 / 4.0, e, 1 - e),
+                 y = std::clamp(n / 5 % 5 / 4.0, e, 1 - e), z = std::clamp(n / 25 / 4.0, e, 1 - e);
+    CHECK(std::fabs(sample(x, y, z) - 1e-5 * n) < 2e-6);
+  }
+  CHECK(std::fabs(sample(5.5, 0.5, 0.5) - 1e-3) < 1e-6);
+  const double before = sample(4.5, 0.5, 0.5);
+  CHECK(std::fabs(before - 1e-3) > 1e-4);
+  h6DestroyModel(model);
 }
 
 TEST_CASE("a shell that would lose contacts is refused") {
