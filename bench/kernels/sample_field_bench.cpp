@@ -34,7 +34,7 @@ void call_corners(const Kernel& kernel, const Data& d, std::vector<float>* out) 
   float* const at[4] = {out[0].data(), out[1].data(), out[2].data(), out[3].data()};
   kernel(ball_field().view(), test::kIdentity,
          PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
-         at);
+         0.5f, at);
 }
 
 bool agrees(const Data& d) {

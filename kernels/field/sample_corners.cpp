@@ -33,17 +33,17 @@ struct Batch {
 struct Sides {
   VF at[2];
 };
-HWY_INLINE Sides sides_of(const float* m, VF x, VF y, VF z) {
-  float row[4] = {m[0], m[1], m[2], m[3] - kCornerStep};
+HWY_INLINE Sides sides_of(const float* m, VF x, VF y, VF z, float step) {
+  float row[4] = {m[0], m[1], m[2], m[3] - step};
   Sides s;
   s.at[0] = affine_row(row, x, y, z);
-  row[3] = m[3] + kCornerStep;
+  row[3] = m[3] + step;
   s.at[1] = affine_row(row, x, y, z);
   return s;
 }
 
 HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const PointsView& points,
-                       std::size_t first, std::size_t i, Batch& batch) {
+                       float step, std::size_t first, std::size_t i, Batch& batch) {
   const DF d;
   const DI di;
   const std::size_t live = points.count - first - i;
@@ -54,7 +54,7 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
   auto inside = hn::FirstN(d, live);
   HWY_UNROLL(3)
   for (int a = 0; a < 3; ++a) {
-    q[a] = sides_of(to_field.m[a], x, y, z);
+    q[a] = sides_of(to_field.m[a], x, y, z, step);
     const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
     inside = hn::And(inside, hn::And(hn::Ge(q[a].at[0], zero), hn::Le(q[a].at[1], last)));
   }
@@ -106,13 +106,14 @@ HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::si
 
 // Points with a corner in a far cell, in a refined brick or outside the grid.
 HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
-                              const PointsView& points, std::size_t k, float* const at[4]) {
+                              const PointsView& points, float step, std::size_t k,
+                              float* const at[4]) {
   const DF d;
   const std::size_t live = points.count - k;
   const VF x = load_n(d, points.x + k, live), y = load_n(d, points.y + k, live);
   const VF z = load_n(d, points.z + k, live);
   Sides q[3];
-  for (int a = 0; a < 3; ++a) q[a] = sides_of(to_field.m[a], x, y, z);
+  for (int a = 0; a < 3; ++a) q[a] = sides_of(to_field.m[a], x, y, z, step);
   for (int c = 0; c < 4; ++c) {
     VF value, none;
     sample_points<false>(field, q[0].at[side(c, 0)], q[1].at[side(c, 1)], q[2].at[side(c, 2)],
@@ -122,18 +123,19 @@ HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
 }
 
 void sample_corners_simd(const FieldView& field, const Affine& to_field, const PointsView& points,
-                         float* const at[4]) {
+                         float step, float* const at[4]) {
   const std::size_t width = hn::Lanes(DF());
   Batch batch;
   for (std::size_t first = 0; first < points.count; first += kBatch) {
     const std::size_t some = HWY_MIN(kBatch, points.count - first);
-    for (std::size_t i = 0; i < some; i += width) locate(field, to_field, points, first, i, batch);
+    for (std::size_t i = 0; i < some; i += width)
+      locate(field, to_field, points, step, first, i, batch);
     for (std::size_t i = 0; i < some; i += width) look_up(field, some - i, i, batch);
     for (std::size_t i = 0; i < some; i += width) {
       if (HWY_LIKELY(batch.plain[i]))
         sample_plain(field, batch, some - i, i, at, first + i);
       else
-        sample_anew(field, to_field, points, first + i, at);
+        sample_anew(field, to_field, points, step, first + i, at);
     }
   }
 }
@@ -147,8 +149,8 @@ namespace h6::kernels {
 HWY_EXPORT(sample_corners_simd);
 
 void sample_corners(const FieldView& field, const Affine& to_field, const PointsView& points,
-                    float* const at[4]) {
-  HWY_DYNAMIC_DISPATCH(sample_corners_simd)(field, to_field, points, at);
+                    float step, float* const at[4]) {
+  HWY_DYNAMIC_DISPATCH(sample_corners_simd)(field, to_field, points, step, at);
 }
 
 }  // namespace h6::kernels

@@ -6,16 +6,14 @@
 
 namespace h6::kernels {
 
-// The corners, from the point, along the axes of the field [voxel]: half an edge of the cube that
-// holds the tetrahedron.
-inline constexpr float kCornerStep = 0.5f;
+// The corners, from the point, along the axes of the field, in steps.
 inline constexpr int kCornerSign[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
 
-// at[c][k] is the distance at `to_field` of point k plus kCornerStep kCornerSign[c], as
-// sample_field gives it, to the bit.
+// at[c][k] is the distance at `to_field` of point k plus step kCornerSign[c], as sample_field gives
+// it, to the bit. `step` [voxel]: half an edge of the cube that holds the tetrahedron.
 void sample_corners(const FieldView& field, const Affine& to_field, const PointsView& points,
-                    float* const at[4]);
+                    float step, float* const at[4]);
 void sample_corners_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
-                        float* const at[4]);
+                        float step, float* const at[4]);
 
 }  // namespace h6::kernels

@@ -6,10 +6,10 @@
 namespace h6::kernels {
 
 void sample_corners_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
-                        float* const at[4]) {
+                        float step, float* const at[4]) {
   for (int c = 0; c < 4; ++c) {
     Affine to = to_field;
-    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += kCornerStep * kCornerSign[c][axis];
+    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += step * kCornerSign[c][axis];
     sample_field_ref(field, to, points, nullptr, points.count, at[c], nullptr, nullptr, nullptr);
   }
 }

@@ -13,6 +13,8 @@ namespace h6 {
 namespace {
 
 constexpr double kPresent = 0.1;  // the depth from which a contact counts in full [voxel]
+constexpr double kAround =
+    0.5;  // from a contact to where its field is sampled, on each axis [voxel]
 constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
 constexpr std::size_t kManySlices = 4;        // from here on two threads share them
 
@@ -27,9 +29,9 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
   if (shifted)
     kernels::sample_field(b.field->view, place, arms, nullptr, arms.count, at[0], nullptr, nullptr,
                           nullptr);
-  kernels::sample_corners(b.field->view, place, arms, at + 1);
-  kernels::Around around{
-      {at[0], at[1], at[2], at[3], at[4]}, kernels::kCornerStep, b.field->view.band, {}};
+  const auto step = static_cast<float>(kAround * b.field->finest / b.field->voxel);
+  kernels::sample_corners(b.field->view, place, arms, step, at + 1);
+  kernels::Around around{{at[0], at[1], at[2], at[3], at[4]}, step, b.field->view.band, {}};
   for (int k = 0; k < 9; ++k) around.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
   kernels::push_directions(kernel_columns(c, begin, end), &around, c.nx + begin, c.ny + begin,
                            c.nz + begin, c.facing + begin);

@@ -17,6 +17,8 @@ using namespace h6::kernels::test;
 
 namespace {
 
+constexpr float kStep = 0.5f;
+
 const AnalyticField& plain_field() {
   static const AnalyticField field(16, 17, 18, clutter);
   return field;
@@ -48,7 +50,7 @@ struct Corners {
   template <class Kernel>
   void sample(Kernel kernel, const AnalyticField& field, const Affine& a, const PointsView& p) {
     float* const to[4] = {at[0].begin(), at[1].begin(), at[2].begin(), at[3].begin()};
-    kernel(field.view(), a, p, to);
+    kernel(field.view(), a, p, kStep, to);
   }
 };
 
@@ -57,7 +59,7 @@ void agree(const AnalyticField& field, const Affine& a, Points& p, std::size_t n
   got.sample(sample_corners, field, a, p.view(n));
   for (int c = 0; c < 4; ++c) {
     Affine to = a;
-    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += kCornerStep * float(kCornerSign[c][axis]);
+    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += kStep * float(kCornerSign[c][axis]);
     sample_field(field.view(), to, p.view(n), nullptr, n, want.at[c].begin(), nullptr, nullptr,
                  nullptr);
     CHECK(same_bits(got.at[c].begin(), want.at[c].begin(), n));
