@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // sample_field_bench.cpp - distance and gradient at n points: "near" all in bricks, "mixed" within
 // 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_corners":
-// four distances about each of n points near the surface.
+// four distances about each of n points near the surface. "creased": near points where one cell in
+// ten of those at the surface is cut into quarters; "refined": where every one is.
 #include "kernels/field/sample_field.h"
 
 #include <memory>
@@ -14,17 +15,35 @@ namespace {
 using namespace h6::kernels;
 using namespace h6::kernels::bench;
 
+// The ball with cells within 2 voxels of its surface cut into quarters: one in `every` of them.
+const test::AnalyticField& cut_field(int every) {
+  const auto make = [](int n) {
+    const auto distance = [](const test::Point& p) {
+      return test::sphere(p, {191.5, 191.5, 191.5}, kBall);
+    };
+    return std::make_unique<test::AnalyticField>(
+        48, 48, 48, distance, 3.0, 0.001, 1.0, [=](int x, int y, int z) {
+          if (std::fabs(distance({x + 0.5, y + 0.5, z + 0.5})) > 2) return 1;
+          return (x / 8 + y / 8 + z / 8) % n == 0 ? 4
+                                                  : 1;  // all cells of some bricks, as at an edge
+        });
+  };
+  static const auto all = make(1), some = make(10);
+  return every == 1 ? *all : *some;
+}
+
 struct Data {
+  const test::AnalyticField& field;
   ShellPoints points;
   std::vector<float> out[4], want[4];
-  Data(std::size_t n, double spread) : points(n, spread) {
+  Data(std::size_t n, double spread, const test::AnalyticField& in) : field(in), points(n, spread) {
     for (int k = 0; k < 4; ++k) out[k].resize(n), want[k].resize(n);
   }
 };
 
 template <class Kernel>
 void call(const Kernel& kernel, const Data& d, std::vector<float>* out) {
-  kernel(ball_field().view(), test::kIdentity,
+  kernel(d.field.view(), test::kIdentity,
          PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
          nullptr, d.points.x.size(), out[0].data(), out[1].data(), out[2].data(), out[3].data());
 }
@@ -32,7 +51,7 @@ void call(const Kernel& kernel, const Data& d, std::vector<float>* out) {
 template <class Kernel>
 void call_corners(const Kernel& kernel, const Data& d, std::vector<float>* out) {
   float* const at[4] = {out[0].data(), out[1].data(), out[2].data(), out[3].data()};
-  kernel(ball_field().view(), test::kIdentity,
+  kernel(d.field.view(), test::kIdentity,
          PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
          0.5f, at);
 }
@@ -44,15 +63,15 @@ bool agrees(const Data& d) {
   return true;
 }
 
-Case make(std::size_t n, double spread) {
-  auto d = std::make_shared<Data>(n, spread);
+Case make(std::size_t n, double spread, const test::AnalyticField& field) {
+  auto d = std::make_shared<Data>(n, spread, field);
   call(sample_field_ref, *d, d->want);
   return {[=] { call(sample_field, *d, d->out); }, [=] { call(sample_field_ref, *d, d->out); },
           [=] { return agrees(*d); }};
 }
 
-Case make_corners(std::size_t n) {
-  auto d = std::make_shared<Data>(n, 1.5);
+Case make_corners(std::size_t n, const test::AnalyticField& field) {
+  auto d = std::make_shared<Data>(n, 1.5, field);
   call_corners(sample_corners_ref, *d, d->want);
   return {[=] { call_corners(sample_corners, *d, d->out); },
           [=] { call_corners(sample_corners_ref, *d, d->out); }, [=] { return agrees(*d); }};
@@ -62,11 +81,20 @@ const bool registered = [] {
   for (const auto& [name, spread] : {std::pair{"near", 2.0}, std::pair{"mixed", 20.0}}) {
     for (std::size_t n : {16, 64, 256, 1024, 8192, 56823}) {
       add(std::string("kernels/sample_field/") + name + "/n:" + std::to_string(n), n,
-          [=, spread = spread] { return make(n, spread); });
+          [=, spread = spread] { return make(n, spread, ball_field()); });
     }
   }
   for (std::size_t n : {64, 1024, 16384})
-    add("kernels/sample_corners/n:" + std::to_string(n), n, [=] { return make_corners(n); });
+    add("kernels/sample_corners/n:" + std::to_string(n), n,
+        [=] { return make_corners(n, ball_field()); });
+  for (const auto& [name, every] : {std::pair{"creased", 10}, std::pair{"refined", 1}})
+    for (std::size_t n : {1024, 8192}) {
+      const std::string rest = std::string(name) + "/n:" + std::to_string(n);
+      add("kernels/sample_field/" + rest, n,
+          [=, every = every] { return make(n, 2.0, cut_field(every)); });
+      add("kernels/sample_corners/" + rest, n,
+          [=, every = every] { return make_corners(n, cut_field(every)); });
+    }
   return true;
 }();
 

@@ -130,7 +130,7 @@ void add_run(CLI::App& app, Program& program) {
                 "As fast as possible instead of in real time; same code, same bits");
   run->add_option(
          "--method", o->method,
-         "none, global, cluster, gauss3, gauss6, robust or series; the Gauss ones also with "
+         "none, global, cluster, gauss3, gauss6, robust, series or firm; the Gauss ones also with "
          "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
       ->option_text("NAME");
   run->add_option("--threads", o->threads,

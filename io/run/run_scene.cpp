@@ -201,7 +201,7 @@ Outcome check_options(const RunOptions& options) {
   if (!options.method.empty() && h6MethodFromName(options.method.c_str(), &method, &pieces) != 0)
     return Failure{
         "no method is called '" + options.method +
-        "': none, global, cluster, gauss3, gauss6, robust or series, the Gauss ones also "
+        "': none, global, cluster, gauss3, gauss6, robust, series or firm, the Gauss ones also "
         "with +facing, +depth, +product, +cluster, +geodesic, +handles, +printed"};
   return options.device.empty() ? Outcome(Done{}) : check_device(options.device);
 }
