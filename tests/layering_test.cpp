@@ -55,11 +55,12 @@ const Rooms& below() {
     room("io/file", {"contract", "sched"});
     room("io/mesh", {"contract", "sched", "kernels/bake", "io/file"});
     room("io/field", {"contract", "sched", "io/file", "io/mesh"});
-    room("io/bake",
-         {"contract", "sched", "kernels", "kernels/bake", "io/file", "io/mesh", "io/field"});
+    room("io/walls", {"contract", "sched", "io/mesh"});
+    room("io/bake", {"contract", "sched", "kernels", "kernels/bake", "io/file", "io/mesh",
+                     "io/walls", "io/field"});
     room("io/shell", {"contract", "sched", "io/file", "io/mesh", "io/field", "io/bake"});
     room("io/check", {"contract", "sched", "kernels", "kernels/field", "kernels/bake", "io/file",
-                      "io/mesh", "io/field"});
+                      "io/mesh", "io/walls", "io/field"});
     room("io/scene", {"contract", "sched", "runtime/settings", "io/file", "io/mesh", "io/field",
                       "io/bake", "io/shell"});
     room("io/scenes", {"contract", "io/file", "io/mesh", "io/shell", "io/scene"});

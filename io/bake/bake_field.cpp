@@ -15,6 +15,8 @@
 #include "io/bake/grid.h"
 #include "io/bake/holes.h"
 #include "io/field/refine.h"
+#include "io/field/unite.h"
+#include "io/walls/thin_pieces.h"
 #include "sched/clock.h"
 #include "sched/parallel_for.h"
 
@@ -92,8 +94,8 @@ void warn_of_gaps(const bake::Surface& surface, const bake::GapWeld& welded,
                               millimetres(welded.widest) + " away; this closes the mesh");
 }
 
-void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Inside& inside,
-          double seal, SignMode sign, FieldBakeReport& report) {
+void warn(const bake::Surface& surface, const bake::Grid& grid, bool nothing_inside, double seal,
+          SignMode sign, FieldBakeReport& report) {
   auto& out = report.warnings;
   if (surface.duplicates > 0)
     out.push_back(plural(surface.duplicates, "triangle is", "triangles are") +
@@ -108,14 +110,20 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, const bake::Insi
     out.push_back(
         "the offset is below half a voxel and the mesh is open: the outside leaks in "
         "through every hole");
-  if (inside.inside_nodes == 0)
+  if (nothing_inside)
     out.push_back(
         "no node of the field lies inside: nothing can touch this obstacle; bake it with "
         "more voxels, or with an offset");
-  else if (inside.thin_edges > 0)
-    out.push_back("walls thinner than a voxel (" + millimetres(grid.voxel) + ") at " +
-                  plural(inside.thin_edges, "place", "places") +
-                  " are no obstacles there; bake with more voxels, or with an offset");
+  if (const FieldBakeReport::Thin& thin = report.thin; thin.area > 0) {
+    char place[80], area[40];
+    std::snprintf(place, sizeof place, "(%.4g, %.4g, %.4g) mm", 1e3 * thin.place.x,
+                  1e3 * thin.place.y, 1e3 * thin.place.z);
+    std::snprintf(area, sizeof area, "%.4g mm2", 1e6 * thin.area);
+    out.push_back("walls thinner than " + millimetres(thin.below) + ", such as one of " +
+                  millimetres(thin.thickness) + " at " + place + ", are too thin for the voxels: " +
+                  area + " of surface is moved out by " + millimetres(thin.grow) + "; voxels of " +
+                  millimetres(thin.thickness / bake::kThin) + " would keep them as they are");
+  }
 }
 
 // Closes gaps of a share of the voxel.
@@ -268,10 +276,18 @@ void warn_of_holes(const bake::Grid& grid, const Openings& openings, const Field
                               " was found that leads into a solid: nothing was sealed");
 }
 
-// A field of the surface, which is in grid coordinates and gains the facets that seal it. Without
-// `far` its far grid stays empty.
-Result<FieldData> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldBake& options,
-                               bool far, const bake::Steps& steps, FieldBakeReport* report) {
+// A field of a surface, and what the report needs to know about it.
+struct Baked {
+  FieldData field;
+  std::vector<std::uint32_t> thin;         // bricks that may have thin walls
+  std::vector<bake::NodeMask> thin_nodes;  // (thin) where in them
+  bool nothing_inside = false;
+};
+
+// The surface is in grid coordinates and gains the facets that seal it. Without `far` the far grid
+// stays empty.
+Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldBake& options,
+                           bool far, const bake::Steps& steps, FieldBakeReport* report) {
   using namespace bake;
   const Failure cancelled{"cancelled"};
   const unsigned threads = options.threads;
@@ -288,7 +304,14 @@ Result<FieldData> bake_on_grid(bake::Surface& surface, bake::Grid grid, const Fi
   Inside inside;
   if (!look_inside(grid, band, reached, threads, steps, inside)) return cancelled;
 
-  FieldData field;
+  Baked out;
+  out.nothing_inside = inside.inside_nodes == 0;
+  for (std::size_t r = 0; r < inside.thin.size(); ++r)
+    if (inside.thin[r].any()) {
+      out.thin.push_back(band.cell[r]);
+      out.thin_nodes.push_back(inside.thin[r]);
+    }
+  FieldData& field = out.field;
   field.origin = grid.origin();
   field.voxel_size = grid.voxel;
   field.bricks = grid.bricks;
@@ -305,30 +328,151 @@ Result<FieldData> bake_on_grid(bake::Surface& surface, bake::Grid grid, const Fi
   if (report) {
     report->sealed_area = double(openings.plugs) * grid.voxel * grid.voxel;
     warn_of_holes(grid, openings, options, *report);
-    warn(surface, grid, inside, options.seal, options.sign, *report);
   }
-  return field;
+  return out;
+}
+
+// Which boxes [voxel] hold one of the given nodes, or may if they are large.
+class NearNodes {
+ public:
+  NearNodes(const bake::Grid& grid, const Baked& baked)
+      : grid_(grid), nodes_(baked.thin_nodes), row_(grid.cells(), -1) {
+    for (std::size_t i = 0; i < baked.thin.size(); ++i) row_[baked.thin[i]] = std::int32_t(i);
+  }
+  bool operator()(const Vec3& low, const Vec3& high) const {
+    int first[3], last[3];
+    for (int k = 0; k < 3; ++k) {
+      const int most = 8 * grid_.bricks[std::size_t(k)] - 1;
+      first[k] = std::clamp(int(std::floor(component(low, k))), 0, most);
+      last[k] = std::clamp(int(std::ceil(component(high, k))), 0, most);
+    }
+    for (int z = first[2] / 8; z <= last[2] / 8; ++z)
+      for (int y = first[1] / 8; y <= last[1] / 8; ++y)
+        for (int x = first[0] / 8; x <= last[0] / 8; ++x)
+          if (const std::int32_t row = row_[grid_.cell(x, y, z)]; row >= 0) {
+            const int corner[3] = {8 * x, 8 * y, 8 * z};
+            if (any_within(nodes_[std::size_t(row)], corner, first, last)) return true;
+          }
+    return false;
+  }
+
+ private:
+  static bool any_within(const bake::NodeMask& nodes, const int (&corner)[3], const int (&first)[3],
+                         const int (&last)[3]) {
+    for (int n = 0; n < 512; ++n) {
+      const int p[3] = {corner[0] + n % 8, corner[1] + n / 8 % 8, corner[2] + n / 64};
+      bool in = true;
+      for (int k = 0; k < 3; ++k) in = in && p[k] >= first[k] && p[k] <= last[k];
+      if (in && nodes.get(std::size_t(n))) return true;
+    }
+    return false;
+  }
+
+  const bake::Grid& grid_;
+  const std::vector<bake::NodeMask>& nodes_;
+  std::vector<std::int32_t> row_;  // (cells) of the nodes, or -1
+};
+
+constexpr double kGrow = 0.9;  // [voxel] on each side of a thin wall, as on each side of a sheet
+
+// The pieces of the surface that bound walls too thin for the grid, in its coordinates.
+Result<ThinPieces> find_thin(const bake::Surface& surface, const bake::Grid& grid,
+                             const Baked& baked, const FieldBake& options,
+                             FieldBakeReport* report) {
+  if (baked.thin.empty() || !options.grow_thin) return ThinPieces{};
+  Mesh mesh;
+  mesh.vertices.assign(surface.vertices.begin(), surface.vertices.end());
+  mesh.triangles.assign(surface.triangles.begin(), surface.triangles.end());
+  mesh.part.assign(surface.part.begin(), surface.part.end());
+  ThinPieceOptions ask;
+  ask.thinner_than = bake::kThin - 2 * grid.offset;
+  ask.piece = 2;
+  ask.asked = NearNodes(grid, baked);
+  ask.threads = options.threads;
+  Result<ThinPieces> thin = thin_pieces(mesh, ask);
+  if (!thin || !report || thin->area == 0) return thin;
+  const double voxel = grid.voxel;
+  report->thin = {thin->area * voxel * voxel, thin->thickness * voxel,
+                  grid.origin() + voxel * thin->place, ask.thinner_than * voxel, kGrow * voxel};
+  return thin;
+}
+
+// Adds the thin walls of a surface to its field on this grid, whose voxels are `cut` voxels of
+// theirs, as open sheets with an offset of kGrow of their voxels.
+Outcome add_thin(const ThinPieces& thin, const bake::Surface& whole, bake::Grid grid, double cut,
+                 FieldBake options, const bake::Steps& steps, FieldData& field) {
+  using namespace bake;
+  Result<Surface> surface = prepare_surface(thin.mesh, options.threads);
+  if (!surface) return surface.failure();
+  for (Vec3& v : surface->vertices) v = (1 / cut) * v;
+  for (std::int32_t& source : surface->source)
+    source = whole.source[std::size_t(thin.source[std::size_t(source)])];
+  if (whole.part.empty()) surface->part.clear();
+  grid.offset += kGrow / cut;
+  grid.seal = 0;
+  options.sign = SignMode::flood;
+  const Result<Baked> walls = bake_on_grid(*surface, grid, options, true, steps, nullptr);
+  if (!walls) return walls.failure();
+  field = unite(field, walls->field, options.threads);
+  field.grown = kGrow / cut * grid.voxel;
+  return Done{};
+}
+
+Result<FieldData> bake_uniform(bake::Surface& surface, const FieldBake& options, bool sealed,
+                               const bake::Steps& steps, FieldBakeReport* report) {
+  using namespace bake;
+  const Result<Grid> grid = choose_grid(surface, options, sealed);
+  if (!grid) return grid.failure();
+  to_grid(surface, *grid, options.threads);
+  Result<Baked> baked = bake_on_grid(surface, *grid, options, true, steps, report);
+  if (!baked) return baked.failure();
+  const Result<ThinPieces> thin = find_thin(surface, *grid, *baked, options, report);
+  if (!thin) return thin.failure();
+  if (thin->area > 0)
+    if (const Outcome done =
+            add_thin(*thin, surface, *grid, 1, options, steps.part(0.9, 1), baked->field);
+        !done)
+      return done.failure();
+  if (report)
+    warn(surface, *grid, baked->nothing_inside && thin->area == 0, options.seal, options.sign,
+         *report);
+  return std::move(baked->field);
 }
 
 // Two bakes that share nodes: coarse bricks everywhere, fine ones where those miss the tolerance.
 Result<FieldData> bake_to_tolerance(bake::Surface& surface, const FieldBake& options, bool sealed,
                                     const bake::Steps& steps, FieldBakeReport* report) {
   using namespace bake;
-  Result<TwoGrids> grids = choose_two_grids(surface, options, sealed);
+  const Result<TwoGrids> grids = choose_two_grids(surface, options, sealed);
   if (!grids) return grids.failure();
   to_grid(surface, grids->fine, options.threads);
-  Result<FieldData> fine =
-      bake_on_grid(surface, grids->fine, options, true, steps.part(0, 0.6), report);
+  Result<Baked> fine =
+      bake_on_grid(surface, grids->fine, options, true, steps.part(0, 0.5), report);
   if (!fine) return fine.failure();
+  const Result<ThinPieces> thin = find_thin(surface, grids->fine, *fine, options, report);
+  if (!thin) return thin.failure();
+  const bool grown = thin->area > 0;
+  if (grown)
+    if (const Outcome done =
+            add_thin(*thin, surface, grids->fine, 1, options, steps.part(0.5, 0.6), fine->field);
+        !done)
+      return done.failure();
   Surface coarse_surface = surface;  // with what seals it
   for (Vec3& v : coarse_surface.vertices) v = (1.0 / kCut) * v;
   FieldBake magnitudes = options;  // the sides are those of the fine bake
   if (!sealed) magnitudes.sign = SignMode::flood;
-  Result<FieldData> coarse =
-      bake_on_grid(coarse_surface, grids->coarse, magnitudes, false, steps.part(0.6, 0.8), nullptr);
+  Result<Baked> coarse = bake_on_grid(coarse_surface, grids->coarse, magnitudes, grown,
+                                      steps.part(0.6, 0.75), nullptr);
   if (!coarse) return coarse.failure();
+  if (grown)
+    if (const Outcome done = add_thin(*thin, surface, grids->coarse, kCut, options,
+                                      steps.part(0.75, 0.8), coarse->field);
+        !done)
+      return done.failure();
+  if (report)
+    warn(surface, grids->fine, fine->nothing_inside && !grown, options.seal, options.sign, *report);
   if (!steps.tell("refine", 0.8)) return Failure{"cancelled"};
-  return refine(*coarse, *fine, options.tolerance, options.threads);
+  return refine(coarse->field, fine->field, options.tolerance, options.threads);
 }
 
 Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
@@ -354,15 +498,8 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   const bool sealed = surface.closed && options.sign != SignMode::flood;
   if (mesh.part_names.size() < 2) surface.part.clear();
   const bool parts = !surface.part.empty();
-  Result<FieldData> field{FieldData{}};
-  if (options.tolerance > 0) {
-    field = bake_to_tolerance(surface, options, sealed, steps, report);
-  } else {
-    Result<Grid> grid = choose_grid(surface, options, sealed);
-    if (!grid) return grid.failure();
-    to_grid(surface, *grid, options.threads);
-    field = bake_on_grid(surface, *grid, options, true, steps, report);
-  }
+  const auto bake = options.tolerance > 0 ? bake_to_tolerance : bake_uniform;
+  Result<FieldData> field = bake(surface, options, sealed, steps, report);
   if (!field) return field;
   field->sign_mode = sealed ? "closed" : options.sign == SignMode::winding ? "winding" : "flood";
   field->triangles = mesh.triangles.size();

@@ -45,6 +45,8 @@ struct FieldBake {
   // Moves the nodes against the mesh, whose centre they share else [voxel], each -0.5 .. 0.5. For
   // studies of what a result owes to the place of the nodes; no scene file has it.
   h6Vec3 shift{};
+  // Whether walls too thin for the voxels grow (bake_field). For studies; no scene file has it.
+  bool grow_thin = true;
   unsigned threads = 0;  // 0: all
 };
 
@@ -56,8 +58,14 @@ struct FieldBakeReport {
     h6Vec3 place;  // [m]
     double width;  // [m] of a ball that can pass, give or take a voxel
   };
-  std::vector<Hole> sealed;           // widest first
-  std::vector<Hole> leaks;            // none, or one that is open and drains the solid
+  std::vector<Hole> sealed;  // widest first
+  std::vector<Hole> leaks;   // none, or one that is open and drains the solid
+  struct Thin {
+    double area = 0;             // of both sides [m^2]; 0: there are none
+    double thickness = 0;        // a tenth of the area bounds thinner walls [m]
+    h6Vec3 place{};              // of a wall this thick [m]
+    double below = 0, grow = 0;  // walls thinner than `below` grew by `grow` on each side [m]
+  } thin;
   std::size_t welded = 0;             // vertices, moved by `weld`
   double weld_widest = 0;             // [m] farthest that one of them moved
   std::vector<std::string> warnings;  // a sentence each
@@ -75,6 +83,10 @@ struct FieldBakeReport {
 // that sheet and the zero set, distance - offset. Where sheets are buried in the solid, because
 // parts overlap, the way out is up to 0.74 voxel + 13 % too short, and in a few places too long
 // (inside.cpp). far_grid: a lower bound of the distance; outside it is at most a voxel below.
+//
+// The walls of a closed mesh that are thinner than one and a half (fine) voxels would be lost
+// between the nodes. They become obstacles like open sheets, 0.9 voxel thicker on each side, and
+// the report says where.
 Result<FieldData> bake_field(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
                              const Progress& progress = {});
 

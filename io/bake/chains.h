@@ -68,12 +68,9 @@ struct Around {
 };
 
 // The nodes of the middle brick that have one of the given nodes among the 27 around them,
-// themselves included. `nodes[i]`: the given nodes of neighbour i; with kOthers, the nodes NOT
-// given.
-template <bool kOthers = false>
-NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
+// themselves included. `nodes[i]`: the given nodes of neighbour i.
+inline NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
   constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
-  constexpr std::uint64_t kFlip = kOthers ? ~std::uint64_t{0} : 0;
   std::uint64_t layer[10];  // z = -1 .. 8, spread along x and y
   for (int z = -1; z <= 8; ++z) {
     const int dz = z < 0 ? -1 : z > 7 ? 1 : 0;
@@ -81,8 +78,8 @@ NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
     std::uint64_t low = 0, mid = 0, high = 0;  // rows y = -1, 0 .. 7, 8, spread along x
     for (int dy = -1; dy <= 1; ++dy) {
       const std::size_t i = std::size_t(13 + 3 * dy + 9 * dz);
-      const std::uint64_t left = nodes[i - 1]->z[at] ^ kFlip, own = nodes[i]->z[at] ^ kFlip,
-                          right = nodes[i + 1]->z[at] ^ kFlip;
+      const std::uint64_t left = nodes[i - 1]->z[at], own = nodes[i]->z[at],
+                          right = nodes[i + 1]->z[at];
       const std::uint64_t along = own | (own & kNotX7) << 1 | (own & kNotX0) >> 1 |
                                   (left >> 7 & 0x0101010101010101) |
                                   (right & 0x0101010101010101) << 7;

@@ -250,6 +250,10 @@ Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, 
               unsigned threads);
 class Chains;  // chains.h
 
+// A wall this thin [voxel] may be nowhere deeper than a quarter of a voxel in the field, or lie
+// between its nodes altogether.
+inline constexpr double kThin = 1.5;
+
 // inside.cpp: the rows that the field needs, and the data beside u that their signed distances
 // need.
 struct Inside {
@@ -264,7 +268,7 @@ struct Inside {
     float depth;  // [voxel]
   };
   std::vector<std::vector<Depth>> depths;
-  std::size_t thin_edges = 0;  // crossed edges between two nodes of R with no inside node near
+  Masks thin;  // (rows) nodes near walls that may be thinner than kThin; empty: there are none
   std::size_t inside_nodes = 0;
 };
 bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,

@@ -25,6 +25,7 @@
 #include <optional>
 
 #include "io/bake/chains.h"
+#include "io/bake/flood.h"
 #include "io/bake/grid.h"
 #include "sched/parallel_for.h"
 
@@ -50,6 +51,7 @@ bool near_outside(const Reached& reached, const Around& around) {
   return false;
 }
 
+using flooding::operator&, flooding::operator|, flooding::operator~;
 constexpr NodeMask kNoNodes{};
 
 std::size_t count(const NodeMask& nodes) {
@@ -58,32 +60,31 @@ std::size_t count(const NodeMask& nodes) {
   return n;
 }
 
-// Nodes with one of `nodes` (rows) among the 27 around them, themselves included. With kOthers:
-// with one that is NOT in `nodes`.
-template <bool kOthers = false>
-NodeMask beside_any(const Around& around, const Masks& nodes) {
+// Nodes with one of `nodes` (rows) among the 27 around them, themselves included. Bricks without a
+// row count as `outside` where they are in R, else as the opposite.
+NodeMask beside_any(const Around& around, const Masks& nodes, bool outside = true) {
   std::array<const NodeMask*, 27> at;
   for (std::size_t i = 0; i < 27; ++i)
-    at[i] = around.row[i] >= 0  ? &nodes[std::size_t(around.row[i])]
-            : around.outside[i] ? &kAllNodes
-                                : &kNoNodes;
-  return spread<kOthers>(at);
+    at[i] = around.row[i] >= 0             ? &nodes[std::size_t(around.row[i])]
+            : around.outside[i] == outside ? &kAllNodes
+                                           : &kNoNodes;
+  return spread(at);
 }
 
-// The same within the brick alone, which mostly decides. `flip` with all bits set has the effect of
-// kOthers.
-NodeMask beside_here(const NodeMask& nodes, std::uint64_t flip = 0) {
-  constexpr std::uint64_t kNotX0 = 0xfefefefefefefefe, kNotX7 = 0x7f7f7f7f7f7f7f7f;
+// The same within the brick alone, which mostly decides.
+NodeMask beside_here(const NodeMask& nodes) {
   std::uint64_t layer[10] = {};
   for (std::size_t z = 0; z < 8; ++z) {
-    const std::uint64_t own = nodes.z[z] ^ flip,
-                        along = own | (own & kNotX7) << 1 | (own & kNotX0) >> 1;
+    const std::uint64_t own = nodes.z[z],
+                        along = own | (own & flooding::kNotX7) << 1 | (own & flooding::kNotX0) >> 1;
     layer[z + 1] = along | along << 8 | along >> 8;
   }
   NodeMask out;
   for (std::size_t z = 0; z < 8; ++z) out.z[z] = layer[z] | layer[z + 1] | layer[z + 2];
   return out;
 }
+
+bool any_outside(const NodeMask& nodes, const NodeMask& of) { return (nodes & ~of).any(); }
 
 // Whether u is larger at a node's neighbour (13 + dx + 3*dy + 9*dz) than at the opposite one.
 bool rises_towards(const Grid& grid, const NarrowBand& band, const Around& around, int node,
@@ -119,6 +120,9 @@ class Look {
     inside_.needed.resize(band_.rows());
     inside_.depths.resize(band_.rows());
     inspect_rows();
+    if (!deep_.empty()) find_thin();
+    Masks().swap(deep_);
+    Masks().swap(thin_);
     find_corrected();
     inside_.in_sight = std::move(band_.free);  // only for its memory
     constexpr std::size_t kSlice = 4096;
@@ -153,9 +157,10 @@ class Look {
   // Finds the rows that are needed, those with nodes inside, those with buried sheets, thin walls.
   void inspect_rows() {
     beside_.resize(offset_ > 0 ? band_.rows() : 0);
-    std::atomic<std::size_t> thin{0}, dry{0};
+    if (!band_.crossing.empty()) find_deep();
+    std::atomic<std::size_t> dry{0};
     each_tile([&](const TileRows& rows) {
-      std::size_t thin_here = 0, dry_here = 0;
+      std::size_t dry_here = 0;
       rows.each([&](std::size_t place, std::size_t r) {
         const NodeMask& nodes = reached_.node[r];
         std::uint64_t some = 0, all = ~std::uint64_t{0};
@@ -176,46 +181,98 @@ class Look {
           beside_[r] = whole     ? kAllNodes
                        : outside ? beside_any(Around(rows, place), reached_.node)
                                  : kNoNodes;
-        if (!band_.crossing.empty()) inspect_crossings(rows, place, r, thin_here);
+        if (band_.crossing.empty()) return;
+        find_buried(rows, place, r);
+        thin_[r] = suspects(rows, place, r);
       });
-      thin.fetch_add(thin_here, std::memory_order_relaxed);
       dry.fetch_add(dry_here, std::memory_order_relaxed);
     });
-    inside_.thin_edges = thin;
     inside_.inside_nodes = dry;
   }
 
-  // - A sheet is buried in the solid where the surface crosses an edge, or meets a node, with no
-  // node
-  //   of R around. (Next to nodes of R it may be a groove narrower than a voxel.)
-  // - A wall is thinner than a voxel where an edge between nodes of R is crossed with no node
-  // inside
-  //   around. A sharp rim has nodes inside close by and does not count.
-  void inspect_crossings(const TileRows& rows, std::size_t place, std::size_t r,
-                         std::size_t& thin) {
+  // A sheet is buried in the solid where the surface crosses an edge, or meets a node, with no node
+  // of R around. (Next to nodes of R it may be a groove narrower than a voxel.)
+  void find_buried(const TileRows& rows, std::size_t place, std::size_t r) {
     const Crossing& c = band_.crossing[r];
     NodeMask met;
     for (std::size_t z = 0; z < 8; ++z)
       met.z[z] = c.edge[0].z[z] | c.edge[1].z[z] | c.edge[2].z[z] | c.on.z[z];
     if (!met.any()) return;
-    const auto outside_of = [&](const NodeMask& nodes) {
-      std::uint64_t left = 0;
-      for (std::size_t z = 0; z < 8; ++z) left |= met.z[z] & ~nodes.z[z];
-      return left != 0;
-    };
-    const Masks& reached = reached_.node;
     if (!beside_.empty())
-      buried_[r] = outside_of(beside_[r]);
+      buried_[r] = any_outside(met, beside_[r]);
     else
-      buried_[r] = outside_of(beside_here(reached[r])) &&
-                   outside_of(beside_any(Around(rows, place), reached));
-    if (offset_ > 0 || !outside_of(beside_here(reached[r], ~std::uint64_t{0}))) return;
-    NodeMask deep = beside_any<true>(Around(rows, place), reached);
-    for (std::uint64_t& z : deep.z) z = ~z;
-    for (const NodeMask& edge : c.edge)
-      for (std::size_t z = 0; z < 8; ++z)
-        if (const std::uint64_t bits = edge.z[z] & deep.z[z]; bits != 0)
-          thin += std::size_t(std::popcount(bits));
+      buried_[r] = any_outside(met, beside_here(reached_.node[r])) &&
+                   any_outside(met, beside_any(Around(rows, place), reached_.node));
+  }
+
+  // The nodes inside that are deeper than any in a wall thinner than kThin.
+  void find_deep() {
+    thin_.resize(band_.rows());
+    deep_.resize(band_.rows());
+    const float least = float(kThin / 2) - offset_;
+    sched::parallel_for((band_.rows() + 63) / 64, threads_, [&](std::size_t block) {
+      for (std::size_t r = 64 * block; r < std::min(band_.rows(), 64 * (block + 1)); ++r) {
+        const NodeMask inside = ~reached_.node[r];
+        deep_[r] = inside;
+        if (!inside.any() || !(band_.towards[r] >> 13 & 1)) continue;
+        NodeMask far;
+        kernels::nodes_above(band_.nodes(r), least, far.z.data());
+        deep_[r] = inside & far;
+      }
+    });
+  }
+
+  // A wall may be thin where the surface crosses an edge between two nodes of R, and at a node
+  // inside, if no deep node is around.
+  NodeMask suspects(const TileRows& rows, std::size_t place, std::size_t r) const {
+    constexpr std::size_t kNext[3] = {1, TileRows::kSide, TileRows::kSide * TileRows::kSide};
+    const NodeMask& reached = reached_.node[r];
+    NodeMask found = ~reached;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t next = place + kNext[axis];
+      const NodeMask& there = rows.row[next] >= 0  ? reached_.node[std::size_t(rows.row[next])]
+                              : rows.outside[next] ? kAllNodes
+                                                   : kNoNodes;
+      const NodeMask after = flooding::before(reached, axis) |
+                             flooding::through(there, flooding::kOpenEdges, axis, -1);
+      found = found | (reached & after & band_.crossing[r].edge[axis]);
+    }
+    found = found & ~beside_here(deep_[r]);
+    return found.any() ? found & ~beside_any(Around(rows, place), deep_, false) : found;
+  }
+
+  // Sharp edges have such nodes too, but deep ones within two steps. In the wall, rays decide
+  // (io/walls), as far as three nodes from the others: up to the solid that the wall stands on.
+  void find_thin() {
+    Masks wide(band_.rows());
+    const auto any = [&] {
+      return std::any_of(thin_.begin(), thin_.end(), [](const NodeMask& m) { return m.any(); });
+    };
+    if (!any()) return;
+    each_tile([&](const TileRows& rows) {
+      rows.each([&](std::size_t place, std::size_t r) {
+        wide[r] = beside_any(Around(rows, place), deep_, false);
+      });
+    });
+    each_tile([&](const TileRows& rows) {
+      rows.each([&](std::size_t place, std::size_t r) {
+        if (thin_[r].any()) thin_[r] = thin_[r] & ~beside_any(Around(rows, place), wide, false);
+      });
+    });
+    if (!any()) return;
+    for (int step = 0; step < 3; ++step) {
+      each_tile([&](const TileRows& rows) {
+        rows.each([&](std::size_t place, std::size_t r) {
+          std::array<const NodeMask*, 27> at;
+          const Around around(rows, place);
+          for (std::size_t i = 0; i < 27; ++i)
+            at[i] = around.row[i] >= 0 ? &thin_[std::size_t(around.row[i])] : &kNoNodes;
+          wide[r] = spread(at);
+        });
+      });
+      thin_.swap(wide);
+    }
+    inside_.thin = std::move(thin_);
   }
 
   // With an offset, a node is near a buried sheet if u <= offset and it is farther from R than the
@@ -358,6 +415,7 @@ class Look {
   float offset_;
   std::vector<std::uint8_t> buried_, live_, corrected_;  // (rows)
   Masks beside_;                                         // (rows) one step from R
+  Masks deep_, thin_;                                    // (rows) far inside; near thin walls
   std::shared_ptr<Chains> chains_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "io/check/ray_votes.h"
 #include "io/field/view.h"
+#include "io/walls/thin_pieces.h"
 #include "kernels/field/field_layout.h"
 #include "kernels/field/sample_field.h"
 #include "sched/parallel_for.h"
@@ -39,9 +40,9 @@ struct Tally {
         corner.add(o.corner), deep.add(o.deep);
     excess = std::max(excess, o.excess), lost += o.lost;
     for (const auto count :
-         {&ExactCheck::buried, &ExactCheck::nearer, &ExactCheck::voted, &ExactCheck::doubtful,
-          &ExactCheck::solid, &ExactCheck::drained, &ExactCheck::filled, &ExactCheck::enclosed,
-          &ExactCheck::far, &ExactCheck::far_wrong})
+         {&ExactCheck::buried, &ExactCheck::grown, &ExactCheck::odd, &ExactCheck::nearer,
+          &ExactCheck::voted, &ExactCheck::doubtful, &ExactCheck::solid, &ExactCheck::drained,
+          &ExactCheck::filled, &ExactCheck::enclosed, &ExactCheck::far, &ExactCheck::far_wrong})
       sum.*count += o.sum.*count;
     if (o.sum.leak_depth > sum.leak_depth) sum.leak_depth = o.sum.leak_depth, sum.leak = o.sum.leak;
   }
@@ -94,10 +95,40 @@ class FarBounds {
   std::vector<std::int16_t> far_;
 };
 
+// The surfaces that the bake may have moved out because walls are thin there.
+class GrownWalls {
+ public:
+  static Result<GrownWalls> find(const Mesh& mesh, const FieldData& field, unsigned threads) {
+    GrownWalls walls;
+    if (field.grown == 0) return walls;
+    const double voxel = field.tolerance > 0 ? 2 * field.tolerance : field.voxel_size;
+    ThinPieceOptions ask;
+    ask.thinner_than = 1.51 * voxel;  // the bake's limit is 1.5
+    ask.piece = 2 * voxel;
+    ask.threads = threads;
+    Result<ThinPieces> pieces = thin_pieces(mesh, ask);
+    if (!pieces) return pieces.failure();
+    if (pieces->mesh.triangles.empty()) return walls;
+    walls.pieces_ = std::make_unique<Mesh>(std::move(pieces->mesh));
+    auto rays = RayScene::make(*walls.pieces_);
+    if (!rays) return rays.failure();
+    walls.rays_ = std::move(*rays);
+    return walls;
+  }
+  // Infinity if there is none.
+  double distance(const Vec3& p) const {
+    return rays_ ? rays_->distance(p) : std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  std::unique_ptr<Mesh> pieces_;
+  std::unique_ptr<RayScene> rays_;
+};
+
 class Check {
  public:
   Check(const Mesh& mesh, const FieldData& field, const ExactCheckOptions& options,
-        const RayScene& rays, const FaceTable& faces)
+        const RayScene& rays, const FaceTable& faces, const GrownWalls& grown)
       : field_(field),
         view_(field),
         options_(options),
@@ -105,9 +136,11 @@ class Check {
         faces_(faces),
         votes_(rays, faces),
         places_(mesh),
+        grown_walls_(grown),
         far_(field, options.threads),
         h_(field.voxel_size),
-        offset_(field.offset / field.voxel_size) {}
+        offset_(field.offset / field.voxel_size),
+        grown_(field.grown / field.voxel_size) {}
 
   bool has_area() const { return places_.area() > 0; }
 
@@ -129,6 +162,13 @@ class Check {
     const Vec3 at = view_.to_metres({std::round(g.x), std::round(g.y), std::round(g.z)});
     const RayScene::Near near = rays_.nearest(at);
     const double d = double(*sample) / h_, u = near.distance / h_;
+    // Where a thin wall was made thicker, what lies near is nearer to it than to the mesh. The
+    // bake's pieces of walls end up to a piece and a half elsewhere.
+    const double thin = grown_walls_.distance(at) / h_;
+    if (thin < u + 2 * grown_ + 3) {
+      grown(d, u, thin, t);
+      return t;
+    }
     if (u < field_.band / h_) distance(d, near, dice, t);
     if (u > std::max(2 * offset_, kNodeSlack)) side(at, d < 0, u, dice, t);
     double value = 0;
@@ -248,6 +288,19 @@ class Check {
     }
   }
 
+  // Near walls that grew: outside, the distance to the mesh or to what grew, or between them where
+  // a part of the wall did not grow. Inside, no more than the depth in what grew.
+  void grown(double d, double u, double thin, Tally& t) const {
+    ++t.sum.grown;
+    if (u >= field_.band / h_) return;
+    const double to_mesh = u - offset_, to_grown = thin - grown_ - offset_;
+    const double error = std::min(std::fabs(d - to_mesh), std::fabs(d - to_grown));
+    t.sum.odd += d > 0 && error > kNodeSlack;
+    t.node.add(std::max(0.0, d - to_mesh));
+    const double deepest = std::min(-u, thin - grown_) - grown_ - offset_;
+    if (d < deepest - kNodeSlack) t.deep.add(deepest - d);
+  }
+
   void side(const Vec3& p, bool inside, double u, Dice& dice, Tally& t) const {
     const RayVotes::Side says = votes_.side(p, dice);
     if (says == RayVotes::Side::doubtful) {
@@ -273,8 +326,9 @@ class Check {
   const FaceTable& faces_;
   const RayVotes votes_;
   const SurfacePlaces places_;
+  const GrownWalls& grown_walls_;
   const FarBounds far_;
-  const double h_, offset_;  // [m], [voxel]
+  const double h_, offset_, grown_;  // [m], [voxel], [voxel]
 };
 
 // Adds ask(i) for all i < count to `sum`. Returns false when the user cancelled.
@@ -305,7 +359,9 @@ Result<ExactCheck> check_exactly(const Mesh& mesh, const FieldData& field,
   const Result<std::unique_ptr<RayScene>> rays = RayScene::make(mesh);
   if (!rays) return rays.failure();
   const FaceTable faces = face_table(mesh);
-  const Check check(mesh, field, options, **rays, faces);
+  const Result<GrownWalls> grown = GrownWalls::find(mesh, field, options.threads);
+  if (!grown) return grown.failure();
+  const Check check(mesh, field, options, **rays, faces, *grown);
   if (!check.has_area())
     return Failure{"the mesh has no area: there is nothing to check a field with"};
   Tally sum;

@@ -25,6 +25,8 @@ struct ExactCheck {
   std::size_t nodes = 0;
   double worst_node = 0, mean_node = 0;
   std::size_t buried = 0;  // other nodes, nearest to a buried sheet: not comparable
+  std::size_t grown = 0;   // other nodes, near thin walls that the bake made thicker
+  std::size_t odd = 0;     // of these, with neither the mesh's distance nor the thicker wall's
   std::size_t nearer = 0;  // other nodes, nearer to the surface than to the mesh: sealed holes
   // Other nodes, deeper than their distance to the mesh although the outside lies beyond it: next
   // to buried sheets the bake's way out may be too long [voxel].
@@ -58,7 +60,7 @@ struct ExactCheck {
   bool drains() const { return !closed && 500 * drained > solid; }
   // Whether the field is right. In a soup only drains() judges sides: a sheet has no inside.
   bool agrees() const {
-    return worst_node < 1e-3 && far_wrong == 0 && 20 * deep <= nodes &&
+    return worst_node < 1e-3 && far_wrong == 0 && 20 * deep <= nodes && 10 * odd <= grown &&
            (closed ? wrong_sides() == 0 : !drains());
   }
 };

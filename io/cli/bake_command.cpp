@@ -170,6 +170,11 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                     {"leaks", holes_json(report.leaks)},
                     {"welded", report.welded},
                     {"weld_widest", report.weld_widest},
+                    {"thin_walls",
+                     {{"area", report.thin.area},
+                      {"thickness", report.thin.thickness},
+                      {"place", {report.thin.place.x, report.thin.place.y, report.thin.place.z}},
+                      {"grown", report.thin.area > 0 ? report.thin.grow : 0}}},
                     {"warnings", report.warnings}};
   console.result(json);
   if (!console.json) {

@@ -34,6 +34,7 @@ struct FieldData {
   Samples quarters;                      // (quarter_count x 125) [m]
   // How the bake made the field.
   double offset = 0;       // sigma [m]; 0 on closed meshes
+  double grown = 0;        // walls too thin for the nodes are thicker by this, on each side [m]
   std::string sign_mode;   // "closed" or "flood"; "given" by another program
   std::string input_hash;  // of the mesh and the options of the bake
   std::size_t triangles = 0;

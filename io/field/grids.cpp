@@ -86,6 +86,7 @@ FloatGrid::Ptr empty_distance_grid(const FieldData& field) {
   grid->insertMeta(key("offset"), openvdb::DoubleMetadata(field.offset));
   if (field.tolerance > 0)
     grid->insertMeta(key("tolerance"), openvdb::DoubleMetadata(field.tolerance));
+  if (field.grown > 0) grid->insertMeta(key("grown"), openvdb::DoubleMetadata(field.grown));
   grid->insertMeta(key("sign_mode"), openvdb::StringMetadata(field.sign_mode));
   grid->insertMeta(key("units_per_metre"), openvdb::DoubleMetadata(units_per_metre(field)));
   grid->insertMeta(key("input_hash"), openvdb::StringMetadata(field.input_hash));
@@ -195,8 +196,8 @@ bool take_head(const FloatGrid& grid, FieldData& f) {
                      take(grid, "input_hash", f.input_hash) && take(grid, "triangles", triangles) &&
                      triangles >= 0 && take(grid, "parts", parts) && parts >= 0;
   if (!whole) return false;
-  if (take(grid, "tolerance", f.tolerance) && !(f.tolerance > 0 && std::isfinite(f.tolerance)))
-    return false;
+  for (const auto& [name, length] : {std::pair{"tolerance", &f.tolerance}, {"grown", &f.grown}})
+    if (take(grid, name, *length) && !(*length > 0 && std::isfinite(*length))) return false;
   f.triangles = std::size_t(triangles);
   f.origin = {origin.x(), origin.y(), origin.z()};
   for (std::size_t k = 0; k < 3; ++k) {

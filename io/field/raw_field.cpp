@@ -25,7 +25,7 @@ namespace h6::io {
 namespace {
 
 constexpr std::size_t kHashed = std::size_t{4} << 20;
-constexpr std::string_view kFieldMagic = "hapsix cached field ", kVersion = "2\n";
+constexpr std::string_view kFieldMagic = "hapsix cached field ", kVersion = "3\n";
 
 struct Head {
   char magic[24] = {};
@@ -36,8 +36,8 @@ struct Head {
   std::uint64_t brick_count = 0, part_count = 0, triangle_count = 0, text_bytes = 0;
   Hash128 hash;
   std::uint64_t refined_count = 0, fine_index_count = 0, halves_count = 0, quarters_count = 0;
-  double tolerance = 0;
-  char rest[kDirectPage - 184] = {};
+  double tolerance = 0, grown = 0;
+  char rest[kDirectPage - 192] = {};
 };
 static_assert(sizeof(Head) == kDirectPage);
 
@@ -143,6 +143,7 @@ Head head_of(const FieldData& f, std::size_t text_bytes) {
   head.halves_count = f.halves.size();
   head.quarters_count = f.quarters.size();
   head.tolerance = f.tolerance;
+  head.grown = f.grown;
   head.text_bytes = text_bytes;
   return head;
 }
@@ -213,6 +214,7 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
   f.halves.resize(std::size_t(head.halves_count));
   f.quarters.resize(std::size_t(head.quarters_count));
   f.tolerance = head.tolerance;
+  f.grown = head.grown;
   text.resize(std::size_t(head.text_bytes));
   return f;
 }

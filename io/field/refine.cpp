@@ -275,6 +275,7 @@ FieldData refine(const FieldData& coarse, const FieldData& fine, double toleranc
   out.bricks = coarse.bricks;
   out.band = coarse.band;
   out.offset = fine.offset;
+  out.grown = fine.grown;
   const FineNodes nodes(fine);
   take_bricks(coarse, fine, nodes, threads, out);
   take_names(coarse, fine, out);

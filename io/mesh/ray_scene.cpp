@@ -222,7 +222,8 @@ RayScene::Near RayScene::nearest(const Vec3& place, double within) const {
           point_nearest(place, mesh_.vertices[f[0]], mesh_.vertices[f[1]], mesh_.vertices[f[2]])};
 }
 
-void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all) const {
+void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all,
+                         double within) const {
   struct Collect : RayContext {
     std::vector<std::uint32_t> found;
   } context;
@@ -235,6 +236,7 @@ void RayScene::crossings(const Vec3& from, const Vec3& along, std::vector<Crossi
     }
   };
   RTCRayHit ray = embree_->ray(from, along);
+  ray.ray.tfar = float(within / embree_->half * (1 + kSlack) + kSlack);
   intersect(embree_->scene, context, collect_all, ray);
   std::sort(context.found.begin(), context.found.end());
   context.found.erase(std::unique(context.found.begin(), context.found.end()), context.found.end());

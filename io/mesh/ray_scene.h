@@ -53,7 +53,9 @@ class RayScene {
 
   // Every triangle that the ray meets, by t. No gap opens between triangles that share an edge, but
   // a ray through the edge itself (one in some million) may meet both: let several rays vote.
-  void crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all) const;
+  // Those farther than `within` [m] may be left out.
+  void crossings(const Vec3& from, const Vec3& along, std::vector<Crossing>& all,
+                 double within = std::numeric_limits<double>::infinity()) const;
   bool meets(const Vec3& from, const Vec3& along) const;
   // The first triangle that the ray meets, and the way to it; infinity where it meets none.
   struct Hit {

@@ -127,7 +127,8 @@ class Bake {
     FieldBake options = options_.field;
     if (sound) step_off(mesh_, options);
     options.threads = options_.threads;
-    options.cavities = Cavities::solid;  // a shell is only touched from outside
+    options.cavities = Cavities::solid;                   // a shell is only touched from outside
+    options.grow_thin = surface_ == ShellSurface::field;  // points on triangles must stay outside
     pulse_.step("finding the outside", 0.05, 0.4);
     Result<FieldData> field = bake_field(mesh_, options, &report_, pulse_.part());
     if (!field) return Failure{sentence(field.error())};

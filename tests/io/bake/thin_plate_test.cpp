@@ -76,6 +76,39 @@ TEST_CASE("closed plates thinner than a coarse voxel hold from both sides, slow 
   }
 }
 
+TEST_CASE("closed plates of 0.05 to 1 mm hold from both sides at voxels of 0.4 mm") {
+  const h6::io::Mesh cube = box({-2e-3, -2e-3, -2e-3}, {2e-3, 2e-3, 2e-3});
+  h6::io::ShellBake shell_bake;
+  shell_bake.points = 600;
+  const auto shell = h6::io::bake_shell(cube, shell_bake, nullptr);
+  REQUIRE(shell);
+  const h6ShellDef shell_def = shell->def();
+  for (const double thickness : {1e-3, 0.6e-3, 0.4e-3, 0.2e-3, 0.1e-3, 0.05e-3})
+    for (const double shift : {0.0, 0.25, 0.5}) {
+      CAPTURE(thickness);
+      CAPTURE(shift);
+      h6::io::FieldBake bake;
+      bake.voxel_size = 0.4e-3;
+      bake.shift = {0, 0, shift};
+      const auto field = bake_field(
+          box({-8e-3, -7e-3, -thickness / 2}, {8e-3, 7e-3, thickness / 2}), bake, nullptr);
+      REQUIRE_MESSAGE(field, field.error());
+      const h6FieldDef field_def = field->def();
+      h6ModelDef model_def = h6DefaultModelDef();
+      model_def.fields = &field_def, model_def.field_count = 1;
+      model_def.shells = &shell_def, model_def.shell_count = 1;
+      h6Model* model = h6CreateModel(&model_def, nullptr);
+      REQUIRE(model);
+      for (const double side : {1.0, -1.0})
+        for (const double speed : {0.1, 0.5, 2.0}) {
+          CAPTURE(side);
+          CAPTURE(speed);
+          CHECK(end_of_push(model, side, speed) > 2e-3);
+        }
+      h6DestroyModel(model);
+    }
+}
+
 TEST_CASE("a shell touches finer samples at every point that lies inside, and at no other") {
   const h6::io::Mesh cube = box({-2e-3, -2e-3, -2e-3}, {2e-3, 2e-3, 2e-3});
   h6::io::ShellBake shell_bake;

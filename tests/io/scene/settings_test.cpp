@@ -20,7 +20,8 @@ TEST_CASE("every member of a scene's structs has its row") {
   every_member_has_a_row<FieldSource>(field_source_settings(), 5);
   every_member_has_a_row<ShellSource>(shell_source_settings(), 6);
   for (const Setting& row : field_source_settings())
-    if (row.stands_among()) every_member_has_a_row<FieldBake>(*row.inside, 2);  // threads, shift
+    if (row.stands_among())
+      every_member_has_a_row<FieldBake>(*row.inside, 3);  // threads, shift, grow_thin
   for (const Setting& row : shell_source_settings())
     if (row.stands_among()) every_member_has_a_row<ShellBake>(*row.inside, 1);  // threads
 }

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// thin_pieces.cpp - see thin_pieces.h.
+#include "io/walls/thin_pieces.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "io/mesh/inward_normals.h"
+#include "io/mesh/ray_scene.h"
+#include "sched/parallel_for.h"
+
+namespace h6::io {
+namespace {
+
+constexpr double kOpposite = 0.70710678;  // cosine of 45 degrees
+
+struct Piece {
+  std::array<Vec3, 3> corner;
+  std::uint32_t triangle;
+  double thickness, area;
+};
+
+class Cutter {
+ public:
+  Cutter(const Mesh& mesh, const ThinPieceOptions& options, const RayScene& rays,
+         const FaceTable& faces)
+      : mesh_(mesh), options_(options), rays_(rays), faces_(faces) {}
+
+  void cut(std::uint32_t triangle, std::vector<Piece>& out) const {
+    if (!(faces_.area[triangle] > 0) || flat(triangle)) return;
+    const auto& t = mesh_.triangles[triangle];
+    cut(triangle, {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]}, out);
+  }
+
+ private:
+  void cut(std::uint32_t triangle, const std::array<Vec3, 3>& c, std::vector<Piece>& out) const {
+    if (!asked(c)) return;
+    std::size_t from = 0;
+    double longest2 = -1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 edge = c[(k + 1) % 3] - c[k];
+      if (dot(edge, edge) > longest2) longest2 = dot(edge, edge), from = k;
+    }
+    const Vec3 &p = c[from], &q = c[(from + 1) % 3], &r = c[(from + 2) % 3];
+    if (longest2 > options_.piece * options_.piece) {
+      const Vec3 middle = 0.5 * (p + q);
+      cut(triangle, {p, middle, r}, out);
+      cut(triangle, {middle, q, r}, out);
+      return;
+    }
+    const double thickness = thickness_at(triangle, (1.0 / 3) * (p + q + r));
+    if (thickness < options_.thinner_than)
+      out.push_back({c, triangle, thickness, 0.5 * norm(cross(q - p, r - p))});
+  }
+
+  bool asked(const std::array<Vec3, 3>& c) const {
+    if (!options_.asked) return true;
+    Vec3 low = c[0], high = c[0];
+    for (const Vec3& v : c) {
+      low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+      high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+    }
+    return options_.asked(low, high);
+  }
+
+  // From a place of the surface straight into the solid to its end; infinity where this is no wall.
+  // Parts that overlap are one solid.
+  double thickness_at(std::uint32_t triangle, const Vec3& place) const {
+    thread_local std::vector<Crossing> way;
+    const Vec3& in = faces_.inward[triangle];
+    rays_.crossings(place, in, way, options_.thinner_than);
+    int depth = 1;
+    for (const Crossing& c : way) {
+      if (c.triangle == triangle || flat(c.triangle)) continue;
+      const double enters = dot(faces_.inward[c.triangle], in);
+      depth += enters > 0 ? 1 : -1;
+      if (depth == 0 && enters < -kOpposite) return c.t;
+      if (depth == 0) break;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  bool flat(std::uint32_t triangle) const {
+    return faces_.sheet[triangle] && !faces_.bowl[triangle];
+  }
+
+  const Mesh& mesh_;
+  const ThinPieceOptions& options_;
+  const RayScene& rays_;
+  const FaceTable& faces_;
+};
+
+void take(const Mesh& whole, const Piece& piece, ThinPieces& out) {
+  const auto first = std::uint32_t(out.mesh.vertices.size());
+  for (const Vec3& v : piece.corner) out.mesh.vertices.push_back(v);
+  out.mesh.triangles.push_back({first, first + 1, first + 2});
+  if (!whole.part.empty()) out.mesh.part.push_back(whole.part[piece.triangle]);
+  out.source.push_back(std::int32_t(piece.triangle));
+  out.area += piece.area;
+}
+
+// Sharp edges taper to nothing, so the thinnest place of all says little about the walls.
+void find_typical(std::vector<Piece> pieces, ThinPieces& out) {
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const Piece& a, const Piece& b) { return a.thickness < b.thickness; });
+  double area = 0;
+  for (const Piece& piece : pieces) {
+    area += piece.area;
+    if (area < 0.1 * out.area) continue;
+    out.thickness = piece.thickness;
+    out.place = (1.0 / 3) * (piece.corner[0] + piece.corner[1] + piece.corner[2]);
+    return;
+  }
+}
+
+}  // namespace
+
+Result<ThinPieces> thin_pieces(const Mesh& mesh, const ThinPieceOptions& options) {
+  const Result<std::unique_ptr<RayScene>> rays = RayScene::make(mesh);
+  if (!rays) return rays.failure();
+  const FaceTable faces = face_table(mesh);
+  const Cutter cutter(mesh, options, **rays, faces);
+  constexpr std::size_t kBlock = 256;  // triangles; blocks are joined in order
+  std::vector<std::vector<Piece>> found((mesh.triangles.size() + kBlock - 1) / kBlock);
+  sched::parallel_for(found.size(), options.threads, [&](std::size_t b) {
+    const std::size_t end = std::min(mesh.triangles.size(), kBlock * (b + 1));
+    for (std::size_t t = kBlock * b; t < end; ++t) cutter.cut(std::uint32_t(t), found[b]);
+  });
+  ThinPieces out;
+  out.mesh.part_names = mesh.part_names;
+  std::vector<Piece> all;
+  for (const std::vector<Piece>& pieces : found)
+    all.insert(all.end(), pieces.begin(), pieces.end());
+  for (const Piece& piece : all) take(mesh, piece, out);
+  find_typical(std::move(all), out);
+  return out;
+}
+
+}  // namespace h6::io
