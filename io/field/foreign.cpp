@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "io/field/grids.h"
+#include "io/field/nearest_node.h"
 
 namespace h6::io {
 namespace {
@@ -35,37 +36,6 @@ FloatGrid::Ptr only_level_set(const openvdb::GridPtrVec& grids) {
   return floats == 1 && any->getGridClass() == openvdb::GRID_UNKNOWN ? any : nullptr;
 }
 
-// The number of steps, diagonals included, from each brick to the nearest one that is `near`.
-std::vector<int> steps_to_near(const std::array<std::int32_t, 3>& size,
-                               const std::vector<std::uint8_t>& near) {
-  constexpr int kCap = 1024;
-  std::vector<int> steps(near.size());
-  for (std::size_t i = 0; i < near.size(); ++i) steps[i] = near[i] ? 0 : kCap;
-  // The set of near bricks grows by one layer at a time.
-  std::vector<std::size_t> layer, next;
-  for (std::size_t i = 0; i < near.size(); ++i)
-    if (near[i]) layer.push_back(i);
-  const std::size_t nx = std::size_t(size[0]), ny = std::size_t(size[1]);
-  for (int step = 1; !layer.empty(); ++step, layer.swap(next)) {
-    next.clear();
-    for (std::size_t i : layer) {
-      const int at[3] = {int(i % nx), int(i / nx % ny), int(i / nx / ny)};
-      for (int n = 0; n < 27; ++n) {
-        const int to[3] = {at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1};
-        bool in = true;
-        for (std::size_t k = 0; k < 3; ++k) in &= to[k] >= 0 && to[k] < size[k];
-        if (!in) continue;
-        const std::size_t j =
-            (std::size_t(to[2]) * ny + std::size_t(to[1])) * nx + std::size_t(to[0]);
-        if (steps[j] <= step) continue;
-        steps[j] = step;
-        next.push_back(j);
-      }
-    }
-  }
-  return steps;
-}
-
 struct Frame {
   Coord low;  // first voxel of brick (0,0,0)
   double voxel = 0;
@@ -87,26 +57,23 @@ bool straight(const openvdb::math::Transform& t, double& voxel) {
   return true;
 }
 
-void far_bounds(FloatGrid& grid, const Frame& frame, const std::vector<std::uint8_t>& near,
-                FieldData& f) {
-  const std::vector<int> steps = steps_to_near(f.bricks, near);
+// A point of the surface lies within half a diagonal of a node that is no farther from it.
+void far_bounds(FloatGrid& grid, const Frame& frame, FieldData& f) {
+  const double half_diagonal = 0.8661 * frame.voxel;
+  const std::vector<float> squared = squared_to_nearest(f, half_diagonal, 0);
   const auto access = grid.getConstAccessor();
-  const int nx = f.bricks[0], ny = f.bricks[1], nz = f.bricks[2];
-  for (int c = 0; c <= nz; ++c)
-    for (int b = 0; b <= ny; ++b)
-      for (int a = 0; a <= nx; ++a) {
-        // A node past the last brick has the bound of that brick less one step.
-        const int over = (a == nx) || (b == ny) || (c == nz);
-        const std::size_t cell = (std::size_t(std::min(c, nz - 1)) * std::size_t(ny) +
-                                  std::size_t(std::min(b, ny - 1))) *
-                                     std::size_t(nx) +
-                                 std::size_t(std::min(a, nx - 1));
-        const float v = access.getValue(frame.low + Coord(8 * a, 8 * b, 8 * c));
-        const double certain = std::min(double(std::fabs(v)), double(frame.background));
-        const double bricks = 8.0 * frame.voxel * std::max(0, steps[cell] - 1 - over);
-        const double bound = certain < frame.background ? certain : std::max(certain, bricks);
-        f.far_grid.push_back(float(std::copysign(bound, double(v))));
-      }
+  const std::array<std::int32_t, 3> size{f.bricks[0] + 1, f.bricks[1] + 1, f.bricks[2] + 1};
+  const Place nodes{size};
+  f.far_grid.resize(nodes.count());
+  for (std::size_t i = 0; i < f.far_grid.size(); ++i) {
+    const auto at = nodes.at(i);
+    const float v = access.getValue(frame.low + Coord(8 * at[0], 8 * at[1], 8 * at[2]));
+    const double known = std::min(std::fabs(v), frame.background);
+    const double nearest = std::isfinite(squared[i]) ? std::sqrt(double(squared[i])) : 0;
+    const double bound = nearest * frame.voxel - half_diagonal;
+    f.far_grid[i] =
+        std::copysign(float(known < frame.background ? known : std::max(known, bound)), v);
+  }
 }
 
 }  // namespace
@@ -154,7 +121,6 @@ Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::str
     leaf_of[(std::size_t(at[2] / 8) * ny + std::size_t(at[1] / 8)) * nx + std::size_t(at[0] / 8)] =
         leaf;
   }
-  std::vector<std::uint8_t> near(cells, 0);
   f.brick_index.assign(cells, -1);
   std::size_t pairs = 0, steep = 0;
   for (std::size_t c = 0; c < cells; ++c) {
@@ -164,7 +130,6 @@ Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::str
     for (std::size_t n = 0; n < 512; ++n) {
       const float v = in[(n % 8) * 64 + n / 8 % 8 * 8 + n / 64];
       if (!std::isfinite(v)) return Failure{name + " has a distance that is not finite"};
-      near[c] |= std::fabs(v) < frame.background;
       f.samples.push_back(std::clamp(v, -frame.background, frame.background));
     }
     const float* s = &f.samples[f.samples.size() - 512];
@@ -176,7 +141,7 @@ Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::str
   }
   if (steep > pairs / 50)
     return Failure{name + " is no distance field: its values rise faster than distances can"};
-  far_bounds(*grid, frame, near, f);
+  far_bounds(*grid, frame, f);
   return f;
 }
 

@@ -313,7 +313,7 @@ TEST_CASE("field_file: a level set of another program becomes a field with safe 
     wrong += std::fabs(t) < field->band && std::fabs(d - t) > 1e-3 * h;
     too_long += std::fabs(d) > std::fabs(t) + 1e-3 * h;
   });
-  double tightest = 0;
+  double tightest = 0, loosest = 0;
   for (int c = 0; c <= field->bricks[2]; ++c)
     for (int b = 0; b <= field->bricks[1]; ++b)
       for (int a = 0; a <= field->bricks[0]; ++a, ++at) {
@@ -321,6 +321,7 @@ TEST_CASE("field_file: a level set of another program becomes a field with safe 
         const double d = field->far_grid[at];
         too_long += std::fabs(d) > std::fabs(t) + 1e-3 * h;
         tightest = std::max(tightest, std::fabs(d));
+        loosest = std::max(loosest, std::fabs(t) - std::fabs(d));
         if (std::fabs(t) > h) wrong += (d < 0) != (t < 0);
       }
   Random random(2);
@@ -334,6 +335,7 @@ TEST_CASE("field_file: a level set of another program becomes a field with safe 
   CHECK(too_long == 0);
   CHECK(missing == 0);
   CHECK(tightest > field->band);
+  CHECK(loosest < 1.8 * h);
 }
 
 TEST_CASE("field_file: what cannot be written leaves nothing behind") {
