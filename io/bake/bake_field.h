@@ -21,6 +21,9 @@ enum class SignMode { automatic, flood, winding };
 // is only for separate shells, with walls at least two voxels thick.
 enum class Cavities { solid, hollow };
 
+// A brick finds the surface in itself and in the bricks beside it.
+inline constexpr double kWidestBand = 8;  // [voxel]
+
 struct FieldBake {
   int voxels = 256;       // cells on the longest padded side, 16 .. 2048
   double voxel_size = 0;  // [m] replaces `voxels` when > 0
@@ -40,7 +43,8 @@ struct FieldBake {
   // [voxel], 0 .. 1; 0: only equal ones. A hundredth moves the surface less than the samples are
   // off between nodes, and is a thousand times the rounding of an STL.
   double weld = 0.01;
-  double band_voxels = 3;  // cells nearer than this to the surface get samples, 1 .. 8
+  double band_voxels = 3;  // cells nearer than this to the surface get samples, 1 ..
+                           // kWidestBand; deeper than this, depth is only bounded
   int padding_voxels = 8;  // empty cells around the mesh
   // Moves the nodes against the mesh, whose centre they share else [voxel], each -0.5 .. 0.5. For
   // studies of what a result owes to the place of the nodes; no scene file has it.

@@ -259,7 +259,7 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
                    std::to_string(options.voxels)};
   if (!(options.voxel_size >= 0) || !std::isfinite(options.voxel_size))
     return Failure{"the voxel size must be a positive length"};
-  if (!(options.band_voxels >= 1) || options.band_voxels > 8)
+  if (!(options.band_voxels >= 1) || options.band_voxels > kWidestBand)
     return Failure{"the band must be 1 to 8 voxels wide, not " + number(options.band_voxels)};
   if (options.padding_voxels < 0 || options.padding_voxels > 512)
     return Failure{"the padding must be 0 to 512 voxels, not " +

@@ -288,6 +288,12 @@ void add_field(CLI::App* bake, Program& program) {
       ->option_text("WIDTH")
       ->check(number_within(0, 1e6));
   field
+      ->add_option("--band", f->bake.band_voxels,
+                   "Voxels on each side of the surface that get samples, 1 to 8; default 3. Deeper "
+                   "than this, force does not grow with depth")
+      ->option_text("VOXELS")
+      ->check(number_within(1, io::kWidestBand));
+  field
       ->add_option("--weld", f->bake.weld,
                    "Welds vertices of open edges this near to each other, if this closes the mesh: "
                    "a share of the voxel, 0 to 1; default 0.01")

@@ -100,8 +100,9 @@ constexpr Setting kFieldBakeRows[] = {
     number<&FieldBake::weld>("weld", "voxel", between(0, 1),
                              "vertices of open edges this near to each other are welded if this "
                              "closes the mesh"),
-    number<&FieldBake::band_voxels>("band_voxels", "voxel", between(1, 64),
-                                    "every cell nearer than this to the surface gets samples"),
+    number<&FieldBake::band_voxels>("band_voxels", "voxel", between(1, kWidestBand),
+                                    "every cell nearer than this to the surface gets samples; "
+                                    "deeper, depth is only bounded"),
     whole<&FieldBake::padding_voxels>("padding_voxels", between(1, 256),
                                       "empty cells around the mesh")};
 constexpr SettingTable kFieldBake = settings_of("FieldBake", kFieldBakeRows);
