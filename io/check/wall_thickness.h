@@ -16,17 +16,28 @@ struct WallOptions {
   unsigned threads = 0;  // 0: all; the result is the same for any number
 };
 
+// A place on the surface, the way into the solid (unit; of a sheet one of its two normals), and the
+// thickness there [m]; 0 for sheets.
+struct WallPlace {
+  Vec3 p{}, in{};
+  double thickness = 0;
+};
+
 // Lengths [m] in ascending order, one for each place with a face opposite, and shares of all
 // places.
 struct Walls {
-  // From a place straight into the solid to its end. Parts that overlap are one solid. Faces that
-  // are not within 45 degrees of parallel make an edge or a corner, not a wall.
+  // From a place straight into the solid to its end. Parts that overlap or abut are one solid.
+  // Faces that are not within 45 degrees of parallel make an edge or a corner, not a wall.
   std::vector<double> thickness;
   // From a place straight out to the next face, under the same rule for faces.
   std::vector<double> gap;
   double bowls = 0;   // on open pieces that hold a volume: measured as if they were closed
   double sheets = 0;  // on other open pieces: not measured
-  double buried = 0;  // within another part: not measured
+  double buried = 0;  // within another part, or between two that abut: not measured
+  // Places to push at, not close to an edge: up to 96 among the thinnest tenth, without the
+  // thinnest hundredth, and up to 96 among the others. A few rays graze an edge and see no wall:
+  // that hundredth is theirs.
+  std::vector<WallPlace> places;
 };
 
 // Indices must be in range, vertices finite and welded as read_mesh does.

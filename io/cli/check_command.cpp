@@ -11,6 +11,7 @@
 #include "io/bake/plan.h"
 #include "io/check/clearance.h"
 #include "io/check/exact_check.h"
+#include "io/check/push_walls.h"
 #include "io/check/wall_thickness.h"
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
@@ -29,7 +30,7 @@ struct CheckOptions {
   std::string units = "m", field;
   io::FieldBake bake;
   bool verify = false;
-  double stiffness = 1e4;
+  double stiffness = 0;  // 0: the scene's, or 1e4
   io::ExactCheckOptions exact;
 };
 
@@ -50,13 +51,6 @@ ordered_json spread(const std::vector<double>& lengths, double voxel) {
   out["below_1_voxel"] = io::share_below(lengths, voxel);
   out["below_2_voxels"] = io::share_below(lengths, 2 * voxel);
   return out;
-}
-
-// The force at which a part is pushed through a wall [N]. Penetration depth grows up to the middle
-// of the wall; beyond it contact pushes out on the other side. Contacts share one stiffness, so one
-// contact stands for all.
-double holding_force(double stiffness, double thickness, double offset) {
-  return stiffness * (thickness / 2 + offset);
 }
 
 ordered_json exact_json(const io::ExactCheck& c) {
@@ -120,10 +114,50 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls,
         100 * walls.sheets, 2 * p.offset / p.voxel_size);
 }
 
-void print_force(const ordered_json& m, double stiffness) {
-  if (m["holding_force_N"].is_number())
-    std::printf("  force   at %.4g N/m, %.3g N and less cannot push through\n", stiffness,
-                m["holding_force_N"].get<double>());
+// The force that walls hold, with the stiffness of the contact [N/m], and what was found.
+struct Force {
+  double stiffness = 0;
+  bool known = false;
+  io::HeldForce held;
+};
+
+void print(const Force& f, double voxel) {
+  if (!f.known) return;
+  const io::WallPlace& w = f.held.weakest;
+  if (f.held.force == 0) {
+    std::printf("  force   none holds: a tool goes through at (%.4g, %.4g, %.4g) mm\n", 1e3 * w.p.x,
+                1e3 * w.p.y, 1e3 * w.p.z);
+    return;
+  }
+  std::printf(
+      "  force   at %.4g N/m, %.3g N and less cannot push a point through: pushed at %zu places "
+      "from "
+      "both sides\n",
+      f.stiffness, f.held.force, f.held.places);
+  if (norm(w.in) > 0)
+    std::printf("          weakest at (%.4g, %.4g, %.4g) mm, %.3g voxels thick there\n",
+                1e3 * w.p.x, 1e3 * w.p.y, 1e3 * w.p.z, w.thickness / voxel);
+}
+
+// Says that a wall of the mesh is none in the field, and where.
+std::string lost_sentence(const io::HeldForce& held, const io::FieldData& field) {
+  const io::WallPlace& w = held.weakest;
+  char text[320], advice[160];
+  const bool thin = w.thickness > 0 && w.thickness < 2 * field.voxel_size;
+  if (thin)
+    std::snprintf(advice, sizeof advice,
+                  "bake with --voxel-size below %.3g mm, or with --offset %.3g mm",
+                  1e3 * w.thickness / 2, 1e3 * 0.9 * field.voxel_size);
+  else
+    std::snprintf(advice, sizeof advice, "--verify compares the field with the mesh");
+  std::snprintf(
+      text, sizeof text,
+      "the weakest wall holds nothing: a tool goes through at (%.4g, %.4g, %.4g) mm, where "
+      "the wall is %.3g mm thick and a voxel %.3g mm (%zu of %zu places let the least "
+      "force through); ",
+      1e3 * w.p.x, 1e3 * w.p.y, 1e3 * w.p.z, 1e3 * w.thickness, 1e3 * field.voxel_size,
+      held.through, held.places);
+  return std::string(text) + advice;
 }
 
 // Describes how far the bounds of the far field lie below the distance, if any places could be
@@ -189,12 +223,72 @@ std::string leak_sentence(const io::ExactCheck& c) {
   return text;
 }
 
-struct Verified {
-  bool asked = false, bad = false;
+struct Verdict {
+  bool asked = false;  // whether a field was compared with its mesh
+  bool bad = false;    // that field is wrong
+  bool lost = false;   // walls hold nothing
 };
 
+ordered_json facts(const Subject& s, const io::MeshAudit& a, const io::FieldPlan& p,
+                   const io::Walls& walls) {
+  return {{"name", s.name},
+          {"triangles", a.triangles},
+          {"closed", a.closed},
+          {"odd_edges", a.odd_edges},
+          {"duplicates", a.duplicates},
+          {"components", a.components},
+          {"low_m", {a.low.x, a.low.y, a.low.z}},
+          {"high_m", {a.high.x, a.high.y, a.high.z}},
+          {"voxel_size", p.voxel_size},
+          {"offset", p.offset},
+          {"dims", {8 * p.bricks[0], 8 * p.bricks[1], 8 * p.bricks[2]}},
+          {"bricks_estimate", p.brick_count},
+          {"field_bytes_estimate", p.bytes},
+          {"engine_bytes_estimate", p.engine_bytes},
+          {"bake_seconds_estimate", p.seconds},
+          {"walls_voxels", spread(walls.thickness, p.voxel_size)},
+          {"gaps_voxels", spread(walls.gap, p.voxel_size)},
+          {"bowls_share", walls.bowls},
+          {"sheets_share", walls.sheets},
+          {"buried_share", walls.buried}};
+}
+
+// Compares the field with its mesh. Returns whether the outside runs into the solid.
+Result<bool> compare(const Console& console, const CheckOptions& o, const Subject& s,
+                     const io::FieldData& field, ordered_json& m, Verdict& verdict) {
+  io::ExactCheckOptions exact = o.exact;
+  exact.sealed = s.bake.seal > 0 || field.sign_mode == "winding";
+  exact.threads = o.bake.threads;
+  const Result<io::ExactCheck> c = io::check_exactly(s.mesh, field, exact, console.progress());
+  if (!c) return c.failure();
+  m["field"] = exact_json(*c);
+  verdict.asked = true;
+  verdict.bad |= !c->agrees();
+  if (c->drains()) console.warn({leak_sentence(*c)});
+  if (!console.json) print(*c);
+  return c->drains();
+}
+
+// Pushes at the walls.
+Outcome push(const Console& console, const CheckOptions& o, const Subject& s,
+             const io::FieldData& field, const io::Walls& walls, double stiffness, ordered_json& m,
+             Verdict& verdict) {
+  const Result<io::HeldForce> held = io::find_held_force(s.mesh, field, walls.places, stiffness,
+                                                         o.bake.threads, console.progress());
+  if (!held) return held.failure();
+  const Force force{stiffness, held->places > 0, *held};
+  m["holding_force_N"] = force.known ? ordered_json(held->force) : ordered_json();
+  m["pushed_places"] = held->places;
+  if (!console.json) print(force, field.voxel_size);
+  if (!force.known || held->force > 0) return Done{};
+  verdict.lost = true;
+  console.warn({lost_sentence(*held, field)});
+  return Done{};
+}
+
 Result<ordered_json> check_one(const Console& console, const CheckOptions& o, const Subject& s,
-                               double stiffness, Verified& verified) {
+                               double stiffness, Verdict& verdict) {
+  const auto named = [&](const std::string& why) { return Failure{s.name + ": " + why}; };
   const io::MeshAudit a = io::audit(s.mesh);
   Result<io::FieldData> field = Failure{""};
   io::FieldBake bake = s.bake;
@@ -203,67 +297,38 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
     if (!field) return field.failure();
     bake.voxel_size = field->voxel_size, bake.offset = field->offset;
   }
-  const Result<io::FieldPlan> planned = io::plan_field(s.mesh, a, bake);
-  if (!planned) return Failure{s.name + ": " + planned.error()};
-  const io::FieldPlan& p = *planned;
+  const Result<io::FieldPlan> p = io::plan_field(s.mesh, a, bake);
+  if (!p) return named(p.error());
   io::WallOptions wall_options;
   wall_options.threads = o.bake.threads;
   const Result<io::Walls> walls = io::measure_walls(s.mesh, wall_options);
-  if (!walls) return Failure{s.name + ": " + walls.error()};
-  const std::vector<std::string> warnings = warnings_of(s, a, *walls, p);
+  if (!walls) return named(walls.error());
+  const std::vector<std::string> warnings = warnings_of(s, a, *walls, *p);
   console.warn(warnings);
-
-  ordered_json m{{"name", s.name},
-                 {"triangles", a.triangles},
-                 {"closed", a.closed},
-                 {"odd_edges", a.odd_edges},
-                 {"duplicates", a.duplicates},
-                 {"components", a.components},
-                 {"low_m", {a.low.x, a.low.y, a.low.z}},
-                 {"high_m", {a.high.x, a.high.y, a.high.z}},
-                 {"voxel_size", p.voxel_size},
-                 {"offset", p.offset},
-                 {"dims", {8 * p.bricks[0], 8 * p.bricks[1], 8 * p.bricks[2]}},
-                 {"bricks_estimate", p.brick_count},
-                 {"field_bytes_estimate", p.bytes},
-                 {"engine_bytes_estimate", p.engine_bytes},
-                 {"bake_seconds_estimate", p.seconds},
-                 {"walls_voxels", spread(walls->thickness, p.voxel_size)},
-                 {"gaps_voxels", spread(walls->gap, p.voxel_size)},
-                 {"bowls_share", walls->bowls},
-                 {"sheets_share", walls->sheets},
-                 {"buried_share", walls->buried}};
-  // The first percentile stands for the thinnest wall, because a few rays graze an edge and see no
-  // wall.
-  const double thin = walls->sheets > 0.001 ? 0 : io::quantile(walls->thickness, 0.01);
-  const bool known = walls->sheets > 0.001 || !walls->thickness.empty();
-  m["holding_force_N"] =
-      known ? ordered_json(holding_force(stiffness, thin, p.offset)) : ordered_json();
+  ordered_json m = facts(s, a, *p, *walls);
   m["warnings"] = warnings;
-  if (!console.json) print(m, s, *walls, p);
+  if (!console.json) print(m, s, *walls, *p);
 
-  if (o.field.empty() && !o.verify) {
-    if (!console.json) print_force(m, stiffness);
-    return m;
+  if (o.field.empty()) field = io::bake_field(s.mesh, s.bake, nullptr, console.progress());
+  if (!field) return named(field.error());
+  m["holding_force_N"] = nullptr;
+  if (o.verify || !o.field.empty()) {
+    const Result<bool> drains = compare(console, o, s, *field, m, verdict);
+    if (!drains) return named(drains.error());
+    if (*drains) return m;
   }
-  if (o.field.empty()) {
-    field = io::bake_field(s.mesh, s.bake, nullptr, console.progress());
-    if (!field) return Failure{s.name + ": " + field.error()};
-  }
-  io::ExactCheckOptions exact = o.exact;
-  exact.sealed = s.bake.seal > 0 || field->sign_mode == "winding";
-  exact.threads = o.bake.threads;
-  const Result<io::ExactCheck> c = io::check_exactly(s.mesh, *field, exact, console.progress());
-  if (!c) return Failure{s.name + ": " + c.error()};
-  m["field"] = exact_json(*c);
-  verified.asked = true;
-  verified.bad |= !c->agrees();
-  if (c->drains()) {
-    m["holding_force_N"] = nullptr;
-    console.warn({leak_sentence(*c)});
-  }
-  if (!console.json) print_force(m, stiffness), print(*c);
+  if (Outcome pushed = push(console, o, s, *field, *walls, stiffness, m, verdict); !pushed)
+    return named(pushed.error());
   return m;
+}
+
+// The stiffness that a run of this scene has [N/m].
+Result<double> stiffness_of(const Console& console, const io::Scene& scene) {
+  if (scene.contact.stiffness > 0) return scene.contact.stiffness;
+  const Result<std::unique_ptr<io::LoadedScene>> loaded = io::load_scene(scene, console.progress());
+  if (!loaded) return loaded.failure();
+  const h6SessionDef def = (*loaded)->session_def();
+  return h6StiffnessFor((*loaded)->model.get(), &def);
 }
 
 // The mesh that a field or a shell is baked from; null for baked files and given points.
@@ -320,11 +385,11 @@ int check_command(const Console& console, CheckOptions& o, bool outside) {
 
   const EndsAtOnce asked(console, o.files.front() + ": cancelled");
   ordered_json list = ordered_json::array();
-  Verified verified;
+  Verdict verdict;
   for (const std::string& file : o.files) {
     if (Outcome there = check_input(file); !there) return console.fail(there.error());
     std::vector<Subject> subjects;
-    double stiffness = o.stiffness;
+    double stiffness = o.stiffness > 0 ? o.stiffness : 1e4;
     std::optional<io::Scene> scene;
     if (file.ends_with(".json")) {
       Result<io::Scene> read = io::read_scene(file, outside);
@@ -333,14 +398,18 @@ int check_command(const Console& console, CheckOptions& o, bool outside) {
       Result<std::vector<Subject>> found = subjects_of_scene(*scene);
       if (!found) return console.fail(found.error());
       subjects = std::move(*found);
-      if (scene->contact.stiffness > 0) stiffness = scene->contact.stiffness;
+      if (o.stiffness == 0 && !subjects.empty()) {
+        const Result<double> own = stiffness_of(console, *scene);
+        if (!own) return console.fail(own.error());
+        if (*own > 0) stiffness = *own;
+      }
     } else {
       Result<io::Mesh> mesh = io::read_mesh(file, *unit);
       if (!mesh) return console.fail(mesh.error());
       subjects.push_back({file, std::move(*mesh), o.bake, {{0, 0, 0}, {1, 0, 0, 0}}});
     }
     for (const Subject& s : subjects) {
-      Result<ordered_json> m = check_one(console, o, s, stiffness, verified);
+      Result<ordered_json> m = check_one(console, o, s, stiffness, verdict);
       if (!m) return console.fail(m.error());
       if (scene) {
         Result<ordered_json> start = clearances(console, *scene, s, *m, o.bake.threads);
@@ -350,9 +419,9 @@ int check_command(const Console& console, CheckOptions& o, bool outside) {
       list.push_back(std::move(*m));
     }
   }
-  console.result({{"meshes", list},
-                  {"agrees", verified.asked ? ordered_json(!verified.bad) : ordered_json()}});
-  return verified.bad ? kFailed : kOk;
+  console.result(
+      {{"meshes", list}, {"agrees", verdict.asked ? ordered_json(!verdict.bad) : ordered_json()}});
+  return verdict.bad || verdict.lost ? kFailed : kOk;
 }
 
 }  // namespace
