@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// frame_team.cpp - the ticket that both threads claim slices from, and the helper's life.
+// frame_team.cpp - the ticket that all threads claim slices from, and a helper's life.
 #include "sched/frame_team.h"
 
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <pthread.h>
 #include <sched.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <ctime>
 #include <thread>
 
 #include "hapsix/base.h"
 #include "sched/clock.h"
+#include "sched/parallel_for.h"
 #include "sched/realtime.h"
 
 #if defined(__SSE2__)
@@ -29,7 +32,7 @@ void relax() {
 }
 constexpr std::int64_t kPollBefore = 150000;  // ns before the next frame is due
 
-thread_local int this_is_helper = 0;
+thread_local unsigned this_is_helper = 0;
 thread_local std::int64_t this_waited = 0;
 
 // Core and priority of the helper's thread. The thread belongs to TBB, so both are given back.
@@ -53,8 +56,6 @@ class Treatment {
   cpu_set_t came_with_{};
 };
 
-// Sharing costs some 0.7 us while the helper polls: a job of 4 us takes 2.7 on both threads. Less
-// work than that does not pay.
 constexpr int kInHaste = 2;           // after so many early frames the next one is expected early
 constexpr std::int64_t kNap = 50000;  // how late the helper may notice an early frame [ns]
 }  // namespace
@@ -62,164 +63,241 @@ constexpr std::int64_t kNap = 50000;  // how late the helper may notice an early
 // There is one job at a time, and the ticket is the whole job in one word: its number (32 bits),
 // the end of its free slices (16) and the first of them (16). A claim is one compare-and-swap of
 // that word, so a helper that wakes late can neither take a slice of a finished job nor read a job
-// that is being set up. The haptic thread takes the first free slice, the helper the last: from
-// frame to frame each gets the same slices, whose data are still in its cache.
-struct FrameTeam::Helper {
-  oneapi::tbb::task_arena arena{1, 0};  // lives as long as its task waits
-  // Where TBB has no thread left the task may never start. The destructor then abandons it.
-  enum State { kWaiting, kHelping, kEnded, kAbandoned };
-  std::atomic<int> state{kWaiting};
-  std::atomic<bool> stop{false};
-  std::atomic<bool> polling{false};         // a frame is running
-  std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
-  std::atomic<int> treatment{0};            // priority + 256 * (the haptic thread's core + 1)
-  std::atomic<int> frame_core{-1};          // the core on which the last frame began
+// that is being set up. The haptic thread takes the first free slice, helpers the last: from frame
+// to frame each gets about the same slices, whose data are still in its cache.
+struct FrameTeam::Job {
+  std::atomic<bool> polling{false};  // a frame is running
   alignas(64) std::atomic<std::uint64_t> ticket{0};
   alignas(64) std::atomic<std::uint32_t> done{0};  // slices of this job that are finished
   // Written before the ticket is published, read after a claim.
   Slice work = nullptr;
   void* context = nullptr;
-  std::uint32_t job = 0;
-  std::int64_t announced = 0;  // when the next frame is due, as end_frame was told
-  int early = 0;               // frames in a row that came long before they were due
-  // The helper writes it before it counts a slice as done; it is read and cleared between jobs.
-  HelperWork helped;
+  std::uint32_t number = 0;
+  // A helper writes its own before it counts a slice as done; read and cleared between jobs.
+  struct alignas(64) Helped : HelperWork {};
+  std::unique_ptr<Helped[]> helped;  // (threads)
 
-  static std::uint64_t ticket_of(std::uint32_t job, std::size_t slices) {
-    return std::uint64_t{job} << 32 | std::uint64_t{slices} << 16;
+  static std::uint64_t ticket_of(std::uint32_t number, std::size_t slices) {
+    return std::uint64_t{number} << 32 | std::uint64_t{slices} << 16;
   }
 
-  // Takes and runs one slice of the current job; false when none is free.
-  bool work_one(bool by_helper) {
+  // Takes and runs one slice of the current job; false when none is free. `by`: 0 is the haptic
+  // thread.
+  bool work_one(unsigned by) {
     std::uint64_t t = ticket.load(std::memory_order_acquire), claimed;
     std::uint32_t first, end;
     do {
       first = t & 0xffff;
       end = t >> 16 & 0xffff;
       if (first >= end) return false;
-      claimed = by_helper ? t - 0x10000 : t + 1;
+      claimed = by > 0 ? t - 0x10000 : t + 1;
     } while (!ticket.compare_exchange_weak(t, claimed, std::memory_order_acq_rel,
                                            std::memory_order_acquire));
-    if (by_helper) {
+    if (by > 0) {
       const std::int64_t start = now_ns();
-      if (helped.slices++ == 0) helped.first = start;
+      HelperWork& mine = helped[by];
+      if (mine.slices++ == 0) mine.first = start;
       work(context, end - 1);
-      helped.busy += now_ns() - start;
+      mine.busy += now_ns() - start;
     } else {
       work(context, first);
     }
     done.fetch_add(1, std::memory_order_release);
     return true;
   }
+};
+
+// A helper that stays for the life of the team.
+struct FrameTeam::Resident {
+  oneapi::tbb::task_arena arena{1, 0};  // lives as long as its task waits
+  std::shared_ptr<Job> job;
+  unsigned number;
+  // Where TBB has no thread left the task may never start. The destructor then abandons it.
+  enum State { kWaiting, kHelping, kEnded, kAbandoned };
+  std::atomic<int> state{kWaiting};
+  std::atomic<bool> stop{false};
+  std::atomic<std::int64_t> next_frame{0};  // when the next frame is due
+  std::atomic<int> treatment{0};            // priority + 256 * (the haptic thread's core + 1)
+  std::atomic<int> frame_core{-1};          // the core on which the last frame began
+  std::int64_t announced = 0;               // when the next frame is due, as end_frame was told
+  int early = 0;                            // frames in a row that came long before they were due
 
   void help() {
-    (void)polling.load(std::memory_order_acquire);
+    (void)job->polling.load(std::memory_order_acquire);
     int waiting = kWaiting;
     if (!state.compare_exchange_strong(waiting, kHelping, std::memory_order_acq_rel)) return;
     FlushDenormals flush;
     Treatment treated;
-    this_is_helper = 1;
+    this_is_helper = number;
     int as = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-      if (!polling.load(std::memory_order_acquire)) {
-        int asked = treatment.load(std::memory_order_relaxed);
-        // Without set_realtime the helper still leaves the core on which frames begin.
-        if (const int core = frame_core.load(std::memory_order_relaxed);
-            asked == 0 && core >= 0 && core == sched_getcpu())
-          asked = 256 * (core + 1);
-        else if (asked == 0)
-          asked = as;
-        if (asked != as) treated.set((as = asked) % 256, asked / 256 - 1);
-        const std::int64_t due = next_frame.load(std::memory_order_relaxed) - kPollBefore;
-        const std::int64_t now = now_ns();
-        if (now < due)
-          sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
-        else if (now > due + 2 * kPollBefore)  // no frames come: nap, and longer after a while
-          sleep_until_ns(now + (now - due > 2000 * kNap ? 20 * kNap : kNap));
-        else
-          relax();
+      if (job->polling.load(std::memory_order_acquire)) {
+        if (!job->work_one(number)) relax();
         continue;
       }
-      if (!work_one(true)) relax();
+      int asked = treatment.load(std::memory_order_relaxed);
+      // Without set_realtime the helper still leaves the core on which frames begin.
+      if (const int core = frame_core.load(std::memory_order_relaxed);
+          asked == 0 && core >= 0 && core == sched_getcpu())
+        asked = 256 * (core + 1);
+      else if (asked == 0)
+        asked = as;
+      if (asked != as) treated.set((as = asked) % 256, asked / 256 - 1);
+      const std::int64_t due = next_frame.load(std::memory_order_relaxed) - kPollBefore;
+      const std::int64_t now = now_ns();
+      if (now < due)
+        sleep_until_ns(due < now + kNap * 20 ? due : now + kNap * 20);
+      else if (now > due + 2 * kPollBefore)  // no frames come: nap, and longer after a while
+        sleep_until_ns(now + (now - due > 2000 * kNap ? 20 * kNap : kNap));
+      else
+        relax();
     }
     this_is_helper = 0;
     state.store(kEnded, std::memory_order_release);
   }
+
+  void begin_frame(std::int64_t now) {
+    const bool is_early = now < announced - kPollBefore;
+    early = is_early ? early + (early < kInHaste) : 0;
+    frame_core.store(sched_getcpu(), std::memory_order_relaxed);
+  }
+  void end_frame(std::int64_t next) {
+    announced = next;
+    // Where the caller steps as fast as it can, the helper does not fall asleep.
+    next_frame.store(early >= kInHaste ? now_ns() + kPollBefore : next, std::memory_order_relaxed);
+  }
+  void end() {
+    int waiting = kWaiting;
+    if (state.compare_exchange_strong(waiting, kAbandoned, std::memory_order_acq_rel)) return;
+    stop.store(true, std::memory_order_relaxed);
+    while (state.load(std::memory_order_acquire) != kEnded) std::this_thread::yield();
+  }
 };
 
-FrameTeam::FrameTeam(unsigned threads) {
-  if (threads < 2) return;
-  helper_ = std::make_shared<Helper>();
-  // Polling is off until the first frame; the store also orders construction before the helper's
+// A task of the program that helps during one frame.
+struct FrameTeam::Lent {
+  Job* job = nullptr;
+  h6Tasks tasks{};
+  unsigned number = 0;
+  void* handle = nullptr;
+  pthread_t caller{};
+
+  static void help(void* self) {
+    const Lent& lent = *static_cast<Lent*>(self);
+    // A program without free threads may run the task at once, where it would wait for itself.
+    if (pthread_equal(lent.caller, pthread_self())) return;
+    FlushDenormals flush;
+    const unsigned before = this_is_helper;
+    this_is_helper = lent.number;
+    while (lent.job->polling.load(std::memory_order_acquire))
+      if (!lent.job->work_one(lent.number)) relax();
+    this_is_helper = before;
+  }
+  void begin_frame() {
+    caller = pthread_self();
+    handle = tasks.enqueue(tasks.user, help, this);
+  }
+  void end_frame() { tasks.finish(tasks.user, handle); }
+};
+
+FrameTeam::FrameTeam(unsigned threads, const h6Tasks& tasks)
+    : threads_(std::clamp(threads, 1u, kMostThreads)) {
+  if (threads_ < 2) return;
+  job_ = std::make_shared<Job>();
+  job_->helped = std::make_unique<Job::Helped[]>(threads_);
+  const unsigned helpers = threads_ - 1;
+  if (tasks.enqueue && tasks.finish) {
+    lent_ = std::make_unique<Lent[]>(helpers);
+    for (unsigned i = 0; i < helpers; ++i) lent_[i] = {job_.get(), tasks, i + 1, nullptr, {}};
+    return;
+  }
+  // TBB makes no more workers than the machine has cores, unless it is told.
+  using Control = oneapi::tbb::global_control;
+  if (threads_ > machine_threads())
+    allowance_ = std::make_shared<Control>(Control::max_allowed_parallelism, threads_);
+  // Polling is off until the first frame; the store also orders construction before the helpers'
   // work.
-  helper_->polling.store(false, std::memory_order_release);
-  // A thread sanitizer cannot see how TBB hands the closure over, so it must ignore this body. The
-  // body reads the raw pointer, not the shared one, because functions that it calls are watched.
-  helper_->arena.enqueue([ kept = helper_, helper = helper_.get() ]()
-                             __attribute__((no_sanitize("thread"))) { helper->help(); });
+  job_->polling.store(false, std::memory_order_release);
+  resident_ = std::make_unique<std::shared_ptr<Resident>[]>(helpers);
+  for (unsigned i = 0; i < helpers; ++i) {
+    auto helper = std::make_shared<Resident>();
+    helper->job = job_;
+    helper->number = i + 1;
+    resident_[i] = helper;
+    job_->polling.store(false, std::memory_order_release);
+    // A thread sanitizer cannot see how TBB hands the closure over, so it must ignore this body.
+    // The body reads the raw pointer, not the shared one, because functions that it calls are
+    // watched.
+    helper->arena.enqueue([ kept = helper, raw = helper.get() ]()
+                              __attribute__((no_sanitize("thread"))) { raw->help(); });
+  }
 }
 
 FrameTeam::~FrameTeam() {
-  if (!helper_) return;
-  int waiting = Helper::kWaiting;
-  if (helper_->state.compare_exchange_strong(waiting, Helper::kAbandoned,
-                                             std::memory_order_acq_rel))
-    return;
-  helper_->stop.store(true, std::memory_order_relaxed);
-  while (helper_->state.load(std::memory_order_acquire) != Helper::kEnded)
-    std::this_thread::yield();
+  for (unsigned i = 0; resident_ && i + 1 < threads_; ++i) resident_[i]->end();
 }
 
-unsigned FrameTeam::threads() const { return helper_ ? 2 : 1; }
+unsigned FrameTeam::threads() const { return threads_; }
 
-int FrameTeam::here() { return this_is_helper; }
+unsigned FrameTeam::here() { return this_is_helper; }
+void FrameTeam::be(unsigned number) { this_is_helper = number; }
+void FrameTeam::replace_helpers(Runner runner, void* self, unsigned threads) {
+  H6_ASSERT(!job_);
+  runner_ = runner;
+  runner_self_ = self;
+  threads_ = threads;
+}
 std::int64_t FrameTeam::waited_ns() { return this_waited; }
 
 void FrameTeam::set_realtime(int priority, int haptic_core) {
-  if (helper_)
-    helper_->treatment.store(priority + 256 * (haptic_core + 1), std::memory_order_relaxed);
+  for (unsigned i = 0; resident_ && i + 1 < threads_; ++i)
+    resident_[i]->treatment.store(priority + 256 * (haptic_core + 1), std::memory_order_relaxed);
 }
 
 void FrameTeam::begin_frame(std::int64_t now) {
-  if (!helper_) return;
-  Helper& h = *helper_;
-  h.helped = {};
-  const bool early = now < h.announced - kPollBefore;
-  h.early = early ? h.early + (h.early < kInHaste) : 0;
-  h.frame_core.store(sched_getcpu(), std::memory_order_relaxed);
-  h.polling.store(true, std::memory_order_release);
+  if (!job_) return;
+  for (unsigned i = 0; i < threads_; ++i) job_->helped[i] = {};
+  for (unsigned i = 0; resident_ && i + 1 < threads_; ++i) resident_[i]->begin_frame(now);
+  job_->polling.store(true, std::memory_order_release);
+  for (unsigned i = 0; lent_ && i + 1 < threads_; ++i) lent_[i].begin_frame();
 }
 
 FrameTeam::HelperWork FrameTeam::helper_work() const {
-  return helper_ ? helper_->helped : HelperWork{};
+  HelperWork all;
+  for (unsigned i = 1; job_ && i < threads_; ++i) {
+    const HelperWork& one = job_->helped[i];
+    if (one.slices == 0) continue;
+    all.first = all.slices == 0 ? one.first : std::min(all.first, one.first);
+    all.busy += one.busy;
+    all.slices += one.slices;
+  }
+  return all;
 }
 
 void FrameTeam::end_frame(std::int64_t next_frame_ns) {
-  if (!helper_) return;
-  helper_->announced = next_frame_ns;
-  // Where the caller steps as fast as it can, the helper does not fall asleep.
-  const bool haste = helper_->early >= kInHaste;
-  helper_->next_frame.store(haste ? now_ns() + kPollBefore : next_frame_ns,
-                            std::memory_order_relaxed);
-  helper_->polling.store(false, std::memory_order_release);
+  if (!job_) return;
+  for (unsigned i = 0; resident_ && i + 1 < threads_; ++i) resident_[i]->end_frame(next_frame_ns);
+  job_->polling.store(false, std::memory_order_release);
+  for (unsigned i = 0; lent_ && i + 1 < threads_; ++i) lent_[i].end_frame();
 }
 
 void FrameTeam::run(std::size_t slices, Slice work, void* context) {
   H6_ASSERT(slices < kMaxSlices);
-  if (!helper_ || slices < 2) {
+  if (runner_ && slices > 1) return runner_(runner_self_, slices, work, context);
+  if (!job_ || slices < 2) {
     for (std::size_t i = 0; i < slices; ++i) work(context, i);
     return;
   }
-  Helper& h = *helper_;
-  h.work = work;
-  h.context = context;
-  h.done.store(0, std::memory_order_relaxed);
-  h.ticket.store(Helper::ticket_of(++h.job, slices), std::memory_order_release);
-  while (h.work_one(false)) {
+  Job& job = *job_;
+  job.work = work;
+  job.context = context;
+  job.done.store(0, std::memory_order_relaxed);
+  job.ticket.store(Job::ticket_of(++job.number, slices), std::memory_order_release);
+  while (job.work_one(0)) {
   }
-  if (h.done.load(std::memory_order_acquire) == slices) return;
+  if (job.done.load(std::memory_order_acquire) == slices) return;
   const std::int64_t since = now_ns();
-  while (h.done.load(std::memory_order_acquire) != slices) relax();
+  while (job.done.load(std::memory_order_acquire) != slices) relax();
   this_waited += now_ns() - since;
 }
 

@@ -6,25 +6,21 @@
 #pragma once
 #include <atomic>
 #include <cstddef>
-#include <memory>
 
 namespace h6::sched {
 
 template <class T>
 class SpscRing {
  public:
-  explicit SpscRing(std::size_t capacity)
-      : slots_(std::make_unique<T[]>(capacity)), capacity_(capacity) {}
+  // `slots` has room for `capacity` values and outlives the ring.
+  SpscRing(T* slots, std::size_t capacity) : slots_(slots), capacity_(capacity) {}
 
-  // Writer. False when the ring is full; the value is then dropped and counted.
+  // Writer. False when the ring is full; the value is then dropped.
   bool push(const T& value) {
     const std::size_t at = written_.load(std::memory_order_relaxed);
     if (at - seen_read_ == capacity_) {
       seen_read_ = read_.load(std::memory_order_acquire);
-      if (at - seen_read_ == capacity_) {
-        dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-        return false;
-      }
+      if (at - seen_read_ == capacity_) return false;
     }
     slots_[at % capacity_] = value;
     written_.store(at + 1, std::memory_order_release);
@@ -37,6 +33,18 @@ class SpscRing {
     return at - seen_read_ == capacity_;
   }
 
+  // Writer. Is there room for `count` more?
+  bool room_for(std::size_t count) {
+    const std::size_t at = written_.load(std::memory_order_relaxed);
+    if (at - seen_read_ + count > capacity_) seen_read_ = read_.load(std::memory_order_acquire);
+    return at - seen_read_ + count <= capacity_;
+  }
+
+  // Reader. The oldest value; null: there is none. It stays until it is popped.
+  const T* front() const {
+    const std::size_t at = read_.load(std::memory_order_relaxed);
+    return written_.load(std::memory_order_acquire) == at ? nullptr : &slots_[at % capacity_];
+  }
   // Reader. Moves up to `room` values out, the oldest first, and returns how many.
   std::size_t pop(T* out, std::size_t room) {
     const std::size_t at = read_.load(std::memory_order_relaxed);
@@ -47,15 +55,11 @@ class SpscRing {
     return count;
   }
 
-  // Either side. Values that were dropped so far.
-  std::size_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
-
  private:
-  std::unique_ptr<T[]> slots_;
+  T* slots_;
   std::size_t capacity_;
   alignas(64) std::atomic<std::size_t> written_{0};
   std::size_t seen_read_ = 0;  // the writer's copy of read_
-  std::atomic<std::size_t> dropped_{0};
   alignas(64) std::atomic<std::size_t> read_{0};
 };
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The resident helper takes slices, each once, and never delays the haptic thread.
+// Helpers take slices, each once, and never delay the haptic thread.
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -18,25 +20,97 @@
 
 using namespace h6::sched;
 
-TEST_CASE("every slice runs exactly once, on either thread, job after job") {
-  for (const unsigned threads : {1u, 2u}) {
-    FrameTeam team(threads);
-    CHECK(team.threads() == threads);
-    std::vector<std::atomic<int>> ran(97);
-    long wrong = 0;
-    for (int frame = 0; frame < 3000; ++frame) {
-      team.begin_frame(now_ns());
-      for (const std::size_t slices :
-           {std::size_t{97}, std::size_t{2}, std::size_t{0}, std::size_t{1}}) {
-        for (auto& r : ran) r.store(0, std::memory_order_relaxed);
-        team.for_slices(slices,
-                        [&](std::size_t i) { ran[i].fetch_add(1, std::memory_order_relaxed); });
-        for (std::size_t i = 0; i < ran.size(); ++i) wrong += ran[i].load() != (i < slices ? 1 : 0);
-      }
-      team.end_frame(0);
-    }
-    CHECK(wrong == 0);
+namespace {
+
+// A program's own pool of threads, for tasks that come frame by frame.
+class OwnPool {
+ public:
+  explicit OwnPool(unsigned threads) {
+    for (unsigned i = 0; i < threads; ++i) workers_.emplace_back([this] { work(); });
   }
+  ~OwnPool() {
+    {
+      std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_all();
+    for (std::thread& worker : workers_) worker.join();
+  }
+  h6Tasks tasks() {
+    return {[](void* self, void (*task)(void*), void* context) -> void* {
+              auto& pool = *static_cast<OwnPool*>(self);
+              std::lock_guard lock(pool.mutex_);
+              pool.waiting_.push_back(new Item{task, context, false});
+              pool.changed_.notify_all();
+              return pool.waiting_.back();
+            },
+            [](void* self, void* handle) {
+              auto& pool = *static_cast<OwnPool*>(self);
+              auto* item = static_cast<Item*>(handle);
+              std::unique_lock lock(pool.mutex_);
+              const auto at = std::find(pool.waiting_.begin(), pool.waiting_.end(), item);
+              if (at != pool.waiting_.end())
+                pool.waiting_.erase(at);  // it has not begun, and never will
+              else
+                pool.changed_.wait(lock, [&] { return item->done; });
+              delete item;
+            },
+            this};
+  }
+  int begun = 0;  // tasks
+
+ private:
+  struct Item {
+    void (*task)(void*);
+    void* context;
+    bool done;
+  };
+  void work() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [&] { return over_ || !waiting_.empty(); });
+      if (over_) return;
+      Item* item = waiting_.front();
+      waiting_.pop_front();
+      ++begun;
+      lock.unlock();
+      item->task(item->context);
+      lock.lock();
+      item->done = true;
+      changed_.notify_all();
+    }
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Item*> waiting_;
+  bool over_ = false;
+  std::vector<std::thread> workers_;
+};
+
+}  // namespace
+
+TEST_CASE("every slice runs exactly once, on any thread, job after job") {
+  OwnPool pool(3);
+  for (const bool own : {false, true})
+    for (const unsigned threads : {1u, 2u, 3u, 4u, 8u}) {
+      FrameTeam team(threads, own ? pool.tasks() : h6Tasks{});
+      CHECK(team.threads() == threads);
+      std::vector<std::atomic<int>> ran(97);
+      long wrong = 0;
+      for (int frame = 0; frame < (threads > 2 ? 300 : 2000); ++frame) {
+        team.begin_frame(now_ns());
+        for (const std::size_t slices :
+             {std::size_t{97}, std::size_t{2}, std::size_t{0}, std::size_t{1}}) {
+          for (auto& r : ran) r.store(0, std::memory_order_relaxed);
+          team.for_slices(slices,
+                          [&](std::size_t i) { ran[i].fetch_add(1, std::memory_order_relaxed); });
+          for (std::size_t i = 0; i < ran.size(); ++i)
+            wrong += ran[i].load() != (i < slices ? 1 : 0);
+        }
+        team.end_frame(0);
+      }
+      CHECK(wrong == 0);
+    }
 }
 
 TEST_CASE("the helper takes slices") {
@@ -134,7 +208,7 @@ TEST_CASE("the helper has the last slices of every job, the haptic thread the fi
   for (int frame = 0; frame < 3000 && shared < 5; ++frame) {
     team.begin_frame(now_ns());
     team.for_slices(kSlices, [&](std::size_t i) {
-      by[i] = FrameTeam::here();
+      by[i] = static_cast<int>(FrameTeam::here());
       for (const std::int64_t end = now_ns() + 20000; now_ns() < end;) {
       }
     });
@@ -161,6 +235,51 @@ TEST_CASE("a caller that steps without a pause still gets the helper in most fra
   }
   CHECK(helped == 200);
   MESSAGE(frames << " frames for 200 with help");
+}
+
+TEST_CASE("a program's own tasks take slices, and are the program's again between frames") {
+  OwnPool pool(2);
+  FrameTeam team(3, pool.tasks());
+  std::mutex mutex;
+  std::set<std::thread::id> seen;
+  std::set<unsigned> numbers;
+  // Both threads of the pool may come as number 1 before one of them comes as number 2.
+  for (int frame = 0; frame < 2000 && (seen.size() < 3 || numbers.size() < 3); ++frame) {
+    team.begin_frame(now_ns());
+    team.for_slices(12, [&](std::size_t) {
+      for (const std::int64_t end = now_ns() + 300000; now_ns() < end;) {
+      }
+      std::lock_guard lock(mutex);
+      seen.insert(std::this_thread::get_id());
+      numbers.insert(FrameTeam::here());
+    });
+    team.end_frame(now_ns());
+    // Every task has returned, so this one gets a thread.
+    std::atomic<bool> ran{false};
+    const h6Tasks tasks = pool.tasks();
+    void* mine = tasks.enqueue(
+        tasks.user, [](void* flag) { static_cast<std::atomic<bool>*>(flag)->store(true); }, &ran);
+    while (!ran) std::this_thread::yield();
+    tasks.finish(tasks.user, mine);
+  }
+  CHECK(seen.size() == 3);
+  CHECK(numbers == std::set<unsigned>{0, 1, 2});
+}
+
+TEST_CASE("a program that runs tasks at once, on the caller, does not hang it") {
+  h6Tasks tasks{[](void*, void (*task)(void*), void* context) -> void* {
+                  task(context);
+                  return nullptr;
+                },
+                [](void*, void*) {}, nullptr};
+  FrameTeam team(4, tasks);
+  int ran = 0;
+  for (int frame = 0; frame < 100; ++frame) {
+    team.begin_frame(now_ns());
+    team.for_slices(9, [&](std::size_t) { ++ran; });
+    team.end_frame(now_ns());
+  }
+  CHECK(ran == 900);
 }
 
 TEST_CASE("a team without frames can be destroyed at once") {

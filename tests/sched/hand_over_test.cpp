@@ -28,10 +28,12 @@ struct Wide {
 };
 }  // namespace
 
-TEST_CASE("a ring keeps order, refuses values when full and counts them") {
-  SpscRing<int> ring(4);
+TEST_CASE("a ring keeps order, shows the oldest value and refuses values when full") {
+  int slots[4];
+  SpscRing<int> ring(slots, 4);
   for (int i = 0; i < 6; ++i) CHECK(ring.push(i) == (i < 4));
-  CHECK(ring.dropped() == 2);
+  CHECK_FALSE(ring.room_for(1));
+  CHECK(*ring.front() == 0);
   int out[8];
   CHECK(ring.pop(out, 3) == 3);
   CHECK(out[2] == 2);
@@ -40,10 +42,14 @@ TEST_CASE("a ring keeps order, refuses values when full and counts them") {
   CHECK(out[0] == 3);
   CHECK(out[1] == 9);
   CHECK(ring.pop(out, 8) == 0);
+  CHECK(ring.front() == nullptr);
+  CHECK(ring.room_for(4));
+  CHECK_FALSE(ring.room_for(5));
 }
 
 TEST_CASE("a ring between two threads loses, repeats and tears nothing") {
-  SpscRing<Wide> ring(64);
+  std::array<Wide, 64> slots;
+  SpscRing<Wide> ring(slots.data(), slots.size());
   constexpr std::uint64_t count = 200000;
   std::thread writer([&] {
     for (std::uint64_t i = 0; i < count; ++i)
