@@ -24,10 +24,12 @@ namespace h6::kernels {
 //        table (bx*by*bz)       bricks                       far
 //        [ 0][-1][-2][ 1] ...   [729 int16, padded][...]     [8 int16][8 int16]...
 //
-// Refined bricks have the first rows. The same row of `cuts` starts with an int32, a unit of 32
-// int16 in `fine`, and has one code for each cell, x fastest, from kCutHead on: 0, or the number of
-// units from there times 2, plus 1 where the cell is cut into quarters. In `fine`, a cell cut into
-// f = 2 or 4 has its (f + 1)^3 nodes, x fastest, in 1/(1024 f) voxel, in one unit or in four.
+// Refined bricks have the first rows. `fine` lies behind `bricks` in the same array, so that one
+// gather fetches samples of either; both together take at most 2 GB. The same row of `cuts` starts
+// with an int32, a unit of 32 int16 in `fine`, and has one code for each cell, x fastest, from
+// kCutHead on: 0, or the number of units from there times 2, plus 1 where the cell is cut into
+// quarters. In `fine`, a cell cut into f = 2 or 4 has its (f + 1)^3 nodes, x fastest, in 1/(1024 f)
+// voxel, in one unit or in four.
 struct FieldView {
   std::int32_t size[3];       // bricks along x, y, z; nodes 0 .. 8*size - 1
   const std::int32_t* table;  // (size z * y * x), x fastest

@@ -88,8 +88,13 @@ HWY_INLINE Slope slope_at(const ContactColumns& c, const Around* around, std::si
     s.g[k] = hn::MulAdd(sure, hn::Sub(hn::Mul(turned, per_step), s.g[k]), s.g[k]);
   }
   const auto bend = hn::NegMulAdd(hn::Set(d, 4.0f), at[0], hn::Add(p, m));
+  const float span = kLeanFull - kLeanFrom;
+  auto shallow =
+      hn::MulAdd(hn::Set(d, 1 / (2 * a.step * span)), at[0], hn::Set(d, kLeanFull / span));
+  shallow = hn::Min(hn::Max(shallow, zero), one);
   const auto sharp = hn::Mul(sure, hn::Mul(bend, hn::Set(d, 1 / (2 * a.step * a.step * kSharp))));
-  s.lean = hn::Div(s.lean, hn::MulAdd(sharp, sharp, one));
+  const auto bent = hn::Div(s.lean, hn::MulAdd(sharp, sharp, one));
+  s.lean = hn::MulAdd(shallow, hn::Sub(bent, s.lean), s.lean);
   return s;
 }
 

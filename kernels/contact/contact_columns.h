@@ -22,20 +22,24 @@ void contact_facing_ref(const ContactColumns& c, float edge, float* facing);
 // it, contact + step (1 1 1), (1 -1 -1), (-1 1 -1), (-1 -1 1) along the field's axes      [voxel]
 struct Around {
   const float* at[5];
-  float step;     // [voxel]
+  float step;     // half the field's finest spacing [voxel]
   float band;     // farther from the surface than this a distance may be a bound [voxel]
   float turn[9];  // field axes to the axes of the normals, row-major
 };
-inline constexpr float kMostLean = 3;          // of the direction towards the gradient
-inline constexpr float kSharp = 0.5f;          // curvature of the field that halves it [1/voxel]
+inline constexpr float kMostLean = 3;  // of the direction towards the gradient
+inline constexpr float kSharp = 0.5f;  // curvature of the field that halves it [1/voxel]
+// Half a voxel deep a contact leans in full, however sharp the field is: a lone point at an edge
+// must get out along the slope. Depths in the field's finest spacing.
+inline constexpr float kLeanFrom = 0.25f, kLeanFull = 0.5f;
 inline constexpr float kStillFacing = -0.25f;  // N.G at which a contact stops pushing
 
 // The direction in which a contact pushes, and its facing factor. METHOD.md, Sec. 3, "Firm".
 //   G   the slope over the tetrahedron, which does not jump between cells; g where `around` is null
 //       or distances may be bounds
 //   q   the curvature of the field, div G, over kSharp; 0 where `around` is null
+//   s   clamp((depth - kLeanFrom) / (kLeanFull - kLeanFrom), 0, 1)
 //   facing    = clamp(1 - N.G / kStillFacing, 0, 1)
-//   direction = N + kMostLean / (1 + q^2) G made unit; N where facing is 0
+//   direction = N + kMostLean (s + (1 - s) / (1 + q^2)) G made unit; N where facing is 0
 // The direction may be written over N.
 void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
                      float* facing);

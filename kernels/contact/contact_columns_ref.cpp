@@ -48,8 +48,11 @@ void push_directions_ref(const ContactColumns& c, const Around* around, float* n
                               double{a.turn[3 * k + 2]} * slope[2];
         G[k] += sure * (turned - G[k]);
       }
+      const double depth = -d[0] / (2 * double{a.step});
+      const double deep =
+          std::clamp((depth - kLeanFrom) / (double{kLeanFull} - kLeanFrom), 0.0, 1.0);
       const double q = sure * curvature / kSharp;
-      lean /= 1 + q * q;
+      lean += (1 - deep) * (lean / (1 + q * q) - lean);
     }
     const double dot = N[0] * G[0] + N[1] * G[1] + N[2] * G[2];
     const double share = std::clamp(1 - dot / kStillFacing, 0.0, 1.0);

@@ -2,6 +2,8 @@
 // cull_spheres.cpp - the SIMD twin of cull_spheres_ref.cpp.
 #include "kernels/contact/cull_spheres.h"
 
+#include <hwy/cache_control.h>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/contact/cull_spheres.cpp"
 #include "kernels/simd.h"
@@ -85,6 +87,64 @@ HWY_INLINE std::size_t cull_lanes(const Culling& c, const Lanes& lanes, std::uin
   return kept;
 }
 
+// Rows that follow each other need no gathers.
+HWY_INLINE bool is_run(const std::uint32_t* rows, std::size_t live) {
+  const DI di;
+  if (live < hn::Lanes(di)) return false;
+  const auto first = static_cast<std::int32_t>(rows[0]);
+  const VI run = hn::Add(hn::Iota(di, 0), hn::Set(di, first));
+  return hn::AllTrue(di, hn::Eq(hn::LoadU(di, reinterpret_cast<const std::int32_t*>(rows)), run));
+}
+
+// Spheres in lanes k and up: columns where their rows are a run.
+HWY_INLINE Lanes lanes_at(const std::uint32_t* rows, std::size_t k, std::size_t count) {
+  const std::size_t live = HWY_MIN(hn::Lanes(DF()), count - k);
+  if (rows != nullptr && is_run(rows + k, live)) return {nullptr, rows[k], live};
+  return {rows, k, live};
+}
+
+// Prefetches what the spheres in lanes begin..end-1 sample: all their entries in the table, then
+// all that these name. Without this each vector of spheres would wait twice for its memory.
+constexpr std::size_t kChunk = 64;  // spheres
+HWY_NOINLINE void prefetch_samples(const Culling& c, const std::uint32_t* rows, std::size_t begin,
+                                   std::size_t end) {
+  const DF d;
+  const DI di;
+  HWY_ALIGN std::int32_t slot[kChunk], node[kChunk];
+  const std::int32_t slots = c.field.size[0] * c.field.size[1] * c.field.size[2];
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    const Lanes lanes = lanes_at(rows, i, end);
+    const VI row = load_rows(lanes);
+    const VF px = load_column(c.spheres.x, lanes, row), py = load_column(c.spheres.y, lanes, row);
+    const VF pz = load_column(c.spheres.z, lanes, row);
+    Axis axis[3];
+    for (int a = 0; a < 3; ++a) {
+      const VF last = hn::Set(d, static_cast<float>(8 * c.field.size[a] - 1));
+      const VF q = affine_row(c.to_field.m[a], px, py, pz);
+      axis[a] = split_axis(hn::Min(hn::Max(q, hn::Zero(d)), last), c.field.size[a]);
+    }
+    const Cell cell = cell_of(c.field, axis[0], axis[1], axis[2]);
+    // A NaN has any cell.
+    const VI known = hn::Min(hn::Max(cell.slot, hn::Zero(di)), hn::Set(di, slots - 1));
+    hn::Store(known, di, slot + (i - begin));
+    hn::Store(cell.node, di, node + (i - begin));
+    for (std::size_t k = i - begin; k < i - begin + hn::Lanes(d); ++k)
+      hwy::Prefetch(c.field.table + slot[k]);
+  }
+  for (std::size_t k = 0; k < end - begin; ++k) {
+    const std::int32_t entry = c.field.table[slot[k]];
+    if (entry < 0) {
+      hwy::Prefetch(c.field.far + 8 * (-1 - std::ptrdiff_t{entry}));
+    } else {
+      const std::int16_t* const brick =
+          c.field.bricks + std::ptrdiff_t{row_of(entry)} * kBrickStride;
+      hwy::Prefetch(brick + (node[k] + 5));
+      hwy::Prefetch(brick + (node[k] + 86));
+    }
+  }
+}
+constexpr std::size_t kWorthPrefetching = 24;  // spheres
+
 std::size_t cull_spheres_simd(const FieldView& field, const Affine& to_field,
                               const SpheresView& spheres, float radius_scale, const Reach& reach,
                               float margin, const std::uint32_t* rows, std::uint32_t first,
@@ -96,10 +156,14 @@ std::size_t cull_spheres_simd(const FieldView& field, const Affine& to_field,
   const Culling culling{field, to_field, from, radius_scale, reach, margin};
   const std::size_t width = hn::Lanes(DF());
   std::size_t written = 0;
+  static_assert(kChunk % hn::MaxLanes(DF()) == 0, "a chunk is whole vectors");
   for (std::size_t k = 0; k < count; k += width) {
-    const std::size_t live = HWY_MIN(width, count - k);
+    if (count >= kWorthPrefetching && k % kChunk == 0)
+      prefetch_samples(culling, rows, k, HWY_MIN(k + kChunk, count));
     float* out = clearance != nullptr ? clearance + k : nullptr;
-    written += cull_lanes(culling, {rows, k, live}, first, survivors + written, out);
+    const Lanes lanes = lanes_at(rows, k, count);
+    const bool run = rows != nullptr && lanes.rows == nullptr;  // lanes.first is a row
+    written += cull_lanes(culling, lanes, run ? 0 : first, survivors + written, out);
   }
   return written;
 }

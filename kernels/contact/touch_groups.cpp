@@ -4,6 +4,8 @@
 
 #include <hwy/cache_control.h>
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/contact/touch_groups.cpp"
 #include "kernels/simd.h"
@@ -77,6 +79,10 @@ HWY_INLINE void stage_points(const PointsView& points, const std::uint32_t* grou
       hn::StoreU(hn::Set(d, column[0]), d, column + n + i);
 }
 
+HWY_INLINE void prefetch_group(const PointsView& points, std::size_t group) {
+  for (const float* column : {points.x, points.y, points.z}) hwy::Prefetch(column + kGroup * group);
+}
+
 // Source of the batches: a whole group each, or the staged points.
 struct WholeGroups {
   const PointsView& points;
@@ -89,6 +95,7 @@ struct WholeGroups {
     return hn::Set(DF(), reach != nullptr ? reach[groups[batch]] : limit);
   }
   std::size_t first(std::size_t batch) const { return kGroup * groups[batch]; }
+  void prefetch(std::size_t batch) const { prefetch_group(points, groups[batch]); }
   VF x(std::size_t at) const { return hn::LoadU(DF(), points.x + at); }
   VF y(std::size_t at) const { return hn::LoadU(DF(), points.y + at); }
   VF z(std::size_t at) const { return hn::LoadU(DF(), points.z + at); }
@@ -107,6 +114,7 @@ struct StagedPoints {
 
   VF limit_of(std::size_t, std::size_t at) const { return hn::Load(DF(), stage.limit + at); }
   std::size_t first(std::size_t batch) const { return kGroup * batch; }
+  void prefetch(std::size_t) const {}
   VF x(std::size_t at) const { return hn::Load(DF(), stage.x + at); }
   VF y(std::size_t at) const { return hn::Load(DF(), stage.y + at); }
   VF z(std::size_t at) const { return hn::Load(DF(), stage.z + at); }
@@ -150,25 +158,33 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
     for (const std::int32_t slot : ring.slot[k]) hwy::Prefetch(field.table + slot);
 }
 
+HWY_INLINE void prefetch_far(const FieldView& field, const std::int32_t* slot) {
+  for (std::size_t i = 0; i < kGroup; ++i) {
+    const std::int32_t entry = field.table[slot[i]];
+    if (entry < 0) hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
+  }
+}
+
 HWY_INLINE void look_up(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
   const DI di;
-  if (cold)
-    for (std::size_t i = 0; i < kGroup; ++i) {
-      const std::int32_t entry = field.table[ring.slot[k][i]];
-      if (entry < 0) {
-        hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
-        continue;
-      }
-      const std::int16_t* const node =
-          field.bricks + std::ptrdiff_t{row_of(entry)} * kBrickStride + ring.node[k][i];
-      hwy::Prefetch(node + 5);
-      hwy::Prefetch(node + 86);
-    }
+  HWY_ALIGN std::int32_t slot[kGroup];
+  if (cold) std::copy_n(ring.slot[k], kGroup, slot);
+  bool any_far = false;
   for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di)) {
     const VI entry = gather_entries(field.table, ring.slot[k] + i);
+    const auto far = hn::Lt(entry, hn::Zero(di));
+    any_far = any_far || !hn::AllFalse(di, far);
     ring.plain[k] = ring.plain[k] && hn::AllTrue(di, is_plain(entry));
-    hn::Store(near_offset(entry, hn::Load(di, ring.node[k] + i)), di, ring.slot[k] + i);
+    const VI row = hn::IfThenZeroElse(far, hn::And(entry, hn::Set(di, ~kRefined)));
+    hn::Store(near_offset(row, hn::Load(di, ring.node[k] + i)), di, ring.slot[k] + i);
   }
+  if (!cold) return;
+  const char* const bytes = reinterpret_cast<const char*>(field.bricks);
+  for (const std::int32_t offset : ring.slot[k]) {
+    hwy::Prefetch(bytes + offset + 2 * 5);
+    hwy::Prefetch(bytes + offset + 2 * 86);
+  }
+  if (any_far) prefetch_far(field, slot);
 }
 
 struct Samples {
@@ -239,6 +255,7 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
   const auto look_up_at = [&](std::size_t k) HWY_ATTR {
     if (k < batches) look_up(field, k % kRing, cold, ring);
   };
+  for (std::size_t k = 0; k < HWY_MIN(2 * ahead, batches); ++k) points.prefetch(k);
   for (std::size_t k = 0; k < ahead; ++k) locate_at(k);
   for (std::size_t k = 0; k < half; ++k) look_up_at(k);
   for (std::size_t k = 0; k < batches; ++k) {
@@ -266,6 +283,7 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
       written += hn::CountTrue(d, touching);
     }
     points.end(k, smallest);
+    if (k + 2 * ahead < batches) points.prefetch(k + 2 * ahead);
     locate_at(k + ahead);
   }
   return written;
@@ -316,6 +334,9 @@ std::size_t touch_groups_simd(const FieldView& field, const Affine& to_field,
   Stage stage;
   for (std::size_t done = 0; done < count; done += kStaged) {
     const std::size_t some = HWY_MIN(kStaged, count - done);
+    // The points of the next stage; at the start, of the first too.
+    for (std::size_t k = done > 0 ? done + some : 0; k < HWY_MIN(done + some + kStaged, count); ++k)
+      prefetch_group(points, groups[k]);
     stage_points(points, groups + done, look.rows + done, some, limit, look.reach, stage);
     const std::size_t staged = stage.first[some];
     written = sample_batches(field, to_field, StagedPoints{stage, staged},

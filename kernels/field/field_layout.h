@@ -16,6 +16,11 @@ struct FieldLayoutSize {
   std::size_t far_cells;
   std::size_t refined;     // bricks with finer samples
   std::size_t fine_units;  // of kFineUnit int16
+  // The size of the table and all pools.
+  std::size_t bytes() const {
+    return 4 * (bricks + far_cells) + 2 * (kBrickStride * bricks + 8 * far_cells +
+                                           kCutStride * refined + kFineUnit * fine_units);
+  }
 };
 FieldLayoutSize field_layout_size(const h6FieldDef& def);
 

@@ -26,7 +26,11 @@ struct Batch {
   HWY_ALIGN float fraction[3][2][kBatch];  // axis, below or above the point
   HWY_ALIGN std::int32_t slot[4][kBatch];  // index in the table
   HWY_ALIGN std::int32_t node[4][kBatch];  // then byte offset in the bricks
-  bool plain[kBatch];  // of a vector's first point: all corners lie in plain bricks
+  bool plain[kBatch];                      // of a vector's first point: all corners lie in bricks
+  // Points with a corner in a cut cell, by their number in the batch.
+  HWY_ALIGN std::int32_t cut[kBatch];
+  std::size_t cut_count = 0;
+  std::uint32_t cut_point[kBatch];
 };
 
 // The two places of an axis for a vector of points.
@@ -73,18 +77,43 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
   }
 }
 
+// The codes of the cells of refined bricks, from their first nodes.
+HWY_INLINE VI codes_at(const FieldView& field, VI row, hn::Mask<DI> refined, VI node) {
+  const DF d;
+  const DI di;
+  // node = x + 9 y + 81 z, each below 8: exact in float, and no multiple of a ninth is near.
+  const auto over = [&](VI n, float share) HWY_ATTR {
+    return hn::ConvertTo(
+        di, hn::Mul(hn::Add(hn::ConvertTo(d, n), hn::Set(d, 0.5f)), hn::Set(d, share)));
+  };
+  const VI z = over(node, 1.0f / 81), rest = hn::Sub(node, hn::Mul(z, hn::Set(di, 81)));
+  const VI y = over(rest, 1.0f / 9), x = hn::Sub(rest, hn::Mul(y, hn::Set(di, 9)));
+  return codes_of(field, row, refined, {z, x, hn::Zero(d)}, {z, y, hn::Zero(d)},
+                  {z, z, hn::Zero(d)});
+}
+
 HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i, Batch& batch) {
   const DI di;
   auto other = hn::FirstN(di, 0);
+  VI codes = hn::Zero(di);
   HWY_UNROLL(4)
   for (int c = 0; c < 4; ++c) {
     const VI entry = gather_entries(field.table, batch.slot[c] + i);
-    const auto beyond = hn::Not(is_plain(entry));
+    const auto beyond = hn::Lt(entry, hn::Zero(di));
     other = hn::Or(other, beyond);
-    const VI offset = near_offset(entry, hn::Load(di, batch.node[c] + i));
-    hn::Store(hn::IfThenZeroElse(beyond, offset), di, batch.node[c] + i);
+    const VI row = hn::And(entry, hn::Set(di, ~kRefined));
+    const VI node = hn::Load(di, batch.node[c] + i);
+    const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
+    if (!hn::AllFalse(di, refined)) codes = hn::Or(codes, codes_at(field, row, refined, node));
+    hn::Store(hn::IfThenZeroElse(beyond, near_offset(row, node)), di, batch.node[c] + i);
   }
   batch.plain[i] = batch.plain[i] && hn::AllFalse(di, hn::And(other, hn::FirstN(di, live)));
+  if (!batch.plain[i] || hn::AllTrue(di, hn::Eq(codes, hn::Zero(di)))) return;
+  hn::Store(codes, di, batch.cut + i);
+  for (std::size_t k = i; k < i + HWY_MIN(live, hn::Lanes(di)); ++k) {
+    batch.cut_point[batch.cut_count] = static_cast<std::uint32_t>(k);
+    batch.cut_count += batch.cut[k] != 0;
+  }
 }
 
 HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::size_t live,
@@ -104,7 +133,30 @@ HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::si
   }
 }
 
-// Points with a corner in a far cell, in a refined brick or outside the grid.
+// Points whose corners lie in bricks, some in cut cells; a vector of them at most.
+HWY_NOINLINE void sample_cut(const FieldView& field, const Affine& to_field,
+                             const PointsView& points, float step, std::size_t first,
+                             const std::uint32_t* which, std::size_t count, float* const at[4]) {
+  const DF d;
+  HWY_ALIGN float column[3][hn::MaxLanes(d)] = {};
+  HWY_ALIGN float out[hn::MaxLanes(d)];
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    const std::size_t row = first + which[HWY_MIN(i, count - 1)];
+    column[0][i] = points.x[row], column[1][i] = points.y[row], column[2][i] = points.z[row];
+  }
+  const VF x = hn::Load(d, column[0]), y = hn::Load(d, column[1]), z = hn::Load(d, column[2]);
+  Sides q[3];
+  for (int a = 0; a < 3; ++a) q[a] = sides_of(to_field.m[a], x, y, z, step);
+  for (int c = 0; c < 4; ++c) {
+    VF value, none;
+    sample_inside<false, false>(field, q[0].at[side(c, 0)], q[1].at[side(c, 1)],
+                                q[2].at[side(c, 2)], value, none, none, none);
+    hn::Store(value, d, out);
+    for (std::size_t i = 0; i < count; ++i) at[c][first + which[i]] = out[i];
+  }
+}
+
+// Points with a corner in a far cell or outside the grid.
 HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
                               const PointsView& points, float step, std::size_t k,
                               float* const at[4]) {
@@ -130,6 +182,7 @@ void sample_corners_simd(const FieldView& field, const Affine& to_field, const P
     const std::size_t some = HWY_MIN(kBatch, points.count - first);
     for (std::size_t i = 0; i < some; i += width)
       locate(field, to_field, points, step, first, i, batch);
+    batch.cut_count = 0;
     for (std::size_t i = 0; i < some; i += width) look_up(field, some - i, i, batch);
     for (std::size_t i = 0; i < some; i += width) {
       if (HWY_LIKELY(batch.plain[i]))
@@ -137,6 +190,9 @@ void sample_corners_simd(const FieldView& field, const Affine& to_field, const P
       else
         sample_anew(field, to_field, points, step, first + i, at);
     }
+    for (std::size_t i = 0; i < batch.cut_count; i += width)
+      sample_cut(field, to_field, points, step, first, batch.cut_point + i,
+                 HWY_MIN(width, batch.cut_count - i), at);
   }
 }
 

@@ -296,38 +296,49 @@ HWY_INLINE FineAxis split_cell(VF fraction, VF factor) {
   return {hn::ConvertTo(DI(), low), hn::Sub(scaled, low)};
 }
 
-// Puts the finer samples of cells that have any in the place of the brick's: corners, fractions and
-// quantum. The slope per voxel needs no change, since finer samples have a finer quantum.
-HWY_INLINE void take_finer(const FieldView& field, VI row, hn::Mask<DI> refined, Axis& x, Axis& y,
-                           Axis& z, VI (&pair)[4], VF& quantum) {
-  const DF d;
+// Where the corners of a cell lie in the pool: the byte offset of the first, and the bytes to the
+// next row and to the next plane.
+struct Place {
+  VI first, line, plane;
+};
+
+// Finds the lanes of refined bricks whose cell is cut. Returns their codes, 0 in other lanes.
+HWY_INLINE VI codes_of(const FieldView& field, VI row, hn::Mask<DI> refined, const Axis& x,
+                       const Axis& y, const Axis& z) {
   const DI di;
   HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
   const VI cell = hn::Add(x.cell, hn::Add(hn::ShiftLeft<3>(y.cell), hn::ShiftLeft<6>(z.cell)));
-  const VI record = hn::IfThenElseZero(refined, hn::Mul(row, hn::Set(di, 2 * kCutStride)));
-  hn::Store(hn::Add(record, hn::IfThenElseZero(refined, hn::Add(hn::Set(di, 2 * kCutHead),
-                                                                hn::ShiftLeft<1>(cell)))),
-            di, at);
-  const VI code =
-      hn::IfThenElseZero(refined, hn::And(gather_at(field.cuts, at), hn::Set(di, 0xffff)));
+  const VI code = hn::Add(hn::Mul(row, hn::Set(di, 2 * kCutStride)),
+                          hn::Add(hn::Set(di, 2 * kCutHead), hn::ShiftLeft<1>(cell)));
+  hn::Store(hn::IfThenElseZero(refined, code), di, at);
+  return hn::IfThenElseZero(refined, hn::And(gather_at(field.cuts, at), hn::Set(di, 0xffff)));
+}
+
+// Puts the finer samples of cut cells in the place of the brick's: place, fractions and quantum.
+// The slope per voxel needs no change, since finer samples have a finer quantum.
+HWY_INLINE void take_finer(const FieldView& field, VI row, VI code, Axis& x, Axis& y, Axis& z,
+                           Place& place, VF& quantum) {
+  const DF d;
+  const DI di;
+  HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
   const auto cut = hn::Ne(code, hn::Zero(di));
-  if (hn::AllFalse(di, cut)) return;
-  hn::Store(record, di, at);
+  hn::Store(hn::IfThenElseZero(cut, hn::Mul(row, hn::Set(di, 2 * kCutStride))), di, at);
   const VI unit = hn::Add(gather_at(field.cuts, at), hn::ShiftRight<1>(code));
   const auto quarter = hn::Ne(hn::And(code, hn::Set(di, 1)), hn::Zero(di));
   const VF factor = hn::IfThenElse(hn::RebindMask(d, quarter), hn::Set(d, 4.0f), hn::Set(d, 2.0f));
-  const VI side = hn::IfThenElse(quarter, hn::Set(di, 5), hn::Set(di, 3));
   const FineAxis fx = split_cell(x.fraction, factor), fy = split_cell(y.fraction, factor),
                  fz = split_cell(z.fraction, factor);
-  const VI node = hn::Add(fx.low, hn::Mul(side, hn::Add(fy.low, hn::Mul(side, fz.low))));
-  const VI first = hn::Add(hn::Mul(unit, hn::Set(di, 2 * kFineUnit)), hn::ShiftLeft<1>(node));
-  const VI line = hn::ShiftLeft<1>(side), plane = hn::Mul(line, side);
-  const VI behind[4] = {hn::Zero(di), line, plane, hn::Add(line, plane)};
-  HWY_UNROLL(4)
-  for (int k = 0; k < 4; ++k) {
-    hn::Store(hn::IfThenElseZero(cut, hn::Add(first, behind[k])), di, at);
-    pair[k] = hn::IfThenElse(cut, gather_at(field.fine, at), pair[k]);
-  }
+  const VI line = hn::IfThenElse(quarter, hn::Set(di, 2 * 5), hn::Set(di, 2 * 3));
+  const VI plane = hn::IfThenElse(quarter, hn::Set(di, 2 * 25), hn::Set(di, 2 * 9));
+  const std::ptrdiff_t behind =
+      reinterpret_cast<const char*>(field.fine) - reinterpret_cast<const char*>(field.bricks);
+  const VI node =
+      hn::Add(hn::ShiftLeft<1>(fx.low), hn::Add(hn::Mul(line, fy.low), hn::Mul(plane, fz.low)));
+  const VI first = hn::Add(hn::Set(di, static_cast<std::int32_t>(behind)),
+                           hn::Add(hn::Mul(unit, hn::Set(di, 2 * kFineUnit)), node));
+  place.first = hn::IfThenElse(cut, first, place.first);
+  place.line = hn::IfThenElse(cut, line, place.line);
+  place.plane = hn::IfThenElse(cut, plane, place.plane);
   const auto cut_f = hn::RebindMask(d, cut);
   x.fraction = hn::IfThenElse(cut_f, fx.fraction, x.fraction);
   y.fraction = hn::IfThenElse(cut_f, fy.fraction, y.fraction);
@@ -336,6 +347,18 @@ HWY_INLINE void take_finer(const FieldView& field, VI row, hn::Mask<DI> refined,
                            hn::Mul(quantum, hn::IfThenElse(hn::RebindMask(d, quarter),
                                                            hn::Set(d, 0.25f), hn::Set(d, 0.5f))),
                            quantum);
+}
+
+// The two int16 at the corners of cells anywhere in the pool.
+HWY_INLINE void gather_places(const std::int16_t* pool, const Place& place, VI (&pair)[4]) {
+  const DI di;
+  HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
+  const VI behind[4] = {hn::Zero(di), place.line, place.plane, hn::Add(place.line, place.plane)};
+  HWY_UNROLL(4)
+  for (int k = 0; k < 4; ++k) {
+    hn::Store(hn::Add(place.first, behind[k]), di, at);
+    pair[k] = gather_at(pool, at);
+  }
 }
 
 // Interpolates pairs along x, then along y and z, at fractions of the cell.
@@ -367,10 +390,12 @@ HWY_INLINE void interpolate(const Corners& c, VF x, VF y, VF z, VF quantum, VF s
   }
 }
 
-// Value and gradient at points inside the grid.
-template <bool kGradient>
-HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& value, VF& gx,
-                              VF& gy, VF& gz) {
+// Value and gradient at points inside the grid. With kDefer, a few lanes with finer samples among
+// others are left out: their bits are set in the result, and their values are not those of the
+// field.
+template <bool kGradient, bool kDefer>
+HWY_INLINE hn::Mask<DI> sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& value,
+                                      VF& gx, VF& gy, VF& gz) {
   const DF d;
   const DI di;
   HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
@@ -383,15 +408,30 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
 
   const auto far = hn::Lt(entry, hn::Zero(di));
   const bool any_far = !hn::AllFalse(di, far);
+  auto left_out = hn::FirstN(di, 0);
   VI pair[4];
   VF quantum = hn::Set(d, kNearQuantum);
   VF slope = quantum;
   if (!hn::AllTrue(di, far)) {
     const VI row = hn::And(entry, hn::Set(di, ~kRefined));
-    hn::Store(hn::IfThenZeroElse(far, near_offset(row, cell.node)), di, at);
-    gather_pairs(field.bricks, at, kNearCorners, pair);
+    const VI first = hn::IfThenZeroElse(far, near_offset(row, cell.node));
     const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
-    if (!hn::AllFalse(di, refined)) take_finer(field, row, refined, x, y, z, pair, quantum);
+    VI code = hn::Zero(di);
+    if (!hn::AllFalse(di, refined)) {
+      code = codes_of(field, row, refined, x, y, z);
+      if (kDefer) {
+        const auto cut = hn::Ne(code, hn::Zero(di));
+        if (2 * hn::CountTrue(di, cut) < hn::Lanes(di)) left_out = cut, code = hn::Zero(di);
+      }
+    }
+    if (HWY_LIKELY(hn::AllTrue(di, hn::Eq(code, hn::Zero(di))))) {
+      hn::Store(first, di, at);
+      gather_pairs(field.bricks, at, kNearCorners, pair);
+    } else {
+      Place place{first, hn::Set(di, kNearCorners[1]), hn::Set(di, kNearCorners[2])};
+      take_finer(field, row, code, x, y, z, place, quantum);
+      gather_places(field.bricks, place, pair);
+    }
   } else {
     pair[0] = pair[1] = pair[2] = pair[3] = hn::Zero(di);
   }
@@ -415,6 +455,7 @@ HWY_INLINE void sample_inside(const FieldView& field, VF qx, VF qy, VF qz, VF& v
         far_bound(c.low, c.step, x.fraction, y.fraction, z.fraction, value, field.band);
     value = hn::IfThenElse(hn::RebindMask(d, far), bound, value);
   }
+  return left_out;
 }
 
 // One axis of the gradient outside the grid, where distance = sqrt(off^2 + value^2): off/distance
@@ -425,9 +466,10 @@ HWY_INLINE VF outside_slope(VF off, VF slope, VF value, VF inverse) {
 }
 
 // Distance and gradient of any points, as sample_field.h says. x, y, z in field coordinates.
-template <bool kGradient>
-HWY_INLINE void sample_points(const FieldView& field, VF x, VF y, VF z, VF& distance, VF& gx,
-                              VF& gy, VF& gz) {
+// Returns the lanes that sample_inside left out.
+template <bool kGradient, bool kDefer = false>
+HWY_INLINE hn::Mask<DI> sample_points(const FieldView& field, VF x, VF y, VF z, VF& distance,
+                                      VF& gx, VF& gy, VF& gz) {
   const DF d;
   const VF zero = hn::Zero(d);
   // 0 * v is 0 only for finite v.
@@ -442,7 +484,7 @@ HWY_INLINE void sample_points(const FieldView& field, VF x, VF y, VF z, VF& dist
   const VF qx = hn::Min(hn::Max(x, zero), last(0));
   const VF qy = hn::Min(hn::Max(y, zero), last(1));
   const VF qz = hn::Min(hn::Max(z, zero), last(2));
-  sample_inside<kGradient>(field, qx, qy, qz, distance, gx, gy, gz);
+  const auto left_out = sample_inside<kGradient, kDefer>(field, qx, qy, qz, distance, gx, gy, gz);
 
   const VF ox = hn::Sub(x, qx), oy = hn::Sub(y, qy), oz = hn::Sub(z, qz);
   const VF off2 = hn::MulAdd(ox, ox, hn::MulAdd(oy, oy, hn::Mul(oz, oz)));
@@ -467,6 +509,7 @@ HWY_INLINE void sample_points(const FieldView& field, VF x, VF y, VF z, VF& dist
       gz = hn::IfThenElseZero(finite, gz);
     }
   }
+  return left_out;
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

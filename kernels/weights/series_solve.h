@@ -29,7 +29,7 @@ using SeriesColumns = SeriesColumnsT<float>;
 
 struct SeriesParameters {
   double c;      // the dial, > 2
-  double lever;  // L, at least the largest |r|, > 0   [m]
+  double lever;  // L > 0 [m]; at least the largest |r|, or a lone contact far out yields more
   double tolerance = 1e-6;
   int iterations = 12;  // Newton steps at most
 };

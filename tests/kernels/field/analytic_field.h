@@ -86,7 +86,7 @@ class AnalyticField {
             far_nodes_.data(),
             layout_band(def_),
             cuts_.data(),
-            fine_.data()};
+            fine()};
   }
   double distance(const Point& p) const { return distance_(p); }
   double last(int axis) const { return 8.0 * def_.bricks[axis] - 1; }
@@ -142,18 +142,20 @@ class AnalyticField {
     return factor == 2 ? std::int32_t(halves_.size() / 27) : -std::int32_t(quarters_.size() / 125);
   }
 
+  const std::int16_t* fine() const { return bricks_.data() + fine_at_; }
+  std::int16_t* fine() { return bricks_.data() + fine_at_; }
   void lay_out() {
     const FieldLayoutSize size = field_layout_size(def_);
     table_.resize(index_.size());
-    bricks_.assign(size.bricks * kBrickStride, 0x7fff);
+    fine_at_ = size.bricks * kBrickStride;
+    bricks_.assign(fine_at_ + (size.fine_units + 1) * kFineUnit, 0x7fff);
     far_nodes_.assign(size.far_cells * 8, 0x7fff);
     layout_table(def_, table_.data());
     cuts_.assign(size.refined * kCutStride + 2, 0x7fff);
-    fine_.assign((size.fine_units + 1) * kFineUnit, 0x7fff);
     layout_cuts(def_, table_.data(), cuts_.data());
     for (std::size_t slot = 0; slot < index_.size(); ++slot) {
       layout_cell(def_, table_.data(), slot, bricks_.data(), far_nodes_.data());
-      layout_fine(def_, table_.data(), cuts_.data(), slot, fine_.data());
+      layout_fine(def_, table_.data(), cuts_.data(), slot, fine());
     }
   }
 
@@ -161,7 +163,8 @@ class AnalyticField {
   h6FieldDef def_;
   std::vector<std::int32_t> index_, table_, refined_, fine_index_;
   std::vector<float> samples_, far_, halves_, quarters_;
-  std::vector<std::int16_t> bricks_, far_nodes_, fine_;
+  std::vector<std::int16_t> bricks_, far_nodes_;
+  std::size_t fine_at_ = 0;
   std::vector<std::uint16_t> cuts_;
 };
 
