@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // frame.cpp - one frame, on one page.
 //
-//   samples -> [traverse -> contacts -> weights -> sums] -> wrench, K, D -> coupling -> step ->
-//   output
-//         each shell body against every field it can touch;            each hand     safety, always
-//         bodies side by side or one after the other
+//   samples -> near pairs -> [traverse -> contacts -> weights -> sums] -> wrench, K, D -> coupling
+//              by boxes      each shell body against the fields near it; side by side   each hand
+//   -> step -> output
+//              safety, always
 //
-// From contacts to step, all of this runs several times a frame where a body is fast near a field.
-// The frame and all that it calls never allocate, lock, print, throw or wait. Slices of work may
-// run on the team's helper and are joined in index order, so any number of threads gives the same
-// bits.
+// From near pairs to step, all of this runs several times a frame where a body is fast near a
+// field. The frame and all that it calls never allocate, lock, print, throw or wait. Slices of work
+// may run on the team's helper and are joined in index order, so any number of threads gives the
+// same bits.
 #include <algorithm>
 
 #include "kernels/contact/contact_columns.h"
@@ -61,7 +61,7 @@ void begin_step(h6Session& s, std::uint32_t step, bool cold) {
   if (step == 1) decide_no_more(s.anytime);
   begin_lanes(s.lanes, cold && step == 0, s.tick_length.ns());
   s.report.contacts = 0;
-  for (std::size_t i = 0; i < s.bodies.size(); ++i) {
+  for (const std::uint32_t i : s.near.all_lively()) {
     const Body& body = s.bodies[i];
     s.acting[i].set_zero();
     if (!body.fixed) s.acting[i].f.head<3>() = body.mass * s.settings.gravity;
@@ -75,6 +75,7 @@ void begin_step(h6Session& s, std::uint32_t step, bool cold) {
 // Reports the depths of points, so it runs before points are merged into clusters.
 void note_depths(std::span<const Body> bodies, const ShellBody& shell, h6FrameReport& report) {
   for (const Pair& pair : shell.pairs) {
+    if (pair.begin == pair.end) continue;
     const kernels::Depths depths =
         kernels::look_at_depths(shell.contacts.depth + pair.begin, pair.end - pair.begin);
     // Not all rows count: `series` also has points that are about to touch.
@@ -101,19 +102,24 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
   watch.timed(H6_STAGE_WEIGHTS, [&] { weigh_contacts(set, bodies, shell, lane); });
   // The time includes the contacts stage, because its columns come back from the helper's cache.
   lane.weighing.took(watch.ns_since(since));
-  if (uses_series(set.contact) && shell.frictions.empty()) return;
   watch.timed(H6_STAGE_WRENCH, [&] {
-    if (!uses_series(set.contact)) sum_contacts(set, bodies, shell, lane);
-    sum_friction(set, bodies, shell, lane);
+    sum_contacts(set, bodies, shell, lane);
+    if (set.contact.friction > 0) sum_friction(set, bodies, shell, lane);
   });
 }
 
-// Finds the wrench on every body at its present pose.
-void collide(h6Session& s, const Settings& set) {
-  run_lanes(s.lanes, set, s.bodies, s.shells, weigh_shell, s.report);
+// Finds the wrench on every body at its present pose. `first`: it is the first step of the frame.
+void collide(h6Session& s, const Settings& set, bool first) {
   Stopwatch watch{s.report, s.tick_length.ns(), sched::ticks()};
+  watch.timed(H6_STAGE_TRAVERSE, [&] {
+    find_near_pairs(s);
+    wake_pairs(s);
+    begin_traversal(s.anytime, s.near.all_awake(), s.near.near_count, first);
+  });
+  run_lanes(s.lanes, set, s.bodies, s.near.all_active(), weigh_shell, s.report);
+  watch.last = sched::ticks();
   watch.timed(H6_STAGE_WRENCH, [&] {
-    for (ShellBody& shell : s.shells) add_wrenches(set, s.bodies, shell, s.acting);
+    for (ShellBody* shell : s.near.all_active()) add_wrenches(set, s.bodies, *shell, s.acting);
   });
 }
 
@@ -186,7 +192,7 @@ h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* com
   MeanWrench felt(s.hands);
   for (std::uint32_t step = 0; step < s.substeps.count; ++step) {
     begin_step(s, step, start - s.left_at > kRest);
-    collide(s, set);
+    collide(s, set, step == 0);
     couple_and_step(s, set, step + 1 == s.substeps.count);
     felt.add();
   }

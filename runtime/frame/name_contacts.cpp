@@ -58,9 +58,6 @@ extern "C" void h6NameContacts(const h6Session* session, int32_t shell_body, int
   const h6Session& s = *session;
   const ShellBody* shell = find_shell(s, shell_body);
   if (!shell) return;
-  for (std::size_t p = 0; p < shell->pairs.size(); ++p) {
-    const Pair& pair = shell->pairs[p];
-    name_rows(shell->contacts, *s.bodies[pair.b].field, pair, shell->searches[p].arms, part,
-              triangle);
-  }
+  for (const Pair& pair : shell->pairs)
+    name_rows(shell->contacts, *s.bodies[pair.b].field, pair, pair.search.arms, part, triangle);
 }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // session.h - the state that changes from frame to frame, in storage that is sized once.
 #pragma once
+#include <atomic>
 #include <span>
 
 #include "hapsix/hapsix.h"
 #include "runtime/contact/anytime.h"
 #include "runtime/contact/pair.h"
 #include "runtime/contact/settings.h"
+#include "runtime/frame/near_pairs.h"
 #include "runtime/frame/shell_lanes.h"
 #include "runtime/frame/start_overlap.h"
 #include "runtime/frame/substeps.h"
@@ -16,16 +18,23 @@
 #include "sched/clock.h"
 #include "sched/frame_team.h"
 
+namespace h6 {
+enum class Owner { nobody, step, loop };  // who runs frames of a session
+}
+
 struct h6Session {
   const h6Model* model = nullptr;
+  std::atomic<h6::Owner> owner{h6::Owner::nobody};
   h6Allocator allocator{};
   h6::Settings settings;
 
   std::span<h6::Body> bodies;
-  std::span<h6::LinearWrench> acting;  // (bodies) the wrench on each in this frame
-  std::span<h6::Pair> pairs;           // the pairs of one shell body are neighbours
-  std::span<h6::ShellBody> shells;
-  std::span<h6::FrictionSpring> frictions;  // (pairs), or none without friction
+  std::span<h6::LinearWrench> acting;  // (bodies) the wrench on each that may move, in this frame
+  std::span<h6::ShellBody> shells;     // by body
+  h6::NearPairs near;
+  std::span<h6::BetweenBodies> between;     // (rows of near pairs), or none where one body moves
+  std::span<h6::BetweenFields> of_fields;   // (rows of near pairs), or none without `series`
+  std::span<h6::FrictionSpring> frictions;  // (rows of near pairs), or none without friction
   std::span<h6::Hand> hands;
   std::span<h6::HandDevice> devices;  // (hands)
   std::span<h6::Island> islands;
@@ -35,6 +44,8 @@ struct h6Session {
   h6::Lanes lanes;
   h6FrameReport report{};
   std::uint64_t frame = 0;
+  std::uint64_t still_hash = 0;  // of the bodies that never moved
+  bool still_hashed = false;
   h6::sched::TickLength tick_length;
   std::int64_t left_at = 0;  // when the last frame ended, by the clock [ns]
   h6::sched::FrameTeam* team = nullptr;
@@ -46,17 +57,18 @@ struct h6Session {
 
 namespace h6 {
 
+inline bool run_by_loop(const h6Session& s) { return s.owner.load() == Owner::loop; }
+
 // The shell body with this body's index, or null.
 inline ShellBody* find_shell(const h6Session& s, std::int32_t body) {
-  for (ShellBody& shell : s.shells)
-    if (shell.body == body) return &shell;
-  return nullptr;
+  const std::int32_t row = s.bodies[static_cast<std::size_t>(body)].meets;
+  return row >= 0 ? &s.shells[static_cast<std::size_t>(row)] : nullptr;
 }
 
 // Lets go of the friction springs of every pair with this body.
 void forget_friction(h6Session& s, std::int32_t body);
 
-std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples);
+std::uint64_t state_hash(h6Session& s, const h6DeviceSample* samples);
 h6Status frame(h6Session& s, const h6DeviceSample* samples, h6DeviceCommand* commands);
 
 }  // namespace h6

@@ -5,15 +5,19 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <bitset>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
+#include <vector>
 
 #include "runtime/settings/engine_settings.h"
 
 namespace h6 {
 
 bool check_contact(const h6ContactDef& def, h6Error* error) {
-  return check_settings(contact_settings(), &def, "contact ", error);
+  return check_reserved(def, "contact ", error) &&
+         check_settings(contact_settings(), &def, "contact ", error);
 }
 
 namespace {
@@ -43,8 +47,9 @@ bool check_inertia(const h6BodyDef& b, std::size_t i, h6Error* error) {
   const double least = std::sqrt(axes.eigenvalues()[0] / b.mass),
                most = std::sqrt(axes.eigenvalues()[2] / b.mass);
   return (least >= kLeastGyration && most <= kMost) ||
-         fail(error, "body %zu: its inertia means radii of gyration of %g to %g m, not %g to %g", i,
-              least, most, kLeastGyration, kMost);
+         fail(error, H6_ERROR_RANGE,
+              "body %zu: its inertia means radii of gyration of %g to %g m, not %g to %g", i, least,
+              most, kLeastGyration, kMost);
 }
 
 bool check_body(const h6Model& model, h6BodyDef b, std::size_t i, h6Error* error) {
@@ -52,9 +57,13 @@ bool check_body(const h6Model& model, h6BodyDef b, std::size_t i, h6Error* error
     b.mass = h6DefaultBodyDef().mass;
     for (double& v : b.inertia) v = 0;
   }
-  if (!check_settings(body_settings(), &b, Where("body", i).text, error)) return false;
+  const Where where("body", i);
+  if (!check_reserved(b, where.text, error) ||
+      !check_settings(body_settings(), &b, where.text, error))
+    return false;
   if (!usable(b.pose, b.velocity) || !within(b.com))
-    return fail(error, "body %zu: its place, com or velocity is not within %g m and m/s", i, kMost);
+    return fail(error, H6_ERROR_RANGE,
+                "body %zu: its place, com or velocity is not within %g m and m/s", i, kMost);
   if (b.shell < -1 || b.shell >= static_cast<std::int64_t>(model.shell_count))
     return fail(error, "body %zu: shell %d, but the model has %zu", i, b.shell, model.shell_count);
   if (b.field < -1 || b.field >= static_cast<std::int64_t>(model.field_count))
@@ -65,6 +74,7 @@ bool check_body(const h6Model& model, h6BodyDef b, std::size_t i, h6Error* error
 bool check_pair(const h6SessionDef& def, std::size_t i, h6Error* error) {
   const h6PairDef& p = def.pairs[i];
   const auto count = static_cast<std::int64_t>(def.body_count);
+  if (!check_reserved(p, Where("pair", i).text, error)) return false;
   if (p.shell_body < 0 || p.shell_body >= count || p.field_body < 0 || p.field_body >= count)
     return fail(error, "pair %zu names a body that does not exist", i);
   if (p.shell_body == p.field_body)
@@ -77,18 +87,25 @@ bool check_pair(const h6SessionDef& def, std::size_t i, h6Error* error) {
 }
 
 bool check_pairs(const h6SessionDef& def, h6Error* error) {
-  constexpr std::size_t most = H6_MAX_BODIES * (H6_MAX_BODIES - 1);
   if (def.pair_count && !def.pairs) return fail(error, "pairs are counted but not given");
+  // A pair is listed once, so more of them cannot be; nothing is read behind the last that can.
+  const std::size_t most = std::min<std::size_t>(UINT32_MAX, def.body_count * (def.body_count - 1));
   if (def.pair_count > most)
-    return fail(error, "%zu bodies have at most %zu pairs, not %zu", std::size_t{H6_MAX_BODIES},
-                most, def.pair_count);
-  std::bitset<H6_MAX_BODIES * H6_MAX_BODIES> seen;
-  for (std::size_t i = 0; i < def.pair_count; ++i) {
+    return fail(error, "%zu pairs are too many: %zu bodies have at most %zu pairs", def.pair_count,
+                def.body_count, most);
+  for (std::size_t i = 0; i < def.pair_count; ++i)
     if (!check_pair(def, i, error)) return false;
-    const h6PairDef& p = def.pairs[i];
-    const auto at = static_cast<std::size_t>(p.shell_body * H6_MAX_BODIES + p.field_body);
-    if (seen[at]) return fail(error, "pair %zu is listed before", i);
-    seen[at] = true;
+  std::vector<std::size_t> order(def.pair_count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto key = [&](std::size_t i) {
+    return std::tuple(def.pairs[i].shell_body, def.pairs[i].field_body, i);
+  };
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t l, std::size_t r) { return key(l) < key(r); });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const h6PairDef &p = def.pairs[order[i - 1]], &q = def.pairs[order[i]];
+    if (p.shell_body == q.shell_body && p.field_body == q.field_body)
+      return fail(error, "pair %zu is listed before", order[i]);
   }
   return true;
 }
@@ -96,7 +113,9 @@ bool check_pairs(const h6SessionDef& def, h6Error* error) {
 bool check_coupling(const h6HandDef& h, std::size_t i, h6Error* error) {
   h6CouplingDef c = h.coupling;
   if (c.max_force > 0) c.max_depth_voxels = 1;  // its value is not read then
-  if (!check_settings(coupling_settings(), &c, Where("hand", i, "coupling ").text, error))
+  const Where where("hand", i, "coupling ");
+  if (!check_reserved(c, where.text, error) ||
+      !check_settings(coupling_settings(), &c, where.text, error))
     return false;
   if (c.mode != H6_COUPLING_DYNAMIC && h.mode != H6_IMPEDANCE)
     return fail(
@@ -127,23 +146,30 @@ bool check_hand(const h6SessionDef& def, std::size_t i, h6Error* error) {
     return fail(error, "hand %zu: body %d does not exist", i, h.body);
   if (def.bodies[h.body].fixed)
     return fail(error, "hand %zu holds body %d, which is fixed", i, h.body);
-  if (!check_settings(hand_settings(), &h, Where("hand", i).text, error)) return false;
   const h6SafetyDef& s = h.safety;
+  const Where where("hand", i);
+  if (!check_reserved(h, where.text, error) || !check_reserved(h.filter, where.text, error) ||
+      !check_reserved(s, where.text, error) ||
+      !check_settings(hand_settings(), &h, where.text, error))
+    return false;
   if (s.derate_speed > 0 && s.cut_speed > 0 && s.derate_speed > s.cut_speed)
-    return fail(error, "hand %zu: safety derate_speed, %g m/s, is above cut_speed, %g", i,
-                s.derate_speed, s.cut_speed);
+    return fail(error, H6_ERROR_RANGE,
+                "hand %zu: safety derate_speed, %g m/s, is above cut_speed, %g", i, s.derate_speed,
+                s.cut_speed);
   return check_coupling(h, i, error) && check_other_hands(def, i, error);
 }
 
 }  // namespace
 
 bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error) {
-  if (def.body_count == 0 || !def.bodies || def.body_count > H6_MAX_BODIES)
-    return fail(error, "a session needs 1 to %d bodies, it has %zu", H6_MAX_BODIES, def.body_count);
+  if (def.body_count == 0 || !def.bodies || def.body_count > INT32_MAX)
+    return fail(error, "a session needs 1 to %d bodies, it has %zu", INT32_MAX, def.body_count);
   if (def.hand_count > H6_MAX_HANDS || (def.hand_count && !def.hands))
     return fail(error, "a session has at most %d hands", H6_MAX_HANDS);
-  if (!within(def.gravity, 1e4)) return fail(error, "gravity is not within 1e4 m/s^2");
-  if (!check_settings(session_settings(), &def, "", error) || !check_contact(def.contact, error))
+  if (!within(def.gravity, 1e4))
+    return fail(error, H6_ERROR_RANGE, "gravity is not within 1e4 m/s^2");
+  if (!check_reserved(def, "", error) || !check_settings(session_settings(), &def, "", error) ||
+      !check_contact(def.contact, error))
     return false;
   for (std::size_t i = 0; i < def.body_count; ++i)
     if (!check_body(model, def.bodies[i], i, error)) return false;

@@ -17,6 +17,7 @@ namespace {
 
 // The points of one pair that are inside, in the order of rows.
 struct Measured {
+  Pair* pair;
   const Body &a, &b;
   std::vector<h6OverlapPoint> points;
   std::vector<std::uint32_t> rows;
@@ -45,10 +46,12 @@ h6OverlapPoint point_at(const Body& a, const Pair& pair, const Field& field,
 
 // One traversal that finds all points with a distance below zero. What the search remembered is
 // forgotten afterwards, so a frame does the same work as if there had been none.
-Measured measure_pair(h6Session& s, const Settings& set, const Pair& pair, PairSearch& search) {
-  Measured found{s.bodies[pair.a], s.bodies[pair.b], {}, {}, {}};
+Measured measure_pair(h6Session& s, const Settings& set, Pair& pair) {
+  Measured found{&pair, s.bodies[pair.a], s.bodies[pair.b], {}, {}, {}};
+  PairSearch& search = pair.search;
   const PairSearch before = search;
   search.travelled = -1;
+  search.number = 0;
   search.cull_blocks = search.cull_groups = search.pick_rows = {};
   search.fit = {};
   TraverseScratch& t = s.lanes.scratch[0].traverse;
@@ -63,31 +66,27 @@ Measured measure_pair(h6Session& s, const Settings& set, const Pair& pair, PairS
   }
   search = before;
   search.travelled = -1;
+  search.quiet.way = 0;
   return found;
 }
 
-bool offset_fits(const Field& field, const h6ContactDef& contact, std::int32_t body,
-                 h6Error* error) {
-  const double offset = contact.fit_offset / field.voxel;
-  return offset <= H6_DEEPEST_FIT ||
-         fail(error, "contact fit_offset is %g mm, which is %.1f voxels of body %d: at most %g",
-              1e3 * contact.fit_offset, offset, body, H6_DEEPEST_FIT);
-}
-
-bool measure(h6Session& s, std::vector<Measured>& all, h6Error* error) {
+std::vector<Measured> measure(h6Session& s) {
   const sched::FlushDenormals flush;
   Settings set = s.settings;
   set.contact.method = H6_METHOD_NONE;  // without a margin
   set.contact.fit_offset = 0;
   s.anytime.by_clock = false;
   s.anytime.coarse_pairs = 0;
-  for (ShellBody& shell : s.shells)
-    for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-      const std::int32_t b = shell.pairs[p].b;
-      if (!offset_fits(*s.bodies[b].field, s.settings.contact, b, error)) return false;
-      all.push_back(measure_pair(s, set, shell.pairs[p], shell.searches[p]));
-    }
-  return true;
+  find_near_pairs(s);
+  begin_traversal(s.anytime, {}, s.near.near_count, true);
+  std::vector<Measured> all;
+  for (const NearPairs::Near& near : s.near.all_near()) {
+    Pair& pair = s.near.pairs[near.slot];
+    if (!overlap(s.near.places[pair.a].shell, s.near.places[pair.b].field)) continue;
+    Measured found = measure_pair(s, set, pair);
+    if (!found.points.empty()) all.push_back(std::move(found));
+  }
+  return all;
 }
 
 // Called twice, like the layout of a session.
@@ -104,7 +103,7 @@ h6Overlap sum_up(const Measured& found, std::size_t first) {
   const auto at = static_cast<std::size_t>(deepest - found.depths.begin());
   const h6OverlapPoint& p = found.points[at];
   return {p.shell_body, p.field_body,   static_cast<std::uint32_t>(found.points.size()), 0,
-          p.depth,      p.depth_voxels, static_cast<std::uint32_t>(first + at)};
+          p.depth,      p.depth_voxels, static_cast<std::uint32_t>(first + at),          {}};
 }
 
 // The relief with which a point's first distance, offset included, is zero to the bit. Where the
@@ -125,27 +124,22 @@ void set_relief(PairFit& fit, const Measured& found, const h6ContactDef& set, st
 
 void store(h6Session& s, const std::vector<Measured>& all, std::uint32_t* rows, float* relief) {
   StartOverlap& to = s.overlap;
-  std::size_t pair = 0, row = 0, next = 0;
-  for (ShellBody& shell : s.shells)
-    for (PairSearch& search : shell.searches) {
-      const Measured& found = all[next++];
-      search.fit = {};
-      if (found.points.empty()) continue;
-      to.pairs[pair++] = sum_up(found, row);
-      std::copy(found.points.begin(), found.points.end(), to.points + row);
-      std::copy(found.rows.begin(), found.rows.end(), to.rows + row);
-      if (s.settings.contact.fit == H6_FIT_RELIEVE)
-        set_relief(search.fit, found, s.settings.contact, rows + row, relief + row);
-      row += found.points.size();
-    }
+  std::size_t pair = 0, row = 0;
+  for (const NearPairs::Near& near : s.near.all_near()) s.near.pairs[near.slot].search.fit = {};
+  for (const Measured& found : all) {
+    to.pairs[pair++] = sum_up(found, row);
+    std::copy(found.points.begin(), found.points.end(), to.points + row);
+    std::copy(found.rows.begin(), found.rows.end(), to.rows + row);
+    if (s.settings.contact.fit == H6_FIT_RELIEVE)
+      set_relief(found.pair->search.fit, found, s.settings.contact, rows + row, relief + row);
+    row += found.points.size();
+  }
 }
 
-// The search of the pair that overlap `i` is of.
-const PairSearch& search_of(const h6Session& s, const h6Overlap& o) {
-  const ShellBody& shell = *find_shell(s, o.shell_body);
-  std::size_t p = 0;
-  while (shell.pairs[p].b != o.field_body) ++p;
-  return shell.searches[p];
+// The relief that is left in an overlap. A pair that is no longer near has none.
+PairFit fit_of(const h6Session& s, const h6Overlap& o) {
+  const Pair* pair = find_near_pair(s, o.shell_body, o.field_body);
+  return pair ? pair->search.fit : PairFit{};
 }
 
 // Keeps the rows of `fit` that `had` has too, with the relief that they have there.
@@ -163,13 +157,10 @@ void keep_common(PairFit& fit, const PairFit& had) {
 }  // namespace
 
 bool measure_overlap(h6Session& s, h6Error* error) {
-  std::vector<Measured> all;
-  if (!measure(s, all, error)) return false;
+  const std::vector<Measured> all = measure(s);
   StartOverlap next;
-  for (const Measured& found : all) {
-    next.pair_count += !found.points.empty();
-    next.point_count += found.points.size();
-  }
+  next.pair_count = all.size();
+  for (const Measured& found : all) next.point_count += found.points.size();
   std::uint32_t* rows = nullptr;
   float* relief = nullptr;
   if (next.point_count > 0) {
@@ -178,7 +169,8 @@ bool measure_overlap(h6Session& s, h6Error* error) {
     next.memory_bytes = count.used();
     next.memory = allocate(s.allocator, next.memory_bytes);
     if (!next.memory)
-      return fail(error, "no memory for the overlap at the start (%zu points)", next.point_count);
+      return fail(error, H6_ERROR_MEMORY, "no memory for the overlap at the start (%zu points)",
+                  next.point_count);
     Arena arena(next.memory, next.memory_bytes);
     lay_out_overlap(next, relief, rows, arena);
   }
@@ -189,9 +181,10 @@ bool measure_overlap(h6Session& s, h6Error* error) {
 }
 
 void forget_relief(h6Session& s, std::int32_t body) {
-  for (ShellBody& shell : s.shells)
-    for (std::size_t p = 0; p < shell.pairs.size(); ++p)
-      if (shell.body == body || shell.pairs[p].b == body) shell.searches[p].fit = {};
+  for (const NearPairs::Near& near : s.near.all_near()) {
+    Pair& pair = s.near.pairs[near.slot];
+    if (pair.a == body || pair.b == body) pair.search.fit = {};
+  }
 }
 
 void forget_overlap(h6Session& s) {
@@ -200,14 +193,11 @@ void forget_overlap(h6Session& s) {
 }
 
 void take_over_relief(h6Session& next, const h6Session& before) {
-  for (ShellBody& shell : next.shells)
-    for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-      PairFit had;
-      if (const ShellBody* old = find_shell(before, shell.body))
-        for (std::size_t q = 0; q < old->pairs.size(); ++q)
-          if (old->pairs[q].b == shell.pairs[p].b) had = old->searches[q].fit;
-      keep_common(shell.searches[p].fit, had);
-    }
+  for (const NearPairs::Near& near : next.near.all_near()) {
+    Pair& pair = next.near.pairs[near.slot];
+    const Pair* had = find_near_pair(before, pair.a, pair.b);
+    keep_common(pair.search.fit, had ? had->search.fit : PairFit{});
+  }
 }
 
 }  // namespace h6
@@ -222,7 +212,7 @@ size_t h6GetOverlaps(const h6Session* session, h6Overlap* out, size_t capacity) 
   if (!out) capacity = 0;
   for (std::size_t i = 0; i < std::min(capacity, all.pair_count); ++i) {
     out[i] = all.pairs[i];
-    out[i].relieved = static_cast<std::uint32_t>(search_of(*session, out[i]).fit.count);
+    out[i].relieved = static_cast<std::uint32_t>(fit_of(*session, out[i]).count);
   }
   return all.pair_count;
 }
@@ -236,7 +226,7 @@ size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, size_t 
   std::copy_n(all.points, count, out);
   std::size_t row = 0;
   for (std::size_t i = 0; i < all.pair_count; ++i) {
-    const PairFit& fit = search_of(s, all.pairs[i]).fit;
+    const PairFit fit = fit_of(s, all.pairs[i]);
     const double voxel = s.bodies[all.pairs[i].field_body].field->voxel;
     const std::size_t end = row + all.pairs[i].points;
     for (std::size_t at = 0; row < end; ++row) {
@@ -250,10 +240,11 @@ size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, size_t 
 
 bool h6RestartFit(h6Session* session, h6Error* error) {
   if (!session) return fail(error, "no session was given");
+  if (run_by_loop(*session)) return fail(error, H6_ERROR_BUSY, "a loop runs this session");
   try {
     return measure_overlap(*session, error);
   } catch (const std::exception& e) {
-    return fail(error, "the overlap could not be measured: %s", e.what());
+    return fail(error, H6_ERROR_MEMORY, "the overlap could not be measured: %s", e.what());
   }
 }
 

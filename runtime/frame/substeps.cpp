@@ -59,21 +59,57 @@ double allowed(h6Session& s, const Pair& pair, double way) {
   return std::min(way, std::max(clear, longest));
 }
 
+// Notes how far the points of each body may move in `dt` seconds. `share`: of the ways of the hands
+// of held bodies. `gains`: free bodies gain as much speed as in the last frame.
+void note_reach(h6Session& s, double dt, double share, bool gains) {
+  for (const std::uint32_t i : s.near.all_lively()) {
+    const Body& body = s.bodies[i];
+    BodyPlace& place = s.near.places[i];
+    place.reach = 0;
+    if (!is_free(body)) continue;
+    place.reach = dt * (body.v.norm() + body.w.norm() * place.radius);
+    if (gains) place.reach += dt * (body.gained_v.norm() + body.gained_w.norm() * place.radius);
+  }
+  for (const Hand& hand : s.hands) {
+    const Body& body = s.bodies[hand.body];
+    if (body.motion != Motion::held || !hand.seen) continue;
+    BodyPlace& place = s.near.places[hand.body];
+    const Way way = way_of(hand, body);
+    place.reach += share * (way.shift + way.turn * place.radius);
+  }
+}
+
+void forget_reach(h6Session& s) {
+  for (const std::uint32_t i : s.near.all_lively()) s.near.places[i].reach = 0;
+}
+
+// Whether points of the pair can reach its field at all within the noted ways.
+bool within_reach(const h6Session& s, const Pair& pair) {
+  const BodyPlace &a = s.near.places[pair.a], &b = s.near.places[pair.b];
+  return overlap(grown(a.shell, a.reach + b.reach), b.field);
+}
+
 }  // namespace
 
 Substeps plan_substeps(h6Session& s) {
   if (s.settings.max_substeps == 1) return {};
+  note_reach(s, s.settings.dt, 1, true);
+  find_near_pairs(s);
   double needed = 1;
-  for (const Pair& pair : s.pairs) {
+  for (const NearPairs::Near& near : s.near.all_near()) {
+    const Pair& pair = s.near.pairs[near.slot];
     const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
     const double dt = s.settings.dt;
     const double way =
         (free_motion(a, b, dt) + dt * (gain(a, a) + gain(b, a)) + held_motion(s, pair)) /
         b.field->voxel;
     const double longest = longest_step(*b.field);
-    if (way > needed * longest && allowed(s, pair, way) < way) needed = std::ceil(way / longest);
+    if (way > needed * longest && within_reach(s, pair) && allowed(s, pair, way) < way)
+      needed = std::ceil(way / longest);
   }
-  for (Body& body : s.bodies) body.gained_v.setZero(), body.gained_w.setZero();
+  forget_reach(s);
+  for (const std::uint32_t i : s.near.all_lively())
+    s.bodies[i].gained_v.setZero(), s.bodies[i].gained_w.setZero();
   const double most = s.settings.max_substeps;
   return {static_cast<std::uint32_t>(std::min(needed, most)), needed};
 }
@@ -84,18 +120,24 @@ double share_of_way(const Substeps& plan, bool held, std::uint32_t i) {
 
 bool slow_down(h6Session& s, double dt) {
   if (s.settings.max_substeps == 1) return false;
+  note_reach(s, dt, 1 / s.substeps.needed, false);
+  find_near_pairs(s);
   double share = 1;
-  for (const Pair& pair : s.pairs) {
+  for (const NearPairs::Near& near : s.near.all_near()) {
+    const Pair& pair = s.near.pairs[near.slot];
     const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
     const double held = held_motion(s, pair) / s.substeps.needed;
     const double moved = free_motion(a, b, dt) / b.field->voxel;
     const double way = moved + held / b.field->voxel;
-    if (way > longest_step(*b.field) && moved > 0)
+    if (way > longest_step(*b.field) && moved > 0 && within_reach(s, pair))
       share = std::min(share, std::max(0.0, 1 - (way - allowed(s, pair, way)) / moved));
   }
+  forget_reach(s);
   if (!(share < 1)) return false;
-  for (Body& body : s.bodies)
+  for (const std::uint32_t i : s.near.all_lively()) {
+    Body& body = s.bodies[i];
     if (is_free(body)) body.v *= share, body.w *= share;
+  }
   return true;
 }
 

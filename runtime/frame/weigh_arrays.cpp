@@ -195,7 +195,7 @@ int h6WeighContacts(const h6ContactDef* given, const h6ContactArrays* contacts, 
   if (!check_arrays(contact, in, voxel, lever, error)) return -1;
   const std::size_t bytes = bytes_of(in.count);
   const Block block(in, bytes);
-  if (!block) return fail(error, "no memory for %zu contacts", in.count), -1;
+  if (!block) return fail(error, H6_ERROR_MEMORY, "no memory for %zu contacts", in.count), -1;
   Work work;
   Arena arena(block.aligned(), bytes - kAlignment);
   lay_out(work, arena, in.count);

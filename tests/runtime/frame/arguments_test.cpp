@@ -13,6 +13,7 @@
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"
 #include "tests/support/one_part.h"
+#include "tests/support/reports.h"
 
 using namespace h6::test;
 
@@ -56,7 +57,7 @@ TEST_CASE("a session that is NULL gives defaults") {
   CHECK(h6GetCoupling(nullptr, 0).stiffness == 0);
   CHECK(h6GetVoxel(nullptr, 0) == 0);
   CHECK(h6GetSafetyInput(nullptr, 0).asked == 0);
-  CHECK(all_zero(h6GetSafety(nullptr, 0)));
+  CHECK(all_zero(h6::test::safety_of(nullptr, 0)));
   CHECK(h6GetOverlaps(nullptr, nullptr, 5) == 0);
   CHECK(h6GetOverlapPoints(nullptr, nullptr, 5) == 0);
   CHECK_FALSE(h6RestartFit(nullptr, nullptr));
@@ -83,7 +84,7 @@ TEST_CASE("a loop that is NULL gives defaults") {
   CHECK_FALSE(h6ReadView(nullptr, &view));
   CHECK(h6ChangeSession(nullptr, nullptr, nullptr) == nullptr);
   CHECK_FALSE(h6LoopRunning(nullptr));
-  CHECK(h6JoinLoop(nullptr).frames == 0);
+  CHECK(h6::test::joined(nullptr).frames == 0);
   h6SetPace(nullptr, 1);
   h6RequestStop(nullptr), h6ArmLoop(nullptr), h6DisarmLoop(nullptr), h6HaltLoop(nullptr);
   h6DestroyLoop(nullptr);
@@ -104,7 +105,7 @@ TEST_CASE("an index that does not exist gives defaults, and the next frame is as
     for (const std::int32_t i : {-1, 1, 2, 256, INT32_MAX, INT32_MIN}) {  // hands: only 0 exists
       CHECK(h6GetCoupling(s, i).stiffness == 0);
       CHECK(h6GetSafetyInput(s, i).asked == 0);
-      CHECK(all_zero(h6GetSafety(s, i)));
+      CHECK(all_zero(h6::test::safety_of(s, i)));
       h6SetRating(s, i, &rating), h6SetSafetyInput(s, i, &input), h6LoseDevice(s, i);
       if (i == 1) continue;  // a body
       CHECK(h6GetBody(s, i).pose.q.w == 1);
@@ -157,15 +158,31 @@ TEST_CASE("counts that no memory can hold are refused at once") {
 
 TEST_CASE("pairs beyond all that can exist, and one that is listed twice, are refused") {
   OnePart scene = box_on_floor();
-  std::vector<h6PairDef> pairs(2, h6PairDef{1, 0});
+  std::vector<h6PairDef> pairs(2, h6PairDef{1, 0, {}});
   scene.def.pairs = pairs.data(), scene.def.pair_count = 1;
   CHECK(refusal(scene) == "");
   scene.def.pair_count = 2;
   CHECK(refusal(scene) == "pair 1 is listed before");
   scene.def.pair_count = 10000000;  // nothing behind the second is read
-  CHECK(refusal(scene).find("at most 65280 pairs") != std::string::npos);
+  CHECK(refusal(scene).find("2 bodies have at most 2 pairs") != std::string::npos);
   scene.def.pairs = nullptr;
   CHECK(refusal(scene) != "");
+}
+
+TEST_CASE("a million contacts may be asked for and change nothing, one more is refused") {
+  OnePart scene = box_on_floor(), plain = box_on_floor();
+  scene.bodies[1].pose = plain.bodies[1].pose = pose(0, 0, 5 * mm);
+  scene.def.max_contacts = 1000001;
+  CHECK(refusal(scene).find("max_contacts") != std::string::npos);
+  scene.def.max_contacts = 1000000;
+  scene.open(), plain.open();
+  for (int frame = 0; frame < 20; ++frame) {
+    const h6DeviceSample sample = hand_at(pose(0, 0, 4.5 * mm));
+    h6DeviceCommand command{}, expected{};
+    h6Step(scene.session, &sample, &command);
+    h6Step(plain.session, &sample, &expected);
+    CHECK(std::memcmp(&command, &expected, sizeof command) == 0);
+  }
 }
 
 TEST_CASE("masses, inertias, scales, places and gravity out of range are refused by name") {

@@ -26,7 +26,7 @@
 #include <utility>
 #include <vector>
 
-#include "hapsix/hapsix.h"
+#include "hapsix/batch.h"
 #include "tests/support/ball_in_bowl.h"
 #include "tests/support/forced_target.h"
 #include "tests/support/sanitized.h"
@@ -205,6 +205,34 @@ TEST_CASE("a thousand frames allocate nothing and take no lock, on one thread an
         check_quiet(scene, 40, 100);
       }
   }
+}
+
+TEST_CASE("stepping many sessions in one call allocates nothing and takes no lock") {
+  BallInBowl scene(1, 6000);
+  std::vector<h6Session*> sessions;
+  for (int i = 0; i < 16; ++i)
+    sessions.push_back(h6CreateSession(scene.model.handle, &scene.def, nullptr));
+  for (const unsigned threads : {1u, 2u}) {
+    h6WorkersDef def = h6DefaultWorkersDef();
+    def.threads = threads;
+    h6Workers* workers = h6CreateWorkers(&def, nullptr);
+    std::vector<h6Pose> where(sessions.size());
+    std::vector<h6Wrench> felt(sessions.size());
+    h6StepArrays arrays = h6DefaultStepArrays();
+    arrays.sessions = sessions.data(), arrays.count = sessions.size();
+    arrays.pose = where.data(), arrays.command = felt.data();
+    for (int i = 0; i < 60; ++i) {
+      for (h6Pose& p : where) p = scene.sample(i).pose;
+      watching_all = true;  // the workers too
+      h6StepMany(workers, &arrays);
+      watching_all = false;
+    }
+    CHECK(h6GetFrame(sessions[0]).contacts > 50);
+    CHECK(allocations.exchange(0) == 0);
+    CHECK(locks.exchange(0) == 0);
+    h6DestroyWorkers(workers);
+  }
+  for (h6Session* session : sessions) h6DestroySession(session);
 }
 
 namespace {

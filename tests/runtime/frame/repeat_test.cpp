@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/support/box_on_floor.h"
+#include "tests/support/reports.h"
 
 using namespace h6::test;
 
@@ -52,7 +53,7 @@ struct Run {
   h6LoopReport report{};
 };
 
-// `act(loop, frames so far)` is called now and then, on this thread.
+// `act(loop, frames so far)` is called now and then, on this thread. 0 seconds: it ends the run.
 Run run(BoxOnFloor& box, const h6Device& device, double seconds,
         const std::function<void(h6Loop*, std::size_t)>& act = {}) {
   h6LoopDef def = h6DefaultLoopDef();
@@ -68,7 +69,7 @@ Run run(BoxOnFloor& box, const h6Device& device, double seconds,
     if (act) act(loop, run.rows.size());
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  run.report = h6JoinLoop(loop);
+  h6JoinLoop(loop, &run.report);
   h6DestroyLoop(loop);
   REQUIRE(run.report.ring_overruns == 0);
   return run;
@@ -89,7 +90,7 @@ std::size_t parts_at(
     h6DeviceCommand command{};
     h6Step(box.session, row.hand, &command);
     if (h6GetFrame(box.session).state_hash != row.report.state_hash ||
-        h6GetSafety(box.session, 0).state != row.state[0])
+        h6::test::safety_of(box.session, 0).state != row.state[0])
       return i;
     // After a stop or a trip of the watchdog the loop does not send the computed command.
     const std::uint32_t outside = 1u << H6_CAUSE_STOPPED | 1u << H6_CAUSE_WATCHDOG;
@@ -185,8 +186,10 @@ TEST_CASE("a replay changes settings before the same frame as the run") {
     def.contact.stiffness = k;
     return h6CreateSession(box.model.handle, &def, nullptr);
   };
-  const Run first = run(box, device, 0.5, [&](h6Loop* loop, std::size_t frames) {
-    if (changed >= stiffness.size() || frames < 100 * (changed + 1)) return;
+  // Frames are counted, and the run has no end of its own: this thread may be starved.
+  const Run first = run(box, device, 0, [&](h6Loop* loop, std::size_t frames) {
+    if (frames < 100 * (changed + 1)) return;
+    if (changed == stiffness.size()) return h6RequestStop(loop);
     h6Session* next = softer(stiffness[changed++]);
     h6Session* before = h6ChangeSession(loop, next, nullptr);
     REQUIRE(before == box.session);
