@@ -78,10 +78,6 @@ double budget_ns(const Anytime& a) { return a.budget_ns / a.steps; }
 
 double elapsed_ns(const Anytime& a) { return static_cast<double>(a.clock() - a.start); }
 
-std::size_t number_of(const Anytime& a, const PairSearch& pair) {
-  return static_cast<std::size_t>(&pair - a.pairs.data());
-}
-
 // The work so far, and the work that remains in this pair and in all later ones if these are as in
 // the last frame.
 struct Ahead {
@@ -92,9 +88,10 @@ struct Ahead {
 Ahead look_ahead(const Anytime& a, const PairSearch& pair, std::size_t used, std::size_t blocks,
                  double groups) {
   Ahead ahead{elapsed_ns(a), static_cast<double>(used), static_cast<double>(blocks), groups};
-  for (const PairSearch& next : a.pairs.subspan(number_of(a, pair) + 1)) {
-    ahead.blocks += static_cast<double>(next.open_blocks);
-    ahead.groups += static_cast<double>(next.open_groups);
+  for (const Pair& next : a.pairs) {
+    if (next.search.number <= pair.number) continue;
+    ahead.blocks += static_cast<double>(next.search.open_blocks);
+    ahead.groups += static_cast<double>(next.search.open_groups);
   }
   return ahead;
 }
@@ -126,12 +123,12 @@ int choose(Anytime& a, const Ahead& ahead) {
 void become_coarse(Anytime& a, std::size_t pair, int tier) {
   a.coarse = true;
   a.tier = tier;
-  a.coarse_pairs = static_cast<std::uint32_t>(a.pairs.size() - pair);
+  a.coarse_pairs = static_cast<std::uint32_t>(a.near - pair);
 }
 
 bool decide(Anytime& a, const Ahead& ahead, const PairSearch& pair) {
   const int tier = choose(a, ahead);
-  if (tier < Anytime::kAll) become_coarse(a, number_of(a, pair), tier);
+  if (tier < Anytime::kAll) become_coarse(a, pair.number, tier);
   return a.coarse;
 }
 
@@ -162,16 +159,23 @@ void begin_anytime(Anytime& a, std::int64_t start, std::uint32_t steps) {
   a.fitting = Anytime::kAll;
   a.by_clock = a.forced == Anytime::kByClock && a.budget_ns > 0 && !a.no_clock;
   if (a.forced == Anytime::kByClock) return;
-  a.coarse_pairs = static_cast<std::uint32_t>(std::min<std::size_t>(a.forced, a.pairs.size()));
+  a.coarse_pairs = a.forced;
   a.tier = std::bit_width(std::max(a.forced_points, 1u)) - 1;
   a.few = a.coarse_pairs > 0 && a.forced_points == 0;
   a.forced = Anytime::kByClock;
 }
 
+void begin_traversal(Anytime& a, PairList pairs, std::size_t near, bool first) {
+  a.pairs = pairs;
+  a.near = near;
+  if (first)
+    a.coarse_pairs = static_cast<std::uint32_t>(std::min<std::size_t>(a.coarse_pairs, near));
+}
+
 void decide_no_more(Anytime& a) { a.by_clock = false; }
 
 bool is_coarse_anyway(Anytime& a, const PairSearch& pair, std::size_t used, std::size_t blocks) {
-  if (!a.by_clock) return number_of(a, pair) + a.coarse_pairs >= a.pairs.size();
+  if (!a.by_clock) return pair.number + a.coarse_pairs >= a.near;
   if (a.coarse) return true;
   const double n = static_cast<double>(blocks), look = 16 * n * kLookNs;
   const double each = pair.open_blocks == 0 ? 16
@@ -197,8 +201,7 @@ bool must_be_coarser(Anytime& a, const PairSearch& pair, std::size_t used, std::
                      std::size_t blocks) {
   const int tier = a.coarse ? a.tier : Anytime::kAll;
   // All coarse pairs of a frame have the same tier, so only the first of them may change it.
-  if (!a.by_clock || tier == 0 ||
-      (a.coarse && number_of(a, pair) + a.coarse_pairs != a.pairs.size()))
+  if (!a.by_clock || tier == 0 || (a.coarse && pair.number + a.coarse_pairs != a.near))
     return false;
   const double most = latest_ns(a), n = static_cast<double>(used + found);
   const double elapsed = elapsed_ns(a);
@@ -212,15 +215,14 @@ bool must_be_coarser(Anytime& a, const PairSearch& pair, std::size_t used, std::
     ahead = elapsed + (1 << coarser) * static_cast<double>(blocks) * a.group_ns +
             left * contact_ns(a, left) + a.rest_ns;
   } while (coarser > 0 && ahead > most);
-  become_coarse(a, number_of(a, pair), coarser);
+  become_coarse(a, pair.number, coarser);
   return true;
 }
 
 bool must_be_few(Anytime& a, const PairSearch& first, std::size_t found) {
   if (!a.by_clock || a.few) return a.few;
   // The coarse pairs of earlier shell bodies have their contacts already.
-  if (!a.coarse || a.tier > 0 || a.coarse_pairs + number_of(a, first) > a.pairs.size())
-    return false;
+  if (!a.coarse || a.tier > 0 || a.coarse_pairs + first.number > a.near) return false;
   // The cost of so many contacts must be measured now and then, or frames would keep few for ever.
   // The first frame reads everything from memory, so its time tells nothing.
   const double n = static_cast<double>(found);
@@ -231,10 +233,10 @@ bool must_be_few(Anytime& a, const PairSearch& first, std::size_t found) {
   return true;
 }
 
-std::size_t coarse_pairs_of(const Anytime& a, std::span<const PairSearch> pairs) {
-  const std::size_t first = a.pairs.size() - std::min<std::size_t>(a.coarse_pairs, a.pairs.size());
-  const std::size_t end = number_of(a, pairs[0]) + pairs.size();
-  return end > first ? std::min(end - first, pairs.size()) : 0;
+std::size_t coarse_pairs_of(const Anytime& a, PairList pairs) {
+  std::size_t count = 0;
+  for (const Pair& pair : pairs) count += pair.search.number + a.coarse_pairs >= a.near;
+  return count;
 }
 
 void learn_sampling(Anytime& a, std::size_t groups, std::size_t near, std::size_t found,
@@ -252,7 +254,7 @@ void learn_frame(Anytime& a, const h6FrameReport& report) {
   const double* us = report.stage_us;
   learn(a.rest_ns, 1e3 * (us[H6_STAGE_COUPLING] + us[H6_STAGE_INTEGRATE] + us[H6_STAGE_OUTPUT]));
   std::size_t contacts = 0;
-  for (const PairSearch& pair : a.pairs) contacts += pair.candidates;
+  for (const Pair& pair : a.pairs) contacts += pair.search.candidates;
   if (!a.few)
     learn_contacts(a, static_cast<double>(contacts),
                    1e3 * (us[H6_STAGE_CONTACTS] + us[H6_STAGE_WEIGHTS] + us[H6_STAGE_WRENCH]));

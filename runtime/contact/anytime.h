@@ -24,12 +24,13 @@ struct Anytime {
   static constexpr int kAll = 4;           // the tier that samples all points
   static constexpr std::size_t kFew = 64;  // contacts that a shell body keeps when `few`
   static constexpr int kSizes = 32;        // classes of frames: class i has 2^i contacts or more
-  std::span<const PairSearch> pairs;       // all pairs of the session, in the order of traversal
-  double budget_ns = 0;                    // from the start of a step; 0: none
-  double period_ns = 1e6;                  // from one step to the next
-  bool no_clock = false;                   // virtual time: frames have no deadline
-  std::uint32_t forced = kByClock;         // coarse pairs of the next step, whatever the clock says
-  std::uint32_t forced_points = 1;         // points sampled of each sixteen in those pairs
+  PairList pairs;                          // those that are traversed in this step, in order
+  std::size_t near = 0;             // how many pairs are near: PairSearch::number counts them
+  double budget_ns = 0;             // from the start of a step; 0: none
+  double period_ns = 1e6;           // from one step to the next
+  bool no_clock = false;            // virtual time: frames have no deadline
+  std::uint32_t forced = kByClock;  // coarse pairs of the next step, whatever the clock says
+  std::uint32_t forced_points = 1;  // points sampled of each sixteen in those pairs
   std::int64_t (*clock)() = sched::now_ns;  // tests replace it
   // The state of this frame.
   std::int64_t start = 0;
@@ -59,13 +60,17 @@ struct Anytime {
 
 // `steps` of the frame share its budget.
 void begin_anytime(Anytime& a, std::int64_t start, std::uint32_t steps = 1);
+// Says which pairs a step traverses, of `near` that are near. `first`: it is the frame's first
+// step.
+void begin_traversal(Anytime& a, PairList pairs, std::size_t near, bool first);
 // Call it after the first of several steps. The others leave out the same pairs and points, so that
 // one pair of numbers repeats the frame. Nothing is learnt from such a frame.
 void decide_no_more(Anytime& a);
 // Both decide whether the pair is traversed coarsely, in a.tier. After the first coarse pair all
 // later ones of the frame are coarse. `pair` is one of a.pairs, `used` contacts were found before
 // it, and `blocks` of its own are open. is_coarse_anyway is called before the pair's groups are
-// tested, must_be_coarse when `groups` of them are known to be near.
+// tested, must_be_coarse when `groups` of them are known to be near. Coarse pairs are counted among
+// all that are near, because only those follow from the poses alone.
 bool is_coarse_anyway(Anytime& a, const PairSearch& pair, std::size_t used, std::size_t blocks);
 bool must_be_coarse(Anytime& a, PairSearch& pair, std::size_t used, std::size_t blocks,
                     std::size_t groups);
@@ -77,7 +82,7 @@ bool must_be_coarser(Anytime& a, const PairSearch& pair, std::size_t used, std::
 // coarse pairs. Returns whether it must keep only kFew of these.
 bool must_be_few(Anytime& a, const PairSearch& first, std::size_t found);
 // How many of `pairs`, a part of a.pairs, are coarse. The coarse ones are the last.
-std::size_t coarse_pairs_of(const Anytime& a, std::span<const PairSearch> pairs);
+std::size_t coarse_pairs_of(const Anytime& a, PairList pairs);
 // Learns from a pair that began at `since`, sampled `groups` of its `near` groups (sixteen points
 // each) and found `found` contacts.
 void learn_sampling(Anytime& a, std::size_t groups, std::size_t near, std::size_t found,

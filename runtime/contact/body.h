@@ -14,6 +14,12 @@ struct RigidState {
   Mat3 R = Mat3::Identity();  // the rotation matrix of q
 };
 
+// How far a body has moved since its session began: sums over its steps.
+struct Travelled {
+  double shift = 0;  // of its centre of mass [m]
+  double turn = 0;   // [rad]
+};
+
 // How a body moves from one frame to the next: METHOD.md, Sec. 4.
 enum class Motion : std::uint8_t { dynamic, quasi_static, held };
 
@@ -31,6 +37,8 @@ struct Body : RigidState {
   double max_step = 0;           // quasi-static: the most that a point may move in a frame [m]
   // How much velocity the solver gave a free body in the last frame, before it was slowed down.
   Vec3 gained_v = Vec3::Zero(), gained_w = Vec3::Zero();
+  Travelled travelled;
+  std::int32_t meets = -1;  // row among the session's shell bodies
   // Quasi-static: the coupling's damping over its stiffness [s], and the velocity of the last step,
   // which this damper sees and contacts do not.
   double lag = 0;

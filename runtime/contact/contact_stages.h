@@ -23,16 +23,16 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
 // Shares the stiffness among all contacts of the shell body, all fields pooled. METHOD.md, Sec. 3.
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                     Lane& lane);
-// Whether the weighing of so many contacts is faster on two threads.
-bool worth_two_threads(const h6ContactDef& def, std::size_t count, Lane& lane);
-// `firm`: replaces N by the direction in which each contact pushes, and fills facing.
-void find_push_directions(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
-                          Lane& lane);
+// The team, if the weighing of so many contacts is faster on all of its threads; else null.
+sched::FrameTeam* weighing_team(std::size_t count, Lane& lane);
+// `firm`: replaces N by the direction in which each contact pushes, fills facing, and notes in
+// slack and kappa how much each counts in the density and the stiffness of its direction.
+void prepare_firm(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
-// Sums each pair's contacts into shell.sums.
+// Sums each pair's contacts into pair.sum. `series` and `firm`: as sum_series_rows.
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 // Stretches the friction springs by the motion since the last step, lets them slip, and sums their
-// wrenches into shell.frictions. It reads the normal loads of all contacts.
+// wrenches into pair.friction. It reads the normal loads of all contacts.
 void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);
 
 // ---- this runs for one shell body after the other, in order
@@ -48,14 +48,16 @@ struct Sides {
   const Body &a, &b;
   LinearWrench &on_a, &on_b;
 };
+// A pair without contacts has no wrench and changes none.
+void clear_wrench(Pair& pair);
 inline Sides sides_of(const Pair& pair, std::span<const Body> bodies,
                       std::span<LinearWrench> acting) {
   return {bodies[pair.a], bodies[pair.b], acting[pair.a], acting[pair.b]};
 }
 void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
                    const kernels::WrenchSum& sum);
-// `series`: call spread_series for each pair of a shell body, then join_series once. The latter
-// reads shell.sums.
+// `series`: call spread_series for each pair with contacts, then join_series once for the shell
+// body. The latter reads pair.sum.
 void spread_series(const Settings& set, const Sides& sides, Pair& pair,
                    const kernels::WrenchSum& sum);
 void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell,

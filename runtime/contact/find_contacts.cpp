@@ -15,11 +15,6 @@ namespace h6 {
 namespace {
 
 constexpr std::size_t kContactSlice = 512;  // contacts made at a time, in about 1.5 us
-// From this many contacts on, two threads make them. For fewer, moving the data between the cores'
-// caches costs more than it saves: 1,000 take 3.1 us on one thread and 6.2 on two, 10,000 take 46
-// and 26.
-constexpr std::size_t kManyContacts = 4096;
-constexpr double kPairsWorthSharing = 8000;  // threads share pairs that take longer [ns]
 constexpr std::size_t kPairSlices = 32;
 
 // The map from contact arms [m], from a's centre of mass along the world's axes, to voxels of b's
@@ -39,16 +34,17 @@ kernels::Affine arms_to_field(const Body& a, const Body& b) {
 // Of the candidates of `pairs`, rows up to `count`, keeps the `most` with the least keys, in their
 // order. Of equal keys the first ones stay. Returns the row behind the last.
 std::size_t keep_least(const TraverseScratch& t, float* key, std::size_t count, std::size_t most,
-                       std::span<PairSearch> pairs) {
-  std::size_t n = pairs[0].first;
+                       PairList pairs) {
+  std::size_t n = pairs[0].search.first;
   const kernels::Touching all = candidates_from(t, 0);
   const kernels::NearestLimit at = kernels::nearest_limit(key + n, count - n, most);
   std::size_t ties = most - at.below;
-  for (PairSearch& pair : pairs) {
-    const std::size_t begin = pair.first, end = begin + pair.candidates;
-    pair.first = n;
-    pair.candidates = kernels::keep_nearest(all, key, begin, end, at.limit, ties, n);
-    n += pair.candidates;
+  for (Pair& pair : pairs) {
+    PairSearch& found = pair.search;
+    const std::size_t begin = found.first, end = begin + found.candidates;
+    found.first = n;
+    found.candidates = kernels::keep_nearest(all, key, begin, end, at.limit, ties, n);
+    n += found.candidates;
   }
   return n;
 }
@@ -107,25 +103,24 @@ void rank_candidates(const Shell& shell, const TraverseScratch& t, std::size_t b
 // keeps its deepest ones: METHOD.md, Sec. 6. It does not matter whether pairs are dropped from one
 // after the other or all at once. Returns the row behind the last.
 std::size_t keep_most(const Shell& shell, const TraverseScratch& t, std::size_t count,
-                      std::size_t most, std::span<PairSearch> pairs) {
-  for (const PairSearch& pair : pairs)
-    rank_candidates(shell, t, pair.first, pair.first + pair.candidates);
+                      std::size_t most, PairList pairs) {
+  for (const Pair& pair : pairs)
+    rank_candidates(shell, t, pair.search.first, pair.search.first + pair.search.candidates);
   return keep_least(t, t.key, count, most, pairs);
 }
 
 // If there is no time for more, keeps only a few of the coarse pairs' candidates. Returns how many
 // candidates are left in all.
-std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, std::span<PairSearch> all,
-                     std::size_t used) {
-  const std::span<PairSearch> pairs = all.last(coarse_pairs_of(anytime, all));
+std::size_t keep_few(Anytime& anytime, const TraverseScratch& t, PairList all, std::size_t used) {
+  const PairList pairs = all.last(coarse_pairs_of(anytime, all));
   if (pairs.empty()) return used;
-  const std::size_t coarse = used - pairs[0].first;
-  if (coarse <= Anytime::kFew || !must_be_few(anytime, all[0], used)) return used;
+  const std::size_t coarse = used - pairs[0].search.first;
+  if (coarse <= Anytime::kFew || !must_be_few(anytime, all[0].search, used)) return used;
   used = keep_least(t, t.candidate_distance, used, Anytime::kFew, pairs);
   float least = -HUGE_VALF;  // the largest distance kept; no dropped point is deeper
-  for (std::size_t i = pairs[0].first; i < used; ++i)
+  for (std::size_t i = pairs[0].search.first; i < used; ++i)
     least = std::max(least, t.candidate_distance[i]);
-  for (PairSearch& pair : pairs) pair.missed = std::max(pair.missed, -least);
+  for (Pair& pair : pairs) pair.search.missed = std::max(pair.search.missed, -least);
   return used;
 }
 
@@ -135,32 +130,17 @@ std::size_t traverse_in_order(const Settings& set, std::span<const Body> bodies,
   const std::size_t most = shell.contacts.capacity;
   std::size_t used = 0;
   for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-    PairSearch& pair = shell.searches[p];
-    pair.first = used;
-    pair.candidates = traverse_pair(set, bodies[shell.body], bodies[shell.pairs[p].b], pair, t,
-                                    lane, used, false);
-    used += pair.candidates;
+    Pair& pair = shell.pairs[p];
+    pair.search.first = used;
+    pair.search.candidates =
+        traverse_pair(set, bodies[shell.body], bodies[pair.b], pair.search, t, lane, used, false);
+    used += pair.search.candidates;
     if (used > most) {
-      used = keep_most(*bodies[shell.body].shell, t, used, most, shell.searches.first(p + 1));
+      used = keep_most(*bodies[shell.body].shell, t, used, most, shell.pairs.first(p + 1));
       lane.report.status |= H6_CONTACTS_DROPPED;
     }
   }
   return used;
-}
-
-// Whether there is enough work for two threads, in enough pairs. If one pair has most of the work,
-// the threads share that pair's slices instead. With a budget the clock decides pair after pair, in
-// order, so pairs cannot be shared.
-bool worth_sharing(const ShellBody& shell, const Lane& lane) {
-  if (!lane.helper || shell.pairs.size() < 2 || lane.anytime->by_clock) return false;
-  if (shell.traverse_ns < (shell.pairs_shared ? 0.5 * kPairsWorthSharing : kPairsWorthSharing))
-    return false;
-  std::size_t all = 0, most = 0;
-  for (const PairSearch& pair : shell.searches) {
-    all += pair.sampled;
-    most = std::max(most, pair.sampled);
-  }
-  return most < kWorthSharing || 2 * most <= all;
 }
 
 // Each thread fills its own scratch; the results are joined in the order of pairs. Returns false if
@@ -168,37 +148,53 @@ bool worth_sharing(const ShellBody& shell, const Lane& lane) {
 // repeat the traversal, because expiries stay valid.
 bool traverse_shared(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                      Lane& lane, std::size_t* used) {
-  TraverseScratch &mine = lane.scratch->traverse, &helpers = *lane.helper;
-  mine.used = helpers.used = 0;
+  TraverseScratch& mine = lane.scratch->traverse;
+  for (Scratch& scratch : lane.scratches) scratch.traverse.used = 0;
   const Body& a = bodies[shell.body];
   const std::size_t pairs = shell.pairs.size(), slice = (pairs + kPairSlices - 1) / kPairSlices;
   const std::size_t room = kBlockRows * a.shell->blocks.count;
   std::atomic<bool> full{false};
   lane.team->for_slices((pairs + slice - 1) / slice, [&](std::size_t i) {
-    const int here = sched::FrameTeam::here();
-    TraverseScratch& t = here == 0 ? mine : helpers;
+    const unsigned here = sched::FrameTeam::here();
+    TraverseScratch& t = lane.scratches[here].traverse;
     const std::size_t end = std::min((i + 1) * slice, pairs);
     for (std::size_t p = i * slice; p < end; ++p) {
       if (t.used + room > t.capacity) return full.store(true, std::memory_order_relaxed);
-      PairSearch& pair = shell.searches[p];
-      pair.found_by = here;
-      pair.first = t.used;
-      pair.candidates =
-          traverse_pair(set, a, bodies[shell.pairs[p].b], pair, t, lane, t.used, true);
-      t.used += pair.candidates;
+      Pair& pair = shell.pairs[p];
+      PairSearch& found = pair.search;
+      found.found_by = here;
+      found.first = t.used;
+      found.candidates = traverse_pair(set, a, bodies[pair.b], found, t, lane, t.used, true);
+      t.used += found.candidates;
     }
   });
-  std::size_t end = mine.used + helpers.used;
+  std::size_t end = 0;
+  for (const Scratch& scratch : lane.scratches) end += scratch.traverse.used;
   if (full.load(std::memory_order_relaxed) || end > mine.capacity) return false;
   *used = end;
   // The loop begins with the last pair, so that the caller's own candidates only ever move up.
   for (std::size_t p = pairs; p-- > 0;) {
-    PairSearch& pair = shell.searches[p];
+    PairSearch& pair = shell.pairs[p].search;
     end -= pair.candidates;
-    move_candidates(mine, end, pair.found_by == 0 ? mine : helpers, pair.first, pair.candidates);
+    move_candidates(mine, end, lane.scratches[pair.found_by].traverse, pair.first, pair.candidates);
     pair.first = end;
   }
   return true;
+}
+
+// On all threads where that is faster than to share the groups of one pair after the other. With a
+// budget the clock decides pair after pair, in order.
+std::size_t traverse_pairs(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
+                           Lane& lane) {
+  const bool may = lane.scratches.size() > 1 && shell.pairs.size() > 1 && !lane.anytime->by_clock;
+  if (!may) return traverse_in_order(set, bodies, shell, lane);
+  const std::int64_t since = sched::now_ns();
+  std::size_t used = 0;
+  const bool shared = lane.pairing.share(shell.pairs.size());
+  if (!shared || !traverse_shared(set, bodies, shell, lane, &used))
+    used = traverse_in_order(set, bodies, shell, lane);
+  lane.pairing.took(static_cast<double>(sched::now_ns() - since));
+  return used;
 }
 
 }  // namespace
@@ -206,25 +202,18 @@ bool traverse_shared(const Settings& set, std::span<const Body> bodies, ShellBod
 void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const TraverseScratch& t = lane.scratch->traverse;
   const std::size_t most = shell.contacts.capacity;
-  const bool timed = lane.helper && shell.pairs.size() > 1;
-  const std::int64_t since = timed ? sched::now_ns() : 0;
-  std::size_t used = 0;
-  shell.pairs_shared =
-      worth_sharing(shell, lane) && traverse_shared(set, bodies, shell, lane, &used);
-  if (!shell.pairs_shared) used = traverse_in_order(set, bodies, shell, lane);
-  used = keep_few(*lane.anytime, t, shell.searches, used);
+  std::size_t used = traverse_pairs(set, bodies, shell, lane);
+  used = keep_few(*lane.anytime, t, shell.pairs, used);
   if (used > most) {
-    keep_most(*bodies[shell.body].shell, t, used, most, shell.searches);
+    keep_most(*bodies[shell.body].shell, t, used, most, shell.pairs);
     lane.report.status |= H6_CONTACTS_DROPPED;
   }
-  if (timed) shell.traverse_ns = static_cast<double>(sched::now_ns() - since);
-  for (std::size_t p = 0; p < shell.searches.size(); ++p) {
-    const PairSearch& pair = shell.searches[p];
-    const Field& field = *bodies[shell.pairs[p].b].field;
+  for (const Pair& pair : shell.pairs) {
+    const Field& field = *bodies[pair.b].field;
     const double cut = field.voxel / field.finest;
     h6FrameReport& report = lane.report;
-    report.missed_depth_voxels = std::max(report.missed_depth_voxels, cut * pair.missed);
-    report.fit_depth_voxels = std::max(report.fit_depth_voxels, cut * pair.fit.deepest);
+    report.missed_depth_voxels = std::max(report.missed_depth_voxels, cut * pair.search.missed);
+    report.fit_depth_voxels = std::max(report.fit_depth_voxels, cut * pair.search.fit.deepest);
   }
 }
 
@@ -236,11 +225,12 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
   const kernels::ShellColumns columns{points.x.data,    points.y.data,  points.z.data,
                                       points.nx.data,   points.ny.data, points.nz.data,
                                       points.point.data};
-  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-    Pair& pair = shell.pairs[p];
-    PairSearch& found = shell.searches[p];
+  for (Pair& pair : shell.pairs) {
+    PairSearch& found = pair.search;
     const Body& b = bodies[pair.b];
     const std::size_t first = c.count;
+    pair.begin = pair.end = first;
+    if (found.candidates == 0) continue;
     kernels::ContactFrame frame;
     const Vec3 arm = a.R * (points.centre - a.com);
     for (int k = 0; k < 9; ++k) {
@@ -249,23 +239,21 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
     }
     for (int k = 0; k < 3; ++k) frame.arm[k] = static_cast<float>(arm[k]);
     frame.voxel = static_cast<float>(b.field->voxel);
-    const bool many = found.candidates >= kManyContacts;
-    const std::size_t size = many ? kContactSlice : found.candidates;
+    const std::uint32_t* const row = lane.scratch->traverse.candidate + found.first;
     const auto make = [&](std::size_t slice) {
-      const std::size_t at = slice * size, to = first + at;
+      const std::size_t at = slice * kContactSlice, to = first + at;
+      const std::size_t count = std::min(kContactSlice, found.candidates - at);
       kernels::make_contacts(columns, candidates_from(lane.scratch->traverse, found.first + at),
-                             std::min(size, found.candidates - at), frame,
+                             count, frame,
                              {c.depth + to, c.nx + to, c.ny + to, c.nz + to, c.gx + to, c.gy + to,
                               c.gz + to, c.rx + to, c.ry + to, c.rz + to, c.point + to});
+      std::fill_n(c.field_body + to, count, pair.b);
+      for (std::size_t i = 0; c.cell && i < count; ++i) c.cell[to + i] = points.cell[row[at + i]];
     };
-    lane.team->for_slices(many ? (found.candidates + size - 1) / size : 1, make);
+    share_slices(lane, lane.making, found.candidates,
+                 (found.candidates + kContactSlice - 1) / kContactSlice, make);
     c.count += found.candidates;
-    if (found.candidates > 0) found.arms = arms_to_field(a, b);
-    std::fill_n(c.field_body + first, found.candidates, pair.b);
-    const std::uint32_t* const row = lane.scratch->traverse.candidate + found.first;
-    for (std::size_t i = 0; c.cell && i < found.candidates; ++i)
-      c.cell[first + i] = points.cell[row[i]];
-    pair.begin = first;
+    found.arms = arms_to_field(a, b);
     pair.end = c.count;
   }
 }

@@ -16,7 +16,6 @@ constexpr double kPresent = 0.1;  // the depth from which a contact counts in fu
 constexpr double kAround =
     0.5;  // from a contact to where its field is sampled, on each axis [voxel]
 constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
-constexpr std::size_t kManySlices = 4;        // from here on two threads share them
 
 // Rows begin..end-1 of one pair. The distances go to columns that are filled later. `shifted`:
 // depths have relief or play in them.
@@ -39,23 +38,23 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
 
 }  // namespace
 
-void find_push_directions(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
-                          Lane& lane) {
-  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-    const Pair& pair = shell.pairs[p];
+void prepare_firm(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  for (const Pair& pair : shell.pairs) {
     if (pair.begin == pair.end) continue;
     const std::size_t slices = (pair.end - pair.begin + kDirectionSlice - 1) / kDirectionSlice;
-    const bool shifted = shell.searches[p].fit.count > 0 || set.contact.fit_offset > 0;
+    const bool shifted = pair.search.fit.count > 0 || set.contact.fit_offset > 0;
+    const Vec6 ahead =
+        Eigen::Map<const Eigen::Matrix<float, 6, 1>>(pair.search.ahead).cast<double>();
     const auto push = [&](std::size_t i) {
       const std::size_t begin = pair.begin + i * kDirectionSlice;
-      push_rows(shell.contacts, bodies[pair.b], shell.searches[p].arms, shifted, begin,
-                std::min(begin + kDirectionSlice, pair.end));
+      const std::size_t end = std::min(begin + kDirectionSlice, pair.end);
+      Contacts& c = shell.contacts;
+      push_rows(c, bodies[pair.b], pair.search.arms, shifted, begin, end);
+      kernels::series_gap(kernel_columns(c, begin, end), c.depth + begin, 1, ahead.data(),
+                          c.slack + begin);
+      note_firmness(c, set.contact, bodies[pair.b].field->finest, begin, end);
     };
-    if (slices >= kManySlices) {
-      lane.team->for_slices(slices, push);
-    } else {
-      for (std::size_t i = 0; i < slices; ++i) push(i);
-    }
+    share_slices(lane, lane.pushing, pair.end - pair.begin, slices, push);
   }
 }
 

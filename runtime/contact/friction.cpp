@@ -289,9 +289,8 @@ void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& 
   const Contacts& c = shell.contacts;
   const FrictionScratch& scratch = lane.scratch->friction;
   const Body& a = bodies[shell.body];
-  for (std::size_t p = 0; p < shell.frictions.size(); ++p) {
-    const Pair& pair = shell.pairs[p];
-    FrictionSpring& spring = shell.frictions[p];
+  for (Pair& pair : shell.pairs) {
+    FrictionSpring& spring = *pair.friction;
     const Body& b = bodies[pair.b];
     const Vec6 u = pair_velocity(a, b);
     const double total = fill_loads(c, set.contact, pair, u, scratch.load);

@@ -28,12 +28,12 @@ void look_ahead(const Settings& set, std::span<const Body> bodies, ShellBody& sh
   Eigen::Map<Vec6> y(shell.series_y);
   if (!y.allFinite()) y.setZero();  // after a run that was unstable
   Vec6 spring = kAhead * y;
-  spring.tail<3>() /= series_lever(a.radius, a.voxel);
-  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-    PairSearch& search = shell.searches[p];
+  spring.tail<3>() /= spring_lever(set.contact, series_lever(a.radius, a.voxel));
+  for (Pair& pair : shell.pairs) {
+    PairSearch& search = pair.search;
     search.margin = 0;
     if (!(most > 0)) continue;
-    const Body& b = bodies[shell.pairs[p].b];
+    const Body& b = bodies[pair.b];
     const Vec6 way = spring + set.contact.damping * pair_velocity(a, b);
     for (int k = 0; k < 6; ++k) search.ahead[k] = static_cast<float>(way[k]);
     const double reach = (way.head<3>().norm() + way.tail<3>().norm() * a.radius) / b.field->voxel;
@@ -52,21 +52,20 @@ kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double 
   const kernels::SeriesColumns columns{c.nx, c.ny,   c.nz,     c.rx,   c.ry,
                                        c.rz, c.load, c.weight, c.count};
   const kernels::SeriesResult result =
-      kernels::series_solve(columns, {def.series_c, lever}, y, c.kappa, c.slack);
+      kernels::series_solve(columns, {def.series_c, spring_lever(def, lever)}, y, c.kappa, c.slack);
   kernels::series_loads(c.kappa, c.slack, c.depth, c.count, c.load, c.weight);
   return result;
 }
 
 kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,
                                    std::size_t end) {
-  const kernels::WrenchColumns columns{c.slack, c.kappa, c.nx, c.ny, c.nz, c.gx,
-                                       c.gy,    c.gz,    c.rx, c.ry, c.rz, c.count};
-  return kernels::contact_wrench(columns, {1.0, 0.0, {}, exact}, begin, end);
+  return kernels::contact_wrench(series_columns(c), {1.0, 0.0, {}, exact}, begin, end);
 }
 
 Mat6 series_spring(const h6ContactDef& def, double lever) {
   Mat6 G = def.series_c * Mat6::Identity();
-  G.bottomRightCorner<3, 3>() *= lever * lever;
+  const double turn = spring_lever(def, lever);
+  G.bottomRightCorner<3, 3>() *= turn * turn;
   return G;
 }
 
@@ -74,17 +73,8 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
   const Body& a = bodies[shell.body];
   Contacts& c = shell.contacts;
   const bool firm = set.contact.method == H6_METHOD_FIRM;
-  if (firm) find_push_directions(set, bodies, shell, lane);
-  for (std::size_t p = 0; firm && p < shell.pairs.size(); ++p) {
-    const Pair& pair = shell.pairs[p];
-    const Vec6 ahead =
-        Eigen::Map<const Eigen::Matrix<float, 6, 1>>(shell.searches[p].ahead).cast<double>();
-    kernels::series_gap(kernel_columns(c, pair.begin, pair.end), c.depth + pair.begin, 1,
-                        ahead.data(), c.slack + pair.begin);
-    note_firmness(c, set.contact, bodies[pair.b].field->finest, pair.begin, pair.end);
-  }
-  fill_inner_stiffness(c, set.contact, a.voxel,
-                       worth_two_threads(set.contact, c.count, lane) ? lane.team : nullptr,
+  if (firm) prepare_firm(set, bodies, shell, lane);
+  fill_inner_stiffness(c, set.contact, a.voxel, firm ? weighing_team(c.count, lane) : nullptr,
                        firm ? lane.scratch->weigh : nullptr);
   for (const Pair& pair : shell.pairs)
     fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin, pair.end);
@@ -112,18 +102,19 @@ void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& s
   const double k = set.contact.stiffness, beta = set.contact.damping;
   const Mat6 G = series_spring(set.contact, series_lever(a.radius, a.voxel));
   Mat6 B = Mat6::Zero(), C = Mat6::Zero();
-  for (const kernels::WrenchSum& sum : shell.sums) {
-    B += row_major(sum.stiffness);
-    C += row_major(sum.damping);
+  for (const Pair& pair : shell.pairs) {
+    if (pair.begin == pair.end) continue;
+    B += row_major(pair.sum.stiffness);
+    C += row_major(pair.sum.damping);
   }
   const Mat6 inverse = (G + C).inverse();
   if (!a.fixed) {
     acting[shell.body].K -= k * G * inverse * B;
     acting[shell.body].D -= k * beta * G * inverse * C;
   }
-  for (std::size_t p = 0; p < shell.pairs.size(); ++p) {
-    Pair& pair = shell.pairs[p];
-    const Mat6 Bp = row_major(shell.sums[p].stiffness), Cp = row_major(shell.sums[p].damping);
+  for (Pair& pair : shell.pairs) {
+    if (pair.begin == pair.end) continue;
+    const Mat6 Bp = row_major(pair.sum.stiffness), Cp = row_major(pair.sum.damping);
     pair.B = k * (Cp - Cp * inverse * C);
     if (!pair.of_fields) continue;
     BetweenFields& to = *pair.of_fields;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// share_gate.h - decides by timing whether a second thread helps.
+// share_gate.h - decides by timing whether helpers help: the one policy for all work of a frame.
 //
-// Data that a second thread writes must be moved from its core's cache. The cost depends on the
+// Data that another thread writes must be moved from its core's cache. The cost depends on the
 // machine, and on a virtual machine it changes while a program runs: summing 1,000 contacts took
 // 25 us on one thread and 17 on two while both cores shared a cache, and 18 and 27 while they did
-// not. The results have the same bits on any thread, so the gate may decide by the clock.
+// not. The results have the same bits on any thread, so the gate may decide by the clock. Every
+// kind of work has a gate of its own, and a gate judges each size of work for itself.
 #pragma once
 #include <algorithm>
 #include <bit>
@@ -15,11 +16,14 @@ namespace h6 {
 
 class ShareGate {
  public:
-  // Decides whether to share work of `size` this time. The caller must then report its time to
-  // took().
+  // Decides whether to share work of `size` items this time. The caller must then report its time
+  // to took().
   bool share(std::size_t size) {
-    now_ = &kinds_[std::min<std::size_t>(std::bit_width(size), kKinds) - 1];
-    size_ = static_cast<double>(size);
+    now_ =
+        &kinds_[std::min<std::size_t>(std::bit_width(std::max<std::size_t>(size, 1)), kKinds) - 1];
+    size_ = static_cast<double>(std::max<std::size_t>(size, 1));
+    settled_ = true;
+    if (now_->each[0] > 0 && now_->each[0] * size_ < kLeast) return trial_ = way_ = false;
     const std::uint32_t phase = now_->times++ % kEvery;
     trial_ = phase < kTrial;
     // The first calls of a trial find the caches as the other way left them, so they do not count.
@@ -45,6 +49,8 @@ class ShareGate {
   static constexpr std::uint32_t kEvery = 512;  // calls until the other way is tried again
   static constexpr std::uint32_t kTrial = 8;    // calls of a trial
   static constexpr double kGain = 0.95;  // sharing begins below this part of one thread's time
+  // Less work is never shared: a helper that polls begins 0.7 us later.
+  static constexpr double kLeast = 3000;  // [ns]
   struct Kind {
     double each[2] = {};  // time of one item, on one thread and shared [ns]
     std::uint32_t times = 0;

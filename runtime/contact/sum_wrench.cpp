@@ -13,48 +13,29 @@
 namespace h6 {
 namespace {
 
-void sum_slices(const Contacts& c, const Pair& pair, const kernels::WrenchParameters& p, Lane& lane,
-                kernels::WrenchSum& out) {
-  const kernels::WrenchColumns columns{c.depth, c.weight, c.nx, c.ny, c.nz, c.gx,
-                                       c.gy,    c.gz,     c.rx, c.ry, c.rz, c.count};
+// Sums of slices are added in order, so any number of threads gives the same bits.
+void sum_slices(const kernels::WrenchColumns& columns, const Pair& pair,
+                const kernels::WrenchParameters& p, Lane& lane, kernels::WrenchSum& out) {
   const std::size_t count = pair.end - pair.begin, slices = (count + kSumSlice - 1) / kSumSlice;
   const auto sum_slice = [&](std::size_t i, kernels::WrenchSum& sum) {
     kernels::contact_wrench(columns, p, pair.begin + i * kSumSlice,
                             std::min(pair.begin + (i + 1) * kSumSlice, pair.end), sum);
   };
-  if (slices <= 1 || lane.team->threads() == 1) {
-    sum_slice(0, out);
-    for (std::size_t i = 1; i < slices; ++i) {
-      kernels::WrenchSum next;
-      sum_slice(i, next);
-      out.add(next);
-    }
-    return;
-  }
+  if (slices == 1) return sum_slice(0, out);
   kernels::WrenchSum* const sums = lane.scratch->slice_sum;
-  const std::int64_t since = sched::now_ns();
-  const auto keep = [&](std::size_t i) { sum_slice(i, sums[i]); };
-  if (lane.summing.share(count))
-    lane.team->for_slices(slices, keep);
-  else
-    for (std::size_t i = 0; i < slices; ++i) keep(i);
-  lane.summing.took(static_cast<double>(sched::now_ns() - since));
+  share_slices(lane, lane.summing, count, slices, [&](std::size_t i) { sum_slice(i, sums[i]); });
   out = sums[0];
   for (std::size_t i = 1; i < slices; ++i) out.add(sums[i]);
 }
 
-void add_wrench(const Settings& set, const Sides& sides, Pair& pair,
-                const kernels::WrenchSum& sum) {
-  if (pair.begin != pair.end) return spread_wrench(set, sides, pair, sum);
+}  // namespace
+
+void clear_wrench(Pair& pair) {
   pair.f.setZero();
   pair.B.setZero();
-  if (pair.between)
-    for (Mat6* block :
-         {&pair.between->Kab, &pair.between->Kba, &pair.between->Dab, &pair.between->Dba})
-      block->setZero();
+  if (pair.between) *pair.between = {};
+  if (pair.of_fields) *pair.of_fields = {};
 }
-
-}  // namespace
 
 Mat6 arm_shift(const Body& a, const Body& b) {
   Mat6 S = Mat6::Identity();
@@ -113,33 +94,37 @@ void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
 }
 
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
-  kernels::WrenchParameters p{
-      set.contact.stiffness, set.contact.damping, {}, set.gradient == H6_EXACT};
-  for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
-    const Pair& pair = shell.pairs[i];
+  const bool series = uses_series(set.contact), exact = set.gradient == H6_EXACT;
+  const Contacts& c = shell.contacts;
+  kernels::WrenchColumns columns = series_columns(c);
+  kernels::WrenchParameters p{1.0, 0.0, {}, exact};
+  if (!series) {
+    columns.depth = c.depth, columns.weight = c.weight;
+    p = {set.contact.stiffness, set.contact.damping, {}, exact};
+  }
+  for (Pair& pair : shell.pairs) {
     if (pair.begin == pair.end) continue;
-    Vec6::Map(p.velocity) = pair_velocity(bodies[pair.a], bodies[pair.b]);
-    sum_slices(shell.contacts, pair, p, lane, shell.sums[i]);
+    if (!series) Vec6::Map(p.velocity) = pair_velocity(bodies[pair.a], bodies[pair.b]);
+    sum_slices(columns, pair, p, lane, pair.sum);
   }
 }
 
 void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                   std::span<LinearWrench> acting) {
   const bool series = uses_series(set.contact);
-  for (std::size_t i = 0; i < shell.pairs.size(); ++i) {
-    Pair& pair = shell.pairs[i];
+  for (Pair& pair : shell.pairs) {
     const Sides sides = sides_of(pair, bodies, acting);
-    if (series) {
-      shell.sums[i] =
-          sum_series_rows(shell.contacts, set.gradient == H6_EXACT, pair.begin, pair.end);
-      spread_series(set, sides, pair, shell.sums[i]);
+    if (pair.begin == pair.end) {
+      clear_wrench(pair);
+    } else if (series) {
+      spread_series(set, sides, pair, pair.sum);
     } else {
-      add_wrench(set, sides, pair, shell.sums[i]);
+      spread_wrench(set, sides, pair, pair.sum);
     }
   }
-  if (series) join_series(set, bodies, shell, acting);
-  for (std::size_t i = 0; i < shell.frictions.size(); ++i)
-    add_friction(set, sides_of(shell.pairs[i], bodies, acting), shell.pairs[i], shell.frictions[i]);
+  if (series && shell.contacts.count > 0) join_series(set, bodies, shell, acting);
+  for (Pair& pair : shell.pairs)
+    if (pair.friction) add_friction(set, sides_of(pair, bodies, acting), pair, *pair.friction);
 }
 
 }  // namespace h6

@@ -55,7 +55,8 @@ kernels::Affine shell_to_field(const Body& a, const Body& b) {
 constexpr float kSlack = 1e-3f;  // [voxel]
 constexpr std::size_t kFewGroups =
     4;  // testing so few groups of a block is cheaper than testing its sphere
-constexpr double kLongestWay = 256;  // float resolves 3e-5 there [voxel]
+constexpr std::size_t kCached = 256;  // groups whose samples lie in the caches while a shell stays
+constexpr double kLongestWay = 256;   // float resolves 3e-5 there [voxel]
 constexpr double kStays = 0.04;  // a shell nearer than this to its anchor counts as staying [voxel]
 // When the shell is slow, only single points of a group are sampled: those nearer than kNearest
 // plus the distance of kStepsNear steps like the last one.
@@ -74,7 +75,7 @@ struct Search {
   float scale;           // voxels per metre
   kernels::Reach reach;  // of the field's samples
   float margin;          // [voxel]
-  bool cold;             // other programs have used the caches
+  bool cold;             // the caches hold little of what is sampled
   float near = 0;        // points are sampled up to this distance; 0: all points of a group [voxel]
   bool reaches = false;  // TraverseScratch::reach says how far each group's points may be
 
@@ -151,7 +152,7 @@ Search search_of(const Settings& set, const Body& a, const Body& b, float margin
 std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::size_t count,
                   std::size_t used, bool shared) {
   const auto by_myself = [&] { return search.touch(t, 0, count, candidates_from(t, used)); };
-  if (shared || count < kWorthSharing || lane.team->threads() == 1) return by_myself();
+  if (shared || count <= kTouchSlice || lane.team->threads() == 1) return by_myself();
   const std::int64_t since = sched::now_ns();
   const auto timed = [&](std::size_t found) {
     lane.touching.took(static_cast<double>(sched::now_ns() - since));
@@ -230,7 +231,8 @@ Way travel(PairSearch& pair, Search& search) {
               HUGE_VALF);
   }
   pair.last_place = search.place;
-  const float now = static_cast<float>(pair.travelled + away);
+  pair.now = pair.travelled + away;
+  const float now = static_cast<float>(pair.now);
   return {now, now + search.margin, static_cast<float>(pair.travelled - away)};
 }
 
@@ -335,12 +337,8 @@ void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& searc
   pair.pick_rows.learn(kGroupRows * groups, near);
 }
 
-// Without this the groups would wait for memory one after the other.
-void prefetch_groups(const Shell& shell, const TraverseScratch& t, std::size_t groups, bool cold) {
-  for (std::size_t k = 0; k < groups; ++k)
-    for (const Column<float>* column : {&shell.x, &shell.y, &shell.z})
-      __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
-  if (!cold) return;  // after a pause, also the columns that contacts are made from
+// After a pause: the columns that contacts are made from.
+void prefetch_normals(const Shell& shell, const TraverseScratch& t, std::size_t groups) {
   for (std::size_t k = 0; k < groups; ++k) {
     for (const Column<float>* column : {&shell.nx, &shell.ny, &shell.nz})
       __builtin_prefetch(column->data + kGroupRows * t.survivors[k]);
@@ -364,6 +362,14 @@ Screw ahead_of_shell(const Body& a, const Body& b, const PairSearch& pair) {
   return screw;
 }
 
+// After a traversal that found nothing: for how long the pair can be left out.
+void note_quiet(const Settings& set, const Body& a, const Body& b, PairSearch& pair) {
+  const float* const least =
+      std::min_element(pair.block_expiry, pair.block_expiry + a.shell->blocks.count);
+  const double margin = uses_series(set.contact) ? set.contact.margin_voxels : 0.0;
+  pair.quiet.begin(b.field->voxel * (*least - pair.now - margin - 2 * kSlack), a, b);
+}
+
 // `complete` becomes false where the traversal is coarse.
 std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                         TraverseScratch& t, Lane& lane, std::size_t used, bool shared,
@@ -372,6 +378,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
   Anytime& anytime = *lane.anytime;
   Search search = search_of(set, a, b, pair.margin, lane.cold);
   const Way way = travel(pair, search);
+  const bool fast = !(search.near > 0);
   pair.sampled = 0;
   pair.missed = 0;
 
@@ -405,7 +412,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
   if (search.reaches)
     count = search.loadable(pair.group_expiry, way.now, ahead_of_shell(a, b, pair).m, blocks, t);
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
-  prefetch_groups(shell, t, groups, search.cold);
+  if (lane.cold) prefetch_normals(shell, t, groups);
   if (must_be_coarse(anytime, pair, used, blocks, groups)) {
     pair.cull_groups.left_out = 0;
     note_blocks();
@@ -413,6 +420,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
   }
   if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
   choose_rows(pair, t, search, groups, way.far);
+  search.cold = lane.cold || fast || groups > kCached;
   const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(search, t, lane, groups, used, shared);
   learn_sampling(anytime, groups, groups, found, since);
@@ -464,7 +472,15 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
   bool complete = true;
+  const bool borrows = !pair.group_expiry;
+  if (borrows) {
+    static_cast<SearchColumns&>(pair) = t.lent;
+    pair.travelled = -1;
+  }
   std::size_t found = search_pair(set, a, b, pair, t, lane, used, shared, complete);
+  pair.quiet.way = 0;
+  if (found == 0 && pair.fit.count == 0) note_quiet(set, a, b, pair);
+  if (borrows) static_cast<SearchColumns&>(pair) = {};
   const kernels::Touching candidates = candidates_from(t, used);
   pair.fit.deepest = 0;
   if (pair.fit.count > 0 || set.contact.fit_offset > 0) {

@@ -9,8 +9,6 @@
 namespace h6 {
 
 inline constexpr std::size_t kTouchSlice = 32;  // groups sampled at a time, in about 2 us
-// From this many groups on, about 6 us of work, the helper takes slices.
-inline constexpr std::size_t kWorthSharing = 80;
 
 // Writes the candidates of shell body a against field body b behind row `used` of the scratch, and
 // returns how many there are. It tests two tiers of spheres, then points. In each tier it tests

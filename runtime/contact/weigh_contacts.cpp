@@ -17,16 +17,15 @@
 namespace h6 {
 namespace {
 
-// From this many contacts on, two threads weigh them: 430 take 6.9 us on one thread and 5.5 on two,
-// 64 take 0.9 and about 3.
-constexpr std::size_t kTwoThreads = 192;
-// From this many contacts on, a density is cut into slices. With fewer, each thread computes one of
-// the two densities from the sorting on, so its data stay in its own cache and it waits only once.
+// From this many contacts on, and for more than two threads, a density is cut into slices. With
+// fewer, each thread computes one of the two densities from the sorting on, so its data stay in its
+// own cache and it waits only once.
 constexpr std::size_t kWorthSlicing = 4096;
 // Up to this many contacts, all pairs of contacts are compared without sorting: 120 take 1.7 us so,
 // and 1.9 to 3.3 us with sorting.
 constexpr std::size_t kWorthSorting = 120;
-constexpr float kFacingEdge = 0.25f;  // N.g from which a contact counts in full
+constexpr float kFacingEdge = 0.25f;     // N.g from which a contact counts in full
+constexpr std::size_t kRowSlice = 1024;  // rows of which simple columns are filled at a time
 
 struct Rule {
   bool gauss = false, facing = false, depth = false, handles = false, printed = false;
@@ -80,20 +79,31 @@ void weigh_as_printed(Contacts& c, const Rule& rule) {
 }
 
 // clamp(N.g / 0.25, 0, 1), or 1 without the filter.
-void fill_facing(const Contacts& c, bool filter, float* facing) {
-  if (filter) return kernels::contact_facing(kernel_columns(c, 0, c.count), kFacingEdge, facing);
-  std::fill_n(facing, c.count, 1.0f);
-}
-
-void fill_torque_directions(Contacts& c, const Rule& rule, double lever) {
-  kernels::torque_directions(kernel_columns(c, 0, c.count), rule.l0,
-                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx, c.ty, c.tz);
+void fill_facing(const Contacts& c, bool filter, std::size_t begin, std::size_t end,
+                 float* facing) {
+  if (filter)
+    return kernels::contact_facing(kernel_columns(c, begin, end), kFacingEdge, facing + begin);
+  std::fill(facing + begin, facing + end, 1.0f);
 }
 
 template <class Run>
 void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
   if (team) return team->for_slices(slices, run);
   for (std::size_t i = 0; i < slices; ++i) run(i);
+}
+
+// Calls run(begin, end) for slices of all rows.
+template <class Run>
+void for_rows(const Contacts& c, sched::FrameTeam* team, const Run& run) {
+  for_slices((c.count + kRowSlice - 1) / kRowSlice, team,
+             [&](std::size_t i) { run(i * kRowSlice, std::min((i + 1) * kRowSlice, c.count)); });
+}
+
+void fill_torque_directions(const Contacts& c, const Rule& rule, double lever, std::size_t begin,
+                            std::size_t end) {
+  kernels::torque_directions(kernel_columns(c, begin, end), rule.l0,
+                             rule.handles ? static_cast<float>(lever) : 0.0f, c.tx + begin,
+                             c.ty + begin, c.tz + begin);
 }
 
 void weigh_with_tree(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
@@ -111,7 +121,8 @@ bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sch
   const kernels::GaussSweep sweep =
       kernels::gauss_sweep(view, rule.hat, rule.widths, scratch, weight);
   int stage = 0;
-  if (sweep.densities == 2 && view.count < kWorthSlicing) {
+  const bool few = view.count < kWorthSlicing && !(team && team->threads() > 2);
+  if (sweep.densities == 2 && few) {
     const std::size_t slices = kernels::gauss_sweep_slices(sweep, 1) / 2;
     for_slices(2, team, [&](std::size_t density) {
       kernels::gauss_sweep_run(sweep, 0, density);
@@ -131,7 +142,6 @@ bool weigh_with_sweep(const kernels::DirectionsView& view, const Rule& rule, sch
 
 void weigh_view(const kernels::DirectionsView& view, const Rule& rule, sched::FrameTeam* team,
                 void* scratch, float* weight) {
-  if (view.count < kTwoThreads) team = nullptr;
   if (view.count <= kWorthSorting)
     kernels::gauss_weights_few(view, rule.hat, rule.widths, weight);
   else if (!weigh_with_sweep(view, rule, team, scratch, weight))
@@ -204,8 +214,10 @@ std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
 void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                    sched::FrameTeam* team, void* scratch) {
   const Rule rule = rule_of(def, voxel);
-  fill_facing(c, rule.facing, c.facing);
-  fill_torque_directions(c, rule, lever);
+  for_rows(c, team, [&](std::size_t begin, std::size_t end) {
+    fill_facing(c, rule.facing, begin, end, c.facing);
+    fill_torque_directions(c, rule, lever, begin, end);
+  });
   if (rule.gauss) {
     weigh_gauss(c, rule, team, scratch);
   } else {
@@ -220,16 +232,17 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
 
 void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
                           sched::FrameTeam* team, void* scratch) {
-  if (def.method == H6_METHOD_SERIES) return fill_facing(c, true, c.weight);
+  if (def.method == H6_METHOD_SERIES) return fill_facing(c, true, 0, c.count, c.weight);
   const Rule rule = rule_of(def, voxel);
-  fill_torque_directions(c, rule, 0);
+  for_rows(c, team, [&](std::size_t begin, std::size_t end) {
+    fill_torque_directions(c, rule, 0, begin, end);
+  });
   weigh_cells(c, rule, team, scratch);
   for (std::size_t i = 0; i < c.count; ++i) c.weight[i] *= c.kappa[i];
 }
 
-bool worth_two_threads(const h6ContactDef& def, std::size_t count, Lane& lane) {
-  return def.method != H6_METHOD_SERIES && count >= kTwoThreads && lane.team->threads() > 1 &&
-         lane.weighing.share(count);
+sched::FrameTeam* weighing_team(std::size_t count, Lane& lane) {
+  return lane.team->threads() > 1 && lane.weighing.share(count) ? lane.team : nullptr;
 }
 
 void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
@@ -240,8 +253,7 @@ void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody
   if (uses_clusters(set.contact)) merge_clusters(set, bodies, shell, lane.scratch->cluster);
   const Body& body = bodies[shell.body];
   weigh_columns(c, set.contact, body.voxel, series_lever(body.radius, body.voxel),
-                worth_two_threads(set.contact, c.count, lane) ? lane.team : nullptr,
-                lane.scratch->weigh);
+                weighing_team(c.count, lane), lane.scratch->weigh);
 }
 
 }  // namespace h6

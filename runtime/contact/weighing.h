@@ -54,6 +54,12 @@ std::size_t cluster_contacts(Contacts& c, std::size_t begin, std::size_t end, st
 
 // The lever L, an upper bound on the arms of the body's contacts [m].
 inline double series_lever(double radius, double voxel) { return radius > voxel ? radius : voxel; }
+// The lever at which the common spring counts turns [m]. Under `firm` it is softer against turns
+// than against shifts: METHOD.md, Sec. 3, "Firm".
+inline constexpr double kFirmTurn = 0.7;
+inline double spring_lever(const h6ContactDef& def, double lever) {
+  return def.method == H6_METHOD_FIRM ? kFirmTurn * lever : lever;
+}
 
 // Writes e of rows begin..end-1 to load: the depth less the damping at the relative velocity u.
 void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin, std::size_t end);
@@ -71,6 +77,9 @@ void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
 // Fills kappa (from weight, the inner stiffness), slack, load (from e) and weight. y holds the
 // start and then the extension.
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6]);
+inline kernels::WrenchColumns series_columns(const Contacts& c) {
+  return {c.slack, c.kappa, c.nx, c.ny, c.nz, c.gx, c.gy, c.gz, c.rx, c.ry, c.rz, c.count};
+}
 // sum lambda J, sum kappa J J_g^T and sum kappa J J^T over rows that carry load.
 kernels::WrenchSum sum_series_rows(const Contacts& c, bool exact, std::size_t begin,
                                    std::size_t end);

@@ -14,6 +14,7 @@
 #include "hapsix/hapsix.h"
 #include "runtime/frame/session.h"
 #include "tests/support/ball_in_bowl.h"
+#include "tests/support/reports.h"
 
 using namespace h6::test;
 
@@ -248,7 +249,7 @@ TEST_CASE("virtual time has no deadline, and leaves nothing out") {
     def.virtual_time = virtual_time;
     h6Loop* loop = h6StartLoop(scene.session, &device, &def, nullptr);
     REQUIRE(loop);
-    const h6LoopReport report = h6JoinLoop(loop);
+    const h6LoopReport report = h6::test::joined(loop);
     CHECK(report.frames == 20);
     CHECK(report.coarse_frames == (virtual_time ? 0 : 20));
     h6DestroyLoop(loop);
@@ -272,11 +273,13 @@ struct Decided {
 
 struct Clocked {
   h6::Anytime a;
-  h6::PairSearch pair;
+  h6::Pair only;
+  h6::Pair* list[1] = {&only};
+  h6::PairSearch& pair = only.search;
   int frame = 0;
   static inline std::int64_t now = 0;
   Clocked() {
-    a.pairs = {&pair, 1};
+    h6::begin_traversal(a, h6::PairList(list), 1, true);
     a.clock = [] { return now; };
   }
 

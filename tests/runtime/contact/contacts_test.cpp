@@ -65,7 +65,7 @@ struct Found {
 };
 
 bool is_sample(const h6Session* s, const h6::Shell& shell, std::size_t r) {
-  const h6::kernels::Affine& place = s->shells[0].searches[0].last_place;
+  const h6::kernels::Affine& place = s->near.pairs[0].search.last_place;
   const h6::Field& field = s->model->fields[0];
   h6::Vec3 at = field.origin;
   for (int k = 0; k < 3; ++k)
@@ -79,7 +79,7 @@ bool is_sample(const h6Session* s, const h6::Shell& shell, std::size_t r) {
 
 // How deep row r would be if its body went the way that the last frame looked ahead [voxel].
 float carried_depth(const h6Session* s, const h6::Shell& shell, std::size_t r, float distance) {
-  const h6::PairSearch& pair = s->shells[0].searches[0];
+  const h6::PairSearch& pair = s->near.pairs[0].search;
   const double voxel = s->model->fields[0].voxel;
   h6::Mat3 turn;  // of the body: the field's axes are the world's
   for (int k = 0; k < 9; ++k) turn(k / 3, k % 3) = voxel * pair.last_place.m[k / 3][k % 3];
@@ -93,7 +93,7 @@ float carried_depth(const h6Session* s, const h6::Shell& shell, std::size_t r, f
 
 // All rows of the shell at the place that the last frame used.
 void compare(const h6Session* s, Found& found, double* least, std::uint32_t* deepest) {
-  const h6::PairSearch& pair = s->shells[0].searches[0];
+  const h6::PairSearch& pair = s->near.pairs[0].search;
   const h6::Shell& shell = s->model->shells[0];
   std::vector<float> d(shell.points);
   h6::kernels::sample_field(s->model->fields[0].view, pair.last_place,
@@ -127,7 +127,7 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
   bodies[0].inertia[0] = bodies[0].inertia[1] = bodies[0].inertia[2] = 1e-4;
   bodies[1].fixed = false, bodies[1].shell = 0;
   h6SessionDef def = h6DefaultSessionDef();
-  const h6PairDef pair{1, 0};
+  const h6PairDef pair{1, 0, {}};
   def.pairs = &pair, def.pair_count = 1;
   def.bodies = bodies, def.body_count = 2;
   def.max_contacts = model->shells[0].points;  // none is dropped
@@ -137,6 +137,7 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
   h6Session* s = h6CreateSession(model, &def, &error);
   CAPTURE(error.message);
   REQUIRE(s);
+  h6::keep_all_awake(*s);  // each step places the points
   std::mt19937_64 random(7);
   Found found;
   h6::Vec3 p(0, 0, 0), base(0, 0, 0);
@@ -179,7 +180,7 @@ Found walk(const h6Model* model, const Walk& w, double step_voxels, int frames, 
     step();
     if (i % 2) continue;
     // Grazing: shifted along the deepest point's gradient until it is within 0.05 voxel.
-    const float margin = s->shells[0].searches[0].margin;
+    const float margin = s->near.pairs[0].search.margin;
     for (int shift = 0; shift < 2; ++shift) {
       const h6::Shell& rows = model->shells[0];
       const h6::Vec3 local =
@@ -338,7 +339,7 @@ TEST_CASE("points clear of a field are not sampled again while the shell tremble
     state.pose = pose(0.03 * mm * (i % 2), 0, 0);
     h6SetBody(s, 1, &state);
     h6Step(s, nullptr, nullptr);
-    if (i > 1) looked += s->shells[0].searches[0].sampled;
+    if (i > 1) looked += s->near.pairs[0].search.sampled;
     CHECK(h6GetFrame(s).contacts == 0);
   }
   CHECK(looked == 0);

@@ -88,7 +88,7 @@ TEST_CASE("without friction a session has no springs, and the setting has its ra
   box.open();
   const std::size_t bytes = box.session->memory_bytes;
   CHECK(box.session->frictions.empty());
-  CHECK(box.session->shells[0].frictions.empty());
+  CHECK(box.session->near.pairs[0].friction == nullptr);
   box.def.contact.friction = 0.1;
   box.open();
   CHECK(box.session->memory_bytes > bytes);

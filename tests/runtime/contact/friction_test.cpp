@@ -206,7 +206,8 @@ TEST_CASE("a dragged box sticks until the pull exceeds mu N, and sticks again on
       const double pull = -box.hold(pose(x, 0, 2 * mm), 1).wrench.force.x;
       const double at = box.body().pose.p.x;
       // Presliding: the spring has k, and yields at mu N.
-      if (pull < 0.9 * most && i < 2000) CHECK(at < 1.05 * (pull / 1e4 + 1e-6));
+      if (pull < 0.9 * most && i < 2000)
+        CHECK(at < 1.07 * (pull / 1e4 + 1e-6));  // the box tilts a little
       x_most = std::max(x_most, at), pull_most = std::max(pull_most, pull);
       if (i > 2000 && pull > -0.9 * most) back = at;
     }

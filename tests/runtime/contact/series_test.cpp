@@ -124,10 +124,12 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
   h6Error error;
   h6Session* s = h6CreateSession(model.handle, &def, &error);
   REQUIRE_MESSAGE(s, error.message);
-  REQUIRE(s->pairs.size() == 2);
   s->bodies[0].radius = world.lever;
   for (int b = 0; b < 3; ++b) s->bodies[b].x = state.x[b];
+  keep_all_awake(*s);
+  wake_pairs(*s);
   ShellBody& touching = s->shells[0];
+  REQUIRE(touching.pairs.size() == 2);
   Contacts& c = touching.contacts;
   c.count = world.point.size();
   int inside = 0;
@@ -141,10 +143,12 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
     put(c.nx, c.ny, c.nz, n), put(c.gx, c.gy, c.gz, g), put(c.rx, c.ry, c.rz, r);
   }
   REQUIRE(inside > 20);
-  s->pairs[0].begin = 0, s->pairs[0].end = s->pairs[1].begin = 30, s->pairs[1].end = 50;
+  Pair &floor = touching.pairs[0], &wall = touching.pairs[1];
+  floor.begin = 0, floor.end = wall.begin = 30, wall.end = 50;
   Lane lane;
   weigh_series(s->settings, s->bodies, touching, lane);
   CHECK(lane.report.series_residual <= 1e-6);
+  sum_contacts(s->settings, s->bodies, touching, lane);
   for (LinearWrench& acting : s->acting) acting.set_zero();
   add_wrenches(s->settings, s->bodies, touching, s->acting);
 
@@ -154,8 +158,8 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
     CHECK((s->acting[b].f - w[b]).norm() < 1e-4 * w[b].norm());
   }
   const std::span<LinearWrench> on = s->acting;
-  const BetweenBodies &ap = *s->pairs[0].between, &aq = *s->pairs[1].between;
-  const BetweenFields &p = *s->pairs[0].of_fields, &q = *s->pairs[1].of_fields;
+  const BetweenBodies &ap = *floor.between, &aq = *wall.between;
+  const BetweenFields &p = *floor.of_fields, &q = *wall.of_fields;
   const Mat6 K[3][3] = {{on[0].K, ap.Kab, aq.Kab},
                         {ap.Kba, on[1].K, p.left * q.right},
                         {aq.Kba, q.left * p.right, on[2].K}};
@@ -198,7 +202,7 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
 namespace {
 
 // A box of 144 points over a floor, held by a hand.
-struct Box {
+struct BoxOnPlane {
   test::FieldArrays field = test::sample_analytic([](double, double, double z) { return z; },
                                                   {-32 * mm, -32 * mm, -16 * mm}, mm, 8, 8, 4);
   test::ShellArrays shell = test::bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12);
@@ -207,7 +211,7 @@ struct Box {
   h6HandDef hand = h6DefaultHandDef();
   h6SessionDef def = h6DefaultSessionDef();
   h6Session* session = nullptr;
-  explicit Box(double height) {
+  explicit BoxOnPlane(double height) {
     bodies[0].fixed = true, bodies[0].field = 0;
     bodies[1].shell = 0, bodies[1].pose = pose(0, 0, height);
     hand.body = 1;
@@ -219,14 +223,14 @@ struct Box {
     session = h6CreateSession(model.handle, &def, &error);
     REQUIRE_MESSAGE(session, error.message);
   }
-  ~Box() { h6DestroySession(session); }
+  ~BoxOnPlane() { h6DestroySession(session); }
 };
 
 }  // namespace
 
 TEST_CASE("series: at rest on a wall the net stiffness lies between k and c k") {
   for (const double c : {2.5, 4.0}) {
-    Box box(5.2 * mm);
+    BoxOnPlane box(5.2 * mm);
     box.def.contact.series_c = c;
     box.def.hands = &box.hand, box.def.hand_count = 1;
     box.open();
@@ -243,7 +247,7 @@ TEST_CASE("series: at rest on a wall the net stiffness lies between k and c k") 
 TEST_CASE("series: a point takes part before it touches only where it can carry load") {
   // 0.1 voxel above the floor; damping makes an approach by 0.15 m/s count 0.15 voxel ahead.
   const auto first_frame = [](double speed, double margin) {
-    Box box(5.1 * mm);
+    BoxOnPlane box(5.1 * mm);
     box.def.contact.margin_voxels = margin;
     box.open();
     const h6BodyState state{pose(0, 0, 5.1 * mm), {{0, 0, speed}, {0, 0, 0}}};
@@ -267,7 +271,7 @@ TEST_CASE("series: a point takes part before it touches only where it can carry 
 
 TEST_CASE("series and firm find contacts again after a wild state, and one that was refused") {
   for (const h6Method method : {H6_METHOD_SERIES, H6_METHOD_FIRM}) {
-    Box box(4.9 * mm);
+    BoxOnPlane box(4.9 * mm);
     box.def.contact.method = method;
     box.open();
     for (const double wild : {1e6, 1e300, std::nan("")}) {

@@ -24,11 +24,18 @@ int shared_of(h6::ShareGate& gate, int times, std::size_t size, double alone, do
 }  // namespace
 
 TEST_CASE("work is shared where that is faster, and not where it is slower") {
-  for (const std::size_t size : {1, 300, 1000, 5000, 100000000}) {
+  for (const std::size_t size : {300, 1000, 5000, 100000000}) {
     h6::ShareGate pays, costs;
     CHECK(shared_of(pays, 10000, size, 20, 15) > 9700);
     CHECK(shared_of(costs, 10000, size, 20, 25) < 300);
   }
+}
+
+TEST_CASE("work of less than three microseconds is not shared, even if that seemed faster") {
+  h6::ShareGate gate;
+  CHECK(shared_of(gate, 10000, 100, 20, 1) < 20);
+  // It may grow.
+  CHECK(shared_of(gate, 10000, 100, 60, 40) > 9500);
 }
 
 TEST_CASE("each size is judged for itself") {

@@ -44,7 +44,7 @@ struct PushedBox : BoxOnFloor {
   }
   // The device is at its commanded pose and is pushed.
   h6Status push(const h6Wrench& wrench, int frames) {
-    h6DeviceSample sample{told.pose, told.velocity, 0, wrench, 0};
+    h6DeviceSample sample{told.pose, told.velocity, 0, wrench, 0, {}};
     for (int i = 0; i < frames; ++i) {
       sample.pose = told.pose;
       h6Step(session, &sample, &told);
@@ -148,7 +148,7 @@ TEST_CASE("a few poses that are not finite do not stop an admittance hand, many 
   PushedBox scene(H6_ADMITTANCE, 100 * mm);
   scene.open();
   scene.push({}, 1);
-  h6DeviceSample sample{scene.told.pose, {}, 0, force(0.5, 0, 0), 0};
+  h6DeviceSample sample{scene.told.pose, {}, 0, force(0.5, 0, 0), 0, {}};
   sample.pose.p.x = NAN;
   for (int i = 0; i < 10; ++i) h6Step(scene.session, &sample, &scene.told);
   CHECK((h6GetFrame(scene.session).status & H6_HAND_NOT_FINITE) != 0);
@@ -544,7 +544,7 @@ TEST_CASE("a loop refuses a device that does not offer the hand's mode") {
       CAPTURE(offered);
       CHECK((loop != nullptr) == ((meant & mode) != 0));
       if (loop) {
-        h6JoinLoop(loop);
+        h6JoinLoop(loop, nullptr);
         h6DestroyLoop(loop);
       } else {
         CHECK(std::string(error.message).find("mode") != std::string::npos);

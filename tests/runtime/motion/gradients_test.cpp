@@ -162,7 +162,7 @@ struct Assembly {
   std::array<Pair, kBodies - 1> pairs;
   std::array<BetweenBodies, kBodies - 1> between;
   std::array<BetweenFields, kBodies - 1> of_fields;
-  std::array<kernels::WrenchSum, kBodies - 1> sums;
+  std::array<Pair*, kBodies - 1> list;
   ShellBody shell;
   Settings set;
   explicit Assembly(const Scene& scene) {
@@ -179,9 +179,10 @@ struct Assembly {
       pairs[b - 1].a = 0, pairs[b - 1].b = b;
       pairs[b - 1].begin = scene.first[b], pairs[b - 1].end = scene.end[b];
       pairs[b - 1].between = &between[b - 1], pairs[b - 1].of_fields = &of_fields[b - 1];
+      list[b - 1] = &pairs[b - 1];
     }
     shell.body = 0;
-    shell.pairs = pairs, shell.sums = sums;
+    shell.pairs = PairList(list);
     set.gradient = H6_EXACT;
     set.contact = h6DefaultContactDef();
     set.contact.method = H6_METHOD_ROBUST;
@@ -354,9 +355,9 @@ TEST_CASE("series: the exact gradients, between the fields too, are derivatives 
   Assembly engine(scene);
   for (std::size_t i = 0; i < engine.pairs.size(); ++i) {
     Pair& pair = engine.pairs[i];
-    engine.sums[i] = kernels::contact_wrench_ref(columns.with(loads.slack, loads.kappa),
-                                                 {1.0, 0.0, {}, true}, pair.begin, pair.end);
-    spread_series(engine.set, sides_of(pair, engine.bodies, engine.acting), pair, engine.sums[i]);
+    pair.sum = kernels::contact_wrench_ref(columns.with(loads.slack, loads.kappa),
+                                           {1.0, 0.0, {}, true}, pair.begin, pair.end);
+    spread_series(engine.set, sides_of(pair, engine.bodies, engine.acting), pair, pair.sum);
   }
   join_series(engine.set, engine.bodies, engine.shell, engine.acting);
 

@@ -12,6 +12,7 @@
 #include "tests/support/analytic.h"
 #include "tests/support/box_on_floor.h"
 #include "tests/support/near.h"
+#include "tests/support/reports.h"
 
 using namespace h6::test;
 
@@ -57,7 +58,7 @@ TEST_CASE("a body of translations alone keeps its orientation to the bit and giv
     }
     CHECK(touched > 0);
     // The hand was too fast on the way, so the safety chain cut its force to zero.
-    CHECK(h6GetSafety(scene.session, 0).fault == H6_CAUSE_OVERSPEED);
+    CHECK(h6::test::safety_of(scene.session, 0).fault == H6_CAUSE_OVERSPEED);
     last.velocity = {};
     scene.hold(last, 100);
     h6Arm(scene.session);
