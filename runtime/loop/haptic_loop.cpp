@@ -15,11 +15,11 @@
 #include "runtime/frame/session.h"
 #include "runtime/loop/device_gate.h"
 #include "runtime/loop/loop_view.h"
+#include "runtime/loop/record_ring.h"
 #include "runtime/settings/engine_settings.h"
 #include "sched/clock.h"
 #include "sched/halt_list.h"
 #include "sched/periodic_thread.h"
-#include "sched/spsc_ring.h"
 #include "sched/watchdog.h"
 
 namespace {
@@ -35,7 +35,7 @@ struct h6Loop {
   std::uint64_t frames = 0;  // how many to run; 0: no end
   std::uint64_t begun = 0;   // frames so far
   double due = 1;            // the next frame runs when this reaches 1
-  std::unique_ptr<h6::sched::SpscRing<h6FrameRecord>> ring;
+  std::unique_ptr<h6::RecordRing> ring;
   h6FrameRecord record{};
   h6LoopReport report{};  // belongs to the haptic thread until that has ended
   std::atomic<bool> stop{false};
@@ -44,6 +44,7 @@ struct h6Loop {
   std::int64_t sent_at = 0;                       // time of the last commands, 0: none yet [ns]
   std::uint64_t trips = 0;                        // trips of the watchdog that were handled
   bool stepped = false;                           // this tick was a frame
+  bool joined = false;                            // the session may be another loop's now
   std::unique_ptr<h6::sched::Watchdog> watchdog;  // uses the gate, so it is destroyed before it
   std::atomic<double> pace{1};
   std::unique_ptr<h6::LoopView> view;
@@ -298,7 +299,7 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
                   "hand %zu: safety %s, %g %s, is above what device %zu is rated for, %g %s: leave "
                   "it out or choose less",
                   h, above.key, above.asked, above.unit, h, above.rating, above.unit);
-  return check_settings(loop_settings(), &def, "", error);
+  return check_reserved(def, "loop: ", error) && check_settings(loop_settings(), &def, "", error);
 }
 
 }  // namespace
@@ -312,8 +313,12 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
                     h6Error* error) {
   const h6LoopDef used = def ? *def : h6DefaultLoopDef();
   if (!check(session, devices, used, error)) return nullptr;
+  Owner none = Owner::nobody;
+  if (!session->owner.compare_exchange_strong(none, Owner::loop))
+    return fail(error, H6_ERROR_BUSY, "another loop or step runs this session"), nullptr;
   try {
-    auto loop = std::make_unique<h6Loop>();
+    const auto let_go = [](h6Loop* l) { l->session->owner = Owner::nobody, delete l; };
+    std::unique_ptr<h6Loop, decltype(let_go)> loop(new h6Loop, let_go);
     loop->session = session;
     loop->def = used;
     for (std::size_t h = 0; h < session->hands.size(); ++h) {
@@ -325,10 +330,17 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     loop->report.grant.core = -1;
     loop->frames = static_cast<std::uint64_t>(used.duration / session->settings.dt + 0.5);
     if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
-    if (used.ring_frames)
-      loop->ring = std::make_unique<sched::SpscRing<h6FrameRecord>>(used.ring_frames);
+    if (used.ring_frames) {
+      loop->ring = std::make_unique<RecordRing>(used.ring_frames, used.ring_inputs,
+                                                session->hands.size(), session->allocator);
+      if (!loop->ring->ready()) {
+        fail(error, H6_ERROR_MEMORY, "no memory for %zu records: lower ring_frames",
+             used.ring_frames);
+        return nullptr;
+      }
+    }
     if (used.view_contacts) {
-      loop->view = std::make_unique<LoopView>(session->bodies.size(), used.view_contacts);
+      loop->view = std::make_unique<LoopView>(*session, used.view_contacts);
       loop->view_step =
           static_cast<std::uint64_t>(std::max(1.0, 1 / (kViewRate * session->settings.dt)));
     }
@@ -370,7 +382,8 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
             [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
     return loop.release();
   } catch (const std::exception& e) {
-    fail(error, "the haptic thread could not be started: %s", e.what());
+    session->owner = Owner::nobody;
+    fail(error, H6_ERROR_SYSTEM, "the haptic thread could not be started: %s", e.what());
     return nullptr;
   }
 }
@@ -390,13 +403,20 @@ void h6SetPace(h6Loop* loop, double pace) {
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (!loop) return fail(error, "no loop was given"), nullptr;
   if (!may_take_over(next, *loop->session, error)) return nullptr;
+  Owner none = Owner::nobody;
+  if (!next->owner.compare_exchange_strong(none, Owner::loop))
+    return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;
   if (const int core = loop->core; core >= 0) next->team->set_realtime(loop->helper_priority, core);
   loop->offered.store(next, std::memory_order_release);
   while (true) {
-    if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire))
+    if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire)) {
+      before->owner = Owner::nobody;
       return before;
-    if (!loop->thread->running() && loop->offered.exchange(nullptr))
+    }
+    if (!loop->thread->running() && loop->offered.exchange(nullptr)) {
+      next->owner = Owner::nobody;
       return fail(error, "the loop has ended"), nullptr;
+    }
     sched::sleep_until_ns(sched::now_ns() + 100000);
   }
 }
@@ -418,12 +438,22 @@ void h6HaltLoop(h6Loop* loop) {
 }
 void h6HaltAll(void) { sched::halt_all(); }
 
-h6LoopReport h6JoinLoop(h6Loop* loop) {
-  if (!loop) return {};
+void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
+  if (out) *out = {};
+  if (!loop) return;
   loop->thread->join();
   loop->gate.stop_all();
-  loop->session->team->set_realtime(0, -1);
-  h6LoopReport report = loop->report;
+  if (!loop->joined) {
+    loop->session->team->set_realtime(0, -1);
+    loop->session->owner = Owner::nobody;
+    loop->joined = true;
+    h6Log(H6_LOG_NOTE, loop->report.granted);
+    if (loop->watchdog && loop->watchdog->trips())
+      h6Log(H6_LOG_WARNING, "the haptic thread stalled, so the watchdog stopped the devices");
+    if (loop->ring && loop->ring->lost())
+      h6Log(H6_LOG_WARNING, "records were lost to a slow reader: raise ring_frames");
+  }
+  h6LoopReport& report = loop->report;  // the haptic thread has ended
   report.fault = H6_CAUSE_NONE;
   for (std::size_t h = 0; h < loop->session->hands.size(); ++h) {
     OutputGuard& guard = loop->session->devices[h].guard;
@@ -431,15 +461,16 @@ h6LoopReport h6JoinLoop(h6Loop* loop) {
     report.hand[h] = guard.report();
     if (report.fault == H6_CAUSE_NONE) report.fault = guard.fault();
   }
-  report.ring_overruns = loop->ring ? loop->ring->dropped() : 0;
+  report.ring_overruns = loop->ring ? loop->ring->lost() : 0;
+  report.inputs_only = loop->ring ? loop->ring->inputs_only() : 0;
   report.watchdog_trips = loop->watchdog ? loop->watchdog->trips() : 0;
-  return report;
+  if (out) *out = report;
 }
 
 void h6DestroyLoop(h6Loop* loop) {
   if (!loop) return;
   h6RequestStop(loop);
-  h6JoinLoop(loop);
+  h6JoinLoop(loop, nullptr);
   delete loop;
 }
 

@@ -6,9 +6,9 @@
 
 namespace h6 {
 
-LoopView::LoopView(std::size_t bodies, std::size_t contacts) {
+LoopView::LoopView(const h6Session& s, std::size_t contacts) {
   slots_.prepare([&](Slot& slot) {
-    slot.body.resize(bodies);
+    for (const Body& body : s.bodies) slot.body.push_back(mesh_pose(body));
     slot.contact.resize(contacts);
   });
 }
@@ -36,7 +36,7 @@ void LoopView::write(const h6Session& s, double time) {
   slot.frame = s.report.frame;
   slot.time = time;
   slot.contacts = 0;
-  for (std::size_t b = 0; b < s.bodies.size(); ++b) slot.body[b] = mesh_pose(s.bodies[b]);
+  for (const std::uint32_t b : s.near.all_lively()) slot.body[b] = mesh_pose(s.bodies[b]);
   for (const ShellBody& shell : s.shells) slot.contacts += shell.contacts.count;
   // Where the viewer has no room for all contacts it gets every n-th, so that no region is missing.
   const std::size_t room = slot.contact.size();
@@ -57,25 +57,32 @@ void LoopView::write(const h6Session& s, double time) {
 bool LoopView::read(h6LoopView* out) {
   const Slot* slot = slots_.newest();
   if (!slot) return false;
-  *out = {slot->frame,    slot->time, slot->body.size(),   slot->body.data(),
-          slot->contacts, slot->rows, slot->contact.data()};
+  *out = {slot->frame,    slot->time, slot->body.size(),    slot->body.data(),
+          slot->contacts, slot->rows, slot->contact.data(), {}};
   return true;
 }
 
 // Pairs that both sessions have keep their stretch.
 static void take_over_friction(h6Session& next, const h6Session& before) {
-  for (std::size_t i = 0; i < next.frictions.size(); ++i)
-    for (std::size_t k = 0; k < before.frictions.size(); ++k)
-      if (next.pairs[i].a == before.pairs[k].a && next.pairs[i].b == before.pairs[k].b)
-        next.frictions[i] = before.frictions[k];
+  for (const NearPairs::Near& near : next.near.all_near()) {
+    const Pair& pair = next.near.pairs[near.slot];
+    const Pair* had = find_near_pair(before, pair.a, pair.b);
+    if (pair.friction && had && had->friction) *pair.friction = *had->friction;
+  }
 }
 
 void take_over(h6Session& next, const h6Session& before) {
   H6_ASSERT(next.bodies.size() == before.bodies.size() && next.hands.size() == before.hands.size());
+  for (const std::uint32_t i : before.near.all_lively()) make_lively(next.near, i);
+  next.still_hashed = false;
   for (std::size_t i = 0; i < next.bodies.size(); ++i) {
+    if (next.bodies[i].x != before.bodies[i].x ||
+        next.bodies[i].q.coeffs() != before.bodies[i].q.coeffs())
+      make_lively(next.near, i);
     static_cast<RigidState&>(next.bodies[i]) = before.bodies[i];
     next.bodies[i].step_rate = before.bodies[i].step_rate;
   }
+  find_near_pairs(next);
   for (std::size_t i = 0; i < next.hands.size(); ++i) {
     const Hand set = next.hands[i];
     Hand& hand = next.hands[i] = before.hands[i];
@@ -113,6 +120,8 @@ extern "C" bool h6TakeOver(h6Session* next, const h6Session* before, h6Error* er
   if (!before || next == before)
     return h6::fail(error, "a session goes on where another one stands");
   if (!h6::may_take_over(next, *before, error)) return false;
+  if (h6::run_by_loop(*next) || h6::run_by_loop(*before))
+    return h6::fail(error, H6_ERROR_BUSY, "a loop runs this session: h6ChangeSession is for that");
   h6::take_over(*next, *before);
   return true;
 }

@@ -12,7 +12,7 @@ namespace h6 {
 class LoopView {
  public:
   // `contacts`: the most rows that a viewer gets.
-  LoopView(std::size_t bodies, std::size_t contacts);
+  LoopView(const h6Session& session, std::size_t contacts);
   // For the haptic thread, between two frames.
   void write(const h6Session& session, double time);
   // For the viewer's thread. False when nothing is newer. `out` points into a slot that stays valid

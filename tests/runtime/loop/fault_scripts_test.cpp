@@ -12,6 +12,7 @@
 #include "hapsix/vector.h"
 #include "tests/support/box_on_floor.h"
 #include "tests/support/sanitized.h"
+#include "tests/support/reports.h"
 
 using namespace h6::test;
 
@@ -92,14 +93,14 @@ class Script {
 
   void frame(int i) {
     choose();
-    const h6HandSafety before = h6GetSafety(scene_.session, 0);
+    const h6HandSafety before = h6::test::safety_of(scene_.session, 0);
     const h6DeviceSample said = next(i);
     const bool armed_now = i % 100 == 99;
     if (lost_) h6LoseDevice(scene_.session, 0);
     h6NoteInterval(scene_.session, late_);
     h6DeviceCommand out{};
     h6Step(scene_.session, &said, &out);
-    const h6HandSafety after = h6GetSafety(scene_.session, 0);
+    const h6HandSafety after = h6::test::safety_of(scene_.session, 0);
     limits(out, said);
     // Only arming leads back.
     if (before.fault != H6_CAUSE_NONE && !armed_now) REQUIRE(after.fault == before.fault);

@@ -14,6 +14,7 @@
 
 #include "hapsix/hapsix.h"
 #include "tests/support/analytic.h"
+#include "tests/support/reports.h"
 
 using namespace h6::test;
 
@@ -100,7 +101,7 @@ struct Scene {
       drain();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    run.report = h6JoinLoop(loop);
+    h6JoinLoop(loop, &run.report);
     drain();
     h6DestroyLoop(loop);
     return run;
@@ -188,7 +189,7 @@ TEST_CASE("stopping from another thread ends an endless loop") {
   }
   CHECK(h6LoopRunning(loop));
   h6RequestStop(loop);
-  const h6LoopReport report = h6JoinLoop(loop);
+  const h6LoopReport report = h6::test::joined(loop);
   CHECK(report.frames >= 5);
   CHECK(!h6LoopRunning(loop));
   h6DestroyLoop(loop);
@@ -241,7 +242,7 @@ struct Live {
   ~Live() { h6DestroyLoop(loop); }
   h6LoopReport end() {
     h6RequestStop(loop);
-    return h6JoinLoop(loop);
+    return h6::test::joined(loop);
   }
 };
 
@@ -304,7 +305,7 @@ TEST_CASE(
       h6HaltLoop(live.loop);
     CHECK(live.scene.pusher.stops >= 1);
     const int writes = live.scene.pusher.writes;
-    const h6LoopReport report = h6JoinLoop(live.loop);
+    const h6LoopReport report = h6::test::joined(live.loop);
     CHECK(live.scene.pusher.writes == writes);
     CHECK(report.fault == H6_CAUSE_STOPPED);
   }
@@ -335,7 +336,7 @@ TEST_CASE("limits above a device's rating are refused; limits below it hold") {
     if (loop) {
       h6LoopReport report{};
       for (h6FrameRecord record; h6LoopRunning(loop);) (void)h6ReadRecords(loop, &record, 1);
-      report = h6JoinLoop(loop);
+      h6JoinLoop(loop, &report);
       CHECK(report.hand[0].frames[H6_CAUSE_CLAMPED] > 100);
       CHECK(most_force(scene.pusher) == h6::test::near(0.3));
       h6DestroyLoop(loop);

@@ -175,7 +175,7 @@ TEST_CASE("a loop that has ended takes no session") {
   Scene scene;
   Running run(scene);
   h6RequestStop(run.loop);
-  (void)h6JoinLoop(run.loop);
+  h6JoinLoop(run.loop, nullptr);
   h6Session* next = h6CreateSession(scene.model.handle, &scene.def, nullptr);
   CHECK(h6ChangeSession(run.loop, next, nullptr) == nullptr);
   h6DestroySession(next);
