@@ -5,13 +5,15 @@
 #include <cstring>
 #include <span>
 
+#include "runtime/base/foreign_enum.h"
 #include "runtime/frame/session.h"
 
 namespace h6 {
 
-// Mixes every bit of all poses, velocities and samples, in order (multiply and shift, 64 bits). A
-// changed sample changes the hash of its own frame, even if it moves nothing.
-std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
+// Mixes every bit of all poses, velocities and samples (multiply and shift, 64 bits). Bodies that
+// never moved come first, so that they need not be mixed again in every frame; the others follow in
+// order. A changed sample changes the hash of its own frame, even if it moves nothing.
+std::uint64_t state_hash(h6Session& s, const h6DeviceSample* samples) {
   std::uint64_t hash = 0x9e3779b97f4a7c15u;
   const auto mix_bits = [&hash](std::uint64_t bits) {
     hash = (hash ^ bits) * 0xd6e8feb86659fd93u;
@@ -30,11 +32,23 @@ std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
     mix(state.v.data(), 3);
     mix(state.w.data(), 3);
   };
-  for (const Body& body : s.bodies) mix_state(body);
+  const std::span<const std::uint32_t> lively = s.near.all_lively();
+  if (!s.still_hashed) {
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < s.bodies.size(); ++i)
+      next < lively.size() && lively[next] == i ? void(++next) : mix_state(s.bodies[i]);
+    s.still_hash = hash;
+    s.still_hashed = true;
+  }
+  hash = s.still_hash;
+  for (const std::uint32_t i : lively) mix_state(s.bodies[i]);
   // In the other modes the manipulandum follows from the sample.
   for (const Hand& hand : s.hands)
     if (hand.mode == H6_PSEUDO_ADMITTANCE) mix_state(hand.manipulandum);
-  for (const FrictionSpring& spring : s.frictions) mix(spring.q.data(), 6);
+  if (!s.frictions.empty())
+    for (const NearPairs::Near& near : s.near.all_near())
+      if (const FrictionSpring& spring = s.frictions[near.slot]; spring.holds)
+        mix(spring.q.data(), 6);
   for (std::size_t h = 0; h < s.hands.size(); ++h) {
     const h6DeviceSample& in = samples[h];
     mix(&in.pose.p.x, 7);
@@ -46,8 +60,10 @@ std::uint64_t state_hash(const h6Session& s, const h6DeviceSample* samples) {
 }
 
 void forget_friction(h6Session& s, std::int32_t body) {
-  for (std::size_t i = 0; i < s.frictions.size(); ++i)
-    if (s.pairs[i].a == body || s.pairs[i].b == body) s.frictions[i] = {};
+  for (const NearPairs::Near& near : s.near.all_near()) {
+    const Pair& pair = s.near.pairs[near.slot];
+    if (pair.friction && (pair.a == body || pair.b == body)) *pair.friction = {};
+  }
 }
 
 namespace {
@@ -56,8 +72,7 @@ namespace {
 // in.
 void forget_energy(h6Session& s, std::int32_t body) {
   for (ShellBody& shell : s.shells)
-    for (const Pair& pair : shell.pairs)
-      if (pair.a == body || pair.b == body) shell.port.known = false;
+    if (shell.body == body || may_touch(s, shell.body, body)) shell.port.known = false;
   for (std::size_t h = 0; h < s.hands.size(); ++h)
     if (s.hands[h].body == body) s.devices[h].port.forget();
 }
@@ -86,11 +101,31 @@ extern "C" {
 h6Status h6Step(h6Session* session, const h6DeviceSample* samples, h6DeviceCommand* commands) {
   if (!session) return H6_OUTPUT_FAULT;
   const std::size_t hands = session->hands.size();
-  if (hands && !samples) {
+  Owner none = Owner::nobody;
+  if ((hands && !samples) || !session->owner.compare_exchange_strong(none, Owner::step)) {
     if (commands) std::fill_n(commands, hands, h6DeviceCommand{});
     return H6_OUTPUT_FAULT;
   }
-  return frame(*session, samples, commands);
+  const h6Status status = frame(*session, samples, commands);
+  session->owner.store(Owner::nobody, std::memory_order_release);
+  return status;
+}
+
+void h6GetRecord(const h6Session* session, const h6DeviceSample* samples,
+                 const h6DeviceCommand* commands, h6FrameRecord* out) {
+  if (!out) return;
+  *out = {};
+  if (!session || (!session->hands.empty() && (!samples || !commands))) return;
+  const h6Session& s = *session;
+  out->report = s.report;
+  out->time = static_cast<double>(s.report.frame) * s.settings.dt;
+  for (std::size_t h = 0; h < s.hands.size(); ++h) {
+    out->hand[h] = samples[h];
+    out->command[h] = commands[h];
+    out->body[h] = h6GetBody(session, s.hands[h].body);
+    out->state[h] = s.devices[h].guard.state();
+    out->safety_input[h] = s.devices[h].guard.input();
+  }
 }
 
 void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points) {
@@ -108,8 +143,9 @@ h6BodyState h6GetBody(const h6Session* session, int32_t index) {
 
 void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   Body* found = body_at(session, index);
-  if (!found || !state || !usable(state->pose, state->velocity)) return;
+  if (!found || !state || !usable(state->pose, state->velocity) || run_by_loop(*session)) return;
   Body& body = *found;
+  if (make_lively(session->near, static_cast<std::size_t>(index))) session->still_hashed = false;
   set_mesh_pose(body, state->pose);
   body.v = from(state->velocity.linear);
   body.w = from(state->velocity.angular);
@@ -128,8 +164,8 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
 h6Contacts h6GetContacts(const h6Session* session, int32_t index) {
   const ShellBody* shell = body_at(session, index) ? find_shell(*session, index) : nullptr;
   const Contacts c = shell ? shell->contacts : Contacts{};
-  return {c.count, c.depth, c.nx, c.ny, c.nz, c.gx,     c.gy,    c.gz,         c.rx,
-          c.ry,    c.rz,    c.tx, c.ty, c.tz, c.weight, c.point, c.field_body, c.load};
+  return {c.count, c.depth, c.nx, c.ny, c.nz,     c.gx,    c.gy,         c.gz,   c.rx, c.ry,
+          c.rz,    c.tx,    c.ty, c.tz, c.weight, c.point, c.field_body, c.load, {}};
 }
 
 h6FrameReport h6GetFrame(const h6Session* session) {
@@ -149,7 +185,8 @@ void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* c
   if (device && capabilities) set_rating(*device, *capabilities);
 }
 void h6Fault(h6Session* session, h6Cause cause) {
-  if (!session || cause <= H6_CAUSE_NONE || cause >= H6_CAUSE_COUNT) return;
+  const std::uint32_t number = raw_number(cause);
+  if (!session || number == H6_CAUSE_NONE || number >= H6_CAUSE_COUNT) return;
   for (HandDevice& device : session->devices) device.guard.fault(cause);
 }
 void h6Arm(h6Session* session) {
@@ -183,9 +220,10 @@ void h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* inp
   to.lost = (input->asked & H6_ASKED_LOST) != 0;
   to.overdue = input->overdue > 0 ? std::min(input->overdue, kMost) : 0;
 }
-h6HandSafety h6GetSafety(const h6Session* session, int32_t hand) {
+void h6GetSafety(const h6Session* session, int32_t hand, h6HandSafety* out) {
+  if (!out) return;
   const HandDevice* device = device_at(session, hand);
-  return device ? device->guard.report() : h6HandSafety{};
+  *out = device ? device->guard.report() : h6HandSafety{};
 }
 
 }  // extern "C"

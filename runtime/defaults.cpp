@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "hapsix/hapsix.h"
+#include "runtime/base/foreign_enum.h"
 #include "runtime/settings/engine_settings.h"
 
 namespace {
@@ -17,7 +18,7 @@ constexpr const char* kDeviceStates[H6_DEVICE_STATE_COUNT] = {"absent", "ready",
 constexpr const char* kStatus[] = {
     "contacts dropped", "hand not finite", "state not finite", "coupling saturated", "solve failed",
     "output clamped",   "output slewed",   "output fault",     "device lost",        "late",
-    "passivity",        "coarse contacts", "motion shortened"};
+    "passivity",        "coarse contacts", "motion shortened", "pairs left out"};
 
 // The choice whose name is the first `length` letters of `name`, or null.
 const h6::Choice* named(std::span<const h6::Choice> choices, const char* name, std::size_t length) {
@@ -36,16 +37,16 @@ const char* h6StatusName(h6Status bit) {
   return nullptr;
 }
 const char* h6StageName(h6Stage stage) {
-  return stage >= 0 && stage < H6_STAGE_COUNT ? kStages[stage] : nullptr;
+  return h6::raw_number(stage) < H6_STAGE_COUNT ? kStages[stage] : nullptr;
 }
 const char* h6CauseName(h6Cause cause) {
-  return cause >= 0 && cause < H6_CAUSE_COUNT ? kCauses[cause] : nullptr;
+  return h6::raw_number(cause) < H6_CAUSE_COUNT ? kCauses[cause] : nullptr;
 }
 const char* h6DeviceStateName(h6DeviceState state) {
-  return state >= 0 && state < H6_DEVICE_STATE_COUNT ? kDeviceStates[state] : nullptr;
+  return h6::raw_number(state) < H6_DEVICE_STATE_COUNT ? kDeviceStates[state] : nullptr;
 }
 const char* h6MethodName(h6Method method) {
-  return method >= 0 && method < H6_METHOD_COUNT ? h6::method_names()[method].name : nullptr;
+  return h6::raw_number(method) < H6_METHOD_COUNT ? h6::method_names()[method].name : nullptr;
 }
 
 int h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces) {
@@ -67,7 +68,25 @@ int h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces) {
   return 0;
 }
 
+h6FieldDef h6DefaultFieldDef(void) { return {}; }
+h6ShellDef h6DefaultShellDef(void) { return {}; }
 h6ModelDef h6DefaultModelDef(void) { return {}; }
+h6PairDef h6DefaultPairDef(void) { return {-1, -1, {}}; }
+h6ContactArrays h6DefaultContactArrays(void) { return {}; }
+h6Device h6DefaultDevice(void) {
+  h6Device device{};
+  h6DeviceCapabilities& rated = device.capabilities;
+  std::strcpy(rated.name, "device");
+  rated.dof_in = rated.dof_out = 6;
+  rated.max_force = 10, rated.max_torque = 1;
+  rated.modes = H6_IMPEDANCE;
+  return device;
+}
+h6DeviceSample h6DefaultDeviceSample(void) {
+  h6DeviceSample sample{};
+  sample.pose.q.w = 1;
+  return sample;
+}
 
 h6BodyDef h6DefaultBodyDef(void) {
   h6BodyDef def = h6::default_def<h6BodyDef>(h6::body_settings());

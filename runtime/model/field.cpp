@@ -61,18 +61,19 @@ bool check_finer(const h6FieldDef& def, const h6ModelDef& model, h6Error* error)
   }
   std::size_t bad = 0;
   if (!all_finite(model, def.halves, def.half_count * 27, &bad))
-    return fail(error, "halves[%zu] is not finite", bad);
+    return fail(error, H6_ERROR_RANGE, "halves[%zu] is not finite", bad);
   if (!all_finite(model, def.quarters, def.quarter_count * 125, &bad))
-    return fail(error, "quarters[%zu] is not finite", bad);
+    return fail(error, H6_ERROR_RANGE, "quarters[%zu] is not finite", bad);
   return true;
 }
 
 bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
+  if (!check_reserved(def, "", error)) return false;
   if (!(def.voxel_size > 0) || !std::isfinite(def.voxel_size))
-    return fail(error, "voxel_size must be a positive number of metres, it is %g", def.voxel_size);
-  if (!from(def.origin).allFinite()) return fail(error, "origin is not finite");
+    return fail(error, H6_ERROR_RANGE, "voxel_size must be a positive number of metres, it is %g", def.voxel_size);
+  if (!from(def.origin).allFinite()) return fail(error, H6_ERROR_RANGE, "origin is not finite");
   if (!(def.band >= 0) || !std::isfinite(def.band))
-    return fail(error, "band must be >= 0, it is %g", def.band);
+    return fail(error, H6_ERROR_RANGE, "band must be >= 0, it is %g", def.band);
   for (int k = 0; k < 3; ++k)
     if (def.bricks[k] < 1 || def.bricks[k] > 256)
       return fail(error, "bricks[%d] is %d; 1 to 256 (2048 nodes) are supported", k, def.bricks[k]);
@@ -86,11 +87,11 @@ bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
                   def.brick_count);
   std::size_t bad = 0;
   if (!all_finite(model, def.samples, def.brick_count * 512, &bad))
-    return fail(error, "samples[%zu] is not finite", bad);
+    return fail(error, H6_ERROR_RANGE, "samples[%zu] is not finite", bad);
   const std::size_t nodes =
       std::size_t(def.bricks[0] + 1) * (def.bricks[1] + 1) * (def.bricks[2] + 1);
   for (std::size_t i = 0; i < nodes; ++i)
-    if (!std::isfinite(def.far_grid[i])) return fail(error, "far_grid[%zu] is not finite", i);
+    if (!std::isfinite(def.far_grid[i])) return fail(error, H6_ERROR_RANGE, "far_grid[%zu] is not finite", i);
   return check_finer(def, model, error);
 }
 
@@ -143,23 +144,61 @@ float steepest(const h6FieldDef& def) {
   return most;
 }
 
-// Room for the finer samples, if there are any, and for what a gather reads behind the last.
-bool reserve_finer(const kernels::FieldLayoutSize& size, const h6Allocator& allocator, Field* field,
-                   h6Error* error) {
-  if (size.refined == 0) return true;
-  constexpr std::size_t most_units = INT32_MAX / (kernels::kFineUnit * sizeof(std::int16_t));
+// Whether some place in a far cell may sample less than the margin of the field's box: views.h, J.
+bool may_be_near(const std::int16_t* corners, float band) {
+  float least = HUGE_VALF;
+  for (int k = 0; k < 8; ++k) least = std::min(least, kernels::kFarQuantum * corners[k]);
+  if (!(least > 0)) return true;
+  constexpr float kSag = 48;  // 64 sum t (1 - t), at most
+  const float squared =
+      std::max(least * least - kSag, std::min(least, band) * std::min(least, band));
+  return squared < kBoxMargin * kBoxMargin;
+}
+
+Box box_of(const h6FieldDef& def, const Field& field) {
+  Box box;
+  for (std::int32_t c = 0, slot = 0; c < def.bricks[2]; ++c)
+    for (std::int32_t b = 0; b < def.bricks[1]; ++b)
+      for (std::int32_t a = 0; a < def.bricks[0]; ++a, ++slot) {
+        const std::int32_t entry = field.table[slot];
+        if (entry < 0 &&
+            !may_be_near(field.far.data + 8 * (std::ptrdiff_t{-1} - entry), field.view.band))
+          continue;
+        const Vec3 low = field.origin + 8 * field.voxel * Vec3(a, b, c);
+        box = united(box, {low, low + Vec3::Constant(8 * field.voxel)});
+      }
+  return box;
+}
+
+// Room for the bricks and the finer samples behind them, and for what a gather reads behind the
+// last of each. Kernels address both by 32-bit byte offsets.
+bool reserve_samples(const kernels::FieldLayoutSize& size, const h6Allocator& allocator,
+                     Field* field, h6Error* error) {
+  constexpr std::size_t most = INT32_MAX / sizeof(std::int16_t);
+  constexpr std::size_t most_bricks = most / kernels::kBrickStride;
   constexpr std::size_t most_cuts = INT32_MAX / (kernels::kCutStride * sizeof(std::uint16_t));
-  if (size.fine_units > most_units || size.refined > most_cuts)
+  const std::size_t bricks = (size.bricks + 1) * kernels::kBrickStride;
+  const std::size_t fine =
+      size.refined > 0 ? (size.fine_units + 1) * std::size_t{kernels::kFineUnit} : 0;
+  const std::size_t cuts = size.refined > 0 ? size.refined * kernels::kCutStride + 2 : 0;
+  if (size.bricks > most_bricks)
+    return fail(error,
+                "%zu bricks are more than the %zu supported: use a larger voxel or a narrower band",
+                size.bricks, most_bricks);
+  if ((fine > 0 && bricks + fine > most) || size.refined > most_cuts)
     return fail(error,
                 "%zu refined bricks with %zu MB of finer samples are too many: 2 GB can be "
                 "addressed",
-                size.refined, size.fine_units * kernels::kFineUnit * 2 / 1000000);
-  const std::size_t fine = (size.fine_units + 1) * kernels::kFineUnit;
-  const std::size_t cuts = size.refined * kernels::kCutStride + 2;
-  if (!field->fine.reserve(allocator, fine) || !field->cuts.reserve(allocator, cuts))
-    return fail(error, "no memory for %zu refined bricks (%zu MB)", size.refined,
-                (fine + cuts) * 2 / 1000000);
-  for (int i = 0; i < kernels::kFineUnit; ++i) field->fine[fine - kernels::kFineUnit + i] = 0;
+                size.refined, (bricks + fine) * 2 / 1000000);
+  if (!field->bricks.reserve(allocator, bricks + fine) ||
+      !field->far.reserve(allocator, (size.far_cells + 1) * 8) ||
+      (cuts > 0 && !field->cuts.reserve(allocator, cuts)))
+    return fail(error, H6_ERROR_MEMORY, "no memory for %zu bricks (%zu MB)", size.bricks,
+                (bricks + fine + cuts) * 2 / 1000000);
+  for (std::size_t i = bricks - kernels::kBrickStride; i < bricks; ++i) field->bricks[i] = 0;
+  for (int i = 0; i < 8; ++i) field->far[size.far_cells * 8 + i] = 0;
+  if (size.refined == 0) return true;
+  for (std::size_t i = fine - kernels::kFineUnit; i < fine; ++i) field->bricks[bricks + i] = 0;
   field->cuts[cuts - 2] = field->cuts[cuts - 1] = 0;
   return true;
 }
@@ -174,41 +213,30 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
   field->wide = def.band < 2.999 * def.voxel_size;
   const std::size_t cells = std::size_t(def.bricks[0]) * def.bricks[1] * def.bricks[2];
   const kernels::FieldLayoutSize size = kernels::field_layout_size(def);
-  // Kernels address bricks by 32-bit byte offsets.
-  constexpr std::size_t most = INT32_MAX / (kernels::kBrickStride * sizeof(std::int16_t));
-  if (size.bricks > most)
-    return fail(error,
-                "%zu bricks are more than the %zu supported: use a larger voxel or a narrower band",
-                size.bricks, most);
-  if (!field->table.reserve(model.allocator, cells) ||
-      !field->bricks.reserve(model.allocator, (size.bricks + 1) * kernels::kBrickStride) ||
-      !field->far.reserve(model.allocator, (size.far_cells + 1) * 8))
-    return fail(error, "no memory for %zu bricks (%zu MB)", size.bricks,
-                size.bricks * kernels::kBrickStride * 2 / 1000000);
-  if (!reserve_finer(size, model.allocator, field, error)) return false;
-  // One row more than used, because a gather may read past its node, and an empty pool must be
-  // readable.
-  for (int i = 0; i < kernels::kBrickStride; ++i)
-    field->bricks[size.bricks * kernels::kBrickStride + i] = 0;
-  for (int i = 0; i < 8; ++i) field->far[size.far_cells * 8 + i] = 0;
+  if (!field->table.reserve(model.allocator, cells))
+    return fail(error, H6_ERROR_MEMORY, "no memory for the table of %zu bricks", size.bricks);
+  if (!reserve_samples(size, model.allocator, field, error)) return false;
+  std::int16_t* const fine =
+      field->bricks.data + (size.bricks + 1) * std::size_t{kernels::kBrickStride};
   kernels::layout_table(def, field->table.data);
   if (size.refined > 0) field->steepest = steepest(def);
   if (size.refined > 0) kernels::layout_cuts(def, field->table.data, field->cuts.data);
   if (!convert_names(def, def.part, size.bricks, *field, model.allocator, &field->part) ||
       !convert_names(def, def.triangle, size.bricks, *field, model.allocator, &field->triangle))
-    return fail(error, "no memory for the names of %zu bricks", size.bricks);
+    return fail(error, H6_ERROR_MEMORY, "no memory for the names of %zu bricks", size.bricks);
   for_each(model, cells, [&](std::size_t cell) {
     kernels::layout_cell(def, field->table.data, cell, field->bricks.data, field->far.data);
     if (size.refined > 0)
-      kernels::layout_fine(def, field->table.data, field->cuts.data, cell, field->fine.data);
+      kernels::layout_fine(def, field->table.data, field->cuts.data, cell, fine);
   });
   for (int k = 0; k < 3; ++k) field->view.size[k] = def.bricks[k];
   field->view.table = field->table.data;
   field->view.bricks = field->bricks.data;
   field->view.far = field->far.data;
   field->view.cuts = field->cuts.data;
-  field->view.fine = field->fine.data;
+  field->view.fine = fine;
   field->view.band = kernels::layout_band(def);
+  field->box = box_of(def, *field);
   return true;
 }
 

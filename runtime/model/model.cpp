@@ -3,22 +3,10 @@
 #include "runtime/model/model.h"
 
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include "kernels/field/sample_field.h"
 
 namespace h6 {
-
-bool fail(h6Error* error, const char* format, ...) {
-  if (error) {
-    va_list arguments;
-    va_start(arguments, format);
-    std::vsnprintf(error->message, sizeof error->message, format, arguments);
-    va_end(arguments);
-  }
-  return false;
-}
 
 namespace {
 
@@ -39,6 +27,7 @@ void drop_array(const h6Allocator& allocator, T* array, std::size_t count) {
 }
 
 bool fill(h6Model& model, const h6ModelDef& def, h6Error* error) {
+  if (!check_reserved(def, "", error)) return false;
   if ((def.field_count && !def.fields) || (def.shell_count && !def.shells))
     return fail(error, "the model definition counts fields or shells but points at none");
   if (def.field_count > kMostParts || def.shell_count > kMostParts)
@@ -46,19 +35,19 @@ bool fill(h6Model& model, const h6ModelDef& def, h6Error* error) {
                 kMostParts, def.field_count, def.shell_count);
   model.fields = make_array<Field>(def.allocator, def.field_count);
   if (def.field_count && !model.fields)
-    return fail(error, "no memory for %zu fields", def.field_count);
+    return fail(error, H6_ERROR_MEMORY, "no memory for %zu fields", def.field_count);
   model.field_count = def.field_count;
   model.shells = make_array<Shell>(def.allocator, def.shell_count);
   if (def.shell_count && !model.shells)
-    return fail(error, "no memory for %zu shells", def.shell_count);
+    return fail(error, H6_ERROR_MEMORY, "no memory for %zu shells", def.shell_count);
   model.shell_count = def.shell_count;
   h6Error why;
   for (std::size_t i = 0; i < def.field_count; ++i)
     if (!convert_field(def.fields[i], def, &model.fields[i], &why))
-      return fail(error, "field %zu: %s", i, why.message);
+      return fail(error, why.code, "field %zu: %s", i, why.message);
   for (std::size_t i = 0; i < def.shell_count; ++i)
     if (!convert_shell(def.shells[i], def.allocator, &model.shells[i], &why))
-      return fail(error, "shell %zu: %s", i, why.message);
+      return fail(error, why.code, "shell %zu: %s", i, why.message);
   return true;
 }
 
@@ -72,7 +61,7 @@ extern "C" {
 h6Model* h6CreateModel(const h6ModelDef* def, h6Error* error) {
   if (!def) return fail(error, "no model definition was given"), nullptr;
   h6Model* model = create<h6Model>(def->allocator);
-  if (!model) return fail(error, "no memory for a model"), nullptr;
+  if (!model) return fail(error, H6_ERROR_MEMORY, "no memory for a model"), nullptr;
   model->allocator = def->allocator;
   if (fill(*model, *def, error)) return model;
   h6DestroyModel(model);

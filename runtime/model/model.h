@@ -4,9 +4,12 @@
 #include "hapsix/hapsix.h"
 #include "kernels/views.h"
 #include "runtime/base/arena.h"
+#include "runtime/base/box.h"
 #include "runtime/base/math.h"
 
 namespace h6 {
+
+inline constexpr double kBoxMargin = 2;  // the largest margin of a definition [voxel]
 
 struct Field {
   Vec3 origin;         // node (0,0,0), mesh frame [m]
@@ -14,14 +17,17 @@ struct Field {
   double finest = 0;   // its finest samples are this far apart [m]: what depths are measured in
   bool wide = false;   // its band is under 3 voxels: culling uses the long form (cull_spheres.h)
   float steepest = 0;  // slope of finer samples, at least 1; 0: there are none (cull_spheres.h)
+  // Mesh frame. A point that samples less than kBoxMargin voxels is inside, or outside of the grid
+  // and no farther from it than its sample.
+  Box box;
   kernels::FieldView view{};
   Buffer<std::int32_t> table;
-  Buffer<std::int16_t> bricks, far, fine;
+  Buffer<std::int16_t> bricks, far;  // finer samples lie behind the bricks
   Buffer<std::uint16_t> cuts;
   Buffer<std::int32_t> part, triangle;  // (bricks) or empty
   std::size_t bytes() const {
     return (table.count + part.count + triangle.count) * 4 +
-           (bricks.count + far.count + fine.count + cuts.count) * 2;
+           (bricks.count + far.count + cuts.count) * 2;
   }
 };
 
@@ -66,6 +72,7 @@ struct Samples {
 struct Shell {
   Vec3 centre;                        // mesh frame [m]
   double radius = 0;                  // farthest point from the centre [m]
+  Box box;                            // around all points, mesh frame [m]
   std::size_t points = 0;             // rows; columns repeat the last one up to a whole block
   Column<float> x, y, z, nx, ny, nz;  // normals point inward
   Column<std::uint32_t> point;        // of the definition
@@ -87,6 +94,21 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
 
 // Writes the sentence (when there is somebody to read it) and returns false.
 bool fail(h6Error* error, const char* format, ...) __attribute__((format(printf, 2, 3)));
+// The same with another code than H6_ERROR_ARGUMENT.
+bool fail(h6Error* error, h6ErrorCode code, const char* format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+// Words of `reserved` that are set ask for something that only a later version knows.
+template <class Def>
+bool check_reserved(const Def& def, const char* where, h6Error* error) {
+  for (const std::uint64_t word : def.reserved)
+    if (word != 0)
+      return fail(error,
+                  "%sreserved is not zero: begin with the default function of the definition, or "
+                  "use a later version of hapsix, which the program was compiled for",
+                  where);
+  return true;
+}
 
 }  // namespace h6
 

@@ -69,7 +69,7 @@ bool check_spheres(const h6ShellDef& def, h6Error* error) {
   // Parents are found in one sweep; then each node of the last level walks up.
   const std::uint32_t nodes = def.level_first[def.level_count];
   Buffer<std::uint32_t> parent;
-  if (!parent.reserve({}, nodes)) return fail(error, "no memory to check %u nodes", nodes);
+  if (!parent.reserve({}, nodes)) return fail(error, H6_ERROR_MEMORY, "no memory to check %u nodes", nodes);
   for (std::uint32_t r = 0; r < def.level_first[def.level_count - 1]; ++r)
     for (std::uint32_t c = 0; c < def.node_child_count[r]; ++c)
       parent[def.node_first_child[r] + c] = r;
@@ -247,14 +247,14 @@ void lay_out(Shell& shell, Arena& arena) {
 
 bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
                    h6Error* error) {
-  if (!check_tree(def, error) || !check_points(def, error) || !check_spheres(def, error))
+  if (!check_reserved(def, "", error) || !check_tree(def, error) || !check_points(def, error) || !check_spheres(def, error))
     return false;
   const std::size_t n = shell->points = def.point_count;
   const std::size_t padded = (n + kBlockRows - 1) / kBlockRows * kBlockRows;
   Arena room;
   lay_out(*shell, room);
   if (!shell->memory.reserve(allocator, room.used()))
-    return fail(error, "no memory for %zu points", n);
+    return fail(error, H6_ERROR_MEMORY, "no memory for %zu points", n);
   Arena arena(shell->memory.data, shell->memory.count);
   lay_out(*shell, arena);
 
@@ -271,6 +271,7 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
+  shell->box = {low, high};
   shell->centre = 0.5 * (low + high);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 p(def.x[i], def.y[i], def.z[i]);

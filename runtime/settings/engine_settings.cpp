@@ -217,16 +217,22 @@ constexpr Setting kSessionRows[] = {
     number<&h6SessionDef::rate>("rate", "Hz", 1000, between(100, 10000), "frames per second"),
     plain<&h6SessionDef::gravity>("gravity", Kind::vec3, "m/s^2",
                                   "default 0: the arm carries the part"),
-    whole<&h6SessionDef::max_contacts>("max_contacts", 16384, between(1, 1e6),
-                                       "of a shell body; storage is reserved once"),
+    whole<&h6SessionDef::max_contacts>(
+        "max_contacts", 16384, between(1, 1e6),
+        "of a shell body; storage is reserved once, up to 330 bytes each"),
+    whole<&h6SessionDef::max_pairs>(
+        "max_pairs", 0, between(0, 1e8),
+        "pairs of bodies that are near each other at a time; storage is reserved once; 0: all that "
+        "there can be, at most 4096 and 16 for each shell"),
     whole<&h6SessionDef::max_substeps>(
         "max_substeps", 16, between(1, 64),
         "a frame takes up to this many steps, as many as keep every point near a field from moving "
         "farther than a fifth of a voxel in one"),
     flag<&h6SessionDef::net_stiffness>(
         "net_stiffness", "report the extreme stiffness of all contacts together in every frame"),
-    whole<&h6SessionDef::threads>("threads", 1, between(1, 2),
-                                  "1: the haptic thread alone; 2: with one resident helper"),
+    whole<&h6SessionDef::threads>("threads", 1, between(1, 64),
+                                  "the haptic thread and its helpers; more than the machine has "
+                                  "cores only cost time"),
     number<&h6SessionDef::frame_budget_us>(
         "frame_budget_us", "us", 0, between(0, 1e6),
         "anytime mode: a frame that would take longer leaves out points; 0: never")};
@@ -245,6 +251,8 @@ constexpr Setting kLoopRows[] = {
                                 "poll the clock for so long before each deadline"),
     whole<&h6LoopDef::ring_frames>("ring_frames", 1000, between(0, 1e7),
                                    "records kept for a slow reader; 0: none"),
+    whole<&h6LoopDef::ring_inputs>("ring_inputs", 0, between(0, 1e7),
+                                   "frames beyond these of which the inputs are kept"),
     flag<&h6LoopDef::disarmed>("disarmed", "every output stays at zero until h6ArmLoop"),
     whole<&h6LoopDef::view_contacts>("view_contacts", 0, between(0, 1e6),
                                      "rows of contacts kept for a viewer; 0: no viewer")};

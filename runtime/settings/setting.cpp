@@ -29,7 +29,7 @@ bool check_number(const Setting& row, double x, const char* where, h6Error* erro
   if (std::isfinite(x) && (r.above_low ? x > r.low : x >= r.low) && x <= r.high) return true;
   char range[kSentence];
   say_range(row, range);
-  return fail(error, "%s%s must be %s, it is %g", where, row.name, range, x);
+  return fail(error, H6_ERROR_RANGE, "%s%s must be %s, it is %g", where, row.name, range, x);
 }
 
 bool check_choice(const Setting& row, int x, const char* where, h6Error* error) {
@@ -41,13 +41,15 @@ bool check_choice(const Setting& row, int x, const char* where, h6Error* error) 
     length += std::snprintf(known + length, room, "%s%s (%d)", length ? ", " : "", c.name, c.value);
     if (length >= static_cast<int>(sizeof known)) length = sizeof known - 1;
   }
-  return fail(error, "%s%s %d does not exist; it is one of %s", where, row.name, x, known);
+  return fail(error, H6_ERROR_RANGE, "%s%s %d does not exist; it is one of %s", where, row.name, x,
+              known);
 }
 
 bool check_finite(const Setting& row, const double* x, int count, const char* where,
                   h6Error* error) {
   for (int i = 0; i < count; ++i)
-    if (!std::isfinite(x[i])) return fail(error, "%s%s is not finite", where, row.name);
+    if (!std::isfinite(x[i]))
+      return fail(error, H6_ERROR_RANGE, "%s%s is not finite", where, row.name);
   return true;
 }
 
@@ -56,7 +58,8 @@ bool check_quaternion(const Setting& row, const h6Quat& q, const char* where, h6
   if (!check_finite(row, x, 4, where, error)) return false;
   const double n = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]);
   return std::fabs(n - 1) <= 1e-3 ||
-         fail(error, "%s%s must be a unit quaternion, its length is %g", where, row.name, n);
+         fail(error, H6_ERROR_RANGE, "%s%s must be a unit quaternion, its length is %g", where,
+              row.name, n);
 }
 
 bool check_row(const Setting& row, const void* value, const char* where, h6Error* error) {

@@ -3,6 +3,12 @@
  *
  * Everything in this folder is plain C99 (and C++), needs only the standard headers and is the
  * whole contract between the engine and a program that embeds it.
+ *
+ * A program that was compiled with an earlier 0.1 runs with this library unchanged. Definitions and
+ * records end in `reserved`: a member that comes later takes words of it, so no size, no offset and no
+ * array changes, and a zero there means "as before". A program writes zeros there: it begins with the
+ * default function of the definition. A definition with other words is refused, since it asks for
+ * something that this library does not know. Enumerations grow at their end.
  */
 #ifndef HAPSIX_BASE_H
 #define HAPSIX_BASE_H
@@ -23,6 +29,12 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* The version of the library that runs, 10000 * major + 100 * minor + patch; the macros tell which one
+ * the program was compiled with. */
+H6_API uint32_t h6Version(void);
+/* One line for reports: version, compiler, SIMD targets that this machine runs, best first. */
+H6_API const char* h6BuildInfo(void);
 
 /* What happened in this frame, as bits; 0 is a frame in which nothing was dropped or limited.
  * Each bit says what was done about it and what the user can change. */
@@ -59,15 +71,32 @@ enum {
   /* A body near a field would have moved farther than a fifth of a voxel in a step, since the frame
    * had no steps left or the body gained speed too suddenly: all bodies were slowed down. Raise
    * h6SessionDef.max_substeps or the rate. */
-  H6_SHORTENED = 1u << 12
+  H6_SHORTENED = 1u << 12,
+  /* More pairs of bodies were near each other than max_pairs: some that came last take no part until
+   * others have parted. Raise h6SessionDef.max_pairs. */
+  H6_PAIRS_LEFT_OUT = 1u << 13
 };
 
 /* The name of one status bit ("contacts dropped"), or NULL when the bit has no name. */
 H6_API const char* h6StatusName(h6Status bit);
 
-/* Why a call failed: one sentence that says what is wrong, where, and what to do. */
+/* Why a call failed, for programs. */
+typedef enum h6ErrorCode {
+  H6_NO_ERROR = 0,
+  H6_ERROR_ARGUMENT,  /* a NULL, a count or an index that cannot be, a definition that is not whole   */
+  H6_ERROR_RANGE,     /* a value outside the range that its comment gives, or not finite             */
+  H6_ERROR_MEMORY,    /* the allocator, or the machine, has no more                                   */
+  H6_ERROR_SYSTEM,    /* the system refused a thread or another service                               */
+  H6_ERROR_BUSY,      /* a loop runs that session                                                     */
+  H6_ERROR_FILE,      /* a file cannot be read or written                                             */
+  H6_ERROR_CONTENT,   /* a file or mesh was read, and what it holds cannot be used                    */
+  H6_ERROR_CANCELLED  /* a progress function returned false                                           */
+} h6ErrorCode;
+
+/* ... and for people: one sentence that says what is wrong, where, and what to do. */
 typedef struct h6Error {
-  char message[512];
+  char        message[512];
+  h6ErrorCode code;
 } h6Error;
 
 /* Memory comes from these two when both are set, else from the C library. They are called only
@@ -77,6 +106,26 @@ typedef struct h6Allocator {
   void (*release)(void* user, void* memory, size_t bytes);
   void* user;
 } h6Allocator;
+
+/* Sentences that no call returns: how a session starts, what a bake repaired. The default is silence;
+ * nothing is ever printed. Any thread but one inside a step calls it, so it must be thread-safe. Set it
+ * before any other call; NULL restores silence. */
+typedef enum h6LogLevel { H6_LOG_NOTE = 0, H6_LOG_WARNING } h6LogLevel;
+typedef void (*h6LogHandler)(void* user, h6LogLevel level, const char* sentence);
+H6_API void h6SetLogHandler(h6LogHandler handler, void* user);
+H6_API void h6Log(h6LogLevel level, const char* sentence); /* to that handler */
+
+/* A program's own workers, for sessions with several threads (h6SessionDef.tasks). At the start of
+ * each frame the engine calls enqueue once for every helper that it would like: some thread of the
+ * program, not the caller, should soon run task(context), which takes work until the frame ends. At the
+ * end of the frame it calls finish with what enqueue returned: task then returns at once, or does
+ * nothing if it has not begun, and finish returns when it will not touch `context` again. A task that
+ * never runs only makes the frame slower. Both are called by the stepping thread. */
+typedef struct h6Tasks {
+  void* (*enqueue)(void* user, void (*task)(void* context), void* context);
+  void  (*finish)(void* user, void* handle);
+  void* user;
+} h6Tasks;
 
 /* Called when one of the engine's own assertions fails; return 0 to go on, else the process
  * stops. Set before any other call; NULL restores the default (a line on stderr, then stop). */

@@ -35,6 +35,7 @@ typedef struct h6DeviceCapabilities {
                                0: samples may stay equal (encoders at rest, a path)           [s]  */
   bool     frame_time;      /* a simulation that lives on the frames' own time: no frame is late for
                                it, and the watchdog ignores it                                     */
+  uint64_t reserved[8];
 } h6DeviceCapabilities;
 
 /* Where the hand holds the mesh frame of its body. Beyond 1e6 m, m/s, rad/s or N a sample is bad. */
@@ -47,6 +48,7 @@ typedef struct h6DeviceSample {
                           (pseudo-admittance); not read in impedance mode                [N, N m]  */
   uint32_t   sequence; /* counts the device's own samples, so that a device that hangs is found
                           within 50 ms; always 0: the device does not count                        */
+  uint64_t reserved[2];
 } h6DeviceSample;
 
 /* State of a hand's device. Only in `active` can the output differ from zero (admittance: from a held
@@ -92,6 +94,7 @@ typedef enum h6Cause {
   H6_CAUSE_WATCHDOG,    /* the haptic thread stalled: devices were stopped; latched                */
   H6_CAUSE_COUNT
 } h6Cause;
+#define H6_MAX_CAUSES 32 /* h6DeviceCommand.causes has a bit for each */
 H6_API const char* h6CauseName(h6Cause cause);
 
 /* A command to a device. Always finite, inside the rating, slew-limited. */
@@ -103,14 +106,15 @@ typedef struct h6DeviceCommand {
   h6Velocity velocity;/* of that mesh frame's origin, world frame; zero in impedance mode          */
   h6Cause    cause;   /* the gravest cause                                                         */
   uint32_t   causes;  /* all causes: bits 1u << h6Cause                                            */
+  uint64_t reserved[2];
 } h6DeviceCommand;
 
 /* What the safety chain of a hand has done. */
 typedef struct h6HandSafety {
   h6DeviceState state;
   h6Cause       fault;                 /* latched, until h6Arm; or H6_CAUSE_NONE                   */
-  uint64_t      frames[H6_CAUSE_COUNT];/* frames with this cause                                   */
-  uint64_t      times[H6_CAUSE_COUNT]; /* times that this cause began                              */
+  uint64_t      frames[H6_MAX_CAUSES]; /* frames with this cause                                   */
+  uint64_t      times[H6_MAX_CAUSES];  /* times that this cause began                              */
 } h6HandSafety;
 
 typedef struct h6Device {
@@ -125,6 +129,7 @@ typedef struct h6Device {
    * at every h6ArmLoop; it must return at once. A device that has it renders nothing from a stop to the
    * next arm, whatever the commands. Returns 0; non-zero: it cannot, and the hand stays as it is. */
   int  (*arm)(void* self);
+  uint64_t reserved[4];
 } h6Device;
 
 #ifdef __cplusplus

@@ -8,7 +8,16 @@
  *
  * Nothing here opens a file or names a device. A step never allocates, locks, prints, throws or
  * waits. Create functions return NULL and fill `error` (which may be NULL) when they fail. For a NULL,
- * a -1 or an index past the end a function gives NULL, -1 or zeros, and changes nothing. */
+ * a -1 or an index past the end a function gives NULL, -1 or zeros, and changes nothing. A value that is
+ * not finite is refused, by a create function or as a bad sample.
+ *
+ * Threads. Any thread, many at once: defaults, names, h6SampleField, h6StiffnessFor, h6WeighContacts,
+ * and everything that only reads a model. A session belongs to one thread at a time: of two threads in
+ * h6Step at once, the second gets H6_OUTPUT_FAULT, and nothing changes. While a loop runs a session it
+ * belongs to the loop's thread: h6Step then gives H6_OUTPUT_FAULT, another h6StartLoop, h6TakeOver and
+ * h6RestartFit fail with H6_ERROR_BUSY, h6SetBody does nothing, and what the h6Get functions give may
+ * change under the reader's eyes: a loop has records and views instead. A session or model must not be
+ * destroyed while another call uses it. */
 #ifndef HAPSIX_H
 #define HAPSIX_H
 
@@ -25,7 +34,13 @@ typedef struct h6Session h6Session;
 typedef struct h6Loop h6Loop;
 
 /* Defaults. A def that was not made by its default function is not valid. */
-H6_API h6ModelDef    h6DefaultModelDef(void);
+H6_API h6FieldDef    h6DefaultFieldDef(void);   /* empty                                              */
+H6_API h6ShellDef    h6DefaultShellDef(void);   /* empty                                              */
+H6_API h6ModelDef    h6DefaultModelDef(void);   /* empty                                              */
+H6_API h6PairDef     h6DefaultPairDef(void);    /* -1, -1                                             */
+H6_API h6ContactArrays h6DefaultContactArrays(void); /* empty, at rest                                */
+H6_API h6Device      h6DefaultDevice(void);     /* no functions; 6-DoF, 10 N, 1 N m                   */
+H6_API h6DeviceSample h6DefaultDeviceSample(void); /* at the origin, at rest                          */
 H6_API h6BodyDef     h6DefaultBodyDef(void);    /* at the origin, at rest, 0.1 kg, no shell, no field */
 H6_API h6ContactDef  h6DefaultContactDef(void); /* firm, k derived from the part, beta 1e-3 s        */
 H6_API h6CouplingDef h6DefaultCouplingDef(void);/* 1e3 N/m, critically damped, half a voxel          */
@@ -108,6 +123,11 @@ H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body)
 H6_API void          h6NameContacts(const h6Session* session, int32_t shell_body, int32_t* part,
                                     int32_t* triangle);
 H6_API h6FrameReport h6GetFrame(const h6Session* session);
+/* The last frame as a row that a recorder takes, for a program that steps by itself: `samples` and
+ * `commands` are those of that h6Step. Zeros for a NULL. */
+struct h6FrameRecord;
+H6_API void          h6GetRecord(const h6Session* session, const h6DeviceSample* samples,
+                                 const h6DeviceCommand* commands, struct h6FrameRecord* out);
 /* Values derived from zeros of the defs: a hand's coupling in use, a body's voxel [m]. */
 H6_API h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand);
 H6_API double        h6GetVoxel(const h6Session* session, int32_t body);
@@ -144,7 +164,7 @@ enum {
 H6_API h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand);
 H6_API void          h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input);
 /* State and fault after the last step, and counts since the session was made. */
-H6_API h6HandSafety h6GetSafety(const h6Session* session, int32_t hand);
+H6_API void         h6GetSafety(const h6Session* session, int32_t hand, h6HandSafety* out);
 
 /* ---- the haptic loop ---------------------------------------------------------------------------- */
 
@@ -163,6 +183,11 @@ typedef struct h6FrameRecord {
                                                   devices; 0 in virtual time                       */
   h6SafetyInput   safety_input[H6_MAX_HANDS];
   uint32_t        settings;                    /* number of h6ChangeSession before this frame      */
+  uint32_t        inputs_only;                 /* 1: the reader was slow, and only the numbers are here
+                                                  that repeat the frame: time, frame, coarse_pairs,
+                                                  coarse_points, hand, safety_input, settings, and cause
+                                                  and causes of commands. 0: all are here              */
+  uint64_t reserved[8];
 } h6FrameRecord;
 
 enum { H6_LATE_COMPUTE = 1u << 0, H6_LATE_WAKEUP = 1u << 1, H6_LATE_STOLEN = 1u << 2 };
@@ -173,9 +198,12 @@ typedef struct h6LoopDef {
   bool     realtime;      /* ask for pinning, SCHED_FIFO and locked memory                         */
   int32_t  core;          /* -1: the last one                                                      */
   double   spin_us;       /* poll the clock this long before each deadline instead of sleeping [us]*/
-  size_t   ring_frames;   /* records kept for a slow reader; lost ones are counted. 0: none        */
+  size_t   ring_frames;   /* records kept for a slow reader; 0: none                               */
+  size_t   ring_inputs;   /* frames beyond these of which the inputs are kept (inputs_only); frames
+                             beyond both are lost and counted                                      */
   bool     disarmed;      /* every output stays at zero until h6ArmLoop                            */
   size_t   view_contacts; /* rows of contacts kept for a viewer; 0: no viewer                      */
+  uint64_t reserved[8];
 } h6LoopDef;
 H6_API h6LoopDef h6DefaultLoopDef(void);  /* real time, realtime asked for, 1000 records           */
 
@@ -190,6 +218,7 @@ typedef struct h6Granted {
   bool    locked;         /* memory                                                                */
   bool    isolated;       /* nothing else is scheduled on that core by itself (isolcpus)           */
   char    governor[32];   /* "performance" keeps the clock up                                      */
+  uint64_t reserved[4];
 } h6Granted;
 
 typedef struct h6LoopReport {
@@ -200,6 +229,7 @@ typedef struct h6LoopReport {
   uint64_t late_stolen;   /* it was not, but the clock was: the machine ran something else         */
   uint64_t late_wakeup;   /* the frame was short enough but started too late                       */
   uint64_t ring_overruns; /* records lost to a slow reader                                         */
+  uint64_t inputs_only;   /* records of which only the inputs were kept                            */
   h6Status status;        /* all bits seen                                                         */
   h6Cause  fault;         /* why the output is latched at zero, or H6_CAUSE_NONE                   */
   double   wakeup_us_max;
@@ -209,9 +239,11 @@ typedef struct h6LoopReport {
   h6Granted grant;        /* the same for programs                                                 */
   h6LateHistogram late_us_compute, late_us_stolen, late_us_wakeup;
   uint64_t coarse_frames; /* frames with H6_COARSE                                                 */
+  uint64_t reserved[16];
 } h6LoopReport;
 
-/* Starts the haptic thread. `devices` has one entry per hand and must outlive the loop. A watchdog
+/* Starts the haptic thread. `devices` has one entry per hand and must outlive the loop. Records come
+ * from the session's allocator. A watchdog
  * thread stops the devices when no command has been sent for a frame and a decay_time, and latches the
  * outputs at zero; there is none when every device lives on the frames' own time (frame_time). */
 H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
@@ -234,6 +266,7 @@ typedef struct h6LoopView {
   size_t   body_count;    const h6Pose* bodies;         /* mesh frame -> world, after the step     */
   size_t   contact_count;                               /* all there are                           */
   size_t   row_count;     const h6ViewContact* contacts;/* all, or evenly picked ones              */
+  uint64_t reserved[4];
 } h6LoopView;
 H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
 /* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused). Devices get the time of the frames,
@@ -261,9 +294,9 @@ H6_API void   h6DisarmLoop(h6Loop* loop);
  * so does the exit of the process. The program installs its signal handlers itself. */
 H6_API void   h6HaltLoop(h6Loop* loop);
 H6_API void   h6HaltAll(void);
-/* Waits for the loop's end, stops the devices and gives the report. Records can be read until
- * h6DestroyLoop. */
-H6_API h6LoopReport h6JoinLoop(h6Loop* loop);
+/* Waits for the loop's end, stops the devices and writes the report, unless `out` is NULL. Records can
+ * be read until h6DestroyLoop. */
+H6_API void         h6JoinLoop(h6Loop* loop, h6LoopReport* out);
 H6_API void         h6DestroyLoop(h6Loop* loop);
 
 #ifdef __cplusplus

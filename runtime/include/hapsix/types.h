@@ -55,6 +55,7 @@ typedef struct h6FieldDef {
   size_t         half_count;
   const float*   quarters;     /* (quarter_count x 5 x 5 x 5), x fastest: signed distance      [m] */
   size_t         quarter_count;
+  uint64_t reserved[8];
 } h6FieldDef;
 
 /* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs
@@ -73,6 +74,7 @@ typedef struct h6ShellDef {
   const float*    node_radius;     /* (nodes)                                                 [m] */
   const uint32_t* node_first_child;/* (nodes) row in the node arrays; 0 in the last level         */
   const uint32_t* node_child_count;/* (nodes) 0 in the last level                                 */
+  uint64_t reserved[8];
 } h6ShellDef;
 
 typedef struct h6ModelDef {
@@ -83,6 +85,7 @@ typedef struct h6ModelDef {
    * to convert fields. NULL: the engine's own workers. */
   void (*parallel_for)(void* user, size_t count, void (*body)(void* context, size_t i), void* context);
   void* parallel_user;
+  uint64_t reserved[8];
 } h6ModelDef;
 
 /* ---- what moves -------------------------------------------------------------------------------- */
@@ -98,10 +101,11 @@ typedef struct h6BodyDef {
   int32_t    shell;      /* index into the model's shells, or -1: none                             */
   int32_t    field;      /* index into the model's fields, or -1: none                             */
   bool       translation_only; /* 3-DoF: never turns, feels no torque (Xu & Barbic 2016, Sec. 3.1) */
+  uint64_t reserved[8];
 } h6BodyDef;
 
 /* A shell body that may touch a field body. Both may move. */
-typedef struct h6PairDef { int32_t shell_body; int32_t field_body; } h6PairDef;
+typedef struct h6PairDef { int32_t shell_body; int32_t field_body; uint64_t reserved[2]; } h6PairDef;
 
 /* How contact stiffness is shared out. The paper: Xu & Barbic 2016, IEEE Trans. Haptics. */
 typedef enum h6Method {
@@ -167,6 +171,7 @@ typedef struct h6ContactDef {
                                each field                                                     [m]  */
   double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none; of
                                sessions, h6WeighContacts does not read it. METHOD.md, Sec. 9       */
+  uint64_t reserved[8];
 } h6ContactDef;
 
 typedef enum h6Integrator { H6_IMPLICIT = 0, H6_EXPLICIT } h6Integrator;
@@ -198,6 +203,7 @@ typedef struct h6CouplingDef {
   double max_torque;          /* 0: max_force * the body's radius                           [N m]  */
   double max_step_voxels;     /* static: no point moves farther than this in a frame, > 0; default
                                  half a voxel                                                      */
+  uint64_t reserved[4];
 } h6CouplingDef;
 
 /* Between a device and the scene: indexing and scaling of motion (METHOD.md, Sec. 4). Scales of 0 are
@@ -210,6 +216,7 @@ typedef struct h6HandFilterDef {
   uint32_t clutch_buttons;  /* indexing: while one of these is down the device moves alone and the
                                hand feels nothing; 0: no clutch                                    */
   bool     relative;        /* the first sample takes the body where it is, wherever the device is */
+  uint64_t reserved[4];
 } h6HandFilterDef;
 
 enum { H6_IMPEDANCE = 1u << 0, H6_ADMITTANCE = 1u << 1, H6_PSEUDO_ADMITTANCE = 1u << 2 };
@@ -237,6 +244,7 @@ typedef struct h6SafetyDef {
   double   freeze_time;     /* equal samples for this long mean that the device is frozen, at most
                                1; 0: the device's                                             [s]  */
   uint32_t dead_man_buttons;/* nothing is rendered unless one of these is held; 0: none            */
+  uint64_t reserved[8];
 } h6SafetyDef;
 
 /* How an arm and the engine exchange data (Xu & Barbic 2016, Fig. 13; METHOD.md, Sec. 4):
@@ -263,10 +271,11 @@ typedef struct h6HandDef {
                                          frames late, 0 .. 2; default 0                            */
   bool            delay_known;        /* ... and always exactly this many                          */
   h6SafetyDef     safety;   /* of the output to the device                                         */
+  uint64_t reserved[8];
 } h6HandDef;
 
 typedef struct h6SessionDef {
-  const h6BodyDef* bodies; size_t body_count;
+  const h6BodyDef* bodies; size_t body_count;  /* at least 1; the storage is reserved once         */
   const h6PairDef* pairs;  size_t pair_count;  /* 0: every moving shell against every other field;
                                                   two moving bodies: the shell of the first listed */
   const h6HandDef* hands;  size_t hand_count;  /* at most H6_MAX_HANDS                             */
@@ -275,22 +284,28 @@ typedef struct h6SessionDef {
   h6Gradient   gradient;
   double       rate;          /* frames per second, 100 .. 10000                             [Hz]  */
   h6Vec3       gravity;       /* default 0: the arm carries the part                      [m/s^2]  */
-  size_t       max_contacts;  /* per shell body; storage is reserved once                          */
+  size_t       max_contacts;  /* per shell body; storage is reserved once, for no more than 8 contacts
+                                 of a point                                                        */
+  size_t       max_pairs;     /* pairs of a shell body and a field body that are near each other at a
+                                 time; storage is reserved once. 0: all that there can be, at most
+                                 4096 and 16 for each shell body (H6_PAIRS_LEFT_OUT)               */
   uint32_t     max_substeps;  /* most steps that a frame takes so that no point near a field moves
                                  farther than a fifth of a voxel in a step, 1 .. 64; default
                                  16. 1, and explicit steps: a frame takes one step, however far it
                                  goes. METHOD.md, Sec. 8                                           */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
-  uint32_t     threads;       /* 1: the calling thread alone; 2: with one resident helper          */
+  uint32_t     threads;       /* that share a frame's work, 1 .. 64: the calling one and resident
+                                 helpers, or `tasks`; at most one for each core helps              */
+  h6Tasks      tasks;         /* the program's own helpers; zero: the engine's                     */
   double       frame_budget_us; /* anytime mode: a step that would take longer samples fewer points
                                    (H6_COARSE). It reads the clock, so runs differ in the points they
                                    leave out; h6SetCoarse repeats one. 0: off; always off in virtual
                                    time [us]                                                       */
   h6Allocator  allocator;
+  uint64_t     reserved[16];
 } h6SessionDef;
 
 #define H6_MAX_HANDS 8
-#define H6_MAX_BODIES 256
 
 /* Contacts of any simulator, for h6WeighContacts: one row per contact, x y z next to each other. All in
  * one frame of reference; arms and torques are about one point, the body's centre of mass. */
@@ -305,6 +320,7 @@ typedef struct h6ContactArrays {
   void*             scratch;   /* h6WeighScratchBytes(count) bytes, any alignment, or NULL: one heap
                                   block of that size, freed before the return                       */
   size_t            scratch_bytes;
+  uint64_t reserved[8];
 } h6ContactArrays;
 
 /* ---- what can be read -------------------------------------------------------------------------- */
@@ -327,6 +343,7 @@ typedef struct h6Contacts {
   const int32_t*  field_body;                    /* the body whose field it touches                */
   const float*    load;                          /* force along N over k: weight * depth; `series`:
                                                     lambda, which includes damping            [m]  */
+  uint64_t reserved[8];
 } h6Contacts;
 
 /* Stages of a frame, in order. */
@@ -340,6 +357,7 @@ typedef enum h6Stage {
   H6_STAGE_OUTPUT,       /* safety chain                                                           */
   H6_STAGE_COUNT
 } h6Stage;
+#define H6_MAX_STAGES 12
 H6_API const char* h6StageName(h6Stage stage);
 
 typedef struct h6FrameReport {
@@ -349,7 +367,7 @@ typedef struct h6FrameReport {
   double   max_depth;                 /* depth of the deepest contact, without its relief and the
                                          fit_offset; 0 without contacts                       [m]  */
   double   max_depth_voxels;          /* the same in voxels of its field: its finest node spacing  */
-  double   stage_us[H6_STAGE_COUNT];
+  double   stage_us[H6_MAX_STAGES];
   double   frame_us;
   uint64_t state_hash;                /* of poses and velocities after the step, of the samples, and
                                          of the friction springs where there is friction           */
@@ -373,6 +391,7 @@ typedef struct h6FrameReport {
                                         with relief or a fit_offset; 0: there are none              */
   uint32_t substeps;                 /* steps that the frame took. `contacts` and h6GetContacts are
                                         those of the last one, depths are the deepest of all        */
+  uint64_t reserved[8];
 } h6FrameReport;
 
 /* The overlap of a shell body with a field body at the start: the points inside the field. */
@@ -383,6 +402,7 @@ typedef struct h6Overlap {
   double   depth;        /* of the deepest point                                              [m]  */
   double   depth_voxels; /* the same in voxels of the field                                        */
   uint32_t deepest;      /* the deepest: its row among those of h6GetOverlapPoints                 */
+  uint64_t reserved[2];
 } h6Overlap;
 typedef struct h6OverlapPoint {
   int32_t  shell_body, field_body;
@@ -393,6 +413,7 @@ typedef struct h6OverlapPoint {
   double   depth_voxels;   /* the same in voxels of the field                                      */
   double   relief;         /* what does not count of its depth now; 0: it has been free; INFINITY:
                               it started too deep and takes no part until it is free          [m]  */
+  uint64_t reserved[2];
 } h6OverlapPoint;
 
 #ifdef __cplusplus

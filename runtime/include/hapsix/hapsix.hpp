@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// hapsix.hpp - the contract for C++20: handles that destroy themselves, and spans.
+//
+// There is no second meaning of anything: a handle is a C pointer that is destroyed in its
+// destructor, and it converts to that pointer, so every function of hapsix.h (and of batch.h and io.h,
+// where they are included first) takes it. A handle that cannot be made throws hapsix::Error.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "hapsix.h"
+
+namespace hapsix {
+
+class Error : public std::runtime_error {
+ public:
+  explicit Error(const h6Error& error) : std::runtime_error(error.message), code(error.code) {}
+  h6ErrorCode code;
+};
+
+// Owns a C object. Moves; does not copy.
+template <class T, void (*destroy)(T*)>
+class Handle {
+ public:
+  Handle() = default;
+  explicit Handle(T* object) : object_(object) {}
+  // make(error) is a call of a create function: Session s = Session::make([&](h6Error* e) {...});
+  template <class Make>
+  static Handle make(Make&& create) {
+    h6Error error{};
+    T* const object = create(&error);
+    if (!object) throw Error(error);
+    return Handle(object);
+  }
+  operator T*() const { return object_.get(); }  // NOLINT: a handle is its pointer
+  T* get() const { return object_.get(); }
+  T* release() { return object_.release(); }
+
+ private:
+  struct Destroy {
+    void operator()(T* object) const { destroy(object); }
+  };
+  std::unique_ptr<T, Destroy> object_;
+};
+
+using Model = Handle<h6Model, h6DestroyModel>;
+using Session = Handle<h6Session, h6DestroySession>;
+using Loop = Handle<h6Loop, h6DestroyLoop>;
+
+inline Model create_model(std::span<const h6FieldDef> fields, std::span<const h6ShellDef> shells,
+                          h6ModelDef def = h6DefaultModelDef()) {
+  def.fields = fields.data(), def.field_count = fields.size();
+  def.shells = shells.data(), def.shell_count = shells.size();
+  return Model::make([&](h6Error* error) { return h6CreateModel(&def, error); });
+}
+
+inline Session create_session(const h6Model* model, std::span<const h6BodyDef> bodies,
+                              std::span<const h6HandDef> hands,
+                              h6SessionDef def = h6DefaultSessionDef(),
+                              std::span<const h6PairDef> pairs = {}) {
+  def.bodies = bodies.data(), def.body_count = bodies.size();
+  def.hands = hands.data(), def.hand_count = hands.size();
+  def.pairs = pairs.data(), def.pair_count = pairs.size();
+  return Session::make([&](h6Error* error) { return h6CreateSession(model, &def, error); });
+}
+
+// One device a hand; they and the session must outlive the loop.
+inline Loop start_loop(h6Session* session, std::span<const h6Device> devices,
+                       const h6LoopDef& def = h6DefaultLoopDef()) {
+  return Loop::make(
+      [&](h6Error* error) { return h6StartLoop(session, devices.data(), &def, error); });
+}
+
+// The contacts of a shell body in the last frame, valid until the next step.
+struct Contacts {
+  explicit Contacts(const h6Contacts& c) : columns(c) {}
+  std::size_t size() const { return columns.count; }
+  std::span<const float> column(const float* first) const { return {first, columns.count}; }
+  std::span<const float> depth() const { return column(columns.depth); }
+  std::span<const float> weight() const { return column(columns.weight); }
+  std::span<const float> load() const { return column(columns.load); }
+  std::span<const std::uint32_t> point() const { return {columns.point, columns.count}; }
+  std::span<const std::int32_t> field_body() const { return {columns.field_body, columns.count}; }
+  h6Vec3 normal(std::size_t i) const { return {columns.nx[i], columns.ny[i], columns.nz[i]}; }
+  h6Vec3 arm(std::size_t i) const { return {columns.rx[i], columns.ry[i], columns.rz[i]}; }
+  h6Contacts columns;
+};
+inline Contacts contacts(const h6Session* session, std::int32_t shell_body) {
+  return Contacts(h6GetContacts(session, shell_body));
+}
+
+inline std::vector<h6Overlap> overlaps(const h6Session* session) {
+  std::vector<h6Overlap> rows(h6GetOverlaps(session, nullptr, 0));
+  h6GetOverlaps(session, rows.data(), rows.size());
+  return rows;
+}
+
+// Records of a loop, oldest first: the part of `room` that was filled.
+inline std::span<const h6FrameRecord> read_records(h6Loop* loop, std::span<h6FrameRecord> room) {
+  return room.first(h6ReadRecords(loop, room.data(), room.size()));
+}
+
+#ifdef HAPSIX_BATCH_H
+using Workers = Handle<h6Workers, h6DestroyWorkers>;
+#endif
+
+#ifdef HAPSIX_IO_H
+using Mesh = Handle<h6Mesh, h6DestroyMesh>;
+using Field = Handle<h6Field, h6DestroyField>;
+using Shell = Handle<h6Shell, h6DestroyShell>;
+using Scene = Handle<h6Scene, h6DestroyScene>;
+using Recorder = Handle<h6Recorder, h6DestroyRecorder>;
+using Recording = Handle<h6Recording, h6DestroyRecording>;
+#endif
+
+}  // namespace hapsix

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+/* quiet_host.c - a program with an allocator, tasks and messages of its own: the engine allocates
+ * nothing after creation, starts no thread and writes nothing to stdout and stderr. */
+#define _GNU_SOURCE
+#include <dirent.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "runtime/examples/floor.h"
+
+void* __libc_malloc(size_t);
+void* __libc_memalign(size_t, size_t);
+static long of_heap, of_ours, lines, tasks;
+/* All that asks the C library for memory comes through here, the engine and its packages too. */
+void* malloc(size_t n) { return ++of_heap, __libc_malloc(n); }
+void* aligned_alloc(size_t a, size_t n) { return ++of_heap, __libc_memalign(a, n); }
+
+static void* allocate(void* user, size_t bytes, size_t alignment) {
+  (void)user, ++of_ours;
+  return __libc_memalign(alignment, bytes);
+}
+static void release(void* user, void* memory, size_t bytes) {
+  (void)user, (void)bytes, free(memory);
+}
+static void parallel_for(void* user, size_t count, void (*body)(void*, size_t), void* context) {
+  (void)user;
+  for (size_t i = 0; i < count; ++i) body(context, i), ++tasks;
+}
+static void log_line(void* user, h6LogLevel level, const char* sentence) {
+  (void)user, (void)level, lines += sentence[0] != 0;
+}
+static int threads(void) {
+  int count = 0;
+  DIR* all = opendir("/proc/self/task");
+  for (struct dirent* one; all && (one = readdir(all)) != NULL;) count += one->d_name[0] != '.';
+  if (all) closedir(all);
+  return count;
+}
+
+int main(int argc, char** argv) {
+  const char* said = argc > 1 ? argv[1] : "quiet_host.out";
+  const int out = open(said, O_RDWR | O_CREAT | O_TRUNC, 0600), terminal = dup(1);
+  dup2(out, 1), dup2(out, 2);
+  h6SetLogHandler(log_line, NULL);
+  h6ModelDef parts = h6DefaultModelDef();
+  parts.allocator.allocate = allocate, parts.allocator.release = release;
+  parts.parallel_for = parallel_for;
+  h6SessionDef def = h6DefaultSessionDef();
+  def.allocator = parts.allocator;
+  h6Error error;
+  h6Model* model = floor_and_tip(parts, &error);
+  h6Session* session = model ? hold_tip(model, def, &error) : NULL;
+  h6DeviceSample in = h6DefaultDeviceSample();
+  h6DeviceCommand felt;
+  in.pose.p.x = in.pose.p.y = 4e-3;
+  const long heap_before = of_heap, ours_before = of_ours;
+  for (int i = 0; session && i < 2000; ++i) {
+    in.pose.p.z = 5e-3 - 2e-3 * (i % 500 < 250 ? i % 250 : 250 - i % 250) / 250;
+    h6Step(session, &in, &felt);
+    h6FrameRecord row;
+    h6GetRecord(session, &in, &felt, &row);
+  }
+  const long allocated = of_heap - heap_before + of_ours - ours_before;
+  const int running = threads();
+  /* Refusals are sentences for the caller, and no text for the terminal. */
+  def.rate = -1;
+  const bool refused = h6CreateSession(model, &def, &error) == NULL && error.code != H6_NO_ERROR;
+  h6DestroySession(session), h6DestroyModel(model);
+  struct stat written;
+  fstat(out, &written);
+  dup2(terminal, 1);
+  dprintf(1, "%ld allocations in 2000 steps, %d thread, %ld bytes said, %ld tasks, %s\n", allocated,
+          running, (long)written.st_size, tasks,
+          refused && ours_before > 0 ? "refused" : "not refused");
+  return 0;
+}
