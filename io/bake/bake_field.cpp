@@ -79,19 +79,22 @@ std::string millimetres(double metres) {
   return text;
 }
 
-void warn_of_gaps(const bake::Surface& surface, const bake::GapWeld& welded,
+// The first of the warnings.
+void warn_of_gaps(const bake::Surface& surface, const bake::GapWeld& welded, bool by_winding,
                   FieldBakeReport& report) {
+  std::string sentence;
   if (!surface.closed)
-    report.warnings.push_back(
+    sentence =
         "the mesh is not closed: " + plural(surface.odd_edges, "edge has", "edges have") +
-        " an odd number of faces (" + std::to_string(surface.open_edges) +
-        " have one); it is taken as a soup" +
+        " an odd number of faces (" + std::to_string(surface.open_edges) + " have one); " +
+        (by_winding ? "its winding number tells the inside" : "it is taken as a soup") +
         (welded.left > 0 ? "; welding its vertices would leave " + std::to_string(welded.left)
-                         : ""));
+                         : "");
   else if (welded.vertices > 0)
-    report.warnings.push_back(plural(welded.vertices, "vertex", "vertices") +
-                              " of open edges were welded to others up to " +
-                              millimetres(welded.widest) + " away; this closes the mesh");
+    sentence = plural(welded.vertices, "vertex", "vertices") +
+               " of open edges were welded to others up to " + millimetres(welded.widest) +
+               " away; this closes the mesh";
+  if (!sentence.empty()) report.warnings.insert(report.warnings.begin(), sentence);
 }
 
 void warn(const bake::Surface& surface, const bake::Grid& grid, bool nothing_inside, double seal,
@@ -131,14 +134,15 @@ Outcome weld(const Mesh& mesh, const FieldBake& options, bake::Surface& surface,
              bake::GapWeld& welded) {
   if (!(options.weld >= 0 && options.weld <= 1))
     return Failure{"vertices are welded within 0 to 1 voxel"};
-  if (surface.closed || options.weld == 0) return Done{};
-  double voxel = 2 * options.tolerance;
-  if (voxel == 0) {
-    const Result<bake::Grid> grid = bake::choose_grid(surface, options, true);
-    if (!grid) return grid.failure();
-    voxel = grid->voxel;
-  }
-  weld_gaps(mesh, options.weld * voxel, options.threads, surface, welded);
+  if (surface.closed || (options.weld == 0 && options.weld_length == 0)) return Done{};
+  const Result<double> found = bake::finest_voxel(surface, options);
+  if (!found) return found.failure();
+  const double voxel = *found;
+  if (options.weld_length > voxel)
+    return Failure{"vertices are welded within a voxel, which is " + millimetres(voxel) +
+                   " here: choose less, or larger voxels"};
+  const double length = options.weld_length > 0 ? options.weld_length : options.weld * voxel;
+  weld_gaps(mesh, length, options.threads, surface, welded);
   return Done{};
 }
 
@@ -475,7 +479,7 @@ Result<FieldData> bake_to_tolerance(bake::Surface& surface, const FieldBake& opt
   return refine(coarse->field, fine->field, options.tolerance, options.threads);
 }
 
-Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, FieldBakeReport* report,
+Result<FieldData> bake_checked(const Mesh& mesh, FieldBake options, FieldBakeReport* report,
                                const Progress& progress) {
   using namespace bake;
   const Steps steps(progress);
@@ -493,7 +497,6 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
     report->closed = surface.closed;
     report->welded = welded.left == 0 ? welded.vertices : 0;
     report->weld_widest = welded.left == 0 ? welded.widest : 0;
-    warn_of_gaps(surface, welded, *report);
   }
   const bool sealed = surface.closed && options.sign != SignMode::flood;
   if (mesh.part_names.size() < 2) surface.part.clear();
@@ -505,7 +508,9 @@ Result<FieldData> bake_checked(const Mesh& mesh, const FieldBake& options, Field
   field->triangles = mesh.triangles.size();
   field->tolerance = options.tolerance;
   if (parts) field->part_names = mesh.part_names;
-  if (report) report->stages = steps.stages();
+  if (!report) return field;
+  warn_of_gaps(surface, welded, options.sign == SignMode::winding, *report);
+  report->stages = steps.stages();
   return field;
 }
 

@@ -27,8 +27,8 @@ inline constexpr double kWidestBand = 8;  // [voxel]
 struct FieldBake {
   int voxels = 256;       // cells on the longest padded side, 16 .. 2048
   double voxel_size = 0;  // [m] replaces `voxels` when > 0
-  // > 0: the largest error [m] within 12 tolerances of the surface, in place of voxels: coarse
-  // voxels of 8 tolerances, cut into 2 or 4 where they would miss it. The cut ones decide about
+  // > 0: the largest error [m] within 9 tolerances of the surface, in place of voxels: coarse
+  // voxels of 6 tolerances, cut into 2 or 4 where they would miss it. The cut ones decide about
   // sides, holes and the automatic offset.
   double tolerance = 0;
   double offset = -1;  // sigma [m]; < 0: automatic (0 for closed meshes, else 0.9 voxel)
@@ -43,6 +43,7 @@ struct FieldBake {
   // [voxel], 0 .. 1; 0: only equal ones. A hundredth moves the surface less than the samples are
   // off between nodes, and is a thousand times the rounding of an STL.
   double weld = 0.01;
+  double weld_length = 0;  // [m] at most a (fine) voxel; replaces `weld` when > 0
   double band_voxels = 3;  // cells nearer than this to the surface get samples, 1 ..
                            // kWidestBand; deeper than this, depth is only bounded
   int padding_voxels = 8;  // empty cells around the mesh

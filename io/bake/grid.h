@@ -91,13 +91,14 @@ struct GapWeld {
 void weld_gaps(const Mesh& mesh, double tolerance, unsigned threads, Surface& surface,
                GapWeld& welded);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
-// For a field with a tolerance: two grids that begin at the same node. The error of trilinear
-// interpolation is at most half a voxel, where the field folds back on itself half way between two
-// nodes. So fine voxels of twice the tolerance keep it.
+// For a field with a tolerance: two grids that begin at the same node. The fine voxels are kFinest
+// tolerances.
 struct TwoGrids {
   Grid coarse, fine;
 };
 Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& options, bool sealed);
+// The voxel that decides about sides [m].
+Result<double> finest_voxel(const Surface& surface, const FieldBake& options);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
 
 // One bit for each node of a brick: word z, bit 8*y + x.

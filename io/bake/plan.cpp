@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <vector>
 
 #include "io/bake/grid.h"
@@ -17,6 +18,11 @@ using Corners = std::array<Vec3, 3>;
 
 constexpr double kPiece = 4;     // [voxel] longest edge
 constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
+// Peak of a bake over the bytes of its field; of a refined field the fine bricks reach twice as
+// far.
+constexpr double kPeak = 1.6, kRefinedPeak = 4;
+constexpr std::size_t kProgram = 65'000'000;  // of the program itself
+constexpr std::size_t kBytesATriangle = 300;
 
 // Estimates the number of pieces that a triangle is cut into.
 double pieces_of(const Corners& c) {
@@ -74,16 +80,17 @@ class Bricks {
 Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const FieldBake& options) {
   bake::Surface box;
   box.low = audit.low, box.high = audit.high;
-  FieldBake coarse = options;
-  if (options.tolerance > 0) {
-    const double fine = 2 * options.tolerance;
-    coarse.voxel_size = kCut * fine;
-    const bool bare = audit.closed || options.sign == SignMode::winding;
-    if (options.offset < 0) coarse.offset = bare ? 0 : 0.9 * fine;
-  }
-  const Result<bake::Grid> grid = bake::choose_grid(box, coarse, audit.closed);
+  if (!(norm(audit.high - audit.low) > 0))
+    return Failure{"the mesh has no triangle with area: there is nothing to make a field of"};
+  const Result<bake::Grid> grid = [&]() -> Result<bake::Grid> {
+    if (options.tolerance == 0) return bake::choose_grid(box, options, audit.closed);
+    const Result<bake::TwoGrids> two = bake::choose_two_grids(box, options, audit.closed);
+    if (!two) return two.failure();
+    return two->coarse;
+  }();
   if (!grid) return grid.failure();
   FieldPlan plan;
+  plan.finest = options.tolerance > 0 ? kFinest * options.tolerance : grid->voxel;
   plan.voxel_size = grid->voxel, plan.offset = grid->offset * grid->voxel;
   plan.bricks = grid->bricks;
   Bricks bricks(*grid);
@@ -106,8 +113,33 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
   plan.engine_bytes = plan.brick_count * kernels::kBrickStride * sizeof(std::int16_t) +
                       (cells - plan.brick_count) * 8 * sizeof(std::int16_t) +
                       cells * sizeof(std::int32_t);
-  plan.seconds = 0.05 + 9e-6 * double(plan.brick_count) + 1e-6 * double(mesh.triangles.size());
+  const bool refined = options.tolerance > 0;
+  plan.peak_bytes = kProgram + std::size_t((refined ? kRefinedPeak : kPeak) * double(plan.bytes)) +
+                    kBytesATriangle * mesh.triangles.size();
+  plan.seconds = 0.05 + (refined ? 50 : 1) * 9e-6 * double(plan.brick_count) +
+                 1e-6 * double(mesh.triangles.size());
   return plan;
+}
+
+Result<std::string> needs_of(const FieldPlan& plan, std::uint64_t free) {
+  const auto gigabytes = [](double bytes) {
+    char text[40];
+    if (bytes < 1e9)
+      std::snprintf(text, sizeof text, "%.0f MB", 1e-6 * bytes);
+    else
+      std::snprintf(text, sizeof text, "%.1f GB", 1e-9 * bytes);
+    return std::string(text);
+  };
+  const double peak = double(plan.peak_bytes);
+  char text[160];
+  if (plan.peak_bytes > free) {
+    std::snprintf(text, sizeof text, "choose voxels, or a tolerance, %.1f times as large",
+                  std::ceil(10.5 * std::sqrt(peak / std::max(1.0, double(free)))) / 10);
+    return Failure{"this bake takes about " + gigabytes(peak) + " of memory, and " +
+                   gigabytes(double(free)) + " are free: " + text};
+  }
+  std::snprintf(text, sizeof text, " of memory and %.1g s", plan.seconds);
+  return "about " + gigabytes(peak) + text;
 }
 
 }  // namespace h6::io

@@ -323,7 +323,7 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
 }
 
 Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& options, bool sealed) {
-  const double voxel = 2 * options.tolerance;  // the fine one
+  const double voxel = kFinest * options.tolerance;  // the fine one
   FieldBake o = options;
   o.voxel_size = kCut * voxel;
   const bool winding = options.sign == SignMode::winding;
@@ -360,6 +360,13 @@ Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& optio
     return Failure{text};
   }
   return two;
+}
+
+Result<double> finest_voxel(const Surface& surface, const FieldBake& options) {
+  if (options.tolerance > 0) return kFinest * options.tolerance;
+  const Result<Grid> grid = choose_grid(surface, options, true);
+  if (!grid) return grid.failure();
+  return grid->voxel;
 }
 
 void to_grid(Surface& surface, const Grid& grid, unsigned threads) {

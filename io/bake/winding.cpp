@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/bake/winding.h"
 
+#include <algorithm>
 #include <numbers>
+#include <numeric>
 
 #include "io/bake/tree.h"
 #include "sched/parallel_for.h"
@@ -64,29 +66,62 @@ Winding::Winding(const Surface& surface, unsigned threads)
     }
     level_.push_back(std::move(above));
   }
+  make_leaves();
   look_at_surface();
 }
 
-// Half the solid angle of the triangle turns the sum (A. van Oosterom, J. Strackee, "The solid
+void Winding::make_leaves() {
+  leaf_.resize((count_ + kFan - 1) / kFan);
+  for (std::size_t i = 0; i < leaf_.size(); ++i) {
+    Leaf& leaf = leaf_[i];
+    leaf.first = std::uint32_t(leaf_vertex_.size());
+    const std::size_t end = std::min(count_, kFan * (i + 1));
+    std::uint32_t known[3 * kFan];
+    std::size_t corners = 0;
+    for (std::size_t k = kFan * i; k < end; ++k)
+      for (const std::uint32_t v : surface_.triangles[triangle_[k]]) {
+        const std::uint32_t* at = std::find(known, known + leaf.vertices, v);
+        leaf.corner[corners++] = std::uint8_t(at - known);
+        if (at != known + leaf.vertices) continue;
+        known[leaf.vertices++] = v;
+        leaf_vertex_.push_back(surface_.vertices[v]);
+      }
+    leaf.triangles = std::uint32_t(end - kFan * i);
+  }
+}
+
+// Half the solid angle of each triangle turns the sum (A. van Oosterom, J. Strackee, "The solid
 // angle of a plane triangle", 1983). It is less than half a turn, so the side of the real axis
 // before and after tells a full turn, and one arc tangent serves all triangles.
-void Winding::turn(std::uint32_t triangle, const Vec3& p, Turns& sum) const {
-  const auto& t = surface_.triangles[triangle];
-  const Vec3 a = surface_.vertices[t[0]] - p, b = surface_.vertices[t[1]] - p,
-             c = surface_.vertices[t[2]] - p;
-  const double la = norm(a), lb = norm(b), lc = norm(c);
-  const double y = dot(a, cross(b, c)),
-               x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-  const double length2 = x * x + y * y;
-  if (!(length2 > 1e-200)) return;  // p is on the triangle's rim
-  const double scale = 1 / std::sqrt(length2);
-  const double before = sum.y, cosine = x * scale, sine = y * scale;
-  sum.y = sum.x * sine + before * cosine;
-  sum.x = sum.x * cosine - before * sine;
-  if (y >= 0)
-    sum.full += before >= 0 && sum.y < 0;
-  else
-    sum.full -= before < 0 && sum.y >= 0;
+void Winding::turn(const Leaf& leaf, const Vec3& p, Turns& sum) const {
+  Vec3 to[3 * kFan];
+  double length[3 * kFan];
+  for (std::uint32_t v = 0; v < leaf.vertices; ++v) {
+    to[v] = leaf_vertex_[leaf.first + v] - p;
+    length[v] = norm(to[v]);
+  }
+  for (std::uint32_t t = 0; t < leaf.triangles; ++t) {
+    const std::uint8_t* corner = &leaf.corner[3 * t];
+    const Vec3 &a = to[corner[0]], &b = to[corner[1]], &c = to[corner[2]];
+    const double la = length[corner[0]], lb = length[corner[1]], lc = length[corner[2]];
+    double y = dot(a, cross(b, c)),
+           x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+    const double length2 = x * x + y * y;
+    if (!(length2 > 1e-200)) continue;  // p is on the triangle's rim
+    if (length2 < 1e-12) {              // eight such factors would leave the range of doubles
+      const double scale = 1 / std::sqrt(length2);
+      x *= scale, y *= scale;
+    }
+    const double before = sum.y;
+    sum.y = sum.x * y + before * x;
+    sum.x = sum.x * x - before * y;
+    if (y >= 0)
+      sum.full += before >= 0 && sum.y < 0;
+    else
+      sum.full -= before < 0 && sum.y >= 0;
+  }
+  const double scale = 1 / std::sqrt(sum.x * sum.x + sum.y * sum.y);
+  sum.x *= scale, sum.y *= scale;
 }
 
 double Winding::at(const Vec3& p) const {
@@ -107,35 +142,39 @@ double Winding::at(const Vec3& p) const {
       sum += dot(to, doubles(cluster.dipole)) / (far2 * std::sqrt(far2));
       continue;
     }
-    const std::size_t first = kFan * e.cluster;
     if (e.level == 0) {
-      for (std::size_t k = first; k < std::min(count_, first + kFan); ++k)
-        turn(triangle_[k], p, turns);
+      turn(leaf_[e.cluster], p, turns);
       continue;
     }
+    const std::size_t first = kFan * e.cluster;
     const std::size_t end = std::min(level_[e.level - 1].size(), first + kFan);
     for (std::size_t k = first; k < end; ++k) stack[depth++] = {e.level - 1, std::uint32_t(k)};
   }
   return sum + turns.full + std::atan2(turns.y, turns.x) / (2 * std::numbers::pi);
 }
 
+Winding::Look Winding::look(std::uint32_t triangle) const {
+  constexpr double kNear = 0.2;
+  const auto& t = surface_.triangles[triangle];
+  const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
+             &c = surface_.vertices[t[2]];
+  const Vec3 n = cross(b - a, c - a), m = (1.0 / 3) * (a + b + c), step = (0.5 / norm(n)) * n;
+  const double before = at(m + step), behind = at(m - step), nearest = std::round(before);
+  if (std::fabs(before - nearest) > kNear || std::fabs(behind - std::round(behind)) > kNear)
+    return {};
+  return {nearest >= 0 && std::round(behind) >= nearest, nearest <= 0 && std::round(behind) <= 0};
+}
+
 void Winding::look_at_surface() {
   constexpr std::size_t kLooks = 200;
-  constexpr double kNear = 0.2, kMost = 0.8;
+  constexpr double kMost = 0.8;
   const std::size_t stride = std::max<std::size_t>(1, count_ / kLooks);
   std::size_t looks = 0, outwards = 0, inwards = 0;
   for (std::size_t i = stride / 2; i < count_; i += stride) {
-    const auto& t = surface_.triangles[triangle_[i]];
-    const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
-               &c = surface_.vertices[t[2]];
-    const Vec3 n = cross(b - a, c - a), m = (1.0 / 3) * (a + b + c), step = (0.5 / norm(n)) * n;
-    const double before = at(m + step), behind = at(m - step);
+    const Look l = look(triangle_[i]);
     ++looks;
-    const double nearest = std::round(before);
-    if (std::fabs(before - nearest) > kNear || std::fabs(behind - std::round(behind)) > kNear)
-      continue;
-    outwards += nearest >= 0 && std::round(behind) >= nearest;
-    inwards += nearest <= 0 && std::round(behind) <= 0;
+    outwards += l.outwards;
+    inwards += l.inwards;
   }
   turn_ = inwards > outwards ? -1 : 1;
   trusted_ = double(std::max(outwards, inwards)) >= kMost * double(looks) && looks > 0;

@@ -28,16 +28,30 @@ class Winding {
     float radius;
     std::array<float, 3> dipole;  // sum of area normals over 4 pi
   };
+  // The corners of a leaf's triangles, each vertex once: most are shared, and their distances cost
+  // more than all else.
+  struct Leaf {
+    std::uint32_t first = 0;                    // in leaf_vertex_
+    std::uint32_t vertices = 0, triangles = 0;  // at most 24 and 8
+    std::array<std::uint8_t, 24> corner{};      // (3 x triangles) from `first`
+  };
   struct Turns {
-    double x = 1, y = 0;  // the last turn, begun
+    double x = 1, y = 0;  // the last turn, begun; of any length
     int full = 0;
   };
-  void turn(std::uint32_t triangle, const Vec3& p, Turns& sum) const;
+  void make_leaves();
+  void turn(const Leaf& leaf, const Vec3& p, Turns& sum) const;
+  struct Look {
+    bool outwards = false, inwards = false;  // the ways in which it may be wound
+  };
+  Look look(std::uint32_t triangle) const;
   void look_at_surface();
 
   const Surface& surface_;
   std::size_t count_;
-  Large<std::uint32_t> triangle_;            // in the order of leaves
+  Large<std::uint32_t> triangle_;  // in the order of leaves
+  std::vector<Leaf> leaf_;
+  std::vector<Vec3> leaf_vertex_;
   std::vector<std::vector<Cluster>> level_;  // of eight triangles, of eight of these, ...
   double turn_ = 1;
   bool trusted_ = false;

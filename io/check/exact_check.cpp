@@ -16,6 +16,7 @@ namespace h6::io {
 namespace {
 
 constexpr double kJitter = 2.5;      // [voxel] how far near places lie from the mesh, per axis
+constexpr double kPromised = 9;      // [tolerance] bake_field.h
 constexpr double kNodeSlack = 1e-3;  // [voxel] error that counts as exact
 constexpr double kFarSlack = 1e-4;   // [voxel] rounding of the engine's sampler
 constexpr std::size_t kBlock = 128;  // places per task; sums are joined in the order of blocks
@@ -30,19 +31,20 @@ struct Worst {
 };
 
 struct Tally {
-  Worst node, between, gap, inside_gap, corner, deep;
+  Worst node, between, asked, gap, inside_gap, corner, deep;
   ExactCheck sum;  // its counts
   double excess = 0;
   std::size_t lost = 0;  // places near the mesh where the field has no samples
 
   void add(const Tally& o) {
-    node.add(o.node), between.add(o.between), gap.add(o.gap), inside_gap.add(o.inside_gap),
-        corner.add(o.corner), deep.add(o.deep);
+    node.add(o.node), between.add(o.between), asked.add(o.asked), gap.add(o.gap),
+        inside_gap.add(o.inside_gap), corner.add(o.corner), deep.add(o.deep);
     excess = std::max(excess, o.excess), lost += o.lost;
     for (const auto count :
          {&ExactCheck::buried, &ExactCheck::grown, &ExactCheck::odd, &ExactCheck::nearer,
-          &ExactCheck::voted, &ExactCheck::doubtful, &ExactCheck::solid, &ExactCheck::drained,
-          &ExactCheck::filled, &ExactCheck::enclosed, &ExactCheck::far, &ExactCheck::far_wrong})
+          &ExactCheck::missed, &ExactCheck::voted, &ExactCheck::doubtful, &ExactCheck::solid,
+          &ExactCheck::drained, &ExactCheck::filled, &ExactCheck::enclosed, &ExactCheck::far,
+          &ExactCheck::far_wrong})
       sum.*count += o.sum.*count;
     if (o.sum.leak_depth > sum.leak_depth) sum.leak_depth = o.sum.leak_depth, sum.leak = o.sum.leak;
   }
@@ -101,7 +103,7 @@ class GrownWalls {
   static Result<GrownWalls> find(const Mesh& mesh, const FieldData& field, unsigned threads) {
     GrownWalls walls;
     if (field.grown == 0) return walls;
-    const double voxel = field.tolerance > 0 ? 2 * field.tolerance : field.voxel_size;
+    const double voxel = field.finest();
     ThinPieceOptions ask;
     ask.thinner_than = 1.51 * voxel;  // the bake's limit is 1.5
     ask.piece = 2 * voxel;
@@ -128,7 +130,7 @@ class GrownWalls {
 class Check {
  public:
   Check(const Mesh& mesh, const FieldData& field, const ExactCheckOptions& options,
-        const RayScene& rays, const FaceTable& faces, const GrownWalls& grown)
+        const RayScene& rays, const FaceTable& faces, const GrownWalls& grown, bool closed)
       : field_(field),
         view_(field),
         options_(options),
@@ -140,7 +142,8 @@ class Check {
         far_(field, options.threads),
         h_(field.voxel_size),
         offset_(field.offset / field.voxel_size),
-        grown_(field.grown / field.voxel_size) {}
+        grown_(field.grown / field.voxel_size),
+        closed_(closed) {}
 
   bool has_area() const { return places_.area() > 0; }
 
@@ -175,6 +178,24 @@ class Check {
     if (view_.distance(g, value) && value >= 0) {
       const double error = value + offset_ - rays_.distance(p) / h_;
       if (!options_.sealed || error > 0) t.between.add(std::fabs(error));
+    }
+    return t;
+  }
+
+  // A place as near to the mesh as the tolerance is promised.
+  Tally asked(std::size_t i) const {
+    Tally t;
+    if (field_.tolerance == 0) return t;
+    Dice dice(options_.seed + 2, i);
+    const double reach = kPromised * field_.tolerance;
+    for (int tries = 0; tries < 8; ++tries) {
+      Vec3 p = places_(dice).p;
+      for (double* c : {&p.x, &p.y, &p.z}) *c += reach * dice.within(-1, 1);
+      const RayScene::Near near = rays_.nearest(p);
+      if (near.distance < reach) {
+        tolerance(p, near, dice, t);
+        break;
+      }
     }
     return t;
   }
@@ -301,6 +322,43 @@ class Check {
     if (d < deepest - kNodeSlack) t.deep.add(deepest - d);
   }
 
+  // A place near the mesh, which is nearest to it at `near`.
+  void tolerance(const Vec3& p, const RayScene::Near& near, Dice& dice, Tally& t) const {
+    const double reach = kPromised * field_.tolerance, u = near.distance;
+    if (grown_walls_.distance(p) < u + 2 * field_.grown + reach) return;
+    double found = 0;
+    if (!view_.distance(view_.from_metres(p), found)) {
+      t.asked.add(reach / field_.tolerance);
+      ++t.sum.missed;
+      return;
+    }
+    found *= h_;
+    double error = std::fabs(std::fabs(found) - u);
+    if (field_.offset > 0) {
+      // Behind a sheet the field knows the way out, which need not be the distance to the mesh.
+      if (found <= -field_.offset) return;
+      error = std::fabs(found + field_.offset - u);
+      if (found < 0 && error > field_.tolerance && !has_room(p, near)) return;
+    } else if (closed_) {
+      const RayVotes::Side says = votes_.side(p, dice);
+      if (says == RayVotes::Side::doubtful) return;
+      if ((found < 0) != (says == RayVotes::Side::inside)) error = std::fabs(found) + u;
+    }
+    if (options_.sealed && std::fabs(found) < u) return;  // nearer to a plug than to the mesh
+    // Where parts overlap, the way out is longer than the way to the mesh.
+    if (-found > u && error > field_.tolerance && !outer(near, dice)) return;
+    t.asked.add(error / field_.tolerance);
+    t.sum.missed += error > field_.tolerance;
+  }
+  // Whether a ball that a flood from fine node to fine node follows fits between the mesh and the
+  // place's side of it. Narrower grooves may close, and are solid then.
+  bool has_room(const Vec3& p, const RayScene::Near& near) const {
+    if (!(near.distance > 0)) return true;
+    const double radius = field_.offset + 0.9 * field_.finest();
+    const Vec3 middle = near.point + radius / near.distance * (p - near.point);
+    return rays_.distance(middle) > 0.999 * radius;
+  }
+
   void side(const Vec3& p, bool inside, double u, Dice& dice, Tally& t) const {
     const RayVotes::Side says = votes_.side(p, dice);
     if (says == RayVotes::Side::doubtful) {
@@ -329,6 +387,7 @@ class Check {
   const GrownWalls& grown_walls_;
   const FarBounds far_;
   const double h_, offset_, grown_;  // [m], [voxel], [voxel]
+  const bool closed_;
 };
 
 // Adds ask(i) for all i < count to `sum`. Returns false when the user cancelled.
@@ -361,26 +420,32 @@ Result<ExactCheck> check_exactly(const Mesh& mesh, const FieldData& field,
   const FaceTable faces = face_table(mesh);
   const Result<GrownWalls> grown = GrownWalls::find(mesh, field, options.threads);
   if (!grown) return grown.failure();
-  const Check check(mesh, field, options, **rays, faces, *grown);
+  const bool closed = audit(mesh).closed;
+  const Check check(mesh, field, options, **rays, faces, *grown, closed);
   if (!check.has_area())
     return Failure{"the mesh has no area: there is nothing to check a field with"};
   Tally sum;
-  if (!ask_all(options.points, options.threads, progress, "near the mesh", 0.1, 0.6, sum,
+  if (!ask_all(options.points, options.threads, progress, "near the mesh", 0.1, 0.5, sum,
                [&](std::size_t i) { return check.near(i); }))
     return cancelled;
   if (sum.lost > options.points * 9 / 10)
     return Failure{
         "hardly any place near the mesh has samples in the field: it was baked from "
         "another mesh, or in another unit"};
+  if (field.tolerance > 0 && !ask_all(options.points, options.threads, progress, "between nodes",
+                                      0.5, 0.6, sum, [&](std::size_t i) { return check.asked(i); }))
+    return cancelled;
   if (!ask_all(options.far_points, options.threads, progress, "far from it", 0.6, 1, sum,
                [&](std::size_t i) { return check.far(i); }))
     return cancelled;
 
   ExactCheck out = sum.sum;
-  out.closed = audit(mesh).closed;
+  out.closed = closed;
   out.nodes = sum.node.count, out.worst_node = sum.node.most, out.mean_node = sum.node.mean();
   out.between = sum.between.count;
   out.worst_between = sum.between.most, out.mean_between = sum.between.mean();
+  out.asked = sum.asked.count;
+  out.worst_asked = sum.asked.most, out.mean_asked = sum.asked.mean();
   out.far_excess = sum.excess;
   out.outside = sum.gap.count, out.far_gap = sum.gap.mean();
   out.inside = sum.inside_gap.count, out.inside_gap = sum.inside_gap.mean();

@@ -155,7 +155,7 @@ WallPusher::Session WallPusher::session_of(const Push& push, const h6Pose& start
 }
 
 WallPusher::Ended WallPusher::end_of(const Push& push) const {
-  const double voxel = field_.voxel_size,
+  const double voxel = field_.finest(),
                before = kStartVoxels * voxel + field_.offset + field_.grown;
   const Vec3 from = push.face - before * push.along;
   const double start[3] = {from.x, from.y, from.z};
@@ -287,7 +287,7 @@ Result<HeldForce> find_held_force(const Mesh& mesh, const FieldData& field,
   const Result<std::unique_ptr<WallPusher>> pusher = WallPusher::make(mesh, field, stiffness);
   if (!pusher) return pusher.failure();
   Search search(**pusher, places, threads, progress);
-  HeldForce held = search.run(stiffness * field.voxel_size);
+  HeldForce held = search.run(stiffness * field.finest());
   if (search.cancelled()) return Failure{"cancelled"};
   return held;
 }

@@ -22,6 +22,7 @@ struct Mesh {
   std::vector<std::int32_t> part;  // (triangles) index into part_names; empty: one part
   std::vector<std::string> part_names;
   std::vector<std::string> remarks;  // sentences about what was left out or seems wrong
+  bool unit_is_doubtful = false;     // it is more than 20 m across if its numbers are metres
 };
 
 // The box around all vertices [m]. The mesh has at least one.

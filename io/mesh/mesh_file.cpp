@@ -67,14 +67,21 @@ struct Named {
   bool gz;
 };
 
-// Decides by the ending alone; throws when it is unknown.
-Named format_of(const std::string& name) {
+// Decides by the ending alone; `format` is null when that is unknown.
+Named named(const std::string& name, std::string& ending) {
   fs::path path(lower_case(name));
   const bool gz = path.extension() == ".gz";
   if (gz) path = path.stem();
-  const std::string ending = path.extension().string();
+  ending = path.extension().string();
   for (const Format& format : kFormats)
     if (ending == format.ending) return {&format, gz};
+  return {nullptr, gz};
+}
+
+// The same, but throws.
+Named format_of(const std::string& name) {
+  std::string ending;
+  if (const Named found = named(name, ending); found.format) return found;
   const std::string what = ending.empty() ? "the name has no ending that says what it is"
                                           : "'" + ending + "' files are not read";
   throw BadMesh{name + ": " + what +
@@ -101,6 +108,7 @@ void remark_size(const MeshSource& source, Mesh& mesh) {
                 "\"units\": \"mm\" in a scene.",
                 across);
   mesh.remarks.push_back(source.name + text);
+  mesh.unit_is_doubtful = true;
 }
 
 Mesh parse(std::string_view bytes, const std::string& name, const Format& format, Unit unit,
@@ -335,6 +343,17 @@ Result<Unit> unit_from_name(const std::string& name) {
   if (name == "cm") return Unit::cm;
   if (name == "in") return Unit::in;
   return Failure{"'" + name + "' is not a unit of length; use m, mm, cm or in."};
+}
+
+bool is_mesh_name(const std::string& name) {
+  std::string ending;
+  return named(name, ending).format != nullptr;
+}
+
+bool states_unit(const std::string& name) {
+  std::string ending;
+  const Format* format = named(name, ending).format;
+  return format && format->has_unit;
 }
 
 Result<Mesh> read_mesh(const fs::path& file, Unit unit) {

@@ -32,6 +32,11 @@ Result<Unit> unit_from_name(const std::string& name);
 // or zeros after a PLY.
 Result<Mesh> read_mesh(const std::filesystem::path& file, Unit unit = Unit::m);
 
+// Whether the ending of the name is that of a mesh, with or without .gz.
+bool is_mesh_name(const std::string& name);
+// Whether files of that format have a unit of length of their own, as glTF and COLLADA do.
+bool states_unit(const std::string& name);
+
 // The same from bytes. The ending of `name` decides the format. Files beside a .gltf are not read.
 Result<Mesh> parse_mesh(const std::string& bytes, const std::string& name, Unit unit = Unit::m);
 

@@ -47,6 +47,10 @@ Outcome check_mesh(const Mesh& mesh) {
   return Done{};
 }
 
+// The spacing of a shell with a tolerance, where the surface is flat: two coarse voxels of a field
+// with the same tolerance.
+constexpr double kTolerances = 16;
+
 constexpr const char* too_many = ", more than the 20 million a shell can have: ask for ";
 
 Outcome check_options(const ShellBake& options) {
@@ -54,7 +58,14 @@ Outcome check_options(const ShellBake& options) {
   if (!std::isfinite(options.spacing)) {
     return Failure{"The spacing of a shell must be a length in metres."};
   }
-  if (options.spacing > 0) return Done{};
+  if (!(options.tolerance >= 0) || !std::isfinite(options.tolerance))
+    return Failure{"The tolerance of a shell must be a positive length."};
+  if (options.tolerance > 0 &&
+      (options.surface == ShellSurface::field || options.normals == ShellNormals::field))
+    return Failure{
+        "A shell with a tolerance has points and normals of its triangles: leave surface and "
+        "normals at auto."};
+  if (options.tolerance > 0 || options.spacing > 0) return Done{};
   if (options.spacing < 0) {
     return Failure{
         "The spacing of a shell must be more than 0 m (or 0, to give a number of points)."};
@@ -94,6 +105,7 @@ class Bake {
     if (!pulse_.alive()) return cancelled_;
     Result<Candidates> samples = surface_ == ShellSurface::triangles ? on_triangles() : on_field();
     if (!samples) return samples.failure();
+    if (options_.tolerance > 0) return build(samples->points, samples->source, demand().spacing);
     return thin_and_build(*samples);
   }
 
@@ -101,7 +113,9 @@ class Bake {
   // The unit of candidates [m]: a voxel for those of a field.
   double unit() const { return surface_ == ShellSurface::field ? field_->voxel_size : 1; }
   Demand demand() const {
-    return {options_.points, options_.spacing / unit(), options_.seed, options_.threads};
+    double spacing = options_.spacing;
+    if (options_.tolerance > 0 && spacing == 0) spacing = kTolerances * options_.tolerance;
+    return {options_.points, spacing / unit(), options_.seed, options_.threads};
   }
 
   // For a sound mesh, the field only has to say what the outside reaches. With half a voxel of
@@ -155,7 +169,10 @@ class Bake {
       reach.offset = field_->offset / field_->voxel_size;
     }
     pulse_.step("spreading points", 0.4, 0.8);
-    Result<Candidates> samples = sample_triangles(mesh_, faces, reach, demand(), pulse_);
+    Result<Candidates> samples =
+        options_.tolerance > 0
+            ? points_to_tolerance(mesh_, faces, reach, demand(), options_.tolerance, pulse_)
+            : sample_triangles(mesh_, faces, reach, demand(), pulse_);
     if (!samples) return samples;
     warnings_.insert(warnings_.end(), faces.warnings.begin(), faces.warnings.end());
     if (faces.sheets > 0) {
@@ -231,15 +248,23 @@ class Bake {
       points[i] = in_metres(samples.points[thinned.chosen[i]]);
       source[i] = samples.source[thinned.chosen[i]];
     }
+    return build(points, source, thinned.spacing * unit());
+  }
+
+  // `spacing` [m] of most points.
+  Result<ShellData> build(std::span<const OrientedPoint> points,
+                          std::span<const std::uint32_t> source, double spacing) {
+    if (points.size() > max_shell_points)
+      return Failure{"This shell has " + std::to_string(points.size()) + " points" + too_many +
+                     "a larger tolerance."};
     if (!pulse_.step("building levels", 0.8, 1)) return cancelled_;
     TreeOptions tree;
     tree.levels = options_.levels;
-    tree.spacing = thinned.spacing * unit();
+    tree.spacing = spacing;
     tree.seed = options_.seed;
     tree.threads = options_.threads;
     tree.pulse = &pulse_;
-    Result<ShellData> shell = build_tree(points, source, tree);
-    return shell;
+    return build_tree(points, source, tree);
   }
 
   OrientedPoint in_metres(OrientedPoint q) const {

@@ -29,7 +29,10 @@ const char* name_of(ShellNormals normals);
 struct ShellBake {
   std::size_t points = 10000;  // on the finest level, exactly
   double spacing = 0;          // least distance between points [m]; replaces `points` when > 0
-  int levels = 7;              // 1 .. 16; fewer if there are too few points
+  // > 0: points so close that no flat obstacle enters between them by more than this [m], in place
+  // of `points`. `spacing` is then the farthest that points lie apart; 0: 16 tolerances.
+  double tolerance = 0;
+  int levels = 7;  // 1 .. 16; fewer if there are too few points
   std::uint64_t seed = 1;
   ShellSurface surface = ShellSurface::automatic;
   ShellNormals normals = ShellNormals::automatic;
@@ -41,6 +44,12 @@ struct ShellBake {
 // The two sides of a thin plate or a sharp wedge (normals more than 134 degrees apart) are sampled
 // separately. Every level is a blue-noise subset of the next one, which has 3 to 4 times as many
 // points. Normals point INTO the body, however the mesh is wound.
+//
+// A shell with a tolerance has as many points as it takes. Every place of the surface that the
+// outside reaches has a point within 1.25 `spacing`, and one that is at most `tolerance` lower
+// along the place's outward normal. Corners and edges (where normals turn by more than 30 degrees)
+// have points of their own, with the mean normal of their faces, and with the normal of every face
+// that differs from it by more than 60 degrees. Points lie on the triangles.
 //
 // Only the surface that the outside reaches has points (METHOD.md, Sec. 5): not the inner wall of a
 // tank, not faces hidden where parts overlap, not gaps narrower than twice the offset (or about a

@@ -73,7 +73,13 @@ std::uint64_t key_at(const Bounds& box, double inverse_cell, const float p[3]) {
 class Thrower {
  public:
   Thrower(std::span<const OrientedPoint> points, const Thinning& options)
-      : points_(points), options_(options), box_(bounds_of(points)), accepted_(points.size(), 0) {}
+      : points_(points),
+        options_(options),
+        box_(bounds_of(points)),
+        accepted_(points.size(), 0),
+        chosen_(options.kept) {
+    std::fill_n(accepted_.begin(), options.kept, 1);
+  }
 
   Thinned run();
 
@@ -87,6 +93,7 @@ class Thrower {
   void round(double radius);
   void throw_at(Cell& cell, std::size_t cell_index, float radius, std::size_t from, std::size_t to,
                 std::vector<std::uint32_t>& fresh);
+  bool leaves_room(const Spot& other, const Spot& spot) const;
   float nearest_blocker(std::size_t cell_index, const Spot& spot, float radius) const;
   void forget_all();
   void drop_excess();
@@ -219,6 +226,15 @@ void Thrower::place_spots() {
   });
 }
 
+// Whether an accepted point leaves another one its place although it is near.
+bool Thrower::leaves_room(const Spot& other, const Spot& spot) const {
+  const float* n = spot.n;
+  const float above = n[0] * (other.p[0] - spot.p[0]) + n[1] * (other.p[1] - spot.p[1]) +
+                      n[2] * (other.p[2] - spot.p[2]);
+  return above > float(options_.tolerance) ||
+         other.n[0] * n[0] + other.n[1] * n[1] + other.n[2] * n[2] < opposed;
+}
+
 // The distance to an accepted point nearer than `radius`, or infinity. The search ends at the first
 // point that is near enough to exclude this spot for some rounds, not at the nearest one.
 float Thrower::nearest_blocker(std::size_t cell_index, const Spot& spot, float radius) const {
@@ -232,8 +248,11 @@ float Thrower::nearest_blocker(std::size_t cell_index, const Spot& spot, float r
                     dz = other->p[2] - spot.p[2];
         float d2 = dx * dx + dy * dy + dz * dz;
         if (!(d2 < best2)) continue;
-        if (options_.both_sides &&
-            other->n[0] * spot.n[0] + other->n[1] * spot.n[1] + other->n[2] * spot.n[2] < opposed) {
+        if (options_.tolerance > 0) {
+          if (leaves_room(*other, spot)) continue;
+        } else if (options_.both_sides &&
+                   other->n[0] * spot.n[0] + other->n[1] * spot.n[1] + other->n[2] * spot.n[2] <
+                       opposed) {
           d2 *= 1 / (across * across);
           if (!(d2 < best2)) continue;
         }
@@ -271,7 +290,7 @@ void Thrower::round(double radius) {
   const auto r = float(radius);
   const std::size_t steps[] = {1, 4, SIZE_MAX};
   std::size_t done = 0;
-  const bool first = chosen_ == 0;
+  const bool first = chosen_ == options_.kept;
   for (const std::size_t step : steps) {
     if (!first && step != SIZE_MAX) continue;
     for (std::size_t k = 0; k < colours_.size(); ++k) {
@@ -361,7 +380,7 @@ Thinned Thrower::run() {
     if (!alive()) return finish(0, true);
     if (!options_.fixed_radius && !(radius > smallest)) break;
     if (cell_ == 0 || radius > cell_ || radius < 0.5 * cell_) {
-      if (chosen_ > 0) {
+      if (chosen_ > 0 && cell_ > 0) {
         gap_.resize(points_.size());
         for (const Spot& spot : spots_) gap_[spot.id] = spot.gap;
       }

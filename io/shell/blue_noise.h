@@ -26,6 +26,10 @@ struct Thinning {
   bool fixed_radius = false;  // one round at first_radius, for as many points as fit
   bool both_sides = false;    // points whose normals differ by more than 134 degrees, as on the two
                               // faces of a thin plate, keep only 0.75 of the radius
+  // > 0, with a fixed radius: chosen points leave room for those that stand out beyond them by more
+  // than this along their own normals [m], and for those of the other side of a thin part.
+  double tolerance = 0;
+  std::size_t kept = 0;  // with a fixed radius: the first so many points are chosen already
   std::uint64_t seed = 1;
   unsigned threads = 0;    // 0: all; the choice is the same for any number
   Pulse* pulse = nullptr;  // hears the share that is chosen; may be null

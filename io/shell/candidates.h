@@ -47,6 +47,13 @@ struct Reach {
 };
 Result<Candidates> sample_triangles(const Mesh& mesh, const FaceTable& faces, const Reach& reach,
                                     const Demand& demand, Pulse& pulse);
+// Whether the outside reaches a place of the surface, looking along the unit vector `out`.
+bool reached(const Reach& reach, const Vec3& place, const Vec3& out);
+
+// tolerance.cpp: the points of a shell with a tolerance [m], not only candidates: at most
+// demand.spacing apart, and closer where the surface turns.
+Result<Candidates> points_to_tolerance(const Mesh& mesh, const FaceTable& faces, const Reach& reach,
+                                       const Demand& demand, double tolerance, Pulse& pulse);
 
 // zero_set.cpp: candidates near the zero set of a field, where the outside reaches it. They and
 // `demand` are in voxels of the field's grid. They have no sources yet.

@@ -77,9 +77,12 @@ OrientedPoint oriented(const Vec3& p, const Vec3& n, double sign) {
           {float(sign * n.x), float(sign * n.y), float(sign * n.z)}};
 }
 
-// Decides which sides of the surface are reached. A side is reached if the field is clearly
-// positive half a voxel outside its zero set. So walls of gaps that the zero set does not enter are
-// not reached.
+// So many voxels outside the field's zero set, in its grid.
+Vec3 look(const Reach& reach, const Vec3& place, const Vec3& out, double voxels) {
+  return reach.field->from_metres(place) + (reach.offset + voxels) * out;
+}
+
+// Decides which sides of the surface are reached.
 class Judge {
  public:
   Judge(const FaceTable& faces, const Reach& reach) : faces_(faces), reach_(reach) {}
@@ -91,7 +94,7 @@ class Judge {
     for (const double sign : {1.0, -1.0}) {  // of the inward normal
       if (sign < 0 && !faces_.sheet[t]) continue;
       const Vec3 out{-sign * n.x, -sign * n.y, -sign * n.z};
-      if (reach_.hide && !reached(place, out)) continue;
+      if (reach_.hide && !reached(reach_, place, out)) continue;
       ++sides;
       Vec3 slope{};
       const bool smooth = reach_.field_normals && outward(place, out, slope);
@@ -101,19 +104,10 @@ class Judge {
   }
 
  private:
-  Vec3 look(const Vec3& place, const Vec3& out, double voxels) const {
-    const Vec3 g = reach_.field->from_metres(place);
-    const double s = reach_.offset + voxels;
-    return {g.x + s * out.x, g.y + s * out.y, g.z + s * out.z};
-  }
-  bool reached(const Vec3& place, const Vec3& out) const {
-    double d = 0;
-    return reach_.field->distance(look(place, out, 0.5), d) && d > 0.25;
-  }
   // The field's slope a little outside, by differences over two whole voxels: the error of
   // trilinear values is the same at both ends.
   bool outward(const Vec3& place, const Vec3& out, Vec3& slope) const {
-    const Vec3 at = look(place, out, 1.1);
+    const Vec3 at = look(reach_, place, out, 1.1);
     double d[6];
     for (int k = 0; k < 6; ++k) {
       const double step = k % 2 ? -1 : 1;
@@ -165,6 +159,13 @@ void join(std::vector<Part>& parts, const Demand& demand, Candidates& out) {
 }
 
 }  // namespace
+
+// A side is reached if the field is clearly positive half a voxel outside its zero set. So walls of
+// gaps that the zero set does not enter are not reached.
+bool reached(const Reach& reach, const Vec3& place, const Vec3& out) {
+  double d = 0;
+  return reach.field->distance(look(reach, place, out, 0.5), d) && d > 0.25;
+}
 
 Result<Candidates> sample_triangles(const Mesh& mesh, const FaceTable& faces, const Reach& reach,
                                     const Demand& demand, Pulse& pulse) {

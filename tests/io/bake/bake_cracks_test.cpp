@@ -193,7 +193,7 @@ TEST_CASE("cracks: a seal as wide as the crack closes it, and what is too narrow
       std::size_t seen = 0;
       CHECK(wrong_sides(held, mesh, held.offset + kVoxel, 0.4, seen) == 0);
       CHECK(seen > 25);
-      must_bake(mesh, options_for(SignMode::automatic), &report);
+      must_bake(mesh, options_for(SignMode::flood), &report);
       REQUIRE(report.leaks.size() == 1);
       CHECK(says(report, "runs into the solid"));
       CHECK(says(report, "--sign winding"));
@@ -207,7 +207,7 @@ TEST_CASE("cracks: a hole too wide for the seal stays open, is named, and nothin
   for (const Mesh& solid : solids()) {
     const Mesh mesh = holed(solid, 12 * kVoxel, random);
     FieldBakeReport plain, narrow;
-    const FieldData a = must_bake(mesh, options_for(SignMode::automatic), &plain),
+    const FieldData a = must_bake(mesh, options_for(SignMode::flood), &plain),
                     b = must_bake(mesh, options_for(SignMode::automatic, 4 * kVoxel), &narrow);
     REQUIRE(plain.leaks.size() == 1);
     REQUIRE(narrow.leaks.size() == 1);

@@ -120,6 +120,15 @@ TEST_CASE("weld: triangles that share no vertex become a solid, up to the tolera
   options.weld = 0.2;
   must_bake(shaken(solid, 0.02 * voxel), options, &report);
   CHECK(report.closed);
+  // The same as a length.
+  options.weld = 0.01;
+  options.weld_length = 0.2 * voxel;
+  must_bake(shaken(solid, 0.02 * voxel), options, &report);
+  CHECK(report.closed);
+  options.weld_length = 1.1 * voxel;
+  const auto wide = bake_field(shaken(solid, 0.02 * voxel), options, nullptr);
+  REQUIRE_FALSE(wide);
+  CHECK(wide.error().find("within a voxel") != std::string::npos);
 }
 
 TEST_CASE("weld: closed meshes with vertices closer than the tolerance keep every bit") {
