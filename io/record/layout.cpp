@@ -52,6 +52,10 @@ const std::vector<Column>& columns() {
       {"overdue", real, 1, input + offsetof(h6SafetyInput, overdue), sizeof(h6SafetyInput), "s",
        "overdue", true},
       {"settings", n32, 1, offsetof(R, settings), 0, "changes so far", "settings", true},
+      {"inputs_only", n32, 1, offsetof(R, inputs_only), 0,
+       "1: all columns but t, frame, hand_*, buttons, sequence, safety_asked, overdue, settings, "
+       "coarse_*, cause and causes are zeros",
+       "inputs_only", true},
       {"contacts", n32, 1, report + offsetof(h6FrameReport, contacts), 0, "1", "contacts"},
       {"max_depth", real, 1, report + offsetof(h6FrameReport, max_depth), 0, "m", "max_depth"},
       {"max_depth_voxels", real, 1, report + offsetof(h6FrameReport, max_depth_voxels), 0, "voxel",

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // layout.h - where each number is in a recording, and safe handles on HDF5. Private.
 //
-//   /config    attributes: version, json, asset_hashes, simd_target, program, run, rate, hands,
-//              stage_names, cause_names, state_names, units
+//   /config    whole, seal; attributes: version, json, asset_hashes, simd_target, program, run,
+//              rate, hands, stage_names, cause_names, state_names, units
 //   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns
-//   /events    t, what, detail
-//   /summary   attribute json; the group exists once the run has ended
+//   /events    t, what, detail, seal
+//   /summary   whole, seal; attribute json; the group exists once the run has ended
 //
 // Attributes are text of variable length, for people and their tools. read_recording reads the same
 // facts from the datasets /config/whole and /summary/whole; stored.cpp says why.

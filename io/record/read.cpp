@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "io/record/layout.h"
+#include "io/record/seal.h"
 #include "io/record/stored.h"
 
 namespace h6::io::recording {
@@ -157,6 +158,48 @@ Outcome read_frames(const Source& source, FrameRange range, Recording& out) {
   return Done{};
 }
 
+// The seals of a part. Empty where the file has none, which is older then.
+Result<std::vector<std::uint64_t>> read_seals(const Source& source, const char* folder,
+                                              hsize_t count) {
+  const Result<Handle> group = open_group(source, folder);
+  if (!group) return group.failure();
+  std::vector<std::uint64_t> seals;
+  if (!has(*group, "seal", H5I_DATASET)) return seals;
+  const Result<Stored> stored = open_stored(source, *group, folder, "seal", H5T_STD_U64LE);
+  if (!stored) return stored.failure();
+  if (stored->dims != std::vector<hsize_t>{count})
+    return source.wrong(stored->name + " has another shape");
+  std::vector<std::byte> bytes;
+  if (Outcome read = read_rows(source, *stored, 0, count, bytes); !read) return read.failure();
+  seals.resize(count);
+  if (count > 0) std::memcpy(seals.data(), bytes.data(), bytes.size());
+  return seals;
+}
+
+// Compares head, events and summary with their seals.
+Outcome check_seals(const Source& source, const std::string& head, Recording& out) {
+  const auto of_head = read_seals(source, "/config", 1),
+             of_events = read_seals(source, "/events", out.events.size());
+  if (!of_head || !of_events) return (of_head ? of_events : of_head).failure();
+  out.sealed = !of_head->empty() && of_events->size() == out.events.size();
+  if (!out.sealed) return Done{};
+  std::uint64_t seal = seal_of_text(0, head);
+  if (seal != of_head->front()) out.unsealed = "its head";
+  for (std::size_t i = 0; i < out.events.size(); ++i) {
+    seal = seal_of_event(seal, out.events[i]);
+    if (out.unsealed.empty() && seal != (*of_events)[i])
+      out.unsealed = "event " + std::to_string(i) + " (" + out.events[i].what + ")";
+  }
+  if (!out.whole) return Done{};
+  const auto of_summary = read_seals(source, "/summary", 1);
+  if (!of_summary) return of_summary.failure();
+  out.sealed = !of_summary->empty();
+  if (out.sealed && out.unsealed.empty() &&
+      seal_of_summary(seal, out.frame_count, out.summary_json) != of_summary->front())
+    out.unsealed = "its summary";
+  return Done{};
+}
+
 Outcome read_events(const Source& source, std::vector<RecordingEvent>& events) {
   const Result<Handle> group = open_group(source, "/events");
   if (!group) return group.failure();
@@ -231,6 +274,7 @@ Result<Recording> read_hdf5(const fs::path& file, FrameRange range) {
   if (Outcome read = read_frames(*source, range, out); !read) return read.failure();
   if (Outcome read = read_events(*source, out.events); !read) return read.failure();
   if (Outcome read = read_summary(*source, out); !read) return read.failure();
+  if (Outcome read = check_seals(*source, *text, out); !read) return read.failure();
   return out;
 }
 

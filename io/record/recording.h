@@ -9,13 +9,14 @@
 // disk.
 //
 // /frames/{t, frame, status, late, hash, contacts, max_depth, max_depth_voxels, net_stiffness,
-// stage_us, frame_us, wakeup_us, settings, substeps, seal} (n) or (n, width), /frames/{hand_pose,
-// hand_velocity, hand_wrench, buttons, sequence, body_pose, body_velocity, wrench, command_pose,
-// cause, causes, state, safety_asked, overdue} (n, hands) or (n, hands, width), with units and
-// column names as attributes; /config, /events/{t, what, detail}, /summary. Numbers are read back
-// bit for bit. Every frame has the gravest cause and all causes, the device's state, and the inputs
-// of its safety chain. An event marks the first frame of each cause. /config and /summary hold
-// their attributes a second time, as the text that read_recording reads.
+// stage_us, frame_us, wakeup_us, settings, substeps, inputs_only, seal} (n) or (n, width),
+// /frames/{hand_pose, hand_velocity, hand_wrench, buttons, sequence, body_pose, body_velocity,
+// wrench, command_pose, cause, causes, state, safety_asked, overdue} (n, hands) or (n, hands,
+// width), with units and column names as attributes; /config, /events/{t, what, detail, seal},
+// /summary. Numbers are read back bit for bit. Every frame has the gravest cause and all causes,
+// the device's state, and the inputs of its safety chain. An event marks the first frame of each
+// cause. /config and /summary hold their attributes a second time, as the text that read_recording
+// reads.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -83,6 +84,8 @@ struct Recording {
   // Of /frames in the file. Older files lack some; `frames` has zeros there.
   std::vector<std::string> columns;
   std::vector<std::uint64_t> seals;  // one for each of `frames`; empty where the file has none
+  bool sealed = false;               // head, events and summary have seals; older files lack them
+  std::string unsealed;  // the first of them that does not fit its seal: "event 3"; or empty
 };
 
 // A frame takes over 2 kB in memory: long recordings can be read in pieces.

@@ -2,6 +2,7 @@
 #include "io/record/seal.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "io/file/content_hash.h"
 #include "io/record/layout.h"
@@ -28,6 +29,20 @@ std::uint64_t RowSeal::next(const h6FrameRecord& row) {
     row_.insert(row_.end(), cells_.begin(), cells_.end());
   }
   return last_ = hash_on(last_, row_.data(), row_.size());
+}
+
+std::uint64_t seal_of_text(std::uint64_t before, const std::string& text) {
+  return hash_on(before, text.data(), text.size());
+}
+
+std::uint64_t seal_of_event(std::uint64_t before, const RecordingEvent& event) {
+  std::string bytes(sizeof event.time, '\0');
+  std::memcpy(bytes.data(), &event.time, sizeof event.time);
+  return seal_of_text(before, bytes + event.what + '\0' + event.detail);
+}
+
+std::uint64_t seal_of_summary(std::uint64_t before, std::uint64_t rows, const std::string& text) {
+  return seal_of_text(before, std::to_string(rows) + text);
 }
 
 }  // namespace h6::io

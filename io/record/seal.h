@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// seal.h - shows in which row a recording was changed.
+// seal.h - shows where a recording was changed.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hapsix/hapsix.h"
+#include "io/record/recording.h"
 
 namespace h6::io {
 
@@ -25,5 +26,11 @@ class RowSeal {
   std::vector<std::byte> cells_, row_;
   std::uint64_t last_ = 0;
 };
+
+// Seals of the other parts, each on top of what comes before it: /config's text, then every event,
+// then the summary with the number of rows. 0 has been sealed before the first.
+std::uint64_t seal_of_text(std::uint64_t before, const std::string& text);
+std::uint64_t seal_of_event(std::uint64_t before, const RecordingEvent& event);
+std::uint64_t seal_of_summary(std::uint64_t before, std::uint64_t rows, const std::string& text);
 
 }  // namespace h6::io

@@ -9,6 +9,7 @@
 
 #include "io/file/write_aside.h"
 #include "io/record/layout.h"
+#include "io/record/seal.h"
 
 namespace h6::io::recording {
 namespace fs = std::filesystem;
@@ -51,10 +52,19 @@ bool put_whole(hid_t group, const std::string& text) {
   return made.ok() && H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()) >= 0;
 }
 
+// One seal, as the dataset `seal`.
+bool put_seal(hid_t group, std::uint64_t seal) {
+  const hsize_t one = 1;
+  const Handle space = H5Screate_simple(1, &one, nullptr);
+  const Handle made =
+      H5Dcreate2(group, "seal", H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  return made.ok() && H5Dwrite(made, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &seal) >= 0;
+}
+
 bool put_head(hid_t file, const RecordingHead& head, const std::string& whole) {
   const Handle config = H5Gcreate2(file, "config", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   const auto hands = static_cast<std::uint32_t>(head.hands);
-  return config.ok() && put_whole(config, whole) &&
+  return config.ok() && put_whole(config, whole) && put_seal(config, seal_of_text(0, whole)) &&
          put_number(config, "version", H5T_STD_U32LE, H5T_NATIVE_UINT32, &format_version) &&
          put_text(config, "json", head.scene_json) &&
          put_texts(config, "asset_hashes", head.asset_hashes) &&
@@ -123,7 +133,13 @@ bool put_frames(hid_t file, const LogSource& from) {
   return true;
 }
 
-bool put_events(hid_t file, const LogSource& from) {
+RecordingEvent event_of(const EventRow& row) {
+  return {row.t, std::string(row.what, strnlen(row.what, sizeof row.what)),
+          std::string(row.detail, strnlen(row.detail, sizeof row.detail))};
+}
+
+// `seal`: of what comes before the events, and then of the last one.
+bool put_events(hid_t file, const LogSource& from, std::uint64_t& seal) {
   const Handle group = H5Gcreate2(file, "events", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   const Handle what_type = fixed_text_type(event_what_bytes);
   const Handle detail_type = fixed_text_type(event_detail_bytes);
@@ -131,11 +147,14 @@ bool put_events(hid_t file, const LogSource& from) {
   const Handle t = make_dataset(group, "t", H5T_IEEE_F64LE, count, {event_chunk});
   const Handle what = make_dataset(group, "what", what_type, count, {event_chunk});
   const Handle detail = make_dataset(group, "detail", detail_type, count, {event_chunk});
-  if (!t.ok() || !what.ok() || !detail.ok() || !put_text(t, "units", "s")) return false;
+  const Handle sealed = make_dataset(group, "seal", H5T_STD_U64LE, count, {event_chunk});
+  if (!t.ok() || !what.ok() || !detail.ok() || !sealed.ok() || !put_text(t, "units", "s"))
+    return false;
   std::vector<std::byte> payload;
   for (hsize_t first = 0; first < count; first += events_at_once) {
     const hsize_t here = std::min<hsize_t>(events_at_once, count - first);
     std::vector<double> times;
+    std::vector<std::uint64_t> seals;
     std::string whats, details;
     for (hsize_t i = first; i < first + here; ++i) {
       EventRow row;
@@ -144,22 +163,25 @@ bool put_events(hid_t file, const LogSource& from) {
       times.push_back(row.t);
       whats.append(row.what, sizeof row.what);
       details.append(row.detail, sizeof row.detail);
+      seals.push_back(seal = seal_of_event(seal, event_of(row)));
     }
     if (!write_rows(t, H5T_NATIVE_DOUBLE, first, here, times.data()) ||
         !write_rows(what, what_type, first, here, whats.data()) ||
-        !write_rows(detail, detail_type, first, here, details.data()))
+        !write_rows(detail, detail_type, first, here, details.data()) ||
+        !write_rows(sealed, H5T_NATIVE_UINT64, first, here, seals.data()))
       return false;
   }
   return true;
 }
 
-bool put_summary(hid_t file, const LogSource& from) {
+bool put_summary(hid_t file, const LogSource& from, std::uint64_t seal) {
   if (!from.index.summary) return true;
   std::vector<std::byte> payload;
   if (!read_payload(from.log, *from.index.summary, payload)) return false;
   const std::string text(reinterpret_cast<const char*>(payload.data()), payload.size());
   const Handle group = H5Gcreate2(file, "summary", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  return group.ok() && put_whole(group, text) && put_text(group, "json", text);
+  return group.ok() && put_whole(group, text) && put_text(group, "json", text) &&
+         put_seal(group, seal_of_summary(seal, from.index.row_count, text));
 }
 
 // HDF5 cannot close a file whose last pages do not fit on the disk, so check for room first.
@@ -195,8 +217,10 @@ Outcome write_hdf5(const File& log, const fs::path& out) {
   const LibraryLock lock;
   // The library's oldest file format, which is its default: MATLAB reads it.
   const Handle h5 = H5Fcreate(out.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, file_access());
+  std::uint64_t seal = seal_of_text(0, from.index.head);
   if (!h5.ok() || !put_head(h5, from.head, from.index.head) || !put_frames(h5, from) ||
-      !put_events(h5, from) || !put_summary(h5, from) || H5Fflush(h5, H5F_SCOPE_GLOBAL) < 0)
+      !put_events(h5, from, seal) || !put_summary(h5, from, seal) ||
+      H5Fflush(h5, H5F_SCOPE_GLOBAL) < 0)
     return Failure{library_reason()};
   return Done{};
 }

@@ -282,6 +282,14 @@ Outcome check_device(const std::string& text) {
   return check_options(*spec);
 }
 
+Outcome check_device_file(const std::string& text) {
+  const Result<DeviceSpec> spec = device::parse_device_spec(text);
+  std::error_code error;
+  if (!spec || spec->name != "plugin" || std::filesystem::is_regular_file(spec->target, error))
+    return Done{};
+  return Failure{"the plug-in " + spec->target + ": there is no such file"};
+}
+
 Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& place) {
   if (Outcome known = check_device(text); !known) return known.failure();
   const DeviceSpec spec = *device::parse_device_spec(text);

@@ -23,6 +23,8 @@ const std::vector<DeviceKind>& device_kinds();
 
 // Checks that `text` names a device and that its options are valid. It opens nothing.
 Outcome check_device(const std::string& text);
+// Fails when a plug-in's file is missing, so that nobody waits for a bake to hear it.
+Outcome check_device_file(const std::string& text);
 
 // The scene and the held body, as far as a device needs to know them.
 struct DevicePlace {

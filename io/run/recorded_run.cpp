@@ -164,6 +164,7 @@ std::string run_text(const RecordedRun& run) {
                     {"threads", run.threads},
                     {"virtual_time", run.virtual_time},
                     {"max_contacts", run.max_contacts},
+                    {"max_pairs", run.max_pairs},
                     {"frame_budget_us", run.frame_budget_us},
                     {"gravity", list(run.gravity)},
                     {"bodies", bodies},
@@ -247,6 +248,7 @@ Result<RecordedRun> recorded_run(const RecordingHead& head) {
     run.threads = all.at("threads").get<std::uint32_t>();
     run.virtual_time = all.at("virtual_time").get<bool>();
     run.max_contacts = all.at("max_contacts").get<std::size_t>();
+    run.max_pairs = all.value("max_pairs", std::size_t{0});
     run.frame_budget_us = all.value("frame_budget_us", 0.0);
     run.gravity = vec3(all.at("gravity"));
     for (const Json& body : all.at("bodies")) run.bodies.push_back(body_def(body));

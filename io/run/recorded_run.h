@@ -22,7 +22,7 @@ struct RecordedRun {
   Unit unit = Unit::m;               // unit of the scene that was run
   std::uint32_t threads = 1;
   bool virtual_time = false;
-  std::size_t max_contacts = 0;
+  std::size_t max_contacts = 0, max_pairs = 0;
   double frame_budget_us = 0;
   h6Vec3 gravity{};
   std::vector<h6BodyDef> bodies;              // in the order of the scene; shell and field are -1

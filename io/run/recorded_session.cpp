@@ -53,6 +53,7 @@ Result<std::unique_ptr<RecordedSession>> RecordedSession::open(const std::filesy
   def.hands = s->hand_defs_.data();
   def.threads = s->threads_ = changes.threads ? changes.threads : s->run_.threads;
   def.max_contacts = s->run_.max_contacts;
+  def.max_pairs = s->run_.max_pairs;
   def.gravity = s->run_.gravity;
   s->method_ = s->recorded_method_ = h6MethodName(def.contact.method);
   s->own_method_ = !changes.method.empty();
@@ -130,7 +131,7 @@ void RecordedSession::hold_back(const h6FrameRecord& recorded) {
     h6DeviceCommand& command = now_.command[h];
     if (told.cause != H6_CAUSE_STOPPED && told.cause != H6_CAUSE_WATCHDOG) continue;
     if (command.cause == told.cause && command.causes == told.causes &&
-        std::memcmp(&command.pose, &told.pose, sizeof told.pose) == 0)
+        (recorded.inputs_only || std::memcmp(&command.pose, &told.pose, sizeof told.pose) == 0))
       continue;
     command.wrench = {};
     command.velocity = {};
@@ -150,13 +151,16 @@ Result<const h6FrameRecord*> RecordedSession::step(const h6FrameRecord& recorded
   h6SetCoarse(session_.get(), recorded.report.coarse_pairs, recorded.report.coarse_points);
   h6Step(session_.get(), now_.hand, now_.command);
   hold_back(recorded);
-  for (std::size_t h = 0; h < hands_; ++h) sent_[h] = recorded.command[h].pose;
+  for (std::size_t h = 0; h < hands_; ++h)
+    sent_[h] = (recorded.inputs_only ? now_ : recorded).command[h].pose;
   any_sent_ = true;
   now_.report = h6GetFrame(session_.get());
   now_.time = static_cast<double>(now_.report.frame) * (1 / def_.rate);
   for (std::size_t h = 0; h < hands_; ++h) {
     now_.body[h] = h6GetBody(session_.get(), loaded_->hands[h].body);
-    now_.state[h] = h6GetSafety(session_.get(), static_cast<std::int32_t>(h)).state;
+    h6HandSafety safety;
+    h6GetSafety(session_.get(), static_cast<std::int32_t>(h), &safety);
+    now_.state[h] = safety.state;
   }
   return &now_;
 }

@@ -27,6 +27,14 @@ ordered_json late_json(const h6LoopReport& report) {
           {"stolen", bins(report.late_us_stolen)}};
 }
 
+// Late frames by what made them late, as far as their neighbours tell.
+ordered_json judged_json(const RunSummary& s) {
+  ordered_json out = ordered_json::object();
+  for (std::size_t i = 0; i < s.late.size(); ++i)
+    out[io::late_cause_name(static_cast<io::LateCause>(i))] = s.late[i];
+  return out;
+}
+
 ordered_json grant_json(const h6Granted& g) {
   return {{"core", g.core < 0 ? ordered_json() : ordered_json(g.core)},
           {"fifo", g.fifo},
@@ -67,6 +75,7 @@ ordered_json pose_json(const h6Pose& p, double scale) {
 // Lengths in the scene's units.
 ordered_json through_json(const PopThroughReport& r, double scale) {
   ordered_json out{{"computed", r.left_out.empty()}, {"first", nullptr}};
+  if (r.interrupted) out["interrupted"] = true;
   if (const auto& p = r.first)
     out["first"] = {{"time", p->time},
                     {"frame", p->frame},
@@ -126,7 +135,11 @@ ordered_json assets_json(const io::LoadedScene& loaded) {
                        {"seconds", a.seconds},
                        {"hash", a.hash}};
     if (a.is_field)
-      asset.update({{"voxel_size", a.voxel_size}, {"dims", a.nodes}, {"bricks", a.bricks}});
+      asset.update({{"voxel_size", a.voxel_size},
+                    {"finest_voxel", a.finest},
+                    {"tolerance", a.tolerance},
+                    {"dims", a.nodes},
+                    {"bricks", a.bricks}});
     else
       asset.update({{"points", a.points}, {"levels", a.levels}});
     assets.push_back(asset);
@@ -141,6 +154,8 @@ std::vector<std::string> remarks(const RunTotals& run) {
   if (run.through.first) all.push_back(sentence(*run.through.first));
   all.insert(all.end(), run.through.left_out.begin(), run.through.left_out.end());
   if (!run.left_behind.empty()) all.push_back(run.left_behind);
+  if (run.never_touched() && run.verdict != io::Verdict::untouched)
+    all.push_back("untouched: no point of the part ever touched anything");
   return all;
 }
 
@@ -167,7 +182,9 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
        {{"missed_compute", s.loop.late_compute},
         {"missed_wakeup", s.loop.late_wakeup},
         {"missed_stolen", s.loop.late_stolen},
-        {"late_us", late_json(s.loop)}}},
+        {"late_us", late_json(s.loop)},
+        {"judged", judged_json(s)},
+        {"host_stole_ms", s.host_stole_ms < 0 ? ordered_json() : ordered_json(s.host_stole_ms)}}},
       {"coarse",
        {{"frames", s.loop.coarse_frames}, {"missed_depth_voxels", s.missed_depth_voxels}}},
       {"final_pose", pose_json(s.final_pose, scale)},
@@ -181,6 +198,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
       {"watchdog_trips", s.loop.watchdog_trips},
       {"state_hash", hash},
       {"records_lost", s.loop.ring_overruns},
+      {"records_with_inputs_only", s.loop.inputs_only},
       {"simd_target", kernels::target_name()},
       {"realtime", s.loop.granted},
       {"granted", grant_json(s.loop.grant)},

@@ -15,9 +15,11 @@
 #include <thread>
 
 #include "io/file/write_aside.h"
+#include "io/mesh/mesh_file.h"
 #include "io/run/run_observer.h"
 #include "io/run/run_setup.h"
 #include "io/run/run_watch.h"
+#include "io/run/steal_clock.h"
 #include "io/view/trace.h"
 
 namespace h6::cli {
@@ -45,6 +47,9 @@ Outcome open_session(const RunOptions& options, RunSetup& run) {
   if (options.virtual_time && !run.devices.real_time.empty())
     return Failure{"the device '" + run.devices.real_time +
                    "' lives in real time: leave out --virtual-time"};
+  if (options.rearm > 0 && !run.devices.real_time.empty())
+    return Failure{"only a person arms the device '" + run.devices.real_time +
+                   "' again, who sees what it does: leave out --rearm"};
   return Done{};
 }
 
@@ -59,7 +64,7 @@ Outcome tell_overlaps(const RunSetup& run, const RunOptions& options, const Cons
 }
 
 // As many records as 10 s have, so that a writer that a loaded machine starves loses none, within a
-// 16th of the machine's memory.
+// 16th of the memory of the machine. Of a minute more the inputs are kept: 14 MB a hand.
 std::size_t ring_frames(double rate) {
   const double pages = static_cast<double>(std::max(0L, sysconf(_SC_PHYS_PAGES))),
                bytes = static_cast<double>(std::max(0L, sysconf(_SC_PAGESIZE)));
@@ -78,6 +83,7 @@ h6LoopDef loop_def(const RunOptions& options, const io::LoadedScene& loaded) {
   def.spin_us = options.spin_us;
   // In virtual time the loop waits for its reader.
   def.ring_frames = options.virtual_time ? 4096 : ring_frames(loaded.session_def().rate);
+  def.ring_inputs = options.virtual_time ? 0 : 6 * def.ring_frames;
   def.view_contacts = options.view_contacts;
   return def;
 }
@@ -96,6 +102,7 @@ class LiveRun {
 
   Outcome start(const h6LoopDef& def) {
     if (!options_.virtual_time) rise_above_load();
+    summary_.host_stole_ms = host_stole_ms(-1);
     h6Error error{};
     loop_.reset(h6StartLoop(run_.session.get(), run_.devices.devices.data(), &def, &error));
     if (!loop_) return Failure{error.message};
@@ -121,9 +128,11 @@ class LiveRun {
       if (options_.observer && !interrupted.load()) silent_ = 0;  // it may pause
       if (silent_ > kSilence) give_up();
     }
-    summary_.loop = h6JoinLoop(loop_.get());
+    h6JoinLoop(loop_.get(), &summary_.loop);
     set_signal_hook(nullptr, nullptr);
     drain();
+    if (summary_.host_stole_ms >= 0)
+      summary_.host_stole_ms = host_stole_ms(-1) - summary_.host_stole_ms;
     if (progress_) progress_("running", 1);
     if (options_.observer) options_.observer->end();
     return recorded_;
@@ -142,17 +151,40 @@ class LiveRun {
 
  private:
   void drain() {
-    while (const std::size_t n = h6ReadRecords(loop_.get(), rows_.data(), rows_.size())) {
+    while (std::size_t n = h6ReadRecords(loop_.get(), rows_.data(), rows_.size())) {
       silent_ = 0;
       if (recorded_) recorded_ = watch_.rows(rows_.data(), n);
+      n = keep_whole(n);
+      if (n == 0) continue;
       if (options_.observer) options_.observer->rows(rows_.data(), n);
       if (!options_.trace.empty()) trace_.add(rows_.data(), n);
       if (progress_)
         progress_("running " + run_.loaded.scene.name, rows_[n - 1].time / summary_.seconds);
+      if (options_.rearm > 0) arm_again(rows_[n - 1]);
     }
     if (recorded_ && run_.recorder)
       recorded_ = run_.recorder->frames(nullptr, 0);  // writes rows that are old enough to disk
     if (!recorded_) h6RequestStop(loop_.get());
+  }
+
+  // Leaves out rows that have nothing to show. Returns how many remain.
+  std::size_t keep_whole(std::size_t count) {
+    const auto end = rows_.begin() + static_cast<std::ptrdiff_t>(count);
+    const auto kept = std::remove_if(rows_.begin(), end,
+                                     [](const h6FrameRecord& r) { return r.inputs_only != 0; });
+    return static_cast<std::size_t>(kept - rows_.begin());
+  }
+
+  // Nothing happens while the device is not well, so it is asked again after as long.
+  void arm_again(const h6FrameRecord& newest) {
+    if (!(newest.report.status & H6_OUTPUT_FAULT))
+      faulty_since_ = -1;
+    else if (faulty_since_ < 0)
+      faulty_since_ = newest.time;
+    if (faulty_since_ < 0 || newest.time - faulty_since_ < options_.rearm) return;
+    faulty_since_ = newest.time;
+    watch_.note("armed again", "as --rearm asks");
+    h6ArmLoop(loop_.get());
   }
 
   // The haptic thread hangs in a device. Nothing can end it, so the process ends, after the
@@ -189,9 +221,23 @@ class LiveRun {
   io::Progress progress_;
   std::vector<h6FrameRecord> rows_ = std::vector<h6FrameRecord>(256);
   double silent_ = 0;          // [s] since the last row
+  double faulty_since_ = -1;   // time of a row [s]; negative: no hand is faulty
   Outcome recorded_ = Done{};  // after a failure the run ends and no more rows are watched
   std::unique_ptr<h6Loop, LoopDeleter> loop_;
 };
+
+// Relief covers the places where a part starts, and none that are tighter on its way.
+void advise_play(const io::LoadedScene& loaded, RunSummary& summary) {
+  if (summary.left_behind.empty() || summary.overlaps.empty()) return;
+  double most = 0;
+  for (const PartOverlap& o : summary.overlaps) most = std::max(most, o.depth);
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "; it overlapped by up to %.3g %s at the start, and its way may be as tight: "
+                "\"fit_offset\" gives all points play",
+                most / io::metres(loaded.scene.unit), io::unit_name(loaded.scene.unit));
+  summary.left_behind += text;
+}
 
 }  // namespace
 
@@ -229,6 +275,7 @@ Result<RunSummary> run_scene(const io::LoadedScene& loaded, const RunOptions& op
       !endless && interrupted.load() &&
       static_cast<double>(summary.loop.frames) < summary.seconds * run.def.rate - 0.5;
   if (Outcome finished = live.finish(); !finished) return finished.failure();
+  advise_play(loaded, summary);
   return summary;
 }
 

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // run_scene.h - runs a loaded scene with its hands, records the run and sums it up.
 #pragma once
+#include <array>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "hapsix/result.h"
 #include "io/console/console.h"
+#include "io/record/late_judge.h"
 #include "io/record/recording.h"
 #include "io/run/run_tally.h"
 #include "io/run/start_overlap.h"
@@ -24,6 +26,7 @@ struct RunOptions {
   unsigned threads = 1;
   double spin_us = 0;
   double budget_us = 0;             // frame budget of the anytime mode [us]; 0 turns it off
+  double rearm = 0;                 // arms a faulty hand again after so long [s]; 0: never
   std::string record;               // file of the recording; empty for none
   std::string trace;                // .json timeline of the last seconds; empty for none
   std::string overlap;              // .csv of the points that overlap at the start; or empty
@@ -37,7 +40,9 @@ struct RunSummary : RunTotals, RunTimes {
   std::vector<PartOverlap> overlaps;  // at the start
   std::vector<io::RecordingEvent> events;
   std::size_t events_dropped = 0;
-  std::vector<float> depth_strip;  // deepest contact in each 1/60 of the run [voxel]
+  std::array<std::uint64_t, 5> late{};  // late frames by io::LateCause
+  double host_stole_ms = 0;             // a hypervisor kept all cores from us; < 0: not known
+  std::vector<float> depth_strip;       // deepest contact in each 1/60 of the run [voxel]
   std::string recording;
   double seconds = 0;  // requested duration [s]
   bool virtual_time = false;

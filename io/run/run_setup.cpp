@@ -42,7 +42,9 @@ Outcome RunSetup::step(h6FrameRecord& r) {
     good = device.write(device.self, r.time, &r.command[h]) == 0 && good;
     const auto hand = static_cast<std::int32_t>(h);
     r.body[h] = h6GetBody(session.get(), hand_defs[h].body);
-    r.state[h] = h6GetSafety(session.get(), hand).state;
+    h6HandSafety safety;
+    h6GetSafety(session.get(), hand, &safety);
+    r.state[h] = safety.state;
     r.safety_input[h] = h6GetSafetyInput(session.get(), hand);
   }
   r.report = h6GetFrame(session.get());
@@ -69,6 +71,7 @@ Outcome RunSetup::open_recording() {
   how.threads = def.threads;
   how.virtual_time = virtual_time;
   how.max_contacts = def.max_contacts;
+  how.max_pairs = def.max_pairs;
   how.frame_budget_us = def.frame_budget_us;
   how.gravity = def.gravity;
   how.bodies.assign(def.bodies, def.bodies + def.body_count);

@@ -97,6 +97,7 @@ RunTotals RunTally::totals(const io::Progress& progress) const {
   RunTotals out = out_;
   out.through = through_.judge(progress);
   out.verdict = verdict_.verdict(out.through.first.has_value());
+  if (loaded_.hands.empty() && out.verdict == io::Verdict::held) out.verdict = io::Verdict::unheld;
   out.left_behind = left_behind();
   if (out.frames) out.contacts_mean = contacts_ / static_cast<double>(out.frames);
   if (touching_) out.touching_contacts_mean = contacts_ / static_cast<double>(touching_);

@@ -34,6 +34,8 @@ struct RunTotals {
   double max_force = 0, max_torque = 0;  // sent to the devices [N], [N m]
   h6Pose final_pose{}, hand_pose{};      // last pose of the first hand's body, and of that hand
   std::uint64_t state_hash = 0;
+  // Its verdict says nothing about contacts: the program says `untouched` beside it.
+  bool never_touched() const { return contacts_max == 0; }
 };
 
 struct RunTimes {

@@ -3,7 +3,6 @@
 #include "io/run/run_watch.h"
 
 #include <algorithm>
-#include <cstdio>
 
 namespace h6::cli {
 namespace {
@@ -17,6 +16,7 @@ RunWatch::RunWatch(const io::LoadedScene& loaded, double rate, RunSummary& summa
     : summary_(summary),
       recorder_(recorder),
       tally_(loaded, rate, summary.seconds),
+      late_(rate),
       hands_(loaded.hands.size()) {
   summary_.depth_strip.assign(kStripBins, 0);
   last_state_.fill(H6_ACTIVE);  // a device that is active from the start is no event
@@ -32,6 +32,7 @@ void RunWatch::note(const std::string& what, const std::string& detail) {
 }
 
 void RunWatch::finish(const io::Progress& progress) {
+  late_.finish([this](const io::LateFrame& late) { note_late(late); });
   if (summary_.interrupted)
     event({last_time_, "interrupted", "by the user; every device was told to stop"});
   static_cast<RunTotals&>(summary_) = tally_.totals(progress);
@@ -44,13 +45,33 @@ void RunWatch::row(const h6FrameRecord& r) {
   if (frames_ == 0)
     for (const PartOverlap& o : summary_.overlaps) event({r.time, "overlap", o.sentence});
   ++frames_;
+  last_time_ = r.time;
+  note_gap(r);
+  if (r.inputs_only) return;
   tally_.frame(r);
   const auto bin = static_cast<std::size_t>(kStripBins * r.time / summary_.seconds);
   if (bin < kStripBins)
     summary_.depth_strip[bin] =
         std::max(summary_.depth_strip[bin], static_cast<float>(r.report.max_depth_voxels));
   note_changes(r);
-  last_time_ = r.time;
+}
+
+// Marks frames that the recorder was too slow for: in part, or altogether.
+void RunWatch::note_gap(const h6FrameRecord& r) {
+  const std::uint64_t frame = r.report.frame;
+  if (frame > next_frame_)
+    event({r.time, "frames lost",
+           "frames " + std::to_string(next_frame_) + " to " + std::to_string(frame - 1) +
+               ": the recorder was too slow, and a replay ends before them"});
+  if (r.inputs_only && !in_gap_)
+    event({r.time, "frames short",
+           "from frame " + std::to_string(frame) +
+               " on: the recorder was too slow, and only inputs are kept; a replay computes the "
+               "rest"});
+  if (!r.inputs_only && in_gap_)
+    event({r.time, "frames whole again", "frame " + std::to_string(frame)});
+  in_gap_ = r.inputs_only != 0;
+  next_frame_ = frame + 1;
 }
 
 // Makes an event when a status bit or a cause appears, not while it stays. Some status bits make no
@@ -65,19 +86,13 @@ void RunWatch::note_changes(const h6FrameRecord& r) {
   for (h6Status bit = 1; h6StatusName(bit); bit <<= 1)
     if ((status & bit) && !(last_status_ & bit)) event({r.time, h6StatusName(bit), frame});
   last_status_ = status;
-  if (r.late) note_late(r);
+  late_.row(r, [this](const io::LateFrame& late) { note_late(late); });
   for (std::size_t h = 0; h < hands_; ++h) note_hand(r, h, frame);
 }
 
-void RunWatch::note_late(const h6FrameRecord& r) {
-  const char* cause = r.late & H6_LATE_COMPUTE  ? "late: own computation"
-                      : r.late & H6_LATE_STOLEN ? "late: stolen"
-                                                : "late: wake-up";
-  char detail[160];
-  std::snprintf(detail, sizeof detail,
-                "frame %llu ended %.0f us after its deadline: began %.0f us late, used %.0f us",
-                static_cast<unsigned long long>(r.report.frame), r.late_us, r.wakeup_us, r.cpu_us);
-  event({r.time, cause, detail});
+void RunWatch::note_late(const io::LateFrame& late) {
+  ++summary_.late[static_cast<std::size_t>(late.cause)];
+  event({late.time, std::string("late: ") + io::late_cause_name(late.cause), late.sentence()});
 }
 
 void RunWatch::note_hand(const h6FrameRecord& r, std::size_t h, const std::string& frame) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "io/record/late_judge.h"
 #include "io/run/run_scene.h"
 #include "io/run/run_tally.h"
 
@@ -21,16 +22,19 @@ class RunWatch {
 
  private:
   void row(const h6FrameRecord& record);
+  void note_gap(const h6FrameRecord& record);
   void note_changes(const h6FrameRecord& record);
-  void note_late(const h6FrameRecord& record);
+  void note_late(const io::LateFrame& late);
   void note_hand(const h6FrameRecord& record, std::size_t hand, const std::string& frame);
   void event(const io::RecordingEvent& event);
 
   RunSummary& summary_;
   io::Recorder* recorder_;
   RunTally tally_;
+  io::LateJudge late_;
   std::size_t hands_;
-  std::uint64_t frames_ = 0;
+  std::uint64_t frames_ = 0, next_frame_ = 0;
+  bool in_gap_ = false;  // the last row had only inputs
   double last_time_ = 0;
   h6Status last_status_ = 0;
   std::array<std::uint32_t, H6_MAX_HANDS> last_causes_{};

@@ -44,11 +44,16 @@ ThroughWatch::Moves ThroughWatch::moves(std::size_t body, int& hand) const {
   return hand < 0 ? Moves::alone : Moves::with_hand;
 }
 
+std::string ThroughWatch::not_computed(std::size_t shell, std::size_t field,
+                                       const std::string& why) const {
+  return "whether '" + loaded_.scene.bodies[shell].name + "' passed through '" +
+         loaded_.scene.bodies[field].name + "' was not computed: " + why;
+}
+
 void ThroughWatch::add_pair(std::size_t a, std::size_t b) {
   const auto name = [&](std::size_t body) { return "'" + loaded_.scene.bodies[body].name + "'"; };
   const auto left_out = [&](const std::string& why) {
-    left_out_.push_back("whether " + name(a) + " passed through " + name(b) +
-                        " was not computed: " + why);
+    left_out_.push_back(not_computed(a, b, why));
   };
   int shell_hand, field_hand;
   for (const auto& [body, hand] : {std::pair{a, &shell_hand}, std::pair{b, &field_hand}})
@@ -119,14 +124,22 @@ Result<std::optional<PopThrough>> ThroughWatch::judge(Pair pair,
 PopThroughReport ThroughWatch::judge(const io::Progress& progress) const {
   PopThroughReport out;
   out.left_out = left_out_;
+  const io::Progress asked = [&](const std::string& what, double done) {
+    out.interrupted = out.interrupted || (progress && !progress(what, done));
+    return !out.interrupted;
+  };
   for (const Pair& pair : pairs_) {
-    const auto found = judge(pair, progress);
+    const auto found = judge(pair, asked);
     if (!found)
-      out.left_out.push_back("whether '" + loaded_.scene.bodies[pair.shell].name +
-                             "' passed through '" + loaded_.scene.bodies[pair.field].name +
-                             "' was not computed: " + found.error());
+      out.left_out.push_back(not_computed(pair.shell, pair.field, found.error()));
     else if (*found && (!out.first || (*found)->free_time < out.first->free_time))
       out.first = *found;
+  }
+  if (out.interrupted) {  // half a search would say something else each time
+    out.first.reset(), out.left_out = left_out_;
+    for (const Pair& pair : pairs_)
+      out.left_out.push_back(not_computed(pair.shell, pair.field, "interrupted"));
+    return out;
   }
   if (progress && !pairs_.empty()) progress("looking for points that passed through", 1);
   return out;

@@ -27,6 +27,7 @@ struct PopThrough {
 struct PopThroughReport {
   std::optional<PopThrough> first;
   std::vector<std::string> left_out;  // a sentence for each pair of bodies that was not judged
+  bool interrupted = false;           // by the user; then no pair was judged
 };
 
 // Its memory is bounded: a motion that is too long is kept in longer steps.
@@ -53,6 +54,7 @@ class ThroughWatch {
   enum class Moves { fixed, with_hand, alone };
 
   Moves moves(std::size_t body, int& hand) const;
+  std::string not_computed(std::size_t shell, std::size_t field, const std::string& why) const;
   void add_pair(std::size_t shell, std::size_t field);
   Result<std::optional<PopThrough>> judge(Pair pair, const io::Progress& progress) const;
 

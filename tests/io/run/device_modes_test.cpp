@@ -41,7 +41,7 @@ struct Rest {
   double late_speed = 0;          // RMS speed of the body over the last 0.2 s [m/s]
   double swing = 0;               // peak-to-peak height over the last 0.2 s [m]
   std::uint32_t contacts = 0;
-  double force = 0;  // sum over the contacts at the end, along the wall's normal [N]
+  double force = 0;  // sum over the contacts, mean of the last 0.2 s [N]
   h6Status status = 0;
 };
 
@@ -69,11 +69,12 @@ Rest press(std::uint32_t mode, int delay, const std::string& device = "arm") {
     const h6Vec3& v = r.body[0].velocity.linear;
     speed2 += v.x * v.x + v.y * v.y + v.z * v.z, ++late;
     low = std::min(low, r.body[0].pose.p.z), high = std::max(high, r.body[0].pose.p.z);
+    const h6Contacts c = h6GetContacts(run.session.get(), run.hand_defs[0].body);
+    for (std::size_t k = 0; k < c.count; ++k) rest.force += run.def.contact.stiffness * c.load[k];
   }
   rest.late_speed = std::sqrt(speed2 / late);
   rest.swing = high - low;
-  const h6Contacts c = h6GetContacts(run.session.get(), run.hand_defs[0].body);
-  for (std::size_t k = 0; k < c.count; ++k) rest.force += run.def.contact.stiffness * c.load[k];
+  rest.force /= late;
   return rest;
 }
 

@@ -156,6 +156,32 @@ TEST_CASE("a point that slides around a block in contact is not through") {
   }
 }
 
+TEST_CASE("a point that stays within 0.4 voxel of a corner is not through, whatever its way") {
+  std::mt19937_64 engine(7);
+  std::uniform_real_distribution<double> share(0, 1);
+  const auto near_corner = [&] {
+    for (;;) {
+      const h6Vec3 p = {2 * share(engine) - 1, 2 * share(engine) - 1, 2 * share(engine) - 1};
+      if (norm(p) < 1) return 0.4 * kMm * p;
+    }
+  };
+  for (int grid = 0; grid < 12; ++grid) {
+    // A wedge with a sharp edge, like the tip of a tooth, anywhere on the lattice.
+    const h6Vec3 corner = mm(20 + share(engine), 8 + share(engine), 6 + share(engine));
+    io::Mesh wedge = io::box_mesh(mm(-20, -8, -6), corner);
+    for (h6Vec3& v : wedge.vertices)
+      if (v.x > 0 && v.y < 0) v.y = corner.y - 5 * kMm;
+    const Loaded l = load(probe_and(std::move(wedge)));
+    for (int way = 0; way < 20; ++way) {
+      const auto free = [&] { return corner + mm(2 + share(engine), 2, 2 + share(engine)); };
+      std::vector<h6Vec3> corners = {free()};
+      for (int k = 0; k < 8; ++k) corners.push_back(corner + near_corner());
+      corners.push_back(free());
+      CHECK_FALSE(walk(*l, corners, 0.05 * kMm));
+    }
+  }
+}
+
 TEST_CASE("a point that starts inside is judged only after it has once been free") {
   const Loaded l = load(probe_and(io::box_mesh(mm(-20, -20, -20), mm(20, 20, 20))));
   CHECK_FALSE(walk(*l, {mm(1, 2, 18), mm(1, 2, 30)}));
