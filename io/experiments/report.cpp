@@ -160,6 +160,7 @@ std::string markdown_report(const std::vector<SceneRow>& rows,
   if (!studies.empty()) out += "## Studies\n\n";
   for (const Study& study : studies) {
     out += "### " + study.title + "\n\n" + study.about + "\n\n" + markdown(study.table) + "\n";
+    if (!study.picture.empty()) out += "![" + study.title + "](" + study.name + ".svg)\n\n";
     if (!study.after.empty()) out += study.after + "\n\n";
   }
   return out;

@@ -16,7 +16,8 @@ std::string markdown(const TextTable& table);
 struct Study {
   std::string name, title, about;
   TextTable table;
-  std::string after;  // the conclusion, below the table; may be empty
+  std::string after;    // the conclusion, below the table; may be empty
+  std::string picture;  // SVG, a file of its own beside the report; may be empty
   nlohmann::ordered_json json;
 };
 

@@ -58,6 +58,45 @@ bool has_torque_noise(const h6Contacts& c) {
   return false;
 }
 
+// Remembers where the deepest contact was.
+class DeepestWatch {
+ public:
+  DeepestWatch(const io::LoadedScene& loaded, int body) : loaded_(loaded), body_(body) {}
+  // `contacts` are those of the step from `before`.
+  void frame(const h6Session* session, const h6Contacts& c, const h6Pose& before) {
+    const auto deepest = std::max_element(c.depth, c.depth + c.count) - c.depth;
+    const auto i = static_cast<std::size_t>(deepest);
+    if (c.count == 0 || !(static_cast<double>(c.depth[i]) > out_.depth)) return;
+    out_.depth = static_cast<double>(c.depth[i]);
+    out_.point = c.point[i];
+    field_body_ = c.field_body[i];
+    const h6Pose field = h6GetBody(session, field_body_).pose;
+    const auto shell =
+        static_cast<std::size_t>(loaded_.bodies[static_cast<std::size_t>(body_)].shell);
+    const h6Vec3 p = place(before, loaded_.shell_points[shell][out_.point]);
+    place_ = rotate(conjugate(field.q), p - field.p);
+  }
+  Deepest found() const {
+    Deepest out = out_;
+    if (!(out.depth > 0)) return out;
+    const auto body = static_cast<std::size_t>(field_body_);
+    out.obstacle = loaded_.scene.bodies[body].name;
+    const auto& mesh = loaded_.field_meshes[static_cast<std::size_t>(loaded_.bodies[body].field)];
+    if (!mesh || !mesh->rays()) return out;
+    out.triangle = (*mesh->rays())->nearest(place_).triangle;
+    const io::Mesh& m = mesh->mesh();
+    if (out.triangle < m.part.size() && m.part[out.triangle] >= 0)
+      out.part = m.part_names[static_cast<std::size_t>(m.part[out.triangle])];
+    return out;
+  }
+
+ private:
+  const io::LoadedScene& loaded_;
+  int body_, field_body_ = 0;
+  Deepest out_;
+  h6Vec3 place_{};  // of the deepest point, field's mesh frame [m]
+};
+
 }  // namespace
 
 void MethodColumn::apply(h6ContactDef& contact) const {
@@ -118,6 +157,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
   const bool has_shell = loaded.bodies[static_cast<std::size_t>(first.body)].shell >= 0;
 
   const bool bare = bare_torque_directions(def.contact);
+  DeepestWatch deepest(loaded, first.body);
 
   const double duration = change.path ? change.path->back().t : loaded.duration();
   RunTally tally(loaded, def.rate, duration);
@@ -127,11 +167,14 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
     h6FrameRecord& r = rows.emplace_back();
     r = {};
     r.time = static_cast<double>(i) * (1 / def.rate);  // as the haptic loop counts
+    const h6Pose before = h6GetBody(run.session.get(), first.body).pose;
     if (Outcome done = run.step(r); !done) return out.error = done.error(), out;
     const h6Contacts contacts =
         has_shell ? h6GetContacts(run.session.get(), first.body) : h6Contacts{};
     out.torque_noise = out.torque_noise || (bare && has_torque_noise(contacts));
+    deepest.frame(run.session.get(), contacts, before);
     tally.frame(r, elastic_wrench(contacts, def.contact.stiffness).force);
+    if (change.each) change.each(r, contacts);
     if (!recorder)
       rows.clear();
     else if (rows.size() == 100) {
@@ -143,6 +186,9 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
   static_cast<RunTotals&>(out) = tally.totals();
   out.frame_us_p50 = tally.times().frame_us.percentile(50);
   out.frame_us_p99 = tally.times().frame_us.percentile(99);
+  for (std::size_t s = 0; s < H6_STAGE_COUNT; ++s)
+    out.stage_us_p50[s] = tally.times().stage_us[s].percentile(50);
+  out.deepest = deepest.found();
   if (recorder) {
     Outcome done = recorder->frames(rows.data(), rows.size());
     const nlohmann::ordered_json summary{{"method", change.method.name},

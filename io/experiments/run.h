@@ -2,6 +2,7 @@
 // run.h - runs a scene in virtual time on the calling thread, measures the figures of the tables,
 // and runs independent jobs on two threads.
 #pragma once
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
@@ -43,10 +44,22 @@ struct RunChange {
   // Called last, once for every hand, to change anything else in the definitions.
   std::function<void(h6SessionDef&, h6HandDef&)> also;
   std::string record;  // .h5 file, empty: none
+  // Called after every frame with the contacts of the first hand's body; they may be empty.
+  std::function<void(const h6FrameRecord&, const h6Contacts&)> each;
+};
+
+// The deepest contact of a run: which triangle stopped which point.
+struct Deepest {
+  double depth = 0;            // [m]; 0: nothing touched
+  std::uint32_t point = 0;     // of the shell
+  std::uint32_t triangle = 0;  // of the obstacle's mesh: the nearest to that point
+  std::string obstacle, part;  // the body and the mesh's part; empty where nothing knows them
 };
 
 struct RunFigures : RunTotals {
   double frame_us_p50 = 0, frame_us_p99 = 0;
+  std::array<double, H6_STAGE_COUNT> stage_us_p50{};
+  Deepest deepest;            // of the first hand's body
   bool torque_noise = false;  // the weights had a torque direction that is rounding noise: r is
                               // parallel to N, and the rule uses r x N made unit
   std::string error;          // why the run failed; empty when it did not

@@ -8,9 +8,59 @@ const std::vector<StudyKind>& studies() {
       {"global", "where the paper says global scaling fails", study_global},
       {"two-planes", "Fig. 4: stiffness of two inclined planes", study_two_planes},
       {"alpha-pushes", "Fig. 8: the alpha pushed in many ways", study_pushes},
+      {"engine-bay", "Figs. 1, 10: a starter motor forced in its engine bay",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("engine-bay", columns, console);
+       },
+       true},
+      {"landing-gear", "Figs. 1, 11: an actuator forced in a landing gear",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("landing-gear", columns, console);
+       },
+       true},
+      {"wire-bundle", "cf. Fig. 12: a bar dragged over a loom",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("wire-bundle", columns, console);
+       },
+       true},
+      {"spline-hub-1k", "a splined shaft in its hub, 1,000 points on driven flanks",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("spline-hub-1k", columns, console);
+       },
+       true},
+      {"spline-hub-10k", "the same with 10,000",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("spline-hub-10k", columns, console);
+       },
+       true},
+      {"spline-hub-100k", "the same with 100,000",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("spline-hub-100k", columns, console);
+       },
+       true},
+      {"piston-in-bore", "cf. Fig. 10: a piston in its bore",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("piston-in-bore", columns, console);
+       },
+       true},
+      {"gear-train", "a gear turned against two others",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("gear-train", columns, console);
+       },
+       true},
+      {"alphas-in-two-hands", "cf. Fig. 9: the alphas in two hands",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("alphas-in-two-hands", columns, console);
+       },
+       true},
       {"forced-paths", "a starter motor forced through its engine bay",
        [](const auto& columns, const auto& console) {
-         return study_forced_paths(columns, console, 50);
+         return study_forced_paths("engine-bay", columns, console, 50);
+       },
+       true},
+      {"forced-paths-gear", "an actuator forced through its landing gear",
+       [](const auto& columns, const auto& console) {
+         return study_forced_paths("landing-gear", columns, console, 50);
        },
        true},
       {"modes", "Fig. 13: device modes and delay", study_modes},

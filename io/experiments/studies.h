@@ -26,9 +26,13 @@ Study study_share(const std::vector<MethodColumn>& columns, const Console& conso
 Study study_global(const std::vector<MethodColumn>& columns, const Console& console);
 // alpha.cpp
 Study study_pushes(const std::vector<MethodColumn>& columns, const Console& console);
-// forced_paths.cpp: `count` seeded paths, at least 1; the first ones do not depend on it
-Study study_forced_paths(const std::vector<MethodColumn>& columns, const Console& console,
-                         std::size_t count);
+// industrial.cpp: a scene of io/scenes/industrial or io/scenes/machines
+Study study_industrial(const std::string& scene, const std::vector<MethodColumn>& columns,
+                       const Console& console);
+// forced_paths.cpp: engine-bay or landing-gear on `count` seeded paths, at least 1; the first ones
+// do not depend on it
+Study study_forced_paths(const std::string& scene, const std::vector<MethodColumn>& columns,
+                         const Console& console, std::size_t count);
 // smoothness.cpp
 Study study_smoothness(const std::vector<MethodColumn>& columns, const Console& console);
 Study study_ripple(const std::vector<MethodColumn>& columns, const Console& console);

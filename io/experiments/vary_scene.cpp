@@ -48,7 +48,9 @@ Result<io::Scene> resampled(const std::string& name, const io::Sampling& samplin
   return scene;
 }
 
+// The spacing of the finest nodes, in which depths are counted.
 double voxel_of(const io::FieldSource& field) {
+  if (field.bake.tolerance > 0) return io::kFinest * field.bake.tolerance;
   if (field.bake.voxel_size > 0) return field.bake.voxel_size;
   if (!field.mesh_data) return 0;
   const auto plan = io::plan_field(*field.mesh_data, io::audit(*field.mesh_data), field.bake);
@@ -74,7 +76,10 @@ void change_field(io::SceneBody& body, const Variation& v) {
   io::FieldSource& field = *body.field;
   const bool turned = v.turn.w != 1, shifted = norm(v.shift) > 0;
   if (v.voxel == 1 && !turned && !shifted) return;
-  field.bake.voxel_size = v.voxel * voxel_of(field);
+  if (field.bake.tolerance > 0)
+    field.bake.tolerance *= v.voxel;
+  else
+    field.bake.voxel_size = v.voxel * voxel_of(field);
   field.bake.shift = v.shift;
   field.keep = false;
   if (turned) turn_lattice(body, v.turn);

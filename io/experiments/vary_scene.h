@@ -11,8 +11,8 @@ namespace h6::cli {
 
 // Factors are relative to the scene's own values.
 struct Variation {
-  double voxel = 1;         // size of the voxels of all fields; the hand's force stays
-  h6Vec3 shift{};           // of a field's nodes against its mesh [voxel], each -0.5 .. 0.5
+  double voxel = 1;  // size of the voxels of all fields, or their tolerance; the hand's force stays
+  h6Vec3 shift{};    // of a field's nodes against its mesh [voxel], each -0.5 .. 0.5
   h6Quat turn{1, 0, 0, 0};  // of a field's lattice against its mesh
   io::Sampling sampling;    // of the shell
   double mass = 1;          // and inertia
@@ -47,7 +47,8 @@ Result<io::Scene> vary(const std::string& scene, const Variation& variation);
 // pose turns it back. The body must be fixed.
 void turn_lattice(io::SceneBody& body, const h6Quat& turn);
 
-// The size of the smallest voxel of a scene's fields [m]; 0 without fields of generated meshes.
+// The size of the smallest voxel of a scene's fields, kFinest tolerances where there is one [m]; 0
+// without fields of generated meshes.
 double smallest_voxel(const io::Scene& scene);
 // The force at which the scene's coupling saturates [N], and the force of half a voxel: contact
 // stiffness times half of smallest_voxel().

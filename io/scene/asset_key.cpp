@@ -10,7 +10,7 @@ namespace {
 
 // Raise a number when its baker gives another result for the same input, so that old cache files
 // are no longer used.
-constexpr std::uint32_t field_bake_version = 5, shell_bake_version = 2;
+constexpr std::uint32_t field_bake_version = 7, shell_bake_version = 3;
 
 // Hashes a list of values. Each text and each column enters as its length and hash, so that
 // different lists do not give the same bytes.
@@ -70,6 +70,7 @@ void add_options(ListHash& list, const FieldBake& options) {
   list.value(options.band_voxels);
   list.value(options.padding_voxels);
   if (options.tolerance > 0) list.value(options.tolerance);
+  if (options.weld_length > 0) list.value(options.weld_length);
   if (!options.grow_thin) list.value(options.grow_thin);
   if (norm(options.shift) == 0) return;  // so that keys are those of before there was a shift
   for (const double s : {options.shift.x, options.shift.y, options.shift.z}) list.value(s);
@@ -95,6 +96,7 @@ std::string asset_key(const HashedMesh& mesh, const ShellBake& options) {
   add_mesh(list, mesh);
   list.value(std::uint64_t(options.points));
   list.value(options.spacing);
+  if (options.tolerance > 0) list.value(options.tolerance);
   list.value(options.levels);
   list.value(options.seed);
   list.value(options.surface);

@@ -12,7 +12,9 @@
 #include <cstdlib>
 #include <system_error>
 
+#include "io/bake/plan.h"
 #include "io/field/raw_field.h"
+#include "io/file/free_memory.h"
 #include "io/shell/shell_file.h"
 
 namespace h6::io {
@@ -101,6 +103,16 @@ Result<Data> through_cache(const std::string& key, const char* ending, bool keep
   return baked;
 }
 
+// Better a sentence now than a machine that stands still, or a killed program, minutes later.
+Outcome check_memory(const Mesh& mesh, const FieldBake& options) {
+  const std::optional<std::uint64_t> free = free_memory();
+  if (!free) return Done{};
+  const Result<FieldPlan> plan = plan_field(mesh, audit(mesh), options);
+  if (!plan) return plan.failure();
+  const Result<std::string> needs = needs_of(*plan, *free);
+  return needs ? Outcome(Done{}) : Outcome(needs.failure());
+}
+
 }  // namespace
 
 std::filesystem::path cache_folder() {
@@ -117,6 +129,8 @@ Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options,
       asset_key(mesh, options), ".field", keep, cached,
       [](const fs::path& file) { return read_raw_field(file); },
       [&](Cached& told) {
+        if (Outcome fits = check_memory(mesh.mesh, options); !fits)
+          return Result<FieldData>(fits.failure());
         FieldBakeReport report;
         Result<FieldData> field = bake_field(mesh.mesh, options, &report, progress);
         told.warnings.insert(told.warnings.end(), report.warnings.begin(), report.warnings.end());

@@ -70,6 +70,8 @@ class Loader {
     if (found == meshes_.end()) {
       Result<Mesh> mesh = read_mesh(source.mesh, unit);
       if (!mesh) return mesh.failure();
+      if (mesh->unit_is_doubtful && !source.unit && !out_.scene.unit_is_stated)
+        return Failure{mesh->remarks.back() + " If they are metres: \"units\": \"m\"."};
       out_.warnings.insert(out_.warnings.end(), mesh->remarks.begin(), mesh->remarks.end());
       out_.meshes.push_back(std::make_unique<const Mesh>(std::move(*mesh)));
       found = meshes_.emplace(key, out_.meshes.back().get()).first;
@@ -127,13 +129,15 @@ class Loader {
                                [](const FieldData& data, LoadedAsset& asset) {
                                  asset.is_field = true;
                                  asset.voxel_size = data.voxel_size;
+                                 asset.finest = data.finest();
+                                 asset.tolerance = data.tolerance;
                                  asset.origin = data.origin;
                                  for (int k = 0; k < 3; ++k) asset.nodes[k] = 8 * data.bricks[k];
                                  asset.bricks = data.brick_count();
                                });
     if (!index || out_.field_meshes.size() == fields_.all.size()) return index;
     out_.field_meshes.emplace_back();  // the field is new
-    out_.field_voxels.push_back(fields_.all.back().voxel_size);
+    out_.field_voxels.push_back(fields_.all.back().finest());
     if (!body.field->file.empty()) return index;
     Result<const Mesh*> mesh = mesh_of(*body.field);
     if (!mesh) return mesh.failure();

@@ -23,6 +23,8 @@ struct LoadedAsset {
   bool rebuilt = false;        // its cache file was damaged or held another asset
   double seconds = 0;          // time to bake or read it [s]
   double voxel_size = 0;       // field [m]
+  double finest = 0;           // field: its finest voxel, in which depths are measured [m]
+  double tolerance = 0;        // field: of its bake [m]; 0: none
   h6Vec3 origin{};             // field: its first node, mesh frame [m]
   std::array<int, 3> nodes{};  // field: nodes per axis
   std::size_t bricks = 0;      // field
@@ -43,7 +45,7 @@ struct LoadedScene {
   // The mesh of each field of the model; null for a field that came from a file. Some of the meshes
   // are in `scene`, the others in `meshes`.
   std::vector<std::unique_ptr<FieldMesh>> field_meshes;
-  std::vector<double> field_voxels;  // [m]
+  std::vector<double> field_voxels;  // the finest of each field [m]
   std::vector<std::unique_ptr<const Mesh>> meshes;
   std::vector<LoadedAsset> assets;
   std::vector<std::string> warnings;

@@ -16,8 +16,10 @@ namespace {
 constexpr double kFree = 0.3;    // a point farther out is free
 constexpr double kBeside = 0.5;  // how far a shadow may step aside
 // Heights of a shadow over the surface. A high one sees over rivets and around edges, a low one
-// fits into narrow gaps.
-constexpr double kHeights[] = {1, 0.5, 1.5, 0.25};
+// fits into narrow gaps. None is below kFree: a shadow must not be under its point.
+constexpr double kHeights[] = {1, 0.5, 1.5, kFree};
+// The surface may be nearer than a field says by this, since it rounds off corners.
+constexpr double kRounding = 0.75;
 constexpr double kRetry = 0.5;  // a parted point looks for its shadow again after this motion
 constexpr double kAwake = 0.5;  // no point this near sleeps
 constexpr std::size_t kBlock = 64;
@@ -146,7 +148,8 @@ void PopThroughSearch::lift(Track& t, const h6Vec3& x, double d, const h6Vec3& o
 bool PopThroughSearch::frees(Track& t, const h6Vec3& x) {
   std::optional<Wall> wall;
   // Nothing stands within the distance of the place where both were.
-  const bool open = !t.judged || (t.free && norm(x - t.last) < t.distance);
+  const double sure = t.distance - kRounding * voxel_;
+  const bool open = !t.judged || (t.free && norm(x - t.last) < sure);
   if (!open && !passes(t.shadow, x, wall)) {
     t.free = false;
     // A field rounds off sharp edges: a point under one may look free.

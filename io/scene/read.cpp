@@ -33,6 +33,7 @@ class SceneReader {
 
   Scene read(const Json& o) {
     if (o.contains("units")) scene_.unit = *unit_from_name(o["units"].get<std::string>());
+    scene_.unit_is_stated = recorded_ || o.contains("units");
     scale_ = metres(scene_.unit);
     read_settings(o, scene_settings(), &scene_, scale_);
     for (std::size_t i = 0; i < o["bodies"].size(); ++i)

@@ -100,11 +100,17 @@ struct SceneVerdict {
   double tolerance_angle = 0;    // [rad]; 0 accepts any orientation
 };
 
+// The axis that points up, for the eye only.
+enum class UpAxis { x, y, z };
+const char* up_axis_name(UpAxis up);  // "x", "y", "z"
+
 struct Scene {
   std::string name, about;
   std::string generated;       // its name in make_scene; empty for a scene from a file
   std::filesystem::path file;  // the file that the scene was read from
   Unit unit = Unit::m;         // for export
+  bool unit_is_stated = true;  // else a mesh that is far too large in metres is refused
+  UpAxis up = UpAxis::z;       // for views
   std::vector<SceneBody> bodies;
   h6ContactDef contact = h6DefaultContactDef();
   h6CouplingDef coupling = h6DefaultCouplingDef();

@@ -100,6 +100,8 @@ constexpr Setting kFieldBakeRows[] = {
     number<&FieldBake::weld>("weld", "voxel", between(0, 1),
                              "vertices of open edges this near to each other are welded if this "
                              "closes the mesh"),
+    in_place_of("weld", number<&FieldBake::weld_length>("weld_length", "m", positive(kNoLimit),
+                                                        "the same as a length, at most a voxel")),
     number<&FieldBake::band_voxels>("band_voxels", "voxel", between(1, kWidestBand),
                                     "every cell nearer than this to the surface gets samples; "
                                     "deeper, depth is only bounded"),
@@ -135,6 +137,10 @@ const Setting kShellBakeRows[] = {
     in_place_of("points", number<&ShellBake::spacing>("spacing", "m", positive(kNoLimit),
                                                       "least distance between points, instead of "
                                                       "points")),
+    in_place_of("points", number<&ShellBake::tolerance>(
+                              "tolerance", "m", positive(kNoLimit),
+                              "no flat obstacle enters farther between points, instead of points; "
+                              "spacing then bounds how far apart they are")),
     whole<&ShellBake::levels>("levels", between(1, 16), "nested levels"),
     whole<&ShellBake::seed>("seed", between(0, kExactIntegers), "of the sampling"),
     choice<&ShellBake::surface>(
@@ -276,6 +282,9 @@ const Setting kVerdictRows[] = {
     object("target", kTarget, "where the first hand's body should end")};
 const SettingTable kVerdict = settings_of("SceneVerdict", kVerdictRows);
 
+constexpr Choice kUpAxes[] = {{"x", static_cast<int>(UpAxis::x)},
+                              {"y", static_cast<int>(UpAxis::y)},
+                              {"z", static_cast<int>(UpAxis::z)}};
 Setting version_row() {
   Setting row = by_hand("hapsix", Kind::whole, "version of the format: 1");
   row.range = between(1, 1);
@@ -286,7 +295,9 @@ const Setting kSceneRows[] = {
     quiet(plain<&Scene::name>("name", Kind::text, "", "default: the file's name")),
     quiet(plain<&Scene::about>("about", Kind::text, "", "a line for people")),
     h6::choice<&Scene::unit>("units", kUnits, static_cast<int>(Unit::m), "of every length"),
-    required(list("bodies", kBody, 1, H6_MAX_BODIES, "at least one")),
+    quiet(h6::choice<&Scene::up>("up", kUpAxes, static_cast<int>(UpAxis::z),
+                                 "the axis that points up in views; forces do not know it")),
+    required(list("bodies", kBody, 1, 1000000, "at least one")),
     h6::object<&Scene::contact>("contact", contact_settings(), "contact stiffness"),
     h6::object<&Scene::coupling>("coupling", coupling_settings(),
                                  "virtual coupling between hand and body"),
@@ -302,6 +313,8 @@ const Setting kSceneRows[] = {
 const SettingTable kScene = settings_of("Scene", kSceneRows);
 
 }  // namespace
+
+const char* up_axis_name(UpAxis up) { return kUpAxes[static_cast<int>(up)].name; }
 
 h6HandDef default_scene_hand() {
   h6HandDef def = h6DefaultHandDef();

@@ -11,18 +11,18 @@ namespace h6::io {
 namespace {
 
 using Kind = SettingKind;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json numbers(std::size_t count) {
+OrderedJson numbers(std::size_t count) {
   return {
       {"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", count}, {"maxItems", count}};
 }
 
-Json schema_of(const SettingTable& rows);
+OrderedJson schema_of(const SettingTable& rows);
 
 // Adds the limits that hold in every unit. A length with bounds in metres gets none, because the
 // schema does not know the unit of the scene.
-void add_limits(const Setting& row, Json& out) {
+void add_limits(const Setting& row, OrderedJson& out) {
   const Range& r = row.range;
   if (row.is_length() && r.high != kNoLimit) return;
   const double high = row.is_length() ? kFarthest : std::min(r.high, r.file_high);
@@ -30,11 +30,11 @@ void add_limits(const Setting& row, Json& out) {
   if (high != kNoLimit) out["maximum"] = high;
 }
 
-void add_limits_of_items(const Setting& row, Json& items) {
+void add_limits_of_items(const Setting& row, OrderedJson& items) {
   if (row.is_length()) items["minimum"] = -kFarthest, items["maximum"] = kFarthest;
 }
 
-Json default_of(const Setting& row) {
+OrderedJson default_of(const Setting& row) {
   if (row.kind == Kind::boolean) return row.start != 0;
   if (row.kind == Kind::whole) return static_cast<std::int64_t>(row.start);
   if (row.kind == Kind::number) return row.start;
@@ -43,8 +43,8 @@ Json default_of(const Setting& row) {
   return nullptr;
 }
 
-Json schema_of(const Setting& row) {
-  Json out;
+OrderedJson schema_of(const Setting& row) {
+  OrderedJson out;
   switch (row.kind) {
     case Kind::boolean:
       out["type"] = "boolean";
@@ -106,17 +106,18 @@ std::string description_of(const Setting& row) {
   return start.empty() ? out : out + "; default " + start;
 }
 
-Json schema_of(const SettingTable& rows) {
-  Json properties = Json::object(), required = Json::array();
+OrderedJson schema_of(const SettingTable& rows) {
+  OrderedJson properties = OrderedJson::object(), required = OrderedJson::array();
   each_setting(rows, nullptr, [&](const Setting& row, const void*) {
-    Json& property = properties[row.name] = schema_of(row);
+    OrderedJson& property = properties[row.name] = schema_of(row);
     // A default length other than 0 depends on the unit of the scene.
     if (!default_text(row).empty() && !(row.is_length() && row.start != 0))
       property["default"] = default_of(row);
     property["description"] = description_of(row);
     if (row.required) required.push_back(row.name);
   });
-  Json out = {{"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
+  OrderedJson out = {
+      {"type", "object"}, {"additionalProperties", false}, {"properties", properties}};
   if (!required.empty()) out["required"] = required;
   return out;
 }
@@ -124,8 +125,8 @@ Json schema_of(const SettingTable& rows) {
 }  // namespace
 
 std::string scene_schema() {
-  Json out = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
-              {"title", "hapsix scene, version 1"}};
+  OrderedJson out = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                     {"title", "hapsix scene, version 1"}};
   out.update(schema_of(scene_settings()));
   return out.dump(2) + "\n";
 }

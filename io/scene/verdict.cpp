@@ -73,12 +73,16 @@ const char* verdict_name(Verdict verdict) {
       return "through";
     case Verdict::chatters:
       return "chatters";
+    case Verdict::sunk:
+      return "sunk";
     case Verdict::arrived:
       return "arrived";
     case Verdict::stuck:
       return "stuck";
     case Verdict::untouched:
       return "untouched";
+    case Verdict::unheld:
+      return "unheld";
     case Verdict::held:
       return "held";
   }
@@ -231,6 +235,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
 
   last_hand_ = hand;
   last_body_ = body;
+  last_depth_ = max_depth_voxels;
   last_time_ = time;
   first_ = false;
 }
@@ -248,6 +253,7 @@ Verdict VerdictWatch::verdict(bool popped_through) const {
   if (!finite_ || peak_speed2_ > limit * limit) return Verdict::unstable;
   if (entered_ || popped_through) return Verdict::through;
   if (chattered_ || (!first_ && chatters_now(last_time_))) return Verdict::chatters;
+  if (last_depth_ > H6_DEEPEST_FIT) return Verdict::sunk;
   if (rules_.target) return arrived() ? Verdict::arrived : Verdict::stuck;
   return touched_ ? Verdict::held : Verdict::untouched;
 }

@@ -9,9 +9,11 @@
 //   chatters  the hand was still for at least 0.2 s, and in the last 0.2 s of that phase the RMS
 //             point speed was above 2 mm/s or the peak-to-peak depth above 0.1 voxel. Only the end
 //             of a phase is judged: the body may settle first, and a limit cycle stays to the end.
+//   sunk      the run ends with a point deeper than 3 voxels, where a field knows no depths
 //   arrived   the scene has a target, and the run ends there
 //   stuck     the scene has a target, and the run ends elsewhere
 //   untouched nothing was ever deeper than 0
+//   unheld    the scene has no hand, so nothing was held (RunTally says so)
 //   held      none of the others applies
 //
 // Speeds are root mean squares (RMS) over all shell points, so that rotation counts like
@@ -27,7 +29,7 @@
 
 namespace h6::io {
 
-enum class Verdict { unstable, through, chatters, arrived, stuck, untouched, held };
+enum class Verdict { unstable, through, chatters, sunk, arrived, stuck, untouched, unheld, held };
 const char* verdict_name(Verdict verdict);
 
 // Watches a run frame by frame. Its memory does not grow with the length of the run.
@@ -80,6 +82,7 @@ class VerdictWatch {
   h6Pose still_hand_{};  // pose of the hand at the start of the still phase
   h6Pose last_hand_{};
   h6BodyState last_body_{};
+  double last_depth_ = 0;  // [voxel]
   Window window_;
 };
 

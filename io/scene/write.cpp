@@ -14,7 +14,7 @@
 namespace h6::io {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 // Turns a body's name into a file name that every system accepts.
@@ -52,18 +52,18 @@ class SceneWriter {
   explicit SceneWriter(const Scene& scene)
       : scene_(scene), scale_(metres(scene.unit)), files_(false) {}
 
-  Json write() {
-    Json out = {{"hapsix", 1}};
-    write_settings(scene_settings(), &scene_, scale_, out, [&](const Setting& row, Json& o) {
+  OrderedJson write() {
+    OrderedJson out = {{"hapsix", 1}};
+    write_settings(scene_settings(), &scene_, scale_, out, [&](const Setting& row, OrderedJson& o) {
       const std::string key = row.name;
       if (key == "bodies") {
-        o[key] = Json::array();
+        o[key] = OrderedJson::array();
         for (const SceneBody& body : scene_.bodies) o[key].push_back(body_json(body));
       } else if (key == "hands") {
-        o[key] = Json::array();
+        o[key] = OrderedJson::array();
         for (const SceneHand& hand : scene_.hands) o[key].push_back(hand_json(hand));
       } else if (key == "verdict") {
-        const Json verdict = verdict_json();
+        const OrderedJson verdict = verdict_json();
         if (!verdict.empty()) o[key] = verdict;
       }
     });
@@ -111,7 +111,7 @@ class SceneWriter {
 
   // Adds "mesh", and its unit if that is not the scene's.
   template <class Source>
-  void mesh_json(const Source& source, const std::string& stem, Json& out) {
+  void mesh_json(const Source& source, const std::string& stem, OrderedJson& out) {
     if (source.mesh_data) {
       out["mesh"] = write_mesh(*source.mesh_data, stem);
     } else {
@@ -120,16 +120,16 @@ class SceneWriter {
     }
   }
 
-  Json field_json(const FieldSource& field, const std::string& stem) {
-    Json out;
+  OrderedJson field_json(const FieldSource& field, const std::string& stem) {
+    OrderedJson out;
     if (!field.file.empty()) return {{"file", copy_file(field.file)}};
     mesh_json(field, stem, out);
     write_settings(field_source_settings(), &field, scale_, out);
     return out;
   }
 
-  Json shell_json(const ShellSource& shell, const std::string& stem) {
-    Json out;
+  OrderedJson shell_json(const ShellSource& shell, const std::string& stem) {
+    OrderedJson out;
     if (!shell.file.empty()) return {{"file", copy_file(shell.file)}};
     if (shell.points) {
       const std::string name = unused(stem, ".ply");
@@ -144,8 +144,8 @@ class SceneWriter {
     return out;
   }
 
-  Json body_json(const SceneBody& body) {
-    Json out;
+  OrderedJson body_json(const SceneBody& body) {
+    OrderedJson out;
     write_settings(scene_body_settings(), &body, scale_, out);
     if (body.fixed) out.erase("mass");  // a fixed body needs no mass
     const std::string stem = file_stem(body.name);
@@ -154,19 +154,20 @@ class SceneWriter {
     return out;
   }
 
-  Json hand_json(const SceneHand& hand) {
-    Json out;
-    write_settings(scene_hand_settings(), &hand, scale_, out, [&](const Setting& row, Json& o) {
-      if (row.name != std::string("path") || hand.path.empty()) return;
-      const std::string name = unused(file_stem(hand.body) + "_hand", ".csv");
-      if (files_) must(write_path(folder_ / name, hand.path, scene_.unit));
-      o[row.name] = name;
-    });
+  OrderedJson hand_json(const SceneHand& hand) {
+    OrderedJson out;
+    write_settings(scene_hand_settings(), &hand, scale_, out,
+                   [&](const Setting& row, OrderedJson& o) {
+                     if (row.name != std::string("path") || hand.path.empty()) return;
+                     const std::string name = unused(file_stem(hand.body) + "_hand", ".csv");
+                     if (files_) must(write_path(folder_ / name, hand.path, scene_.unit));
+                     o[row.name] = name;
+                   });
     return out;
   }
 
-  Json verdict_json() const {
-    Json out = Json::object();
+  OrderedJson verdict_json() const {
+    OrderedJson out = OrderedJson::object();
     for (const Box& box : scene_.verdict.forbidden)
       write_settings(forbidden_settings(), &box, scale_, out["forbidden"].emplace_back());
     if (scene_.verdict.target)
@@ -193,7 +194,7 @@ Outcome export_scene(const Scene& scene, const std::filesystem::path& folder) {
     fs::create_directories(folder, error);
     if (error || !fs::is_directory(folder, error))
       return Failure{folder.string() + ": cannot be made a folder; " + error.message()};
-    const Json json = SceneWriter(scene, folder).write();
+    const OrderedJson json = SceneWriter(scene, folder).write();
     // The scene file is written last, so that the files it names exist when it does.
     return write_text_aside(folder / "scene.json", json.dump(2) + '\n');
   } catch (const WriteFailed& failed) {

@@ -16,7 +16,14 @@ Scene cone_in_gap();
 Scene rod_between_tubes();
 Scene alpha_shortcut();
 Scene alpha_solution();
+Scene alphas_in_two_hands();
 Scene engine_bay();
+Scene gear_train();
 Scene landing_gear();
+Scene piston_in_bore();
+Scene spline_hub_1k();
+Scene spline_hub_10k();
+Scene spline_hub_100k();
+Scene wire_bundle();
 
 }  // namespace h6::io

@@ -149,7 +149,6 @@ Scene common_scene(const std::string& name, const std::string& about) {
   scene.about = about;
   scene.unit = Unit::mm;
   scene.contact = h6DefaultContactDef();
-  scene.contact.method = H6_METHOD_ROBUST;
   scene.contact.stiffness = 1e4;
   scene.contact.damping = 1e-3;
   scene.coupling = h6DefaultCouplingDef();

@@ -114,7 +114,46 @@ void judge_goal(const GroupFigures& g, double goal, const std::string& begin,
                 number(100 * goal, 0) + " % is " + verdict + ".");
 }
 
+// Whether runs at the force of half a voxel stay that shallow.
+void judge_depth(const GroupFigures& g, const std::string& begin, std::vector<std::string>& out) {
+  if (g.depths.empty()) return;
+  const auto deeper = g.depths.end() - std::upper_bound(g.depths.begin(), g.depths.end(), 0.5);
+  out.push_back(begin + "is at most " + number(g.depths.back(), 2) +
+                " voxels deep, and deeper than "
+                "half a voxel in " +
+                std::to_string(deeper) + " of " + std::to_string(g.depths.size()) +
+                " runs; the goal of half a voxel is " + (deeper ? "missed." : "reached."));
+}
+
+// The goals, for all scenes or for those with implicit steps.
+void judge_goals(const std::vector<const MapScene*>& scenes, int table, std::size_t m,
+                 const std::string& begin, const std::string& where,
+                 std::vector<std::string>& out) {
+  judge_goal(group_figures(scenes, table, kAtSceneForce, m), 0.99,
+             begin + "holds the scene's force" + where + " in ", out);
+  judge_goal(
+      group_figures(scenes, table, kGentlyPushed, m), 0.8,
+      begin + "holds pushes up to " + number(kGentlePush, 0) + " times the force" + where + " in ",
+      out);
+  judge_depth(group_figures(scenes, table, kAtHalfVoxelForce, m),
+              begin + "with the force of half a voxel" + where + " ", out);
+}
+
 }  // namespace
+
+std::vector<const MapScene*> run_scenes(const std::vector<MapScene>& scenes) {
+  std::vector<const MapScene*> out;
+  for (const MapScene& scene : scenes)
+    if (scene.left_out.empty()) out.push_back(&scene);
+  return out;
+}
+
+std::vector<const MapScene*> implicit_scenes(const std::vector<const MapScene*>& scenes) {
+  std::vector<const MapScene*> out;
+  for (const MapScene* scene : scenes)
+    if (!scene->explicit_steps) out.push_back(scene);
+  return out;
+}
 
 GroupFigures group_figures(const std::vector<const MapScene*>& scenes, int table, MapGroup group,
                            std::size_t method) {
@@ -148,20 +187,17 @@ Sign sign_of_ratio(const std::vector<double>& ratios) {
 
 std::vector<std::string> map_conclusions(const std::vector<MapScene>& all,
                                          const std::vector<MethodColumn>& methods) {
-  std::vector<const MapScene*> scenes;
-  for (const MapScene& scene : all)
-    if (scene.left_out.empty()) scenes.push_back(&scene);
+  const std::vector<const MapScene*> scenes = run_scenes(all);
+  const std::vector<const MapScene*> implicit = implicit_scenes(scenes);
   std::vector<std::string> out;
   for (int table = 0; table < kMapTables; ++table)
     for (std::size_t m = 0; m < methods.size(); ++m) {
       if (table == kEqualWall && m == 0) continue;  // its runs are those of the other table
       const std::string begin = std::string(table_words(table)) + " `" + methods[m].name + "` ";
       if (m > 0) compare_with_first(scenes, methods, table, m, out);
-      judge_goal(group_figures(scenes, table, kAtSceneForce, m), 0.99,
-                 begin + "holds the scene's force in ", out);
-      judge_goal(group_figures(scenes, table, kGentlyPushed, m), 0.8,
-                 begin + "holds pushes up to " + number(kGentlePush, 0) + " times the force in ",
-                 out);
+      judge_goals(scenes, table, m, begin, "", out);
+      if (implicit.size() < scenes.size())
+        judge_goals(implicit, table, m, begin, " with implicit steps", out);
     }
   return out;
 }

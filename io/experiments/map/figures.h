@@ -29,6 +29,10 @@ struct PairFigures {
   std::vector<double> depth_ratios;  // at the scene's force where both hold; sorted
 };
 
+// The scenes that have runs, and among them those with implicit steps.
+std::vector<const MapScene*> run_scenes(const std::vector<MapScene>& scenes);
+std::vector<const MapScene*> implicit_scenes(const std::vector<const MapScene*>& scenes);
+
 GroupFigures group_figures(const std::vector<const MapScene*>& scenes, int table, MapGroup group,
                            std::size_t method);
 PairFigures pair_figures(const std::vector<const MapScene*>& scenes, int table, std::size_t method);

@@ -66,6 +66,7 @@ MapScene planned(const std::string& name, const MapOptions& options) {
   const Result<io::Scene> scene = io::make_scene(name);
   if (!scene) out.left_out = scene.error();
   if (!out.left_out.empty()) return out;
+  out.explicit_steps = scene->integrator == H6_EXPLICIT;
   std::vector<double> walls;
   for (const MethodColumn& method : options.methods)
     walls.push_back(wall_stiffness(scene->contact, method));

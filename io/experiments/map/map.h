@@ -53,6 +53,7 @@ struct MapVariation {
 struct MapScene {
   std::string name;
   std::string left_out;         // why there are no variations; empty when there are
+  bool explicit_steps = false;  // a step that is too long is unstable under any rule
   std::vector<double> stiffer;  // of each method: factor of k that makes the wall equally stiff
   std::vector<MapVariation> variations;
 };

@@ -37,13 +37,6 @@ std::string ratios(const std::vector<double>& sorted) {
          (i ? " [" + number(i->low, 2) + ", " + number(i->high, 2) + "]" : "");
 }
 
-std::vector<const MapScene*> shown(const std::vector<MapScene>& scenes) {
-  std::vector<const MapScene*> out;
-  for (const MapScene& scene : scenes)
-    if (scene.left_out.empty()) out.push_back(&scene);
-  return out;
-}
-
 // The cells of a method behind its name and its factor of k.
 std::vector<std::string> cells(const std::vector<const MapScene*>& scenes, int table,
                                std::size_t method) {
@@ -194,6 +187,8 @@ constexpr const char* kAbout =
 
 }  // namespace
 
+std::string MapReport::about() { return kAbout; }
+
 std::string MapReport::first_error() const {
   for (const MapScene& scene : scenes)
     for (const MapVariation& v : scene.variations) {
@@ -209,7 +204,7 @@ TextTable MapReport::table(int which) const {
   TextTable out = {{"scene", "method", "k ×", "held", "depth", "chatters", "through", "≤ ½ voxel",
                     "push ≤ 4×", "push > 4×", "depth / " + options.methods[0].name,
                     "better, worse"}};
-  const std::vector<const MapScene*> all = shown(scenes);
+  const std::vector<const MapScene*> all = run_scenes(scenes);
   const auto add = [&](const std::string& name, const std::vector<const MapScene*>& of) {
     for (std::size_t m = 0; m < options.methods.size(); ++m) {
       const std::string mark = has_torque_noise(of, which, m) ? " *" : "";
@@ -221,15 +216,17 @@ TextTable MapReport::table(int which) const {
   };
   for (const MapScene* scene : all) add(scene->name, {scene});
   if (all.size() > 1) add("all", all);
+  const std::vector<const MapScene*> implicit = implicit_scenes(all);
+  if (implicit.size() > 1 && implicit.size() < all.size()) add("all, implicit steps", implicit);
   return out;
 }
 
 std::string MapReport::text(bool as_markdown) const {
   const auto drawn = [&](const TextTable& t) { return as_markdown ? markdown(t) : plain(t); };
   const std::string head = as_markdown ? "## " : "", item = as_markdown ? "- " : "  ";
-  std::string out = as_markdown ? "# Robustness map\n\n" + std::string(kAbout) + "\n\n" : "";
+  std::string out = as_markdown ? "# Robustness map\n\n" + about() + "\n\n" : "";
   if (options.only) {
-    for (const MapScene* scene : shown(scenes))
+    for (const MapScene* scene : run_scenes(scenes))
       for (const MapVariation& v : scene->variations)
         out += scene->name + ":" + std::to_string(v.index) + ": " + change_text(v.change) + "\n\n" +
                (v.error.empty() ? drawn(one_variation(v, options.methods)) : v.error + "\n");
@@ -240,7 +237,7 @@ std::string MapReport::text(bool as_markdown) const {
   bool noise = false;
   for (int t = 0; t < kMapTables; ++t)
     for (std::size_t m = 0; m < options.methods.size(); ++m)
-      noise = noise || has_torque_noise(shown(scenes), t, m);
+      noise = noise || has_torque_noise(run_scenes(scenes), t, m);
   if (noise)
     out +=
         "* In some runs r is parallel to N and the torque direction is rounding noise: these "
@@ -248,7 +245,7 @@ std::string MapReport::text(bool as_markdown) const {
   for (const MapScene& scene : scenes)
     if (!scene.left_out.empty()) out += "Left out: " + scene.name + ", " + scene.left_out + ".\n";
   std::string failures;
-  for (const MapScene* scene : shown(scenes)) {
+  for (const MapScene* scene : run_scenes(scenes)) {
     for (const MapVariation& v : scene->variations)
       if (!v.error.empty())
         failures += item + scene->name + ":" + std::to_string(v.index) + ": " + v.error + "\n";
@@ -300,7 +297,9 @@ ordered_json MapReport::json() const {
     }
   }
   for (int t = 0; t < kMapTables; ++t)
-    out["all"][kTableNames[t]] = figures_json(shown(scenes), t, options.methods);
+    for (const auto& [name, of] : {std::pair{"all", run_scenes(scenes)},
+                                   {"implicit_steps", implicit_scenes(run_scenes(scenes))}})
+      out[name][kTableNames[t]] = figures_json(of, t, options.methods);
   if (const std::string error = first_error(); !error.empty()) out["error"] = error;
   out["conclusions"] = map_conclusions(scenes, options.methods);
   return out;
@@ -312,7 +311,7 @@ std::string MapReport::csv() const {
       "jitter,sampling_seed,mass,speed,step,push,table,force,newtons,method,stiffer,verdict,held,"
       "depth_voxels,late_speed,late_depth_swing_voxels,differs_by_processor,error\n";
   char text[512];
-  for (const MapScene* scene : shown(scenes))
+  for (const MapScene* scene : run_scenes(scenes))
     for (const MapVariation& v : scene->variations)
       for (int t = 0; v.error.empty() && t < kMapTables; ++t)
         for (int f = 0; f < kMapForces; ++f)

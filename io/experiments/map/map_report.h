@@ -10,6 +10,7 @@ struct MapReport {
   const MapOptions& options;
   const std::vector<MapScene>& scenes;
 
+  static std::string about();        // what is run, and what the columns of the tables mean
   TextTable table(int which) const;  // MapTable
   // The tables with what their columns mean, scenes that are left out, variations that do not hold,
   // and the conclusions.

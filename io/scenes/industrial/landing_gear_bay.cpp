@@ -9,7 +9,7 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kRoof = 1992, kLeft = -320, kRight = 800, kHalf = 500;
+constexpr double kRoof = 1992, kLeft = -320, kRight = 800, kHalfBay = 500;
 constexpr Frame kBack = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};  // 2-D (x, z), along -y
 
 void add_rivets(Assembly& a, const std::string& name, const h6Vec3& from, const h6Vec3& to,
@@ -79,7 +79,7 @@ void add_roof(Assembly& a) {
   a.add("bay roof",
         sheet(60, 50,
               [](double u, double v) {
-                return h6Vec3{kLeft + (kRight - kLeft) * u, -kHalf + 2 * kHalf * v,
+                return h6Vec3{kLeft + (kRight - kLeft) * u, -kHalfBay + 2 * kHalfBay * v,
                               kRoof + 6 * std::sin(std::numbers::pi * u)};
               }),
         {}, Kind::sheet);
@@ -91,21 +91,22 @@ void add_roof(Assembly& a) {
           sheet(50, 3,
                 [&](double u, double v) {
                   const P2 p = zee[static_cast<std::size_t>(std::lround(3 * v))];
-                  return h6Vec3{x + p.x, -kHalf + 2 * kHalf * u, z - 2.5 + p.y};
+                  return h6Vec3{x + p.x, -kHalfBay + 2 * kHalfBay * u, z - 2.5 + p.y};
                 }),
           {}, Kind::sheet);
     for (const double dx : {-9.0, -25.0})
-      add_rivets(a, "roof rivet", {x + dx, -kHalf + 12, z}, {x + dx, kHalf - 12, z}, {0, 0, 1}, 15);
+      add_rivets(a, "roof rivet", {x + dx, -kHalfBay + 12, z}, {x + dx, kHalfBay - 12, z},
+                 {0, 0, 1}, 15);
   }
   for (const double x : {kLeft, kRight}) {
     a.add("bay side wall",
           sheet(40, 16,
                 [&](double u, double v) {
-                  return h6Vec3{x, -kHalf + 2 * kHalf * u, 1610 + (kRoof - 1610) * v};
+                  return h6Vec3{x, -kHalfBay + 2 * kHalfBay * u, 1610 + (kRoof - 1610) * v};
                 }),
           {}, Kind::sheet);
     for (const double z : {1640.0, 1760.0, 1880.0})
-      add_rivets(a, "wall rivet", {x, -kHalf + 12, z}, {x, kHalf - 12, z},
+      add_rivets(a, "wall rivet", {x, -kHalfBay + 12, z}, {x, kHalfBay - 12, z},
                  {x < 0 ? -1.0 : 1.0, 0, 0}, 15);
   }
 }

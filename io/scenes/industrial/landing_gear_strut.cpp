@@ -8,9 +8,10 @@
 namespace h6::io::industrial {
 namespace {
 
-// Frames of extruded outlines: kSide takes 2-D (y, z), along x; kBack takes 2-D (x, z), along -y.
-constexpr Frame kSide = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
-constexpr Frame kBack = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
+// Frames of extruded outlines: kSideFrame takes 2-D (y, z), along x; kBackFrame takes 2-D (x, z),
+// along -y.
+constexpr Frame kSideFrame = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
+constexpr Frame kBackFrame = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, -1, 0}};
 
 void add_cylinder(Assembly& a) {
   Profile body = {{0, 1770}, {64, 1770}, {78, 1756}, {84, 1730}, {84, 1640}};
@@ -44,7 +45,7 @@ void add_cylinder(Assembly& a) {
         counter_clockwise(
             {{side * 60, 1700}, {side * 60, 1420}, {side * 320, 1660}, {side * 320, 1700}}),
         {circle(26, 48, {side * 130, 1620})}};
-    a.add("trunnion web", extrude(web, -9, 9), kSide);
+    a.add("trunnion web", extrude(web, -9, 9), kSideFrame);
     a.add("trunnion bearing",
           revolve({{41, 0}, {70, 0}, {74, 6}, {74, 40}, {70, 46}, {41, 46}}, 80, Ends::joined),
           facing({0, side * 380, 1690}, {0, -side, 0}));
@@ -85,7 +86,7 @@ void add_torque_links(Assembly& a) {
             facing(frame.at({0, side * 66, 0}), {1, 0, 0}));
       Outline lug{hull({{from.y, from.z, 32}, {60, from.z + (upper ? 10 : -10), 46}}, 56),
                   {circle(14, 40, {from.y, from.z})}};
-      a.add("torque link lug", extrude(lug, side * 30 - 14, side * 30 + 14), kSide);
+      a.add("torque link lug", extrude(lug, side * 30 - 14, side * 30 + 14), kSideFrame);
     }
     const Frame pin = facing(from + h6Vec3{-100, 0, 0}, {-1, 0, 0});
     a.add("torque link pin", cylinder(14, -206, 4, 48), pin);
@@ -146,19 +147,19 @@ void add_braces(Assembly& a) {
           extrude({hull({{low.x, low.z, 42}, {50, low.z + 20, 60}}, 56),
                    {circle(17, 40, {low.x, low.z})}},
                   -y - 22, -y),
-          kBack);
+          kBackFrame);
   for (const double x : {-34.0, 12.0})
     a.add("brace lug",
           extrude({hull({{-128, 1060, 42}, {-50, 1075, 60}}, 56), {circle(17, 40, {-128, 1060})}},
                   x, x + 22),
-          kSide);
+          kSideFrame);
   // An arm with a fork for the actuator.
   for (const double y : {kStrutPin.y - 42, kStrutPin.y + 22})
     a.add("actuator lug",
           extrude({hull({{kStrutPin.x, kStrutPin.z, 34}, {30, kStrutPin.z - 10, 52}}, 56),
                    {circle(13.5, 40, {kStrutPin.x, kStrutPin.z})}},
                   -y - 20, -y),
-          kBack);
+          kBackFrame);
   a.add("actuator lug arm", block(96, 190, 84, 20, 8), at(24, 150, kStrutPin.z - 60));
 }
 

@@ -8,9 +8,9 @@
 namespace h6::io::industrial {
 namespace {
 
-constexpr double kAxle = 400;  // height
-constexpr double kTyre = 385;  // outer radius
-constexpr double kHalf = 108;  // half of the tyre's width
+constexpr double kAxle = 400;      // height
+constexpr double kTyre = 385;      // outer radius
+constexpr double kHalfTyre = 108;  // half of the tyre's width
 constexpr double kRim = 215;
 
 // A point of the tyre's section, which runs from bead to bead.
@@ -25,7 +25,7 @@ std::vector<TyrePoint> tyre_section() {
       const double t = (outward ? k : 22 - k) / 22.0, angle = std::numbers::pi * (0.06 + 0.66 * t);
       const double r = 300 - 96 * std::cos(angle) - (t > 0.9 ? (t - 0.9) * 30 : 0);
       const double rib = k == 9 || k == 12 ? 1.5 : 0;  // moulded rings
-      add(r, side * (62 + (kHalf - 62 + rib) * std::sin(angle)));
+      add(r, side * (62 + (kHalfTyre - 62 + rib) * std::sin(angle)));
     }
   };
   wall(-1, true);

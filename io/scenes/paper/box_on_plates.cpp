@@ -9,19 +9,19 @@
 namespace h6::io {
 namespace {
 
-const h6Vec3 kHalf = {20 * kMm, 10 * kMm, 5 * kMm};
+const h6Vec3 kHalfBox = {20 * kMm, 10 * kMm, 5 * kMm};
 
 void press_box(Scene& scene, const Sampling& sampling, int nu, int nv) {
   SceneBody box;
   box.name = "box";
   box.com = h6Vec3{0, 0, 0};
-  box.inertia = box_inertia(box.mass, kHalf);
+  box.inertia = box_inertia(box.mass, kHalfBox);
   box.pose = {{0, 0, 5.1 * kMm}, {1, 0, 0, 0}};
   box.shell.emplace();
   box.shell->points.emplace();
   Sampler sampler(sampling);
-  sampler.face(*box.shell->points, {0, 0, -kHalf.z}, {kHalf.x, 0, 0}, {0, kHalf.y, 0}, nu, nv,
-               {0, 0, 1});
+  sampler.face(*box.shell->points, {0, 0, -kHalfBox.z}, {kHalfBox.x, 0, 0}, {0, kHalfBox.y, 0}, nu,
+               nv, {0, 0, 1});
   box.shell->bake.levels = 5;
   scene.bodies.push_back(box);
 

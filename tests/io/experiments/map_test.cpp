@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/experiments/map/map_report.h"
+#include "io/experiments/map/map_page.h"
 #include "io/experiments/probe.h"
 #include "tests/support/sanitized.h"
 
@@ -162,4 +162,50 @@ TEST_CASE("a scene that is left out is named with the reason") {
   o.scenes = {"no-such-scene"};
   const std::vector<MapScene> none = run_map(o, quiet());
   CHECK(none[0].left_out.find("no-such-scene") != std::string::npos);
+}
+
+TEST_CASE("goals are judged for all scenes, and apart for those with implicit steps") {
+  MapOptions o = options({"robust"}, {"box-on-wall", "box-on-wall-explicit", "box-over-wire"}, 2);
+  const std::vector<MapScene> scenes = run_map(o, quiet());
+  CHECK(implicit_scenes(run_scenes(scenes)).size() == 2);
+  const MapReport report{o, scenes};
+  const nlohmann::ordered_json json = report.json();
+  CHECK(json["all"]["equal_stiffness"]["robust"]["scene"]["runs"] == 6);
+  CHECK(json["implicit_steps"]["equal_stiffness"]["robust"]["scene"]["runs"] == 4);
+  const TextTable table = report.table(kEqualStiffness);
+  CHECK(table[table.size() - 2][0] == "all");
+  CHECK(table.back()[0] == "all, implicit steps");
+  const std::vector<std::string> sentences = map_conclusions(scenes, o.methods);
+  for (const char* words :
+       {"`robust` holds the scene's force in ",
+        "`robust` holds the scene's force with implicit steps in ",
+        "`robust` with the force of half a voxel with implicit steps is at most "})
+    CHECK_MESSAGE(says(sentences, words), words);
+  o.scenes = {"box-on-wall", "box-over-wire"};
+  const std::vector<MapScene> implicit = run_map(o, quiet());
+  CHECK_FALSE(says(map_conclusions(implicit, o.methods), "with implicit steps"));
+}
+
+TEST_CASE("the drawing has a mark for every run, a cross for each that is not held") {
+  const MapOptions o = options({"robust", "global"}, {"cone-in-gap"}, 3);
+  const std::vector<MapScene> scenes = run_map(o, quiet());
+  const std::string drawing = map_drawing({o, scenes}, kEqualStiffness);
+  const auto count = [&](const std::string& word) {
+    std::size_t n = 0;
+    for (std::size_t at = 0; (at = drawing.find(word, at)) != std::string::npos; ++at) ++n;
+    return n;
+  };
+  std::size_t held = 0;
+  for (const MapVariation& v : scenes[0].variations)
+    for (std::size_t m = 0; m < 2; ++m)
+      for (int force = 0; force < kMapForces; ++force)
+        held += v.run(kEqualStiffness, force, m).held;
+  CHECK(count("<circle") == held);
+  CHECK(count("<path") == 3 * 2 * kMapForces - held);
+  CHECK(count("<path") > 0);
+  CHECK(count("<title>cone-in-gap:2 global") == kMapForces);
+  const std::string page = map_page({o, scenes});
+  CHECK(page.find("<svg") != std::string::npos);
+  CHECK(page.find("<td>global</td>") != std::string::npos);
+  CHECK(page.find("the goal of 99 % is") != std::string::npos);
 }

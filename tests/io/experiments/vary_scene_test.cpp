@@ -94,6 +94,24 @@ TEST_CASE("every factor reaches its place in the scene") {
   }
 }
 
+TEST_CASE("a field with a tolerance is varied in its tolerance, and its force stays") {
+  const io::Scene plain = varied("box-over-fused-wire", {});
+  Variation v = draw_variation(Vary::turn, 3);
+  v.voxel = 0.5, v.shift = {0.5, 0, 0};
+  const io::Scene scene = varied("box-over-fused-wire", v);
+  const io::FieldBake &a = plain.bodies[0].field->bake, &b = scene.bodies[0].field->bake;
+  CHECK(a.tolerance > 0);
+  CHECK(b.tolerance == 0.5 * a.tolerance);
+  CHECK(b.voxel_size == 0);
+  CHECK(smallest_voxel(plain) == io::kFinest * a.tolerance);
+  CHECK(largest_force(plain) == 5);
+  CHECK(largest_force(scene) == 5);
+  const auto loaded = io::load_scene(io::Scene(scene));
+  REQUIRE_MESSAGE(loaded, loaded.error());
+  // Its coarse voxels are cut into four.
+  CHECK((*loaded)->assets[0].voxel_size == doctest::Approx(4 * smallest_voxel(scene)));
+}
+
 TEST_CASE("a lattice that turns and shifts leaves the obstacle where it is, with other samples") {
   Variation v = draw_variation(Vary::turn, 3);
   v.shift = {0.5, 0.25, -0.25};

@@ -78,12 +78,12 @@ inline Json small_scene() {
 }
 
 inline Json full_scene() {
-  return Json::parse(R"({"hapsix": 1, "name": "all keys", "about": "every one", "units": "mm",
+  return Json::parse(R"({"hapsix": 1, "name": "all keys", "about": "every one", "units": "mm", "up": "y",
     "bodies": [
       {"name": "bay", "fixed": true,
        "field": {"mesh": "bay.stl", "voxels": 1024, "offset": 0.5, "sign": "flood",
                  "cavities": "hollow", "seal": 2.5, "units": "in", "band_voxels": 4, "padding_voxels": 9}},
-      {"name": "wall", "fixed": true, "field": {"mesh": "bay.stl", "voxel_size": 0.25}},
+      {"name": "wall", "fixed": true, "field": {"mesh": "bay.stl", "voxel_size": 0.25, "weld_length": 0.01}},
       {"name": "old", "fixed": true, "field": {"file": "baked.vdb"}},
       {"name": "part", "mass": 0.25, "com": [1, 2, 3],
        "inertia": [3e-4, 2e-4, 4e-4, 1e-5, -2e-5, 3e-5],
@@ -93,7 +93,8 @@ inline Json full_scene() {
                  "seal": 1.5}},
       {"name": "other", "translation_only": true, "shell": {"mesh": "bay.stl", "spacing": 0.75, "voxel_size": 0.25}},
       {"name": "third", "shell": {"file": "part.ply"}},
-      {"name": "cut", "fixed": true, "field": {"mesh": "bay.stl", "tolerance": 0.05}}],
+      {"name": "cut", "fixed": true, "field": {"mesh": "bay.stl", "tolerance": 0.05}},
+      {"name": "blade", "shell": {"mesh": "bay.stl", "tolerance": 0.05}}],
     "contact": {"method": "gauss6+facing+product+geodesic", "stiffness": 2e4, "damping": 2e-3,
                 "global_n0": 7, "epsilon": 0.02, "epsilon_normal": 0.03,
                 "epsilon_torque": 0.9, "torque_length": 1.5,

@@ -10,8 +10,9 @@ using namespace h6::io;
 using test::every_member_has_a_row;
 
 TEST_CASE("every member of a scene's structs has its row") {
-  // The numbers count members that no row points at: generated, file, bodies, hands, verdict.
-  every_member_has_a_row<Scene>(scene_settings(), 5);
+  // The numbers count members that no row points at: generated, file, unit_is_stated, bodies, hands,
+  // verdict.
+  every_member_has_a_row<Scene>(scene_settings(), 6);
   every_member_has_a_row<SceneBody>(scene_body_settings(), 2);  // field, shell
   every_member_has_a_row<SceneHand>(scene_hand_settings(), 2);  // path and its file
   every_member_has_a_row<SceneArm>(arm_settings(), 0);

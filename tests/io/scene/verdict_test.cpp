@@ -80,14 +80,27 @@ Moment swinging(double t, double rms_speed) {
 }  // namespace
 
 TEST_CASE("every verdict has a name") {
-  for (const Verdict v : {Verdict::unstable, Verdict::through, Verdict::chatters, Verdict::arrived,
-                          Verdict::stuck, Verdict::untouched, Verdict::held})
+  for (const Verdict v :
+       {Verdict::unstable, Verdict::through, Verdict::chatters, Verdict::sunk, Verdict::arrived,
+        Verdict::stuck, Verdict::untouched, Verdict::unheld, Verdict::held})
     CHECK(std::string(verdict_name(v)).size() >= 4);
   CHECK(std::string(verdict_name(Verdict::held)) == "held");
 }
 
 TEST_CASE("a body that follows its hand and rests is held") {
   CHECK(judge(0.6, calm) == Verdict::held);
+}
+
+TEST_CASE("a body that ends deeper than three voxels has sunk, and one that came back is held") {
+  const auto deep = [](double from, double to) {
+    return [=](double t) {
+      Moment m = calm(t);
+      if (from <= t && t < to) m.depth = 3.5;
+      return m;
+    };
+  };
+  CHECK(judge(0.6, deep(0.1, 1)) == Verdict::sunk);
+  CHECK(judge(0.6, deep(0.1, 0.15)) == Verdict::held);
 }
 
 TEST_CASE("a run that never touched is untouched, but one with a target is judged by it") {

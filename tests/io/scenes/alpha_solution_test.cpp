@@ -216,7 +216,7 @@ TEST_CASE("the engine follows the way: the tool arrives, within one voxel of the
   const Scene scene = solution();
   CHECK(scene.bodies[0].field->bake.voxels == 512);
   CHECK(scene.bodies[1].shell->bake.points == 25269);
-  REQUIRE(scene.contact.method == H6_METHOD_ROBUST);
+  REQUIRE(scene.contact.method == H6_METHOD_FIRM);
   auto loaded = load_scene(scene);
   REQUIRE_MESSAGE(loaded, loaded.error());
   const LoadedScene& l = **loaded;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "io/mesh/mesh_file.h"
+#include "io/scenes/industrial/forced_path.h"
 #include "io/scenes/industrial/industrial.h"
 #include "io/scenes/scenes.h"
 #include "io/scenes/shapes.h"
@@ -442,15 +443,35 @@ TEST_CASE("the industrial scenes have the paper's sizes; their parts start and e
       REQUIRE(path[i].t > path[i - 1].t);
       CHECK(norm(path[i].pose.p - path[i - 1].pose.p) <= 0.1001 * (path[i].t - path[i - 1].t));
     }
-    // Where the hand waits, which is the tightest place, and at the start, the part's points come
-    // near no triangle of the soup.
-    const h6Pose tight = sample_path(path, path.back().t / 2);
+    // At the end of the way in, which is the tightest place, and at the start, the part's points
+    // come near no triangle of the soup. After that the hand leads it through triangles.
+    const Path way_in = std::string(name) == "engine-bay" ? starter_way_in() : actuator_way_in();
+    const h6Pose tight = way_in.back().pose;
+    for (const PathRow& row : way_in) CHECK(norm(sample_path(path, row.t).p - row.pose.p) < 1e-12);
     CHECK(norm(tight.p - part.pose.p) > 0.15);
     const double voxel = (std::string(name) == "engine-bay" ? bay() : gear()).truth.voxel;
     CHECK(least_distance(*soup.field->mesh_data, moved(*part.shell->mesh_data, tight)) > 2 * voxel);
     CHECK(least_distance(*soup.field->mesh_data, moved(*part.shell->mesh_data, part.pose)) >
           5 * voxel);
+    std::size_t forced = 0;  // stations at which the hand alone would be in the way of something
+    for (const PathRow& row : path)
+      forced += row.t > way_in.back().t &&
+                least_distance(*soup.field->mesh_data, moved(*part.shell->mesh_data, row.pose)) <
+                    0.5 * voxel;
+    CHECK(forced >= 3);
   }
+}
+
+TEST_CASE("forced paths begin on the way in and are the same every time") {
+  const Path way_in = starter_way_in();
+  const Path a = forced_path(way_in, 7), b = forced_path(way_in, 7), c = forced_path(way_in, 8);
+  REQUIRE(a.size() == b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    CHECK(norm(a[i].pose.p - b[i].pose.p) == 0);
+    CHECK(a[i].t == b[i].t);
+  }
+  CHECK(norm(a.front().pose.p - way_in.front().pose.p) == 0);
+  CHECK(norm(a.back().pose.p - c.back().pose.p) > 1e-3);
 }
 
 TEST_CASE("an industrial scene is exported as plain files and read back" *

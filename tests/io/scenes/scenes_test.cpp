@@ -30,11 +30,14 @@ Scene scene_of(const std::string& name) {
 }
 
 // All scenes but the industrial ones, which have up to 1.8 million triangles and take a second each
-// to make. industrial_scenes_test.cpp checks those.
+// to make, and the machines. industrial_scenes_test.cpp and machines_test.cpp check those.
 std::vector<SceneName> small_scenes() {
+  static const std::set<std::string> others = {
+      "engine-bay",  "landing-gear",  "alphas-in-two-hands", "piston-in-bore", "gear-train",
+      "wire-bundle", "spline-hub-1k", "spline-hub-10k",      "spline-hub-100k"};
   std::vector<SceneName> out;
   for (const SceneName& entry : scene_names())
-    if (entry.name != "engine-bay" && entry.name != "landing-gear") out.push_back(entry);
+    if (!others.count(entry.name)) out.push_back(entry);
   return out;
 }
 
