@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The guides are true: every command in them is run, in their order, in a folder of its own; links
+// lead somewhere; Python runs where h5py is there.
+#include <cstdlib>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+const fs::path guides = fs::path(HAPSIX_SOURCE_DIR) / "io/guide";
+
+std::vector<fs::path> all_guides() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(guides))
+    if (entry.path().extension() == ".md") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// All fenced blocks of one language, joined.
+std::string blocks(const fs::path& guide, const std::string& language) {
+  std::istringstream in(slurp(guide));
+  std::string out;
+  bool open = false, wanted = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("```")) {
+      open = !open;
+      wanted = open && line == "```" + language;
+    } else if (wanted) {
+      out += line + "\n";
+    }
+  }
+  return out;
+}
+
+int shell(const std::string& command) { return std::system(command.c_str()); }
+
+// Runs a script in `folder`, with the program on the path and a cache of its own.
+int run_script(const Sandbox& box, const std::string& what, const fs::path& script,
+               const fs::path& log) {
+  const fs::path bin = fs::path(HAPSIX_PROGRAM).parent_path();
+  return shell("cd '" + box.folder().string() + "' && HAPSIX_CACHE='" + box.cache().string() +
+               "' HAPSIX='" + HAPSIX_SOURCE_DIR + "' PATH=\"" + bin.string() + ":$PATH\" " + what +
+               " '" + script.string() + "' > '" + log.string() + "' 2>&1 < /dev/null");
+}
+
+}  // namespace
+
+TEST_CASE("every command of every guide runs") {
+  int with_commands = 0;
+  for (const fs::path& guide : all_guides()) {
+    const std::string commands = blocks(guide, "sh");
+    if (commands.empty()) continue;
+    ++with_commands;
+    Sandbox box;
+    const fs::path script = box.stream(), log = box.stream();
+    spill(script, commands);
+    const int code = run_script(box, "bash -e -o pipefail", script, log);
+    CHECK_MESSAGE(code == 0, guide.filename(), "\n", slurp(log));
+    const std::string python = blocks(guide, "python");
+    if (python.empty()) continue;
+    if (shell("python3 -c 'import h5py' 2> /dev/null") != 0) {
+      MESSAGE("skipped: no h5py for the Python of ", guide.filename().string());
+      continue;
+    }
+    spill(script, python);
+    const int ran = run_script(box, "python3", script, log);
+    CHECK_MESSAGE(ran == 0, guide.filename(), "\n", slurp(log));
+  }
+  CHECK(with_commands >= 6);
+}
+
+TEST_CASE("the guides have no command outside the blocks that are run") {
+  for (const fs::path& guide : all_guides())
+    for (const char* other : {"", "text", "bash", "console", "shell"})
+      CHECK_MESSAGE(blocks(guide, other).find("hapsix ") == std::string::npos, guide.filename(),
+                    " has commands in a block of '", other, "'");
+}
+
+TEST_CASE("links of the guides lead somewhere") {
+  static const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
+  int seen = 0;
+  for (const fs::path& guide : all_guides()) {
+    const std::string text = slurp(guide);
+    for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it, ++seen)
+      CHECK_MESSAGE(fs::exists(guide.parent_path() / (*it)[1].str()), guide.filename(), " names ",
+                    (*it)[1].str());
+  }
+  CHECK(seen > 10);
+}
