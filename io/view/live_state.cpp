@@ -75,9 +75,11 @@ void LiveState::contacts(const h6LoopView& view) {
   for (std::size_t b = 0; b < view.body_count; ++b) append_pose(poses_, view.bodies[b]);
   for (std::vector<float>* column : {&p_, &n_, &t_, &w_, &d_}) column->clear();
   stiffness_ = {};
+  deepest_ = {};
   for (std::size_t i = 0; i < view.row_count; ++i) {
     const h6ViewContact& c = view.contacts[i];
     if (!(c.depth > 0)) continue;  // about to touch
+    if (c.depth > deepest_.depth) deepest_ = c;
     p_.insert(p_.end(), c.position, c.position + 3);
     n_.insert(n_.end(), c.normal, c.normal + 3);
     t_.insert(t_.end(), c.torque_direction, c.torque_direction + 3);
@@ -100,6 +102,27 @@ ordered_json LiveState::contact_json() const {
           {"stiffness", contact_.stiffness},
           {"epsilon", epsilon_of(contact_)},
           {"max_depth_voxels", coupling_.max_depth_voxels}};
+}
+
+// The obstacle at the deepest contact, with the triangle of its mesh that is nearest; null where
+// nothing touches. A field without its mesh has neither part nor triangle.
+ordered_json LiveState::deepest_json() const {
+  if (!(deepest_.depth > 0)) return nullptr;
+  const auto other = static_cast<std::size_t>(deepest_.field_body);
+  ordered_json out{{"with", loaded_.scene.bodies[other].name}, {"part", ""}, {"triangle", -1}};
+  const int field = loaded_.bodies[other].field;
+  const auto& mesh = loaded_.field_meshes[static_cast<std::size_t>(field)];
+  if (!mesh || !mesh->rays() || 7 * other + 6 >= poses_.size()) return out;
+  const float* at = &poses_[7 * other];
+  const float* p = deepest_.position;
+  const h6Vec3 away = h6Vec3{p[0], p[1], p[2]} - h6Vec3{at[0], at[1], at[2]};
+  const h6Vec3 place = rotate(conjugate(h6Quat{at[3], at[4], at[5], at[6]}), away);
+  const RayScene::Near near = (*mesh->rays())->nearest(place);
+  if (near.triangle == RayScene::kNoTriangle) return out;
+  out["triangle"] = near.triangle;
+  const Mesh& m = mesh->mesh();
+  if (!m.part.empty()) out["part"] = m.part_names[static_cast<std::size_t>(m.part[near.triangle])];
+  return out;
 }
 
 Message LiveState::scene_message(std::vector<std::string>& remarks) const {
@@ -161,6 +184,7 @@ Message LiveState::state_message() {
                     {"force", norm(r.command[0].wrench.force)},
                     {"lag", lag},
                     {"stiffness", stiffness_},
+                    {"deepest", deepest_json()},
                     {"contact", contact_json()},
                     {"budget_us", 1e6 / loaded_.scene.rate},
                     {"late", {{"compute", late_[0]}, {"wakeup", late_[1]}, {"stolen", late_[2]}}},

@@ -43,11 +43,13 @@ class LiveState {
  private:
   static constexpr std::size_t kBins = 64, kRow = 6;
   nlohmann::ordered_json contact_json() const;
+  nlohmann::ordered_json deepest_json() const;
   const LoadedScene& loaded_;
   h6ContactDef contact_{};
   h6CouplingDef coupling_{};
   h6FrameRecord last_{};
   bool any_ = false, recording_ = false;
+  h6ViewContact deepest_{};  // of the newest frame; its depth is 0 where nothing touches
   h6Status status_ = 0;  // of all rows since the last message
   h6Cause cause_ = H6_CAUSE_NONE;
   std::uint64_t late_[3] = {};

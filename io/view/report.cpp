@@ -87,7 +87,7 @@ ordered_json popped_through(const ordered_json& summary) {
 }  // namespace
 
 ReportRun::ReportRun(std::string label, RecordingHead head, std::uint64_t frames)
-    : label_(std::move(label)), head_(std::move(head)), frames_(frames) {
+    : label_(std::move(label)), head_(std::move(head)), frames_(frames), judge_(head_.rate) {
   span_frames_ = std::max<std::uint64_t>(1, (frames + kSpans - 1) / kSpans);
   const auto by_rate = static_cast<std::uint64_t>(std::max(1.0, head_.rate / kReplayRate));
   const std::uint64_t step = std::max(by_rate, (frames + kReplaySamples - 1) / kReplaySamples);
@@ -123,15 +123,8 @@ void ReportRun::row(const h6FrameRecord& r) {
   for (std::size_t s = 0; s < stage_us_.size(); ++s)
     stage_us_[s].push_back(static_cast<float>(r.report.stage_us[s]));
   frame_us_.push_back(static_cast<float>(r.report.frame_us));
-  for (int k = 0; k < 3; ++k) {
-    static const char* const causes[] = {"own computation", "wake-up", "stolen"};
-    if (!(r.late & (1u << k))) continue;
-    ++late_[k];
-    if (late_frames_.size() < kLateFrames)
-      late_frames_.push_back({r.time, r.report.frame, causes[k], r.report.frame_us, r.wakeup_us});
-    else
-      ++late_left_out_;
-  }
+  for (int k = 0; k < 3; ++k) late_[k] += (r.late & (1u << k)) != 0;
+  judge_.row(r, [this](const LateFrame& late) { late_frame(late); });
   contacts_sum_ += r.report.contacts;
   contacts_max_ = std::max(contacts_max_, r.report.contacts);
   depth_max_ = std::max(depth_max_, r.report.max_depth_voxels);
@@ -139,6 +132,13 @@ void ReportRun::row(const h6FrameRecord& r) {
   hash_ = r.report.state_hash;
   end_ = r.time;
   ++seen_;
+}
+
+void ReportRun::late_frame(const LateFrame& late) {
+  if (late_frames_.size() < kLateFrames)
+    late_frames_.push_back(late);
+  else
+    ++late_left_out_;
 }
 
 void ReportRun::close_span() {
@@ -156,6 +156,7 @@ void ReportRun::events(std::vector<RecordingEvent> events, std::string summary_j
   events_ = std::move(events);
   summary_ = std::move(summary_json);
   if (span_.frames > 0) close_span();
+  judge_.finish([this](const LateFrame& late) { late_frame(late); });
 }
 
 void ReportRun::contacts(std::size_t sample, std::vector<ReportContact> all) {
@@ -210,7 +211,7 @@ class ReportWriter {
     for (const auto& l : r.late_frames_)
       late.push_back({{"t", l.time},
                       {"frame", l.frame},
-                      {"cause", l.cause},
+                      {"cause", late_cause_name(l.cause)},
                       {"frame_us", l.frame_us},
                       {"wakeup_us", l.wakeup_us}});
     for (std::size_t i = 0; i < std::min(kEvents, r.events_.size()); ++i)

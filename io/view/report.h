@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "hapsix/result.h"
+#include "io/record/late_judge.h"
 #include "io/record/recording.h"
 #include "io/scene/load_scene.h"
 
@@ -41,18 +42,13 @@ class ReportRun {
   friend class ReportWriter;
   friend Result<std::string> make_report(const std::vector<ReportRun>& runs,
                                          const LoadedScene* scene, const std::string& why);
-  struct Late {
-    double time;
-    std::uint64_t frame;
-    const char* cause;
-    double frame_us, wakeup_us;
-  };
   struct Span {
     std::uint64_t frames = 0;
     double time = 0;
     std::array<float, 5> low{}, high{};
   };
   void row(const h6FrameRecord& r);
+  void late_frame(const LateFrame& late);
   void close_span();
 
   std::string label_;
@@ -60,13 +56,14 @@ class ReportRun {
   std::string summary_;
   std::uint64_t frames_, span_frames_, seen_ = 0, late_[3] = {};
   std::size_t late_left_out_ = 0;
+  LateJudge judge_;
   Span span_;
   std::vector<float> rows_, replay_t_, replay_body_, replay_hand_;
   std::vector<std::uint64_t> replay_frames_;
   std::vector<std::vector<ReportContact>> contacts_;
   std::array<std::vector<float>, H6_STAGE_COUNT> stage_us_;
   std::vector<float> frame_us_;
-  std::vector<Late> late_frames_;
+  std::vector<LateFrame> late_frames_;
   std::vector<RecordingEvent> events_;
   double contacts_sum_ = 0, depth_max_ = 0, force_max_ = 0, end_ = 0;
   std::uint32_t contacts_max_ = 0;

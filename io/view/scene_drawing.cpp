@@ -157,10 +157,11 @@ ordered_json draw_scene(const LoadedScene& loaded, const DrawLimits& limits, Env
   }
   double voxel = 0;
   for (const LoadedAsset& a : loaded.assets)
-    if (a.is_field && (voxel == 0 || a.voxel_size < voxel)) voxel = a.voxel_size;
+    if (a.is_field && (voxel == 0 || a.finest < voxel)) voxel = a.finest;
   return {{"name", scene.name},
           {"unit", unit_name(scene.unit)},
           {"per_metre", 1 / metres(scene.unit)},
+          {"up", up_axis_name(scene.up)},
           {"voxel", voxel > 0 ? voxel : 1e-3},
           {"hand_body", loaded.hands.empty() ? -1 : loaded.hands[0].body},
           {"bodies", bodies}};

@@ -13,4 +13,10 @@ export function weightColour(weight: number): [number, number, number] {
 }
 
 export const series = ['#d95f02', '#1b9e77', '#7570b3', '#e7298a', '#66a61e', '#e6ab02'];
-export const normalColour = '#ff5a4d', torqueColour = '#4da3ff';
+
+// A colour of style.css, which knows whether the system is light or dark.
+export const css = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+// Calls at every change between light and dark.
+export function onTheme(changed: () => void) {
+  matchMedia('(prefers-color-scheme: light)').addEventListener('change', changed);
+}

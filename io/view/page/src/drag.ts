@@ -32,6 +32,28 @@ export class Drag {
     canvas.addEventListener('contextmenu', (e) => e.preventDefault());
   }
 
+  // Takes the hand where it is, once.
+  take() {
+    const ghost = this.view.ghost;
+    if (!ghost) return false;
+    this.p.copy(ghost.position);
+    this.q.copy(ghost.quaternion);
+    this.moves.begin();
+    return true;
+  }
+
+  // Moves the hand along the camera's axes (right, up, towards the eye) [radii of the scene], and
+  // turns it about them [rad].
+  nudge(move: THREE.Vector3, turn: THREE.Vector3) {
+    const axes = [0, 1, 2].map((i) => new THREE.Vector3().setFromMatrixColumn(this.view.camera.matrixWorld, i));
+    axes.forEach((axis, i) => this.p.addScaledVector(axis, move.getComponent(i) * this.view.radius));
+    const centre = this.com.clone().applyQuaternion(this.q).add(this.p);
+    axes.forEach((axis, i) => this.q.premultiply(new THREE.Quaternion().setFromAxisAngle(axis, turn.getComponent(i))));
+    this.q.normalize();
+    this.p.copy(centre).sub(this.com.clone().applyQuaternion(this.q));
+    this.moves.move(this.p, this.q);
+  }
+
   private aim(e: PointerEvent | WheelEvent) {
     const box = this.view.renderer.domElement.getBoundingClientRect();
     const at = new THREE.Vector2((2 * (e.clientX - box.left)) / box.width - 1, 1 - (2 * (e.clientY - box.top)) / box.height);
@@ -53,9 +75,7 @@ export class Drag {
     this.last.copy(hit.point);
     this.lastX = e.clientX;
     this.lastY = e.clientY;
-    this.p.copy(ghost.position);
-    this.q.copy(ghost.quaternion);
-    this.moves.begin();
+    this.take();
   }
 
   private moved(e: PointerEvent) {

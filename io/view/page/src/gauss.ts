@@ -2,7 +2,7 @@
 // The Gauss sphere: normals N (red) and torque directions T (blue) of all contacts, seen in the
 // direction of the scene's camera. Dots on the far side are faint.
 import { Quaternion, Vector3 } from 'three';
-import { normalColour, torqueColour } from './colours';
+import { css } from './colours';
 
 export class GaussSphere {
   private turn = new Quaternion();
@@ -18,8 +18,8 @@ export class GaussSphere {
     const g = c.getContext('2d')!;
     const x0 = c.width / 2, y0 = c.height / 2, r = size / 2 - 8 * ratio;
     g.clearRect(0, 0, c.width, c.height);
-    g.fillStyle = '#161b24';
-    g.strokeStyle = '#3a4354';
+    g.fillStyle = css('sphere');
+    g.strokeStyle = css('edge');
     g.lineWidth = ratio;
     g.beginPath();
     g.arc(x0, y0, r, 0, 7);
@@ -27,12 +27,12 @@ export class GaussSphere {
     g.stroke();
     this.turn.copy(camera).invert();
     for (let axis = 0; axis < 3; ++axis) this.circle(g, axis, x0, y0, r);
-    this.dots(g, torques, weights, torqueColour, x0, y0, r, 2.2 * ratio);
-    this.dots(g, normals, weights, normalColour, x0, y0, r, 2.8 * ratio);
+    this.dots(g, torques, weights, css('torque'), x0, y0, r, 2.2 * ratio);
+    this.dots(g, normals, weights, css('normal'), x0, y0, r, 2.8 * ratio);
   }
 
   private circle(g: CanvasRenderingContext2D, axis: number, x0: number, y0: number, r: number) {
-    g.strokeStyle = '#2a3342';
+    g.strokeStyle = css('line');
     g.beginPath();
     for (let i = 0; i <= 64; ++i) {
       const a = (i * Math.PI) / 32, u = Math.cos(a), v = Math.sin(a);

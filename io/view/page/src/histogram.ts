@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+import { css } from './colours';
+
 // Histograms of times: bins of a quarter octave from 1/4 us on, counts on a logarithmic scale.
 export const binLow = (bin: number) => 0.25 * 2 ** (bin / 4);
 
@@ -33,15 +35,15 @@ export function drawHistogram(canvas: HTMLCanvasElement, bins: ArrayLike<number>
     const y = (h * Math.log10(1 + bins[i])) / Math.log10(1 + most);
     g.fillRect(i * step, h - y, Math.max(1, step - ratio), y);
   }
-  g.fillStyle = '#8b96a8';
+  g.fillStyle = css('muted');
   g.font = `${10 * ratio}px sans-serif`;
-  for (const mark of [1, 10, 100, 1000, 10000]) {
+  for (const mark of [1, 10, 100, 1000]) {
     const x = 4 * Math.log2(mark / 0.25) * step;
     g.fillRect(x, h, ratio, 3 * ratio);
     g.fillText(short(mark), x + 2 * ratio, h + 11 * ratio);
   }
   if (budget > 0) {
-    g.fillStyle = '#e05545';
+    g.fillStyle = css('limit');
     g.fillRect(4 * Math.log2(budget / 0.25) * step, 0, ratio, h);
   }
 }

@@ -7,20 +7,26 @@ import { drawHistogram, percentile, short } from './histogram';
 import { Strips } from './strips';
 import { View3D } from './view3d';
 import { Drag } from './drag';
+import { inControl, Steer } from './steer';
 
 const $ = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 const input = (id: string) => $<HTMLInputElement>(id);
 
 const view = new View3D($('space'));
 const gauss = new GaussSphere($<HTMLCanvasElement>('gauss'));
-const strips = new Strips($('strips'), ['now'], 148);
+const strips = new Strips($('strips'), ['now'], null);
 const width = 6, windowSeconds = 12;
 let rows = new Float32Array(0);
 let socket: WebSocket;
 let scene: any = null;
 let newest: Packet | null = null;
 let drag: Drag | null = null;
+let steer: Steer | null = null;
+let heard = 0;             // when the last state came [ms]
+let last = 0, slow = 0;     // the picture before [ms]; mean time between pictures [ms]
+const help = 'Drag the part to move it · Shift or right button turns it · wheel moves it away · or arrow and page keys, or a gamepad · drag elsewhere turns the camera';
 let paused = false, clutched = false;
+let recording = false;  // as the program said last; the button shows it when the page draws
 let pace = 1;
 
 function ask(request: object) {
@@ -32,6 +38,8 @@ function chip(id: string, text: string, kind: string) {
   e.textContent = text;
   e.className = `chip ${kind}`;
 }
+
+function hint(text: string) { ($('hint').firstElementChild as HTMLElement).textContent = text; }
 
 function load(packet: Packet) {
   if (scene) { location.reload(); return; }  // another run serves the same address now
@@ -57,6 +65,8 @@ function load(packet: Packet) {
     },
     end() { ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] }); },
   });
+  steer = new Steer(drag, clutch);
+  hint(help);
   settings(scene.contact);
   if (view.partHidden()) {
     input('opacity').value = '0.25';
@@ -115,9 +125,28 @@ function show(packet: Packet) {
     e.className = `chip ${kind}`;
     $('safety').append(e, ' ');
   }
-  chip('state', paused ? 'paused' : `${h.time.toFixed(1)} s`, 'good');
+  freshness(h.time);
+  showDeepest(h);
   settings(h.contact);
   $('record').classList.toggle('on', h.recording);
+  $('record').setAttribute('aria-pressed', String(h.recording));
+}
+
+// Says when what is shown is old, or when this page is too slow to follow.
+function freshness(time?: number) {
+  const age = performance.now() - heard;
+  const stale = heard > 0 && age > 1000 && !paused;
+  for (const id of ['safety', 'strips', 'n-contacts', 'n-depth', 'n-force', 'n-lag']) $(id).classList.toggle('stale', stale);
+  if (stale) return chip('state', `no news for ${(age / 1000).toFixed(0)} s`, 'bad');
+  if (time === undefined) return;
+  if (paused) return chip('state', 'paused', 'warn');
+  chip('state', `${time.toFixed(1)} s${slow > 250 ? `, page draws ${(1000 / slow).toFixed(1)}/s` : ''}`, slow > 250 ? 'warn' : 'good');
+}
+
+function showDeepest(h: any) {
+  const d = h.deepest;
+  $('deepest').textContent = !d ? 'nothing touches'
+    : `deepest at ${d.with}${d.part && d.part !== d.with ? ` / ${d.part}` : ''}${d.triangle >= 0 ? `, triangle ${d.triangle}` : ''}`;
 }
 
 function keep(packet: Packet) {
@@ -141,16 +170,17 @@ function connect() {
     const packet = unpack(event.data as ArrayBuffer);
     if (packet.head.kind === 'scene') load(packet);
     else if (packet.head.kind === 'slice') view.showSlice(input('slice-on').checked ? packet : null);
-    else if (packet.head.kind === 'state') { keep(packet); newest = packet; }
-    else if (packet.head.kind === 'note') $('hint').textContent = packet.head.text;
+    else if (packet.head.kind === 'state') { keep(packet); newest = packet; heard = performance.now(); recording = packet.head.recording; }
+    else if (packet.head.kind === 'note') hint(packet.head.text);
   };
-  socket.onclose = () => chip('state', 'the program has ended', 'bad');
+  socket.onclose = () => { heard = 0; chip('state', 'the program has ended', 'bad'); };
 }
 
 function changeContact(change: object) { ask({ do: 'contact', ...change }); }
 function setPace(value: number) { ask({ do: 'pace', pace: value }); }
 function pause() {
   paused = !paused;
+  $('pause').setAttribute('aria-pressed', String(paused));
   $('pause').textContent = paused ? 'go on' : 'pause';
   $('pause').classList.toggle('on', paused);
   setPace(paused ? 0 : pace);
@@ -158,6 +188,7 @@ function pause() {
 function clutch(on: boolean) {
   clutched = on;
   $('clutch').classList.toggle('on', on);
+  $('clutch').setAttribute('aria-pressed', String(on));
   ask({ do: 'clutch', on });
 }
 function askSlice() {
@@ -173,18 +204,22 @@ $('clutch').onclick = () => clutch(!clutched);
 $('pause').onclick = pause;
 input('pace').oninput = () => { pace = Number(input('pace').value); if (!paused) setPace(pace); };
 $('reset').onclick = () => ask({ do: 'reset' });
-$('record').onclick = () => ask({ do: 'record', on: !$('record').classList.contains('on') });
+$('record').onclick = () => ask({ do: 'record', on: !recording });
 input('opacity').oninput = () => view.environmentOpacity(Number(input('opacity').value));
 for (const id of ['slice-on', 'slice-axis', 'slice-at']) $(id).oninput = askSlice;
 addEventListener('keydown', (e) => {
-  if (e.target instanceof HTMLSelectElement || e.repeat) return;
-  if (e.key === ' ') { e.preventDefault(); pause(); }
+  if (e.repeat || e.target instanceof HTMLSelectElement) return;
+  if (e.key === ' ' && !inControl(e)) { e.preventDefault(); pause(); }
   if (e.key === 'c') clutch(true);
 });
 addEventListener('keyup', (e) => { if (e.key === 'c') clutch(false); });
 
 let drawn: Packet | null = null, strips_at = 0;
 function tick(now: number) {
+  const passed = now - last;
+  last = now;
+  if (passed < 5000) slow = 0.9 * slow + 0.1 * passed;
+  steer?.tick(passed / 1000);
   if (scene && newest && newest !== drawn) {
     drawn = newest;
     show(newest);
@@ -193,6 +228,7 @@ function tick(now: number) {
       strips.show([{ rows, width }]);
     }
   }
+  if (newest === drawn) freshness();
   view.render();
   requestAnimationFrame(tick);
 }

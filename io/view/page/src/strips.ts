@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Strips over time, as in the paper's Fig. 10: contacts, force, torque, penetration depth.
 import uPlot from 'uplot';
-import { series as colours } from './colours';
+import { css, onTheme, series as colours } from './colours';
 
 export interface StripSpec {
   title: string;
@@ -12,8 +12,8 @@ export interface StripSpec {
 export const specs: StripSpec[] = [
   { title: 'contacts', column: 1 },
   { title: 'force [N]', column: 2 },
-  { title: 'torque [mN m]', column: 3 },
-  { title: 'depth [voxel]', column: 4, line: 0.5 },
+  { title: 'torque [mN·m]', column: 3 },
+  { title: 'depth [voxel], limit 0.5', column: 4, line: 0.5 },
 ];
 
 // Rows of `width` numbers, time first.
@@ -22,18 +22,20 @@ export class Strips {
   private marker = Number.NaN;
   private flags: { time: number; colour: string }[] = [];
 
-  constructor(private where: HTMLElement, labels: string[], private height: number,
+  // `height` of one strip with its title and axes [pixels]; null: they share the height of `where`.
+  constructor(private where: HTMLElement, labels: string[], private height: number | null,
               private onTime?: (time: number) => void) {
     const sync = uPlot.sync('strips');
+    const ink = { stroke: () => css('muted'), grid: { stroke: () => css('grid') }, ticks: { stroke: () => css('grid'), size: 4 }, font: '11px system-ui, sans-serif' };
     for (const spec of specs) {
       const plot = new uPlot({
-        title: spec.title, width: this.width(), height, legend: { show: false },
+        title: spec.title, ...this.size(), legend: { show: false },
         cursor: { sync: { key: sync.key }, y: false, drag: { x: false, y: false } },
         scales: { x: { time: false }, y: { range: (_u, _low, high) => [0, Math.max(high * 1.08, spec.line ? 2 * spec.line : 1e-3)] } },
-        axes: [{ stroke: '#8b96a8', grid: { stroke: '#232b38' }, size: 24 },
-               { stroke: '#8b96a8', grid: { stroke: '#232b38' }, size: 46 }],
+        axes: [{ ...ink, size: 22, space: 44, gap: 3, values: (_u, marks) => marks.map((m) => `${+m.toFixed(3)} s`) },
+               { ...ink, size: 44, space: 22, gap: 3 }],
         series: [{}, ...labels.map((label, i) => ({
-          label, stroke: colours[i % colours.length], width: 1.4, points: { show: false },
+          label, stroke: colours[i % colours.length], width: 1.6, points: { show: false },
         }))],
         hooks: { draw: [(u: uPlot) => this.lines(u, spec)] },
       }, [[], ...labels.map(() => [])] as uPlot.AlignedData, where);
@@ -43,8 +45,8 @@ export class Strips {
       });
       this.plots.push(plot);
     }
-    new ResizeObserver(() => this.plots.forEach(
-      (p) => p.setSize({ width: this.width(), height: this.height }))).observe(where);
+    new ResizeObserver(() => this.plots.forEach((p) => p.setSize(this.size()))).observe(where);
+    onTheme(() => this.plots.forEach((p) => p.redraw(false)));
   }
 
   // One table of rows for each label; tables with other times are joined.
@@ -75,9 +77,15 @@ export class Strips {
     this.plots.forEach((p) => p.redraw(false));
   }
 
-  private width() {  // of one column of the grid
+  // Of one plot in the grid. uPlot does not count its title.
+  private size() {
     const columns = getComputedStyle(this.where).gridTemplateColumns.split(' ').length;
-    return Math.max(160, Math.floor(this.where.clientWidth / columns) - 4);
+    const rows = Math.ceil(specs.length / columns);
+    const title = 1.6 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    return {
+      width: Math.max(120, Math.floor(this.where.clientWidth / columns) - 4),
+      height: Math.max(60, (this.height ?? Math.floor(this.where.clientHeight / rows)) - title - 4),
+    };
   }
 
   private lines(u: uPlot, spec: StripSpec) {
@@ -85,7 +93,7 @@ export class Strips {
     g.save();
     if (spec.line !== undefined) {
       const y = u.valToPos(spec.line, 'y', true);
-      g.strokeStyle = '#e05545';
+      g.strokeStyle = css('limit');
       g.setLineDash([6, 4]);
       g.beginPath();
       g.moveTo(left, y);
@@ -103,7 +111,7 @@ export class Strips {
       g.stroke();
     };
     for (const flag of this.flags) upright(flag.time, flag.colour, [3, 3]);
-    upright(this.marker, '#f5f7fa', []);
+    upright(this.marker, css('marker'), []);
     g.restore();
   }
 }

@@ -6,7 +6,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Packet } from './envelope';
 import { floats } from './envelope';
-import { weightColour } from './colours';
+import { css, onTheme, weightColour } from './colours';
 import { principalAxes } from './stiffness';
 
 export interface BodyHead {
@@ -44,13 +44,15 @@ function arrowShape(): THREE.BufferGeometry {
 export class View3D {
   readonly camera = new THREE.PerspectiveCamera(40, 1, 0.01, 100);
   readonly renderer: THREE.WebGLRenderer;
-  readonly orbit: OrbitControls;
+  orbit: OrbitControls;
   readonly root = new THREE.Group();
   readonly bodies: THREE.Group[] = [];
   ghost: THREE.Object3D | null = null;
   hand = -1;                                // the body that the first hand moves
   radius = 1;
   private scene = new THREE.Scene();
+  private sky = new THREE.HemisphereLight('#dfe8f5', '#3a3f4a', 1.6);
+  private sun = new THREE.DirectionalLight('#ffffff', 1.8);
   private arrows: THREE.InstancedMesh;
   private deepest: THREE.Mesh;
   private crossing: THREE.Mesh;
@@ -60,6 +62,7 @@ export class View3D {
   private matrix = new THREE.Matrix4();
   private colour = new THREE.Color();
   private heads: BodyHead[] = [];
+  private others: THREE.Object3D[] = [];
 
   constructor(private where: HTMLElement) {
     try {
@@ -73,13 +76,14 @@ export class View3D {
     }
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     where.appendChild(this.renderer.domElement);
-    this.scene.background = new THREE.Color('#10141b');
-    this.scene.add(new THREE.HemisphereLight('#dfe8f5', '#3a3f4a', 1.6));
-    const sun = new THREE.DirectionalLight('#ffffff', 1.8);
-    sun.position.set(2, -3, 4);
-    this.camera.up.set(0, 0, 1);
+    this.scene.background = new THREE.Color(css('ground'));
+    onTheme(() => { this.scene.background = new THREE.Color(css('ground')); });
+    const canvas = this.renderer.domElement;
+    canvas.tabIndex = 0;
+    canvas.setAttribute('role', 'application');
+    canvas.setAttribute('aria-label', 'the parts in space; arrow keys and page keys move the part, with Shift they turn it');
     this.camera.add(new THREE.DirectionalLight('#ffffff', 0.7));
-    this.scene.add(sun, this.camera, this.root);
+    this.scene.add(this.sky, this.sun, this.camera, this.root);
     this.arrows = new THREE.InstancedMesh(arrowShape(), new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }), maxArrows);
     this.arrows.frustumCulled = false;
     this.arrows.renderOrder = 5;
@@ -97,14 +101,31 @@ export class View3D {
     this.ellipsoid.visible = false;
     this.ellipsoid.matrixAutoUpdate = false;
     this.root.add(this.arrows, this.deepest, this.crossing, this.ellipsoid);
-    this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
-    this.orbit.enableDamping = true;
+    this.orbit = this.controls();
     new ResizeObserver(() => this.resize()).observe(where);
     this.resize();
   }
 
+  // OrbitControls reads the camera's up once, when it is made.
+  private controls(): OrbitControls {
+    const orbit = new OrbitControls(this.camera, this.renderer.domElement);
+    orbit.enableDamping = true;
+    return orbit;
+  }
+
+  // Turns a direction of a world with z up into the scene's, whose up is another axis.
+  private upright(v: THREE.Vector3, up: string): THREE.Vector3 {
+    return up === 'y' ? new THREE.Vector3(v.x, v.z, -v.y) : up === 'x' ? new THREE.Vector3(v.z, v.x, v.y) : v;
+  }
+
   load(packet: Packet) {
     this.heads = packet.head.bodies;
+    const up = packet.head.up ?? 'z';
+    this.camera.up.copy(this.upright(new THREE.Vector3(0, 0, 1), up));
+    this.sun.position.copy(this.upright(new THREE.Vector3(2, -3, 4), up));
+    this.sky.position.copy(this.camera.up);
+    this.orbit.dispose();
+    this.orbit = this.controls();
     this.hand = packet.head.hand_body ?? -1;
     const box = new THREE.Box3(), part = new THREE.Box3();
     this.heads.forEach((head, i) => {
@@ -153,7 +174,7 @@ export class View3D {
     const focus = (part.isEmpty() ? box : part).getCenter(new THREE.Vector3()).divideScalar(this.radius);
     const near = part.isEmpty() ? 1 : Math.max(0.3, 0.7 * part.getSize(new THREE.Vector3()).length() / this.radius);
     this.orbit.target.copy(focus);
-    const place = (scale: number) => this.camera.position.copy(focus).add(new THREE.Vector3(1.2, -1.9, 1.3).multiplyScalar(1.25 * scale));
+    const place = (scale: number) => this.camera.position.copy(focus).add(this.upright(new THREE.Vector3(1.2, -1.9, 1.3), up).multiplyScalar(1.25 * scale));
     place(near);
     if (this.partHidden()) place(1);  // the part is deep inside: look at the whole scene
     this.orbit.update();
@@ -201,6 +222,42 @@ export class View3D {
       this.deepest.position.set(c.p[3 * deepest], c.p[3 * deepest + 1], c.p[3 * deepest + 2]);
       this.deepest.scale.setScalar(0.009 * this.radius);
     }
+  }
+
+  // Copies of the hand's body in other colours, for other runs.
+  copies(colours: string[]) {
+    const body = this.bodies[this.hand];
+    if (!body) return;
+    this.others = colours.map((colour) => {
+      const copy = body.clone();
+      copy.traverse((o) => {
+        if (o instanceof THREE.Mesh)
+          o.material = new THREE.MeshStandardMaterial({ color: colour, transparent: true, opacity: 0.45, depthWrite: false, side: THREE.DoubleSide });
+      });
+      copy.visible = false;
+      this.root.add(copy);
+      return copy;
+    });
+  }
+  copyAt(i: number, pose: Float32Array | null, at: number) {
+    const copy = this.others[i];
+    if (!copy) return;
+    copy.visible = pose !== null;
+    if (pose) setPose(copy, pose, at);
+  }
+
+  // Turns the camera to a place in the world, from where it stands but near enough to see the place
+  // among its surroundings.
+  frame(place: number[]) {
+    const at = new THREE.Vector3(place[0], place[1], place[2]).divideScalar(this.radius);
+    const from = this.camera.position.clone().sub(this.orbit.target);
+    this.root.updateMatrixWorld(true);
+    const body = this.bodies[this.hand];
+    const size = body ? new THREE.Box3().setFromObject(body).getSize(new THREE.Vector3()).length() : 1;
+    from.setLength(Math.min(from.length(), Math.max(0.25, 1.1 * size)));
+    this.orbit.target.copy(at);
+    this.camera.position.copy(at).add(from);
+    this.orbit.update();
   }
 
   // Marks the place where a point passed through the environment; null: none.

@@ -46,7 +46,7 @@ test('the scrubber moves the part, and contacts are there', async () => {
   const seen = async (t) => browser.value(`(async () => {
     const h = window.hapsix, scrub = document.getElementById('scrub');
     scrub.value = ${t}; scrub.dispatchEvent(new Event('input'));
-    await new Promise((done) => setTimeout(done, 300));
+    for (let frame = 0; frame < 3; ++frame) await new Promise((done) => requestAnimationFrame(done));
     const v = h.replay.view; const p = v.bodies[v.hand].position;
     return { x: [p.x, p.y, p.z], contacts: Number(document.getElementById('n-contacts').textContent) };
   })()`);
