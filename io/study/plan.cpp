@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/study/plan.h"
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "hapsix/hapsix.h"
+#include "io/file/content_hash.h"
+#include "io/file/json.h"
+#include "io/scene/scene_file.h"
+#include "io/scenes/scenes.h"
+
+namespace h6::study {
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+constexpr std::size_t kMostRuns = 1000000;
+
+struct Varied {
+  std::string key;
+  std::vector<Json> values;
+};
+struct Drawn {
+  std::string key;
+  double low = 0, high = 0;
+};
+
+// A mistake in STUDY.json, on its way to the one place that makes a Failure of it.
+struct Mistake {
+  std::string sentence;
+};
+
+double number_of(const Json& from, const char* key, const std::string& where) {
+  if (!from.contains(key) || !from[key].is_number() || !std::isfinite(from[key].get<double>()))
+    throw Mistake{where + " needs a number '" + key + "'"};
+  return from[key].get<double>();
+}
+
+std::uint64_t whole_of(const Json& from, const char* key, std::uint64_t usual, std::uint64_t most) {
+  if (!from.contains(key)) return usual;
+  if (!from[key].is_number_unsigned() || from[key].get<std::uint64_t>() > most)
+    throw Mistake{std::string(key) + " must be a whole number from 0 to " + std::to_string(most)};
+  return from[key].get<std::uint64_t>();
+}
+
+void refuse_others(const Json& object, const std::vector<std::string>& known,
+                   const std::string& where) {
+  for (const auto& [key, value] : object.items())
+    if (std::find(known.begin(), known.end(), key) == known.end())
+      throw Mistake{where + " has an unknown key '" + key + "'"};
+}
+
+Varied varied(const std::string& key, const Json& given) {
+  const std::string where = "vary '" + key + "'";
+  Varied out{key, {}};
+  if (given.is_array()) {
+    for (const Json& value : given) out.values.push_back(value);
+  } else if (given.is_object()) {
+    refuse_others(given, {"from", "to", "count", "log"}, where);
+    const double from = number_of(given, "from", where), to = number_of(given, "to", where);
+    const std::uint64_t count = whole_of(given, "count", 2, kMostRuns);
+    const bool log = given.value("log", false);
+    if (log && !(from > 0 && to > 0)) throw Mistake{where + ": log needs 'from' and 'to' above 0"};
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const double s = count > 1 ? static_cast<double>(i) / static_cast<double>(count - 1) : 0;
+      out.values.push_back(log ? from * std::pow(to / from, s) : from + (to - from) * s);
+    }
+  }
+  if (out.values.empty())
+    throw Mistake{where + " must be a list of values, or {\"from\", \"to\", \"count\"}"};
+  return out;
+}
+
+Drawn drawn(const std::string& key, const Json& given) {
+  const std::string where = "draw '" + key + "'";
+  if (!given.is_object()) throw Mistake{where + " must be {\"low\", \"high\"}"};
+  refuse_others(given, {"low", "high"}, where);
+  return {key, number_of(given, "low", where), number_of(given, "high", where)};
+}
+
+// A number in [0, 1) that depends on these three alone.
+double draw(std::uint64_t seed, std::uint64_t repeat, std::uint64_t key) {
+  const std::uint64_t words[] = {repeat, key};
+  return static_cast<double>(io::hash_on(seed, words, sizeof words) >> 11) * 0x1p-53;
+}
+
+// The element of a list that a word of a key names.
+Json* element(Json& list, const std::string& word) {
+  for (Json& one : list)
+    for (const char* name : {"name", "body"})
+      if (one.is_object() && one.contains(name) && one[name] == word) return &one;
+  std::size_t i = list.size();
+  if (word.size() == 1 && std::string("xyz").find(word) != std::string::npos && list.size() == 3)
+    i = std::string("xyz").find(word);
+  else if (word.size() == 1 && std::string("wxyz").find(word) != std::string::npos &&
+           list.size() == 4)
+    i = std::string("wxyz").find(word);
+  else if (!word.empty() && word.size() < 6 &&
+           word.find_first_not_of("0123456789") == std::string::npos)
+    i = std::stoul(word);
+  return i < list.size() ? &list[i] : nullptr;
+}
+
+void put(Json& scene, const std::string& key, const Json& value) {
+  Json* at = &scene;
+  std::stringstream words(key);
+  for (std::string word; std::getline(words, word, '.');) {
+    if (at->is_array()) {
+      at = element(*at, word);
+      if (!at) throw Mistake{"the scene has no '" + word + "' for the key '" + key + "'"};
+    } else if (at->is_object() || at->is_null()) {
+      at = &(*at)[word];
+    } else {
+      throw Mistake{"'" + word + "' in the key '" + key + "' is inside a value, not a setting"};
+    }
+  }
+  *at = value;
+}
+
+// A scene's file names become absolute, since its text goes elsewhere.
+template <class Use>
+void each_file(io::Scene& scene, Use&& use) {
+  const auto both = [&](auto& source) {
+    if (!source) return;
+    for (fs::path* file : {&source->mesh, &source->file})
+      if (!file->empty()) use(*file);
+  };
+  for (io::SceneBody& body : scene.bodies) both(body.field), both(body.shell);
+}
+
+std::string content_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+Result<io::Scene> base_scene(const std::string& name, const fs::path& study, const fs::path& folder,
+                             bool outside) {
+  const fs::path file = fs::path(name).is_absolute() ? fs::path(name) : study.parent_path() / name;
+  std::error_code error;
+  if (fs::is_regular_file(file, error)) return io::read_scene(file, outside);
+  const fs::path exported = folder / "scene";
+  if (!fs::exists(exported / "scene.json", error)) {
+    Result<io::Scene> made = io::make_scene(name);
+    if (!made) return Failure{name + ": there is neither such a file nor such a generated scene"};
+    // Aside first: a kill leaves no half scene.
+    const fs::path aside = folder / "scene.unfinished";
+    fs::remove_all(aside, error);
+    if (const Outcome out = io::export_scene(*made, aside); !out) return out.failure();
+    fs::rename(aside, exported, error);
+    if (error) return Failure{"cannot write " + exported.string() + ": " + error.message()};
+  }
+  return io::read_scene(exported / "scene.json");
+}
+
+}  // namespace
+
+struct Plan::Parts {
+  io::Scene base;
+  Json scene;  // of the base
+  std::vector<Varied> vary;
+  std::vector<Drawn> draws;
+  std::uint64_t repeats = 1, seed = 1;
+  std::vector<std::string> keys;
+  std::string identity;
+
+  std::size_t combinations() const {
+    std::size_t n = 1;
+    for (const Varied& v : vary) n *= v.values.size();
+    return n;
+  }
+  // The values of a run, one for each key; the last of `vary` changes fastest, then repeats.
+  std::vector<Json> values(std::size_t run) const {
+    std::vector<Json> out(keys.size());
+    std::size_t rest = run / repeats;
+    for (std::size_t i = vary.size(); i-- > 0; rest /= vary[i].values.size())
+      out[i] = vary[i].values[rest % vary[i].values.size()];
+    for (std::size_t i = 0; i < draws.size(); ++i)
+      out[vary.size() + i] =
+          draws[i].low + (draws[i].high - draws[i].low) * draw(seed, run % repeats, i);
+    return out;
+  }
+  // Runs in which every value occurs: the first, and those that differ from it in one value.
+  std::vector<std::size_t> with_each_value() const {
+    std::vector<std::size_t> out{0};
+    std::size_t step = repeats;
+    for (std::size_t i = vary.size(); i-- > 0; step *= vary[i].values.size())
+      for (std::size_t j = 1; j < vary[i].values.size(); ++j) out.push_back(j * step);
+    return out;
+  }
+  void read(const Json& study) {
+    refuse_others(study, {"hapsix_study", "scene", "vary", "draw", "repeats", "seed"}, "the study");
+    const Json given_vary = study.value("vary", Json::object());
+    const Json given_draw = study.value("draw", Json::object());
+    for (const auto& [key, given] : given_vary.items()) vary.push_back(varied(key, given));
+    for (const auto& [key, given] : given_draw.items()) draws.push_back(drawn(key, given));
+    repeats = whole_of(study, "repeats", 1, kMostRuns);
+    seed = whole_of(study, "seed", 1, std::uint64_t{1} << 53);
+    for (const Varied& v : vary) keys.push_back(v.key);
+    for (const Drawn& d : draws) keys.push_back(d.key);
+    double runs = static_cast<double>(repeats);
+    for (const Varied& v : vary) runs *= static_cast<double>(v.values.size());
+    if (runs < 1 || runs > kMostRuns)
+      throw Mistake{"these are " + Json(runs).dump() + " runs: 1 to " + std::to_string(kMostRuns)};
+  }
+  void identify(const Json& study) {
+    std::ostringstream out;
+    out << study.dump() << '\n' << scene.dump() << '\n';
+    each_file(base, [&](fs::path& file) {
+      const std::string content = content_of(file);
+      out << io::hex(io::hash_bytes(content.data(), content.size())) << '\n';
+    });
+    for (const io::SceneHand& hand : base.hands)
+      out << io::hex(io::hash_bytes(hand.path.data(), hand.path.size() * sizeof(io::PathRow)))
+          << '\n';
+    out << h6Version() << '\n';
+    identity = out.str();
+  }
+};
+
+Plan::Plan(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Plan::Plan(Plan&&) noexcept = default;
+Plan& Plan::operator=(Plan&&) noexcept = default;
+Plan::~Plan() = default;
+
+Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outside) {
+  const std::string text = content_of(file), name = file.string();
+  if (const Outcome json = io::check_json_text(text, name); !json) return json.failure();
+  try {
+    const Json study = Json::parse(text);
+    if (!study.is_object() || study.value("hapsix_study", Json()) != 1 ||
+        !study.contains("scene") || !study["scene"].is_string())
+      return Failure{name + ": a study begins with \"hapsix_study\": 1 and names a \"scene\""};
+    auto parts = std::make_unique<Parts>();
+    parts->read(study);
+    Result<io::Scene> base = base_scene(study["scene"], fs::absolute(file), folder, outside);
+    if (!base) return base.failure();
+    parts->base = std::move(*base);
+    each_file(parts->base, [](fs::path& f) { f = fs::absolute(f).lexically_normal(); });
+    parts->scene = Json::parse(io::scene_text(parts->base));
+    parts->identify(study);
+    Plan plan(std::move(parts));
+    for (const std::size_t run : plan.parts_->with_each_value())
+      if (Result<io::Scene> scene = plan.scene(run); !scene)
+        return Failure{name + ": " + scene.error()};
+    return plan;
+  } catch (const Mistake& mistake) {
+    return Failure{name + ": " + mistake.sentence};
+  } catch (const std::exception& problem) {
+    return Failure{name + ": this is no study (" + problem.what() + ")"};
+  }
+}
+
+std::size_t Plan::runs() const { return parts_->combinations() * parts_->repeats; }
+const std::vector<std::string>& Plan::keys() const { return parts_->keys; }
+std::size_t Plan::repeat(std::size_t run) const { return run % parts_->repeats; }
+double Plan::unit() const { return io::metres(parts_->base.unit); }
+const std::string& Plan::identity() const { return parts_->identity; }
+
+std::vector<std::string> Plan::values(std::size_t run) const {
+  std::vector<std::string> out;
+  for (const Json& value : parts_->values(run))
+    out.push_back(value.is_string() ? value.get<std::string>() : value.dump());
+  return out;
+}
+
+Result<io::Scene> Plan::scene(std::size_t run) const {
+  Json text = parts_->scene;
+  const std::vector<Json> values = parts_->values(run);
+  try {
+    for (std::size_t i = 0; i < values.size(); ++i) put(text, parts_->keys[i], values[i]);
+  } catch (const Mistake& mistake) {
+    return Failure{mistake.sentence};
+  }
+  Result<io::Scene> scene = io::read_scene_text(text.dump(), "run " + std::to_string(run));
+  if (!scene) return scene;
+  for (std::size_t h = 0; h < scene->hands.size() && h < parts_->base.hands.size(); ++h)
+    scene->hands[h].path = parts_->base.hands[h].path;
+  return scene;
+}
+
+}  // namespace h6::study

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests `hapsix study` from outside: rows, their order and bits, kills of the study and of its
+// workers, and mistakes.
+#include <algorithm>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+constexpr const char* kStudy = R"({ "hapsix_study": 1, "scene": "peg-in-hole",
+  "vary": { "contact.method": ["firm", "global"],
+            "bodies.block.field.offset": { "from": 0, "to": 0.4, "count": 2 } },
+  "draw": { "bodies.peg.pose.p.x": { "low": -0.2, "high": 0.2 } }, "repeats": 8, "seed": 3 })";
+
+std::vector<std::string> lines(const std::string& text) {
+  std::vector<std::string> out;
+  std::stringstream in(text);
+  for (std::string line; std::getline(in, line);) out.push_back(line);
+  return out;
+}
+
+std::vector<std::string> fields(const std::string& row) {
+  std::vector<std::string> out;
+  std::stringstream in(row);
+  for (std::string field; std::getline(in, field, ',');) out.push_back(field);
+  return out;
+}
+
+// The processes that this one started.
+std::vector<pid_t> children(pid_t of) {
+  std::ifstream in("/proc/" + std::to_string(of) + "/task/" + std::to_string(of) + "/children");
+  std::vector<pid_t> out;
+  for (pid_t pid; in >> pid;) out.push_back(pid);
+  return out;
+}
+
+std::string whole_table(Sandbox& box, const std::string& folder, const char* jobs) {
+  const Json said = result_of(box, {"study", "study.json", "-o", folder, "--jobs", jobs});
+  CHECK(said["failed"] == 0);
+  CHECK_FALSE(fs::exists(box.file(folder + "/runs.csv.part")));
+  return slurp(box.file(folder + "/runs.csv"));
+}
+
+}  // namespace
+
+TEST_CASE("a study has a row for each run, in order, whatever the number of processes") {
+  Sandbox box;
+  spill(box.file("study.json"), kStudy);
+  const std::string table = whole_table(box, "two", "2");
+  CHECK(table == whole_table(box, "one", "1"));
+  const std::vector<std::string> rows = lines(table);
+  REQUIRE(rows.size() == 1 + 2 * 2 * 8);
+  CHECK(
+      rows[0].rfind(
+          "run,repeat,contact.method,bodies.block.field.offset,bodies.peg.pose.p.x,verdict,frames",
+          0) == 0);
+  for (std::size_t run = 0; run + 1 < rows.size(); ++run) {
+    const std::vector<std::string> row = fields(rows[run + 1]);
+    CAPTURE(rows[run + 1]);
+    CHECK(row[0] == std::to_string(run));
+    CHECK(row[1] == std::to_string(run % 8));
+    CHECK(row[2] == (run < 16 ? "firm" : "global"));
+    CHECK(row[3] == (run / 8 % 2 ? "0.4" : "0.0"));
+    // A repeat has the same draw in every combination.
+    CHECK(row[4] == fields(rows[1 + run % 8])[4]);
+    CHECK(std::fabs(std::stod(row[4])) <= 0.2);
+    CHECK(row[6] == "1400");
+  }
+  // `firm` holds where `global` sinks in with no clearance left.
+  CHECK(fields(rows[9])[5] == "held");
+  CHECK(std::stod(fields(rows[25])[9]) > 3 * std::stod(fields(rows[9])[9]));
+}
+
+TEST_CASE(
+    "a study that is killed again and again, or loses its workers, ends with the same table") {
+  Sandbox box;
+  spill(box.file("study.json"), kStudy);
+  const std::string want = whole_table(box, "whole", "2");
+  std::mt19937_64 random(5);
+  int kills = 0;
+  std::size_t most = 0;
+  while (!fs::exists(box.file("killed/runs.csv")) && kills < 8) {
+    auto process =
+        std::make_unique<Process>(box, Args{"study", "study.json", "-o", "killed", "--jobs", "2"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(400 + random() % 1000));
+    const std::vector<pid_t> study = children(getpid());
+    const auto workers = study.empty() ? study : children(study.front());
+    if (kills % 2 && !workers.empty()) {  // a worker first: its run goes to another process
+      kill(workers[random() % workers.size()], SIGKILL);
+      std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
+    }
+    process.reset();  // SIGKILL
+    ++kills;
+    const auto rows = lines(slurp(box.file("killed/runs.csv.part")));
+    CHECK((rows.size() >= most || fs::exists(box.file("killed/runs.csv"))));  // nothing is lost
+    most = rows.size();
+  }
+  CHECK(kills > 2);
+  // A torn last row, as a loss of power leaves it.
+  if (fs::exists(box.file("killed/runs.csv.part")))
+    std::ofstream(box.file("killed/runs.csv.part"), std::ios::app) << "31,7,glob";
+  CHECK(whole_table(box, "killed", "2") == want);
+  MESSAGE(kills << " kills");
+}
+
+TEST_CASE("a study says what is wrong before it runs, and keeps another's table") {
+  Sandbox box;
+  const auto refused = [&](const std::string& text, const char* words) {
+    spill(box.file("bad.json"), text);
+    const Ended end = run(box, {"study", "bad.json", "-o", "bad"});
+    CHECK(end.code == 1);
+    CHECK_MESSAGE(end.err.find(words) != std::string::npos, end.err);
+    CHECK_FALSE(fs::exists(box.file("bad")));
+  };
+  const auto changed = [](const std::string& from, const std::string& to) {
+    std::string text = kStudy;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  refused("{", "line 1");
+  refused("[1]", "begins with");
+  refused(changed("\"hapsix_study\": 1", "\"hapsix_study\": 2"), "begins with");
+  refused(changed("peg-in-hole", "peg-in-hull"), "neither such a file nor such a generated scene");
+  refused(changed("contact.method", "contact.methods"), "no such key");
+  refused(changed("\"firm\"", "\"firmer\""), "firmer");
+  refused(changed("bodies.block", "bodies.blok"), "the scene has no 'blok'");
+  refused(changed("\"count\": 2", "\"count\": 0"), "must be a list");
+  refused(changed("\"to\": 0.4", "\"two\": 0.4"), "unknown key 'two'");
+  refused(changed("\"repeats\": 8", "\"repeats\": 900000"), "runs: 1 to");
+  refused(changed("\"high\": 0.2", "\"high\": \"a\""), "needs a number 'high'");
+  CHECK(run(box, {"study", "none.json", "-o", "bad"}).code == 1);
+  CHECK(run(box, {"study", "bad.json"}).code == 2);
+
+  std::string few = changed("\"repeats\": 8", "\"repeats\": 1");
+  spill(box.file("study.json"), few);
+  const std::string table = whole_table(box, "kept", "1");
+  spill(box.file("study.json"), changed("\"repeats\": 8", "\"repeats\": 2"));
+  const Ended other = run(box, {"study", "study.json", "-o", "kept"});
+  CHECK(other.code == 1);
+  CHECK(other.err.find("another study") != std::string::npos);
+  CHECK(slurp(box.file("kept/runs.csv")) == table);
+}
+
+TEST_CASE("a run that fails has a row that says why, and the others have theirs") {
+  Sandbox box;
+  // The peg starts 20 mm to the side: more than 3 voxels deep in the block, which a run refuses.
+  spill(box.file("study.json"), R"({ "hapsix_study": 1, "scene": "peg-in-hole",
+    "vary": { "bodies.peg.pose.p.x": [0, 20] } })");
+  const Ended end = run(box, {"study", "study.json", "-o", "out", "--json"});
+  CHECK(end.code == 1);
+  CHECK(Json::parse(end.out)["failed"] == 1);
+  const std::vector<std::string> rows = lines(slurp(box.file("out/runs.csv")));
+  REQUIRE(rows.size() == 3);
+  CHECK(fields(rows[1])[4] == "1400");
+  CHECK(fields(rows[2])[3] == "error");
+  CHECK(rows[2].find("deep") != std::string::npos);
+}
