@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// recording_api.cpp - writes and reads recordings, for C.
+#include <algorithm>
+
+#include "io/api/guard.h"
+#include "io/api/scene_object.h"
+#include "io/record/recording.h"
+#include "io/scene/scene_file.h"
+
+using namespace h6;
+using namespace h6::io;
+
+struct h6Recorder {
+  std::unique_ptr<Recorder> recorder;
+};
+struct h6Recording {
+  std::filesystem::path file;
+  Recording head;  // without frames
+};
+
+namespace {
+
+RecordingHead head_of(const h6RecorderDef& def, const h6SessionDef& session) {
+  RecordingHead head;
+  if (def.scene) {
+    Scene scene = def.scene->loaded->scene;
+    scene.contact = session.contact;
+    scene.rate = session.rate;
+    head.scene_json = scene_text(scene);
+    for (const LoadedAsset& asset : def.scene->loaded->assets)
+      head.asset_hashes.push_back(asset.hash);
+  }
+  head.rate = session.rate;
+  head.hands = session.hand_count;
+  head.program = def.program ? def.program : h6BuildInfo();
+  return head;
+}
+
+}  // namespace
+
+extern "C" {
+
+h6RecorderDef h6DefaultRecorderDef(void) { return {}; }
+
+h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, h6Error* error) {
+  if (!file || !def || (!def->scene && !def->session))
+    return fill(error, H6_ERROR_ARGUMENT, "a recorder needs a file, and a scene or a session"),
+           nullptr;
+  if (!understood(*def, error)) return nullptr;
+  return guarded(error, static_cast<h6Recorder*>(nullptr), [&]() -> h6Recorder* {
+    const h6SessionDef session = def->session ? *def->session : def->scene->loaded->session_def();
+    if (session.hand_count > H6_MAX_HANDS || !(session.rate > 0))
+      return fill(error, H6_ERROR_ARGUMENT, "the session's hands or rate cannot be"), nullptr;
+    return wrap<h6Recorder>(Recorder::create(file, head_of(*def, session)), H6_ERROR_FILE, error);
+  });
+}
+
+bool h6RecordFrames(h6Recorder* recorder, const h6FrameRecord* rows, size_t count, h6Error* error) {
+  if (!recorder || (count && !rows))
+    return fill(error, H6_ERROR_ARGUMENT, "a recorder and rows are needed"), false;
+  return guarded(error, false, [&] {
+    return finish(recorder->recorder->frames(rows, count), H6_ERROR_FILE, error);
+  });
+}
+
+bool h6FinishRecorder(h6Recorder* recorder, const char* summary, h6Error* error) {
+  if (!recorder) return fill(error, H6_ERROR_ARGUMENT, "no recorder was given"), false;
+  return guarded(error, false, [&] {
+    return finish(recorder->recorder->finish(summary ? summary : "{}"), H6_ERROR_FILE, error);
+  });
+}
+
+void h6DestroyRecorder(h6Recorder* recorder) { delete recorder; }
+
+h6Recording* h6ReadRecording(const char* file, h6Error* error) {
+  if (!file) return fill(error, H6_ERROR_ARGUMENT, "no file was given"), nullptr;
+  return guarded(error, static_cast<h6Recording*>(nullptr), [&]() -> h6Recording* {
+    Result<Recording> head = read_recording(file, {0, 0});
+    if (!head) return fill(error, reading(file), head.error()), nullptr;
+    if (!head->remark.empty()) h6Log(H6_LOG_WARNING, head->remark.c_str());
+    return new h6Recording{file, std::move(*head)};
+  });
+}
+
+void h6DestroyRecording(h6Recording* recording) { delete recording; }
+
+void h6GetRecording(const h6Recording* recording, h6RecordingInfo* out) {
+  if (!out) return;
+  *out = {};
+  if (!recording) return;
+  const Recording& r = recording->head;
+  *out = {r.frame_count,
+          r.head.rate,
+          r.head.hands,
+          r.events.size(),
+          r.whole,
+          r.head.scene_json.c_str(),
+          r.head.program.c_str(),
+          r.summary_json.c_str(),
+          {}};
+}
+
+int64_t h6GetRecordingFrames(h6Recording* recording, uint64_t first, h6FrameRecord* out,
+                             size_t count, h6Error* error) {
+  if (!recording || (count && !out))
+    return fill(error, H6_ERROR_ARGUMENT, "a recording and room are needed"), -1;
+  return guarded(error, std::int64_t{-1}, [&]() -> std::int64_t {
+    Result<Recording> part = read_recording(recording->file, {first, count});
+    if (!part) return fill(error, H6_ERROR_CONTENT, part.error()), -1;
+    std::copy(part->frames.begin(), part->frames.end(), out);
+    return static_cast<std::int64_t>(part->frames.size());
+  });
+}
+
+bool h6GetRecordingEvent(const h6Recording* recording, size_t event, h6RecordingEvent* out) {
+  if (!recording || !out || event >= recording->head.events.size()) return false;
+  const RecordingEvent& e = recording->head.events[event];
+  *out = {e.time, e.what.c_str(), e.detail.c_str()};
+  return true;
+}
+
+}  // extern "C"

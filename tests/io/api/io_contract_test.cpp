@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// hapsix/io.h from outside: what the program does with files, and wrong arguments of every
+// function.
+#include <doctest/doctest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "hapsix/io.h"
+#include "tests/io/private_cache.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kCorners[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
+                                   {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
+constexpr std::uint32_t kFaces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
+                                         {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
+                                         {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+
+struct Box {
+  std::vector<double> vertices;
+  h6MeshDef def = h6DefaultMeshDef();
+  explicit Box(double half) {
+    for (const auto& c : kCorners)
+      for (const double x : c) vertices.push_back(half * x);
+    def.vertices = vertices.data(), def.vertex_count = 8;
+    def.triangles = kFaces[0], def.triangle_count = 12;
+  }
+};
+
+// A mesh, and all that is made of it in these tests.
+struct Made {
+  h6Mesh* mesh = nullptr;
+  h6Field* field = nullptr;
+  h6Shell* shell = nullptr;
+  ~Made() { h6DestroyMesh(mesh), h6DestroyField(field), h6DestroyShell(shell); }
+};
+
+h6FieldBakeDef coarse() {
+  h6FieldBakeDef def = h6DefaultFieldBakeDef();
+  def.voxels = 32;
+  return def;
+}
+
+fs::path scratch(const char* name) { return h6::test::private_cache.folder / name; }
+
+struct Log {
+  std::vector<std::string> lines;
+  Log() {
+    h6SetLogHandler(
+        [](void* user, h6LogLevel, const char* sentence) {
+          static_cast<Log*>(user)->lines.push_back(sentence);
+        },
+        this);
+  }
+  ~Log() { h6SetLogHandler(nullptr, nullptr); }
+};
+
+}  // namespace
+
+TEST_CASE("a mesh from memory is baked, written, read and checked") {
+  Made made;
+  h6Error error{};
+  const Box box(0.01);
+  made.mesh = h6CreateMesh(&box.def, &error);
+  REQUIRE_MESSAGE(made.mesh, error.message);
+  h6MeshInfo info;
+  h6GetMesh(made.mesh, &info);
+  CHECK((info.triangles == 12 && info.vertices == 8 && info.closed && info.parts == 1));
+  CHECK(info.volume == doctest::Approx(8e-6));
+  const h6FieldBakeDef def = coarse();
+  made.field = h6BakeField(made.mesh, &def, &error);
+  REQUIRE_MESSAGE(made.field, error.message);
+  h6ShellBakeDef points = h6DefaultShellBakeDef();
+  points.points = 500, points.field = def;
+  made.shell = h6BakeShell(made.mesh, &points, &error);
+  REQUIRE_MESSAGE(made.shell, error.message);
+
+  Made again;
+  CHECK(h6WriteField(made.field, scratch("box.vdb").c_str(), &error));
+  CHECK(h6WriteShell(made.shell, scratch("box.ply").c_str(), &error));
+  again.field = h6ReadField(scratch("box.vdb").c_str(), &error);
+  REQUIRE_MESSAGE(again.field, error.message);
+  again.shell = h6ReadShell(scratch("box.ply").c_str(), &error);
+  REQUIRE_MESSAGE(again.shell, error.message);
+  h6FieldDef a, b;
+  h6GetField(made.field, &a), h6GetField(again.field, &b);
+  REQUIRE(a.brick_count == b.brick_count);
+  CHECK(std::memcmp(a.samples, b.samples, 512 * sizeof(float) * a.brick_count) == 0);
+  h6ShellDef s;
+  h6GetShell(again.shell, &s);
+  CHECK(s.point_count == 500);
+
+  h6CheckDef check = h6DefaultCheckDef();
+  check.points = 2000;
+  h6CheckReport report;
+  REQUIRE_MESSAGE(h6CheckField(made.mesh, made.field, &check, &report, &error), error.message);
+  CHECK((report.agrees && !report.drains));
+  CHECK(report.worst_node < 1e-3);
+  CHECK(report.wall_median == doctest::Approx(0.02).epsilon(0.01));
+  CHECK((report.pushed > 0 && report.holding_force > 0));
+}
+
+TEST_CASE("progress rises on the caller's thread, and false cancels with a code") {
+  Made made;
+  const Box box(0.01);
+  made.mesh = h6CreateMesh(&box.def, nullptr);
+  struct Seen {
+    double last = 0;
+    int calls = 0, allowed = 1 << 30;
+  } seen;
+  h6FieldBakeDef def = coarse();
+  def.voxels = 128, def.user = &seen;
+  def.progress = [](void* user, const char* what, double done) {
+    Seen& s = *static_cast<Seen*>(user);
+    CHECK((what && done >= 0 && done <= 1));
+    s.last = done;
+    return ++s.calls <= s.allowed;
+  };
+  h6Error error{};
+  made.field = h6BakeField(made.mesh, &def, &error);
+  REQUIRE_MESSAGE(made.field, error.message);
+  REQUIRE(seen.calls > 0);
+  seen = {.last = 0, .calls = 0, .allowed = 0};
+  CHECK(h6BakeField(made.mesh, &def, &error) == nullptr);
+  CHECK(error.code == H6_ERROR_CANCELLED);
+}
+
+TEST_CASE("the cache is used only on request") {
+  Made one, two;
+  const Box box(0.0123);
+  one.mesh = h6CreateMesh(&box.def, nullptr);
+  const auto kept = [] {
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator(h6::test::private_cache.folder))
+      count += entry.path().extension() == ".field";
+    return count;
+  };
+  const std::size_t before = kept();
+  h6FieldBakeDef def = coarse();
+  one.field = h6BakeField(one.mesh, &def, nullptr);
+  CHECK(kept() == before);
+  def.cache = true;
+  two.field = h6BakeField(one.mesh, &def, nullptr);
+  CHECK(kept() == before + 1);
+  h6FieldDef a, b;
+  h6GetField(one.field, &a), h6GetField(two.field, &b);
+  REQUIRE((a.brick_count > 0 && a.brick_count == b.brick_count));
+  CHECK(std::memcmp(a.samples, b.samples, 512 * sizeof(float) * a.brick_count) == 0);
+}
+
+TEST_CASE("a generated scene runs, is recorded, and its rows are read back to the bit") {
+  h6Error error{};
+  h6Scene* scene = h6ReadScene("box-on-wall", nullptr, &error);
+  REQUIRE_MESSAGE(scene, error.message);
+  h6SessionDef def;
+  h6GetSceneSession(scene, &def);
+  h6Session* session = h6CreateSession(h6GetSceneModel(scene), &def, &error);
+  REQUIRE_MESSAGE(session, error.message);
+  CHECK(h6FindBody(scene, h6GetBodyName(scene, 0)) == 0);
+  CHECK(h6GetSceneDuration(scene) > 0);
+  h6RecorderDef what = h6DefaultRecorderDef();
+  what.scene = scene, what.program = "a test";
+  const std::string file = scratch("run.h5");
+  h6Recorder* recorder = h6CreateRecorder(file.c_str(), &what, &error);
+  REQUIRE_MESSAGE(recorder, error.message);
+  std::vector<h6FrameRecord> rows;
+  for (int i = 0; i < 400; ++i) {
+    h6DeviceSample in;
+    h6DeviceCommand out;
+    REQUIRE(h6SampleScenePath(scene, 0, i / def.rate, &in));
+    h6Step(session, &in, &out);
+    h6FrameRecord row;
+    h6GetRecord(session, &in, &out, &row);
+    rows.push_back(row);
+    CHECK(h6RecordFrames(recorder, &row, 1, &error));
+  }
+  REQUIRE_MESSAGE(h6FinishRecorder(recorder, "{\"verdict\": \"held\"}", &error), error.message);
+  h6DestroyRecorder(recorder);
+  h6Recording* recording = h6ReadRecording(file.c_str(), &error);
+  REQUIRE_MESSAGE(recording, error.message);
+  h6RecordingInfo info;
+  h6GetRecording(recording, &info);
+  CHECK((info.frames == 400 && info.hands == 1 && info.whole && info.rate == def.rate));
+  CHECK(std::string(info.program) == "a test");
+  CHECK(std::string(info.summary).find("held") != std::string::npos);
+  CHECK(std::string(info.scene).find("\"bodies\"") != std::string::npos);
+  std::vector<h6FrameRecord> read(10);
+  CHECK(h6GetRecordingFrames(recording, 395, read.data(), read.size(), &error) == 5);
+  for (int i = 0; i < 5; ++i) {
+    CHECK(read[i].report.state_hash == rows[395 + i].report.state_hash);
+    CHECK(read[i].command[0].wrench.force.z == rows[395 + i].command[0].wrench.force.z);
+  }
+  h6DestroyRecording(recording), h6DestroySession(session), h6DestroyScene(scene);
+}
+
+TEST_CASE("what a bake repaired goes to the log, and nothing to the terminal") {
+  const Log log;
+  std::vector<std::uint32_t> open(kFaces[0], kFaces[0] + 30);  // a box without a side
+  Box box(0.01);
+  box.def.triangles = open.data(), box.def.triangle_count = 10;
+  Made made;
+  made.mesh = h6CreateMesh(&box.def, nullptr);
+  const h6FieldBakeDef def = coarse();
+  made.field = h6BakeField(made.mesh, &def, nullptr);
+  CHECK(made.field != nullptr);
+  CHECK(!log.lines.empty());
+}
+
+TEST_CASE("wrong arguments give NULL, false, -1 or zeros, a code, and no crash") {
+  h6Error error{};
+  const auto code = [&] {
+    const h6ErrorCode found = error.code;
+    error = {};
+    return found;
+  };
+  Box box(0.01);
+  CHECK((h6CreateMesh(nullptr, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  std::uint32_t wild[36];
+  std::memcpy(wild, kFaces, sizeof wild);
+  wild[7] = 8;
+  box.def.triangles = wild;
+  CHECK((h6CreateMesh(&box.def, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  box.def.triangles = kFaces[0];
+  for (const double bad : {std::nan(""), 1e7, -std::numeric_limits<double>::infinity()}) {
+    Box spoilt(0.01);
+    spoilt.vertices[4] = bad;
+    CHECK((h6CreateMesh(&spoilt.def, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  }
+  box.def.triangle_count = SIZE_MAX;
+  CHECK((h6CreateMesh(&box.def, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  box.def.triangle_count = 12, box.def.reserved[3] = 1;
+  CHECK((h6CreateMesh(&box.def, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  box.def.reserved[3] = 0;
+  CHECK((h6ReadMesh("/no/such.stl", H6_METRES, &error) == nullptr && code() == H6_ERROR_FILE));
+  CHECK((h6ReadMesh("x.stl", static_cast<h6Unit>(9), &error) == nullptr &&
+         code() == H6_ERROR_ARGUMENT));
+  CHECK((h6ParseMesh("solid", 5, "x.stl", H6_METRES, &error) == nullptr &&
+         code() == H6_ERROR_CONTENT));
+  std::ofstream(scratch("bad.vdb")) << "this is no field";
+  CHECK((h6ReadField(scratch("bad.vdb").c_str(), &error) == nullptr && code() == H6_ERROR_CONTENT));
+  CHECK((h6ReadShell("/no/such.ply", &error) == nullptr && code() == H6_ERROR_FILE));
+  CHECK((h6ReadScene("no-such-scene", nullptr, &error) == nullptr && code() == H6_ERROR_FILE));
+  CHECK((h6ReadRecording("/no/such.h5", &error) == nullptr && code() == H6_ERROR_FILE));
+  CHECK(h6GetPartName(nullptr, 0) == nullptr);
+
+  Made made;
+  made.mesh = h6CreateMesh(&box.def, &error);
+  REQUIRE(made.mesh);
+  const auto refused = [&](auto change) {
+    h6FieldBakeDef def = coarse();
+    change(def);
+    h6Field* field = h6BakeField(made.mesh, &def, &error);
+    h6DestroyField(field);
+    return field == nullptr && code() == H6_ERROR_RANGE;
+  };
+  for (const double bad : {std::nan(""), -2.0, 1e300}) {
+    CHECK(refused([&](h6FieldBakeDef& d) { d.voxel_size = bad; }));
+    CHECK(refused([&](h6FieldBakeDef& d) { d.weld = bad; }));
+    CHECK(refused([&](h6FieldBakeDef& d) { d.band_voxels = bad; }));
+    CHECK(refused([&](h6FieldBakeDef& d) { d.seal = bad; }));
+  }
+  for (const std::int32_t bad : {0, -1, 15, 2049, INT32_MAX})
+    CHECK(refused([&](h6FieldBakeDef& d) { d.voxels = bad; }));
+  CHECK(refused([&](h6FieldBakeDef& d) { d.sign = static_cast<h6Sign>(7); }));
+  CHECK((h6BakeField(nullptr, nullptr, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  CHECK((h6BakeShell(nullptr, nullptr, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  h6ShellBakeDef shell = h6DefaultShellBakeDef();
+  shell.points = 0;
+  CHECK((h6BakeShell(made.mesh, &shell, &error) == nullptr && code() == H6_ERROR_RANGE));
+  CHECK((!h6WriteField(nullptr, "x.vdb", &error) && code() == H6_ERROR_ARGUMENT));
+  h6CheckReport report;
+  CHECK(
+      (!h6CheckField(made.mesh, nullptr, nullptr, &report, &error) && code() == H6_ERROR_ARGUMENT));
+  h6FieldDef field;
+  h6GetField(nullptr, &field), h6GetField(nullptr, nullptr);
+  CHECK(field.brick_count == 0);
+  h6DeviceSample sample;
+  CHECK_FALSE(h6SampleScenePath(nullptr, 0, 0, &sample));
+  CHECK(sample.pose.q.w == 1);
+  CHECK(h6FindBody(nullptr, "x") == -1);
+  CHECK(h6GetSceneModel(nullptr) == nullptr);
+  const h6RecorderDef none = h6DefaultRecorderDef();
+  CHECK((h6CreateRecorder("x.h5", &none, &error) == nullptr && code() == H6_ERROR_ARGUMENT));
+  CHECK((!h6RecordFrames(nullptr, nullptr, 0, &error) && code() == H6_ERROR_ARGUMENT));
+  CHECK((!h6FinishRecorder(nullptr, nullptr, &error) && code() == H6_ERROR_ARGUMENT));
+  CHECK(h6GetRecordingFrames(nullptr, 0, nullptr, 0, &error) == -1);
+  h6DestroyScene(nullptr), h6DestroyRecorder(nullptr), h6DestroyRecording(nullptr);
+}
