@@ -1,0 +1,403 @@
+// SPDX-License-Identifier: Apache-2.0
+// bind_assets.cpp - meshes, fields, shells, models and scenes; what they hold is seen through
+// views.
+#include "python/bindings.h"
+
+namespace hapsix::python {
+namespace {
+
+struct PyMesh {
+  Mesh mesh;
+};
+struct PyField {
+  Field field;
+  h6FieldDef def() const {
+    h6FieldDef out{};
+    h6GetField(field, &out);
+    return out;
+  }
+};
+struct PyShell {
+  Shell shell;
+  h6ShellDef def() const {
+    h6ShellDef out{};
+    h6GetShell(shell, &out);
+    return out;
+  }
+};
+
+template <class T>
+T chosen(const std::vector<const char*>& names, const std::string& name, const char* what) {
+  std::string all;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (name == names[i]) return static_cast<T>(i);
+    all += (all.empty() ? "'" : ", '") + std::string(names[i]) + "'";
+  }
+  throw py::value_error(std::string(what) + " is '" + name + "', not one of " + all);
+}
+h6Unit unit_of(const std::string& unit) {
+  return chosen<h6Unit>({"m", "mm", "cm", "in"}, unit, "unit");
+}
+
+// The option `name` where it is given; it is taken out, so that what is left is unknown.
+template <class T>
+void take(py::dict& options, const char* name, T& value) {
+  if (!options.contains(name)) return;
+  value = options[name].cast<T>();
+  options.attr("pop")(name);
+}
+template <class T>
+void take_choice(py::dict& options, const char* name, const std::vector<const char*>& names,
+                 T& value) {
+  std::string text = names[static_cast<std::size_t>(value)];
+  take(options, name, text);
+  value = chosen<T>(names, text, name);
+}
+void refuse_rest(const py::dict& options, const char* function) {
+  for (const auto& [key, value] : options)
+    throw py::type_error(std::string(function) + " has no option '" + std::string(py::str(key)) +
+                         "'");
+}
+
+h6FieldBakeDef take_field_options(py::dict& options) {
+  h6FieldBakeDef def = h6DefaultFieldBakeDef();
+  take(options, "voxels", def.voxels), take(options, "voxel_size", def.voxel_size);
+  take(options, "tolerance", def.tolerance), take(options, "offset", def.offset);
+  take_choice(options, "sign", {"auto", "flood", "winding"}, def.sign);
+  take(options, "hollow", def.hollow), take(options, "seal", def.seal);
+  take(options, "weld", def.weld), take(options, "band_voxels", def.band_voxels);
+  take(options, "threads", def.threads), take(options, "cache", def.cache);
+  return def;
+}
+
+std::shared_ptr<PyField> bake_field(const PyMesh& mesh, py::object progress,
+                                    const py::kwargs& given) {
+  py::dict options(given);
+  h6FieldBakeDef def = take_field_options(options);
+  refuse_rest(options, "bake_field");
+  ProgressOf watched(std::move(progress));
+  watched.enter(def);
+  return std::make_shared<PyField>(PyField{
+      watched.run([&](h6Error* error) { return Field(h6BakeField(mesh.mesh, &def, error)); })});
+}
+
+std::shared_ptr<PyShell> bake_shell(const PyMesh& mesh, py::object progress,
+                                    const py::kwargs& given) {
+  py::dict options(given);
+  h6ShellBakeDef def = h6DefaultShellBakeDef();
+  take(options, "points", def.points), take(options, "spacing", def.spacing);
+  take(options, "levels", def.levels), take(options, "seed", def.seed);
+  take_choice(options, "surface", {"auto", "triangles", "field"}, def.surface);
+  take_choice(options, "normals", {"auto", "triangles", "field"}, def.normals);
+  def.field = take_field_options(options);
+  refuse_rest(options, "bake_shell");
+  ProgressOf watched(std::move(progress));
+  watched.enter(def.field);
+  return std::make_shared<PyShell>(PyShell{
+      watched.run([&](h6Error* error) { return Shell(h6BakeShell(mesh.mesh, &def, error)); })});
+}
+
+std::shared_ptr<PyMesh> make_mesh(const Rows<double>& vertices,
+                                  const Rows<std::uint32_t>& triangles,
+                                  const std::optional<Rows<std::int32_t>>& part) {
+  h6MeshDef def = h6DefaultMeshDef();
+  def.vertices = vertices.data(), def.vertex_count = rows_of(vertices, 3, "vertices");
+  def.triangles = triangles.data(), def.triangle_count = rows_of(triangles, 3, "triangles");
+  if (part && static_cast<std::size_t>(part->size()) != def.triangle_count)
+    throw py::value_error("part must have one number for each triangle");
+  def.part = part ? part->data() : nullptr;
+  py::gil_scoped_release release;
+  return std::make_shared<PyMesh>(
+      PyMesh{Mesh::make([&](h6Error* error) { return h6CreateMesh(&def, error); })});
+}
+
+py::dict info_of(const PyMesh& mesh) {
+  h6MeshInfo i{};
+  {
+    py::gil_scoped_release release;
+    h6GetMesh(mesh.mesh, &i);
+  }
+  py::list names;
+  for (std::int32_t part = 0; const char* name = h6GetPartName(mesh.mesh, part); ++part)
+    names.append(name);
+  using namespace py::literals;
+  return py::dict("triangles"_a = i.triangles, "vertices"_a = i.vertices, "parts"_a = i.parts,
+                  "duplicates"_a = i.duplicates, "degenerate"_a = i.degenerate,
+                  "open_edges"_a = i.open_edges, "odd_edges"_a = i.odd_edges,
+                  "components"_a = i.components, "closed"_a = i.closed, "low"_a = tuple_of(i.low),
+                  "high"_a = tuple_of(i.high), "volume"_a = i.volume, "names"_a = names);
+}
+
+py::dict check_field(const PyMesh& mesh, const PyField& field, double stiffness, std::size_t points,
+                     bool push, std::uint32_t threads, py::object progress) {
+  h6CheckDef def = h6DefaultCheckDef();
+  def.stiffness = stiffness, def.points = points, def.push = push, def.threads = threads;
+  h6CheckReport r{};
+  ProgressOf watched(std::move(progress));
+  watched.enter(def);
+  watched.run(
+      [&](h6Error* error) { return h6CheckField(mesh.mesh, field.field, &def, &r, error); });
+  using namespace py::literals;
+  return py::dict("agrees"_a = r.agrees, "drains"_a = r.drains, "leak"_a = tuple_of(r.leak),
+                  "worst_node"_a = r.worst_node, "worst_between"_a = r.worst_between,
+                  "wall_hundredth"_a = r.wall_hundredth, "wall_median"_a = r.wall_median,
+                  "gap_hundredth"_a = r.gap_hundredth, "gap_median"_a = r.gap_median,
+                  "pushed"_a = r.pushed, "holding_force"_a = r.holding_force,
+                  "weakest"_a = tuple_of(r.weakest));
+}
+
+void add_meshes(py::module_& m) {
+  py::class_<PyMesh, std::shared_ptr<PyMesh>>(m, "Mesh", "Triangles.")
+      .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"),
+           py::arg("part") = py::none(),
+           "vertices (n, 3) [m], triangles (m, 3) rows of vertices, part (m,) or None. Copied.")
+      .def_static(
+          "read",
+          [](const std::string& file, const std::string& unit) {
+            const h6Unit in = unit_of(unit);
+            py::gil_scoped_release release;
+            return std::make_shared<PyMesh>(PyMesh{
+                Mesh::make([&](h6Error* error) { return h6ReadMesh(file.c_str(), in, error); })});
+          },
+          py::arg("file"), py::arg("unit") = "m",
+          "STL, OBJ, PLY, glTF, COLLADA, each also .gz. `unit` ('m', 'mm', 'cm', 'in') is that of "
+          "a "
+          "format that has none.")
+      .def_static(
+          "parse",
+          [](const py::bytes& bytes, const std::string& name, const std::string& unit) {
+            const std::string_view text = bytes;
+            const h6Unit in = unit_of(unit);
+            py::gil_scoped_release release;
+            return std::make_shared<PyMesh>(PyMesh{Mesh::make([&](h6Error* error) {
+              return h6ParseMesh(text.data(), text.size(), name.c_str(), in, error);
+            })});
+          },
+          py::arg("bytes"), py::arg("name"), py::arg("unit") = "m",
+          "The same from memory; the ending of `name` tells the format.")
+      .def_property_readonly(
+          "info", &info_of,
+          "dict: triangles, vertices, parts, duplicates, degenerate, open_edges, "
+          "odd_edges, components, closed, low, high [m], volume [m^3], names");
+}
+
+void add_fields(py::module_& m) {
+  py::class_<PyField, std::shared_ptr<PyField>>(
+      m, "Field", "A signed distance field in sparse bricks. Its arrays are views without copies.")
+      .def_static(
+          "read",
+          [](const std::string& file) {
+            py::gil_scoped_release release;
+            return std::make_shared<PyField>(PyField{
+                Field::make([&](h6Error* error) { return h6ReadField(file.c_str(), error); })});
+          },
+          py::arg("file"), "A .vdb.")
+      .def(
+          "write",
+          [](const PyField& f, const std::string& file) {
+            py::gil_scoped_release release;
+            h6Error error{};
+            if (!h6WriteField(f.field, file.c_str(), &error)) throw Error(error);
+          },
+          py::arg("file"), "A .vdb.")
+      .def_property_readonly(
+          "origin", [](const PyField& f) { return tuple_of(f.def().origin); },
+          "(3,) node (0, 0, 0), mesh frame [m]")
+      .def_property_readonly(
+          "voxel_size", [](const PyField& f) { return f.def().voxel_size; }, "[m]")
+      .def_property_readonly(
+          "band", [](const PyField& f) { return f.def().band; }, "[m]")
+      .def_property_readonly(
+          "samples",
+          [](const py::object& self) {
+            const h6FieldDef d = self.cast<const PyField&>().def();
+            return view(d.samples, {static_cast<py::ssize_t>(d.brick_count), 8, 8, 8},
+                        {2048, 256, 32, 4}, self);
+          },
+          "(bricks, 8, 8, 8) float32, axes brick, z, y, x: signed distance [m]")
+      .def_property_readonly(
+          "brick_index",
+          [](const py::object& self) {
+            const h6FieldDef d = self.cast<const PyField&>().def();
+            const py::ssize_t x = d.bricks[0], y = d.bricks[1], z = d.bricks[2];
+            return view(d.brick_index, {z, y, x}, {4 * x * y, 4 * x, 4}, self);
+          },
+          "(bz, by, bx) int32: row in `samples`, -1: no brick")
+      .def_property_readonly(
+          "far_grid",
+          [](const py::object& self) {
+            const h6FieldDef d = self.cast<const PyField&>().def();
+            const py::ssize_t x = d.bricks[0] + 1, y = d.bricks[1] + 1, z = d.bricks[2] + 1;
+            return view(d.far_grid, {z, y, x}, {4 * x * y, 4 * x, 4}, self);
+          },
+          "(bz + 1, by + 1, bx + 1) float32: bounds of the distance at nodes (8a, 8b, 8c) [m]");
+}
+
+void add_shells(py::module_& m) {
+  const auto points = [](const char* which) {
+    return [which](const py::object& self) {
+      const h6ShellDef d = self.cast<const PyShell&>().def();
+      const std::string name = which;
+      const float* data = name == "x"    ? d.x
+                          : name == "y"  ? d.y
+                          : name == "z"  ? d.z
+                          : name == "nx" ? d.nx
+                          : name == "ny" ? d.ny
+                                         : d.nz;
+      return column(data, d.point_count, self);
+    };
+  };
+  py::class_<PyShell, std::shared_ptr<PyShell>> shell(
+      m, "Shell", "Points that may touch, coarse ones first. Its arrays are views without copies.");
+  shell
+      .def_static(
+          "read",
+          [](const std::string& file) {
+            py::gil_scoped_release release;
+            return std::make_shared<PyShell>(PyShell{
+                Shell::make([&](h6Error* error) { return h6ReadShell(file.c_str(), error); })});
+          },
+          py::arg("file"), "A .ply.")
+      .def(
+          "write",
+          [](const PyShell& s, const std::string& file) {
+            py::gil_scoped_release release;
+            h6Error error{};
+            if (!h6WriteShell(s.shell, file.c_str(), &error)) throw Error(error);
+          },
+          py::arg("file"), "A .ply.")
+      .def("__len__", [](const PyShell& s) { return s.def().point_count; });
+  for (const char* name : {"x", "y", "z"})
+    shell.def_property_readonly(name, points(name), "(points,) float32, mesh frame [m]");
+  for (const char* name : {"nx", "ny", "nz"})
+    shell.def_property_readonly(name, points(name), "(points,) float32, inward unit normal");
+}
+
+std::shared_ptr<PyModel> make_model(const std::vector<std::shared_ptr<PyField>>& fields,
+                                    const std::vector<std::shared_ptr<PyShell>>& shells) {
+  std::vector<h6FieldDef> f;
+  std::vector<h6ShellDef> s;
+  for (const auto& field : fields) f.push_back(field->def());
+  for (const auto& shell : shells) s.push_back(shell->def());
+  py::gil_scoped_release release;
+  auto model = std::make_shared<PyModel>();
+  model->own = create_model(f, s);
+  return model;
+}
+
+py::tuple sample_field(const PyModel& model, std::int32_t field, const Rows<double>& points) {
+  const std::size_t count = rows_of(points, 3, "points");
+  py::array_t<double> distance(count), gradient({count, std::size_t{3}});
+  py::array_t<bool> exact(count);
+  static_assert(sizeof(bool) == 1);
+  const double* in = points.data();
+  double *d = distance.mutable_data(), *g = gradient.mutable_data();
+  auto* e = reinterpret_cast<std::uint8_t*>(exact.mutable_data());
+  int result;
+  {
+    py::gil_scoped_release release;
+    result = h6SampleField(model.get(), field, in, count, d, g, e);
+  }
+  if (result != 0) throw py::index_error("the model has no field " + std::to_string(field));
+  return py::make_tuple(distance, gradient, exact);
+}
+
+void add_models(py::module_& m) {
+  py::class_<PyModel, std::shared_ptr<PyModel>>(m, "Model",
+                                                "Fields and shells, immutable, shared by sessions.")
+      .def(py::init(&make_model), py::arg("fields"), py::arg("shells"))
+      .def_property_readonly("bytes",
+                             [](const PyModel& model) { return h6ModelBytes(model.get()); })
+      .def("sample_field", &sample_field, py::arg("field"), py::arg("points"),
+           "points (n, 3) in the field's mesh frame [m] -> distance (n,) [m], gradient (n, 3), "
+           "exact "
+           "(n,) bool: a sample, not a bound")
+      .def(
+          "stiffness_for",
+          [](const PyModel& model, const Definition& definition) {
+            return definition.with(
+                [&](const h6SessionDef& def) { return h6StiffnessFor(model.get(), &def); });
+          },
+          py::arg("definition"),
+          "The contact stiffness that such a session has [N/m]; 0: not valid.");
+}
+
+std::shared_ptr<PyScene> read_scene(const std::string& name, bool outside, py::object progress) {
+  h6SceneDef def = h6DefaultSceneDef();
+  def.outside = outside;
+  ProgressOf watched(std::move(progress));
+  watched.enter(def);
+  return std::make_shared<PyScene>(PyScene{
+      watched.run([&](h6Error* error) { return Scene(h6ReadScene(name.c_str(), &def, error)); })});
+}
+
+void add_scenes(py::module_& m) {
+  py::class_<PyScene, std::shared_ptr<PyScene>>(m, "Scene",
+                                                "Parts, hands and rules of a scene file.")
+      .def(py::init(&read_scene), py::arg("name"), py::kw_only(), py::arg("outside") = false,
+           py::arg("progress") = py::none(),
+           "A scene file (.json) or a generated scene ('peg-in-hole'). Assets are baked, or come "
+           "from "
+           "the cache. outside: files outside the scene's folder may be read.")
+      .def_property_readonly("model",
+                             [](const std::shared_ptr<PyScene>& scene) {
+                               auto model = std::make_shared<PyModel>();
+                               model->scene = scene;
+                               return model;
+                             })
+      .def(
+          "definition",
+          [](const PyScene& scene) {
+            h6SessionDef def;
+            h6GetSceneSession(scene.scene, &def);
+            return std::make_shared<Definition>(def);
+          },
+          "A new Definition of a session, to be changed at will.")
+      .def_property_readonly(
+          "duration", [](const PyScene& s) { return h6GetSceneDuration(s.scene); }, "[s]")
+      .def_property_readonly(
+          "bodies",
+          [](const PyScene& scene) {
+            py::list names;
+            for (std::int32_t i = 0; const char* name = h6GetBodyName(scene.scene, i); ++i)
+              names.append(name);
+            return py::tuple(names);
+          },
+          "names of bodies, in the order of their indices")
+      .def(
+          "path",
+          [](const PyScene& scene, std::int32_t hand, double time) {
+            h6DeviceSample sample;
+            if (!h6SampleScenePath(scene.scene, hand, time, &sample))
+              throw py::index_error("hand " + std::to_string(hand) + " has no path");
+            return py::make_tuple(tuple_of(sample.pose), tuple_of(sample.velocity));
+          },
+          py::arg("hand"), py::arg("time"),
+          "Where the scene's hand wants to be at a time [s]: pose (7,), velocity (6,).");
+}
+
+}  // namespace
+
+void add_assets(py::module_& m) {
+  add_meshes(m);
+  add_fields(m);
+  add_shells(m);
+  add_models(m);
+  add_scenes(m);
+  m.def(
+      "bake_field", &bake_field, py::arg("mesh"), py::kw_only(), py::arg("progress") = py::none(),
+      "A Field of a Mesh. Options: voxels (256), voxel_size [m], tolerance [m], offset [m], sign "
+      "('auto', 'flood', 'winding'), hollow, seal [m], weld [voxel], band_voxels (3), threads (0: "
+      "all), cache (False). progress(what, done) may return False to cancel.");
+  m.def("bake_shell", &bake_shell, py::arg("mesh"), py::kw_only(), py::arg("progress") = py::none(),
+        "A Shell of a Mesh. Options: points (10000), spacing [m], levels (7), seed, surface and "
+        "normals "
+        "('auto', 'triangles', 'field'), and those of bake_field for the field that finds what the "
+        "outside reaches.");
+  m.def("check_field", &check_field, py::arg("mesh"), py::arg("field"), py::kw_only(),
+        py::arg("stiffness") = 1e4, py::arg("points") = 20000, py::arg("push") = true,
+        py::arg("threads") = 0, py::arg("progress") = py::none(),
+        "Compares a field with its mesh; dict as h6CheckReport, lengths in m, force in N.");
+}
+
+}  // namespace hapsix::python

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+// bind_session.cpp - a session: samples and commands as arrays that it owns, contacts as views.
+#include "python/bindings.h"
+#include "python/rows.h"
+
+namespace hapsix::python {
+namespace {
+
+using SessionPtr = std::shared_ptr<PySession>;
+
+// Rows of a column, three next to each other: (count, 3). The engine's columns of x, y and z have
+// equal distances, so this is a view; else it is a copy.
+py::object three(const float* x, const float* y, const float* z, std::size_t count,
+                 py::handle owner) {
+  const auto gap = reinterpret_cast<const char*>(y) - reinterpret_cast<const char*>(x);
+  const auto n = static_cast<py::ssize_t>(count);
+  if (reinterpret_cast<const char*>(z) - reinterpret_cast<const char*>(y) == gap)
+    return view(x, {n, 3}, {sizeof(float), gap}, owner);
+  py::array_t<float> rows({n, py::ssize_t{3}});
+  auto to = rows.mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < n; ++i) to(i, 0) = x[i], to(i, 1) = y[i], to(i, 2) = z[i];
+  return rows;
+}
+
+struct PyContacts {
+  SessionPtr session;
+  h6Contacts c;
+  std::int32_t body;
+};
+
+void add_contacts(py::module_& m) {
+  using P = PyContacts;
+  const auto in = [](auto get) {
+    return [get](const P& p) { return column(get(p.c), p.c.count, py::cast(p.session)); };
+  };
+  py::class_<P>(
+      m, "Contacts",
+      "Contacts of a shell body in the last frame: views, valid until the next step (later "
+      "they show whatever is there then). World frame. Rows with depth <= 0 are about to touch.")
+      .def("__len__", [](const P& p) { return p.c.count; })
+      .def_property_readonly("depth", in([](const h6Contacts& c) { return c.depth; }),
+                             "(n,) float32 [m]")
+      .def_property_readonly("weight", in([](const h6Contacts& c) { return c.weight; }),
+                             "(n,) float32, share of the stiffness")
+      .def_property_readonly("load", in([](const h6Contacts& c) { return c.load; }),
+                             "(n,) float32, force along the normal over k [m]")
+      .def_property_readonly("point", in([](const h6Contacts& c) { return c.point; }),
+                             "(n,) uint32, index into the shell's points")
+      .def_property_readonly("field_body", in([](const h6Contacts& c) { return c.field_body; }),
+                             "(n,) int32, the body whose field it touches")
+      .def_property_readonly(
+          "normal",
+          [](const P& p) { return three(p.c.nx, p.c.ny, p.c.nz, p.c.count, py::cast(p.session)); },
+          "(n, 3) float32, inward unit normal; `firm`: direction of the push")
+      .def_property_readonly(
+          "gradient",
+          [](const P& p) { return three(p.c.gx, p.c.gy, p.c.gz, p.c.count, py::cast(p.session)); },
+          "(n, 3) float32, unit gradient of the field, outward")
+      .def_property_readonly(
+          "arm",
+          [](const P& p) { return three(p.c.rx, p.c.ry, p.c.rz, p.c.count, py::cast(p.session)); },
+          "(n, 3) float32, from the centre of mass [m]")
+      .def_property_readonly(
+          "torque_direction",
+          [](const P& p) { return three(p.c.tx, p.c.ty, p.c.tz, p.c.count, py::cast(p.session)); },
+          "(n, 3) float32")
+      .def(
+          "names",
+          [](const P& p) {
+            py::array_t<std::int32_t> part(p.c.count), triangle(p.c.count);
+            h6NameContacts(p.session->session, p.body, part.mutable_data(),
+                           triangle.mutable_data());
+            return py::make_tuple(part, triangle);
+          },
+          "part (n,), triangle (n,) int32 of the field's mesh that each touches; -1: not known. "
+          "Call it "
+          "before the next step.");
+}
+
+// A member of each row of samples or commands: (hands, ...), strided over the structs.
+template <class Row, class T>
+auto rows(T Row::*member, std::array<Row, H6_MAX_HANDS> PySession::*of, bool writable) {
+  return [=](const SessionPtr& s) {
+    Row* first = ((*s).*of).data();
+    const auto hands = static_cast<py::ssize_t>(s->hands);
+    if constexpr (sizeof(T) > 8)
+      return view(reinterpret_cast<const double*>(&(first->*member)),
+                  {hands, static_cast<py::ssize_t>(kNumbers<T>)}, {sizeof(Row), 8}, py::cast(s),
+                  writable);
+    else
+      return view(&(first->*member), {hands}, {sizeof(Row)}, py::cast(s), writable);
+  };
+}
+
+h6Status step(PySession& s) {
+  py::gil_scoped_release release;
+  return h6Step(s.session, s.samples.data(), s.commands.data());
+}
+
+// Numbers of a sample that a call gives: (hands, n), or (n,) for one hand.
+template <class T>
+void put(PySession& s, T h6DeviceSample::*member, const std::optional<Rows<double>>& values,
+         const char* name) {
+  if (!values) return;
+  const auto n = static_cast<py::ssize_t>(kNumbers<T>);
+  if (values->size() != n * static_cast<py::ssize_t>(s.hands) ||
+      values->shape(values->ndim() - 1) != n)
+    throw py::value_error(std::string(name) + " must have the shape (" + std::to_string(s.hands) +
+                          ", " + std::to_string(n) + ")");
+  for (std::size_t h = 0; h < s.hands; ++h)
+    std::memcpy(&(s.samples[h].*member), values->data() + h * kNumbers<T>, sizeof(T));
+}
+
+h6Status step_with(PySession& s, const Rows<double>& pose,
+                   const std::optional<Rows<double>>& velocity,
+                   const std::optional<Rows<double>>& wrench,
+                   std::optional<std::uint32_t> buttons) {
+  put(s, &h6DeviceSample::pose, std::optional(pose), "pose");
+  put(s, &h6DeviceSample::velocity, velocity, "velocity");
+  put(s, &h6DeviceSample::wrench, wrench, "wrench");
+  for (std::size_t h = 0; h < s.hands && buttons; ++h) s.samples[h].buttons = *buttons;
+  return step(s);
+}
+
+// One frame for each row of poses (n, hands, 7), without the interpreter: the frames as rows.
+py::array follow(PySession& s, const Rows<double>& poses) {
+  const auto hands = static_cast<py::ssize_t>(s.hands);
+  if (poses.ndim() != 3 || poses.shape(1) != hands || poses.shape(2) != 7)
+    throw py::value_error("poses must have the shape (frames, " + std::to_string(hands) + ", 7)");
+  const auto frames = static_cast<std::size_t>(poses.shape(0));
+  py::array_t<h6FrameRecord> out(frames);
+  h6FrameRecord* to = out.mutable_data();
+  const double* from = poses.data();
+  py::gil_scoped_release release;
+  for (std::size_t i = 0; i < frames; ++i) {
+    for (std::size_t h = 0; h < s.hands; ++h)
+      std::memcpy(&s.samples[h].pose, from + 7 * (i * s.hands + h), sizeof(h6Pose));
+    h6Step(s.session, s.samples.data(), s.commands.data());
+    h6GetRecord(s.session, s.samples.data(), s.commands.data(), &to[i]);
+  }
+  return out;
+}
+
+std::int32_t body_at(const PySession& s, std::int32_t body) {
+  if (body < 0 || static_cast<std::size_t>(body) >= s.bodies)
+    throw py::index_error("body " + std::to_string(body) + " does not exist: the session has " +
+                          std::to_string(s.bodies));
+  return body;
+}
+std::int32_t hand_at(const PySession& s, std::int32_t hand) {
+  if (hand < 0 || static_cast<std::size_t>(hand) >= s.hands)
+    throw py::index_error("hand " + std::to_string(hand) + " does not exist: the session has " +
+                          std::to_string(s.hands));
+  return hand;
+}
+
+py::array_t<double> body_of(const PySession& s, std::int32_t body) {
+  const h6BodyState state = h6GetBody(s.session, body_at(s, body));
+  py::array_t<double> out(13);
+  std::memcpy(out.mutable_data(), &state, sizeof state);
+  return out;
+}
+
+py::dict safety_of(const PySession& s, std::int32_t hand) {
+  h6HandSafety safety;
+  h6GetSafety(s.session, hand_at(s, hand), &safety);
+  py::dict frames;
+  for (int i = 1; i < H6_CAUSE_COUNT; ++i)
+    if (safety.frames[i]) frames[h6CauseName(static_cast<h6Cause>(i))] = safety.frames[i];
+  using namespace py::literals;
+  return py::dict("state"_a = h6DeviceStateName(safety.state),
+                  "fault"_a = h6CauseName(safety.fault), "frames"_a = frames);
+}
+
+py::array frame_of(const PySession& s) {
+  py::array_t<h6FrameReport> row(1);
+  *row.mutable_data() = h6GetFrame(s.session);
+  return row.attr("reshape")(py::tuple(0));
+}
+
+py::array overlaps_of(const PySession& s) {
+  const auto made = overlaps(s.session);
+  py::array_t<h6Overlap> out(made.size());
+  std::copy(made.begin(), made.end(), out.mutable_data());
+  return out;
+}
+
+void add_steps(py::class_<PySession, SessionPtr>& c) {
+  using S = PySession;
+  c.def("step", &step,
+        "One frame with what stands in `pose`, `velocity`, `wrench` and `buttons`; returns "
+        "the status bits (status_names), 0: nothing was dropped or limited.")
+      .def("step", &step_with, py::arg("pose"), py::arg("velocity") = py::none(),
+           py::arg("wrench") = py::none(), py::arg("buttons") = py::none(),
+           "Puts these samples, (hands, 7) and (hands, 6), in place first.")
+      .def("follow", &follow, py::arg("poses"),
+           "A frame for each row of poses (n, hands, 7), without the interpreter; the frames as a "
+           "structured array (n,), the rows of a recording.")
+      .def_property_readonly("pose", rows(&h6DeviceSample::pose, &S::samples, true),
+                             "(hands, 7) sample of each hand, to be written [m]")
+      .def_property_readonly("velocity", rows(&h6DeviceSample::velocity, &S::samples, true),
+                             "(hands, 6) of the samples [m/s, rad/s]")
+      .def_property_readonly("wrench", rows(&h6DeviceSample::wrench, &S::samples, true),
+                             "(hands, 6) of the samples, in the admittance modes [N, N m]")
+      .def_property_readonly("buttons", rows(&h6DeviceSample::buttons, &S::samples, true),
+                             "(hands,)")
+      .def_property_readonly("command", rows(&h6DeviceCommand::wrench, &S::commands, false),
+                             "(hands, 6) wrench on each hand after the last step [N, N m]")
+      .def_property_readonly("command_pose", rows(&h6DeviceCommand::pose, &S::commands, false),
+                             "(hands, 7)")
+      .def_property_readonly("causes", rows(&h6DeviceCommand::causes, &S::commands, false),
+                             "(hands,) bits: cause_names");
+}
+
+void add_state(py::class_<PySession, SessionPtr>& c) {
+  using S = PySession;
+  c.def("body", &body_of, py::arg("body"), "(13,) pose (7) and velocity (6) of a body; a copy")
+      .def(
+          "set_body",
+          [](S& s, std::int32_t body, const Numbers<h6Pose>& pose,
+             const Numbers<h6Velocity>& velocity) {
+            const h6BodyState state{struct_of<h6Pose>(pose), struct_of<h6Velocity>(velocity)};
+            h6SetBody(s.session, body_at(s, body), &state);
+          },
+          py::arg("body"), py::arg("pose"), py::arg("velocity") = Numbers<h6Velocity>{},
+          "Teleports a body; an overlap that it makes pushes in full.")
+      .def(
+          "contacts",
+          [](const SessionPtr& s, std::int32_t body) {
+            return PyContacts{s, h6GetContacts(s->session, body_at(*s, body)), body};
+          },
+          py::arg("body"), "Contacts of a shell body in the last frame, as views.")
+      .def_property_readonly("frame", &frame_of,
+                             "The last frame's report, a structured scalar: frame['contacts'], "
+                             "['max_depth'] [m], ['frame_us'], ['state_hash'], ...; a copy")
+      .def_property_readonly("overlaps", &overlaps_of, "Overlaps at the start, a structured array")
+      .def(
+          "restart_fit",
+          [](S& s) {
+            h6Error error{};
+            if (!h6RestartFit(s.session, &error)) throw Error(error);
+          },
+          "Makes the present poses a new start.")
+      .def(
+          "voxel",
+          [](const S& s, std::int32_t body) { return h6GetVoxel(s.session, body_at(s, body)); },
+          py::arg("body"), "[m]")
+      .def(
+          "coupling",
+          [](const S& s, std::int32_t hand) { return h6GetCoupling(s.session, hand_at(s, hand)); },
+          py::arg("hand"), "The Coupling in use, with derived values.")
+      .def("safety", &safety_of, py::arg("hand"), "dict: state, fault, frames with each cause")
+      .def(
+          "arm", [](S& s) { h6Arm(s.session); }, "Clears faults and starts again softly.")
+      .def(
+          "disarm", [](S& s) { h6Disarm(s.session); }, "Lets every output decay to zero.")
+      .def(
+          "note_interval", [](S& s, double seconds) { h6NoteInterval(s.session, seconds); },
+          py::arg("seconds"), "From the last commands to the next [s], for a loop in real time.")
+      .def_property_readonly("hands", [](const S& s) { return s.hands; })
+      .def_property_readonly("bodies", [](const S& s) { return s.bodies; })
+      .def_property_readonly(
+          "rate", [](const S& s) { return s.rate; }, "[Hz]")
+      .def_property_readonly("model", [](const S& s) { return s.model; });
+}
+
+}  // namespace
+
+SessionPtr make_session(std::shared_ptr<PyModel> model, const Definition& of) {
+  auto made = std::make_shared<PySession>();
+  made->hands = of.hands.size(), made->bodies = of.bodies.size(), made->rate = of.def.rate;
+  for (h6DeviceSample& sample : made->samples) sample = h6DefaultDeviceSample();
+  for (std::size_t h = 0; h < made->hands && h < H6_MAX_HANDS; ++h)
+    if (const auto body = static_cast<std::size_t>(of.hands[h]->body); body < of.bodies.size())
+      made->samples[h].pose = of.bodies[body]->pose;
+  made->session = of.with([&](const h6SessionDef& def) {
+    return Session::make(
+        [&](h6Error* error) { return h6CreateSession(model->get(), &def, error); });
+  });
+  made->model = std::move(model);
+  return made;
+}
+
+void add_session(py::module_& m) {
+  declare_rows();
+  add_contacts(m);
+  py::class_<PySession, SessionPtr> c(m, "Session", "Bodies, hands and their state.");
+  c.def(py::init([](std::shared_ptr<PyModel> model, const Definition& definition) {
+          py::gil_scoped_release release;
+          return make_session(std::move(model), definition);
+        }),
+        py::arg("model"), py::arg("definition"),
+        "Each hand's sample begins where its body is, at rest.");
+  add_steps(c);
+  add_state(c);
+}
+
+}  // namespace hapsix::python

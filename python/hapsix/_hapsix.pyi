@@ -1,0 +1,559 @@
+# SPDX-License-Identifier: Apache-2.0
+# Written by python/stubs.py.
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, overload
+
+from numpy.typing import ArrayLike, NDArray
+
+class Error(RuntimeError):
+    """Why a call failed, in one sentence; `code` names the kind of failure."""
+    code: str
+
+class Batch:
+    """Many sessions of one model, stepped in one call on several threads. Each has the bits
+    that it has alone, on any number of threads. Its arrays are views of what the batch owns;
+    keep them."""
+    def __init__(self, model: Model, definition: Definition, count: int, threads: int = 0) -> None:
+        """count sessions of this definition; threads: 1 .. 64, 0: one for each core. Keep
+        definition.max_contacts small: that is most of a session's memory."""
+    def __len__(self) -> int:
+        ...
+    @property
+    def body(self) -> NDArray[Any]:
+        """(count, hands, 13) pose and velocity of each hand's body"""
+    @property
+    def buttons(self) -> NDArray[Any]:
+        """(count, hands)"""
+    @property
+    def causes(self) -> NDArray[Any]:
+        """(count, hands) bits"""
+    @property
+    def command(self) -> NDArray[Any]:
+        """(count, hands, 6) wrench on each hand [N, N m]"""
+    @property
+    def command_pose(self) -> NDArray[Any]:
+        """(count, hands, 7)"""
+    @property
+    def contacts(self) -> NDArray[Any]:
+        """(count,) points that touch"""
+    @property
+    def hands(self) -> int:
+        ...
+    @property
+    def max_depth(self) -> NDArray[Any]:
+        """(count,) [m]"""
+    @property
+    def max_depth_voxels(self) -> NDArray[Any]:
+        """(count,)"""
+    @property
+    def model(self) -> Model:
+        ...
+    @property
+    def pose(self) -> NDArray[Any]:
+        """(count, hands, 7) samples, to be written [m]"""
+    def reset(self, which: Optional[List[int]] = None, poses: Optional[ArrayLike] = None) -> None:
+        """Begins sessions anew (None: all), the bodies of their hands at poses (which,
+        hands, 7), or where the definition puts them. Samples start there, at rest."""
+    @property
+    def state_hash(self) -> NDArray[Any]:
+        """(count,) uint64"""
+    @property
+    def status(self) -> NDArray[Any]:
+        """(count,) bits of the frames"""
+    def step(self, steps: int = 1) -> int:
+        """Each session takes `steps` frames with its samples; returns the status bits of
+        all."""
+    @property
+    def threads(self) -> int:
+        ...
+    @property
+    def velocity(self) -> NDArray[Any]:
+        """(count, hands, 6) of the samples [m/s, rad/s]"""
+    @property
+    def wrench(self) -> NDArray[Any]:
+        """(count, hands, 6) of the samples, admittance modes [N, N m]"""
+
+class Body:
+    """What moves, or stands fast."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    com: Any
+    """(3,) centre of mass, mesh frame [m]"""
+    field: int
+    """index into the model's fields; -1: none"""
+    fixed: bool
+    """never moves"""
+    inertia: Any
+    """(6,) xx yy zz xy xz yz about com [kg m^2]; zeros: from the shell's points"""
+    mass: float
+    """[kg]"""
+    pose: Any
+    """(7,) mesh frame -> world at the start [m]"""
+    shell: int
+    """index into the model's shells; -1: none"""
+    translation_only: bool
+    """3-DoF: never turns"""
+    velocity: Any
+    """(6,) of the centre of mass, linear and angular [m/s, rad/s]"""
+
+class Contact:
+    """How contacts push and share their stiffness."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    cluster_voxels: float
+    """`cluster`: contacts nearer are one [voxel]"""
+    damping: float
+    """beta: damping over stiffness [s]"""
+    epsilon: float
+    """`gauss3`, `gauss6`: half-width of the hat, (0, 2]"""
+    epsilon_normal: float
+    """`robust`: half-width over normals"""
+    epsilon_torque: float
+    """`robust`: half-width over torques"""
+    firmness: float
+    """`firm`: rho, in units of k"""
+    firmness_shallow: float
+    """`firm`: rho at the surface"""
+    fit: str
+    """overlap at the start: 'relieve' (default) or 'tight'"""
+    fit_offset: float
+    """play [m]"""
+    friction: float
+    """mu, 0 .. 10"""
+    global_n0: float
+    """`global`: contacts above which they share"""
+    margin_voxels: float
+    """`series`, `firm`: takes part before it touches"""
+    method: str
+    """Weight rule: 'firm' (default), 'robust', 'series', 'global', ..."""
+    passivity: bool
+    """damp energy that contacts would make"""
+    series_c: float
+    """`series`, `firm`: net stiffness is at most c k"""
+    stiffness: float
+    """k of one contact [N/m]; 0: derived"""
+    torque_length: float
+    """l0 [m]; 0: derived"""
+
+class Contacts:
+    """Contacts of a shell body in the last frame: views, valid until the next step (later
+    they show whatever is there then). World frame. Rows with depth <= 0 are about to touch."""
+    def __len__(self) -> int:
+        ...
+    @property
+    def arm(self) -> object:
+        """(n, 3) float32, from the centre of mass [m]"""
+    @property
+    def depth(self) -> NDArray[Any]:
+        """(n,) float32 [m]"""
+    @property
+    def field_body(self) -> NDArray[Any]:
+        """(n,) int32, the body whose field it touches"""
+    @property
+    def gradient(self) -> object:
+        """(n, 3) float32, unit gradient of the field, outward"""
+    @property
+    def load(self) -> NDArray[Any]:
+        """(n,) float32, force along the normal over k [m]"""
+    def names(self) -> tuple:
+        """part (n,), triangle (n,) int32 of the field's mesh that each touches; -1: not
+        known. Call it before the next step."""
+    @property
+    def normal(self) -> object:
+        """(n, 3) float32, inward unit normal; `firm`: direction of the push"""
+    @property
+    def point(self) -> NDArray[Any]:
+        """(n,) uint32, index into the shell's points"""
+    @property
+    def torque_direction(self) -> object:
+        """(n, 3) float32"""
+    @property
+    def weight(self) -> NDArray[Any]:
+        """(n,) float32, share of the stiffness"""
+
+class Coupling:
+    """The virtual coupling between a hand and its body."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    damping_ratio: float
+    """1 is critical"""
+    max_depth_voxels: float
+    """largest force is k times this [voxel]"""
+    max_force: float
+    """[N]; 0: derived"""
+    max_step_voxels: float
+    """static: most way in a frame [voxel]"""
+    max_torque: float
+    """[N m]; 0: derived"""
+    mode: str
+    """'dynamic' (default), 'static' or 'direct'"""
+    rotational_stiffness: float
+    """[N m/rad]; 0: derived"""
+    stiffness: float
+    """k_VC [N/m]"""
+
+class Definition:
+    """A session's bodies, hands, pairs and settings."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    bodies: Any
+    """tuple of Body, which may be changed; assign a new sequence for others"""
+    contact: Contact
+    """Contact"""
+    exact_gradient: bool
+    """default False"""
+    frame_budget_us: float
+    """anytime mode [us]; 0: off"""
+    gravity: Any
+    """(3,) [m/s^2]"""
+    hands: Any
+    """tuple of Hand, at most 8"""
+    implicit: bool
+    """default True"""
+    max_contacts: int
+    """room, per shell body"""
+    max_pairs: int
+    """room for pairs that are near; 0: derived"""
+    max_substeps: int
+    """most steps of a frame, 1 .. 64"""
+    net_stiffness: bool
+    """report it in each frame"""
+    pairs: Any
+    """tuple of (shell body, field body); empty: every moving shell against every other field"""
+    rate: float
+    """frames a second [Hz]"""
+    threads: int
+    """that share a frame's work, 1 .. 64"""
+
+class Field:
+    """A signed distance field in sparse bricks. Its arrays are views without copies."""
+    @property
+    def band(self) -> float:
+        """[m]"""
+    @property
+    def brick_index(self) -> NDArray[Any]:
+        """(bz, by, bx) int32: row in `samples`, -1: no brick"""
+    @property
+    def far_grid(self) -> NDArray[Any]:
+        """(bz + 1, by + 1, bx + 1) float32: bounds of the distance at nodes (8a, 8b, 8c)
+        [m]"""
+    @property
+    def origin(self) -> tuple:
+        """(3,) node (0, 0, 0), mesh frame [m]"""
+    @staticmethod
+    def read(file: str) -> Field:
+        """A .vdb."""
+    @property
+    def samples(self) -> NDArray[Any]:
+        """(bricks, 8, 8, 8) float32, axes brick, z, y, x: signed distance [m]"""
+    @property
+    def voxel_size(self) -> float:
+        """[m]"""
+    def write(self, file: str) -> None:
+        """A .vdb."""
+
+class Filter:
+    """Between a device and the scene: scales and clutch."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    clutch_buttons: int
+    """bits"""
+    force_scale: float
+    """newtons at the device per newton in the scene"""
+    motion_scale: float
+    """metres in the scene per metre of the device"""
+    relative: bool
+    """the first sample takes the body where it is"""
+    rotation_scale: float
+    """the same for angles"""
+
+class Hand:
+    """What holds a body."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    admittance_damping: float
+    """[N s/m]"""
+    body: int
+    """index of the body that moves with this hand"""
+    coupling: Coupling
+    """Coupling"""
+    delay_frames: int
+    """0 .. 2"""
+    delay_known: bool
+    """always exactly so many"""
+    driver_damping: float
+    """[N s/m]"""
+    driver_stiffness: float
+    """[N/m]"""
+    filter: Filter
+    """Filter"""
+    manipulandum_mass: float
+    """[kg]"""
+    mode: str
+    """'impedance' (default), 'admittance' or 'pseudo-admittance'"""
+    passivity: bool
+    """observe the energy that leaves through this hand"""
+    safety: Safety
+    """Safety"""
+
+class Mesh:
+    """Triangles."""
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, part: Optional[ArrayLike] = None) -> None:
+        """vertices (n, 3) [m], triangles (m, 3) rows of vertices, part (m,) or None.
+        Copied."""
+    @property
+    def info(self) -> dict:
+        """dict: triangles, vertices, parts, duplicates, degenerate, open_edges,
+        odd_edges, components, closed, low, high [m], volume [m^3], names"""
+    @staticmethod
+    def parse(bytes: bytes, name: str, unit: str = 'm') -> Mesh:
+        """The same from memory; the ending of `name` tells the format."""
+    @staticmethod
+    def read(file: str, unit: str = 'm') -> Mesh:
+        """STL, OBJ, PLY, glTF, COLLADA, each also .gz. `unit` ('m', 'mm', 'cm', 'in') is
+        that of a format that has none."""
+
+class Model:
+    """Fields and shells, immutable, shared by sessions."""
+    def __init__(self, fields: List[Field], shells: List[Shell]) -> None:
+        ...
+    @property
+    def bytes(self) -> int:
+        ...
+    def sample_field(self, field: int, points: ArrayLike) -> tuple:
+        """points (n, 3) in the field's mesh frame [m] -> distance (n,) [m], gradient (n,
+        3), exact (n,) bool: a sample, not a bound"""
+    def stiffness_for(self, definition: Definition) -> float:
+        """The contact stiffness that such a session has [N/m]; 0: not valid."""
+
+class Recorder:
+    """Writes a recording (.h5); a killed program loses at most half a second of it."""
+    def __init__(self, file: str, scene: Optional[Scene] = None, definition: Optional[Definition] = None, program: str = 'python') -> None:
+        """Of a run of `scene`, which is kept in the recording, or of a session with this
+        `definition`."""
+    def finish(self, summary: Optional[str] = None) -> None:
+        """Makes the file. summary: one JSON object, or None."""
+    @overload
+    def record(self, session: Session) -> None:
+        """Adds the session's last frame."""
+    @overload
+    def record(self, frames: ArrayLike) -> None:
+        """Adds the rows that Session.follow returned."""
+
+class Recording:
+    """A recorded run, or what a killed run left of one."""
+    def __init__(self, file: str) -> None:
+        ...
+    def __len__(self) -> int:
+        ...
+    @property
+    def events(self) -> list:
+        """list of (time [s], what, detail)"""
+    def frames(self, first: int = 0, count: Optional[int] = None) -> NDArray[Any]:
+        """Rows first .. first + count as a structured array: ['time'] [s],
+        ['report']['contacts'], ['hand'] (n, 8), ['command'], ['body'], ...; the member
+        names of h6FrameRecord"""
+    @property
+    def hands(self) -> int:
+        ...
+    @property
+    def program(self) -> str:
+        ...
+    @property
+    def rate(self) -> float:
+        """[Hz]"""
+    @property
+    def scene(self) -> str:
+        """JSON, or ''"""
+    @property
+    def summary(self) -> str:
+        """JSON, or ''"""
+    @property
+    def whole(self) -> bool:
+        """False: the run was killed"""
+
+class Safety:
+    """The safety chain of a hand's output. 0: the device's rating."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begins with the defaults; keywords set attributes."""
+    cut_speed: float
+    """[m/s]"""
+    dead_man_buttons: int
+    """bits"""
+    decay_time: float
+    """[s]"""
+    derate_speed: float
+    """[m/s]"""
+    freeze_time: float
+    """[s]"""
+    max_force: float
+    """[N]"""
+    max_force_rate: float
+    """slew limit [N/s]"""
+    max_power: float
+    """[W]"""
+    max_speed: float
+    """admittance [m/s]"""
+    max_torque: float
+    """[N m]"""
+    max_torque_rate: float
+    """slew limit [N m/s]"""
+    pose_jump: float
+    """[m]"""
+    soft_start: float
+    """[s]"""
+
+class Scene:
+    """Parts, hands and rules of a scene file."""
+    def __init__(self, name: str, *, outside: bool = False, progress: Optional[Callable[[str, float], Optional[bool]]] = None) -> None:
+        """A scene file (.json) or a generated scene ('peg-in-hole'). Assets are baked, or
+        come from the cache. outside: files outside the scene's folder may be read."""
+    @property
+    def bodies(self) -> tuple:
+        """names of bodies, in the order of their indices"""
+    def definition(self) -> Definition:
+        """A new Definition of a session, to be changed at will."""
+    @property
+    def duration(self) -> float:
+        """[s]"""
+    @property
+    def model(self) -> Model:
+        ...
+    def path(self, hand: int, time: float) -> tuple:
+        """Where the scene's hand wants to be at a time [s]: pose (7,), velocity (6,)."""
+
+class Session:
+    """Bodies, hands and their state."""
+    def __init__(self, model: Model, definition: Definition) -> None:
+        """Each hand's sample begins where its body is, at rest."""
+    def arm(self) -> None:
+        """Clears faults and starts again softly."""
+    @property
+    def bodies(self) -> int:
+        ...
+    def body(self, body: int) -> NDArray[Any]:
+        """(13,) pose (7) and velocity (6) of a body; a copy"""
+    @property
+    def buttons(self) -> NDArray[Any]:
+        """(hands,)"""
+    @property
+    def causes(self) -> NDArray[Any]:
+        """(hands,) bits: cause_names"""
+    @property
+    def command(self) -> NDArray[Any]:
+        """(hands, 6) wrench on each hand after the last step [N, N m]"""
+    @property
+    def command_pose(self) -> NDArray[Any]:
+        """(hands, 7)"""
+    def contacts(self, body: int) -> Contacts:
+        """Contacts of a shell body in the last frame, as views."""
+    def coupling(self, hand: int) -> Coupling:
+        """The Coupling in use, with derived values."""
+    def disarm(self) -> None:
+        """Lets every output decay to zero."""
+    def follow(self, poses: ArrayLike) -> NDArray[Any]:
+        """A frame for each row of poses (n, hands, 7), without the interpreter; the
+        frames as a structured array (n,), the rows of a recording."""
+    @property
+    def frame(self) -> NDArray[Any]:
+        """The last frame's report, a structured scalar: frame['contacts'], ['max_depth']
+        [m], ['frame_us'], ['state_hash'], ...; a copy"""
+    @property
+    def hands(self) -> int:
+        ...
+    @property
+    def model(self) -> Model:
+        ...
+    def note_interval(self, seconds: float) -> None:
+        """From the last commands to the next [s], for a loop in real time."""
+    @property
+    def overlaps(self) -> NDArray[Any]:
+        """Overlaps at the start, a structured array"""
+    @property
+    def pose(self) -> NDArray[Any]:
+        """(hands, 7) sample of each hand, to be written [m]"""
+    @property
+    def rate(self) -> float:
+        """[Hz]"""
+    def restart_fit(self) -> None:
+        """Makes the present poses a new start."""
+    def safety(self, hand: int) -> dict:
+        """dict: state, fault, frames with each cause"""
+    def set_body(self, body: int, pose: Sequence[float], velocity: Sequence[float] = ...) -> None:
+        """Teleports a body; an overlap that it makes pushes in full."""
+    @overload
+    def step(self) -> int:
+        """One frame with what stands in `pose`, `velocity`, `wrench` and `buttons`;
+        returns the status bits (status_names), 0: nothing was dropped or limited."""
+    @overload
+    def step(self, pose: ArrayLike, velocity: Optional[ArrayLike] = None, wrench: Optional[ArrayLike] = None, buttons: Optional[int] = None) -> int:
+        """Puts these samples, (hands, 7) and (hands, 6), in place first."""
+    @property
+    def velocity(self) -> NDArray[Any]:
+        """(hands, 6) of the samples [m/s, rad/s]"""
+    def voxel(self, body: int) -> float:
+        """[m]"""
+    @property
+    def wrench(self) -> NDArray[Any]:
+        """(hands, 6) of the samples, in the admittance modes [N, N m]"""
+
+class Shell:
+    """Points that may touch, coarse ones first. Its arrays are views without copies."""
+    def __len__(self) -> int:
+        ...
+    @property
+    def nx(self) -> NDArray[Any]:
+        """(points,) float32, inward unit normal"""
+    @property
+    def ny(self) -> NDArray[Any]:
+        """(points,) float32, inward unit normal"""
+    @property
+    def nz(self) -> NDArray[Any]:
+        """(points,) float32, inward unit normal"""
+    @staticmethod
+    def read(file: str) -> Shell:
+        """A .ply."""
+    def write(self, file: str) -> None:
+        """A .ply."""
+    @property
+    def x(self) -> NDArray[Any]:
+        """(points,) float32, mesh frame [m]"""
+    @property
+    def y(self) -> NDArray[Any]:
+        """(points,) float32, mesh frame [m]"""
+    @property
+    def z(self) -> NDArray[Any]:
+        """(points,) float32, mesh frame [m]"""
+
+def bake_field(mesh: Mesh, *, progress: Optional[Callable[[str, float], Optional[bool]]] = None, **kwargs: Any) -> Field:
+    """A Field of a Mesh. Options: voxels (256), voxel_size [m], tolerance [m], offset [m],
+    sign ('auto', 'flood', 'winding'), hollow, seal [m], weld [voxel], band_voxels (3),
+    threads (0: all), cache (False). progress(what, done) may return False to cancel."""
+
+def bake_shell(mesh: Mesh, *, progress: Optional[Callable[[str, float], Optional[bool]]] = None, **kwargs: Any) -> Shell:
+    """A Shell of a Mesh. Options: points (10000), spacing [m], levels (7), seed, surface and
+    normals ('auto', 'triangles', 'field'), and those of bake_field for the field that finds
+    what the outside reaches."""
+
+def build_info() -> str:
+    """Version, compiler and SIMD targets of the library, as a line."""
+
+def cause_names(causes: int) -> tuple:
+    """The names of the bits of `causes`."""
+
+def check_field(mesh: Mesh, field: Field, *, stiffness: float = 10000.0, points: int = 20000, push: bool = True, threads: int = 0, progress: Optional[Callable[[str, float], Optional[bool]]] = None) -> dict:
+    """Compares a field with its mesh; dict as h6CheckReport, lengths in m, force in N."""
+
+def set_log(function: Optional[Callable[[str, str], None]]) -> None:
+    """Calls function(level, sentence) for what no call returns: what a bake repaired, how a
+    session starts. level is 'note' or 'warning'. None, the default: silence."""
+
+def status_names(status: int) -> tuple:
+    """The names of the bits of a status."""
+
+def weigh(normals: ArrayLike, arms: ArrayLike, depths: ArrayLike, *, voxel: float, lever: float, gradients: Optional[ArrayLike] = None, velocity: Optional[Sequence[float]] = None, contact: Optional[Contact] = None, exact: bool = False) -> tuple:
+    """Weights of any simulator's contacts: normals (n, 3) unit, the direction of the push;
+    arms (n, 3) from the centre of mass [m]; depths (n,) > 0 inside [m]; voxel: the length of
+    l0 and clusters [m]; lever: at least the largest arm, the same in every call [m]; velocity
+    (6,) of the body. Returns weights (n,), wrench (6,) [N, N m], stiffness (6, 6) and damping
+    (6, 6), its derivatives by q = (x, theta) and by velocity."""
+

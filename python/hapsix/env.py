@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Assembly tasks with the interface of Gymnasium; Gymnasium itself is used where it is installed.
+
+    env = hapsix.env.AssemblyEnv()                      # peg in hole
+    observation, info = env.reset(seed=1)
+    observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+
+    many = hapsix.env.AssemblyVectorEnv(num_envs=1024)  # the same for many at once: arrays
+
+An action moves the hand, not the part: the coupling pulls the part after it, and contacts hold it.
+Every force is one that a person would have felt. The same seed and actions give the same bits.
+"""
+import dataclasses
+
+import numpy as np
+
+import hapsix
+
+try:
+    import gymnasium
+    from gymnasium.spaces import Box
+    _Base = gymnasium.Env
+except ImportError:
+    _Base = object
+
+    class Box:
+        """What Gymnasium's Box is here: bounds, a shape, samples."""
+
+        def __init__(self, low, high, shape, dtype=np.float32, seed=None):
+            self.shape, self.dtype = tuple(shape), np.dtype(dtype)
+            self.low = np.full(shape, low, dtype)
+            self.high = np.full(shape, high, dtype)
+            self.seed(seed)
+
+        def seed(self, seed=None):
+            self._random = np.random.default_rng(seed)
+
+        def sample(self):
+            low, high = np.maximum(self.low, -1e3), np.minimum(self.high, 1e3)
+            return self._random.uniform(low, high).astype(self.dtype)
+
+        def contains(self, x):
+            x = np.asarray(x)
+            return x.shape == self.shape and bool(np.all(x >= self.low) and np.all(x <= self.high))
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """Where the part of a scene's first hand starts and where it belongs; mesh frame, world."""
+
+    scene: str                 # a generated scene or a file
+    start: tuple               # (3,) middle of the starts [m]
+    goal: tuple                # (3,) [m]; the orientation there is that of the scene's definition
+    spread: tuple              # (3,) starts lie within this of the middle [m]
+    tilt: float                # ... turned by up to this about any axis [rad]
+    tolerance: float           # how near to the goal is there [m]
+    reach: float = 5e-4        # most way of the hand in an action [m]
+    turn: float = np.radians(0.5)   # most turn of the hand in an action [rad]
+    lead: float = 5e-3         # the hand stays this near to the part [m]
+    frames: int = 10           # that an action lasts: 10 ms at 1 kHz
+    actions: int = 400         # after which an episode is truncated
+    max_contacts: int = 1000   # room in each session
+
+
+PEG_IN_HOLE = Task("peg-in-hole", start=(0, 0, 17e-3), goal=(0, 0, -15e-3), spread=(2e-3, 2e-3, 1e-3),
+                   tilt=np.radians(2), tolerance=5e-4)
+# The shaft must be turned so that its 24 teeth meet the gaps.
+SHAFT_IN_HUB = Task("spline-hub-1k", start=(0, 0, 45e-3), goal=(0, 0, 0), spread=(1e-3, 1e-3, 1e-3),
+                    tilt=np.radians(3), tolerance=5e-4, max_contacts=2000)
+
+OBSERVATION = 22
+_MM, _FORCE, _TORQUE = 1e-3, 10.0, 0.1
+
+
+def _turned(q, turns):
+    """Quaternions (n, 4) turned by rotation vectors (n, 3) in the world frame."""
+    angle = np.linalg.norm(turns, axis=1, keepdims=True)
+    half = 0.5 * angle
+    scale = np.where(angle > 1e-12, np.sin(half) / np.maximum(angle, 1e-12), 0.5)
+    w, v = np.cos(half)[:, 0], turns * scale
+    out = np.empty_like(q)
+    out[:, 0] = w * q[:, 0] - np.sum(v * q[:, 1:], axis=1)
+    out[:, 1:] = w[:, None] * q[:, 1:] + q[:, :1] * v + np.cross(v, q[:, 1:])
+    return out / np.linalg.norm(out, axis=1, keepdims=True)
+
+
+class AssemblyVectorEnv:
+    """num_envs episodes of a task side by side. With autoreset an episode that ends begins anew in the
+    same step: infos["final"] has its index and infos["final_observation"] its last observation.
+
+    observation (num_envs, 22) float32: way to the goal (3) [mm], quaternion (4), velocity (6) [mm/s,
+    rad/s], wrench on the hand (6) [10 N, 0.1 N m], way from the part to the hand (3) [mm]
+    action (num_envs, 6) in -1 .. 1: way (3) and turn (3) of the hand, in units of the task's reach and turn
+    """
+
+    def __init__(self, num_envs=1, task=PEG_IN_HOLE, threads=0, autoreset=True):
+        self.task, self.num_envs, self.autoreset = task, num_envs, autoreset
+        self._scene = hapsix.Scene(task.scene)
+        definition = self._scene.definition()
+        definition.max_contacts = task.max_contacts
+        self._upright = np.array(definition.bodies[definition.hands[0].body].pose[3:])
+        self._batch = hapsix.Batch(self._scene.model, definition, num_envs, threads)
+        self.single_observation_space = Box(-np.inf, np.inf, (OBSERVATION,), np.float32)
+        self.single_action_space = Box(-1, 1, (6,), np.float32)
+        self.observation_space = Box(-np.inf, np.inf, (num_envs, OBSERVATION), np.float32)
+        self.action_space = Box(-1, 1, (num_envs, 6), np.float32)
+        self._goal = np.asarray(task.goal, float)
+        self._age = np.zeros(num_envs, int)
+        self._random = np.random.default_rng()
+
+    @property
+    def batch(self):
+        """The hapsix.Batch underneath."""
+        return self._batch
+
+    def reset(self, *, seed=None, options=None):
+        """All episodes begin anew: observations, infos. The same seed gives the same starts."""
+        if seed is not None:
+            self._random = np.random.default_rng(seed)
+        self._begin(np.arange(self.num_envs))
+        return self._observe(), {}
+
+    def _begin(self, which):
+        n = len(which)
+        poses = np.empty((n, 1, 7))
+        poses[:, 0, :3] = self.task.start + self._random.uniform(-1, 1, (n, 3)) * self.task.spread
+        turns = self._random.uniform(-1, 1, (n, 3)) * self.task.tilt
+        poses[:, 0, 3:] = _turned(np.tile(self._upright, (n, 1)), turns)
+        self._batch.reset(which.tolist(), poses)
+        self._age[which] = 0
+
+    def _observe(self):
+        b = self._batch
+        out = np.empty((self.num_envs, OBSERVATION), np.float32)
+        out[:, 0:3] = (self._goal - b.body[:, 0, :3]) / _MM
+        out[:, 3:7] = b.body[:, 0, 3:7]
+        out[:, 7:10] = b.body[:, 0, 7:10] / _MM
+        out[:, 10:13] = b.body[:, 0, 10:13]
+        out[:, 13:16] = b.command[:, 0, :3] / _FORCE
+        out[:, 16:19] = b.command[:, 0, 3:] / _TORQUE
+        out[:, 19:22] = (b.pose[:, 0, :3] - b.body[:, 0, :3]) / _MM
+        return out
+
+    def step(self, actions):
+        """Observations, rewards, terminated, truncated (num_envs,), infos. The reward of an action is
+        how much nearer the part came [mm], less a hundredth for each newton beyond 5, and 10 at the goal.
+        """
+        task, b = self.task, self._batch
+        actions = np.clip(np.asarray(actions, float).reshape(self.num_envs, 6), -1, 1)
+        before = np.linalg.norm(self._goal - b.body[:, 0, :3], axis=1)
+        ahead = b.pose[:, 0, :3] + task.reach * actions[:, :3] - b.body[:, 0, :3]
+        length = np.linalg.norm(ahead, axis=1, keepdims=True)
+        b.pose[:, 0, :3] = b.body[:, 0, :3] + ahead * np.minimum(1, task.lead / np.maximum(length, 1e-12))
+        b.pose[:, 0, 3:] = _turned(b.pose[:, 0, 3:], task.turn * actions[:, 3:])
+        b.step(task.frames)
+        self._age += 1
+        distance = np.linalg.norm(self._goal - b.body[:, 0, :3], axis=1)
+        force = np.linalg.norm(b.command[:, 0, :3], axis=1)
+        terminated = distance < task.tolerance
+        truncated = ~terminated & (self._age >= task.actions)
+        rewards = (before - distance) / _MM - 0.01 * np.maximum(force - 5, 0) + 10.0 * terminated
+        infos = {"distance": distance, "force": force, "contacts": b.contacts.copy(), "max_depth": b.max_depth.copy()}
+        ended = np.flatnonzero(terminated | truncated)
+        observations = self._observe()
+        if self.autoreset and len(ended):
+            infos["final_observation"] = observations[ended].copy()
+            infos["final"] = ended
+            self._begin(ended)
+            observations = self._observe()
+        return observations, rewards, terminated, truncated, infos
+
+    def close(self):
+        """Nothing is held open."""
+
+
+class AssemblyEnv(_Base):
+    """One episode of a task at a time, with the interface of gymnasium.Env; observation (22,) and action
+    (6,) as AssemblyVectorEnv has them. An episode goes on until reset, also after its end."""
+
+    metadata = {"render_modes": []}
+    render_mode = None
+    spec = None
+
+    def __init__(self, task=PEG_IN_HOLE):
+        self._many = AssemblyVectorEnv(1, task, threads=1, autoreset=False)
+        self.observation_space = self._many.single_observation_space
+        self.action_space = self._many.single_action_space
+
+    def reset(self, *, seed=None, options=None):
+        """observation (22,), info"""
+        observations, info = self._many.reset(seed=seed)
+        return observations[0], info
+
+    def step(self, action):
+        """observation (22,), reward, terminated, truncated, info"""
+        observations, rewards, terminated, truncated, infos = self._many.step(np.asarray(action)[None])
+        info = {name: values[0] for name, values in infos.items()}
+        return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def close(self):
+        """Nothing is held open."""
+

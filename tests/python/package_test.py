@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python package: the same bits as the library, views without copies, sentences for mistakes."""
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+try:
+    import numpy as np
+except ImportError:
+    print("skipped: NumPy is not installed (python3-numpy)")
+    sys.exit(77)
+os.environ["HAPSIX_CACHE"] = tempfile.mkdtemp()
+import hapsix  # noqa: E402
+import hapsix.env  # noqa: E402
+
+SOURCE = os.environ["HAPSIX_SOURCE"]
+SCENE = hapsix.Scene("peg-in-hole")
+
+
+def cube(half):
+    """Vertices and triangles of a cube."""
+    corners = np.array([[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
+
+
+def pressed(definition=None, frames=670):
+    """A session with its peg pressed to the wall of the hole."""
+    session = hapsix.Session(SCENE.model, definition or SCENE.definition())
+    for i in range(frames):
+        session.step(*SCENE.path(0, 1e-3 * i))
+    return session
+
+
+class Sessions(unittest.TestCase):
+    def test_a_mesh_in_memory_becomes_a_part_that_is_felt(self):
+        field = hapsix.bake_field(hapsix.Mesh(*cube(20e-3)), voxels=64)
+        shell = hapsix.bake_shell(hapsix.Mesh(*cube(10e-3)), points=600, levels=4)
+        self.assertEqual(len(shell), 600)
+        model = hapsix.Model([field], [shell])
+        definition = hapsix.Definition(
+            bodies=[hapsix.Body(fixed=True, field=0), hapsix.Body(shell=0, pose=(0, 0, 31e-3, 1, 0, 0, 0))],
+            hands=[hapsix.Hand(body=1)])
+        session = hapsix.Session(model, definition)
+        for _ in range(500):
+            session.step((0, 0, 29e-3, 1, 0, 0, 0))
+        # The hand is 1 mm in: about 1e3 N/m of the coupling, bounded by half a voxel of contact.
+        coupling = session.coupling(0)
+        self.assertAlmostEqual(session.command[0, 2], min(coupling.max_force, 1.0), delta=0.1)
+        self.assertGreater(len(session.contacts(1)), 50)
+        self.assertAlmostEqual(session.body(1)[2], 30e-3, delta=0.3e-3)
+
+    def test_steps_one_by_one_and_together_give_the_same_bits(self):
+        one, together = pressed(frames=1), pressed(frames=1)
+        poses = np.array([[SCENE.path(0, 1e-3 * i)[0]] for i in range(1, 500)])
+        for pose in poses:
+            one.step(pose, velocity=np.zeros((1, 6)))
+        together.velocity[:] = 0
+        frames = together.follow(poses)
+        self.assertEqual(one.frame["state_hash"], frames[-1]["report"]["state_hash"])
+        self.assertEqual(len(frames), 499)
+        np.testing.assert_array_equal(one.command[0, :3], list(frames[-1]["command"][0]["wrench"]["force"].item()))
+
+    def test_a_view_shows_the_next_step_without_a_copy(self):
+        session = pressed()
+        command, pose, contacts = session.command, session.pose, session.contacts(1)
+        before, normal = command.copy(), contacts.normal
+        for array in (command, pose, normal, contacts.depth, contacts.arm, contacts.point):
+            self.assertIsNotNone(array.base)
+        self.assertTrue(pose.flags.writeable)
+        self.assertFalse(command.flags.writeable)
+        pose[0, 1] += 1e-4
+        session.step()
+        self.assertFalse(np.array_equal(before, command))
+        self.assertEqual(normal.shape, (len(contacts), 3))
+        np.testing.assert_allclose(np.linalg.norm(session.contacts(1).normal, axis=1), 1, atol=1e-5)
+
+    def test_a_view_outlives_its_session(self):
+        session = pressed(frames=200)
+        depth, expected = session.contacts(1).depth, session.contacts(1).depth.copy()
+        del session
+        np.testing.assert_array_equal(depth, expected)
+
+    def test_fields_and_shells_are_seen_as_arrays(self):
+        field = hapsix.bake_field(hapsix.Mesh(*cube(20e-3)), voxels=64)
+        rows = field.brick_index[field.brick_index >= 0]
+        self.assertEqual(sorted(rows), list(range(len(field.samples))))
+        self.assertEqual(field.far_grid.shape, tuple(n + 1 for n in field.brick_index.shape))
+        # A node by its indices, and by the model.
+        z, y, x = np.argwhere(field.brick_index >= 0)[0]
+        node = np.array(field.origin) + field.voxel_size * (8 * np.array([x, y, z]) + 3)
+        distance, gradient, exact = hapsix.Model([field], []).sample_field(0, node[None])
+        self.assertTrue(exact[0])
+        self.assertAlmostEqual(distance[0], field.samples[field.brick_index[z, y, x], 3, 3, 3], delta=1e-5)
+        self.assertEqual(gradient.shape, (1, 3))
+        shell = hapsix.bake_shell(hapsix.Mesh(*cube(10e-3)), points=100)
+        np.testing.assert_allclose(shell.nx**2 + shell.ny**2 + shell.nz**2, 1, atol=1e-5)
+        self.assertAlmostEqual(float(np.abs(shell.x).max()), 10e-3, delta=1e-4)
+
+    def test_a_recording_can_be_read_as_columns_and_replayed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "run.h5")
+            session = hapsix.Session(SCENE.model, SCENE.definition())
+            recorder = hapsix.Recorder(file, SCENE, program="test")
+            session.velocity[:] = 0
+            recorder.record(session.follow(np.array([[SCENE.path(0, 1e-3 * i)[0]] for i in range(300)])))
+            session.step()
+            recorder.record(session)
+            recorder.finish('{"note": "made by a test"}')
+            recording = hapsix.Recording(file)
+            self.assertEqual((len(recording), recording.rate, recording.whole), (301, 1000, True))
+            self.assertIn("made by a test", recording.summary)
+            columns = hapsix.columns(recording.frames(), recording.hands)
+            self.assertEqual({len(c) for c in columns.values()}, {301})
+            self.assertEqual(columns["state_hash"][-1], session.frame["state_hash"])
+            self.assertEqual(columns["command_wrench_force_x"][-1], session.command[0, 0])
+            self.assertEqual(len(recording.frames(290, 100)), 11)
+
+    def test_weights_share_the_stiffness_of_equal_contacts(self):
+        n = 40
+        normals = np.tile([0, 0, 1.0], (n, 1))
+        arms = np.random.default_rng(1).uniform(-0.01, 0.01, (n, 3))
+        weights, wrench, stiffness, damping = hapsix.weigh(
+            normals, arms, np.full(n, 1e-4), voxel=1e-3, lever=0.02,
+            contact=hapsix.Contact(method="gauss3", stiffness=1e4))
+        np.testing.assert_allclose(weights, 1 / n, rtol=1e-5)
+        self.assertAlmostEqual(wrench[2], 1e4 * 1e-4, places=5)
+        self.assertAlmostEqual(stiffness[2, 2], -1e4, places=1)
+        self.assertEqual(damping.shape, (6, 6))
+
+
+class Mistakes(unittest.TestCase):
+    def sentence(self, kind, work):
+        with self.assertRaises(kind) as raised:
+            work()
+        self.assertGreater(len(str(raised.exception)), 15)
+        return raised.exception
+
+    def test_an_error_of_the_library_has_its_sentence_and_code(self):
+        error = self.sentence(hapsix.Error, lambda: hapsix.Scene("no-such-scene"))
+        self.assertEqual((error.code, isinstance(error, RuntimeError)), ("file", True))
+        definition = SCENE.definition()
+        definition.bodies[1].mass = -1
+        error = self.sentence(hapsix.Error, lambda: hapsix.Session(SCENE.model, definition))
+        self.assertIn("mass", str(error))
+        self.assertEqual(error.code, "range")
+
+    def test_wrong_shapes_names_and_indices_are_refused_in_a_sentence(self):
+        session = pressed(frames=1)
+        self.sentence(ValueError, lambda: session.step((1, 2, 3)))
+        self.sentence(ValueError, lambda: session.follow(np.zeros((5, 7))))
+        self.sentence(ValueError, lambda: hapsix.Mesh(np.zeros((3, 2)), np.zeros((1, 3))))
+        self.sentence(ValueError, lambda: hapsix.Mesh.read("a.stl", unit="furlong"))
+        self.sentence(ValueError, lambda: hapsix.Contact(method="firmer"))
+        self.sentence(ValueError, lambda: hapsix.weigh(np.zeros((2, 3)), np.zeros((3, 3)), [1, 2], voxel=1, lever=1))
+        self.sentence(TypeError, lambda: hapsix.Body(mas=1))
+        self.sentence(TypeError, lambda: hapsix.bake_field(hapsix.Mesh(*cube(0.01)), voxel=3))
+        for index in (-1, 2, 1 << 20):
+            self.sentence(IndexError, lambda: session.body(index))
+            self.sentence(IndexError, lambda: session.contacts(index))
+        with self.assertRaises(TypeError):
+            SCENE.definition().bodies[0].pose[2] = 1  # a tuple: nothing changes in vain
+
+    def test_a_bake_can_be_cancelled_and_passes_an_exception_on(self):
+        big = np.random.default_rng(1).normal(size=(60000, 3))
+        mesh = hapsix.Mesh(big, np.arange(60000).reshape(-1, 3))
+        with self.assertRaises(hapsix.Error) as raised:
+            hapsix.bake_field(mesh, voxels=256, progress=lambda what, done: False)
+        self.assertEqual(raised.exception.code, "cancelled")
+
+        def fails(what, done):
+            raise KeyError("from the callback")
+        with self.assertRaises(KeyError):
+            hapsix.bake_field(mesh, voxels=256, progress=fails)
+
+
+class Many(unittest.TestCase):
+    def test_each_session_of_a_batch_has_the_bits_that_it_has_alone(self):
+        definition = SCENE.definition()
+        definition.max_contacts = 500
+        alone = [hapsix.Session(SCENE.model, definition) for _ in range(5)]
+        for threads in (1, 2):
+            batch = hapsix.Batch(SCENE.model, definition, 5, threads)
+            alone = [hapsix.Session(SCENE.model, definition) for _ in range(5)]
+            for i in range(0, 400, 4):
+                for k in range(5):
+                    batch.pose[k] = SCENE.path(0, 1e-3 * i + 0.02 * k)[0]
+                batch.step(4)
+                for k, session in enumerate(alone):
+                    for _ in range(4):
+                        session.step(batch.pose[k])
+                    self.assertEqual(batch.state_hash[k], session.frame["state_hash"])
+                    np.testing.assert_array_equal(batch.command[k], session.command)
+                    np.testing.assert_array_equal(batch.body[k, 0], session.body(1))
+            self.assertGreater(batch.contacts.min(), 20)
+
+    def test_a_session_that_is_reset_repeats_its_bits(self):
+        batch = hapsix.Batch(SCENE.model, SCENE.definition(), 3, 2)
+        start = batch.pose.copy()
+
+        def push():
+            batch.pose[:, 0, 0] += 2e-3
+            for _ in range(50):
+                batch.step()
+            return batch.state_hash.copy()
+        first = push()
+        batch.reset([1])
+        np.testing.assert_array_equal(batch.pose[1], start[1])
+        self.assertEqual(batch.contacts[1], 0)
+        batch.reset()
+        np.testing.assert_array_equal(push(), first)
+        with self.assertRaises(IndexError):
+            batch.reset([3])
+
+    def test_two_threads_do_not_meet_in_one_batch(self):
+        batch = hapsix.Batch(SCENE.model, SCENE.definition(), 4, 1)
+
+        def step_long():
+            while True:  # the other thread may be first
+                try:
+                    return batch.step(20000)
+                except RuntimeError:
+                    pass
+        thread = threading.Thread(target=step_long)
+        thread.start()
+        refused = 0
+        while thread.is_alive():  # runs while the other steps: the interpreter's lock is free
+            try:
+                batch.step()
+            except RuntimeError as error:
+                refused += 1
+                self.assertIn("another thread", str(error))
+        thread.join()
+        self.assertGreater(refused, 0)
+
+    def test_other_python_threads_run_while_a_session_steps(self):
+        session, ticks, done = pressed(frames=300), [0], [False]
+
+        def count():
+            while not done[0]:
+                ticks[0] += 1
+        thread = threading.Thread(target=count)
+        poses = np.tile(session.pose, (30000, 1, 1))
+        thread.start()
+        before = ticks[0]
+        session.follow(poses)
+        counted = ticks[0] - before
+        done[0] = True
+        thread.join()
+        self.assertGreater(counted, 0)
+
+
+class Environments(unittest.TestCase):
+    @staticmethod
+    def policy(observation, way=0.15):
+        """Over the hole and upright first, then down."""
+        action = np.zeros(6)
+        action[:2] = observation[:2] / 0.5
+        action[3:] = -2 * observation[4:7] / np.radians(0.5)
+        if np.abs(observation[:2]).max() < way and np.linalg.norm(observation[4:7]) < 3e-3:
+            action[2] = -1
+        return np.clip(action, -1, 1)
+
+    def play(self, env, seed):
+        observation, _ = env.reset(seed=seed)
+        total = 0
+        for _ in range(env._many.task.actions):
+            observation, reward, terminated, truncated, info = env.step(self.policy(observation))
+            total += reward
+            if terminated or truncated:
+                break
+        return observation, total, terminated, info
+
+    def test_a_peg_that_is_led_over_its_hole_goes_in(self):
+        env = hapsix.env.AssemblyEnv()
+        for seed in (1, 2, 3):
+            observation, total, terminated, info = self.play(env, seed)
+            self.assertTrue(terminated)
+            self.assertGreater(total, 30)
+            self.assertLess(info["max_depth"], 0.5e-3)
+        self.assertTrue(env.observation_space.contains(observation))
+        self.assertTrue(env.action_space.contains(env.action_space.sample()))
+
+    def test_a_peg_beside_its_hole_stands_on_the_block(self):
+        env = hapsix.env.AssemblyEnv()
+        env.reset(seed=1)
+        env.step([1, 0, 0, 0, 0, 0])
+        for k in range(150):
+            action = [1, 0, 0, 0, 0, 0] if k < 20 else [0, 0, -1, 0, 0, 0]
+            observation, _, terminated, _, info = env.step(action)
+        self.assertFalse(terminated)
+        self.assertLess(observation[2], -29.5)  # its end is at the top of the block still
+        self.assertGreater(info["contacts"], 0)
+        self.assertGreater(info["force"], 1)
+
+    def test_the_same_seed_and_actions_give_the_same_bits_also_in_a_crowd(self):
+        env = hapsix.env.AssemblyEnv()
+        a, b = self.play(env, 7), self.play(env, 7)
+        np.testing.assert_array_equal(a[0], b[0])
+        hashes = []
+        for threads in (1, 2):
+            many = hapsix.env.AssemblyVectorEnv(6, threads=threads)
+            many.reset(seed=5)
+            random = np.random.default_rng(2)
+            for _ in range(30):
+                observations, rewards, *_ = many.step(random.uniform(-1, 1, (6, 6)))
+            hashes.append(many.batch.state_hash.copy())
+        np.testing.assert_array_equal(*hashes)
+        self.assertEqual((observations.shape, rewards.shape), ((6, 22), (6,)))
+
+    def test_an_episode_that_ends_in_a_crowd_begins_anew(self):
+        task = hapsix.env.dataclasses.replace(hapsix.env.PEG_IN_HOLE, actions=5)
+        many = hapsix.env.AssemblyVectorEnv(3, task)
+        many.reset(seed=1)
+        for k in range(5):
+            observations, _, terminated, truncated, infos = many.step(np.zeros((3, 6)))
+            self.assertEqual(truncated.all(), k == 4)
+        self.assertEqual(infos["final_observation"].shape, (3, 22))
+        self.assertLess(observations[0, 2], -30)  # above the block again
+
+
+class Stubs(unittest.TestCase):
+    def test_the_stubs_say_what_the_module_has(self):
+        made = subprocess.run([sys.executable, os.path.join(SOURCE, "python/stubs.py")], capture_output=True,
+                              text=True, check=True).stdout
+        with open(os.path.join(SOURCE, "python/hapsix/_hapsix.pyi")) as file:
+            self.assertEqual(file.read(), made, "run python/stubs.py")
+
+    def test_everything_public_has_a_docstring(self):
+        for name, value in vars(hapsix).items():
+            if not name.startswith("_") and callable(value):
+                self.assertTrue(value.__doc__, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
