@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# fuzz.sh [TARGET] [SECONDS] - runs build/fuzz/tests/hapsix_fuzz on one target, or on all in turn.
+# fuzz.sh [TARGET] [SECONDS] - runs build/fuzz/hapsix_fuzz on one target, or on all in turn.
 # Seeds: tests/fuzz/corpus. What it learns stays in build/fuzz/corpus; findings go to
 # build/fuzz/findings and belong into tests/fuzz/findings/TARGET once they are mended.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-program=${HAPSIX_FUZZER:-build/fuzz/tests/hapsix_fuzz}
+program=${HAPSIX_FUZZER:-build/fuzz/hapsix_fuzz}
 all=$(ls tests/fuzz/corpus)
 case "${1:-}" in ""|[0-9]*) targets=$all ;; *) targets=$1; shift ;; esac
 seconds=${1:-60}
@@ -19,7 +19,7 @@ for target in $targets; do
   learnt=build/fuzz/corpus/$target kept=build/fuzz/findings/$target log=build/fuzz/$target.log
   mkdir -p "$learnt" "$kept"
   HAPSIX_FUZZ=$target "$program" -max_total_time="$each" -timeout=20 -rss_limit_mb=4000 \
-    -print_final_stats=1 -artifact_prefix="$kept/" "$learnt" "tests/fuzz/corpus/$target" \
+    -print_final_stats=1 -print_funcs=0 -artifact_prefix="$kept/" "$learnt" "tests/fuzz/corpus/$target" \
     >"$log" 2>&1 || true
   runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
   edges=$(grep -o 'cov: [0-9]*' "$log" | tail -n 1 | cut -c6-) || true

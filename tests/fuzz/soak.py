@@ -2,22 +2,42 @@
 # SPDX-License-Identifier: Apache-2.0
 """soak.py [HOURS] [SEED] - runs build/release/hapsix under seeded trouble, one line a minute.
 
-Each run draws: a scene, a bad operator (seed, kinds, how often), whether it is recorded, and one
-trouble from outside: none, SIGKILL, SIGINT, SIGSTOP for a while, a load of busy processes, a file
-size limit as on a full disk. Watched: exit codes, memory and descriptors of the program at the end
-of each run against its own beginning, and that every recording opens and replays to the bit. A run
-ends at a latched fault of its hand, so the next run goes on after it. The report says what came how
-often; the exit code is 1 when a promise was broken.
+Each run draws a scene, a hand, and one trouble from outside. The hand is a bad operator (seed, kinds,
+how often), whose output is armed again after each latch, or an arm of its own process behind UDP,
+in real time. The trouble is none, SIGKILL, SIGINT, SIGSTOP for a while, a load of busy processes, a
+file size limit as on a full disk, or an arm that is stopped or killed. Now and then a run lasts ten
+minutes.
+
+What must hold, or the exit code is 1:
+- a run ends as its trouble says, and never hangs;
+- its memory and descriptors do not grow from its tenth second on, nor do those of this script;
+- every recording opens and replays to the bit;
+- in every recording, no force goes out 20 ms after a fault began, nor later in that fault. Lost
+  devices and spoilt samples are found in what came in, not only in the causes that the engine names.
+
+The report at the end has the faults by kind, with the longest time to zero force. Recordings that break
+a promise stay in build/soak-findings.
 """
-import collections, json, os, random, resource, signal, subprocess, sys, tempfile, time
+import collections, json, os, random, resource, shutil, signal, subprocess, sys, tempfile, threading, time
+
+import h5py
+import numpy as np
 
 root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 program = os.environ.get("HAPSIX_PROGRAM", os.path.join(root, "build/release/hapsix"))
-hours = float(sys.argv[1]) if len(sys.argv) > 1 else 2
-seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-draw = random.Random(seed)
+arm_program = os.path.join(os.path.dirname(program), "hapsix_udp_arm")
+kept = os.path.join(root, "build/soak-findings")
+arm_plugin = os.path.join(os.path.dirname(program), "plugins/udp_arm.so")
+
+LIMIT = 0.020  # [s] from the start of a fault to zero force
+FAULTS = ["not finite", "late", "device lost", "stopped", "overspeed", "pose jump", "bad sample",
+          "frozen", "watchdog"]
+LOST, AGAIN = 4, 1 | 8  # bits of safety_asked: no answer; armed, out of a fault
+
 count, broken = collections.Counter(), []
-longest_gap = 0.0
+slowest = collections.defaultdict(float)  # [s] to zero force, by kind of fault
+most_growth = {"memory [kB]": 0, "descriptors": 0}
+number = 0
 
 
 def usage(pid):
@@ -44,12 +64,63 @@ def json_of(*arguments):
         return done.returncode, None
 
 
-def check_recording(file, trouble, what):
+# ---- forces in a recording ----------------------------------------------------------------------
+
+def episodes(rows, frame):
+    """First and last + 1 of every stretch of true rows without a missing frame."""
+    follows = np.concatenate(([False], rows[:-1])) & (np.diff(frame, prepend=frame[:1]) == 1)
+    first = np.flatnonzero(rows & ~follows)
+    ends = np.append(np.flatnonzero(~rows | ~follows), len(rows))
+    return zip(first, ends[np.searchsorted(ends, first, side="right")])
+
+
+def spoilt(pose, velocity):
+    """Samples that are not numbers, or that no hand can send. All hands here are impedance hands: the
+    engine does not read their wrench."""
+    values = np.concatenate((pose, velocity), axis=1)
+    with np.errstate(invalid="ignore"):
+        norm = np.sqrt((pose[:, 3:].clip(-1e6, 1e6) ** 2).sum(axis=1))
+        return ~((np.abs(values) <= 1e6).all(axis=1) & (norm > 0.5) & (norm < 2))
+
+
+def check_forces(file, what):
+    with h5py.File(file, "r") as h5:
+        frames, dt = h5["frames"], 1 / h5["config"].attrs["rate"]
+        names = [n.decode() if isinstance(n, bytes) else n for n in h5["config"].attrs["cause_names"]]
+        column = {name: frames[name][()] for name in
+                  ("wrench", "causes", "safety_asked", "overdue", "hand_pose", "hand_velocity",
+                   "frame")}
+    count["frames recorded"] += len(column["frame"])
+    for h in range(column["wrench"].shape[1]):
+        wrench = column["wrench"][:, h]
+        promise(np.isfinite(wrench).all(), f"{what}: a force that is no number was sent")
+        zero = ~wrench.any(axis=1)
+        passed = dt * np.diff(column["frame"], prepend=column["frame"][:1]) + column["overdue"][:, h]
+        causes = column["causes"][:, h]
+        kinds = {kind: (causes >> names.index(kind)) & 1 != 0 for kind in FAULTS}
+        kinds["(in) no answer"] = column["safety_asked"][:, h] & LOST != 0
+        kinds["(in) spoilt sample"] = spoilt(column["hand_pose"][:, h], column["hand_velocity"][:, h])
+        for kind, rows in kinds.items():
+            for first, end in episodes(rows, column["frame"]):
+                since = np.cumsum(passed[first:end]) - passed[first]
+                forced = ~zero[first:end]
+                count[f"fault: {kind}"] += 1
+                promise(not (forced & (since >= LIMIT - 1e-9)).any(),
+                        f"{what}: frame {first + int(forced.nonzero()[0][-1]) if forced.any() else 0} "
+                        f"has force over 20 ms after '{kind}' began in frame {first}")
+                if not forced.all():
+                    slowest[kind] = max(slowest[kind], since[int(np.argmin(forced))])
+        count["latches that ended"] += int(((column["safety_asked"][:, h] & AGAIN) == AGAIN).sum())
+
+
+def check_recording(file, what):
     code, info = json_of("info", file)
     promise(code == 0 and info, f"{what}: its recording does not open")
     if not info or code != 0:
         return
     count["recordings opened"] += 1
+    if info["frames"] > 0:
+        check_forces(file, what)
     code, replay = json_of("replay", file, "--verify")
     if replay and replay.get("same"):
         count["recordings replayed to the bit"] += 1
@@ -59,50 +130,116 @@ def check_recording(file, trouble, what):
         promise(False, f"{what}: replay says {(replay or {}).get('error')}")
 
 
-def one_run(folder, number):
-    scene = draw.choice(["box-on-wall", "peg-in-hole", "alpha-shortcut"])
-    kinds = ",".join(draw.sample(["shake", "jerk", "freeze", "nan", "jump", "unplug"], 3))
-    device = f"bad-operator?seed={draw.randrange(1000)}&kinds={kinds}&every={draw.choice([0.3, 1, 3])}"
-    seconds = draw.uniform(2, 12)
-    trouble = draw.choice(["none", "none", "kill", "interrupt", "stop", "load", "full disk"])
-    file = os.path.join(folder, f"{number}.h5")
-    record = draw.random() < 0.7 or trouble in ("kill", "full disk")
-    what = f"run {number} ({scene}, {device}, {trouble})"
-    arguments = [program, "run", scene, "--duration", f"{seconds:.2f}", "--device", device, "--json"]
-    if record:
-        arguments += ["--record", file]
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (300000, 300000))
-    with open(os.path.join(folder, "out"), "w") as out, open(os.path.join(folder, "err"), "w") as err:
-        child = subprocess.Popen(arguments, stdout=out, stderr=err,
-                                 preexec_fn=limit if trouble == "full disk" else None)
-    busy = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(8 * (trouble == "load"))]
-    begun, first, last, done = time.time(), None, None, False
-    try:
-        while child.poll() is None:
-            age = time.time() - begun
-            if age > 1 and first is None:
-                first = usage(child.pid)
-            last = usage(child.pid) or last
-            if trouble == "kill" and age > seconds / 2 and not done:
-                child.kill(), (done := True)
-            if trouble == "interrupt" and age > seconds / 2 and not done:
-                child.send_signal(signal.SIGINT), (done := True)
-            if trouble == "stop" and age > seconds / 2 and not done:
-                child.send_signal(signal.SIGSTOP), time.sleep(draw.uniform(0.05, 1))
-                child.send_signal(signal.SIGCONT), (done := True)
-            if age > seconds + 120:
-                promise(False, f"{what}: it hangs")
-                child.kill()
-            time.sleep(0.05)
-    finally:
-        for process in busy:
+# ---- runs ---------------------------------------------------------------------------------------
+
+class Arm:
+    """hapsix_udp_arm as a process; port 0 lets the system pick one."""
+
+    def __init__(self, port=0):
+        self.process = subprocess.Popen([arm_program, "--port", str(port), "--press", "0.02",
+                                         "--period", "0.5"], stdout=subprocess.PIPE, text=True)
+        self.port = int(self.process.stdout.readline())
+
+    def end(self):
+        self.process.kill(), self.process.wait(), self.process.stdout.close()
+
+
+class Trouble:
+    """What happens to a run from outside."""
+
+    KINDS = ["none", "none", "kill", "interrupt", "stop", "load", "full disk"]
+    ARM_KINDS = ["none", "stop", "load", "arm stopped", "arm killed"]
+
+    def __init__(self, kind, at, arm):
+        self.kind, self.at, self.arm, self.done, self.busy = kind, at, arm, False, []
+        if kind == "load":  # idle: whatever else this machine computes goes on
+            self.busy = [subprocess.Popen(["chrt", "-i", "0", "sh", "-c", "while :; do :; done"])
+                         for _ in range(8)]
+
+    def limits(self):
+        if self.kind == "full disk":
+            resource.setrlimit(resource.RLIMIT_FSIZE, (300000, 300000))
+
+    def turn(self, child, age):
+        if self.done or age < self.at:
+            return
+        self.done = True
+        if self.kind == "kill":
+            child.kill()
+        if self.kind == "interrupt":
+            child.send_signal(signal.SIGINT)
+        if self.kind in ("stop", "arm stopped"):
+            process = child if self.kind == "stop" else self.arm.process
+            process.send_signal(signal.SIGSTOP)
+            time.sleep(draw.uniform(0.05, 1))
+            process.send_signal(signal.SIGCONT)
+        if self.kind == "arm killed":
+            port = self.arm.port
+            self.arm.end()
+            self.arm.__init__(port)
+
+    def end(self):
+        for process in self.busy:
             process.kill(), process.wait()
-    code = child.returncode
-    count[f"trouble: {trouble}"] += 1
-    promise(code in (0, 1) or (trouble == "kill" and code == -9), f"{what}: it ended with {code}")
+
+
+def hand(seconds):
+    """The device of a run, with its arm if there is one."""
+    if draw.random() < 0.2:
+        arm = Arm()
+        return f"plugin:{arm_plugin}?port={arm.port}", [], arm
+    kinds = ",".join(draw.sample(["shake", "jerk", "freeze", "nan", "jump", "unplug"], 4))
+    device = f"bad-operator?seed={draw.randrange(1000)}&kinds={kinds}&every={draw.choice([0.3, 1, 3])}"
+    return device, ["--rearm", f"{draw.uniform(0.05, 0.5):.2f}"], None
+
+
+def follow(child, trouble, seconds, log, what):
+    """Waits for the end of a run, and watches its memory and descriptors. It begins with its log."""
+    asked, begun, first, last = time.time(), None, None, None
+    while child.poll() is None:
+        time.sleep(0.05)
+        if begun is None and os.path.exists(log):
+            begun = time.time()
+        age = 0 if begun is None else time.time() - begun
+        if age > min(10, seconds / 2) and first is None:
+            first = usage(child.pid)
+        last = usage(child.pid) or last
+        trouble.turn(child, age)
+        if time.time() - asked > seconds + 900:
+            promise(False, f"{what}: it hangs")
+            child.kill()
+            child.wait()
     if first and last:
-        promise(last[1] <= first[1] + 2, f"{what}: descriptors grew from {first[1]} to {last[1]}")
-        promise(last[0] <= first[0] + 65536, f"{what}: memory grew from {first[0]} to {last[0]} kB")
+        grown = [now - before for now, before in zip(last, first)]
+        for name, by in zip(most_growth, grown):
+            most_growth[name] = max(most_growth[name], by)
+        promise(grown[1] <= 2, f"{what}: descriptors grew from {first[1]} to {last[1]}")
+        promise(grown[0] <= 16384, f"{what}: memory grew from {first[0]} to {last[0]} kB")
+
+
+def one_run(folder):
+    scene = draw.choice(["box-on-wall", "peg-in-hole", "alpha-shortcut"])
+    seconds = 600 if number % 200 == 20 else draw.uniform(3, 30)
+    device, more, arm = hand(seconds)
+    kind = draw.choice(Trouble.ARM_KINDS if arm else Trouble.KINDS)
+    file = os.path.join(folder, f"{number}.h5")
+    what = f"run {number} ({scene}, {device}, {kind})"
+    arguments = [program, "run", scene, "--duration", f"{seconds:.2f}", "--device", device, "--json",
+                 "--record", file, *more]
+    trouble, broken_before = Trouble(kind, seconds / 2, arm), len(broken)
+    try:
+        with open(os.path.join(folder, "out"), "w") as out:
+            child = subprocess.Popen(arguments, stdout=out, stderr=subprocess.DEVNULL,
+                                     preexec_fn=trouble.limits)
+        follow(child, trouble, seconds, file + ".part", what)
+    finally:
+        trouble.end()
+        if arm:
+            arm.end()
+    count[f"trouble: {kind}"] += 1
+    count["hand: arm behind UDP" if arm else "hand: bad operator"] += 1
+    code = child.returncode
+    promise(code in (0, 1) or (kind == "kill" and code == -9), f"{what}: it ended with {code}")
     try:
         with open(os.path.join(folder, "out")) as out:
             summary = json.load(out)
@@ -110,30 +247,57 @@ def one_run(folder, number):
         summary = {}
     for event in summary.get("events", []):
         count[f"event: {event['what']}"] += 1
-    if record and (os.path.exists(file) or os.path.exists(file + ".part")):
-        check_recording(file, trouble, what)
+    if os.path.exists(file) or os.path.exists(file + ".part"):
+        check_recording(file, what)
+    if len(broken) > broken_before and os.path.exists(file):
+        os.makedirs(kept, exist_ok=True)
+        shutil.copy(file, kept)
     for name in os.listdir(folder):
         os.remove(os.path.join(folder, name))
 
 
-def main():
-    end, minute, number = time.time() + 3600 * hours, time.time() + 60, 0
-    with tempfile.TemporaryDirectory(prefix="hapsix-soak-") as folder:
-        while time.time() < end:
-            number += 1
-            one_run(folder, number)
-            if time.time() >= minute:
-                minute += 60
-                own = usage(os.getpid())
-                print(f"{(time.time() - end) / 3600 + hours:6.2f} h  runs {number}  recordings "
-                      f"{count['recordings opened']}  replayed {count['recordings replayed to the bit']}"
-                      f"  broken {len(broken)}  own memory {own[0]} kB, descriptors {own[1]}", flush=True)
+def watch(begun):
+    """One line a minute, from a thread of its own."""
+    while True:
+        time.sleep(60)
+        own = usage(os.getpid())
+        print(f"{(time.time() - begun) / 3600:6.2f} h  runs {number}  recordings "
+              f"{count['recordings opened']}  replayed {count['recordings replayed to the bit']}  "
+              f"faults {sum(n for k, n in count.items() if k.startswith('fault: '))}  broken "
+              f"{len(broken)}  own memory {own[0]} kB, descriptors {own[1]}", flush=True)
+
+
+def report():
     print(f"\nseed {seed}, {number} runs")
     for name, times in sorted(count.items()):
-        print(f"{times:8d}  {name}")
+        zero = slowest.get(name[7:]) if name.startswith("fault: ") else None
+        print(f"{times:8d}  {name}" + ("" if zero is None else f", zero force after {1e3 * zero:.1f} ms"))
+    for name, most in most_growth.items():
+        print(f"{most:8d}  most growth of a run: {name}")
     for sentence in broken:
         print("BROKEN:", sentence)
+
+
+def main():
+    global number
+    begun = time.time()
+    threading.Thread(target=watch, args=(begun,), daemon=True).start()
+    with tempfile.TemporaryDirectory(prefix="hapsix-soak-") as folder:
+        own = None
+        while time.time() < begun + 3600 * hours:
+            number += 1
+            one_run(folder)
+            own = own or (usage(os.getpid()) if number == 20 else None)
+    if own:
+        now = usage(os.getpid())
+        promise(now[1] <= own[1] + 2 and now[0] <= own[0] + 65536,
+                f"this script grew from {own} to {now} (kB, descriptors)")
+    report()
     sys.exit(1 if broken else 0)
 
 
-main()
+if __name__ == "__main__":
+    hours = float(sys.argv[1]) if len(sys.argv) > 1 else 2
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    draw = random.Random(seed)
+    main()
