@@ -10,7 +10,8 @@
 
 namespace h6::bench {
 
-std::size_t mesh_to_level_set(const io::Mesh& mesh, double voxel_size, unsigned threads) {
+std::size_t mesh_to_level_set(const io::Mesh& mesh, double voxel_size, unsigned threads,
+                              std::vector<NodeDistance>* nodes) {
   openvdb::initialize();
   const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,
                                           threads);
@@ -22,6 +23,15 @@ std::size_t mesh_to_level_set(const io::Mesh& mesh, double voxel_size, unsigned 
   for (const auto& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
   const auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(
       *openvdb::math::Transform::createLinearTransform(voxel_size), points, triangles, 3.0f);
+  if (nodes != nullptr) {
+    const std::size_t step = 1 + grid->activeVoxelCount() / 4000;  // half of them are outside
+    std::size_t i = 0;
+    for (auto it = grid->cbeginValueOn(); it; ++it) {
+      if (i++ % step != 0 || !(*it > 0)) continue;
+      const openvdb::Vec3d p = grid->indexToWorld(it.getCoord());
+      nodes->push_back({{p[0], p[1], p[2]}, static_cast<double>(*it)});
+    }
+  }
   return grid->tree().leafCount();
 }
 

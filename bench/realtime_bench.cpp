@@ -301,7 +301,8 @@ void realtime(benchmark::State& state, const std::string& name, double rate, boo
       had_stolen = stolen;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
-    const h6LoopReport result = h6JoinLoop(loop.get());
+    h6LoopReport result;
+  h6JoinLoop(loop.get(), &result);
     Times plain;
     const std::uint64_t plain_late = plain_thread(scene, rate, seconds / 6, plain);
     contacts /= static_cast<double>(times.total.size());
