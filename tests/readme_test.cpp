@@ -21,7 +21,7 @@ std::string slurp(const fs::path& file) {
 }  // namespace
 
 TEST_CASE("the program in README.md is the one that is compiled and run") {
-  const std::string program = slurp(root / "tests/contract/readme_program.c");
+  const std::string program = slurp(root / "runtime/examples/hello.c");
   REQUIRE(program.size() > 500);
   const std::string shown = program.substr(program.find('\n') + 1);  // without the licence's line
   CHECK(slurp(root / "README.md").find("```c\n" + shown + "```\n") != std::string::npos);

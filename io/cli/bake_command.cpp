@@ -8,14 +8,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "io/bake/bake_field.h"
+#include "io/bake/plan.h"
 #include "io/cli/commands.h"
+#include "io/cli/mesh_unit.h"
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
-#include "io/mesh/mesh_file.h"
+#include "io/file/free_memory.h"
 #include "io/scene/asset_key.h"
 #include "io/shell/bake_shell.h"
 #include "io/shell/shell_file.h"
+#include "kernels/field/field_layout.h"
 
 namespace h6::cli {
 namespace {
@@ -36,6 +38,7 @@ std::size_t peak_bytes() {
 
 struct Common {
   std::string mesh, out, units = "m";
+  CLI::Option* units_option = nullptr;
   unsigned threads = 0;
 };
 
@@ -47,12 +50,14 @@ void add_common(CLI::App* command, Common& c, const char* ending) {
       ->required()
       ->option_text("FILE")
       ->check(ends_with(ending));
-  command
-      ->add_option("--units", c.units,
-                   "Unit of the mesh file (glTF and COLLADA have their own) and of lengths here: "
-                   "m, mm, cm or in; default m")
-      ->option_text("UNIT")
-      ->check(one_of({"m", "mm", "cm", "in"}));
+  c.units_option =
+      command
+          ->add_option(
+              "--units", c.units,
+              "Unit of the mesh file (glTF and COLLADA have their own) and of lengths here: "
+              "m, mm, cm or in; default m")
+          ->option_text("UNIT")
+          ->check(one_of({"m", "mm", "cm", "in"}));
   command->add_option("--threads", c.threads, "Default: all of the machine's")
       ->option_text("N")
       ->check(whole_within(0, 1024));
@@ -72,12 +77,11 @@ struct Input {
   io::MeshAudit audit;
   double seconds;
 };
-Result<Input> read_input(const Common& c) {
+// The unit is asked for if the mesh is far too large without a stated one.
+Result<Input> read_input(const Console& console, Common& c) {
   if (Outcome checked = check_files(c); !checked) return checked.failure();
   const auto start = Clock::now();
-  Result<io::Unit> unit = io::unit_from_name(c.units);
-  if (!unit) return unit.failure();
-  Result<io::Mesh> mesh = io::read_mesh(c.mesh, *unit);
+  Result<io::Mesh> mesh = read_in_unit(console, c.mesh, c.units_option->count() > 0, c.units);
   if (!mesh) return mesh.failure();
   Input input{std::move(*mesh), {}, 0};
   input.audit = io::audit(input.mesh);
@@ -123,18 +127,17 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                                       : io::SignMode::automatic;
   o.bake.cavities = o.cavities == "hollow" ? io::Cavities::hollow : io::Cavities::solid;
   o.bake.threads = o.common.threads;
-  Result<io::Unit> unit = io::unit_from_name(o.common.units);
-  if (!unit) return console.fail(unit.error(), kUsage);
-  // Lengths on the command line are in the mesh's unit.
-  o.bake.voxel_size *= io::metres(*unit);
-  o.bake.tolerance *= io::metres(*unit);
-  if (o.bake.offset > 0) o.bake.offset *= io::metres(*unit);
-  o.bake.seal *= io::metres(*unit);
-
   const EndsAtOnce asked(console, o.common.mesh + ": cancelled");
-  Result<Input> input = read_input(o.common);
+  Result<Input> input = read_input(console, o.common);
   if (!input) return console.fail(input.error());
+  o.bake = in_metres(o.bake, o.common.units);
   console.warn(input->mesh.remarks);
+  const Result<io::FieldPlan> plan = io::plan_field(input->mesh, input->audit, o.bake);
+  if (!plan) return bake_failed(console, o.common, *input, plan.error());
+  const Result<std::string> needs =
+      io::needs_of(*plan, io::free_memory().value_or(std::uint64_t(-1)));
+  if (!needs) return bake_failed(console, o.common, *input, needs.error());
+  console.log("this bake takes " + *needs);
   auto start = Clock::now();
   io::FieldBakeReport report;
   Result<io::FieldData> field = io::bake_field(input->mesh, o.bake, &report, console.progress());
@@ -156,7 +159,10 @@ int bake_field_command(const Console& console, FieldOptions& o) {
   ordered_json json{{"file", o.common.out},
                     {"seconds", timings(input->seconds, baked, written)},
                     {"peak_bytes", peak_bytes()},
+                    {"peak_bytes_estimate", plan->peak_bytes},
+                    {"seconds_estimate", plan->seconds},
                     {"file_bytes", bytes},
+                    {"engine_bytes", kernels::field_layout_size(field->def()).bytes()},
                     {"voxel_size", field->voxel_size},
                     {"dims", {8 * field->bricks[0], 8 * field->bricks[1], 8 * field->bricks[2]}},
                     {"bricks", field->brick_count()},
@@ -178,7 +184,7 @@ int bake_field_command(const Console& console, FieldOptions& o) {
                     {"warnings", report.warnings}};
   console.result(json);
   if (!console.json) {
-    const double unit_m = io::metres(*unit);
+    const double unit_m = io::metres(*io::unit_from_name(o.common.units));
     std::printf(
         "%s: %d x %d x %d nodes, voxel %.4g %s, %zu bricks, %.1f MB\n"
         "  %zu triangles, %s; sign mode %s, offset %.4g %s; read %.2f s, baked %.2f s, wrote %.2f "
@@ -200,17 +206,15 @@ struct ShellOptions {
 
 int bake_shell_command(const Console& console, ShellOptions& o) {
   o.bake.threads = o.common.threads;
-  Result<io::Unit> unit = io::unit_from_name(o.common.units);
-  if (!unit) return console.fail(unit.error(), kUsage);
-  o.bake.spacing *= io::metres(*unit);
   o.bake.surface = *io::surface_from_name(o.surface);  // checked by the parser
   o.bake.normals = *io::normals_from_name(o.normals);
-  o.bake.field.voxel_size *= io::metres(*unit);
-  if (o.bake.field.offset > 0) o.bake.field.offset *= io::metres(*unit);
-  o.bake.field.seal *= io::metres(*unit);
   const EndsAtOnce asked(console, o.common.mesh + ": cancelled");
-  Result<Input> input = read_input(o.common);
+  Result<Input> input = read_input(console, o.common);
   if (!input) return console.fail(input.error());
+  const Result<io::Unit> unit = io::unit_from_name(o.common.units);
+  o.bake.spacing *= io::metres(*unit);
+  o.bake.tolerance *= io::metres(*unit);
+  o.bake.field = in_metres(o.bake.field, o.common.units);
   console.warn(input->mesh.remarks);
   auto start = Clock::now();
   std::vector<std::string> warnings;
@@ -262,7 +266,7 @@ void add_field(CLI::App* bake, Program& program) {
   field
       ->add_option("--tolerance", f->bake.tolerance,
                    "Largest error of the distance near the surface, instead of --voxels: voxels of "
-                   "8 tolerances, cut into 2 or 4 where they would miss it")
+                   "6 tolerances, cut into 2 or 4 where they would miss it")
       ->option_text("S")
       ->excludes(voxels)
       ->excludes("--voxel-size")
@@ -293,12 +297,18 @@ void add_field(CLI::App* bake, Program& program) {
                    "than this, force does not grow with depth")
       ->option_text("VOXELS")
       ->check(number_within(1, io::kWidestBand));
-  field
-      ->add_option("--weld", f->bake.weld,
-                   "Welds vertices of open edges this near to each other, if this closes the mesh: "
-                   "a share of the voxel, 0 to 1; default 0.01")
-      ->option_text("SHARE")
-      ->check(number_within(0, 1));
+  auto* weld =
+      field
+          ->add_option(
+              "--weld", f->bake.weld,
+              "Welds vertices of open edges this near to each other, if this closes the mesh: "
+              "a share of the voxel, 0 to 1; default 0.01")
+          ->option_text("SHARE")
+          ->check(number_within(0, 1));
+  field->add_option("--weld-length", f->bake.weld_length, "The same as a length, at most a voxel")
+      ->option_text("S")
+      ->excludes(weld)
+      ->check(number_above(0));
   field->add_flag("--no-compression", f->no_compression, "Larger file, faster to load");
   field->callback([&program, f] {
     program.work = [&program, f] { return bake_field_command(program.console, *f); };
@@ -317,6 +327,14 @@ void add_shell(CLI::App* bake, Program& program) {
   shell
       ->add_option("--spacing", s->bake.spacing,
                    "Least distance between points, instead of --points")
+      ->option_text("S")
+      ->excludes(points)
+      ->check(number_above(0));
+  shell
+      ->add_option("--tolerance", s->bake.tolerance,
+                   "No flat obstacle enters farther between points, instead of --points: edges, "
+                   "corners and curved places get more; --spacing then bounds how far apart points "
+                   "are, default 16 tolerances")
       ->option_text("S")
       ->excludes(points)
       ->check(number_above(0));

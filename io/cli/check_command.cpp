@@ -14,6 +14,7 @@
 #include "io/check/push_walls.h"
 #include "io/check/wall_thickness.h"
 #include "io/cli/commands.h"
+#include "io/cli/mesh_unit.h"
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
@@ -28,6 +29,7 @@ using nlohmann::ordered_json;
 struct CheckOptions {
   std::vector<std::string> files;
   std::string units = "m", field;
+  CLI::Option* units_option = nullptr;
   io::FieldBake bake;
   bool verify = false;
   double stiffness = 0;  // 0: the scene's, or 1e4
@@ -65,6 +67,10 @@ ordered_json exact_json(const io::ExactCheck& c) {
           {"between", c.between},
           {"between_error_max", c.worst_between},
           {"between_error_mean", c.mean_between},
+          {"tolerance_places", c.asked},
+          {"tolerance_error_max", c.worst_asked},
+          {"tolerance_error_mean", c.mean_asked},
+          {"tolerance_missed", c.missed},
           {"sides", c.voted},
           {"sides_doubtful", c.doubtful},
           {"sides_drained", c.drained},
@@ -86,6 +92,7 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls,
   std::printf("%s: %zu triangles, %s; voxel %.4g mm", printable(s.name).c_str(),
               m["triangles"].get<std::size_t>(), m["closed"].get<bool>() ? "closed" : "a soup",
               1e3 * p.voxel_size);
+  if (p.finest < p.voxel_size) std::printf(", cut down to %.4g mm", 1e3 * p.finest);
   if (p.offset > 0) std::printf(", moved out by %.4g mm", 1e3 * p.offset);
   std::printf(
       "\n  bake    %d x %d x %d nodes, about %zu bricks, %.0f MB, %.0f MB as the engine keeps "
@@ -98,10 +105,9 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls,
     return std::printf(
         "  %-7s %.3g voxels for a hundredth, %.3g for a twentieth, %.3g for half of them; %.2g %% "
         "below one voxel, %.2g %% below two\n",
-        what, io::quantile(lengths, 0.01) / p.voxel_size,
-        io::quantile(lengths, 0.05) / p.voxel_size, io::quantile(lengths, 0.5) / p.voxel_size,
-        100 * io::share_below(lengths, p.voxel_size),
-        100 * io::share_below(lengths, 2 * p.voxel_size));
+        what, io::quantile(lengths, 0.01) / p.finest, io::quantile(lengths, 0.05) / p.finest,
+        io::quantile(lengths, 0.5) / p.finest, 100 * io::share_below(lengths, p.finest),
+        100 * io::share_below(lengths, 2 * p.finest));
   };
   line("walls", walls.thickness);
   line("gaps", walls.gap);
@@ -111,7 +117,7 @@ void print(const ordered_json& m, const Subject& s, const io::Walls& walls,
   if (walls.sheets > 0)
     std::printf(
         "  sheets  %.3g %% of the area is on sheets, which hold nothing: %.3g voxels thick\n",
-        100 * walls.sheets, 2 * p.offset / p.voxel_size);
+        100 * walls.sheets, 2 * p.offset / p.finest);
 }
 
 // The force that walls hold, with the stiffness of the contact [N/m], and what was found.
@@ -143,11 +149,12 @@ void print(const Force& f, double voxel) {
 std::string lost_sentence(const io::HeldForce& held, const io::FieldData& field) {
   const io::WallPlace& w = held.weakest;
   char text[320], advice[160];
-  const bool thin = w.thickness > 0 && w.thickness < 2 * field.voxel_size;
+  const bool thin = w.thickness > 0 && w.thickness < 2 * field.finest();
   if (thin)
-    std::snprintf(advice, sizeof advice,
-                  "bake with --voxel-size below %.3g mm, or with --offset %.3g mm",
-                  1e3 * w.thickness / 2, 1e3 * 0.9 * field.voxel_size);
+    std::snprintf(advice, sizeof advice, "bake with --%s below %.3g mm, or with --offset %.3g mm",
+                  field.tolerance > 0 ? "tolerance" : "voxel-size",
+                  1e3 * w.thickness / (field.tolerance > 0 ? 2 * io::kFinest : 2),
+                  1e3 * 0.9 * field.finest());
   else
     std::snprintf(advice, sizeof advice, "--verify compares the field with the mesh");
   std::snprintf(
@@ -155,8 +162,8 @@ std::string lost_sentence(const io::HeldForce& held, const io::FieldData& field)
       "the weakest wall holds nothing: a tool goes through at (%.4g, %.4g, %.4g) mm, where "
       "the wall is %.3g mm thick and a voxel %.3g mm (%zu of %zu places let the least "
       "force through); ",
-      1e3 * w.p.x, 1e3 * w.p.y, 1e3 * w.p.z, 1e3 * w.thickness, 1e3 * field.voxel_size,
-      held.through, held.places);
+      1e3 * w.p.x, 1e3 * w.p.y, 1e3 * w.p.z, 1e3 * w.thickness, 1e3 * field.finest(), held.through,
+      held.places);
   return std::string(text) + advice;
 }
 
@@ -188,6 +195,11 @@ void print(const io::ExactCheck& c) {
       c.agrees() ? "agrees with the mesh" : "DISAGREES with the mesh", c.nodes, c.worst_node,
       c.worst_between, c.mean_between, c.voted, c.drained, c.filled, c.enclosed, c.doubtful, c.far,
       c.far_wrong, looseness(c).c_str());
+  if (c.asked > 0)
+    std::printf(
+        "    tolerance %zu places within 9 tolerances of the mesh: wrong by %.2g tolerances at "
+        "most, %.2g on average\n",
+        c.asked, c.worst_asked, c.mean_asked);
 }
 
 // Returns a warning sentence for each bad finding.
@@ -196,7 +208,7 @@ std::vector<std::string> warnings_of(const Subject& s, const io::MeshAudit& a,
   std::vector<std::string> out = s.mesh.remarks;
   if (std::string far = io::too_far_for_floats(a.low, a.high); !far.empty()) out.push_back(far);
   const auto percent = [](double share) { return number_text(std::round(1e3 * share) / 10); };
-  if (const double thin = io::share_below(walls.thickness, 2 * p.voxel_size); thin > 0.001)
+  if (const double thin = io::share_below(walls.thickness, 2 * p.finest); thin > 0.001)
     out.push_back(percent(thin) +
                   " % of the walls are thinner than two voxels: "
                   "penetration there ends after one; bake with more voxels");
@@ -204,7 +216,7 @@ std::vector<std::string> warnings_of(const Subject& s, const io::MeshAudit& a,
     out.push_back(percent(closed) + " % of the gaps are narrower than " +
                   number_text(std::round(2e6 * p.offset) / 1e3) +
                   " mm, twice the offset, and will close; more voxels make this smaller");
-  if (!a.closed && p.offset < 0.5 * p.voxel_size)
+  if (!a.closed && p.offset < 0.5 * p.finest)
     out.push_back(
         "the offset is below half a voxel and the mesh is open: the outside leaks in "
         "through every hole");
@@ -240,14 +252,15 @@ ordered_json facts(const Subject& s, const io::MeshAudit& a, const io::FieldPlan
           {"low_m", {a.low.x, a.low.y, a.low.z}},
           {"high_m", {a.high.x, a.high.y, a.high.z}},
           {"voxel_size", p.voxel_size},
+          {"finest_voxel", p.finest},
           {"offset", p.offset},
           {"dims", {8 * p.bricks[0], 8 * p.bricks[1], 8 * p.bricks[2]}},
           {"bricks_estimate", p.brick_count},
           {"field_bytes_estimate", p.bytes},
           {"engine_bytes_estimate", p.engine_bytes},
           {"bake_seconds_estimate", p.seconds},
-          {"walls_voxels", spread(walls.thickness, p.voxel_size)},
-          {"gaps_voxels", spread(walls.gap, p.voxel_size)},
+          {"walls_voxels", spread(walls.thickness, p.finest)},
+          {"gaps_voxels", spread(walls.gap, p.finest)},
           {"bowls_share", walls.bowls},
           {"sheets_share", walls.sheets},
           {"buried_share", walls.buried}};
@@ -279,7 +292,7 @@ Outcome push(const Console& console, const CheckOptions& o, const Subject& s,
   const Force force{stiffness, held->places > 0, *held};
   m["holding_force_N"] = force.known ? ordered_json(held->force) : ordered_json();
   m["pushed_places"] = held->places;
-  if (!console.json) print(force, field.voxel_size);
+  if (!console.json) print(force, field.finest());
   if (!force.known || held->force > 0) return Done{};
   verdict.lost = true;
   console.warn({lost_sentence(*held, field)});
@@ -295,10 +308,17 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
   if (!o.field.empty()) {
     field = io::read_field(o.field);
     if (!field) return field.failure();
-    bake.voxel_size = field->voxel_size, bake.offset = field->offset;
+    bake.offset = field->offset;
+    if (field->tolerance > 0)
+      bake.tolerance = field->tolerance;
+    else
+      bake.voxel_size = field->voxel_size;
   }
-  const Result<io::FieldPlan> p = io::plan_field(s.mesh, a, bake);
+  Result<io::FieldPlan> p = io::plan_field(s.mesh, a, bake);
   if (!p) return named(p.error());
+  if (o.field.empty()) field = io::bake_field(s.mesh, s.bake, nullptr, console.progress());
+  if (!field) return named(field.error());
+  p->offset = field->offset;  // of a nearly closed mesh it is 0
   io::WallOptions wall_options;
   wall_options.threads = o.bake.threads;
   const Result<io::Walls> walls = io::measure_walls(s.mesh, wall_options);
@@ -309,8 +329,6 @@ Result<ordered_json> check_one(const Console& console, const CheckOptions& o, co
   m["warnings"] = warnings;
   if (!console.json) print(m, s, *walls, *p);
 
-  if (o.field.empty()) field = io::bake_field(s.mesh, s.bake, nullptr, console.progress());
-  if (!field) return named(field.error());
   m["holding_force_N"] = nullptr;
   if (o.verify || !o.field.empty()) {
     const Result<bool> drains = compare(console, o, s, *field, m, verdict);
@@ -363,7 +381,7 @@ Result<ordered_json> clearances(const Console& console, const io::Scene& scene, 
     const Result<double> gap = io::clearance(*mesh, b.pose, s.mesh, s.pose, threads);
     if (!gap) return gap.failure();
     if (!std::isfinite(*gap)) continue;
-    const double voxels = (*gap - m["offset"].get<double>()) / m["voxel_size"].get<double>();
+    const double voxels = (*gap - m["offset"].get<double>()) / m["finest_voxel"].get<double>();
     list.push_back({{"shell", b.name}, {"distance_m", *gap}, {"voxels", voxels}});
     if (!console.json)
       std::printf("  start   %s is %.3g mm away: %.3g voxels from contact\n",
@@ -373,16 +391,10 @@ Result<ordered_json> clearances(const Console& console, const io::Scene& scene, 
 }
 
 int check_command(const Console& console, CheckOptions& o, bool outside) {
-  const Result<io::Unit> unit = io::unit_from_name(o.units);
-  if (!unit) return console.fail(unit.error(), kUsage);
   if (!o.field.empty() && o.files.size() > 1)
     return console.fail("--field is the field of one mesh: name one", kUsage);
   if (!o.field.empty())
     if (Outcome there = check_input(o.field); !there) return console.fail(there.error());
-  o.bake.voxel_size *= io::metres(*unit);
-  if (o.bake.offset > 0) o.bake.offset *= io::metres(*unit);
-  o.bake.seal *= io::metres(*unit);
-
   const EndsAtOnce asked(console, o.files.front() + ": cancelled");
   ordered_json list = ordered_json::array();
   Verdict verdict;
@@ -404,9 +416,11 @@ int check_command(const Console& console, CheckOptions& o, bool outside) {
         if (*own > 0) stiffness = *own;
       }
     } else {
-      Result<io::Mesh> mesh = io::read_mesh(file, *unit);
+      std::string units = o.units;
+      Result<io::Mesh> mesh = read_in_unit(console, file, o.units_option->count() > 0, units);
       if (!mesh) return console.fail(mesh.error());
-      subjects.push_back({file, std::move(*mesh), o.bake, {{0, 0, 0}, {1, 0, 0, 0}}});
+      subjects.push_back(
+          {file, std::move(*mesh), in_metres(o.bake, units), {{0, 0, 0}, {1, 0, 0, 0}}});
     }
     for (const Subject& s : subjects) {
       Result<ordered_json> m = check_one(console, o, s, stiffness, verdict);
@@ -433,9 +447,10 @@ void add_check(CLI::App& app, Program& program) {
   check->add_option("FILE", o->files, "Meshes, or scenes whose fields are meshes")
       ->required()
       ->option_text("FILE...");
-  check->add_option("--units", o->units, "Unit of the meshes and of lengths here; default m")
-      ->option_text("UNIT")
-      ->check(one_of({"m", "mm", "cm", "in"}));
+  o->units_option =
+      check->add_option("--units", o->units, "Unit of the meshes and of lengths here; default m")
+          ->option_text("UNIT")
+          ->check(one_of({"m", "mm", "cm", "in"}));
   auto* voxels =
       check
           ->add_option("--voxels", o->bake.voxels,
@@ -445,6 +460,14 @@ void add_check(CLI::App& app, Program& program) {
   check->add_option("--voxel-size", o->bake.voxel_size, "Edge of a voxel, instead of --voxels")
       ->option_text("S")
       ->excludes(voxels)
+      ->check(number_above(0));
+  check
+      ->add_option("--tolerance", o->bake.tolerance,
+                   "As for 'hapsix bake field', instead of --voxels: --verify then compares places "
+                   "between nodes with it")
+      ->option_text("S")
+      ->excludes(voxels)
+      ->excludes("--voxel-size")
       ->check(number_above(0));
   check->add_option("--offset", o->bake.offset, "As for 'hapsix bake field'")
       ->option_text("S")

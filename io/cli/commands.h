@@ -18,6 +18,7 @@ struct Program {
   std::function<int()> work;
 };
 
+void add_new(CLI::App& app, Program& program);
 void add_bake(CLI::App& app, Program& program);
 void add_report(CLI::App& app, Program& program);
 void add_run(CLI::App& app, Program& program);
@@ -29,5 +30,6 @@ void add_scene(CLI::App& app, Program& program);
 void add_demo(CLI::App& app, Program& program);
 void add_experiments(CLI::App& app, Program& program);
 void add_map(CLI::App& app, Program& program);
+void add_study(CLI::App& app, Program& program);
 
 }  // namespace h6::cli

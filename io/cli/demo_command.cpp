@@ -109,9 +109,10 @@ void add_demo(CLI::App& app, Program& program) {
       ->check(number_within(1e-3, 1e6));
   demo->add_flag("--virtual-time", o->run.virtual_time,
                  "As fast as possible instead of in real time");
-  demo->add_option("--threads", o->run.threads, "1 (default), or 2 for a helper on the other core")
+  demo->add_option("--threads", o->run.threads,
+                   "1 (default): the haptic thread alone; N: with N - 1 helpers")
       ->option_text("N")
-      ->check(whole_within(1, 2));
+      ->check(whole_within(1, 64));
   add_view_options(*demo, o->view);
   demo->callback([&program, o] {
     program.work = [&program, o] { return demo_command(program.console, *o); };

@@ -97,6 +97,12 @@ int experiments_command(const Console& console, const Options& o) {
     const std::string text = markdown_report(rows, columns, done, seconds);
     const Outcome written = io::write_text_aside(file, text);
     if (!written) return console.fail(written.error());
+    for (const Study& study : done) {
+      if (study.picture.empty()) continue;
+      const auto picture = std::filesystem::path(o.folder) / (study.name + ".svg");
+      if (const Outcome kept = io::write_text_aside(picture, study.picture); !kept)
+        return console.fail(kept.error());
+    }
     json["report"] = file;
     if (!console.json) std::printf("report: %s\n", file.c_str());
   }

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstring>
 #include <exception>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 
 #include "hapsix/base.h"
 #include "io/cli/commands.h"
+#include "io/cli/manual.h"
 #include "io/console/checks.h"
 #include "kernels/targets.h"
 
@@ -66,14 +68,21 @@ std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
   return what + (what.back() == '?' ? " '" : "; '") + command + " --help' tells more";
 }
 
-std::string version() {
-  std::string text = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." +
-                     std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH) +
-                     "\nSIMD targets of this machine, best first:";
+// Whether --json was given, wherever the parser stopped.
+bool has_json_flag(int argc, char** argv) {
+  return std::any_of(argv + 1, argv + argc,
+                     [](const char* a) { return std::string(a) == "--json"; });
+}
+
+std::string version_number() {
+  return std::to_string(H6_VERSION_MAJOR) + "." + std::to_string(H6_VERSION_MINOR) + "." +
+         std::to_string(H6_VERSION_PATCH);
+}
+
+std::vector<std::string> simd_targets() {
   const char* names[32];
   const std::size_t count = h6::kernels::supported_targets(names, 32);
-  for (std::size_t i = 0; i < count; ++i) text += std::string(" ") + names[i];
-  return text;
+  return {names, names + count};
 }
 
 // Packages make threads before main begins, and one that gets none ends the process without a word
@@ -117,7 +126,19 @@ int main(int argc, char** argv) {
   app.add_flag("--json", program.console.json, "One JSON object on stdout, messages on stderr");
   app.add_flag("--allow-outside", program.allow_outside,
                "Scene files may name files outside their folder");
-  app.set_version_flag("--version", version);
+  app.set_version_flag("--version", [] { return std::string(h6BuildInfo()); });
+  std::string generated;
+  app.add_option_function<std::string>(
+         "--generate",
+         [&](const std::string& what) {
+           generated = manual(app, what);
+           throw CLI::Success();
+         },
+         "The man page, or the completion of a shell: man, bash, zsh or fish")
+      ->check(one_of({"man", "bash", "zsh", "fish"}))
+      ->trigger_on_parse()
+      ->group("");  // for the build, not for people
+  add_new(app, program);
   add_bake(app, program);
   add_check(app, program);
   add_run(app, program);
@@ -129,19 +150,26 @@ int main(int argc, char** argv) {
   add_demo(app, program);
   add_experiments(app, program);
   add_map(app, program);
+  add_study(app, program);
   app.footer(
       "COMMAND --help explains each. To begin with:\n"
       "  hapsix demo                                  two methods side by side\n"
       "  hapsix run peg-in-hole --virtual-time        a generated scene\n"
+      "  hapsix new starter.stl bay.stl               your own parts, from meshes to touch\n"
       "  hapsix bake field bay.stl -o bay.vdb --units mm --voxels 512\n" +
       app.get_footer());
   try {
     app.parse(argc, argv);
-  } catch (const CLI::Success& e) {  // --help, --version
-    return app.exit(e);
+  } catch (const CLI::CallForVersion& e) {
+    program.console.json = has_json_flag(argc, argv);
+    if (!program.console.json) return app.exit(e);
+    program.console.result({{"hapsix", version_number()}, {"simd_targets", simd_targets()}});
+    return kOk;
+  } catch (const CLI::Success& e) {  // --help, --generate
+    std::fputs(generated.c_str(), stdout);
+    return program.console.finish(app.exit(e));
   } catch (const CLI::ParseError& e) {
-    for (int i = 1; i < argc; ++i)
-      program.console.json = program.console.json || std::string(argv[i]) == "--json";
+    program.console.json = has_json_flag(argc, argv);
     return program.console.fail(mistake(app, e), kUsage);
   }
   if (const char* why = h6::kernels::force_target_from_environment())

@@ -8,7 +8,7 @@
 
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
-#include "io/experiments/map/map_report.h"
+#include "io/experiments/map/map_page.h"
 #include "io/file/write_aside.h"
 
 namespace h6::cli {
@@ -63,7 +63,9 @@ int map_command(const Console& console, Options& o) {
     if (Outcome written = io::write_text_aside(o.csv, report.csv()); !written)
       return console.fail(written.error());
   if (!o.report.empty())
-    if (Outcome written = io::write_text_aside(o.report, report.text(true)); !written)
+    if (Outcome written = io::write_text_aside(
+            o.report, o.report.ends_with(".html") ? map_page(report) : report.text(true));
+        !written)
       return console.fail(written.error());
   console.result(report.json());
   const std::string error = report.first_error();
@@ -99,9 +101,13 @@ void add_map(CLI::App& app, Program& program) {
   map->add_option("--csv", o->csv, "A row for each run")
       ->check(ends_with(".csv"))
       ->option_text("FILE.csv");
-  map->add_option("-o,--output", o->report, "The tables as Markdown")
-      ->check(ends_with(".md"))
-      ->option_text("FILE.md");
+  map->add_option("-o,--output", o->report,
+                  "The tables as Markdown, or a page that also draws every run")
+      ->check([](const std::string& name) {
+        const bool good = name.ends_with(".md") || name.ends_with(".html");
+        return good ? std::string{} : must_be("a file name that ends in .md or .html", name);
+      })
+      ->option_text("FILE.md|FILE.html");
   map->callback(
       [&program, o] { program.work = [&program, o] { return map_command(program.console, *o); }; });
 }

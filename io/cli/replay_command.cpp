@@ -15,6 +15,7 @@
 #include "io/console/checks.h"
 #include "io/record/recording.h"
 #include "io/record/seal.h"
+#include "io/run/account.h"
 #include "io/run/recorded_session.h"
 #include "io/run/run_scene.h"
 #include "io/run/run_tally.h"
@@ -92,17 +93,23 @@ class Replay {
     none.count = 0;
     Result<io::Recording> recording = io::read_recording(options_.file, none);
     if (!recording) return recording.failure();
-    head_ = recording->head;
-    columns_ = recording->columns;
+    recording_ = std::move(*recording);
+    head_ = recording_.head;
+    columns_ = recording_.columns;
     sealed_ = std::find(columns_.begin(), columns_.end(), "seal") != columns_.end();
     seal_.emplace(head_.hands, columns_);
-    frames_ = recording->frame_count;
-    if (!recording->remark.empty()) remarks.push_back(recording->remark);
+    frames_ = recording_.frame_count;
+    if (!recording_.remark.empty()) remarks.push_back(recording_.remark);
     Result<std::unique_ptr<RecordedSession>> opened =
-        RecordedSession::open(options_.file, *recording, {options_.method, options_.threads},
+        RecordedSession::open(options_.file, recording_, {options_.method, options_.threads},
                               console_.progress(), remarks);
+    if (!opened && !recording_.unsealed.empty())
+      return Failure{opened.error() + "; " + recording_.unsealed +
+                     " was changed after it was recorded"};
     if (!opened) return opened.failure();
     session_ = std::move(*opened);
+    if (options_.verify)
+      account_.emplace(session_->loaded(), recording_, session_->run().virtual_time);
     return Done{};
   }
 
@@ -122,9 +129,11 @@ class Replay {
         ++expected;
         const Result<const h6FrameRecord*> now = session_->step(row);
         if (!now) return now.failure();
-        recorded_->add(row);
-        replayed_->add(**now);
+        short_ += row.inputs_only != 0;
+        if (!row.inputs_only) recorded_->add(row), replayed_->add(**now);
+        note_late(row, **now);
         if (!options_.verify) continue;
+        account_->row(row);
         const std::uint64_t seal = seal_->next(row);
         if (!same(row, **now, !sealed_ || piece->seals[i] == seal)) break;
       }
@@ -134,26 +143,36 @@ class Replay {
     }
     recorded_->judge(progress);
     replayed_->judge(progress);
+    if (!options_.verify || divergence) return Done{};
+    changed = recording_.unsealed;
+    if (changed.empty()) changed = account_->first_difference(progress);
+    if (interrupted.load()) return Failure{"interrupted while the summary was compared"};
     return Done{};
   }
 
   ordered_json json() const {
-    ordered_json out{{"recording", options_.file},
-                     {"scene", session_->loaded().scene.name},
-                     {"recorded_method", session_->recorded_method()},
-                     {"method", session_->method()},
-                     {"threads", session_->threads()},
-                     {"frames", replayed_->totals.frames},
-                     {"seconds", static_cast<double>(replayed_->totals.frames) / head_.rate},
-                     {"recorded_simd_target", head_.simd_target},
-                     {"simd_target", kernels::target_name()},
-                     {"recorded_in_virtual_time", session_->run().virtual_time},
-                     {"remarks", remarks},
-                     {"recorded", recorded_->json()},
-                     {"replayed", replayed_->json()}};
+    ordered_json out{
+        {"recording", options_.file},
+        {"scene", session_->loaded().scene.name},
+        {"recorded_method", session_->recorded_method()},
+        {"method", session_->method()},
+        {"threads", session_->threads()},
+        {"frames", replayed_->totals.frames + short_},
+        {"seconds", static_cast<double>(replayed_->totals.frames + short_) / head_.rate},
+        {"late_by_clock", late_},
+        {"late_again", late_again_},
+        {"late_again_most_us", late_most_us_},
+        {"recorded_simd_target", head_.simd_target},
+        {"simd_target", kernels::target_name()},
+        {"recorded_in_virtual_time", session_->run().virtual_time},
+        {"remarks", remarks},
+        {"recorded", recorded_->json()},
+        {"replayed", replayed_->json()}};
     if (!options_.verify) return out;
-    out["same"] = !divergence;
-    out["sealed"] = sealed_;
+    out["same"] = !divergence && changed.empty();
+    out["sealed"] = sealed_ && recording_.sealed;
+    out["compared"] = replayed_->totals.frames;  // the rest had only inputs
+    out["changed"] = changed.empty() ? ordered_json() : ordered_json(changed);
     out["divergence"] = nullptr;
     if (divergence) {
       const io::RowDifference d =
@@ -178,19 +197,28 @@ class Replay {
                 "[N]", "[us]", "[us]");
     recorded_->print("recorded", session_->recorded_method());
     replayed_->print("replayed", session_->method());
-    if (options_.verify && !divergence)
+    if (late_ > 0) std::printf("\n%s\n", late_sentence().c_str());
+    if (options_.verify && good())
       std::printf(
           "\nevery one of %" PRIu64
-          " frames is the same to the bit: %s on %u thread%s\n"
+          " frames is the same to the bit: %s on %u thread%s\n%s"
           "computed again: contacts, depths, stiffness, poses, velocities, commands, causes, "
-          "states, status\n%s: the hand's samples, deadlines and measured times\n",
+          "states, status, events, the summary's figures\n%s: scene, the hand's samples, "
+          "deadlines, measured times, notes\n",
           replayed_->totals.frames, kernels::target_name(), session_->threads(),
-          session_->threads() == 1 ? "" : "s",
-          sealed_ ? "sealed, and unchanged since" : "neither computed nor sealed (an older file)");
+          session_->threads() == 1 ? "" : "s", short_sentence().c_str(),
+          sealed_ && recording_.sealed ? "sealed, and unchanged since"
+                                       : "neither computed nor sealed (an older file)");
   }
+
+  bool good() const { return !divergence && changed.empty(); }
 
   // Describes the divergence in a sentence.
   std::string sentence() const {
+    if (!divergence)
+      return changed + " was changed after it was recorded: it " +
+             (recording_.unsealed.empty() ? "does not follow from the frames"
+                                          : "does not fit its seal");
     if (!divergence->where)
       return "frame " + std::to_string(divergence->frame) + " (" + number(divergence->time, 4) +
              " s) was changed after it was recorded: its seal does not fit, while all that can be "
@@ -215,12 +243,14 @@ class Replay {
 
   std::vector<std::string> remarks;
   std::optional<Divergence> divergence;
+  std::string changed;  // what else was changed: the head, an event, the summary
 
  private:
   static constexpr std::uint64_t kPiece = 4096;
 
   bool same(const h6FrameRecord& row, const h6FrameRecord& now, bool seal_fits) {
-    const auto where = io::first_difference(row, now, head_.hands, columns_);
+    const auto where =
+        row.inputs_only ? std::nullopt : io::first_difference(row, now, head_.hands, columns_);
     if (!where && seal_fits) return true;
     divergence =
         Divergence{row.report.frame, row.time, where, row.report.state_hash, now.report.state_hash};
@@ -236,13 +266,40 @@ class Replay {
                    (options_.verify ? "every frame is the same" : "it was replayed")};
   }
 
+  // A frame that was late by its own CPU clock is computed once more here.
+  void note_late(const h6FrameRecord& row, const h6FrameRecord& now) {
+    if (!(row.late & H6_LATE_COMPUTE)) return;
+    ++late_;
+    late_again_ += now.report.frame_us > 1e6 / head_.rate;
+    late_most_us_ = std::max(late_most_us_, now.report.frame_us);
+  }
+
+  std::string late_sentence() const {
+    return std::to_string(late_) + " frames were late by the thread's own clock; computed again, " +
+           std::to_string(late_again_) + " of them took over a period, and the dearest " +
+           number(late_most_us_, 4) + " us" +
+           (late_again_ < late_ ? ": the machine made the others late, if it is this one" : "");
+  }
+
+  std::string short_sentence() const {
+    return short_ == 0 ? ""
+                       : std::to_string(short_) +
+                             " more were computed and not compared: the recorder was too slow and "
+                             "kept only their inputs\n";
+  }
+
   const Console& console_;
   const ReplayOptions& options_;
+  io::Recording recording_;  // without its frames
   io::RecordingHead head_;
   std::uint64_t frames_ = 0;
-  std::vector<std::string> columns_;  // in the file
+  std::vector<std::string> columns_;         // in the file
+  std::uint64_t short_ = 0;                  // frames so far of which the recording has only inputs
+  std::uint64_t late_ = 0, late_again_ = 0;  // frames late by their own clock; again over a period
+  double late_most_us_ = 0;
   bool sealed_ = false;
   std::optional<io::RowSeal> seal_;
+  std::optional<Account> account_;
   std::unique_ptr<RecordedSession> session_;
   std::optional<Figures> recorded_, replayed_;
 };
@@ -264,10 +321,10 @@ int replay_command(const Console& console, const ReplayOptions& options) {
   if (Outcome played = replay.play(); !played) return failed(played.error());
   console.warn(replay.remarks);
   ordered_json json = replay.json();
-  if (replay.divergence) json["error"] = replay.sentence();
+  if (!replay.good()) json["error"] = replay.sentence();
   console.result(json);
   if (!console.json) replay.print();
-  if (!replay.divergence) return kOk;
+  if (replay.good()) return kOk;
   console.log("hapsix: " + replay.sentence());
   return kFailed;
 }
@@ -284,9 +341,9 @@ void add_replay(CLI::App& app, Program& program) {
       ->check(ends_with(".h5"));
   replay->add_option("--method", o->method, "Another way to share contact stiffness, same hand")
       ->option_text("NAME");
-  replay->add_option("--threads", o->threads, "1 or 2; default as recorded")
+  replay->add_option("--threads", o->threads, "Default: as recorded")
       ->option_text("N")
-      ->check(whole_within(1, 2));
+      ->check(whole_within(1, 64));
   replay->add_flag(
       "--verify", o->verify,
       "Compute every number of every frame again, and check the seal of the others; exit 1 at "

@@ -11,16 +11,18 @@
 #include "io/cli/tables.h"
 #include "io/cli/view_run.h"
 #include "io/console/checks.h"
+#include "io/mesh/mesh_file.h"
 #include "io/run/hands.h"
 #include "io/run/run_scene.h"
+#include "io/run/start_warnings.h"
 #include "io/scene/scene_file.h"
 #include "io/scenes/scenes.h"
 
 namespace h6::cli {
 namespace {
 
-// Reads a scene file, or makes the generated scene of that name.
-Result<io::Scene> find_scene(const std::string& name, bool outside) {
+// Reads a scene file, or makes the generated scene of that name. Sets the exit code of a failure.
+Result<io::Scene> find_scene(const std::string& name, bool outside, int* code) {
   const bool is_file = std::filesystem::exists(name);
   std::vector<std::string> known;
   for (const io::SceneName& scene : io::scene_names()) known.push_back(scene.name);
@@ -28,6 +30,7 @@ Result<io::Scene> find_scene(const std::string& name, bool outside) {
     return io::make_scene(name);
   if (!is_file && std::filesystem::path(name).extension() != ".json") {  // the user meant a name
     const std::string like = nearest(name, known);
+    *code = kUsage;
     return Failure{"there is neither a file nor a generated scene '" + name + "'" +
                    (like.empty() ? "; 'hapsix scene list' shows what there is"
                                  : ", did you mean '" + like + "'?")};
@@ -48,16 +51,43 @@ Outcome stays_inside(const io::Scene& scene, const io::SceneHand& hand, bool out
                  "--allow-outside if you trust the scene"};
 }
 
-int run_command(const Console& console, const std::string& name, const RunOptions& options,
-                const ViewOptions& view, bool outside) {
+// The user gave meshes where a scene belongs: says how a scene is made of them. The smaller one is
+// taken for the part.
+std::string mesh_sentence(std::vector<std::string> names) {
+  const auto size = [](const std::string& name) {
+    const Result<io::Mesh> mesh = io::read_mesh(name);
+    return mesh ? io::bounds_of(*mesh).longest() : 0;
+  };
+  if (names.size() == 2 && size(names[1]) < size(names[0])) std::swap(names[0], names[1]);
+  std::string command = "hapsix new", meshes;
+  for (const std::string& name : names) command += " " + name;
+  if (names.size() == 1) command += " ENVIRONMENT";
+  return "'" + names[0] + "' is a mesh, and run needs a scene: '" + command +
+         "' makes one of a part and what it touches, and shows it";
+}
+
+// An empty text unless one of the names is a mesh.
+std::string about_names(const std::vector<std::string>& names) {
+  if (std::any_of(names.begin(), names.end(), io::is_mesh_name)) return mesh_sentence(names);
+  return names.size() == 1 ? ""
+                           : "'" + names[1] + "' is one argument too many: run takes one scene";
+}
+
+int run_command(const Console& console, const std::vector<std::string>& names,
+                const RunOptions& options, const ViewOptions& view, bool outside) {
+  if (const std::string wrong = about_names(names); !wrong.empty())
+    return console.fail(wrong, kUsage);
+  const std::string& name = names[0];
   if (view.on && options.virtual_time)
     return console.fail("--view shows a run in real time: leave --virtual-time out", kUsage);
   if (Outcome known = check_options(options); !known) return console.fail(known.error(), kUsage);
+  if (Outcome there = check_device_file(options.device); !there) return console.fail(there.error());
   for (const std::string& file : {options.record, options.trace, options.overlap})
     if (!file.empty())
       if (Outcome place = check_output(file); !place) return console.fail(place.error());
-  Result<io::Scene> scene = find_scene(name, outside);
-  if (!scene) return console.fail(scene.error());
+  int code = kFailed;
+  Result<io::Scene> scene = find_scene(name, outside, &code);
+  if (!scene) return console.fail(scene.error(), code);
   if (options.device.empty())
     for (const io::SceneHand& hand : scene->hands) {
       if (Outcome known = check_device(hand.device); !known)
@@ -75,6 +105,7 @@ int run_command(const Console& console, const std::string& name, const RunOption
   }();
   if (!loaded) return console.fail(name + ": " + loaded.error());
   console.warn((*loaded)->warnings);
+  console.warn(start_warnings(**loaded, options.device));
   if (!console.json) console.log(assets(**loaded));
   Result<RunSummary> summary = Failure{"nothing was run"};
   if (view.on) {
@@ -111,12 +142,13 @@ int run_command(const Console& console, const std::string& name, const RunOption
 
 void add_run(CLI::App& app, Program& program) {
   CLI::App* run = app.add_subcommand("run", "Run a scene: forces and a verdict out");
-  auto name = std::make_shared<std::string>();
+  auto name = std::make_shared<std::vector<std::string>>();
   auto o = std::make_shared<RunOptions>();
   auto view = std::make_shared<ViewOptions>();
   run->add_option("SCENE", *name,
                   "A scene file, or the name of a generated scene ('hapsix scene list')")
       ->required()
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
       ->option_text("FILE|NAME");
   run->add_option("--device", o->device,
                   "For every hand: path (follows the scene's path exactly), simulated (a person "
@@ -134,9 +166,9 @@ void add_run(CLI::App& app, Program& program) {
          "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
       ->option_text("NAME");
   run->add_option("--threads", o->threads,
-                  "1 (default), or 2 for a helper on the other core; same bits")
+                  "1 (default): the haptic thread alone; N: with N - 1 helpers; same bits")
       ->option_text("N")
-      ->check(whole_within(1, 2));
+      ->check(whole_within(1, 64));
   run->add_option("--spin", o->spin_us,
                   "Poll the clock for this long before each deadline; default 0")
       ->option_text("MICROSECONDS")
@@ -147,6 +179,11 @@ void add_run(CLI::App& app, Program& program) {
          "sixteen; not in virtual time; default off")
       ->option_text("MICROSECONDS")
       ->check(number_within(0, 1000000));
+  run->add_option("--rearm", o->rearm,
+                  "Arm hands again so long after a fault has latched their output; simulated hands "
+                  "only; default never")
+      ->option_text("SECONDS")
+      ->check(number_within(1e-3, 1e6));
   run->add_option("--record", o->record, "Record every frame to this .h5 file")
       ->option_text("FILE")
       ->check(ends_with(".h5"));

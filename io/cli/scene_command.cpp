@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // scene_command.cpp - hapsix scene list | export NAME DIR: generated scenes as plain files.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -13,9 +14,12 @@ namespace {
 
 int list_command(const Console& console) {
   nlohmann::ordered_json json{{"scenes", nlohmann::ordered_json::array()}};
+  std::size_t width = 0;
+  for (const io::SceneName& scene : io::scene_names()) width = std::max(width, scene.name.size());
   for (const io::SceneName& scene : io::scene_names()) {
     json["scenes"].push_back({{"name", scene.name}, {"about", scene.about}});
-    if (!console.json) std::printf("%-16s %s\n", scene.name.c_str(), scene.about.c_str());
+    if (!console.json)
+      std::printf("%-*s  %s\n", static_cast<int>(width), scene.name.c_str(), scene.about.c_str());
   }
   console.result(json);
   return kOk;

@@ -62,11 +62,23 @@ std::string late_table(const RunSummary& run) {
     }
     return all ? line + '\n' : std::string();
   };
-  std::string rows = row("own computation", r.late_us_compute) + row("wake-up", r.late_us_wakeup) +
-                     row("stolen", r.late_us_stolen);
+  std::string rows = row("own work by the clock", r.late_us_compute) +
+                     row("wake-up", r.late_us_wakeup) + row("stolen", r.late_us_stolen);
   if (!rows.empty())
     rows =
         "late frames, by how late  < 10 us  < 0.1 ms   < 1 ms  < 10 ms < 0.1 s   longer\n" + rows;
+  const auto judged = [&](io::LateCause cause) {
+    return static_cast<unsigned long long>(run.late[static_cast<std::size_t>(cause)]);
+  };
+  if (r.late_compute > 0)
+    rows += format(
+        "of %llu by the clock, the frames around them say: %llu own work, %llu the machine, %llu "
+        "in doubt\n",
+        static_cast<unsigned long long>(r.late_compute), judged(io::LateCause::own),
+        judged(io::LateCause::machine), judged(io::LateCause::doubt));
+  if (r.late_compute + r.late_stolen + r.late_wakeup > 0 && run.host_stole_ms > 0)
+    rows +=
+        format("the host took %.0f ms of this machine's cores during the run\n", run.host_stole_ms);
   if (r.coarse_frames > 0)
     rows +=
         format("coarse frames: %llu, to end in time; nothing left out was deeper than %.2f voxel\n",

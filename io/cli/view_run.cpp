@@ -279,7 +279,8 @@ void add_view_options(CLI::App& command, ViewOptions& view) {
   command.add_option("--port", view.port, "Port of the view on 127.0.0.1; default: any free one")
       ->option_text("NUMBER")
       ->check(whole_within(0, 65535));
-  command.add_flag("--no-browser{false}", view.open, "Only print the view's address");
+  command.add_flag_callback(
+      "--no-browser", [&view] { view.open = false; }, "Only print the view's address");
 }
 
 Outcome view_scene(const io::LoadedScene& loaded, const RunOptions& given, const ViewOptions& view,

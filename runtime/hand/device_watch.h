@@ -33,7 +33,7 @@ class DeviceWatch {
   bool simulated_ = false;
   std::uint32_t dead_man_ = 0;
   bool seen_ = false, usable_ = false, jumped_ = false, frozen_ = false, held_ = true;
-  h6DeviceSample last_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};  // the last usable one
+  h6DeviceSample last_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0, {}};  // the last usable one
   double since_ = 0;                                              // time since last_ [s]
   double same_for_ = 0;                                           // [s]
   Vec3 drift_ = Vec3::Zero(), spin_ = Vec3::Zero();  // velocities of the poses, smoothed

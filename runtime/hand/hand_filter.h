@@ -62,10 +62,10 @@ class HandFilter {
 
  private:
   void anchor(const h6Pose& device, const h6Pose& scene);
-  h6HandFilterDef def_{1, 1, 1, 0, false};
+  h6HandFilterDef def_{1, 1, 1, 0, false, {}};
   bool admittance_ = false, started_ = false, clutched_ = false;
   ScaledMotion to_scene_, to_device_;
-  h6DeviceSample device_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};
+  h6DeviceSample device_{{{0, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0, {}};
   h6Pose held_{{0, 0, 0}, {1, 0, 0, 0}};  // last pose in the scene
 };
 

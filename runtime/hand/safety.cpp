@@ -82,7 +82,8 @@ SafetyLimits limits_of(const h6DeviceCapabilities& c) {
                                   .decay_time = 0,
                                   .pose_jump = 0,
                                   .freeze_time = 0,
-                                  .dead_man_buttons = 0});
+                                  .dead_man_buttons = 0,
+                                  .reserved = {}});
 }
 
 SafetyLimits limits_of(const h6DeviceCapabilities& c, const h6SafetyDef& def) {

@@ -22,6 +22,7 @@
 #include "hapsix/hapsix.h"
 #include "hapsix/vector.h"
 #include "tests/support/near.h"
+#include "tests/support/reports.h"
 #include "tests/support/sanitized.h"
 
 using namespace h6;
@@ -88,8 +89,8 @@ struct Floor {
     for (int& bricks : field.bricks) bricks = 1;
     field.brick_index = &brick, field.samples = d.data(), field.brick_count = 1;
     field.far_grid = far_grid.data(), field.band = 5e-3;
-    const h6ShellDef tip{1,    &zero, &zero, &zero, &zero, &zero, &up,
-                         NULL, 1,     rows,  rows,  &zero, rows,  rows};
+    const h6ShellDef tip{1, &zero, &zero, &zero, &zero, &zero, &up, NULL,
+                         1, rows,  rows,  &zero, rows,  rows,  {}};
     h6ModelDef parts = h6DefaultModelDef();
     parts.fields = &field, parts.field_count = 1, parts.shells = &tip, parts.shell_count = 1;
     h6Error error{};
@@ -199,7 +200,7 @@ TEST_CASE(
   }
   CHECK(lowest < 0);  // its samples are read again
   h6RequestStop(loop);
-  const h6LoopReport report = h6JoinLoop(loop);
+  const h6LoopReport report = h6::test::joined(loop);
   CHECK(expected(report.fault));
   h6DestroyLoop(loop);
 }

@@ -105,6 +105,29 @@ TEST_CASE(
   for (const Json& m : all["meshes"]) CHECK(m["triangles"].get<int>() > 0);
 }
 
+TEST_CASE("a field with a tolerance is checked between its nodes, in its finest voxel") {
+  Sandbox box;
+  spill(box.file("ball.stl"), stl(sphere_facets(50, 20)));
+  const Args check{"check",    "ball.stl", "--units", "mm",           "--tolerance", "0.2",
+                   "--verify", "--points", "4000",    "--far-points", "2000"};
+  const Json all = result_of(box, check);
+  CHECK(all["agrees"] == true);
+  const Json ball = all["meshes"][0];
+  CHECK(near(ball["voxel_size"].get<double>(), 1.2e-3, 1e-12));
+  CHECK(near(ball["finest_voxel"].get<double>(), 3e-4, 1e-12));
+  CHECK(ball["field"]["tolerance_places"].get<int>() > 3000);
+  CHECK(ball["field"]["tolerance_missed"] == 0);
+  CHECK(ball["field"]["tolerance_error_max"].get<double>() <= 1);
+  CHECK(ball["field"]["tolerance_error_max"].get<double>() > 0.05);
+  CHECK(ball["holding_force_N"].get<double>() > 1);
+  // A baked field knows its tolerance.
+  result_of(box,
+            {"bake", "field", "ball.stl", "-o", "ball.vdb", "--units", "mm", "--tolerance", "0.2"});
+  const Json baked = result_of(box, {"check", "ball.stl", "--units", "mm", "--field", "ball.vdb",
+                                     "--points", "1000", "--far-points", "1000"});
+  CHECK(baked["meshes"][0]["field"]["tolerance_places"].get<int>() > 500);
+}
+
 TEST_CASE("where a tool goes through a wall check says where, and exits 1") {
   Sandbox box;
   std::vector<Facet> sheet = scaled(box_facets(1), 40, 40, 1);

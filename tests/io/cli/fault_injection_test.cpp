@@ -28,6 +28,7 @@
 
 #include "hapsix/hapsix.h"
 #include "tests/support/box_on_floor.h"
+#include "tests/support/reports.h"
 
 #if defined(__SANITIZE_THREAD__)
 // One test makes the engine exit while its loop runs, so that its thread still exists at the exit.
@@ -146,7 +147,7 @@ void on_signal(int number) {
     if (wishes.exits.load()) std::exit(0);
     if (wishes.destroys.load()) {
       h6RequestStop(loop);
-      const h6LoopReport report = h6JoinLoop(loop);
+      const h6LoopReport report = h6::test::joined(loop);
       h6DestroyLoop(loop);
       driver.send({Packet::kReport, now_seconds(), {}, report.fault, 0});
       _exit(0);

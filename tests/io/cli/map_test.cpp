@@ -25,6 +25,11 @@ TEST_CASE("map writes a row for each run, a report, and the same figures as JSON
   for (const char* words : {"| box-over-wire | robust |", "## Conclusions", "--only SCENE:INDEX"})
     CHECK_MESSAGE(report.find(words) != std::string::npos, words);
 
+  CHECK(run(box, {"map", "--scenes", "box-on-wall", "--methods", "robust", "--variations", "1",
+                  "-o", "map.html"})
+            .code == 0);
+  CHECK(slurp(box.file("map.html")).find("<svg") != std::string::npos);
+
   const Ended alone = run(box, {"map", "--methods", "gauss3", "--only", "cone-in-gap:1"});
   CHECK(alone.code == 0);
   CHECK(alone.out.rfind("cone-in-gap:1: voxel ", 0) == 0);
@@ -45,6 +50,7 @@ TEST_CASE("map says what is wrong with its arguments before it runs") {
   told({"map", "--only", "cone-in-gap:x"}, 2, "SCENE:INDEX");
   told({"map", "--variations", "0"}, 2, "must be a whole number");
   told({"map", "--csv", "runs.txt"}, 2, ".csv");
+  told({"map", "-o", "map.txt"}, 2, ".md or .html");
   told({"map", "--scenes", "box-on-wall", "--csv", "no/folder/runs.csv"}, 1, "does not exist");
   CHECK(box.files().empty());
 }

@@ -149,9 +149,11 @@ TEST_CASE("a mesh of nothing, of too much or of the same again is a result or a 
     spill(sandbox.file(odd.file), odd.bytes);
     spill_scene(sandbox, odd.file);
     const std::set<std::string> before = sandbox.files();
-    Process field(sandbox, {"bake", "field", odd.file, "-o", "out.vdb", "--voxels", "32"});
-    Process shell(
-        sandbox, {"bake", "shell", odd.file, "-o", "out.ply", "--points", "100", "--voxels", "32"});
+    // With a stated unit no mesh is too large.
+    Process field(sandbox, {"bake", "field", odd.file, "-o", "out.vdb", "--voxels", "32", "--units",
+                            "m"});
+    Process shell(sandbox, {"bake", "shell", odd.file, "-o", "out.ply", "--points", "100",
+                            "--voxels", "32", "--units", "m"});
     Process info(sandbox, {"info", odd.file});
     Process scene(sandbox, {"run", "scene.json", "--virtual-time"});
     std::set<std::string> expected = before;

@@ -54,7 +54,7 @@ inline json shell_of(const std::string& name, const fs::path& mesh, json bake, c
 
 // The last body is the one in the hand. Returns the scene file.
 inline fs::path write_scene(const fs::path& folder, const json& bodies, const Grip& grip,
-                            const HandPath& path) {
+                            const HandPath& path, double play = 0) {
   fs::create_directories(folder);
   std::ofstream csv(folder / "hand.csv");
   csv.precision(17);
@@ -67,7 +67,7 @@ inline fs::path write_scene(const fs::path& folder, const json& bodies, const Gr
       {"name", folder.filename().string()},
       {"units", "m"},
       {"bodies", bodies},
-      {"contact", {{"stiffness", grip.contact_stiffness}}},
+      {"contact", {{"stiffness", grip.contact_stiffness}, {"fit_offset", play}}},
       {"coupling",
        {{"stiffness", grip.stiffness()}, {"rotational_stiffness", grip.rotational_stiffness()}}},
       {"hands", {{{"body", bodies.back()["name"]}, {"path", "hand.csv"}}}}};
@@ -136,6 +136,20 @@ inline fs::path write(const fs::path& data, const fs::path& folder) {
        shell_of("gear", data / "gears/factory_gear_medium_space_5e-4.obj", {{"spacing", 5e-4}},
                 path.front())},
       grip, path);
+}
+
+// The gear starts on its post, and the base has the default offset of 0.9 voxel, so that gear and
+// post overlap by 0.84 voxel. The foot of the post is undercut by 0.5 mm.
+inline fs::path write_seated(const fs::path& data, const fs::path& folder, double play) {
+  const HandPath path = {
+      {0, {0, 0, 0}}, {0.2, {0, 0, 0}}, {1.2, {0, 0, start}}, {1.6, {0, 0, start}}};
+  return write_scene(
+      folder,
+      {field_of("base", data / "gears/factory_gear_base_loose_space_5e-4_subdiv_4x.obj",
+                {{"voxel_size", voxel}}),
+       shell_of("gear", data / "gears/factory_gear_medium_space_5e-4.obj", {{"spacing", 5e-4}},
+                path.front())},
+      grip, path, play);
 }
 }  // namespace gear
 

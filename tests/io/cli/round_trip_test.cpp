@@ -18,7 +18,9 @@ TEST_CASE("an exported scene runs like the scene it came from") {
     if (kSanitized && (name == "engine-bay" || name == "landing-gear")) continue;
     const auto run_of = [&](const std::string& what) {
       Args args{"run", what, "--virtual-time"};
-      if (kThreadSanitized) args.insert(args.end(), {"--duration", "0.2"});
+      // Machines with thousands of contacts take half a minute for their whole way.
+      const bool large = name.starts_with("spline-hub") || name == "piston-in-bore";
+      if (kThreadSanitized || large) args.insert(args.end(), {"--duration", "0.2"});
       return result_of(box, args);
     };
     const Json named = run_of(name);
@@ -28,7 +30,7 @@ TEST_CASE("an exported scene runs like the scene it came from") {
     CHECK(exported["frames"] == named["frames"]);
     // Mesh files have single precision, so the last digits may change, and with them a contact.
     CHECK(exported["max_depth_voxels"].get<double>() ==
-          doctest::Approx(named["max_depth_voxels"].get<double>()).epsilon(0.01));
+          doctest::Approx(named["max_depth_voxels"].get<double>()).epsilon(0.05));
     CHECK(exported["max_force"].get<double>() ==
           doctest::Approx(named["max_force"].get<double>()).epsilon(0.02));
   }
@@ -76,7 +78,8 @@ TEST_CASE("baked files in a scene give the very run of the meshes they came from
 
   // The option --units decides: the same numbers read as metres give a mesh 1000 times as large.
   const Json large =
-      result_of(box, {"bake", "field", "block.stl", "-o", "large.vdb", "--voxels", "48"});
+      result_of(box, {"bake", "field", "block.stl", "-o", "large.vdb", "--voxels", "48", "--units",
+                      "m"});
   CHECK(large["voxel_size"].get<double>() ==
         doctest::Approx(1000 * field["voxel_size"].get<double>()));
 }

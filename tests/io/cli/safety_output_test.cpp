@@ -104,3 +104,25 @@ TEST_CASE("a terminal that hangs up ends a run like Ctrl-C; a crash stays a cras
     if (number == SIGHUP) CHECK(ended.err.find("interrupted after") != std::string::npos);
   }
 }
+
+TEST_CASE(
+    "a simulated hand is armed again after each latch if --rearm asks, and a real one never") {
+  Sandbox box;
+  make_scene(box, "{}");
+  const Args args{"run", "scene.json", "--duration",
+                  "4",   "--device",   "bad-operator?seed=3&kinds=unplug&every=0.2"};
+  const auto lost = [](const Json& told) {
+    return told["safety"][0]["causes"]["device lost"]["times"].get<int>();
+  };
+  CHECK(lost(result_of(box, args)) == 1);  // the first latch is the end
+  Args again = args;
+  again.insert(again.end(), {"--rearm", "0.1", "--record", "run.h5"});
+  const Json armed = result_of(box, again);
+  CHECK(lost(armed) >= 3);
+  CHECK(happened(armed["events"], "armed again"));
+  CHECK(result_of(box, {"replay", "run.h5", "--verify"})["same"] == true);
+  const Ended real = run(box, {"run", "scene.json", "--rearm", "1", "--device",
+                               "plugin:" HAPSIX_PLUGIN_FOLDER "/template_device.so"});
+  CHECK(real.code == 1);
+  CHECK(real.err.find("leave out --rearm") != std::string::npos);
+}

@@ -157,7 +157,7 @@ void check_interrupted(Sandbox& box, const Args& args, double after) {
   CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - asked).count() <
         0.5 * kSlower);
   CHECK(ended.code == 1);
-  CHECK(ended.err == "hapsix: " + args.back() + ": cancelled\n");
+  CHECK(ended.err.ends_with("hapsix: " + args.back() + ": cancelled\n"));
   CHECK(ended.out.empty());
   CHECK(box.files() == before);
 }
@@ -241,7 +241,7 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
     spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
     Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", kVoxels}, "",
                     dup(terminal.theirs));
-    pause_seconds(2.5 * std::min(kSlower, 4.0));
+    pause_seconds(4 * std::min(kSlower, 4.0));
     process.send(SIGINT);
     CHECK(process.wait(10).code == 1);
     const std::string seen = terminal.read_all();

@@ -129,3 +129,27 @@ TEST_CASE("without a thread to be had the program says so") {
   }
   CHECK(one_object(json)["error"].get<std::string>().find("no thread") != std::string::npos);
 }
+
+TEST_CASE("with too little memory the program ends with one sentence") {
+  if (kSanitized) return;
+  Sandbox box;
+  rlimit before{};
+  REQUIRE(getrlimit(RLIMIT_AS, &before) == 0);
+  int refused = 0, ran = 0;
+  for (const rlim_t megabytes : {60, 100, 130, 150, 170, 190, 220, 260, 1000}) {
+    CAPTURE(megabytes);
+    const rlimit less{megabytes << 20, before.rlim_max};
+    REQUIRE(setrlimit(RLIMIT_AS, &less) == 0);
+    const Ended version = run(box, {"--version"});
+    const Ended scene = run(box, {"run", "box-on-wall", "--virtual-time", "--duration", "0.01"});
+    REQUIRE(setrlimit(RLIMIT_AS, &before) == 0);
+    for (const Ended& ended : {version, scene}) {
+      ++(ended.code == 0 ? ran : refused);
+      if (ended.code == 0) continue;
+      CHECK((ended.code == 1 || ended.code == 127));  // 127: the system's loader, before us
+      CHECK(ended.err.size() > 20);
+    }
+  }
+  CHECK(ran > 0);
+  CHECK(refused > 0);
+}
