@@ -12,6 +12,7 @@ namespace h6::cli {
 namespace {
 
 constexpr double kLate = 0.2;     // the same window as the verdict's [s]
+constexpr double kSlides = 2e-3;  // [m/s]
 constexpr double kFarBehind = 3;  // [voxel]
 
 // The centre of mass of the body that the first hand holds.
@@ -87,10 +88,16 @@ std::string RunTally::left_behind() const {
       "'%.60s' ends %.3g mm (%.1f voxels) from its hand, which rests: the coupling pulls as "
       "hard as it may, and ",
       loaded_.scene.hands[0].body.c_str(), 1e3 * lag, lag / voxel);
-  return text + (contacts_last_ == 0 ? std::string("nothing touches")
-                 : contacts_last_ == 1
-                     ? std::string("one contact holds the part")
-                     : std::to_string(contacts_last_) + " contacts hold the part");
+  std::string why = contacts_last_ == 0   ? "nothing touches"
+                    : contacts_last_ == 1 ? "one contact holds the part"
+                                          : std::to_string(contacts_last_) +
+                                                " contacts hold the part";
+  if (const double slide = verdict_.slide(); slide > kSlides) {
+    char how[60];
+    std::snprintf(how, sizeof how, ", which still slides by %.2g mm/s", 1e3 * slide);
+    why += how;
+  }
+  return text + why;
 }
 
 RunTotals RunTally::totals(const io::Progress& progress) const {

@@ -104,6 +104,7 @@ VerdictWatch::VerdictWatch(const SceneVerdict& rules, std::vector<h6Vec3> points
   const auto frames = static_cast<std::size_t>(std::lround(kWindow * rate_));
   window_.speed2.resize(std::max<std::size_t>(frames, 2));
   window_.depth.resize(window_.speed2.size());
+  window_.from.resize(window_.speed2.size());
 }
 
 // Halves the points along the longest side of their box until few are left.
@@ -184,6 +185,12 @@ bool VerdictWatch::entered(const h6Pose& body) const {
   return false;
 }
 
+double VerdictWatch::slide() const {
+  if (first_ || window_.filled < window_.speed2.size()) return 0;
+  const double seconds = static_cast<double>(window_.filled) / rate_;
+  return std::sqrt(mean_motion2(window_.from[window_.next], last_body_.pose)) / seconds;
+}
+
 bool VerdictWatch::chatters_now(double time) const {
   // Times are sums of frame periods and carry rounding errors, so allow half a frame.
   const bool still_long_enough = time - still_since_ >= kWindow - 0.5 / rate_;
@@ -191,7 +198,9 @@ bool VerdictWatch::chatters_now(double time) const {
   double sum = 0;
   for (const double speed2 : window_.speed2) sum += speed2;
   const auto [low, high] = std::minmax_element(window_.depth.begin(), window_.depth.end());
-  return std::sqrt(sum / static_cast<double>(window_.speed2.size())) > kChatterSpeed ||
+  const double mean = slide();
+  const double about2 = sum / static_cast<double>(window_.speed2.size()) - mean * mean;
+  return about2 > kChatterSpeed * kChatterSpeed ||
          *high - *low > kChatterDepth;
 }
 
@@ -230,6 +239,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   const double speed2 = first_ ? 0 : mean_motion2(last_body_.pose, body.pose) / (dt * dt);
   window_.speed2[window_.next] = speed2;
   window_.depth[window_.next] = max_depth_voxels;
+  window_.from[window_.next] = first_ ? body.pose : last_body_.pose;
   window_.next = (window_.next + 1) % window_.speed2.size();
   window_.filled = std::min(window_.filled + 1, window_.speed2.size());
 

@@ -7,8 +7,10 @@
 //   through   a shell point passed through the environment's mesh (pop_through.h, which the caller
 //             asks), or a shell point or the centre of mass was in a forbidden box
 //   chatters  the hand was still for at least 0.2 s, and in the last 0.2 s of that phase the RMS
-//             point speed was above 2 mm/s or the peak-to-peak depth above 0.1 voxel. Only the end
-//             of a phase is judged: the body may settle first, and a limit cycle stays to the end.
+//             point speed about the mean motion was above 2 mm/s or the peak-to-peak depth above
+//             0.1 voxel. Only the end of a phase is judged: the body may settle first, and a limit
+//             cycle stays to the end. The mean motion is no chatter: a part that a far hand drags
+//             along a surface slides (slide() says how fast).
 //   sunk      the run ends with a point deeper than 3 voxels, where a field knows no depths
 //   arrived   the scene has a target, and the run ends there
 //   stuck     the scene has a target, and the run ends elsewhere
@@ -47,6 +49,8 @@ class VerdictWatch {
   // is from it [m]. Both mean the last frame.
   bool hand_rests() const { return !first_ && last_time_ - still_since_ >= kRest; }
   double lag() const { return first_ ? 0 : std::sqrt(mean_motion2(last_hand_, last_body_.pose)); }
+  // The RMS speed of the points' mean motion in the last 0.2 s [m/s]; 0 before.
+  double slide() const;
 
  private:
   static constexpr double kRest = 0.2 - 1e-6;  // [s]
@@ -59,6 +63,7 @@ class VerdictWatch {
   };
   struct Window {  // ring buffer of the last 0.2 s
     std::vector<double> speed2, depth;
+    std::vector<h6Pose> from;  // where each frame's motion began
     std::size_t next = 0, filled = 0;
   };
 

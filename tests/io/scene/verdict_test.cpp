@@ -222,6 +222,30 @@ TEST_CASE("chatter begins at an RMS point speed of 2 mm/s") {
   CHECK(judge(0.6, [](double t) { return swinging(t, 2.1e-3); }) == Verdict::chatters);
 }
 
+TEST_CASE("a steady slide is no chatter, but a swing about it is") {
+  const auto sliding = [](double speed, double rms) {
+    return judge(0.6, [=](double t) {
+      Moment m = swinging(t, rms);
+      if (t >= 0.2) m.body.pose.p.z = speed * (t - 0.2);
+      return m;
+    });
+  };
+  CHECK(sliding(10e-3, 1.9e-3) == Verdict::held);
+  CHECK(sliding(10e-3, 2.1e-3) == Verdict::chatters);
+  const auto turning = [](double t) {  // slowly about its own axis
+    Moment m = calm(t);
+    if (t >= 0.2) m.body.pose.q = about_z(0.3 * (t - 0.2));
+    return m;
+  };
+  CHECK(judge(0.6, turning) == Verdict::held);
+  VerdictWatch watch({}, cube(), {0, 0, 0}, kRate);
+  for (int i = 0; i < 600; ++i) {
+    const Moment m = turning(i / kRate);
+    watch.frame(i / kRate, m.hand, m.hand_velocity, m.body, m.depth, m.finite);
+  }
+  CHECK(watch.slide() == doctest::Approx(0.3 * std::sqrt(36.0 / 27.0) * 0.01).epsilon(0.01));
+}
+
 TEST_CASE("turning to and fro chatters like moving") {
   const auto twist = [](double rms) {
     return judge(0.6, [=](double t) {
