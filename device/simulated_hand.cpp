@@ -61,7 +61,7 @@ h6Device SimulatedHand::device() {
     auto& hand = *static_cast<SimulatedHand*>(self);
     hand.advance(time);
     const h6Vec3 lever = rotate(hand.q_, hand.arm_.grip);
-    *out = {{hand.x_ - lever, hand.q_}, {hand.v_ - cross(hand.w_, lever), hand.w_}, 0, {}, 0};
+    *out = {{hand.x_ - lever, hand.q_}, {hand.v_ - cross(hand.w_, lever), hand.w_}, 0, {}, 0, {}};
     return 0;
   };
   d.write = [](void* self, double, const h6DeviceCommand* command) {

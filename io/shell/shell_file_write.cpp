@@ -39,7 +39,7 @@ std::string header(const ShellData& shell) {
       "comment units metres\n";
   if (!shell.input_hash.empty()) text += "comment input_hash " + shell.input_hash + "\n";
   text += "comment level_first";
-  for (const auto first : shell.level_first) text += " " + std::to_string(first);
+  for (const auto first : shell.level_first) (text += ' ') += std::to_string(first);
   text += "\nelement vertex " + std::to_string(shell.size()) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius"}) {
     text += std::string("property float ") + name + "\n";

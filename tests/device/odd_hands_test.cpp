@@ -184,7 +184,7 @@ TEST_CASE("a recorded hand gives its samples to the bit, then stays where the la
   std::vector<h6DeviceSample> samples(50);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const double u = static_cast<double>(i);
-    samples[i] = {{{std::sin(u), u / 3, 0}, {1, 0, 0, 0}}, {{u, 0, 0}, {}}, 0, {}, 0};
+    samples[i] = {{{std::sin(u), u / 3, 0}, {1, 0, 0, 0}}, {{u, 0, 0}, {}}, 0, {}, 0, {}};
     samples[i].buttons = static_cast<std::uint32_t>(i);
   }
   auto hand = RecordedHand::open(samples, 1000);

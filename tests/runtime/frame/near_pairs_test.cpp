@@ -165,7 +165,7 @@ TEST_CASE("the same for listed pairs, whose order is that of the list") {
   for (std::int32_t a = 14; a >= 3; --a)
     for (std::int32_t b = 14; b >= 0; --b)
       if (a != b && world.bodies[static_cast<std::size_t>(b)].field >= 0 && (a + b) % 4 != 0)
-        pairs.push_back({a, b});
+        pairs.push_back({a, b, {}});
   world.def.pairs = pairs.data(), world.def.pair_count = pairs.size();
   compare(world, 250, {});
 }

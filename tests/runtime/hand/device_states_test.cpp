@@ -21,7 +21,7 @@ constexpr double kFrame = 1e-3, kForce = 5;
 struct Chain {
   OutputGuard guard;
   DeviceWatch watch;
-  h6DeviceSample sample{{{0.01, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};
+  h6DeviceSample sample{{{0.01, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0, {}};
   h6DeviceCommand command{};
 
   explicit Chain(std::uint32_t dead_man = 0, double freeze_time = 0) {
@@ -240,7 +240,7 @@ TEST_CASE("before the first sample a device is absent, and the first sample find
   DeviceWatch watch;
   h6SafetyDef def = h6DefaultSafetyDef();
   watch.set(def, {});
-  h6DeviceSample sample{{{NAN, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};
+  h6DeviceSample sample{{{NAN, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0, {}};
   h6Status status = 0;
   for (int i = 0; i < 100; ++i) {
     if (i == 50) sample.pose.p.x = 0;

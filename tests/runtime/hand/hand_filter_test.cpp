@@ -32,7 +32,7 @@ h6DeviceSample sample_at(const Vec3& p, const Quat& q) {
 }
 
 h6HandFilterDef scales(double motion, double rotation, double force = 1) {
-  return {motion, rotation, force, 1u, false};
+  return {motion, rotation, force, 1u, false, {}};
 }
 
 bool same_bits(const void* a, const void* b, std::size_t n) { return std::memcmp(a, b, n) == 0; }

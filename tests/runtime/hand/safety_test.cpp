@@ -39,7 +39,7 @@ h6SafetyDef at_once() {
 struct Chain {
   OutputGuard guard;
   DeviceWatch watch;
-  h6DeviceSample sample{{{0.01, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0};
+  h6DeviceSample sample{{{0.01, 0, 0}, {1, 0, 0, 0}}, {}, 0, {}, 0, {}};
   h6Status status = 0;
 
   explicit Chain(const h6DeviceCapabilities& device, const h6SafetyDef& def = at_once()) {

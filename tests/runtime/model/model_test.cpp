@@ -226,7 +226,7 @@ TEST_CASE("an invalid session is refused with a sentence that names the value") 
   const auto complaint_of = [&](const std::function<void(Scene&)>& spoil) {
     Scene s{{h6DefaultBodyDef(), h6DefaultBodyDef()},
             h6DefaultHandDef(),
-            {1, 0},
+            {1, 0, {}},
             h6DefaultSessionDef()};
     s.bodies[0].fixed = true, s.bodies[0].field = 0;
     s.bodies[1].shell = 0;
@@ -283,11 +283,11 @@ TEST_CASE("an invalid session is refused with a sentence that names the value") 
       {[](Scene& s) { s.hand.coupling.max_depth_voxels = 0; }, "max_depth_voxels"},
       {[](Scene& s) { s.hand.coupling.max_force = -2; }, "max_force"},
       {[](Scene& s) {
-         s.pair = {0, 1};
+         s.pair = {0, 1, {}};
        },
        "no shell"},
       {[](Scene& s) {
-         s.pair = {1, 1};
+         s.pair = {1, 1, {}};
        },
        "itself"},
       {[](Scene& s) { s.def.hand_count = 99; }, "hands"},
