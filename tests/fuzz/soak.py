@@ -3,8 +3,9 @@
 """soak.py [HOURS] [SEED] - runs build/release/hapsix under seeded trouble, one line a minute.
 
 Each run draws a scene, a hand, and one trouble from outside. The hand is a bad operator (seed, kinds,
-how often), whose output is armed again after each latch, or an arm of its own process behind UDP,
-in real time. The trouble is none, SIGKILL, SIGINT, SIGSTOP for a while, a load of busy processes, a
+how often), whose output is armed again after each latch, an arm of its own process behind UDP, in
+real time, or a witness (witness.c): a plug-in in real time with faults of its own, which keeps what it
+got and when. The trouble is none, SIGKILL, SIGINT, SIGSTOP for a while, a load of busy processes, a
 file size limit as on a full disk, or an arm that is stopped or killed. Now and then a run lasts ten
 minutes.
 
@@ -14,9 +15,13 @@ What must hold, or the exit code is 1:
 - every recording opens and replays to the bit;
 - in every recording, no force goes out 20 ms after a fault began, nor later in that fault. Lost
   devices and spoilt samples are found in what came in, not only in the causes that the engine names.
+  A recording has no row for what the watchdog sends between two frames. So a row whose command came
+  more than 20 ms late must name the watchdog;
+- a witness feels no force 20 ms after its fault began (a hang: 20 ms after it could be known), on the
+  machine's clock, and none for longer than that without a command.
 
-The report at the end has the faults by kind, with the longest time to zero force. Recordings that break
-a promise stay in build/soak-findings.
+The report at the end has the faults by kind, with the longest time to zero force: of recordings in the
+time of frames, of witnesses in their own. Recordings that break a promise stay in build/soak-findings.
 """
 import collections, json, os, random, resource, shutil, signal, subprocess, sys, tempfile, threading, time
 
@@ -27,9 +32,11 @@ root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 program = os.environ.get("HAPSIX_PROGRAM", os.path.join(root, "build/release/hapsix"))
 arm_program = os.path.join(os.path.dirname(program), "hapsix_udp_arm")
 kept = os.path.join(root, "build/soak-findings")
-arm_plugin = os.path.join(os.path.dirname(program), "plugins/udp_arm.so")
+plugins = os.path.join(os.path.dirname(program), "plugins")
 
 LIMIT = 0.020  # [s] from the start of a fault to zero force
+PERIOD = 0.001  # [s] a frame; a fault begins when the next command is due, and a wake-up takes part of one
+HANG = 0.050  # [s] after which a witness that repeats its sample is known to hang
 FAULTS = ["not finite", "late", "device lost", "stopped", "overspeed", "pose jump", "bad sample",
           "frozen", "watchdog"]
 LOST, AGAIN = 4, 1 | 8  # bits of safety_asked: no answer; armed, out of a fault
@@ -102,15 +109,82 @@ def check_forces(file, what):
         kinds["(in) spoilt sample"] = spoilt(column["hand_pose"][:, h], column["hand_velocity"][:, h])
         for kind, rows in kinds.items():
             for first, end in episodes(rows, column["frame"]):
+                # What the watchdog sent meanwhile is in no row.
+                hidden = column["overdue"][first:end, h] > LIMIT
+                before = ~zero[np.arange(first, end) - 1]
+                promise(not (hidden & before & ~kinds["watchdog"][first:end]).any(),
+                        f"{what}: a command came over 20 ms late in frame {first} and no watchdog")
                 since = np.cumsum(passed[first:end]) - passed[first]
                 forced = ~zero[first:end]
                 count[f"fault: {kind}"] += 1
                 promise(not (forced & (since >= LIMIT - 1e-9)).any(),
                         f"{what}: frame {first + int(forced.nonzero()[0][-1]) if forced.any() else 0} "
                         f"has force over 20 ms after '{kind}' began in frame {first}")
-                if not forced.all():
-                    slowest[kind] = max(slowest[kind], since[int(np.argmin(forced))])
+                if hidden[:1 + int(np.argmin(forced))].any():
+                    count[f"fault: {kind}, ended by the watchdog"] += 1
+                elif not forced.all():
+                    slowest[f"fault: {kind}"] = max(slowest[f"fault: {kind}"], since[int(np.argmin(forced))])
         count["latches that ended"] += int(((column["safety_asked"][:, h] & AGAIN) == AGAIN).sum())
+
+
+TOLD = np.dtype([("at", "f8"), ("force", "f8"), ("what", "u4"), ("trouble", "u4")])
+WRITE, STOP, ARM, BEGINS, ENDS, STOOD_STILL = range(6)
+TROUBLES = ["", "lost", "not a number", "hang", "jump", "stall"]
+
+
+def rows_told(file):
+    with open(file, "rb") as told:
+        told.seek(8)
+        kept, room = np.frombuffer(told.read(16), "u8")
+        return np.frombuffer(told.read(int(min(kept, room)) * TOLD.itemsize), TOLD)
+
+
+def check_witness(file, what):
+    """What the device got, on the machine's clock. A stop may be told by another thread."""
+    rows = rows_told(file)
+    rows = rows[np.argsort(rows["at"], kind="stable")]
+    still = rows[rows["what"] == STOOD_STILL]
+    commands = rows[(rows["what"] == WRITE) | (rows["what"] == STOP)]
+    if len(commands) < 2:
+        return
+    at, force = commands["at"], commands["force"]
+
+    def stood(begin, end):
+        """How long the machine gave no thread any time, of what lies in between [s]."""
+        first, last = still["at"] - still["force"] + PERIOD, still["at"]
+        return np.clip(np.minimum(last, end) - np.maximum(first, begin), 0, None).sum()
+
+    # No command: the watchdog's stop comes a period and 20 ms after the last.
+    silent = np.diff(at) - PERIOD
+    for i in np.flatnonzero((silent > 0.5 * PERIOD) & (force[:-1] > 0)):
+        note_witness("late command", silent[i], LIMIT, stood(at[i], at[i + 1]), what, at[i])
+    for begin, kind in rows[["at", "trouble"]][rows["what"] == BEGINS]:
+        i = int(np.searchsorted(at, begin))
+        ends = rows["at"][(rows["what"] == ENDS) & (rows["at"] > begin)]
+        end = ends[0] if len(ends) else at[-1]
+        if kind == TROUBLES.index("stall") or i >= len(at) or (i > 0 and force[i - 1] == 0):
+            continue  # the watchdog's, or there was no force
+        zero = i + int(np.argmin(force[i:] > 0))
+        if force[zero] > 0 or at[zero] > end + PERIOD:
+            count[f"witness: {TROUBLES[kind]}, over before the force was"] += 1
+            promise(end - begin <= (HANG if kind == TROUBLES.index("hang") else 0) + LIMIT + 2 * PERIOD
+                    + stood(begin, end), f"{what}: force during all of '{TROUBLES[kind]}' at {begin:.4f}")
+            continue
+        # The last command before zero may have come late, which the watchdog bounds.
+        late = max(0, at[zero] - at[zero - 1] - PERIOD) if zero > 0 else 0
+        known = HANG if kind == TROUBLES.index("hang") else 0
+        note_witness(TROUBLES[kind], at[zero] - begin - known, LIMIT + late,
+                     stood(begin, at[zero]), what, begin)
+
+
+def note_witness(kind, took, limit, still, what, at):
+    count[f"witness: {kind}"] += 1
+    count[f"witness: {kind}, over 20 ms and a period"] += took > LIMIT + PERIOD
+    slowest[f"witness: {kind}"] = max(slowest[f"witness: {kind}"], took)
+    if still > 0 and took > limit + PERIOD:
+        count["witness: while the machine stood still"] += 1
+    promise(took <= limit + PERIOD + still,
+            f"{what}: the device had force {1e3 * took:.1f} ms after '{kind}' at {at:.4f}")
 
 
 def check_recording(file, what):
@@ -149,6 +223,7 @@ class Trouble:
 
     KINDS = ["none", "none", "kill", "interrupt", "stop", "load", "full disk"]
     ARM_KINDS = ["none", "stop", "load", "arm stopped", "arm killed"]
+    WITNESS_KINDS = ["none", "none", "kill", "load"]  # a stop would stop the device, too
 
     def __init__(self, kind, at, arm):
         self.kind, self.at, self.arm, self.done, self.busy = kind, at, arm, False, []
@@ -183,14 +258,19 @@ class Trouble:
             process.kill(), process.wait()
 
 
-def hand(seconds):
-    """The device of a run, with its arm if there is one."""
-    if draw.random() < 0.2:
+def hand(seconds, told):
+    """The device of a run, what else it needs, its kinds of trouble, and its arm if there is one."""
+    which = draw.random()
+    if which < 0.2:
         arm = Arm()
-        return f"plugin:{arm_plugin}?port={arm.port}", [], arm
+        return f"plugin:{plugins}/udp_arm.so?port={arm.port}", [], Trouble.ARM_KINDS, arm
+    if which < 0.5:
+        rows = int(3 * 1000 * seconds) + 10000
+        return (f"plugin:{plugins}/witness.so?file={told}&rows={rows}&seed={draw.randrange(10000)}"
+                f"&every={draw.choice([0.2, 0.5])}", [], Trouble.WITNESS_KINDS, None)
     kinds = ",".join(draw.sample(["shake", "jerk", "freeze", "nan", "jump", "unplug"], 4))
     device = f"bad-operator?seed={draw.randrange(1000)}&kinds={kinds}&every={draw.choice([0.3, 1, 3])}"
-    return device, ["--rearm", f"{draw.uniform(0.05, 0.5):.2f}"], None
+    return device, ["--rearm", f"{draw.uniform(0.05, 0.5):.2f}"], Trouble.KINDS, None
 
 
 def follow(child, trouble, seconds, log, what):
@@ -219,9 +299,12 @@ def follow(child, trouble, seconds, log, what):
 
 def one_run(folder):
     scene = draw.choice(["box-on-wall", "peg-in-hole", "alpha-shortcut"])
-    seconds = 600 if number % 200 == 20 else draw.uniform(3, 30)
-    device, more, arm = hand(seconds)
-    kind = draw.choice(Trouble.ARM_KINDS if arm else Trouble.KINDS)
+    told = os.path.join(folder, "told")
+    seconds = 600 if number % 200 == 20 else draw.uniform(3, 20)
+    device, more, troubles, arm = hand(seconds, told)
+    if troubles is Trouble.WITNESS_KINDS:
+        seconds = min(seconds, 6)  # nothing arms it after its first latch
+    kind = draw.choice(troubles)
     file = os.path.join(folder, f"{number}.h5")
     what = f"run {number} ({scene}, {device}, {kind})"
     arguments = [program, "run", scene, "--duration", f"{seconds:.2f}", "--device", device, "--json",
@@ -237,7 +320,7 @@ def one_run(folder):
         if arm:
             arm.end()
     count[f"trouble: {kind}"] += 1
-    count["hand: arm behind UDP" if arm else "hand: bad operator"] += 1
+    count["hand: arm behind UDP" if arm else "hand: bad operator" if more else "hand: witness"] += 1
     code = child.returncode
     promise(code in (0, 1) or (kind == "kill" and code == -9), f"{what}: it ended with {code}")
     try:
@@ -249,9 +332,12 @@ def one_run(folder):
         count[f"event: {event['what']}"] += 1
     if os.path.exists(file) or os.path.exists(file + ".part"):
         check_recording(file, what)
-    if len(broken) > broken_before and os.path.exists(file):
+    if os.path.exists(told):
+        check_witness(told, what)
+    if len(broken) > broken_before:
         os.makedirs(kept, exist_ok=True)
-        shutil.copy(file, kept)
+        for kept_file in filter(os.path.exists, (file, told)):
+            shutil.copy(kept_file, os.path.join(kept, f"{seed}-{number}-{os.path.basename(kept_file)}"))
     for name in os.listdir(folder):
         os.remove(os.path.join(folder, name))
 
@@ -263,14 +349,15 @@ def watch(begun):
         own = usage(os.getpid())
         print(f"{(time.time() - begun) / 3600:6.2f} h  runs {number}  recordings "
               f"{count['recordings opened']}  replayed {count['recordings replayed to the bit']}  "
-              f"faults {sum(n for k, n in count.items() if k.startswith('fault: '))}  broken "
+              f"faults {sum(n for k, n in count.items() if k.startswith('fault: '))}  witnessed "
+              f"{sum(n for k, n in count.items() if k.startswith('witness: ') and ',' not in k)}  broken "
               f"{len(broken)}  own memory {own[0]} kB, descriptors {own[1]}", flush=True)
 
 
 def report():
     print(f"\nseed {seed}, {number} runs")
     for name, times in sorted(count.items()):
-        zero = slowest.get(name[7:]) if name.startswith("fault: ") else None
+        zero = slowest.get(name)
         print(f"{times:8d}  {name}" + ("" if zero is None else f", zero force after {1e3 * zero:.1f} ms"))
     for name, most in most_growth.items():
         print(f"{most:8d}  most growth of a run: {name}")
