@@ -152,7 +152,7 @@ TEST_CASE("a run with a plug-in in real time; virtual time is refused") {
 TEST_CASE("the process behind a plug-in is killed in a run: no more force, lost, and a clean end") {
   Sandbox box;
   ArmProcess arm;
-  Process process(box, {"run", "box-on-wall", "--device", arm.device(), "--duration", "2.5",
+  Process process(box, {"run", "box-on-wall", "--device", arm.device(), "--duration", "6",
                         "--record", "run.h5", "--json"});
   REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
@@ -161,7 +161,7 @@ TEST_CASE("the process behind a plug-in is killed in a run: no more force, lost,
   CHECK(ended.in_time);
   CHECK(ended.code >= 0);  // it ended by itself
   const Json json = one_object(ended);
-  CHECK(json["frames"] == 2500);
+  CHECK(json["frames"] == 6000);
   // If a busy machine held up the haptic thread before, the output was at zero already.
   const std::string fault = json["fault"];
   CHECK_MESSAGE((fault == "device lost" || fault == "watchdog" || fault == "late"), fault);
@@ -169,7 +169,7 @@ TEST_CASE("the process behind a plug-in is killed in a run: no more force, lost,
   for (const Json& event : json["events"]) told = told || event["what"] == "device lost";
   CHECK(told);
   const Json info = result_of(box, {"info", "run.h5"});
-  CHECK(info["frames"] == 2500);
+  CHECK(info["frames"] == 6000);
 }
 
 TEST_CASE("a scene does not load a plug-in by itself: it may come from someone else") {

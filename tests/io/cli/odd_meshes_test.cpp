@@ -150,8 +150,8 @@ TEST_CASE("a mesh of nothing, of too much or of the same again is a result or a 
     spill_scene(sandbox, odd.file);
     const std::set<std::string> before = sandbox.files();
     // With a stated unit no mesh is too large.
-    Process field(sandbox, {"bake", "field", odd.file, "-o", "out.vdb", "--voxels", "32", "--units",
-                            "m"});
+    Process field(sandbox,
+                  {"bake", "field", odd.file, "-o", "out.vdb", "--voxels", "32", "--units", "m"});
     Process shell(sandbox, {"bake", "shell", odd.file, "-o", "out.ply", "--points", "100",
                             "--voxels", "32", "--units", "m"});
     Process info(sandbox, {"info", odd.file});
@@ -160,16 +160,16 @@ TEST_CASE("a mesh of nothing, of too much or of the same again is a result or a 
     if (!odd.refused) expected.insert({"out.vdb", "out.ply"});
 
     for (Process* bake : {&field, &shell}) {
-      const Ended ended = bake->wait(10);
+      const Ended ended = bake->wait();
       check_end(ended, odd.refused, !odd.refused);
       if (odd.refused) CHECK(ended.err.find(odd.refused) != std::string::npos);
       if (odd.refused) CHECK(ended.err.find(odd.file) != std::string::npos);
       if (odd.warned) CHECK(ended.err.find(odd.warned) != std::string::npos);
     }
-    const Ended facts = info.wait(10);
+    const Ended facts = info.wait();
     check_end(facts, odd.read, !odd.read);
     if (odd.read) CHECK(facts.err.find(odd.read) != std::string::npos);
-    const Ended ran = scene.wait(10);
+    const Ended ran = scene.wait();
     check_end(ran, true, !odd.refused);
     CHECK(sandbox.files() == expected);
   }

@@ -143,6 +143,17 @@ class Process {
     return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            info.si_pid == pid_;
   }
+  // User and system time so far [s]. What a program does after a signal costs such time; how long it
+  // waits for a core is the machine's affair.
+  double cpu_seconds() const {
+    const std::string stat = slurp("/proc/" + std::to_string(pid_) + "/stat");
+    std::istringstream fields(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+    std::string skipped;
+    for (int i = 0; i < 11; ++i) fields >> skipped;
+    double user = 0, system = 0;
+    fields >> user >> system;
+    return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  }
   // Waits for the end and kills the program after `limit` seconds, which is ample on a busy
   // machine. ThreadSanitizer gets ten times as long, AddressSanitizer three times.
   Ended wait(double limit = 100) {
@@ -209,12 +220,20 @@ inline Json result_of(Sandbox& box, Args args, const std::string& cache = "") {
 
 // Waits until the condition holds. Returns false after `limit` seconds.
 template <class Condition>
-bool soon(Condition condition, double limit = 10) {
+bool soon(Condition condition, double limit = 100) {
   for (double waited = 0; waited < limit; waited += 0.005) {
     if (condition()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return condition();
+}
+
+// Whether the log of a running recording has kSomeFrames. A frame takes some 200 bytes.
+constexpr int kSomeFrames = 40;
+inline bool records(const Sandbox& box, const std::string& name) {
+  std::error_code absent;
+  const auto bytes = fs::file_size(box.file(name + ".part"), absent);
+  return !absent && bytes > 30'000;
 }
 
 // --- meshes, written by hand so that no test relies on the library's own writer -----------------

@@ -410,29 +410,26 @@ TEST_CASE("the recording of a run that the user ended replays to the bit") {
   spill(box.file("scene.json"), ball_and_block(box).dump());
   result_of(box, {"run", "scene.json", "--virtual-time", "--duration", "0.01"});  // bakes
   Process process(box, {"run", "scene.json", "--duration", "60", "--record", "run.h5"});
-  REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
-  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  REQUIRE(soon([&] { return records(box, "run.h5"); }));
   process.send(SIGINT);
   CHECK(process.wait().code == 1);
   // There was no time to look for points that passed through, so the replay does not look either.
   CHECK(result_of(box, {"info", "run.h5"})["summary"]["pop_through"]["interrupted"] == true);
   const Json json = result_of(box, {"replay", "run.h5", "--verify"});
   CHECK(json["same"] == true);
-  CHECK(json["frames"] > 100);
+  CHECK(json["frames"] > kSomeFrames);
 }
 
 TEST_CASE("the log of a killed run is replayed as far as it goes") {
   Sandbox box;
   {
     Process victim(box, {"run", "peg-in-hole", "--record", "run.h5"});
-    for (int i = 0; i < 400 && !fs::exists(box.file("run.h5.part")); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    std::this_thread::sleep_for(std::chrono::milliseconds(900));
+    REQUIRE(soon([&] { return records(box, "run.h5"); }));
   }  // killed
   // The first program that reads the log turns it into a recording and says so.
   const Json json = result_of(box, {"replay", "run.h5", "--verify"});
   CHECK(json["same"] == true);
-  CHECK(json["frames"] > 100);
+  CHECK(json["frames"] > kSomeFrames);
   REQUIRE(json["remarks"].size() == 1);
   CHECK(std::string(json["remarks"][0]).find("run.h5.part with ") != std::string::npos);
   CHECK(box.files() == std::set<std::string>{"run.h5"});

@@ -98,7 +98,7 @@ TEST_CASE("a terminal that hangs up ends a run like Ctrl-C; a crash stays a cras
     Process process(box, {"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"});
     REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
     process.send(number);
-    const Ended ended = process.wait(10);
+    const Ended ended = process.wait();
     CHECK(ended.in_time);
     CHECK(ended.code == (number == SIGHUP ? 1 : -number));
     if (number == SIGHUP) CHECK(ended.err.find("interrupted after") != std::string::npos);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // On Ctrl-C the program ends soon, leaves no half-written file and keeps its recording. It also
 // keeps the log when it is killed, and shows its progress on a terminal.
+#include <poll.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -18,9 +20,7 @@ using namespace h6::test;
 namespace {
 
 constexpr double kSlower = kSanitized ? 15 : 1;
-// For runs in real time: with a sanitizer their frames take longer.
-constexpr double kPatience = kSanitized ? 6 : 1;
-constexpr int kSomeFrames = kSanitized ? 10 : 100;
+const double kThreads = std::max(1u, std::thread::hardware_concurrency());
 
 // Bake sizes that take long in every build.
 const std::string kVoxels = kThreadSanitized ? "640" : "2048";
@@ -40,13 +40,27 @@ struct Terminal {
     if (mine >= 0) close(mine);
     if (theirs >= 0) close(theirs);
   }
+  std::string text;
+  bool read_some() {
+    char buffer[4096];
+    const ssize_t n = read(mine, buffer, sizeof buffer);
+    if (n > 0) text.append(buffer, static_cast<std::size_t>(n));
+    return n > 0;
+  }
+  // Whether it says this within 100 s.
+  bool says(const char* word) {
+    return soon([&] {
+      pollfd there{mine, POLLIN, 0};
+      while (poll(&there, 1, 0) > 0 && read_some()) {
+      }
+      return text.find(word) != std::string::npos;
+    });
+  }
   std::string read_all() {
     close(theirs);
     theirs = -1;
-    std::string text;
-    char buffer[4096];
-    for (ssize_t n; (n = read(mine, buffer, sizeof buffer)) > 0;)
-      text.append(buffer, static_cast<std::size_t>(n));
+    while (read_some()) {
+    }
     return text;
   }
 };
@@ -67,14 +81,12 @@ TEST_CASE("Ctrl-C ends a real-time run at once: devices stopped, recording finis
       Args args{"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"};
       if (json) args.push_back("--json");
       Process process(box, args);
-      REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
-      pause_seconds(0.5 * kPatience);
-      const auto asked = std::chrono::steady_clock::now();
+      REQUIRE(soon([&] { return records(box, "run.h5"); }));
+      const double before = process.cpu_seconds();
       process.send(number);
       const Ended ended = process.wait();
-      const double took =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - asked).count();
-      CHECK(took < 1 * kSlower);  // some 0.03 s on an idle machine
+      CHECK(ended.in_time);
+      CHECK(ended.cpu_seconds - before < 1 * kSlower);  // some 0.03 s
       CHECK(ended.code == 1);
       CHECK(ended.err.find("interrupted after") != std::string::npos);
       if (json) {
@@ -95,17 +107,15 @@ TEST_CASE("Ctrl-C ends a real-time run at once: devices stopped, recording finis
     }
 }
 
-TEST_CASE("a killed run leaves a recording that opens and lacks half a second at most") {
+TEST_CASE("a killed run leaves a recording that opens and has what its log had") {
   Sandbox box;
   Process process(box, {"run", "peg-in-hole", "--duration", "60", "--record", "run.h5"});
-  REQUIRE(soon([&] { return fs::exists(box.file("run.h5.part")); }));
-  pause_seconds(1.5 * kPatience);
+  REQUIRE(soon([&] { return records(box, "run.h5"); }));
   process.send(SIGKILL);
   CHECK(process.wait().code == -SIGKILL);
   const Json info = result_of(box, {"info", "run.h5"});
   CHECK(info["kind"] == "recording");
-  // The log may lack the last half second of the 1.5 s. The rest is a margin for a busy machine.
-  CHECK(info["frames"] >= 3 * kSomeFrames);
+  CHECK(info["frames"] > kSomeFrames);
   CHECK(info["whole"] == false);
   CHECK(!info.value("remark", "").empty());
 }
@@ -117,10 +127,10 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
   for (const double seconds : {0.3, 1.2}) {
     Process process(box,
                     {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", kVoxels, "--json"});
-    REQUIRE(soon([&] { return process.handles(SIGINT); }, 20));
+    REQUIRE(soon([&] { return process.handles(SIGINT); }));
     pause_seconds(seconds);
     process.send(SIGINT);
-    const Ended ended = process.wait(10);
+    const Ended ended = process.wait();
     CHECK(ended.in_time);
     CHECK(ended.code == 1);
     CHECK(one_object(ended).value("error", "").find("cancelled") != std::string::npos);
@@ -131,10 +141,10 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
     {"name": "ball", "fixed": true, "field": {"mesh": "ball.stl", "voxels": )" +
                                     kVoxels + "}}]}");
   Process process(box, {"run", "scene.json"});
-  REQUIRE(soon([&] { return process.handles(SIGINT); }, 20));
+  REQUIRE(soon([&] { return process.handles(SIGINT); }));
   pause_seconds(1);
   process.send(SIGINT);
-  const Ended ended = process.wait(10);
+  const Ended ended = process.wait();
   CHECK(ended.in_time);
   CHECK(ended.code == 1);
   CHECK(fs::is_empty(box.cache()));
@@ -142,8 +152,8 @@ TEST_CASE("Ctrl-C during a long bake leaves nothing behind") {
 
 namespace {
 
-// Starts the program, interrupts it after `after` seconds, and checks that it ends soon, with one
-// sentence, and leaves no file.
+// Starts the program, interrupts it after `after` seconds, and checks that it ends after half a
+// second of each thread's work at most, with one sentence, and leaves no file.
 void check_interrupted(Sandbox& box, const Args& args, double after) {
   CAPTURE(args[1]);
   CAPTURE(after);
@@ -151,11 +161,11 @@ void check_interrupted(Sandbox& box, const Args& args, double after) {
   Process process(box, args);
   REQUIRE(soon([&] { return process.handles(SIGINT); }));
   pause_seconds(after);
-  const auto asked = std::chrono::steady_clock::now();
+  const double spent = process.cpu_seconds();
   process.send(SIGINT);
-  const Ended ended = process.wait(10);
-  CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - asked).count() <
-        0.5 * kSlower);
+  const Ended ended = process.wait();
+  CHECK(ended.in_time);
+  CHECK(ended.cpu_seconds - spent < 0.5 * kSlower * kThreads);
   CHECK(ended.code == 1);
   CHECK(ended.err.ends_with("hapsix: " + args.back() + ": cancelled\n"));
   CHECK(ended.out.empty());
@@ -204,7 +214,7 @@ TEST_CASE("a second Ctrl-C does not wait") {
   process.send(SIGINT);
   pause_seconds(0.05);
   process.send(SIGINT);
-  const Ended ended = process.wait(10);
+  const Ended ended = process.wait();
   CHECK(ended.in_time);
   CHECK(ended.code != 0);
   CHECK(box.files() == before);
@@ -218,7 +228,8 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
       MESSAGE("skipped: this machine gives no pseudo-terminal");
       return;
     }
-    Process process(box, {"run", "box-on-wall", "--duration", "1.8"}, "", dup(terminal.theirs));
+    Process process(box, {"run", "box-on-wall", "--duration", "6"}, "", dup(terminal.theirs));
+    CHECK(terminal.says(" s left"));  // the estimate appears after one second
     CHECK(process.wait().code == 0);
     const std::string seen = terminal.read_all();
     CHECK(count(seen, "running box-on-wall") >= 3);
@@ -232,8 +243,6 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
       CHECK(seen.find('\n', at) > end);
       CHECK(end - seen.rfind(wipe, at) - wipe.size() <= 80);  // a longer line would wrap
     }
-    // The run takes 1.8 s, and the estimate appears after one second.
-    CHECK(count(seen, "about 1 s left") >= 1);
   }
   {
     // A bake shows a share that only grows, and an estimate too.
@@ -241,12 +250,11 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
     spill(box.file("ball.stl"), stl(sphere_facets(0.1f, 100)));
     Process process(box, {"bake", "field", "ball.stl", "-o", "ball.vdb", "--voxels", kVoxels}, "",
                     dup(terminal.theirs));
-    pause_seconds(4 * std::min(kSlower, 4.0));
+    CHECK(terminal.says(" left"));
     process.send(SIGINT);
-    CHECK(process.wait(10).code == 1);
+    CHECK(process.wait().code == 1);
     const std::string seen = terminal.read_all();
     CAPTURE(seen);
-    CHECK(count(seen, " s left") + count(seen, " min left") >= 1);
     int share = 0;
     for (std::size_t at = seen.find('%'); at != std::string::npos; at = seen.find('%', at + 1)) {
       const int now = std::atoi(seen.c_str() + at - 4);

@@ -61,7 +61,7 @@ Seen check_same(ThreeBalls& one, ThreeBalls& two, int frames, bool coarse = fals
   one.open_both(), two.open_both();
   Seen seen;
   std::array<h6DeviceCommand, kHands> a{}, b{};
-  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
   for (int i = 0; i < frames || seen.helped < kHelped; ++i) {
     if (i > frames && std::chrono::steady_clock::now() > give_up) break;
     const auto samples = one.samples(i % 1000);
