@@ -10,6 +10,7 @@
 #include <deque>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <variant>
 
 #include "device/steering.h"
@@ -30,6 +31,9 @@ using Clock = std::chrono::steady_clock;
 using io::view::ViewRequest;
 
 constexpr auto kPicture = std::chrono::microseconds(16667);
+constexpr auto kBackground = std::chrono::seconds(1);
+constexpr double kMostDepth = 2;  // where a run may begin again [voxel]; check_start refuses 3
+constexpr double kGlide = 2;      // of a hand that is let go there, to its path [s]
 constexpr std::size_t kWaiting = 256;        // most requests of the page that may wait
 constexpr std::size_t kViewContacts = 2000;  // most contacts drawn as arrows
 
@@ -102,21 +106,23 @@ class Viewer : public RunObserver {
 
   void prepare(RunSetup& setup) override {
     again_ = false;
+    wish_ = {};
     steering_ = std::make_shared<device::Steering>();
     setup.steering = steering_;
     for (h6HandDef& hand : setup.hand_defs) hand.filter.clutch_buttons |= 1;
     apply(setup);
+    if (from_) start_from(*from_, setup);
   }
 
   void begin(RunSetup& setup, h6Loop* loop, Note note) override {
     setup_ = &setup;
     loop_ = loop;
     note_ = std::move(note);
-    wish_ = {};
     offset_ = {};
+    tell_settings(setup.session.get());
     state_.begin();
     state_.recording(setup.recorder != nullptr);
-    overlaps_ = setup.overlaps;
+    if (!from_) overlaps_ = setup.overlaps;
     next_ = Clock::now();
   }
 
@@ -129,11 +135,11 @@ class Viewer : public RunObserver {
     if (!refused.empty()) server_->say(io::view::LiveState::note(refused));
     tell_overlaps();
     h6LoopView view;
-    if (h6ReadView(loop_, &view)) state_.contacts(view);
-    if (Clock::now() >= next_ && state_.any() && server_->clients() > 0) {
-      next_ = std::max(next_ + kPicture, Clock::now() - kPicture);
-      server_->publish(state_.state_message());
+    if (h6ReadView(loop_, &view)) {
+      state_.contacts(view);
+      bodies_.assign(view.bodies, view.bodies + view.body_count);
     }
+    publish();
     return !again_;
   }
 
@@ -144,6 +150,21 @@ class Viewer : public RunObserver {
   }
 
  private:
+  // A page that draws slowly gets fewer messages, with all rows in them. One that draws nothing
+  // (it is in the background) gets one a second.
+  void publish() {
+    const auto now = Clock::now();
+    if (now < next_ || !state_.any() || server_->clients() == 0) return;
+    if (!server_->ready() && now - published_ < kBackground) return;
+    next_ = std::max(next_ + kPicture, now - kPicture);
+    published_ = now;
+    server_->publish(state_.state_message());
+  }
+  void tell_settings(const h6Session* session) {
+    h6CouplingDef coupling = coupling_;
+    if (!loaded_.hands.empty()) coupling = h6GetCoupling(session, 0);
+    state_.settings(in_use(loaded_, contact_), coupling);
+  }
   // Each page that opens is told what overlaps at the start.
   void tell_overlaps() {
     const std::size_t clients = server_->clients();
@@ -190,6 +211,12 @@ class Viewer : public RunObserver {
         contact_.epsilon = set.epsilon;
       }
     }
+    if (set.hand_stiffness > 0) {
+      // A rotational stiffness of the scene's own keeps its lever; the engine derives one of 0.
+      const double before_now = h6GetCoupling(setup_->session.get(), 0).stiffness;
+      coupling_.rotational_stiffness *= set.hand_stiffness / before_now;
+      coupling_.stiffness = set.hand_stiffness;
+    }
     if (set.max_depth_voxels > 0) {
       coupling_.max_depth_voxels = set.max_depth_voxels;
       coupling_.max_force = coupling_.max_torque =
@@ -209,7 +236,7 @@ class Viewer : public RunObserver {
     (void)setup_->session.release();  // the next line destroys it as `old`
     h6DestroySession(old);
     setup_->session = std::move(next);
-    state_.settings(in_use(loaded_, contact_), coupling_);
+    tell_settings(setup_->session.get());
     note_("settings", io::settings_text(contact_, coupling_));
   }
   void act(const io::view::SetPace& set) {
@@ -220,11 +247,40 @@ class Viewer : public RunObserver {
   }
   void act(const io::view::Reset&) {
     record_.clear();
+    from_.reset();
     again_ = true;
   }
+  void act(const io::view::Keep&) {
+    if (!state_.any() || bodies_.size() != loaded_.bodies.size()) return;
+    if (const char* why = stays()) return say(why);
+    const h6FrameRecord& r = state_.last();
+    if (r.report.max_depth_voxels > kMostDepth)
+      return say("the part is too deep in contact to begin here again: move it out a little");
+    kept_.emplace();
+    kept_->bodies = bodies_;
+    for (std::size_t h = 0; h < loaded_.hands.size(); ++h)
+      kept_->hands.push_back(r.command[h].pose);
+    say("kept: U or ‘back to it’ returns here");
+  }
+  void act(const io::view::GoBack&) {
+    if (const char* why = stays()) return say(why);
+    if (!record_.empty())
+      return say("a recording begins at the start and has no way back: stop it first");
+    from_ = kept_;  // nothing was kept: the start
+    again_ = true;
+  }
+  // Why the hands cannot be put back to another place; null: they can.
+  const char* stays() const {
+    for (const io::SceneHand& hand : setup_->hands)
+      if (hand.device != "path" && hand.device != "simulated")
+        return "a real hand cannot be put back: keep and back are for simulated hands";
+    return nullptr;
+  }
+  void say(const std::string& text) const { server_->say(io::view::LiveState::note(text)); }
   void act(const io::view::Record& record) {
     if (record.on == !record_.empty()) return;
     again_ = true;
+    from_.reset();
     if (!record.on) {
       server_->say(io::view::LiveState::note("recorded: " + record_));
       record_.clear();
@@ -241,6 +297,31 @@ class Viewer : public RunObserver {
   }
   void act(const io::view::Slice& slice) {
     if (const auto message = state_.slice_message(slice)) server_->say(message);
+  }
+
+  // Where all bodies and hands were; they start there at rest.
+  struct Place {
+    std::vector<h6Pose> bodies, hands;
+  };
+  // The first hand is held there, as the mouse held it. Let go, it glides to the start of its path.
+  void start_from(const Place& place, RunSetup& setup) {
+    placed_.assign(setup.def.bodies, setup.def.bodies + setup.def.body_count);
+    for (std::size_t b = 0; b < placed_.size(); ++b)
+      if (!placed_[b].fixed) placed_[b].pose = place.bodies[b];
+    setup.def.bodies = placed_.data();
+    // What overlaps in contact is a push, not a fit: it is relieved only where parts overlap by
+    // design.
+    if (overlaps_.empty()) setup.def.contact.fit = H6_FIT_TIGHT;
+    for (std::size_t h = 0; h < setup.hands.size(); ++h) {
+      io::Path path{{0, place.hands[h]}};
+      for (const io::PathRow& row : setup.hands[h].path)
+        path.push_back({row.t - setup.hands[h].path.front().t + kGlide, row.pose});
+      setup.hands[h].path = std::move(path);
+    }
+    if (place.hands.empty()) return;
+    wish_.held = wish_.placed = true;
+    wish_.pose = place.hands[0];
+    steering_->wish(wish_);
   }
 
   void apply(RunSetup& setup) const {
@@ -260,6 +341,9 @@ class Viewer : public RunObserver {
   std::shared_ptr<device::Steering> steering_;
   device::Steering::Wish wish_;
   h6Vec3 offset_{};
+  std::vector<h6Pose> bodies_;      // in the newest picture
+  std::optional<Place> kept_, from_;  // from_: where this run began; none: the scene's start
+  std::vector<h6BodyDef> placed_;   // of a run that began elsewhere
   std::vector<PartOverlap> overlaps_;
   std::size_t greeted_ = 0;  // open pages that know of `overlaps_`
   RunSetup* setup_ = nullptr;
@@ -267,7 +351,7 @@ class Viewer : public RunObserver {
   Note note_;
   std::string record_;
   bool again_ = false;
-  Clock::time_point next_;
+  Clock::time_point next_, published_;
 };
 
 }  // namespace

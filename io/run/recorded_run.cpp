@@ -179,6 +179,8 @@ std::string settings_text(const h6ContactDef& contact, const h6CouplingDef& coup
                       {"epsilon", contact.epsilon},
                       {"epsilon_normal", contact.epsilon_normal},
                       {"epsilon_torque", contact.epsilon_torque},
+                      {"hand_stiffness", coupling.stiffness},
+                      {"hand_rotational_stiffness", coupling.rotational_stiffness},
                       {"max_depth_voxels", coupling.max_depth_voxels},
                       {"max_force", coupling.max_force},
                       {"max_torque", coupling.max_torque}};
@@ -209,6 +211,9 @@ Outcome take_settings(const std::string& text, h6ContactDef& contact, h6Coupling
                                      {"max_force", &held.max_force},
                                      {"max_torque", &held.max_torque}})
       *value = o.at(key).get<double>();
+    // Older recordings have none, since nobody could change them then.
+    held.stiffness = o.value("hand_stiffness", held.stiffness);
+    held.rotational_stiffness = o.value("hand_rotational_stiffness", held.rotational_stiffness);
     contact = to;
     coupling = held;
     return Done{};

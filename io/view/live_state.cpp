@@ -101,7 +101,9 @@ ordered_json LiveState::contact_json() const {
   return {{"method", method},
           {"stiffness", contact_.stiffness},
           {"epsilon", epsilon_of(contact_)},
-          {"max_depth_voxels", coupling_.max_depth_voxels}};
+          {"max_depth_voxels", coupling_.max_depth_voxels},
+          {"hand_stiffness", coupling_.stiffness},
+          {"max_force", coupling_.max_force}};
 }
 
 // The obstacle at the deepest contact, with the triangle of its mesh that is nearest; null where

@@ -18,7 +18,7 @@ namespace h6::io::view {
 class LiveState {
  public:
   explicit LiveState(const LoadedScene& loaded);
-  // The contact and coupling settings in force.
+  // The contact and coupling settings in force, without zeros that the engine would replace.
   void settings(const h6ContactDef& contact, const h6CouplingDef& coupling);
   // A run begins and time restarts at zero.
   void begin();

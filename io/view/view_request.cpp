@@ -68,6 +68,8 @@ Result<ViewRequest> contact(const json& object) {
   if (!number(object, "epsilon", 1e-4, 2, set.epsilon)) return wrong("'epsilon' is 1e-4 to 2");
   if (!number(object, "max_depth_voxels", 0.01, 100, set.max_depth_voxels))
     return wrong("'max_depth_voxels' is 0.01 to 100");
+  if (!number(object, "hand_stiffness", 1, 1e6, set.hand_stiffness))
+    return wrong("'hand_stiffness' is 1 to 1e6 N/m");
   return ViewRequest(set);
 }
 
@@ -91,6 +93,8 @@ Result<ViewRequest> parse_request(std::string_view text) {
   if (name == "clutch") return turn<Clutch>(object);
   if (name == "contact") return contact(object);
   if (name == "reset") return ViewRequest(Reset{});
+  if (name == "keep") return ViewRequest(Keep{});
+  if (name == "back") return ViewRequest(GoBack{});
   if (name == "record") return turn<Record>(object);
   if (name == "pace") {
     SetPace set;

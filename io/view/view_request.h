@@ -27,12 +27,16 @@ struct SetContact {
   double stiffness = 0;         // [N/m]; 0: unchanged
   double epsilon = 0;           // 0: unchanged
   double max_depth_voxels = 0;  // of the coupling; 0: unchanged
+  double hand_stiffness = 0;    // of the coupling [N/m]; 0: unchanged
 };
 // 1: real time; between 0 and 1: slow motion; 0: paused.
 struct SetPace {
   double pace = 1;
 };
 struct Reset {};
+// Keeps where everything is; goes back to what was kept last.
+struct Keep {};
+struct GoBack {};
 struct Record {
   bool on = false;
 };
@@ -42,7 +46,8 @@ struct Slice {
   int axis = 2;
   double at = 0.5;
 };
-using ViewRequest = std::variant<Grab, MoveHand, Clutch, SetContact, SetPace, Reset, Record, Slice>;
+using ViewRequest = std::variant<Grab, MoveHand, Clutch, SetContact, SetPace, Reset, Keep, GoBack,
+                                 Record, Slice>;
 
 // {"do": "grab", "on": true}, {"do": "hand", "p": [x, y, z], "q": [w, x, y, z]}, ... Every number
 // must be finite and in its range; a failure is a sentence for the page.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/view/view_server.h"
 
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -28,6 +29,10 @@ using beast::error_code;
 
 constexpr std::size_t kOutstanding = 64;
 constexpr auto kRequestTime = std::chrono::seconds(10);
+// Of live messages that a client has not seen yet. Two: one is drawn while the next is on its way.
+constexpr int kUnseen = 2;
+// A page in the background does not draw, and sees nothing; it gets a message now and then.
+constexpr auto kPatience = std::chrono::seconds(1);
 
 // Takes the same time for wrong and right guesses, so the time tells nothing about the token.
 bool same(std::string_view a, std::string_view b) {
@@ -78,9 +83,11 @@ struct ViewServer::Body {
   std::set<std::shared_ptr<Client>> watching;
   std::atomic<std::size_t> client_count{0};
   std::atomic<std::uint64_t> refused_count{0};
+  std::atomic<bool> any_ready{false};
   std::thread thread;
 
   void accept();
+  void count_ready();
   bool known_host(std::string_view host) const {
     return host == "127.0.0.1:" + port_text || host == "localhost:" + port_text;
   }
@@ -108,6 +115,7 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
       self->body_.watching.insert(self);
       self->body_.client_count = self->body_.watching.size();
       if (self->body_.greeting) self->say(self->body_.greeting);
+      self->body_.count_ready();
       self->read();
     });
   }
@@ -122,11 +130,13 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
     live_ = message;
     write();
   }
+  bool ready() const { return open_ && !live_ && may_send(); }
   void end() {
     open_ = false;
     error_code ignored;
     stream_.next_layer().socket().close(ignored);
     if (body_.watching.erase(shared_from_this())) body_.client_count = body_.watching.size();
+    body_.count_ready();
   }
 
  private:
@@ -135,18 +145,30 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
       if (failed) return self->end();  // closed, too long, or not a WebSocket's frame
       if (!self->stream_.got_text()) return self->end();
       const auto data = self->buffer_.cdata();
-      self->body_.receive({static_cast<const char*>(data.data()), data.size()});
+      self->heard({static_cast<const char*>(data.data()), data.size()});
       self->buffer_.consume(self->buffer_.size());
       self->read();
     });
+  }
+  void heard(std::string_view text) {
+    if (text != "seen") return body_.receive(text);
+    unseen_ = 0;
+    paced_ = true;
+    write();
+    body_.count_ready();
+  }
+  bool may_send() const {
+    return !paced_ || unseen_ < kUnseen || std::chrono::steady_clock::now() - sent_at_ > kPatience;
   }
   void write() {
     if (sending_) return;
     if (!queue_.empty()) {
       sending_ = queue_.front();
       queue_.pop_front();
-    } else {
+    } else if (live_ && may_send()) {
       sending_.swap(live_);
+      ++unseen_;
+      sent_at_ = std::chrono::steady_clock::now();
     }
     if (!sending_) return;
     stream_.async_write(asio::buffer(*sending_),
@@ -154,6 +176,7 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
                           self->sending_.reset();
                           if (failed) return self->end();
                           self->write();
+                          self->body_.count_ready();
                         });
   }
 
@@ -162,7 +185,9 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
   beast::flat_buffer buffer_;
   std::deque<Message> queue_;
   Message live_, sending_;
-  bool open_ = false;
+  bool open_ = false, paced_ = false;  // paced: it says what it has seen
+  int unseen_ = 0;                     // live messages sent since it said so
+  std::chrono::steady_clock::time_point sent_at_{};  // of the last live message
 };
 
 // One request: it is answered, refused, or becomes a client.
@@ -261,6 +286,11 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
   std::optional<http::response<http::string_body>> response_;
 };
 
+void ViewServer::Body::count_ready() {
+  any_ready = std::any_of(watching.begin(), watching.end(),
+                          [](const std::shared_ptr<Client>& c) { return c->ready(); });
+}
+
 void ViewServer::Body::accept() {
   acceptor.async_accept([this](error_code failed, tcp::socket socket) {
     if (failed == asio::error::operation_aborted) return;
@@ -327,6 +357,7 @@ void ViewServer::publish(Message live) {
   asio::post(body_->io, [this, live] {
     const auto clients = body_->watching;  // sending may end a client, which leaves `watching`
     for (const auto& client : clients) client->live(live);
+    body_->count_ready();
   });
 }
 void ViewServer::say(Message message) {
@@ -337,6 +368,7 @@ void ViewServer::say(Message message) {
 }
 
 std::size_t ViewServer::clients() const { return body_->client_count.load(); }
+bool ViewServer::ready() const { return body_->any_ready.load(); }
 std::uint64_t ViewServer::refused() const { return body_->refused_count.load(); }
 
 }  // namespace h6::io::view

@@ -7,7 +7,8 @@
 // It listens on 127.0.0.1. Other programs and other sites' scripts are refused: every request must
 // carry the token, which only the printed address has; the Host header must be this address, so a
 // foreign name that resolves here fails; a WebSocket must come from this page's Origin. A client
-// too slow for the live messages misses some. A client that stops reading or sends too long a text
+// that answers each live message it has drawn with the text "seen" gets the next when it has drawn
+// all but one; a client too slow for the live messages misses some. A client that stops reading or sends too long a text
 // is closed; the others do not notice. Where too many connections wait with half a request, the one
 // that waits longest gives way to the next. The server works on its own thread, so a caller that
 // publishes never waits for a client.
@@ -53,6 +54,8 @@ class ViewServer {
   void say(Message message);
 
   std::size_t clients() const;    // that watch now
+  // Whether a client waits for a live message. What is published otherwise reaches nobody yet.
+  bool ready() const;
   std::uint64_t refused() const;  // requests turned away
 
  private:

@@ -111,6 +111,7 @@ TEST_CASE("settings come back to the bit, and nonsense in their place is a sente
   contact.method = H6_METHOD_GAUSS6, contact.pieces = H6_PIECE_PRODUCT | H6_PIECE_DEPTH;
   contact.stiffness = 1e5 / 7, contact.epsilon = 1.0 / 3, contact.epsilon_torque = 1e-300;
   coupling.max_depth_voxels = 0.1, coupling.max_torque = 1.0 / 9;
+  coupling.stiffness = 1e4 / 3, coupling.rotational_stiffness = 1.0 / 7;
   const std::string text = io::settings_text(contact, coupling);
   CHECK(text.size() < 400);  // a recording cuts the detail of an event after 512 bytes
   REQUIRE(io::take_settings("after frame 12: " + text, back, held));
@@ -122,6 +123,12 @@ TEST_CASE("settings come back to the bit, and nonsense in their place is a sente
     CHECK_FALSE(io::take_settings(wrong, back, held));
     CHECK(std::memcmp(&back, &contact, sizeof back) == 0);
   }
+  // As older recordings have it: nobody could change the hand's stiffness then.
+  std::string older = text;
+  const std::size_t at = older.find("\"hand_"), end = older.find("\"max_depth");
+  older.erase(at, end - at);
+  CHECK(io::take_settings(older, back, held));
+  CHECK(held.stiffness == coupling.stiffness);
   for (std::size_t cut = 0; cut < text.size(); cut += 7)
     CHECK_FALSE(io::take_settings(text.substr(0, cut), back, held));
 }

@@ -50,6 +50,11 @@ TEST_CASE("each request is parsed into its members") {
   CHECK(asked<SetContact>(set)->method == "gauss6+facing");
   CHECK(asked<SetContact>(set)->stiffness == 2e4);
   CHECK(asked<SetContact>(set)->epsilon == 0);  // unchanged
+  const auto hand = parse_request(R"({"do":"contact","hand_stiffness":500})");
+  REQUIRE(asked<SetContact>(hand));
+  CHECK(asked<SetContact>(hand)->hand_stiffness == 500);
+  CHECK(asked<Keep>(parse_request(R"({"do":"keep"})")));
+  CHECK(asked<GoBack>(parse_request(R"({"do":"back"})")));
   CHECK(asked<Reset>(parse_request(R"({"do":"reset"})")));
   const auto slice = parse_request(R"({"do":"slice","axis":1,"at":0.25})");
   REQUIRE(asked<Slice>(slice));
@@ -78,6 +83,7 @@ TEST_CASE("a member that is out of range, of another type or unknown gives one s
         R"({"do":"pace","pace":2})", R"({"do":"pace","pace":-0.1})",
         R"({"do":"contact","method":"best"})", R"({"do":"contact","stiffness":-5})",
         R"({"do":"contact","stiffness":1e30})", R"({"do":"contact","epsilon":5})",
+        R"({"do":"contact","hand_stiffness":-1})", R"({"do":"contact","hand_stiffness":1e7})",
         R"({"do":"contact","max_depth_voxels":0})", R"({"do":"slice","axis":3,"at":0.5})",
         R"({"do":"slice","axis":1.5,"at":0.5})", R"({"do":"slice","axis":0,"at":1.01})",
         R"({"do":"record"})"}) {

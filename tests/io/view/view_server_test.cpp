@@ -218,6 +218,35 @@ TEST_CASE("texts reach the program, messages reach the client, and the greeting 
   CHECK(got.find("live one") != std::string::npos);
 }
 
+TEST_CASE("a page that says what it has seen gets two messages ahead, and the newest after that") {
+  Server s;
+  const Client client(s);
+  REQUIRE(soon([&] { return s.server->clients() == 1; }));
+  client.send(frame("seen"));
+  client.send(frame("{}"));  // both are heard in their order
+  REQUIRE(soon([&] { return s.heard_count() == 1; }));
+  CHECK(s.heard[0] == "{}");
+  for (const char* live : {"live 1", "live 2"}) {
+    REQUIRE(soon([&] { return s.server->ready(); }));
+    s.server->publish(std::make_shared<const std::string>(live));
+  }
+  CHECK(client.read(100).find("live 2") != std::string::npos);
+  CHECK(!s.server->ready());
+  s.server->publish(std::make_shared<const std::string>("live 3"));
+  s.server->publish(std::make_shared<const std::string>("live 4"));
+  CHECK(client.read(100).empty());
+  client.send(frame("seen"));
+  const std::string got = client.read(500);
+  CHECK(got.find("live 3") == std::string::npos);
+  CHECK(got.find("live 4") != std::string::npos);
+  // One that sees nothing for a second, in the background, is sent the next all the same.
+  s.server->publish(std::make_shared<const std::string>("live 5"));
+  s.server->publish(std::make_shared<const std::string>("live 6"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+  s.server->publish(std::make_shared<const std::string>("live 7"));
+  CHECK(client.read(500).find("live 7") != std::string::npos);
+}
+
 TEST_CASE("oversize and malformed messages close that client only") {
   ServerOptions options;
   options.stall_seconds = 600;  // so that only the cause under test closes a client

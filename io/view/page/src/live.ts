@@ -5,9 +5,11 @@ import { floats, unpack, type Packet } from './envelope';
 import { GaussSphere } from './gauss';
 import { drawHistogram, percentile, short } from './histogram';
 import { Strips } from './strips';
+import { principalAxes } from './stiffness';
 import { View3D } from './view3d';
 import { Drag } from './drag';
 import { inControl, Steer } from './steer';
+import { Headset } from './xr';
 
 const $ = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 const input = (id: string) => $<HTMLInputElement>(id);
@@ -22,9 +24,12 @@ let scene: any = null;
 let newest: Packet | null = null;
 let drag: Drag | null = null;
 let steer: Steer | null = null;
+let headset: Headset | null = null;
 let heard = 0;             // when the last state came [ms]
 let last = 0, slow = 0;     // the picture before [ms]; mean time between pictures [ms]
-const help = 'Drag the part to move it · Shift or right button turns it · wheel moves it away · or arrow and page keys, or a gamepad · drag elsewhere turns the camera';
+const help = matchMedia('(pointer: coarse)').matches
+  ? 'Drag the part to move it · two fingers turn, twist and pinch it away · drag elsewhere turns the camera'
+  : 'Drag the part to move it · Shift or right button turns it · wheel moves it away · or arrow and page keys, or a gamepad · drag elsewhere turns the camera';
 let paused = false, clutched = false;
 let recording = false;  // as the program said last; the button shows it when the page draws
 let pace = 1;
@@ -66,6 +71,12 @@ function load(packet: Packet) {
     end() { ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] }); },
   });
   steer = new Steer(drag, clutch);
+  headset = new Headset(view, drag, (on) => {
+    $('headset').setAttribute('aria-pressed', String(on));
+    $('headset').classList.toggle('on', on);
+    hint(on ? 'Hold a controller\'s grip to take the part' : help);
+  });
+  void Headset.offered().then((yes) => { $('headset').hidden = !yes; });
   hint(help);
   settings(scene.contact);
   if (view.partHidden()) {
@@ -87,6 +98,7 @@ function settings(c: any) {
   };
   put('stiffness', c.stiffness, `${c.stiffness.toPrecision(3)} N/m`);
   put('epsilon', c.epsilon, c.epsilon.toPrecision(2));
+  put('hand', c.hand_stiffness, `${c.hand_stiffness.toPrecision(3)} N/m`);
   put('saturation', c.max_depth_voxels, `${c.max_depth_voxels.toPrecision(2)} voxel`);
 }
 
@@ -94,13 +106,14 @@ function show(packet: Packet) {
   const h = packet.head;
   view.poses(floats(packet, 'poses'));
   const hand = floats(packet, 'hands');
-  if (!drag?.held) view.handAt(hand);
+  if (!drag?.held && !headset?.holds) view.handAt(hand);
   const contacts = {
     p: floats(packet, 'contact_p'), n: floats(packet, 'contact_n'), t: floats(packet, 'contact_t'),
     w: floats(packet, 'contact_w'), d: floats(packet, 'contact_d'),
   };
   view.contacts(contacts, scene.voxel);
   view.stiffness(h.stiffness, h.contact.stiffness, input('ellipsoid').checked);
+  $('ellipsoid-out').textContent = stiffest(h.stiffness);
   gauss.draw(contacts.n, contacts.t, contacts.w, view.camera.quaternion);
   $('n-contacts').textContent = String(h.contacts);
   $('n-depth').textContent = h.depth_voxels.toFixed(2);
@@ -130,6 +143,12 @@ function show(packet: Packet) {
   settings(h.contact);
   $('record').classList.toggle('on', h.recording);
   $('record').setAttribute('aria-pressed', String(h.recording));
+}
+
+// The largest principal value, in words.
+function stiffest(m: number[]) {
+  const most = Math.max(...principalAxes(m).values);
+  return most > 0 ? `${most.toPrecision(2)} N/m` : 'free';
 }
 
 // Says when what is shown is old, or when this page is too slow to follow.
@@ -197,25 +216,31 @@ function askSlice() {
 }
 
 $('method').onchange = () => changeContact({ method: $<HTMLSelectElement>('method').value });
-for (const [id, key] of [['stiffness', 'stiffness'], ['epsilon', 'epsilon'], ['saturation', 'max_depth_voxels']])
+for (const [id, key] of [['stiffness', 'stiffness'], ['epsilon', 'epsilon'], ['saturation', 'max_depth_voxels'], ['hand', 'hand_stiffness']])
   input(id).onchange = () => changeContact({ [key]: 10 ** Number(input(id).value) });
 $('path').onclick = () => ask({ do: 'grab', on: false });
 $('clutch').onclick = () => clutch(!clutched);
 $('pause').onclick = pause;
 input('pace').oninput = () => { pace = Number(input('pace').value); if (!paused) setPace(pace); };
 $('reset').onclick = () => ask({ do: 'reset' });
+$('keep').onclick = () => ask({ do: 'keep' });
+$('back').onclick = () => ask({ do: 'back' });
+$('headset').onclick = () => headset?.toggle().catch((e) => hint(`the headset cannot be used: ${e.message}`));
 $('record').onclick = () => ask({ do: 'record', on: !recording });
 input('opacity').oninput = () => view.environmentOpacity(Number(input('opacity').value));
 for (const id of ['slice-on', 'slice-axis', 'slice-at']) $(id).oninput = askSlice;
 addEventListener('keydown', (e) => {
   if (e.repeat || e.target instanceof HTMLSelectElement) return;
   if (e.key === ' ' && !inControl(e)) { e.preventDefault(); pause(); }
+  if (e.ctrlKey || e.metaKey || e.altKey) return;
   if (e.key === 'c') clutch(true);
+  if (e.key === 'k') ask({ do: 'keep' });
+  if (e.key === 'u') ask({ do: 'back' });
 });
 addEventListener('keyup', (e) => { if (e.key === 'c') clutch(false); });
 
 let drawn: Packet | null = null, strips_at = 0;
-function tick(now: number) {
+function tick(now: number, frame?: XRFrame) {
   const passed = now - last;
   last = now;
   if (passed < 5000) slow = 0.9 * slow + 0.1 * passed;
@@ -223,20 +248,22 @@ function tick(now: number) {
   if (scene && newest && newest !== drawn) {
     drawn = newest;
     show(newest);
+    if (socket.readyState === WebSocket.OPEN) socket.send('seen');
     if (now - strips_at > 90) {
       strips_at = now;
       strips.show([{ rows, width }]);
     }
   }
   if (newest === drawn) freshness();
+  const h = newest?.head;
+  headset?.tick(frame, h && performance.now() - heard < 1000 ? { force: h.force, most: h.contact.max_force, contacts: h.contacts } : null);
   view.render();
-  requestAnimationFrame(tick);
 }
 connect();
-requestAnimationFrame(tick);
+view.renderer.setAnimationLoop(tick);  // a headset calls it at its own rate
 // The browser tests read numbers here instead of pixels.
 (window as any).hapsix = {
-  view, ask, state: () => newest?.head,
+  view, ask, state: () => newest?.head, drag: () => drag, headset: () => headset,
   // The greatest penetration depth since a time of the run [voxel].
   deepest(since: number) {
     let most = 0;

@@ -63,6 +63,9 @@ export class View3D {
   private colour = new THREE.Color();
   private heads: BodyHead[] = [];
   private others: THREE.Object3D[] = [];
+  private centre = new THREE.Vector3();     // of the scene, world [m]
+  private up = 'z';
+  private seat: THREE.Matrix4 | null = null; // the camera's place, while a headset moves it
 
   constructor(private where: HTMLElement) {
     try {
@@ -81,7 +84,7 @@ export class View3D {
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     canvas.setAttribute('role', 'application');
-    canvas.setAttribute('aria-label', 'the parts in space; arrow keys and page keys move the part, with Shift they turn it');
+    canvas.setAttribute('aria-label', 'the parts in space; drag the part, or use arrow keys and page keys; with Shift they turn it');
     this.camera.add(new THREE.DirectionalLight('#ffffff', 0.7));
     this.scene.add(this.sky, this.sun, this.camera, this.root);
     this.arrows = new THREE.InstancedMesh(arrowShape(), new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }), maxArrows);
@@ -120,7 +123,7 @@ export class View3D {
 
   load(packet: Packet) {
     this.heads = packet.head.bodies;
-    const up = packet.head.up ?? 'z';
+    const up = this.up = packet.head.up ?? 'z';
     this.camera.up.copy(this.upright(new THREE.Vector3(0, 0, 1), up));
     this.sun.position.copy(this.upright(new THREE.Vector3(2, -3, 4), up));
     this.sky.position.copy(this.camera.up);
@@ -170,6 +173,7 @@ export class View3D {
     if (box.isEmpty()) box.set(new THREE.Vector3(-0.05, -0.05, -0.05), new THREE.Vector3(0.05, 0.05, 0.05));
     this.radius = 0.5 * box.getSize(new THREE.Vector3()).length();
     this.root.scale.setScalar(1 / this.radius);
+    box.getCenter(this.centre);
     // Near enough to see the part, far enough to see its surroundings.
     const focus = (part.isEmpty() ? box : part).getCenter(new THREE.Vector3()).divideScalar(this.radius);
     const near = part.isEmpty() ? 1 : Math.max(0.3, 0.7 * part.getSize(new THREE.Vector3()).length() / this.radius);
@@ -358,12 +362,32 @@ export class View3D {
     }
   }
 
+  // Puts the scene on a table: its centre at `at`, its up axis up (y), its radius as given [m].
+  // Null: back to where the page shows it, with the camera where it was.
+  putOn(at: THREE.Vector3 | null, radius: number) {
+    if (at) this.seat ??= this.camera.matrix.clone();
+    this.root.scale.setScalar(radius / this.radius);
+    this.root.position.set(0, 0, 0);
+    this.root.quaternion.identity();
+    if (at) {
+      const up = this.upright(new THREE.Vector3(0, 0, 1), this.up);
+      this.root.quaternion.setFromUnitVectors(up, new THREE.Vector3(0, 1, 0));
+      this.root.position.copy(this.centre).multiplyScalar(-radius / this.radius).applyQuaternion(this.root.quaternion).add(at);
+    } else if (this.seat) {
+      this.seat.decompose(this.camera.position, this.camera.quaternion, new THREE.Vector3());
+      this.seat = null;
+      this.resize();
+    }
+    this.root.updateMatrixWorld(true);
+  }
+
   render() {
-    this.orbit.update();
+    if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.renderer.render(this.scene, this.camera);
   }
 
   private resize() {
+    if (this.renderer.xr.isPresenting) return;
     const w = Math.max(64, this.where.clientWidth), h = Math.max(64, this.where.clientHeight);
     this.renderer.setSize(w, h);
     this.camera.aspect = w / h;
