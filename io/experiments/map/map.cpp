@@ -15,6 +15,8 @@ struct Slow {
   const char* why;
 };
 constexpr Slow kSlow[] = {
+    {"spline-hub-10k", "a frame takes milliseconds; --scenes spline-hub-10k runs it"},
+    {"spline-hub-100k", "a frame takes tens of milliseconds; --scenes spline-hub-100k runs it"},
     {"engine-bay", "each variation bakes 505,276 triangles anew; --scenes engine-bay runs it"},
     {"landing-gear",
      "each variation bakes 1,789,551 triangles anew; --scenes landing-gear runs it"}};
