@@ -123,7 +123,7 @@ struct FrameTeam::Resident {
   int early = 0;                            // frames in a row that came long before they were due
 
   void help() {
-    (void)job->polling.load(std::memory_order_acquire);
+    (void)state.load(std::memory_order_acquire);  // what the constructor wrote before
     int waiting = kWaiting;
     if (!state.compare_exchange_strong(waiting, kHelping, std::memory_order_acq_rel)) return;
     FlushDenormals flush;
@@ -215,19 +215,16 @@ FrameTeam::FrameTeam(unsigned threads, const h6Tasks& tasks)
   using Control = oneapi::tbb::global_control;
   if (threads_ > machine_threads())
     allowance_ = std::make_shared<Control>(Control::max_allowed_parallelism, threads_);
-  // Polling is off until the first frame; the store also orders construction before the helpers'
-  // work.
-  job_->polling.store(false, std::memory_order_release);
   resident_ = std::make_unique<std::shared_ptr<Resident>[]>(helpers);
   for (unsigned i = 0; i < helpers; ++i) {
     auto helper = std::make_shared<Resident>();
     helper->job = job_;
     helper->number = i + 1;
     resident_[i] = helper;
-    job_->polling.store(false, std::memory_order_release);
-    // A thread sanitizer cannot see how TBB hands the closure over, so it must ignore this body.
-    // The body reads the raw pointer, not the shared one, because functions that it calls are
-    // watched.
+    // A thread sanitizer cannot see how TBB hands the closure over. So help() gets all that was
+    // written up to here through this store, and the closure's body, which reads the raw pointer,
+    // is not watched.
+    helper->state.store(Resident::kWaiting, std::memory_order_release);
     helper->arena.enqueue([ kept = helper, raw = helper.get() ]()
                               __attribute__((no_sanitize("thread"))) { raw->help(); });
   }
