@@ -266,11 +266,12 @@ TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped 
   }
   {
     Terminal terminal;
-    // This run is short even on a busy machine.
     Process process(box, {"run", "box-on-wall", "--virtual-time", "--duration", "0.1"}, "",
                     dup(terminal.theirs));
-    CHECK(process.wait().code == 0);
-    CHECK(terminal.read_all().find('%') == std::string::npos);
+    const Ended ended = process.wait();
+    CHECK(ended.code == 0);
+    // A full machine may make a second of it, and then there is a bar.
+    if (ended.wall_seconds < 0.5) CHECK(terminal.read_all().find('%') == std::string::npos);
   }
   const Ended piped = run(box, {"run", "box-on-wall", "--duration", "1.2"});
   CHECK(piped.code == 0);
