@@ -82,7 +82,8 @@ class Batch {
     std::atomic<bool>& busy;
   };
   Session create(const Definition& of) const {
-    return of.with([&](const h6SessionDef& def) {
+    return of.with([&](h6SessionDef def) {
+      def.workers = workers_;
       return Session::make(
           [&](h6Error* error) { return h6CreateSession(model_->get(), &def, error); });
     });

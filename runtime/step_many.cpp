@@ -6,18 +6,14 @@
 #include <atomic>
 #include <exception>
 #include <iterator>
+#include <vector>
 
 #include "hapsix/batch.h"
 #include "runtime/frame/session.h"
+#include "runtime/frame/workers.h"
 #include "sched/clock.h"
 #include "sched/frame_team.h"
 #include "sched/parallel_for.h"
-
-struct h6Workers {
-  h6Workers(unsigned threads, const h6Tasks& tasks) : team(threads, tasks) {}
-  h6::sched::FrameTeam team;
-  std::atomic<bool> busy{false};
-};
 
 namespace h6 {
 namespace {
@@ -61,15 +57,17 @@ void put_out(const h6StepArrays& a, std::size_t i, h6Status status, const h6Fram
   put(a.state_hash, i, report.state_hash);
 }
 
-bool taken(h6Session* session, std::uint32_t hands) {
-  Owner none = Owner::nobody;
-  return session && session->hands.size() == hands &&
-         session->owner.compare_exchange_strong(none, Owner::step);
+bool taken(h6Workers* workers, h6Session* session, std::uint32_t hands) {
+  if (!session || session->hands.size() != hands) return false;
+  if (session->workers && session->workers != workers) return false;
+  Owner idle = idle_owner(*session);
+  return session->owner.compare_exchange_strong(idle, Owner::step);
 }
 
-h6Status step_one(const h6StepArrays& a, std::size_t i) {
+// `thread`: of the workers.
+h6Status step_one(h6Workers* workers, unsigned thread, const h6StepArrays& a, std::size_t i) {
   h6Session* const session = a.sessions[i];
-  if (!taken(session, a.hands)) {
+  if (!taken(workers, session, a.hands)) {
     for (std::uint32_t h = 0; h < a.hands; ++h) put_out(a, i, h, {}, {});
     put_out(a, i, H6_OUTPUT_FAULT, {});
     return H6_OUTPUT_FAULT;
@@ -77,40 +75,70 @@ h6Status step_one(const h6StepArrays& a, std::size_t i) {
   h6DeviceSample samples[H6_MAX_HANDS]{};
   h6DeviceCommand commands[H6_MAX_HANDS];
   put_in(a, a.hands * i, samples);
+  if (session->workers) borrow(session->lanes, workers->scratch[thread]);
   h6Status status = 0;
   for (std::uint32_t step = 0; step < a.steps; ++step) status |= frame(*session, samples, commands);
   for (std::uint32_t h = 0; h < a.hands; ++h)
     put_out(a, i, h, commands[h], h6GetBody(session, session->hands[h].body));
   put_out(a, i, status, session->report);
-  session->owner.store(Owner::nobody, std::memory_order_release);
+  session->owner.store(idle_owner(*session), std::memory_order_release);
   return status;
 }
 
 // A session has scratch for the threads of its own team, so every worker is the first thread there.
-h6Status step_some(const h6StepArrays& a, std::size_t begin, std::size_t end) {
+h6Status step_some(h6Workers* workers, const h6StepArrays& a, std::size_t begin, std::size_t end) {
   const unsigned before = sched::FrameTeam::here();
   sched::FrameTeam::be(0);
   h6Status status = 0;
-  for (std::size_t i = begin; i < end; ++i) status |= step_one(a, i);
+  for (std::size_t i = begin; i < end; ++i) status |= step_one(workers, before, a, i);
   sched::FrameTeam::be(before);
   return status;
 }
 
-h6Status step_all(sched::FrameTeam& team, const h6StepArrays& a) {
+h6Status step_all(h6Workers& workers, const h6StepArrays& a) {
+  sched::FrameTeam& team = workers.team;
   std::atomic<h6Status> status{0};
   // One session a slice; more only where there are more sessions than a job can have slices.
   constexpr std::size_t most = sched::FrameTeam::kMaxSlices - 1;
   const std::size_t each = (a.count + most - 1) / most;
+  const unsigned before = sched::FrameTeam::here();
+  sched::FrameTeam::be(0);  // the caller may be a helper of another team
   team.begin_frame(sched::now_ns());
   team.for_slices((a.count + each - 1) / each, [&](std::size_t slice) {
     const std::size_t begin = each * slice;
-    status.fetch_or(step_some(a, begin, std::min(begin + each, a.count)));
+    status.fetch_or(step_some(&workers, a, begin, std::min(begin + each, a.count)));
   });
   team.end_frame(sched::now_ns());
+  sched::FrameTeam::be(before);
   return status;
 }
 
 }  // namespace
+
+bool make_room(h6Workers& workers, const ScratchRoom& room, h6Error* error) {
+  const ScratchRoom next = either(workers.room, room);
+  std::vector<Scratch> scratch(workers.scratch.size());
+  const auto lay_out = [&](Arena& arena) {
+    for (Scratch& one : scratch) lay_out_scratch(one, arena, next, true);
+    return arena.used();
+  };
+  if (workers.memory && next == workers.room) return true;
+  Arena count;
+  const std::size_t bytes = lay_out(count);
+  void* const memory = allocate(workers.allocator, bytes);
+  if (!memory)
+    return fail(error, H6_ERROR_MEMORY,
+                "no memory for the scratch of the workers (%zu MB): lower max_contacts",
+                bytes / 1000000);
+  std::fill_n(static_cast<char*>(memory), bytes, char{0});  // no page faults later
+  Arena arena(memory, bytes);
+  lay_out(arena);
+  release(workers.allocator, workers.memory, workers.memory_bytes);
+  workers.memory = memory, workers.memory_bytes = bytes, workers.room = next;
+  std::copy(scratch.begin(), scratch.end(), workers.scratch.begin());  // sessions point to these
+  return true;
+}
+
 }  // namespace h6
 
 using namespace h6;
@@ -134,7 +162,7 @@ h6Workers* h6CreateWorkers(const h6WorkersDef* def, h6Error* error) {
            nullptr;
   const unsigned cores = std::min(sched::machine_threads(), sched::FrameTeam::kMostThreads);
   try {
-    return new h6Workers(used.threads ? used.threads : cores, used.tasks);
+    return new h6Workers(used.threads ? used.threads : cores, used);
   } catch (const std::exception& e) {  // from threads
     return fail(error, H6_ERROR_SYSTEM, "the workers could not be made: %s", e.what()), nullptr;
   }
@@ -147,11 +175,10 @@ uint32_t h6WorkerThreads(const h6Workers* workers) { return workers ? workers->t
 h6Status h6StepMany(h6Workers* workers, const h6StepArrays* arrays) {
   if (!arrays || !whole(*arrays)) return H6_OUTPUT_FAULT;
   if (arrays->count == 0) return 0;
-  if (!workers) return step_some(*arrays, 0, arrays->count);
-  if (workers->busy.exchange(true, std::memory_order_acquire)) return H6_OUTPUT_FAULT;
-  const h6Status status = step_all(workers->team, *arrays);
-  workers->busy.store(false, std::memory_order_release);
-  return status;
+  if (!workers) return step_some(nullptr, *arrays, 0, arrays->count);
+  const Turn turn(workers);
+  if (!turn) return H6_OUTPUT_FAULT;
+  return step_all(*workers, *arrays);
 }
 
 }  // extern "C"

@@ -11,9 +11,12 @@ int main(void) {
   h6Error error;
   h6Scene* scene = h6ReadScene("peg-in-hole", NULL, &error);
   if (!scene) return fprintf(stderr, "%s\n", error.message), 1;
+  h6Workers* workers = h6CreateWorkers(NULL, &error); /* one for each core */
+  if (!workers) return fprintf(stderr, "%s\n", error.message), 1;
   h6SessionDef def;
   h6GetSceneSession(scene, &def);
   def.max_contacts = 500; /* most of a session's memory */
+  def.workers = workers;  /* whose scratch the sessions share */
   static h6Session* sessions[COUNT];
   static h6Pose hand[COUNT];
   static h6Wrench felt[COUNT];
@@ -22,8 +25,6 @@ int main(void) {
     if (!sessions[i]) return fprintf(stderr, "%s\n", error.message), 1;
     hand[i] = def.bodies[1].pose;
   }
-  h6Workers* workers = h6CreateWorkers(NULL, &error); /* one for each core */
-  if (!workers) return fprintf(stderr, "%s\n", error.message), 1;
   h6StepArrays arrays = h6DefaultStepArrays();
   arrays.sessions = sessions, arrays.count = COUNT;
   arrays.pose = hand, arrays.command = felt;
@@ -32,7 +33,7 @@ int main(void) {
     h6StepMany(workers, &arrays);
   }
   printf("forces from %.2f to %.2f N\n", felt[0].force.x, felt[COUNT - 1].force.x);
-  h6DestroyWorkers(workers);
   for (int i = 0; i < COUNT; ++i) h6DestroySession(sessions[i]);
+  h6DestroyWorkers(workers);
   return h6DestroyScene(scene), 0;
 }

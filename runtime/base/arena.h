@@ -94,6 +94,11 @@ class Arena {
     return reinterpret_cast<T*>(base_ + at);
   }
   std::size_t used() const { return used_; }
+  // What is taken next lies over what was taken since used() was `at`.
+  void go_back(std::size_t at) {
+    if (used_ != kTooMuch) used_ = at;
+  }
+  void go_on(std::size_t at) { used_ = std::max(used_, at); }  // behind both
 
  private:
   char* base_ = nullptr;

@@ -12,6 +12,7 @@
 #include "runtime/contact/contact_stages.h"
 #include "runtime/frame/session_checks.h"
 #include "runtime/frame/session_memory.h"
+#include "runtime/frame/workers.h"
 
 namespace h6 {
 namespace {
@@ -205,6 +206,8 @@ bool offsets_fit(const h6Model& model, const h6SessionDef& def, std::span<const 
 }
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
+  const Turn turn(def.workers);
+  if (!turn) return fail(error, H6_ERROR_BUSY, "the session's workers are stepping others");
   const std::vector<h6PairDef> listed = sorted_pairs(def);
   if (!offsets_fit(*s.model, def, listed, error) || !reserve_memory(s, def, listed, error))
     return false;
@@ -267,6 +270,8 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   if (!s) return fail(error, H6_ERROR_MEMORY, "no memory for a session"), nullptr;
   s->model = model;
   s->allocator = def->allocator;
+  s->workers = def->workers;
+  s->owner = idle_owner(*s);
   s->settings = {
       .contact = def->contact,
       .integrator = def->integrator,

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <span>
 
+#include "hapsix/batch.h"
 #include "hapsix/hapsix.h"
 #include "runtime/contact/anytime.h"
 #include "runtime/contact/pair.h"
@@ -19,12 +20,14 @@
 #include "sched/frame_team.h"
 
 namespace h6 {
-enum class Owner { nobody, step, loop };  // who runs frames of a session
-}
+// Who runs frames of a session. `workers`: nobody now, and no others may.
+enum class Owner { nobody, workers, step, loop };
+}  // namespace h6
 
 struct h6Session {
   const h6Model* model = nullptr;
   std::atomic<h6::Owner> owner{h6::Owner::nobody};
+  h6Workers* workers = nullptr;  // whose scratch it borrows; null: it has its own
   h6Allocator allocator{};
   h6::Settings settings;
 
@@ -57,6 +60,8 @@ struct h6Session {
 
 namespace h6 {
 
+// Who owns the session while nobody steps it.
+inline Owner idle_owner(const h6Session& s) { return s.workers ? Owner::workers : Owner::nobody; }
 inline bool run_by_loop(const h6Session& s) { return s.owner.load() == Owner::loop; }
 
 // The shell body with this body's index, or null.

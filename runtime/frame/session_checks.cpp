@@ -171,6 +171,9 @@ bool check_session(const h6Model& model, const h6SessionDef& def, h6Error* error
   if (!check_reserved(def, "", error) || !check_settings(session_settings(), &def, "", error) ||
       !check_contact(def.contact, error))
     return false;
+  if (def.workers && def.threads != 1)
+    return fail(error, "a session of workers stays on one thread: threads is %u, not 1",
+                def.threads);
   for (std::size_t i = 0; i < def.body_count; ++i)
     if (!check_body(model, def.bodies[i], i, error)) return false;
   if (!check_pairs(def, error)) return false;

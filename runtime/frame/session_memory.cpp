@@ -6,10 +6,10 @@
 #include <new>
 #include <vector>
 
-#include "runtime/contact/contact_stages.h"
-#include "runtime/contact/traverse_pair.h"
 #include "runtime/contact/weighing.h"
+#include "runtime/frame/scratch_memory.h"
 #include "runtime/frame/session.h"
+#include "runtime/frame/workers.h"
 
 namespace h6 {
 namespace {
@@ -32,16 +32,18 @@ struct ShellSize {
 
 struct Sizes {
   std::size_t bodies = 0, hands = 0, listed = 0;
-  std::size_t pairs = 0;                 // near at a time
-  std::size_t groups = 16, blocks = 16;  // for the largest shell
+  std::size_t pairs = 0;  // near at a time
+  ScratchRoom scratch;
   std::vector<ShellSize> shells;
   bool between = false;                   // the bodies of a pair may both move
   bool of_fields = false;                 // `series` couples fields that move
-  std::size_t traversals = 1, lanes = 0;  // one for each thread that may need one
+  std::size_t traversals = 1, lanes = 0;  // one for each thread that may need one; of workers: 0
 };
 
-Sizes sizes_of(const h6Model& model, const h6SessionDef& def, std::span<const h6PairDef> listed) {
+Sizes sizes_of(const h6Model& model, const Settings& set, const h6SessionDef& def,
+               std::span<const h6PairDef> listed) {
   Sizes n;
+  std::size_t groups = 0, blocks = 0;
   n.bodies = def.body_count, n.hands = def.hand_count, n.listed = listed.size();
   std::size_t all = 0;
   each_pair(def, listed, [&](std::int32_t a, std::int32_t b) {
@@ -55,15 +57,17 @@ Sizes sizes_of(const h6Model& model, const h6SessionDef& def, std::span<const h6
   bool shares = n.shells.size() > 1;
   for (ShellSize& size : n.shells) {
     const Shell& shell = model.shells[def.bodies[size.body].shell];
-    n.groups = std::max(n.groups, 16 * shell.blocks.count);
-    n.blocks = std::max(n.blocks, shell.blocks.x.count);
+    groups = std::max(groups, 16 * shell.blocks.count);
+    blocks = std::max(blocks, shell.blocks.x.count);
     size.contacts =
         std::min(def.max_contacts, shell.points * std::min(size.fields, kFieldsAtAPoint));
     shares = shares || size.fields > 1;
   }
+  n.scratch = scratch_room(set, groups, blocks);
   n.pairs = std::min(all, def.max_pairs ? def.max_pairs : default_pairs(n.shells.size()));
   if (shares) n.traversals = def.threads;
   if (n.shells.size() > 1 && def.threads > 1) n.lanes = def.threads;
+  if (def.workers) n.traversals = 0;
   return n;
 }
 
@@ -73,46 +77,6 @@ std::span<T> take(Arena& arena, std::size_t n) {
   T* const first = arena.take<T>(n);
   for (std::size_t i = 0; first && i < n; ++i) new (first + i) T{};
   return {first, n};
-}
-
-SearchColumns take_search(Arena& arena, std::size_t groups, std::size_t blocks) {
-  SearchColumns columns;
-  columns.group_expiry = arena.take<float>(groups);
-  columns.block_expiry = arena.take<float>(blocks);
-  columns.near_rows = arena.take<std::uint16_t>(groups);
-  columns.rest_expiry = arena.take<float>(groups);
-  return columns;
-}
-
-void take_traversal(TraverseScratch& t, Arena& arena, const Sizes& n, std::size_t max_contacts) {
-  t.capacity = max_contacts + kGroupRows * n.groups;
-  t.frontier = arena.take<std::uint32_t>(n.groups);
-  t.survivors = arena.take<std::uint32_t>(n.groups);
-  t.far = arena.take<std::uint32_t>(n.groups);
-  t.far_survivors = arena.take<std::uint32_t>(n.groups);
-  t.open_blocks = arena.take<std::uint32_t>(n.blocks);
-  t.clearance = arena.take<float>(n.groups);
-  t.rest = arena.take<float>(n.groups);
-  t.reach = arena.take<float>(n.groups);
-  t.rows = arena.take<std::uint16_t>(n.groups);
-  t.near_rows = arena.take<std::uint16_t>(n.groups);
-  t.candidate = arena.take<std::uint32_t>(t.capacity);
-  for (float** column :
-       {&t.candidate_distance, &t.key, &t.gradient_x, &t.gradient_y, &t.gradient_z})
-    *column = arena.take<float>(t.capacity);
-  t.lent = take_search(arena, n.groups, n.blocks);
-}
-
-void take_scratch(Scratch& scratch, Arena& arena, const Sizes& n, const Settings& set) {
-  const std::size_t merged = uses_clusters(set.contact) ? set.max_contacts : 0;
-  scratch.cluster = {arena.take<std::uint32_t>(merged), arena.take<std::uint32_t>(merged),
-                     arena.take<std::uint64_t>(merged)};
-  const std::size_t weighing = weigh_scratch_bytes(set.contact, set.max_contacts);
-  scratch.weigh = weighing ? arena.take<char>(weighing) : nullptr;
-  scratch.slice_count = arena.take<std::size_t>(n.groups / kTouchSlice + 1);
-  scratch.slice_sum = arena.take<kernels::WrenchSum>(set.max_contacts / kSumSlice + 1);
-  const std::size_t rubbing = set.contact.friction > 0 ? set.max_contacts : 0;
-  scratch.friction = {arena.take<double>(rubbing), arena.take<double>(rubbing)};
 }
 
 void lay_out_shell(const Settings& set, const ShellSize& size, const Shell& points,
@@ -171,8 +135,7 @@ void lay_out(h6Session& s, const h6SessionDef& def, const Sizes& n, Arena& arena
   for (std::size_t i = 0; i < n.traversals; ++i) {
     Scratch counted;
     Scratch& scratch = s.lanes.scratch.data() ? s.lanes.scratch[i] : counted;
-    take_traversal(scratch.traverse, arena, n, s.settings.max_contacts);
-    if (i == 0 || n.lanes > 0) take_scratch(scratch, arena, n, s.settings);
+    lay_out_scratch(scratch, arena, n.scratch, i == 0 || n.lanes > 0);
   }
 }
 
@@ -191,18 +154,21 @@ void list_pairs(std::span<const h6PairDef> listed, NearPairs& near) {
 
 bool reserve_memory(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef> listed,
                     h6Error* error) {
-  const Sizes n = sizes_of(*s.model, def, listed);
+  const Sizes n = sizes_of(*s.model, s.settings, def, listed);
+  if (def.workers && !make_room(*def.workers, n.scratch, error)) return false;
   Arena count;
   lay_out(s, def, n, count);
   s.memory_bytes = count.used();
   s.memory = allocate(def.allocator, s.memory_bytes);
   if (!s.memory)
-    return fail(error, H6_ERROR_MEMORY, "no memory for the session (%zu MB): lower max_contacts or max_pairs",
+    return fail(error, H6_ERROR_MEMORY,
+                "no memory for the session (%zu MB): lower max_contacts or max_pairs",
                 s.memory_bytes / 1000000);
   // This touches all pages now, so that the first frames have no page faults.
   std::fill_n(static_cast<char*>(s.memory), s.memory_bytes, char{0});
   Arena arena(s.memory, s.memory_bytes);
   lay_out(s, def, n, arena);
+  if (def.workers) s.lanes.scratch = std::span(def.workers->scratch).first(1);
   list_pairs(listed, s.near);
   for (std::size_t i = 0; i < n.pairs; ++i)  // the first row is taken first
     s.near.unused[i] = static_cast<std::uint32_t>(n.pairs - 1 - i);

@@ -64,6 +64,12 @@ void open_lanes(Lanes& lanes, sched::FrameTeam* team, sched::FrameTeam* alone, A
   }
 }
 
+void borrow(Lanes& lanes, Scratch& scratch) {
+  lanes.scratch = {&scratch, 1};
+  lanes.whole.scratch = &scratch;
+  lanes.whole.scratches = lanes.scratch;
+}
+
 void begin_lanes(Lanes& lanes, bool cold, double tick_ns) {
   const auto begin = [&](Lane& lane) {
     lane.cold = cold;

@@ -21,6 +21,8 @@ struct Lanes {
 
 // lanes.scratch and lanes.single must be laid out. `alone` is a team of one thread.
 void open_lanes(Lanes& lanes, sched::FrameTeam* team, sched::FrameTeam* alone, Anytime* anytime);
+// From now on the one thread of these lanes uses this scratch.
+void borrow(Lanes& lanes, Scratch& scratch);
 void begin_lanes(Lanes& lanes, bool cold, double tick_ns);
 
 using WeighShell = void (*)(const Settings& set, std::span<const Body> bodies, ShellBody& shell,

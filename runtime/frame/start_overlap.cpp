@@ -10,6 +10,7 @@
 #include "runtime/contact/traverse_pair.h"
 #include "runtime/frame/name_contacts.h"
 #include "runtime/frame/session.h"
+#include "runtime/frame/workers.h"
 #include "sched/realtime.h"
 
 namespace h6 {
@@ -241,6 +242,8 @@ size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, size_t 
 bool h6RestartFit(h6Session* session, h6Error* error) {
   if (!session) return fail(error, "no session was given");
   if (run_by_loop(*session)) return fail(error, H6_ERROR_BUSY, "a loop runs this session");
+  const Turn turn(session->workers);
+  if (!turn) return fail(error, H6_ERROR_BUSY, "the session's workers are stepping others");
   try {
     return measure_overlap(*session, error);
   } catch (const std::exception& e) {

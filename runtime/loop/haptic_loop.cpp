@@ -278,9 +278,13 @@ bool speaks(const h6Device& device, std::uint32_t mode) {
   return ((modes ? modes : std::uint32_t{H6_IMPEDANCE}) & mode) != 0;
 }
 
+constexpr const char* kOfWorkers =
+    "the session was made for h6StepMany: its h6SessionDef.workers must be NULL for a loop";
+
 bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& def,
            h6Error* error) {
   if (!session) return fail(error, "a loop needs a session");
+  if (session->workers) return fail(error, kOfWorkers);
   if (!session->hands.empty() && !devices)
     return fail(error, "a loop needs one device for each of %zu hands", session->hands.size());
   for (std::size_t h = 0; h < session->hands.size(); ++h)
@@ -403,6 +407,7 @@ void h6SetPace(h6Loop* loop, double pace) {
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (!loop) return fail(error, "no loop was given"), nullptr;
   if (!may_take_over(next, *loop->session, error)) return nullptr;
+  if (next->workers) return fail(error, kOfWorkers), nullptr;
   Owner none = Owner::nobody;
   if (!next->owner.compare_exchange_strong(none, Owner::loop))
     return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;

@@ -5,9 +5,11 @@
  *
  * Sessions may share one model, which is only read. A session gives the same bits as with h6Step alone,
  * on any number of workers and beside any other sessions. A call never allocates, locks, prints or
- * throws; it waits only for the sessions that other workers are stepping. Make the sessions with
- * `threads` 1, since here a session stays on one thread, and with max_contacts as small as your parts
- * allow: that is most of a session's memory. */
+ * throws; it waits only for the sessions that other workers are stepping. Make the workers first and
+ * the sessions with h6SessionDef.workers: they then share one scratch a thread, which stays in its
+ * cache, and take a third of the memory. Other sessions can be stepped here, too, as long as nobody
+ * else steps them. Use `threads` 1, since here a session stays on one thread, and max_contacts as small
+ * as your parts allow: that is most of a session's memory. */
 #ifndef HAPSIX_BATCH_H
 #define HAPSIX_BATCH_H
 
@@ -22,12 +24,15 @@ typedef struct h6Workers h6Workers;
 typedef struct h6WorkersDef {
   uint32_t threads;     /* 1 .. 64, the calling one included; 0, the default: one for each core    */
   h6Tasks  tasks;       /* the program's own workers in place of the engine's; zero: the engine's   */
-  uint64_t reserved[8];
+  h6Allocator allocator;/* of the scratch of sessions that name these workers; zero: the heap        */
+  uint64_t reserved[5];
 } h6WorkersDef;
 H6_API h6WorkersDef h6DefaultWorkersDef(void);
 
-/* The engine's workers poll during a call and nap between calls. def NULL: the default. */
+/* The engine's workers poll during a call and nap between calls. def NULL: the default. NULL with
+ * `error` filled for threads above 64, words in `reserved`, and where the system gives no threads. */
 H6_API h6Workers* h6CreateWorkers(const h6WorkersDef* def, h6Error* error);
+/* After the sessions that name them, and in no call with them. NULL is allowed. */
 H6_API void       h6DestroyWorkers(h6Workers* workers);
 H6_API uint32_t   h6WorkerThreads(const h6Workers* workers); /* 0 for a NULL                        */
 
@@ -60,7 +65,7 @@ typedef struct h6StepArrays {
 H6_API h6StepArrays h6DefaultStepArrays(void);
 
 /* Steps every session and returns the bits of all of them. A session that is NULL, has another number
- * of hands, or is run by a loop or another thread gets H6_OUTPUT_FAULT and rows of zeros, and does not
+ * of hands, names other workers, or is run by a loop or another thread gets H6_OUTPUT_FAULT and rows of zeros, and does not
  * change; the others step. Nothing steps, nothing is written and the result is H6_OUTPUT_FAULT for
  * arrays that are NULL, not whole or with words in `reserved`, and while another thread is in a call
  * with the same workers. workers NULL: all on the calling thread. Any thread may call. */

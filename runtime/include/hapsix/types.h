@@ -302,7 +302,10 @@ typedef struct h6SessionDef {
                                    leave out; h6SetCoarse repeats one. 0: off; always off in virtual
                                    time [us]                                                       */
   h6Allocator  allocator;
-  uint64_t     reserved[16];
+  struct h6Workers* workers;  /* batch.h: only h6StepMany with these workers steps the session, and it
+                                 borrows their scratch, most of its memory; `threads` must be 1. NULL,
+                                 the default: anybody steps it                                     */
+  uint64_t     reserved[15];
 } h6SessionDef;
 
 #define H6_MAX_HANDS 8

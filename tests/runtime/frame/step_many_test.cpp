@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -48,7 +50,9 @@ struct Crowd {
   std::vector<std::uint64_t> hash;
   h6StepArrays arrays = h6DefaultStepArrays();
 
-  Crowd(BallInBowl& scene, std::size_t count) {
+  // `w`: the sessions are made for these workers.
+  Crowd(BallInBowl& scene, std::size_t count, h6Workers* w = nullptr) {
+    scene.def.workers = w;
     for (std::size_t i = 0; i < count; ++i) {
       scene.bodies[1].pose.p.x = 0.01 * kMm * static_cast<double>(i);
       sessions.emplace_back(h6CreateSession(scene.model.handle, &scene.def, nullptr));
@@ -121,13 +125,14 @@ void check_same(const Crowd& a, const Crowd& b) {
   CHECK(same(a.voxels, b.voxels));
 }
 
-void check_crowd(h6Workers* w, std::uint32_t hands, std::uint32_t steps) {
+// `lent`: the sessions share the scratch of the workers.
+void check_crowd(h6Workers* w, std::uint32_t hands, std::uint32_t steps, bool lent = false) {
   BallInBowl scene(1, 2000);
   const std::vector<h6HandDef> both(hands, scene.hand);
   scene.def.hands = both.data(), scene.def.hand_count = hands;
   scene.def.contact.friction = 0.2;
   scene.def.max_contacts = 1000;
-  Crowd together(scene, 37), alone(scene, 37);
+  Crowd together(scene, 37, lent ? w : nullptr), alone(scene, 37);
   together.arrays.steps = steps;
   std::uint32_t most = 0;
   for (int frame = 0; frame < 25; ++frame) {
@@ -155,6 +160,110 @@ TEST_CASE("each session of a crowd has the bits that it has alone, on any number
   check_crowd(workers(2).get(), 0, 2);
   CHECK(h6WorkerThreads(workers(0).get()) >= 1);
   CHECK(h6WorkerThreads(workers(3).get()) == 3);
+}
+
+TEST_CASE("sessions that share the scratch of their workers have the bits that they have alone") {
+  for (const unsigned threads : {1u, 2u, 3u, 8u}) {
+    CAPTURE(threads);
+    check_crowd(workers(threads).get(), 1, 1, true);
+  }
+  check_crowd(workers(2).get(), 2, 3, true);
+}
+
+TEST_CASE("sessions of all sizes and rules share one scratch, which grows with them") {
+  const Workers w = workers(2);
+  std::vector<std::unique_ptr<BallInBowl>> scenes;
+  std::vector<Crowd> together, alone;
+  const h6Method methods[] = {H6_METHOD_GLOBAL, H6_METHOD_CLUSTER, H6_METHOD_FIRM,
+                              H6_METHOD_GAUSS6, H6_METHOD_SERIES,  H6_METHOD_ROBUST};
+  int points = 100;
+  for (const h6Method method : methods) {
+    scenes.push_back(std::make_unique<BallInBowl>(1, points));
+    scenes.back()->def.contact.method = method;
+    scenes.back()->def.max_contacts = static_cast<std::size_t>(points);
+    alone.emplace_back(*scenes.back(), 5);
+    together.emplace_back(*scenes.back(), 5, w.get());
+    points = points < 3000 ? 3 * points : 200;
+    for (int frame = 0; frame < 12; ++frame)  // the larger leave their rows to the smaller
+      for (std::size_t k = 0; k < scenes.size(); ++k) {
+        together[k].sample(*scenes[k], frame), alone[k].sample(*scenes[k], frame);
+        h6StepMany(w.get(), &together[k].arrays);
+        for (std::size_t i = 0; i < 5; ++i) step_alone(alone[k], i, 1);
+        check_same(together[k], alone[k]);
+      }
+  }
+}
+
+TEST_CASE("a session of workers steps with them only, and takes less memory") {
+  BallInBowl scene(1, 2000);
+  static std::size_t taken;
+  scene.def.allocator = {[](void*, std::size_t bytes, std::size_t alignment) {
+                           taken += bytes;
+                           return std::aligned_alloc(alignment, bytes);
+                         },
+                         [](void*, void* memory, std::size_t) { std::free(memory); }, nullptr};
+  scene.def.max_contacts = 1000;
+  const Workers w = workers(2), other = workers(2);
+  taken = 0;
+  const Crowd own(scene, 2);
+  const std::size_t whole = taken;
+  taken = 0;
+  Crowd crowd(scene, 2, w.get());
+  CHECK(2 * taken < whole);
+  crowd.sample(scene, 3);
+  for (h6Workers* wrong : {static_cast<h6Workers*>(nullptr), other.get()}) {
+    CHECK(h6StepMany(wrong, &crowd.arrays) == H6_OUTPUT_FAULT);
+    CHECK(crowd.status[0] == H6_OUTPUT_FAULT);
+  }
+  const h6DeviceSample sample = scene.sample(3);
+  CHECK(h6Step(crowd.handles[0], &sample, nullptr) == H6_OUTPUT_FAULT);
+  h6Device device = h6DefaultDevice();
+  h6Error error{};
+  CHECK(h6StartLoop(crowd.handles[0], &device, nullptr, &error) == nullptr);
+  CHECK(std::string(error.message).find("workers") != std::string::npos);
+  CHECK(h6GetFrame(crowd.handles[0]).state_hash == 0);
+  CHECK((h6StepMany(w.get(), &crowd.arrays) & H6_OUTPUT_FAULT) == 0);
+  CHECK(h6GetFrame(crowd.handles[0]).state_hash != 0);
+  CHECK(h6RestartFit(crowd.handles[0], &error));
+  scene.def.workers = w.get(), scene.def.threads = 2;
+  CHECK(h6CreateSession(scene.model.handle, &scene.def, &error) == nullptr);
+  CHECK(std::string(error.message).find("threads is 2") != std::string::npos);
+}
+
+TEST_CASE("while workers step, no session is made for them, and without memory none is") {
+  BallInBowl scene(1, 2000);
+  struct Inner {
+    BallInBowl& scene;
+    h6Workers* workers = nullptr;
+    h6Error error{};
+    bool refit = true;
+    h6Session* session = nullptr;
+  } inner{scene};
+  const h6Tasks tasks{
+      [](void* user, void (*)(void*), void*) -> void* {  // inside the call
+        Inner& self = *static_cast<Inner*>(user);
+        self.scene.def.workers = self.workers;
+        h6DestroySession(h6CreateSession(self.scene.model.handle, &self.scene.def, &self.error));
+        self.refit = h6RestartFit(self.session, nullptr);
+        return nullptr;
+      },
+      [](void*, void*) {}, &inner};
+  const Workers w = workers(2, tasks);
+  Crowd crowd(scene, 3, w.get());
+  inner.workers = w.get(), inner.session = crowd.handles[2];
+  crowd.sample(scene, 0);
+  CHECK((h6StepMany(w.get(), &crowd.arrays) & H6_OUTPUT_FAULT) == 0);
+  CHECK(inner.error.code == H6_ERROR_BUSY);
+  CHECK_FALSE(inner.refit);
+
+  h6WorkersDef def = h6DefaultWorkersDef();
+  def.allocator = {[](void*, std::size_t, std::size_t) -> void* { return nullptr; },
+                   [](void*, void*, std::size_t) {}, nullptr};
+  const Workers poor(h6CreateWorkers(&def, nullptr));
+  scene.def.workers = poor.get();
+  h6Error error{};
+  CHECK(h6CreateSession(scene.model.handle, &scene.def, &error) == nullptr);
+  CHECK(error.code == H6_ERROR_MEMORY);
 }
 
 TEST_CASE("a program's own tasks step sessions too") {
