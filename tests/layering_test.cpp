@@ -34,15 +34,19 @@ const Rooms& below() {
     room("kernels/contact", {"contract", "kernels", "kernels/field"});
     room("kernels/weights", {"contract", "kernels"});
     room("kernels/bake", {"contract", "kernels"});
+    room("kernels/bend", {"contract", "kernels"});
     room("sched", {"contract"});
 
     room("runtime/base", {"contract"});
-    room("runtime/model", {"contract", "kernels", "kernels/field", "sched", "runtime/base"});
+    room("runtime/model", {"contract", "kernels", "kernels/field", "kernels/bend", "sched",
+                           "runtime/base"});
     room("runtime/settings", {"contract", "runtime/model"});
     room("runtime/hand", {"contract", "runtime/base"});
-    room("runtime/contact", {"contract", "kernels", "kernels/field", "kernels/contact",
-                             "kernels/weights", "sched", "runtime/base", "runtime/model"});
-    room("runtime/motion", {"contract", "runtime/base", "runtime/hand", "runtime/contact"});
+    room("runtime/contact",
+         {"contract", "kernels", "kernels/field", "kernels/contact", "kernels/weights",
+          "kernels/bend", "sched", "runtime/base", "runtime/model"});
+    room("runtime/motion",
+         {"contract", "kernels", "kernels/bend", "runtime/base", "runtime/hand", "runtime/contact"});
     room("runtime/frame", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/model",
                            "runtime/contact", "runtime/motion"});
     room("runtime/loop", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/hand",
