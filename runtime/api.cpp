@@ -2,6 +2,7 @@
 // api.cpp - the public functions that read and change a session.
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <span>
 
@@ -42,6 +43,7 @@ std::uint64_t state_hash(h6Session& s, const h6DeviceSample* samples) {
   }
   hash = s.still_hash;
   for (const std::uint32_t i : lively) mix_state(s.bodies[i]);
+  for (const Deformation& d : s.bends) mix(d.q, d.modes), mix(d.v, d.modes);
   // In the other modes the manipulandum follows from the sample.
   for (const Hand& hand : s.hands)
     if (hand.mode == H6_PSEUDO_ADMITTANCE) mix_state(hand.manipulandum);
@@ -159,6 +161,30 @@ void h6SetBody(h6Session* session, int32_t index, const h6BodyState* state) {
   forget_energy(*session, index);
   for (Hand& hand : session->hands)
     if (hand.body == index) hand.manipulandum = body;
+}
+
+size_t h6GetDeformation(const h6Session* session, int32_t index, double* q, double* velocity,
+                        size_t capacity) {
+  const Body* found = body_at(session, index);
+  if (!found || !found->bend) return 0;
+  const Deformation& d = *found->bend;
+  const auto modes = static_cast<std::size_t>(d.modes);
+  if (q) std::copy_n(d.q, std::min(capacity, modes), q);
+  if (velocity) std::copy_n(d.v, std::min(capacity, modes), velocity);
+  return modes;
+}
+
+bool h6SetDeformation(h6Session* session, int32_t index, const double* q, const double* velocity,
+                      size_t count) {
+  Body* found = body_at(session, index);
+  if (!found || !found->bend || !q || run_by_loop(*session)) return false;
+  Deformation& d = *found->bend;
+  if (count != static_cast<std::size_t>(d.modes)) return false;
+  for (std::size_t j = 0; j < count; ++j)
+    if (!(std::fabs(q[j]) <= kMost) || (velocity && !(std::fabs(velocity[j]) <= kMost)))
+      return false;
+  for (std::size_t j = 0; j < count; ++j) d.q[j] = q[j], d.v[j] = velocity ? velocity[j] : 0;
+  return true;
 }
 
 h6Contacts h6GetContacts(const h6Session* session, int32_t index) {

@@ -70,6 +70,7 @@ int h6MethodFromName(const char* name, h6Method* method, uint32_t* pieces) {
 
 h6FieldDef h6DefaultFieldDef(void) { return {}; }
 h6ShellDef h6DefaultShellDef(void) { return {}; }
+h6DeformableDef h6DefaultDeformableDef(void) { return {}; }
 h6ModelDef h6DefaultModelDef(void) { return {}; }
 h6PairDef h6DefaultPairDef(void) { return {-1, -1, {}}; }
 h6ContactArrays h6DefaultContactArrays(void) { return {}; }

@@ -49,6 +49,7 @@ void begin(h6Session& s, const h6DeviceSample* samples, std::int64_t start) {
   for (std::size_t h = 0; h < s.hands.size(); ++h)
     accept(s.devices[h], s.hands[h], s.bodies[s.hands[h].body], samples[h], s.settings.dt,
            s.report.status);
+  for (Deformation& d : s.bends) follow(d, s.bodies);
   s.substeps = plan_substeps(s);
   s.report.substeps = s.substeps.count;
   if (s.substeps.needed > s.substeps.count)
@@ -112,6 +113,7 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
 void collide(h6Session& s, const Settings& set, bool first) {
   Stopwatch watch{s.report, s.tick_length.ns(), sched::ticks()};
   watch.timed(H6_STAGE_TRAVERSE, [&] {
+    for (Deformation& d : s.bends) follow(d, s.bodies), d.touches = false;
     find_near_pairs(s);
     wake_pairs(s);
     begin_traversal(s.anytime, s.near.all_awake(), s.near.near_count, first);
@@ -138,14 +140,17 @@ void couple_and_step(h6Session& s, const Settings& set, bool last) {
     if (set.net_stiffness && last) report_net_stiffness(s.bodies, s.shells, s.report);
   });
   watch.timed(H6_STAGE_INTEGRATE, [&] {
+    fold_bends(set, s.bodies, s.bends, s.acting, status);
     for (const Hand& hand : s.hands) {
       Body& body = s.bodies[hand.body];
       if (body.motion == Motion::quasi_static && hand.seen)
         step_static(set, body, s.acting[hand.body], body.max_step / s.substeps.count, status);
     }
     accelerate_bodies(set, s.bodies, s.acting, s.shells, s.islands, status);
+    accelerate_bends(set, s.bodies, s.bends);
     if (slow_down(s, set.dt)) status |= H6_SHORTENED;
     move_bodies(set, s.bodies, s.islands, status);
+    move_bends(s.bends, status);
     if (set.contact.passivity) observe_contacts(set, s.bodies, s.shells);
   });
 }

@@ -98,16 +98,16 @@ HWY_INLINE void add_rows(const RowSums& rows, std::size_t first, std::size_t cou
       hn::Store(hn::Mul(share, value), d, right[k] + b);
     }
   }
-  const auto add = [&](const double f[kAtOnce], const double (*columns)[kMostStride],
-                       double* out) HWY_ATTR {
-    for (std::size_t b = 0; b < rows.stride; b += hn::Lanes(d)) {
-      VD sum = hn::LoadU(d, out + b);
-      HWY_UNROLL(4)
-      for (std::size_t k = 0; k < kAtOnce; ++k)
-        sum = hn::MulAdd(hn::Set(d, f[k]), hn::Load(d, columns[k] + b), sum);
-      hn::StoreU(sum, d, out + b);
-    }
-  };
+  const auto add = [&](const double f[kAtOnce], const double(*columns)[kMostStride], double* out)
+                       HWY_ATTR {
+                         for (std::size_t b = 0; b < rows.stride; b += hn::Lanes(d)) {
+                           VD sum = hn::LoadU(d, out + b);
+                           HWY_UNROLL(4)
+                           for (std::size_t k = 0; k < kAtOnce; ++k)
+                             sum = hn::MulAdd(hn::Set(d, f[k]), hn::Load(d, columns[k] + b), sum);
+                           hn::StoreU(sum, d, out + b);
+                         }
+                       };
   add(load, left, force);
   for (std::size_t a = 0; a < rows.size; ++a) {
     const double f[kAtOnce] = {left[0][a], left[1][a], left[2][a], left[3][a]};

@@ -23,12 +23,15 @@ struct Travelled {
 // How a body moves from one frame to the next: METHOD.md, Sec. 4.
 enum class Motion : std::uint8_t { dynamic, quasi_static, held };
 
+struct Deformation;
+
 struct Body : RigidState {
   bool fixed = true;
   bool translation_only = false;
   Motion motion = Motion::dynamic;
   const Shell* shell = nullptr;  // null: the body touches nothing by itself
   const Field* field = nullptr;  // null: nothing touches the body
+  Deformation* bend = nullptr;   // null: the body is rigid
   double mass = 0;               // [kg]
   Vec3 com = Vec3::Zero();       // mesh frame [m]
   Mat3 inertia = Mat3::Zero();   // about com, mesh axes [kg m^2]

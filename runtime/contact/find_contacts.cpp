@@ -8,6 +8,7 @@
 
 #include "kernels/contact/keep_nearest.h"
 #include "runtime/contact/contact_stages.h"
+#include "runtime/contact/deformation.h"
 #include "runtime/contact/traverse_pair.h"
 #include "sched/clock.h"
 
@@ -22,7 +23,7 @@ constexpr std::size_t kPairSlices = 32;
 kernels::Affine arms_to_field(const Body& a, const Body& b) {
   const Field& field = *b.field;
   const Mat3 m = b.R.transpose() / field.voxel;
-  const Vec3 t = m * (a.x - (b.x - b.R * b.com)) - field.origin / field.voxel;
+  const Vec3 t = m * (arm_origin(a) - (b.x - b.R * b.com)) - field.origin / field.voxel;
   kernels::Affine affine;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) affine.m[r][c] = static_cast<float>(m(r, c));
@@ -222,9 +223,9 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
   c.count = 0;
   const Body& a = bodies[shell.body];
   const Shell& points = *a.shell;
-  const kernels::ShellColumns columns{points.x.data,    points.y.data,  points.z.data,
-                                      points.nx.data,   points.ny.data, points.nz.data,
-                                      points.point.data};
+  const PointColumns now = points_of(a);
+  const kernels::ShellColumns columns{
+      now.x, now.y, now.z, now.nx, now.ny, now.nz, points.point.data};
   for (Pair& pair : shell.pairs) {
     PairSearch& found = pair.search;
     const Body& b = bodies[pair.b];
@@ -232,7 +233,8 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
     pair.begin = pair.end = first;
     if (found.candidates == 0) continue;
     kernels::ContactFrame frame;
-    const Vec3 arm = a.R * (points.centre - a.com);
+    Vec3 arm = a.R * (points.centre - a.com);
+    if (a.bend) arm += a.x - a.bend->about;
     for (int k = 0; k < 9; ++k) {
       frame.Ra[k] = static_cast<float>(a.R(k / 3, k % 3));
       frame.Rb[k] = static_cast<float>(b.R(k / 3, k % 3));
@@ -249,6 +251,7 @@ void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane)
                               c.gz + to, c.rx + to, c.ry + to, c.rz + to, c.point + to});
       std::fill_n(c.field_body + to, count, pair.b);
       for (std::size_t i = 0; c.cell && i < count; ++i) c.cell[to + i] = points.cell[row[at + i]];
+      if (a.bend) std::copy_n(row + at, count, a.bend->row + to);
     };
     share_slices(lane, lane.making, found.candidates,
                  (found.candidates + kContactSlice - 1) / kContactSlice, make);

@@ -12,6 +12,7 @@
 #include <algorithm>
 
 #include "runtime/contact/contact_stages.h"
+#include "runtime/contact/deformation.h"
 #include "runtime/contact/weighing.h"
 
 namespace h6 {
@@ -76,8 +77,14 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
   if (firm) prepare_firm(set, bodies, shell, lane);
   fill_inner_stiffness(c, set.contact, a.voxel, firm ? weighing_team(c.count, lane) : nullptr,
                        firm ? lane.scratch->weigh : nullptr);
+  if (a.bend) {
+    make_bent_rows(set, bodies, shell);
+    fill_bent_gap(set, bodies, shell);
+  }
   for (const Pair& pair : shell.pairs)
-    fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin, pair.end);
+    if (!a.bend)
+      fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin,
+                      pair.end);
   const kernels::SeriesResult result =
       solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y);
   h6FrameReport& report = lane.report;

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "runtime/contact/contact_stages.h"
+#include "runtime/contact/deformation.h"
 #include "runtime/contact/weighing.h"
 #include "sched/clock.h"
 
@@ -39,13 +40,14 @@ void clear_wrench(Pair& pair) {
 
 Mat6 arm_shift(const Body& a, const Body& b) {
   Mat6 S = Mat6::Identity();
-  S.bottomLeftCorner<3, 3>() = cross_matrix(a.x - b.x);
+  S.bottomLeftCorner<3, 3>() = cross_matrix(arm_origin(a) - b.x);
   return S;
 }
 
 Vec6 pair_velocity(const Body& a, const Body& b) {
   Vec6 ua, ub;
   ua << a.v, a.w;
+  if (a.bend) ua.head<3>() += a.w.cross(a.bend->about - a.x);
   ub << b.v, b.w;
   return ua - arm_shift(a, b).transpose() * ub;
 }
@@ -94,6 +96,7 @@ void spread_wrench(const Settings& set, const Sides& sides, Pair& pair,
 }
 
 void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
+  if (bodies[shell.body].bend) return sum_bent(set, bodies, shell);
   const bool series = uses_series(set.contact), exact = set.gradient == H6_EXACT;
   const Contacts& c = shell.contacts;
   kernels::WrenchColumns columns = series_columns(c);
@@ -111,6 +114,7 @@ void sum_contacts(const Settings& set, std::span<const Body> bodies, ShellBody& 
 
 void add_wrenches(const Settings& set, std::span<const Body> bodies, ShellBody& shell,
                   std::span<LinearWrench> acting) {
+  if (bodies[shell.body].bend) return add_bent_wrench(set, bodies, shell, acting);
   const bool series = uses_series(set.contact);
   for (Pair& pair : shell.pairs) {
     const Sides sides = sides_of(pair, bodies, acting);

@@ -14,6 +14,7 @@
 #include "kernels/contact/cull_spheres.h"
 #include "kernels/contact/expiry.h"
 #include "kernels/contact/keep_loadable.h"
+#include "runtime/contact/deformation.h"
 #include "sched/clock.h"
 
 namespace h6 {
@@ -78,6 +79,10 @@ struct Search {
   bool cold;             // the caches hold little of what is sampled
   float near = 0;        // points are sampled up to this distance; 0: all points of a group [voxel]
   bool reaches = false;  // TraverseScratch::reach says how far each group's points may be
+  Deformation* bend = nullptr;  // where the shell bends: spheres and points as they are now
+
+  const Tier& blocks() const { return bend ? bend->blocks : shell.blocks; }
+  const Tier& groups() const { return bend ? bend->groups : shell.groups; }
 
   std::size_t cull(const Tier& tier, const std::uint32_t* rows, std::size_t count,
                    std::uint32_t* survivors, float* clearance) const {
@@ -118,9 +123,12 @@ struct Search {
   // Samples `count` groups of t.survivors from `first` on.
   std::size_t touch(const TraverseScratch& t, std::size_t first, std::size_t count,
                     const kernels::Touching& out) const {
+    if (bend) bend_points(*bend, t.survivors + first, count);
+    const Column<float>&x = bend ? bend->x : shell.x, &y = bend ? bend->y : shell.y,
+          &z = bend ? bend->z : shell.z;
     return kernels::touch_groups(
-        field, place, {shell.x.data, shell.y.data, shell.z.data, shell.points}, t.survivors + first,
-        count, margin, cold,
+        field, place, {x.data, y.data, z.data, shell.points}, t.survivors + first, count, margin,
+        cold,
         {near > 0 ? t.rows + first : nullptr, t.clearance + first, t.near_rows + first,
          t.rest + first, near, reaches ? t.reach : nullptr},
         out);
@@ -144,7 +152,10 @@ Search search_of(const Settings& set, const Body& a, const Body& b, float margin
           static_cast<float>(1.0 / field.voxel),
           reach_of(set, field),
           margin,
-          cold};
+          cold,
+          0,
+          false,
+          a.bend};
 }
 
 // Samples `count` groups and writes the points that touch behind row `used`. Their order does not
@@ -188,6 +199,14 @@ double motion_bound(const kernels::Affine& from, const kernels::Affine& to, doub
   return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
 }
 
+// And by bending between two shapes.
+double bending_bound(const Search& search, const float* from) {
+  if (!search.bend) return 0;
+  double change[H6_MAX_MODES];
+  for (int j = 0; j < search.bend->modes; ++j) change[j] = double{search.bend->bent[j]} - from[j];
+  return double{search.scale} * bend_reach(*search.bend, change);
+}
+
 // The distance that the shell has travelled through the field [voxel]. It does not grow while the
 // shell moves to and fro around its anchor.
 struct Way {
@@ -206,22 +225,29 @@ float expiry_of(const Way& way, float clearance) {
 // nothing is known.
 Way travel(PairSearch& pair, Search& search) {
   const Shell& shell = search.shell;
+  Deformation* const bend = search.bend;
+  const auto anchor = [&] {
+    pair.anchor = search.place;
+    if (bend) std::copy_n(bend->bent, bend->modes, bend->anchor_bent);
+  };
   double away = 0;
   if (pair.travelled >= 0) {
-    const double radius = shell.radius * (1 + 1e-6);
-    const double step = motion_bound(pair.last_place, search.place, radius);
+    const double radius = (shell.radius + (bend ? bend->reach : 0)) * (1 + 1e-6);
+    const double step = motion_bound(pair.last_place, search.place, radius) +
+                        (bend ? bending_bound(search, bend->last_bent) : 0);
     if (step < kSlowStep)
       search.near = search.margin + kNearest + static_cast<float>(kStepsNear * step);
-    away = motion_bound(pair.anchor, search.place, radius);
+    away = motion_bound(pair.anchor, search.place, radius) +
+           (bend ? bending_bound(search, bend->anchor_bent) : 0);
     if (!(away < kStays)) {
       pair.travelled += away;
-      pair.anchor = search.place;
+      anchor();
       away = 0;
     }
   }
   if (!(pair.travelled >= 0 && pair.travelled < kLongestWay)) {
     pair.travelled = away = 0;
-    pair.anchor = search.place;
+    anchor();
     std::fill_n(pair.group_expiry, shell.groups.count, 0.0f);
     std::fill_n(pair.near_rows, shell.groups.count, std::uint16_t{0});
     std::fill(pair.group_expiry + shell.groups.count, pair.group_expiry + 16 * shell.blocks.count,
@@ -231,6 +257,7 @@ Way travel(PairSearch& pair, Search& search) {
               HUGE_VALF);
   }
   pair.last_place = search.place;
+  if (bend) std::copy_n(bend->bent, bend->modes, bend->last_bent);
   pair.now = pair.travelled + away;
   const float now = static_cast<float>(pair.now);
   return {now, now + search.margin, static_cast<float>(pair.travelled - away)};
@@ -278,7 +305,7 @@ std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search&
   std::size_t left = far;
   std::uint32_t* others = t.far;
   if (far > 0 && pair.cull_groups.worth(far)) {
-    left = search.cull(search.shell.groups, t.far, far, t.far_survivors, t.clearance);
+    left = search.cull(search.groups(), t.far, far, t.far_survivors, t.clearance);
     for (std::size_t k = 0; k < far; ++k)
       pair.group_expiry[t.far[k]] = expiry_of(way, t.clearance[k]);
     pair.cull_groups.learn(far, left);
@@ -350,11 +377,24 @@ struct Screw {
   float m[6];
 };
 
+// Bends the normals of the groups that hold these rows.
+void bend_candidates(Deformation& d, const TraverseScratch& t, const std::uint32_t* rows,
+                     std::size_t count) {
+  std::size_t groups = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto g = static_cast<std::uint32_t>(rows[i] / kGroupRows);
+    if (groups == 0 || t.frontier[groups - 1] != g) t.frontier[groups++] = g;
+  }
+  bend_normals(d, t.frontier, groups);
+}
+
 // pair.ahead about the shell's centre, in its axes: v in voxels, w in voxels a metre.
 Screw ahead_of_shell(const Body& a, const Body& b, const PairSearch& pair) {
   const Eigen::Map<const Eigen::Matrix<float, 6, 1>> ahead(pair.ahead);
   const Mat3 turn = a.R.transpose() / b.field->voxel;
-  const Vec3 w = ahead.tail<3>().cast<double>(), arm = a.R * (a.shell->centre - a.com);
+  const Vec3 w = ahead.tail<3>().cast<double>();
+  Vec3 arm = a.R * (a.shell->centre - a.com);
+  if (a.bend) arm += a.x - a.bend->about;
   const Vec3 v = turn * (ahead.head<3>().cast<double>() + w.cross(arm)), spin = turn * w;
   Screw screw;
   for (int k = 0; k < 3; ++k)
@@ -391,7 +431,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
   std::size_t count = expired_groups();
   if (count > kFewGroups * blocks && pair.cull_blocks.worth(blocks)) {
     const std::size_t left =
-        search.cull(shell.blocks, t.open_blocks, blocks, t.survivors, t.clearance);
+        search.cull(search.blocks(), t.open_blocks, blocks, t.survivors, t.clearance);
     pair.cull_blocks.learn(blocks, left);
     for (std::size_t k = 0; k < blocks; ++k)
       pair.block_expiry[t.open_blocks[k]] = expiry_of(way, t.clearance[k]);
@@ -407,13 +447,16 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
     complete = false;
     return touch_coarsely(search, pair, t, anytime, blocks, used);
   };
-  if (is_coarse_anyway(anytime, pair, used, blocks)) return coarsely();
-  search.reaches = search.margin > 0 && pair.fit.count == 0;
+  // Samples and bundles of normals do not bend: such a shell is never coarse.
+  const bool bends = search.bend != nullptr;
+  if (bends) bend_groups(*search.bend, t.open_blocks, blocks);
+  if (!bends && is_coarse_anyway(anytime, pair, used, blocks)) return coarsely();
+  search.reaches = search.margin > 0 && pair.fit.count == 0 && !bends;
   if (search.reaches)
     count = search.loadable(pair.group_expiry, way.now, ahead_of_shell(a, b, pair).m, blocks, t);
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
   if (lane.cold) prefetch_normals(shell, t, groups);
-  if (must_be_coarse(anytime, pair, used, blocks, groups)) {
+  if (!bends && must_be_coarse(anytime, pair, used, blocks, groups)) {
     pair.cull_groups.left_out = 0;
     note_blocks();
     return coarsely();
@@ -424,7 +467,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
   const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(search, t, lane, groups, used, shared);
   learn_sampling(anytime, groups, groups, found, since);
-  if (must_be_coarser(anytime, pair, used, found, blocks)) {
+  if (!bends && must_be_coarser(anytime, pair, used, found, blocks)) {
     note_blocks();
     return coarsely();
   }
@@ -441,8 +484,10 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
   const Shell& shell = *a.shell;
   const Search search = search_of(set, a, b, 0, false);
   const float far = static_cast<float>(enough) + kSlack;
-  search.cull(shell.blocks, nullptr, shell.blocks.count, t.survivors, t.clearance);
+  search.cull(search.blocks(), nullptr, shell.blocks.count, t.survivors, t.clearance);
   const auto add_groups = [&](std::size_t block, std::size_t groups) {
+    const auto vector = static_cast<std::uint32_t>(block);
+    if (search.bend) bend_groups(*search.bend, &vector, 1);
     const std::size_t end = std::min(16 * block + 16, shell.groups.count);
     for (std::size_t g = 16 * block; g < end; ++g)
       t.frontier[groups++] = static_cast<std::uint32_t>(g);
@@ -452,7 +497,7 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
   const float* const nearest = std::min_element(t.clearance, t.clearance + shell.blocks.count);
   if (*nearest < far) {
     const std::size_t groups = add_groups(static_cast<std::size_t>(nearest - t.clearance), 0);
-    search.cull(shell.groups, t.frontier, groups, t.survivors, t.rest);
+    search.cull(search.groups(), t.frontier, groups, t.survivors, t.rest);
     const float found = *std::min_element(t.rest, t.rest + groups) - kSlack;
     if (found <= little) return found;
   }
@@ -464,7 +509,7 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
     else
       least = std::min(least, t.clearance[block]);
   }
-  search.cull(shell.groups, t.frontier, groups, t.survivors, t.clearance);
+  search.cull(search.groups(), t.frontier, groups, t.survivors, t.clearance);
   for (std::size_t k = 0; k < groups; ++k) least = std::min(least, t.clearance[k]);
   return least - kSlack;
 }
@@ -479,7 +524,7 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
   }
   std::size_t found = search_pair(set, a, b, pair, t, lane, used, shared, complete);
   pair.quiet.way = 0;
-  if (found == 0 && pair.fit.count == 0) note_quiet(set, a, b, pair);
+  if (found == 0 && pair.fit.count == 0 && !a.bend) note_quiet(set, a, b, pair);
   if (borrows) static_cast<SearchColumns&>(pair) = {};
   const kernels::Touching candidates = candidates_from(t, used);
   pair.fit.deepest = 0;
@@ -487,11 +532,11 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
     const FitRule rule{static_cast<float>(set.contact.fit_offset / b.field->voxel), pair.margin};
     found = relieve(pair.fit, candidates, found, rule, complete);
   }
+  if (a.bend) bend_candidates(*a.bend, t, candidates.row, found);
   if (!(pair.margin > 0)) return found;
-  const Shell& s = *a.shell;
-  return kernels::keep_loadable(
-      {s.x.data, s.y.data, s.z.data, s.nx.data, s.ny.data, s.nz.data, s.point.data}, candidates,
-      found, ahead_of_shell(a, b, pair).m);
+  const PointColumns s = points_of(a);
+  return kernels::keep_loadable({s.x, s.y, s.z, s.nx, s.ny, s.nz, a.shell->point.data}, candidates,
+                                found, ahead_of_shell(a, b, pair).m);
 }
 
 }  // namespace h6

@@ -35,7 +35,7 @@ bool find_key(const h6Session& s, std::int32_t a, std::int32_t b, std::uint64_t&
   if (n.listed.empty()) {
     const Body &shell = s.bodies[a], &field = s.bodies[b];
     key = key_of(a, static_cast<std::uint32_t>(b));
-    if (a == b || shell.fixed || !shell.shell || !field.field) return false;
+    if (a == b || (shell.fixed && !shell.bend) || !shell.shell || !field.field) return false;
     return !(b < a && !field.fixed && field.shell && shell.field);
   }
   const auto at =
@@ -58,7 +58,10 @@ Box region_of(const Settings& set, const Field& field) {
 void place_body(const Settings& set, const Body& body, BodyPlace& place) {
   place.x = body.x, place.q = body.q;
   const Vec3 shift = body.x - body.R * body.com;
-  if (body.shell) place.shell = placed(body.shell->box, body.R, shift);
+  if (body.shell)
+    place.shell =
+        placed(body.bend ? grown(body.shell->box, double{body.bend->reach}) : body.shell->box,
+               body.R, shift);
   if (body.field) place.field = placed(region_of(set, *body.field), body.R, shift);
 }
 
@@ -74,6 +77,8 @@ void follow_body(h6Session& s, std::size_t i) {
     body.travelled.shift += (body.x - place.x).norm();
     // A point at distance r moves by 2 r sin(angle / 2), at most 2 r times this chord.
     body.travelled.turn += 2 * std::min((q - before).norm(), (q + before).norm());
+    place_body(s.settings, body, place);
+  } else if (body.bend) {
     place_body(s.settings, body, place);
   }
   const Box both = grown(united(place.shell, place.field), place.reach);
@@ -219,7 +224,7 @@ void open_near_pairs(h6Session& s) {
     if (body.field)
       place.radius = std::max(place.radius, farthest(region_of(s.settings, *body.field), body.com));
     place_body(s.settings, body, place);
-    moving[i] = !body.fixed;
+    moving[i] = !body.fixed || body.bend;
     boxes[i] = grown(united(place.shell, place.field), moving[i] ? kSlackOfSize * place.radius : 0);
     place.left = true;
     if (moving[i]) n.lively[n.lively_count++] = static_cast<std::uint32_t>(i);

@@ -67,14 +67,16 @@ std::vector<h6PairDef> sorted_pairs(const h6SessionDef& def);
 // Calls f(shell body, field body) for every pair of a definition, in the order of traversal.
 // `sorted`: its sorted_pairs. If none are listed: every moving shell against every other field. Two
 // moving bodies that both have a shell and a field make one pair, not two.
+//
+// A shell that bends counts as one that moves.
 template <class F>
-void each_pair(const h6SessionDef& def, std::span<const h6PairDef> sorted, F&& f) {
+void each_pair(const h6Model& model, const h6SessionDef& def, std::span<const h6PairDef> sorted, F&& f) {
   for (const h6PairDef& p : sorted) f(p.shell_body, p.field_body);
   if (!sorted.empty()) return;
   const auto count = static_cast<std::int32_t>(def.body_count);
   for (std::int32_t a = 0; a < count; ++a) {
     const h6BodyDef& shell = def.bodies[a];
-    if (shell.fixed || shell.shell < 0) continue;
+    if (shell.shell < 0 || (shell.fixed && !model.shells[shell.shell].bends())) continue;
     for (std::int32_t b = 0; b < count; ++b) {
       const h6BodyDef& field = def.bodies[b];
       const bool both = !field.fixed && field.shell >= 0 && shell.field >= 0;

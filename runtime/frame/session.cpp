@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runtime/contact/contact_stages.h"
+#include "runtime/contact/weighing.h"
 #include "runtime/frame/session_checks.h"
 #include "runtime/frame/session_memory.h"
 #include "runtime/frame/workers.h"
@@ -37,7 +38,7 @@ Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) 
 std::vector<double> voxels_of(const h6Model& model, const h6SessionDef& def,
                               std::span<const h6PairDef> listed) {
   std::vector<double> voxel(def.body_count, HUGE_VAL);
-  each_pair(def, listed, [&](std::int32_t a, std::int32_t b) {
+  each_pair(model, def, listed, [&](std::int32_t a, std::int32_t b) {
     const double finest = model.fields[def.bodies[b].field].finest;
     for (const std::int32_t i : {a, b})
       voxel[static_cast<std::size_t>(i)] = std::min(voxel[static_cast<std::size_t>(i)], finest);
@@ -158,8 +159,8 @@ void set_hand(const Settings& set, double force_stiffness, Hand& hand, HandDevic
 // Moving bodies that pairs connect, in groups of at most four. A larger group is split into single
 // bodies; within a step each treats its neighbours as fixed. Quasi-static and held bodies have no
 // mass of their own and are in no island.
-std::vector<Island> islands_of(std::span<const Body> bodies, const h6SessionDef& def,
-                               std::span<const h6PairDef> listed) {
+std::vector<Island> islands_of(const h6Model& model, std::span<const Body> bodies,
+                               const h6SessionDef& def, std::span<const h6PairDef> listed) {
   const auto dynamic = [&](std::int32_t i) {
     return !bodies[i].fixed && bodies[i].motion == Motion::dynamic;
   };
@@ -169,7 +170,7 @@ std::vector<Island> islands_of(std::span<const Body> bodies, const h6SessionDef&
     while (root[i] != i) i = root[i] = root[root[i]];
     return i;
   };
-  each_pair(def, listed, [&](std::int32_t a, std::int32_t b) {
+  each_pair(model, def, listed, [&](std::int32_t a, std::int32_t b) {
     if (dynamic(a) && dynamic(b)) root[find(b)] = find(a);
   });
   std::vector<std::vector<std::int32_t>> members(bodies.size());
@@ -199,10 +200,58 @@ bool offsets_fit(const h6Model& model, const h6SessionDef& def, std::span<const 
                  h6Error* error) {
   bool fits = true;
   if (def.contact.fit_offset > 0)
-    each_pair(def, listed, [&](std::int32_t, std::int32_t b) {
+    each_pair(model, def, listed, [&](std::int32_t, std::int32_t b) {
       fits = fits && offset_fits(def, model.fields[def.bodies[b].field].voxel, b, error);
     });
   return fits;
+}
+
+// Sec. 10 of METHOD.md says why these do not go with a body that bends.
+bool bends_fit(const h6Session& s, const h6SessionDef& def, h6Error* error) {
+  const h6ContactDef& c = def.contact;
+  const char* const no = c.friction > 0                  ? "contact friction"
+                         : c.passivity                   ? "contact passivity"
+                         : uses_clusters(c)              ? "clusters of contacts"
+                         : def.integrator == H6_EXPLICIT ? "the explicit integrator"
+                         : def.frame_budget_us > 0       ? "a frame budget"
+                                                         : nullptr;
+  for (const Deformation& d : s.bends) {
+    const Body& body = s.bodies[d.body];
+    if (no) return fail(error, "body %d bends, and %s cannot be used with it", d.body, no);
+    if (!def.bodies[d.body].fixed)
+      return fail(error, "body %d bends and must be fixed: only rigid bodies move", d.body);
+    if (body.field)
+      return fail(error,
+                  "body %d bends and cannot have a field, which would stay as it is at rest: give "
+                  "the field to the rigid body",
+                  d.body);
+  }
+  return true;
+}
+
+// Finds the body that each body that bends may touch: one at most, whose centre of mass its arms
+// begin at, and whose size they have.
+bool join_partners(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef> listed,
+                   h6Error* error) {
+  std::int32_t two = -1;
+  each_pair(*s.model, def, listed, [&](std::int32_t a, std::int32_t b) {
+    Deformation* const d = s.bodies[a].bend;
+    if (d && d->partner >= 0) two = a;
+    if (d) d->partner = b;
+  });
+  if (two >= 0)
+    return fail(error,
+                "body %d bends and may touch the fields of several bodies: list one pair with it",
+                two);
+  for (Deformation& d : s.bends) {
+    Body& a = s.bodies[d.body];
+    if (d.partner >= 0) {
+      const Body& b = s.bodies[d.partner];
+      a.radius = b.shell && !b.bend ? b.radius + 2 * a.voxel : farthest(b.field->box, b.com);
+    }
+    follow(d, s.bodies);
+  }
+  return true;
 }
 
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
@@ -214,12 +263,13 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const std::vector<double> voxels = voxels_of(*s.model, def, listed);
   for (std::size_t i = 0; i < s.bodies.size(); ++i)
     set_body(s.bodies[i], def.bodies[i], voxels[i] < HUGE_VAL ? voxels[i] : 1e-3);
+  if (!bends_fit(s, def, error) || !join_partners(s, def, listed, error)) return false;
   const Stiffness k = stiffness_for(def, voxels);
   s.settings.contact.stiffness = k.contact;
   for (std::size_t i = 0; i < s.hands.size(); ++i)
     set_hand(s.settings, k.force, s.hands[i], s.devices[i], s.bodies[def.hands[i].body],
              def.hands[i]);
-  const std::vector<Island> islands = islands_of(s.bodies, def, listed);
+  const std::vector<Island> islands = islands_of(*s.model, s.bodies, def, listed);
   s.islands = s.islands.first(islands.size());
   std::copy(islands.begin(), islands.end(), s.islands.begin());
   s.team = new sched::FrameTeam(def.threads, def.tasks);

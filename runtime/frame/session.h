@@ -38,6 +38,7 @@ struct h6Session {
   std::span<h6::BetweenBodies> between;     // (rows of near pairs), or none where one body moves
   std::span<h6::BetweenFields> of_fields;   // (rows of near pairs), or none without `series`
   std::span<h6::FrictionSpring> frictions;  // (rows of near pairs), or none without friction
+  std::span<h6::Deformation> bends;         // by body; of the bodies that bend
   std::span<h6::Hand> hands;
   std::span<h6::HandDevice> devices;  // (hands)
   std::span<h6::Island> islands;

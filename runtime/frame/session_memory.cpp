@@ -35,6 +35,7 @@ struct Sizes {
   std::size_t pairs = 0;  // near at a time
   ScratchRoom scratch;
   std::vector<ShellSize> shells;
+  std::vector<std::int32_t> bends;        // bodies whose shells bend
   bool between = false;                   // the bodies of a pair may both move
   bool of_fields = false;                 // `series` couples fields that move
   std::size_t traversals = 1, lanes = 0;  // one for each thread that may need one; of workers: 0
@@ -46,7 +47,7 @@ Sizes sizes_of(const h6Model& model, const Settings& set, const h6SessionDef& de
   std::size_t groups = 0, blocks = 0;
   n.bodies = def.body_count, n.hands = def.hand_count, n.listed = listed.size();
   std::size_t all = 0;
-  each_pair(def, listed, [&](std::int32_t a, std::int32_t b) {
+  each_pair(model, def, listed, [&](std::int32_t a, std::int32_t b) {
     const bool moves = !def.bodies[b].fixed;
     n.between = n.between || (moves && !def.bodies[a].fixed);
     n.of_fields = n.of_fields || (moves && uses_series(def.contact));
@@ -54,6 +55,9 @@ Sizes sizes_of(const h6Model& model, const Settings& set, const h6SessionDef& de
     ++n.shells.back().fields;
     ++all;
   });
+  for (std::size_t i = 0; i < def.body_count; ++i)
+    if (const std::int32_t shell = def.bodies[i].shell; shell >= 0 && model.shells[shell].bends())
+      n.bends.push_back(static_cast<std::int32_t>(i));
   bool shares = n.shells.size() > 1;
   for (ShellSize& size : n.shells) {
     const Shell& shell = model.shells[def.bodies[size.body].shell];
@@ -113,6 +117,35 @@ void lay_out_near(NearPairs& near, const Sizes& n, Arena& arena) {
   near.boxes.lay_out(arena, n.bodies);
 }
 
+// Of a shell that bends: columns as in the shell, rows for as many contacts as it may have.
+void lay_out_bend(const Settings& set, const Shell& shell, Deformation* to, Arena& arena) {
+  Deformation counted, &d = to ? *to : counted;
+  for (Tier* tier : {&d.blocks, &d.groups}) {
+    const Tier& rest = tier == &d.blocks ? shell.blocks : shell.groups;
+    tier->count = rest.count;
+    for (Column<float>* column : {&tier->x, &tier->y, &tier->z, &tier->radius})
+      column->take(arena, rest.x.count);
+  }
+  for (Column<float>* column : {&d.x, &d.y, &d.z, &d.nx, &d.ny, &d.nz})
+    column->take(arena, shell.x.count);
+  const std::size_t r = shell.bend.modes, contacts = set.max_contacts;
+  const bool exact = set.gradient == H6_EXACT;
+  d.shell = &shell;
+  d.modes = static_cast<int>(r);
+  d.sums.size = 6 + r;
+  d.sums.stride = (6 + r + 7) / 8 * 8;
+  d.row = arena.take<std::uint32_t>(contacts);
+  d.load = arena.take<float>(contacts);
+  d.share = arena.take<float>(contacts);
+  d.push = arena.take<float>(contacts * d.sums.stride);
+  d.slope = arena.take<float>(exact ? contacts * d.sums.stride : 0);
+  d.sums.force = arena.take<double>(d.sums.stride);
+  d.sums.stiffness = arena.take<double>(d.sums.size * d.sums.stride);
+  d.sums.damping = arena.take<double>(d.sums.size * d.sums.stride);
+  d.internal = arena.take<double>((r + 7) / 8 * 8);
+  d.tangent = arena.take<double>(r * ((r + 7) / 8 * 8));
+}
+
 // Called twice: with an arena that only counts, then with one over the memory.
 void lay_out(h6Session& s, const h6SessionDef& def, const Sizes& n, Arena& arena) {
   s.bodies = take<Body>(arena, n.bodies);
@@ -129,6 +162,12 @@ void lay_out(h6Session& s, const h6SessionDef& def, const Sizes& n, Arena& arena
     const Shell& points = s.model->shells[def.bodies[n.shells[i].body].shell];
     lay_out_shell(s.settings, n.shells[i], points, n.pairs,
                   s.shells.data() ? &s.shells[i] : nullptr, arena);
+  }
+  s.bends = take<Deformation>(arena, n.bends.size());
+  for (std::size_t i = 0; i < n.bends.size(); ++i) {
+    const Shell& shell = s.model->shells[def.bodies[n.bends[i]].shell];
+    lay_out_bend(s.settings, shell, s.bends.data() ? &s.bends[i] : nullptr, arena);
+    if (s.bends.data()) s.bends[i].body = n.bends[i];
   }
   s.lanes.scratch = take<Scratch>(arena, n.traversals);
   s.lanes.single = take<Lane>(arena, n.lanes);
@@ -181,6 +220,7 @@ bool reserve_memory(h6Session& s, const h6SessionDef& def, std::span<const h6Pai
   }
   for (std::size_t i = 0; i < n.shells.size(); ++i)
     s.bodies[n.shells[i].body].meets = static_cast<std::int32_t>(i);
+  for (Deformation& d : s.bends) s.bodies[d.body].bend = &d;
   return true;
 }
 

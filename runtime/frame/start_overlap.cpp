@@ -28,7 +28,8 @@ struct Measured {
 h6OverlapPoint point_at(const Body& a, const Pair& pair, const Field& field,
                         const kernels::Affine& place, std::uint32_t row, float depth) {
   const Shell& shell = *a.shell;
-  const float p[3] = {shell.x[row], shell.y[row], shell.z[row]};
+  const PointColumns now = points_of(a);
+  const float p[3] = {now.x[row], now.y[row], now.z[row]};
   float at[3];
   for (int k = 0; k < 3; ++k) {
     const float* m = place.m[k];

@@ -21,8 +21,9 @@ double reach(const Body& a, double shift, double turn) { return shift + turn * a
 double free_motion(const Body& a, const Body& b, double dt) {
   Vec3 v = Vec3::Zero(), w = Vec3::Zero();
   if (is_free(a)) v = a.v, w = a.w;
-  if (is_free(b)) v -= b.v + b.w.cross(a.x - b.x), w -= b.w;
-  return dt * reach(a, v.norm(), w.norm());
+  if (is_free(b)) v -= b.v + b.w.cross(arm_origin(a) - b.x), w -= b.w;
+  const double way = dt * reach(a, v.norm(), w.norm());
+  return a.bend ? way + a.bend->pace : way;
 }
 
 // The motion that the hands of held bodies make in this frame [m].
@@ -34,7 +35,8 @@ double held_motion(const h6Session& s, const Pair& pair) {
     if (body.motion != Motion::held || !hand.seen) continue;
     const Way of = way_of(hand, body);
     if (hand.body == pair.a) way += reach(a, of.shift, of.turn);
-    if (hand.body == pair.b) way += reach(a, of.shift + of.turn * (a.x - b.x).norm(), of.turn);
+    if (hand.body == pair.b)
+      way += reach(a, of.shift + of.turn * (arm_origin(a) - b.x).norm(), of.turn);
   }
   return way;
 }
@@ -65,7 +67,7 @@ void note_reach(h6Session& s, double dt, double share, bool gains) {
   for (const std::uint32_t i : s.near.all_lively()) {
     const Body& body = s.bodies[i];
     BodyPlace& place = s.near.places[i];
-    place.reach = 0;
+    place.reach = body.bend ? body.bend->pace : 0;
     if (!is_free(body)) continue;
     place.reach = dt * (body.v.norm() + body.w.norm() * place.radius);
     if (gains) place.reach += dt * (body.gained_v.norm() + body.gained_w.norm() * place.radius);
@@ -93,6 +95,7 @@ bool within_reach(const h6Session& s, const Pair& pair) {
 
 Substeps plan_substeps(h6Session& s) {
   if (s.settings.max_substeps == 1) return {};
+  for (Deformation& d : s.bends) d.pace = s.settings.dt * bend_reach(d, d.v);
   note_reach(s, s.settings.dt, 1, true);
   find_near_pairs(s);
   double needed = 1;
@@ -120,6 +123,7 @@ double share_of_way(const Substeps& plan, bool held, std::uint32_t i) {
 
 bool slow_down(h6Session& s, double dt) {
   if (s.settings.max_substeps == 1) return false;
+  for (Deformation& d : s.bends) d.pace = bend_reach(d, d.step);
   note_reach(s, dt, 1 / s.substeps.needed, false);
   find_near_pairs(s);
   double share = 1;
@@ -138,6 +142,8 @@ bool slow_down(h6Session& s, double dt) {
     Body& body = s.bodies[i];
     if (is_free(body)) body.v *= share, body.w *= share;
   }
+  for (Deformation& d : s.bends)
+    for (int j = 0; j < d.modes; ++j) d.step[j] *= share, d.next_v[j] *= share;
   return true;
 }
 

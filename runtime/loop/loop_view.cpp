@@ -2,6 +2,8 @@
 // loop_view.cpp - poses and contacts for a viewer, and one session taking over from another.
 #include "runtime/loop/loop_view.h"
 
+#include <algorithm>
+
 #include "runtime/frame/session.h"
 
 namespace h6 {
@@ -48,7 +50,7 @@ void LoopView::write(const h6Session& s, double time) {
     const Contacts& c = shell.contacts;
     std::size_t i = skip;
     for (; i < c.count; i += step)
-      slot.contact[slot.rows++] = row_of(c, i, s.bodies[shell.body].x, shell.body);
+      slot.contact[slot.rows++] = row_of(c, i, arm_origin(s.bodies[shell.body]), shell.body);
     skip = i - c.count;
   }
   slots_.publish();
@@ -96,6 +98,10 @@ void take_over(h6Session& next, const h6Session& before) {
     device.passivity = own.passivity;
     device.port.same_delay(own.port);
     if (!own.passivity) device.port.forget();
+  }
+  for (std::size_t i = 0; i < next.bends.size() && i < before.bends.size(); ++i) {
+    std::copy_n(before.bends[i].q, before.bends[i].modes, next.bends[i].q);
+    std::copy_n(before.bends[i].v, before.bends[i].modes, next.bends[i].v);
   }
   take_over_relief(next, before);
   take_over_friction(next, before);

@@ -66,6 +66,17 @@ struct Samples {
       reach[kTiers];  // (blocks) from a point of a group to its nearest sample, the longest
 };
 
+// How a shell bends: h6DeformableDef. Modes of points and spheres as kernels/bend/bend_points.h has
+// them, in the order of the shell's rows; the internal force as bend_sums.h has it.
+struct Deformable {
+  std::size_t modes = 0;         // r; 0: the shell is rigid
+  double alpha = 0, beta = 0;    // damping [1/s], [s]
+  Column<float> groups, blocks;  // of their spheres
+  Column<double> force;
+  Column<float> points, normals;  // (rows)
+  Buffer<char> memory;
+};
+
 // A shell's points in three flat tiers. Rows are sorted so that those next to each other are near
 // each other (split at medians): 16 rows are a group, 16 groups a block, each with its smallest
 // sphere. Coordinates are relative to `centre`, so that float serves meshes far from their origin.
@@ -83,7 +94,9 @@ struct Shell {
   Bundles normals;  // of groups
   Samples samples;
   Buffer<char> memory;  // of all columns: together they lie on few pages
-  std::size_t bytes() const { return memory.count; }
+  Deformable bend;
+  bool bends() const { return bend.modes > 0; }
+  std::size_t bytes() const { return memory.count + bend.memory.count; }
 };
 inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;
 
@@ -91,6 +104,9 @@ inline constexpr std::size_t kGroupRows = 16, kBlockRows = 256;
 bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field, h6Error* error);
 bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
                    h6Error* error);
+// Adds how a converted shell bends.
+bool convert_deformable(const h6DeformableDef& def, const h6Allocator& allocator, Shell* shell,
+                        h6Error* error);
 
 // Writes the sentence (when there is somebody to read it) and returns false.
 bool fail(h6Error* error, const char* format, ...) __attribute__((format(printf, 2, 3)));

@@ -292,7 +292,7 @@ bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* s
   make_tier(*shell, kBlockRows, shell->blocks);
   bundle_normals(*shell, shell->normals);
   take_samples(*shell, shell->samples);
-  return true;
+  return !def.deformable || convert_deformable(*def.deformable, allocator, shell, error);
 }
 
 }  // namespace h6

@@ -43,7 +43,8 @@ void stop_impacts(const Settings& set, std::span<const Body> bodies,
                   std::span<const ShellBody> shells, std::span<LinearWrench> acting) {
   for (const ShellBody& shell : shells)
     for (const Pair& pair : shell.pairs) {
-      if (pair.begin == pair.end) continue;
+      // The modes of a body that bends would not feel this damper.
+      if (pair.begin == pair.end || bodies[pair.a].bend) continue;
       const Sides sides = sides_of(pair, bodies, acting);
       const Body &a = sides.a, &b = sides.b;
       const double mass = std::min(free_mass(a), free_mass(b));

@@ -3,6 +3,7 @@
 #pragma once
 #include <span>
 
+#include "runtime/contact/deformation.h"
 #include "runtime/contact/pair.h"
 #include "runtime/contact/settings.h"
 #include "runtime/motion/hand.h"
@@ -44,6 +45,14 @@ void accelerate_bodies(const Settings& set, std::span<Body> bodies,
 // Moves all free bodies by one time step, with the velocities that they have.
 void move_bodies(const Settings& set, std::span<Body> bodies, std::span<const Island> islands,
                  h6Status& status);
+// Adds to the wrenches on rigid bodies how the bodies that bend will answer in this step. Call it
+// when all other wrenches are known.
+void fold_bends(const Settings& set, std::span<const Body> bodies, std::span<Deformation> bends,
+                std::span<LinearWrench> acting, h6Status& status);
+// Finds the coming step of the modes, when the rigid bodies have their new velocities.
+void accelerate_bends(const Settings& set, std::span<const Body> bodies,
+                      std::span<Deformation> bends);
+void move_bends(std::span<Deformation> bends, h6Status& status);
 // One step of a body without mass towards the pose in which its wrenches balance. No point moves
 // farther than `most` [m].
 void step_static(const Settings& set, Body& body, const LinearWrench& acting, double most,

@@ -36,6 +36,7 @@ typedef struct h6Loop h6Loop;
 /* Defaults. A def that was not made by its default function is not valid. */
 H6_API h6FieldDef    h6DefaultFieldDef(void);   /* empty                                              */
 H6_API h6ShellDef    h6DefaultShellDef(void);   /* empty                                              */
+H6_API h6DeformableDef h6DefaultDeformableDef(void); /* empty, without damping                        */
 H6_API h6ModelDef    h6DefaultModelDef(void);   /* empty                                              */
 H6_API h6PairDef     h6DefaultPairDef(void);    /* -1, -1                                             */
 H6_API h6ContactArrays h6DefaultContactArrays(void); /* empty, at rest                                */
@@ -115,6 +116,14 @@ H6_API bool   h6RestartFit(h6Session* session, h6Error* error);
  * step. */
 H6_API h6BodyState   h6GetBody(const h6Session* session, int32_t body);
 H6_API void          h6SetBody(h6Session* session, int32_t body, const h6BodyState* state);
+/* Coordinates and velocities of a body whose shell bends, after the last step: the first `capacity` of
+ * each array, which may be NULL. Returns r; 0: no such body, or it is rigid. */
+H6_API size_t        h6GetDeformation(const h6Session* session, int32_t body, double* q,
+                                      double* velocity, size_t capacity);
+/* Puts such a body into a shape; `velocity` may be NULL: at rest. False, and nothing has changed, where
+ * `count` is not r, a number is not finite or beyond 1e6, or a loop runs the session. */
+H6_API bool          h6SetDeformation(h6Session* session, int32_t body, const double* q,
+                                      const double* velocity, size_t count);
 H6_API h6Contacts    h6GetContacts(const h6Session* session, int32_t shell_body);
 /* What each row of h6GetContacts touches: the `part` and the `triangle` that the field names for the
  * brick (8 voxels wide) around the contact; -1 where it names none, or where the contact is deeper

@@ -58,6 +58,28 @@ typedef struct h6FieldDef {
   uint64_t reserved[8];
 } h6FieldDef;
 
+/* A reduced deformable: how the points of a shell move with r coordinates q, and what resists.
+ * Barbic & James 2005 (reduced StVK), 2008 (haptics); METHOD.md, Sec. 10. Point i stands at
+ *     p_i + sum_j q_j modes[i][j]                                                  mesh frame  [m]
+ * and q obeys, since the modes are mass-orthonormal,
+ *     q'' + (alpha + beta df/dq) q' + f(q) = forces on the modes
+ *     f_i = sum_j P1[i][j] q_j + sum_{j<=k} P2[i][jk] q_j q_k + sum_{j<=k<=l} P3[i][jkl] q_j q_k q_l
+ * in SI units (q in m sqrt(kg)). Pairs and triples stand in lexicographic order, row i contiguous.
+ * Arrays are read while h6CreateModel runs, never after. */
+#define H6_MAX_MODES 64
+typedef struct h6DeformableDef {
+  uint32_t      mode_count;  /* r, 1 .. H6_MAX_MODES                                               */
+  const float*  modes;       /* (point_count x r x 3): displacement of each point for q_j = 1      */
+  const float*  normal_modes;/* (point_count x r x 3): first derivative of each point's unit normal by
+                                q_j, or NULL: from how neighbouring points move                    */
+  const double* linear;      /* P1 (r x r)                                                         */
+  const double* quadratic;   /* P2 (r x r(r+1)/2), or NULL: 0                                      */
+  const double* cubic;       /* P3 (r x r(r+1)(r+2)/6), or NULL: 0                                 */
+  double        alpha;       /* mass damping, 0 .. 1e6                                       [1/s] */
+  double        beta;        /* stiffness damping, 0 .. 1e3                                    [s] */
+  uint64_t reserved[8];
+} h6DeformableDef;
+
 /* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs
  * to its own level and to all finer ones. Nodes are the sphere tree: row r of a level is the point
  * `node_point[r]` with the sphere, centred on that point, that holds all its descendants. The
@@ -74,7 +96,10 @@ typedef struct h6ShellDef {
   const float*    node_radius;     /* (nodes)                                                 [m] */
   const uint32_t* node_first_child;/* (nodes) row in the node arrays; 0 in the last level         */
   const uint32_t* node_child_count;/* (nodes) 0 in the last level                                 */
-  uint64_t reserved[8];
+  const h6DeformableDef* deformable; /* how the shell bends, or NULL: it is rigid. A body with a shell
+                                      that bends is fixed, has no field, and touches the field of one
+                                      body: METHOD.md, Sec. 10                                     */
+  uint64_t reserved[7];
 } h6ShellDef;
 
 typedef struct h6ModelDef {
@@ -339,7 +364,8 @@ typedef struct h6Contacts {
   const float*    depth;                         /* penetration depth, > 0 inside             [m]  */
   const float*    nx; const float* ny; const float* nz; /* inward unit normal; `firm`: of the push  */
   const float*    gx; const float* gy; const float* gz; /* unit gradient of the field, outward     */
-  const float*    rx; const float* ry; const float* rz; /* arm: from the centre of mass       [m]  */
+  const float*    rx; const float* ry; const float* rz; /* arm: from the centre of mass; of a shell that
+                                                    bends: from that of the body it touches   [m]  */
   const float*    tx; const float* ty; const float* tz; /* torque direction T                      */
   const float*    weight;                        /* share of the stiffness                         */
   const uint32_t* point;                         /* index into the shell's points                  */
@@ -372,8 +398,8 @@ typedef struct h6FrameReport {
   double   max_depth_voxels;          /* the same in voxels of its field: its finest node spacing  */
   double   stage_us[H6_MAX_STAGES];
   double   frame_us;
-  uint64_t state_hash;                /* of poses and velocities after the step, of the samples, and
-                                         of the friction springs where there is friction           */
+  uint64_t state_hash;                /* of poses, velocities and deformations after the step, of the
+                                         samples, and of the friction springs where there is friction */
   uint32_t series_iterations;         /* `series`: most Newton steps of any shell body             */
   double   series_residual;           /* `series`: largest gradient left, over c * the largest e   */
   /* With h6SessionDef.net_stiffness: extreme eigenvalues of S J^T w k J S over all shell bodies'

@@ -228,8 +228,8 @@ TEST_CASE("sum_rows: SIMD agrees with the reference for every count, misaligned"
       Column left(n * kStride, n % 4), right(n * kStride, n % 3), load(n, 1), share(n, 2);
       fill(left, n * kStride, random, 1), fill(right, n * kStride, random, 1);
       fill(load, n, random, 1), fill(share, n, random, 1);
-      const RowSums rows{left.begin(), right.begin(), load.begin(), share.begin(),
-                         n,            kSize,         kStride};
+      const RowSums rows{left.begin(), right.begin(), load.begin(), share.begin(), n,
+                         kSize,        kStride};
       std::vector<double> f(kStride), m(kSize * kStride), f_ref = f, m_ref = m;
       sum_rows(rows, f.data(), m.data());
       sum_rows_ref(rows, f_ref.data(), m_ref.data());

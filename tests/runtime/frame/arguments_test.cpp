@@ -53,6 +53,10 @@ TEST_CASE("a session that is NULL gives defaults") {
   CHECK(h6Step(nullptr, &sample, &command) == H6_OUTPUT_FAULT);
   CHECK(h6GetBody(nullptr, 0).pose.q.w == 1);
   CHECK(h6GetContacts(nullptr, 0).count == 0);
+  double q = 1;
+  CHECK(h6GetDeformation(nullptr, 0, &q, &q, 1) == 0);
+  CHECK_FALSE(h6SetDeformation(nullptr, 0, &q, nullptr, 1));
+  CHECK(q == 1);
   CHECK(h6GetFrame(nullptr).frame == 0);
   CHECK(h6GetCoupling(nullptr, 0).stiffness == 0);
   CHECK(h6GetVoxel(nullptr, 0) == 0);

@@ -28,6 +28,7 @@
 
 #include "hapsix/batch.h"
 #include "tests/support/ball_in_bowl.h"
+#include "tests/support/bridge.h"
 #include "tests/support/forced_target.h"
 #include "tests/support/sanitized.h"
 
@@ -155,7 +156,8 @@ constexpr Mode kModes[] = {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 namespace {
 
-void check_quiet(BallInBowl& scene, int frames, std::uint32_t touching) {
+template <class Scene>
+void check_quiet(Scene& scene, int frames, std::uint32_t touching) {
   scene.open();
   std::uint32_t most = 0;
   h6DeviceCommand command;
@@ -205,6 +207,25 @@ TEST_CASE("a thousand frames allocate nothing and take no lock, on one thread an
         check_quiet(scene, 40, 100);
       }
   }
+}
+
+TEST_CASE("frames with a body that bends allocate nothing and take no lock") {
+  for (const unsigned threads : {1u, 2u})
+    for (const h6Method method : {H6_METHOD_FIRM, H6_METHOD_ROBUST, H6_METHOD_SERIES})
+      for (const h6Gradient gradient : {H6_SYMMETRIC, H6_EXACT})
+        for (const h6CouplingMode mode :
+             {H6_COUPLING_DYNAMIC, H6_COUPLING_STATIC, H6_COUPLING_DIRECT})
+          for (const std::size_t modes : {std::size_t{6}, std::size_t{64}}) {
+            if (modes == 64 && (method != H6_METHOD_FIRM || mode != H6_COUPLING_DYNAMIC)) continue;
+            BallOnBridge scene(modes == 64 ? 3000 : 20000, modes);
+            scene.def.threads = threads;
+            scene.def.contact.method = method;
+            scene.def.gradient = gradient;
+            scene.hand.coupling.mode = mode;
+            CAPTURE(std::string(h6MethodName(method)));
+            CAPTURE(modes);
+            check_quiet(scene, 150, modes == 64 ? 0 : 5);
+          }
 }
 
 TEST_CASE("stepping many sessions in one call allocates nothing and takes no lock") {
