@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/bake/plan.h"
+#include "io/cli/bake_deformable.h"
 #include "io/cli/commands.h"
 #include "io/cli/mesh_unit.h"
 #include "io/console/checks.h"
@@ -383,10 +384,12 @@ void add_shell(CLI::App* bake, Program& program) {
 }  // namespace
 
 void add_bake(CLI::App& app, Program& program) {
-  CLI::App* bake = app.add_subcommand("bake", "Bake a mesh into a field (.vdb) or a shell (.ply)");
+  CLI::App* bake = app.add_subcommand(
+      "bake", "Bake a mesh into a field (.vdb), a shell (.ply) or a reduced deformable (.h5)");
   bake->require_subcommand(1);
   add_field(bake, program);
   add_shell(bake, program);
+  add_bake_deformable(bake, program);
 }
 
 }  // namespace h6::cli

@@ -9,6 +9,7 @@
 
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
+#include "io/deform/deformable_file.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
 #include "io/record/recording.h"
@@ -169,6 +170,30 @@ Result<ordered_json> recording_info(const Console& console, const std::string& f
   return json;
 }
 
+Result<ordered_json> deformable_info(const std::string& file) {
+  const Result<io::ReducedModel> m = io::read_deformable(file);
+  if (!m) return m.failure();
+  ordered_json materials = ordered_json::array();
+  for (const io::SolidMaterial& each : m->mesh.materials)
+    materials.push_back({{"name", each.name},
+                         {"young", each.young},
+                         {"poisson", each.poisson},
+                         {"density", each.density}});
+  return ordered_json{{"kind", "deformable"},
+                      {"modes", m->modes},
+                      {"vertices", m->mesh.vertices.size()},
+                      {"elements", m->mesh.elements.size()},
+                      {"fixed", m->mesh.fixed.size()},
+                      {"free", m->free},
+                      {"materials", materials},
+                      {"lowest_hz", m->frequency.front()},
+                      {"highest_hz", m->frequency.back()},
+                      {"mass_damping", m->mass_damping},
+                      {"stiffness_damping", m->stiffness_damping},
+                      {"input_hash", m->input_hash},
+                      {"made_with", ordered_json::parse(m->made_with, nullptr, false)}};
+}
+
 Result<ordered_json> scene_info(const std::string& file, bool outside) {
   Result<io::Scene> s = io::read_scene(file, outside);
   if (!s) return s.failure();
@@ -223,6 +248,8 @@ int info_command(const Console& console, const std::string& file, const std::str
   Result<ordered_json> facts = Failure{""};
   if (ending == ".vdb")
     facts = field_info(file);
+  else if (ending == ".h5" && io::is_deformable(file))
+    facts = deformable_info(file);
   else if (ending == ".h5" || ending == ".part")
     facts = recording_info(console, file);
   else if (ending == ".json")
@@ -242,8 +269,8 @@ int info_command(const Console& console, const std::string& file, const std::str
 }  // namespace
 
 void add_info(CLI::App& app, Program& program) {
-  CLI::App* info =
-      app.add_subcommand("info", "What a file is: mesh, field, shell, scene, path or recording");
+  CLI::App* info = app.add_subcommand(
+      "info", "What a file is: mesh, field, shell, deformable, scene, path or recording");
   auto file = std::make_shared<std::string>(), units = std::make_shared<std::string>("m");
   auto schema = std::make_shared<bool>(false), settings = std::make_shared<bool>(false);
   auto* option =

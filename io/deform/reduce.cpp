@@ -9,6 +9,7 @@
 
 #include "io/deform/basis.h"
 #include "io/deform/polynomials.h"
+#include "io/file/content_hash.h"
 
 namespace h6::io {
 namespace {
@@ -123,11 +124,27 @@ Result<ReducedModel> reduce_checked(const SolidMesh& mesh, const ReduceOptions& 
   put_basis(*basis, dofs, model);
   put_damping(options.damping, model);
   model.free = options.free;
+  model.input_hash = reduction_key(mesh, options);
   stages.done("polynomials");
   return model;
 }
 
 }  // namespace
+
+std::string reduction_key(const SolidMesh& mesh, const ReduceOptions& o) {
+  constexpr int kReducer = 1;  // another number when the same input gives other results
+  std::string bytes;
+  const auto put = [&](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  put(kReducer), put(o.modes), put(o.linear_modes), put(int{o.free}), put(o.damping);
+  put(mesh.vertices.size()), put(mesh.elements.size()), put(mesh.materials.size());
+  for (const h6Vec3& p : mesh.vertices) put(p);
+  for (const SolidElement& e : mesh.elements) put(e);
+  for (const SolidMaterial& m : mesh.materials) put(m.young), put(m.poisson), put(m.density);
+  for (const std::uint32_t v : mesh.fixed) put(v);
+  return hex(hash_bytes(bytes.data(), bytes.size()));
+}
 
 Result<ReducedModel> reduce(const SolidMesh& mesh, const ReduceOptions& options,
                             ReduceReport* report, const Progress& progress) {

@@ -17,6 +17,10 @@ struct ReduceOptions {
   unsigned threads = 0;  // 0: all
 };
 
+// 32 hex digits of the mesh, its materials and fixed vertices, and the options; `threads` does not
+// count. `input_hash` of the model.
+std::string reduction_key(const SolidMesh& mesh, const ReduceOptions& options);
+
 struct ReduceReport {
   SolidFacts facts;
   std::size_t freedoms = 0;  // degrees of freedom of the full model

@@ -6,7 +6,7 @@
 //   f_i(q) = sum_j P1[i][j] q_j + sum_{j<=k} P2[i][jk] q_j q_k + sum_{j<=k<=l} P3[i][jkl] q_j q_k
 //   q_l.
 // J. Barbic, D. James, "Real-time subspace integration for St. Venant-Kirchhoff deformable models",
-// 2005. METHOD.md, "Reduced deformables".
+// 2005.
 #pragma once
 #include <cstddef>
 #include <string>

@@ -189,7 +189,12 @@ Outcome give_material(SolidMesh& mesh, const std::string& set, const SolidMateri
 Result<SolidFacts> check_solid(const SolidMesh& mesh, bool free) {
   if (mesh.elements.empty()) return Failure{"The model has no element."};
   std::vector<bool> used(mesh.materials.size(), false);
-  for (const SolidElement& e : mesh.elements) used[e.material] = true;
+  for (std::size_t e = 0; e < mesh.elements.size(); ++e) {
+    if (mesh.elements[e].material >= used.size())
+      return Failure{"Element " + std::to_string(e + 1) +
+                     " has no material; give Young's modulus, Poisson's ratio and the density."};
+    used[mesh.elements[e].material] = true;
+  }
   for (std::size_t m = 0; m < used.size(); ++m)
     if (used[m])
       if (Outcome good = check_material(mesh.materials[m]); !good) return good.failure();

@@ -19,6 +19,8 @@ struct SolidMaterial {
   double density = 0;  // above 0 and at most 1e5 [kg/m^3]
 };
 
+inline constexpr std::uint32_t kNoMaterial = 0xffffffff;
+
 // A tetrahedron (4 corners) or a hexahedron (8). Seen from corner 3 of a tetrahedron, corners 0, 1,
 // 2 run anticlockwise. A hexahedron's corners 0..3 run around one face and 4..7 stand opposite to
 // them, as in VTK: at (0,0,0), (1,0,0), (1,1,0), (0,1,0), (0,0,1), (1,0,1), (1,1,1), (0,1,1) of the
@@ -26,7 +28,7 @@ struct SolidMaterial {
 struct SolidElement {
   std::array<std::uint32_t, 8> corner{};  // indices into vertices
   std::uint32_t corners = 0;              // 4 or 8
-  std::uint32_t material = 0;             // index into materials
+  std::uint32_t material = 0;             // index into materials, or kNoMaterial
 };
 
 struct SolidMesh {

@@ -38,7 +38,7 @@ Result<Source> open_source(const fs::path& file) {
   const std::uint64_t bytes = fs::file_size(file, failed);
   Handle h5 = H5Fopen(file.c_str(), H5F_ACC_RDONLY, file_access());
   if (failed || !h5.ok()) return not_opened(file);
-  return Source{file, bytes, std::move(h5)};
+  return Source{file, bytes, std::move(h5), "recording"};
 }
 
 Result<Handle> open_group(const Source& source, const char* name) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// stored.h - rows of a dataset, from a file that may be damaged or forged. Private.
+// stored.h - rows of a dataset, from a file that may be damaged or forged. For rooms that read
+// HDF5.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -15,9 +16,10 @@ struct Source {
   std::filesystem::path file;
   std::uint64_t bytes;
   Handle h5;
+  std::string kind;  // "recording"
 
   Failure wrong(const std::string& what) const {
-    return {file.string() + " is not a recording that can be read: " + what};
+    return {file.string() + " is not a " + kind + " that can be read: " + what};
   }
 };
 

@@ -17,6 +17,8 @@
 #include "device/device_spec.h"
 #include "device/scripted_hand.h"
 #include "device/spacemouse_report.h"
+#include "io/deform/deformable_file.h"
+#include "io/deform/solid_file.h"
 #include "io/field/field_file.h"
 #include "io/field/raw_field.h"
 #include "io/file/content_hash.h"
@@ -52,6 +54,27 @@ void take_mesh(std::string_view bytes) {
 }
 constexpr char kStl[] = "m.stl", kObj[] = "m.obj", kPly[] = "m.ply", kGltf[] = "m.gltf",
                kGlb[] = "m.glb", kDae[] = "m.dae", kGz[] = "m.stl.gz";
+
+template <const char* Name>
+void take_solid(std::string_view bytes) {
+  const auto mesh = io::parse_solid(std::string(bytes), Name);
+  if (!mesh) return check_sentence(mesh.error());
+  promise(!mesh->elements.empty(), "a solid mesh has elements");
+  for (const auto& e : mesh->elements)
+    for (std::uint32_t a = 0; a < e.corners; ++a)
+      promise(e.corner[a] < mesh->vertices.size(), "an element names vertices");
+  for (const auto& p : mesh->vertices)
+    promise(std::abs(p.x) <= 1e6 && std::abs(p.y) <= 1e6 && std::abs(p.z) <= 1e6,
+            "vertices lie within 1e6 m");
+  if (const auto facts = io::check_solid(*mesh, true); !facts) check_sentence(facts.error());
+}
+constexpr char kVeg[] = "m.veg", kMsh[] = "m.msh", kVtk[] = "m.vtk";
+
+void take_deformable(std::string_view bytes) {
+  const auto model = io::read_deformable(as_file(bytes, "d.h5"));
+  if (!model) return check_sentence(model.error());
+  promise(io::consistent(*model), "the arrays of a reduced model fit each other");
+}
 
 void take_shell(std::string_view bytes) {
   const auto shell = io::parse_shell(bytes, "s.ply");
@@ -186,7 +209,9 @@ constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},    {"obj", take_mesh<kO
                                {"path", take_path},         {"script", take_script},
                                {"device", take_spec},       {"hid", take_hid},
                                {"request", take_request},   {"recording", take_recording},
-                               {"log", take_log},           {"contract", take_contract}};
+                               {"log", take_log},           {"contract", take_contract},
+                               {"veg", take_solid<kVeg>},   {"msh", take_solid<kMsh>},
+                               {"vtk", take_solid<kVtk>},   {"deformable", take_deformable}};
 
 }  // namespace
 

@@ -12,7 +12,7 @@ if command -v man >/dev/null && [ -n "$(command -v groff || true)" ]; then
   [ -z "$said" ] || fail "the man page: $said"
 fi
 count=0
-for command in "" bake "bake field" "bake shell" check run report replay info devices scene demo experiments map study; do
+for command in "" bake "bake field" "bake shell" "bake deformable" check run report replay info devices scene demo experiments map study; do
   for option in $("$PROGRAM" $command --help | grep -oE '^ +(-[a-zA-Z],)?--[a-z-]+' | grep -oE -- '--[a-z-]+'); do
     grep -qF -- "$(sed 's/-/\\-/g' <<<"$option")" "$WORK/hapsix.1" || fail "the man page lacks $option of '$command'"
     count=$((count + 1))
@@ -29,7 +29,7 @@ expect() { # what it must be, then the words
   [ "$got" = "$wanted" ] || fail "hapsix $*: '$got' and not '$wanted'"
 }
 expect "bake" ba
-expect "field shell" bake ""
+expect "field shell deformable" bake ""
 expect "--voxels --voxel-size" bake field bay.stl --vox
 expect "list export" scene ""
 expect "--virtual-time --view" run --v
