@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // main.cpp - hapsix_peers [--json FILE] [--svg FILE] [NAME...]: hapsix and other libraries on the
-// same tasks. Names are those of tasks, and `bakes`; default all.
+// same tasks. Names are those of tasks, `bakes` and `batch`; default all.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "bench/peers/bakes.h"
+#include "bench/peers/batch.h"
 #include "bench/peers/measure.h"
 #include "bench/peers/picture.h"
 #include "io/console/console.h"
@@ -84,6 +85,26 @@ TextTable table_of(const std::vector<BakeRow>& rows) {
   return table;
 }
 
+TextTable table_of(const std::vector<BatchRow>& rows) {
+  TextTable table{{"peer", "sessions", "1 thread [1/s]", "2 threads [1/s]", "times", "contacts",
+                   "ours over it, 2 threads"}};
+  for (const BatchRow& r : rows) {
+    const auto ours = std::find_if(rows.begin(), rows.end(),
+                                   [&](const BatchRow& o) { return o.sessions == r.sessions; });
+    table.push_back({r.peer, std::to_string(r.sessions), number(r.per_second[0], 0),
+                     number(r.per_second[1], 0), number(r.per_second[1] / r.per_second[0], 2),
+                     number(r.contacts, 0), number(ours->per_second[1] / r.per_second[1], 1)});
+  }
+  return table;
+}
+
+Json json_of(const BatchRow& r) {
+  return {{"peer", r.peer},
+          {"sessions", r.sessions},
+          {"steps_per_second", r.per_second},
+          {"contacts", r.contacts}};
+}
+
 Json json_of(const BakeRow& r) {
   return {{"triangles", r.triangles},
           {"voxel", r.voxel},
@@ -104,7 +125,7 @@ struct Arguments {
 Result<Arguments> parse(int count, char** values) {
   Arguments out;
   std::vector<std::string> known = task_names();
-  known.push_back("bakes");
+  known.insert(known.end(), {"bakes", "batch"});
   for (int i = 1; i < count; ++i) {
     const std::string word = values[i];
     if (word == "--json" || word == "--svg") {
@@ -138,6 +159,13 @@ int run(int count, char** values) {
         bakes.push_back(*row);
       }
       std::printf("bakes\n%s\n", cli::markdown(table_of(bakes)).c_str());
+      continue;
+    }
+    if (name == "batch") {
+      const Result<std::vector<BatchRow>> rows = compare_batches(console.progress());
+      if (!rows) return console.fail(rows.error());
+      for (const BatchRow& row : *rows) json["batch"].push_back(json_of(row));
+      std::printf("batch\n%s\n", cli::markdown(table_of(*rows)).c_str());
       continue;
     }
     Result<std::unique_ptr<Task>> task = make_task(name);

@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // study_command.cpp - hapsix study: a scene run over ranges of its settings, a row for each run.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
+#include "hapsix/hapsix.h"
 #include "io/cli/commands.h"
 #include "io/console/checks.h"
+#include "io/file/write_aside.h"
 #include "io/run/try_run.h"
 #include "io/scene/load_scene.h"
+#include "io/study/cluster.h"
+#include "io/study/picture.h"
 #include "io/study/plan.h"
 #include "io/study/table.h"
 #include "io/study/workers.h"
@@ -22,6 +29,7 @@ namespace fs = std::filesystem;
 
 struct Options {
   std::string file, folder;
+  std::string scheduler;  // address
   std::size_t jobs = 0;
   bool worker = false;  // this process does runs for another
 };
@@ -83,12 +91,36 @@ std::size_t errors_in(const study::Table& table) {
   return n;
 }
 
-Outcome do_runs(const Program& program, const Options& o, const study::Plan& plan,
-                study::Table& table) {
-  study::Work work;
+void use_processes(const Program& program, const Options& o, study::Work& work) {
   work.command = {"hapsix", "study", o.file, "-o", o.folder, "--worker"};
   if (program.allow_outside) work.command.push_back("--allow-outside");
   work.processes = o.jobs ? o.jobs : std::max(1u, std::thread::hardware_concurrency());
+}
+
+// "hapsix 0.1.0" of "hapsix 0.1.0, 12.2.0, SIMD AVX3 AVX2", and "AVX3".
+void use_scheduler(const Options& o, const study::Plan& plan, study::Work& work) {
+  const std::string info = h6BuildInfo(), simd = info.substr(info.find("SIMD ") + 5);
+  std::error_code error;
+  work.program = "python3";
+  work.command = {"python3",
+                  "-c",
+                  study::kClusterProgram,
+                  o.scheduler,
+                  o.file,
+                  plan.scene_file().string(),
+                  fs::read_symlink("/proc/self/exe", error).string(),
+                  info.substr(0, info.find(',')),
+                  simd.substr(0, simd.find(' '))};
+  work.ahead = 4096;  // their numbers fit into a pipe; the scheduler knows what each worker has
+}
+
+Outcome do_runs(const Program& program, const Options& o, const study::Plan& plan,
+                study::Table& table) {
+  study::Work work;
+  if (o.scheduler.empty())
+    use_processes(program, o, work);
+  else
+    use_scheduler(o, plan, work);
   for (std::size_t run = 0; run < plan.runs(); ++run)
     if (!table.has(run)) work.runs.push_back(run);
   work.processes = std::min(work.processes, work.runs.size());
@@ -99,10 +131,29 @@ Outcome do_runs(const Program& program, const Options& o, const study::Plan& pla
            !interrupted.load();
   };
   work.done = [&](const std::string& row) { return table.add(row); };
-  work.lost = [&](std::size_t run) {
-    return failed_row(plan, run, "the process of this run ended three times before its end");
-  };
+  work.lost = [&](std::size_t run, const std::string& why) { return failed_row(plan, run, why); };
   return work.runs.empty() ? Outcome(Done{}) : study::share_out(work);
+}
+
+// The rows' last 18 columns begin with the verdict; quoted fields have no part in those.
+Outcome draw(const Options& o, const study::Plan& plan, const study::Table& table) {
+  std::vector<study::Seen> rows;
+  for (std::size_t run = 0; run < plan.runs(); ++run) {
+    const std::string begin = row_begin(plan, run) + ",";
+    std::stringstream rest(
+        table.rows()[run].substr(std::min(begin.size(), table.rows()[run].size())));
+    std::string verdict, skipped, depth;
+    std::getline(rest, verdict, ',');
+    for (int i = 0; i < 3; ++i) std::getline(rest, skipped, ',');
+    std::getline(rest, depth, ',');
+    std::vector<std::string> values = plan.values(run);
+    for (std::string& value : values)
+      value.erase(std::remove(value.begin(), value.end(), '"'), value.end());
+    rows.push_back(
+        {std::move(values), verdict, depth.empty() ? NAN : std::strtod(depth.c_str(), nullptr)});
+  }
+  return io::write_text_aside(fs::path(o.folder) / "runs.svg",
+                              study::picture(fs::path(o.file).stem().string(), plan.keys(), rows));
 }
 
 int report(const Console& console, const study::Table& table) {
@@ -141,6 +192,7 @@ int study_command(const Program& program, const Options& o) {
     return console.fail("interrupted after " + std::to_string(table->done()) + " of " +
                         std::to_string(plan->runs()) + " runs; the same command goes on");
   if (const Outcome finished = table->finish(); !finished) return console.fail(finished.error());
+  if (const Outcome drawn = draw(o, *plan, *table); !drawn) return console.fail(drawn.error());
   return report(console, *table);
 }
 
@@ -153,12 +205,20 @@ void add_study(CLI::App& app, Program& program) {
   auto o = std::make_shared<Options>();
   command->add_option("study", o->file, "STUDY.json")->required()->option_text("STUDY.json");
   command
-      ->add_option("-o,--output", o->folder,
-                   "Its folder: runs.csv in the end. A study that was killed goes on where it was")
+      ->add_option(
+          "-o,--output", o->folder,
+          "Its folder: runs.csv and runs.svg in the end. A study that was killed goes on where it "
+          "was")
       ->required()
       ->option_text("FOLDER");
   command->add_option("--jobs", o->jobs, "Processes; default: one for each core")
       ->check(whole_within(1, 1024));
+  command
+      ->add_option("--scheduler", o->scheduler,
+                   "Do the runs on the workers of this scheduler of Dask's distributed; the same "
+                   "table, as far as they have this machine's SIMD target")
+      ->option_text("ADDRESS")
+      ->excludes("--jobs");
   command->add_flag("--worker", o->worker)->group("");
   command->footer(
       "STUDY.json: {\"hapsix_study\": 1, \"scene\": \"peg-in-hole\",\n"

@@ -20,6 +20,7 @@ Scene alphas_in_two_hands();
 Scene engine_bay();
 Scene gear_train();
 Scene landing_gear();
+Scene nut_on_bolt();
 Scene piston_in_bore();
 Scene spline_hub_1k();
 Scene spline_hub_10k();

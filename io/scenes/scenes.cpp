@@ -37,6 +37,8 @@ constexpr Entry kScenes[] = {
     {"piston-in-bore", "a piston in a blind bore with a quarter of a voxel of play",
      piston_in_bore},
     {"gear-train", "a gear pushed into the mesh of two others and turned against both", gear_train},
+    {"nut-on-bolt", "a nut screwed on a bolt, pulled against its thread and screwed off",
+     nut_on_bolt},
     {"wire-bundle", "a bar dragged over a loom of wires two voxels thick", wire_bundle},
     {"spline-hub-1k", "a splined shaft turned in its hub, 1,000 points on its driven flanks",
      spline_hub_1k},

@@ -139,28 +139,28 @@ std::string content_of(const fs::path& file) {
   return text.str();
 }
 
-Result<io::Scene> base_scene(const std::string& name, const fs::path& study, const fs::path& folder,
-                             bool outside) {
+Result<fs::path> scene_file_of(const std::string& name, const fs::path& study,
+                               const fs::path& folder) {
   const fs::path file = fs::path(name).is_absolute() ? fs::path(name) : study.parent_path() / name;
   std::error_code error;
-  if (fs::is_regular_file(file, error)) return io::read_scene(file, outside);
+  if (fs::is_regular_file(file, error)) return file;
   const fs::path exported = folder / "scene";
-  if (!fs::exists(exported / "scene.json", error)) {
-    Result<io::Scene> made = io::make_scene(name);
-    if (!made) return Failure{name + ": there is neither such a file nor such a generated scene"};
-    // Aside first: a kill leaves no half scene.
-    const fs::path aside = folder / "scene.unfinished";
-    fs::remove_all(aside, error);
-    if (const Outcome out = io::export_scene(*made, aside); !out) return out.failure();
-    fs::rename(aside, exported, error);
-    if (error) return Failure{"cannot write " + exported.string() + ": " + error.message()};
-  }
-  return io::read_scene(exported / "scene.json");
+  if (fs::exists(exported / "scene.json", error)) return exported / "scene.json";
+  Result<io::Scene> made = io::make_scene(name);
+  if (!made) return Failure{name + ": there is neither such a file nor such a generated scene"};
+  // Aside first: a kill leaves no half scene.
+  const fs::path aside = folder / "scene.unfinished";
+  fs::remove_all(aside, error);
+  if (const Outcome out = io::export_scene(*made, aside); !out) return out.failure();
+  fs::rename(aside, exported, error);
+  if (error) return Failure{"cannot write " + exported.string() + ": " + error.message()};
+  return exported / "scene.json";
 }
 
 }  // namespace
 
 struct Plan::Parts {
+  fs::path file;  // of the scene
   io::Scene base;
   Json scene;  // of the base
   std::vector<Varied> vary;
@@ -238,8 +238,13 @@ Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outsi
       return Failure{name + ": a study begins with \"hapsix_study\": 1 and names a \"scene\""};
     auto parts = std::make_unique<Parts>();
     parts->read(study);
-    Result<io::Scene> base = base_scene(study["scene"], fs::absolute(file), folder, outside);
+    const Result<fs::path> at = scene_file_of(study["scene"], fs::absolute(file), folder);
+    if (!at) return at.failure();
+    // What was exported into the folder is our own.
+    Result<io::Scene> base =
+        *at == folder / "scene" / "scene.json" ? io::read_scene(*at) : io::read_scene(*at, outside);
     if (!base) return base.failure();
+    parts->file = *at;
     parts->base = std::move(*base);
     each_file(parts->base, [](fs::path& f) { f = fs::absolute(f).lexically_normal(); });
     parts->scene = Json::parse(io::scene_text(parts->base));
@@ -259,6 +264,7 @@ Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outsi
 std::size_t Plan::runs() const { return parts_->combinations() * parts_->repeats; }
 const std::vector<std::string>& Plan::keys() const { return parts_->keys; }
 std::size_t Plan::repeat(std::size_t run) const { return run % parts_->repeats; }
+const fs::path& Plan::scene_file() const { return parts_->file; }
 double Plan::unit() const { return io::metres(parts_->base.unit); }
 const std::string& Plan::identity() const { return parts_->identity; }
 

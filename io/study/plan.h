@@ -39,7 +39,8 @@ class Plan {
   Result<io::Scene> scene(std::size_t run) const;
   std::vector<std::string> values(std::size_t run) const;  // one for each key, as JSON
   std::size_t repeat(std::size_t run) const;
-  double unit() const;  // metres in the scene's unit of length
+  const std::filesystem::path& scene_file() const;  // of the scene, also of a generated one
+  double unit() const;                              // metres in the scene's unit of length
   // All that decides what the runs give: study, scene, content of its files, version.
   const std::string& identity() const;
 

@@ -10,11 +10,12 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <deque>
 #include <iostream>
 #include <map>
-#include <optional>
+#include <set>
 
 extern char** environ;
 
@@ -27,11 +28,11 @@ struct Worker {
   pid_t pid = -1;
   int to = -1, from = -1;
   std::string heard;
-  std::optional<std::size_t> run;
+  std::set<std::size_t> runs;  // under way
 };
 
 // Pipes are not inherited but by dup2, so each worker hears of the end of this process.
-bool start(const std::vector<std::string>& command, Worker& worker) {
+bool start(const std::string& program, const std::vector<std::string>& command, Worker& worker) {
   int to[2], from[2];
   if (pipe2(to, O_CLOEXEC) != 0) return false;
   if (pipe2(from, O_CLOEXEC) != 0) return close(to[0]), close(to[1]), false;
@@ -44,12 +45,12 @@ bool start(const std::vector<std::string>& command, Worker& worker) {
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   const int failed =
-      posix_spawn(&worker.pid, "/proc/self/exe", &actions, nullptr, arguments.data(), environ);
+      posix_spawnp(&worker.pid, program.c_str(), &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   close(to[0]), close(from[1]);
   if (failed) return close(to[1]), close(from[0]), errno = failed, false;
   worker.to = to[1], worker.from = from[0];
-  worker.heard.clear(), worker.run.reset();
+  worker.heard.clear(), worker.runs.clear();
   return true;
 }
 
@@ -81,18 +82,21 @@ class Pool {
  private:
   bool left_to_do() const {
     for (const Worker& worker : workers_)
-      if (worker.run) return true;
+      if (!worker.runs.empty()) return true;
     return !queue_.empty();
   }
   Outcome give(Worker& worker) {
-    if (worker.run || queue_.empty()) return Done{};
-    if (worker.pid < 0 && !start(work_.command, worker))
-      return Failure{std::string("the system gives no process: ") + std::strerror(errno)};
-    worker.run = queue_.front();
-    queue_.pop_front();
-    const std::string line = std::to_string(*worker.run) + "\n";
+    if (worker.runs.size() >= work_.ahead || queue_.empty()) return Done{};
+    if (worker.pid < 0 && !start(work_.program, work_.command, worker))
+      return Failure{"cannot start " + work_.program + ": " + std::strerror(errno)};
+    std::string lines;
+    while (worker.runs.size() < work_.ahead && !queue_.empty()) {
+      lines += std::to_string(queue_.front()) + "\n";
+      worker.runs.insert(queue_.front());
+      queue_.pop_front();
+    }
     // A worker that died meanwhile is found by the end of its answers.
-    (void)!write(worker.to, line.data(), line.size());
+    (void)!write(worker.to, lines.data(), lines.size());
     return Done{};
   }
   Outcome listen() {
@@ -111,22 +115,38 @@ class Pool {
     if (n < 0 && errno == EINTR) return Done{};
     if (n <= 0) return died(worker);
     worker.heard.append(text, static_cast<std::size_t>(n));
-    const std::size_t end_of_line = worker.heard.find('\n');
-    if (end_of_line == std::string::npos) return Done{};
-    const std::string line = worker.heard.substr(0, end_of_line);
-    worker.heard.erase(0, end_of_line + 1);
-    worker.run.reset();
-    return work_.done(line);
+    for (std::size_t end; (end = worker.heard.find('\n')) != std::string::npos;) {
+      const std::string line = worker.heard.substr(0, end);
+      worker.heard.erase(0, end + 1);
+      if (const Outcome taken = take(worker, line); !taken) return taken;
+    }
+    return Done{};
   }
-  // Its run goes to another, unless it has brought several down.
+  Outcome take(Worker& worker, const std::string& line) {
+    if (line[0] == '!') return Failure{line.substr(1)};
+    const bool lost = line[0] == '?';
+    const char* const digits = line.c_str() + lost;
+    char* rest = nullptr;
+    const std::size_t run = std::strtoull(digits, &rest, 10);
+    if (rest == digits || worker.runs.erase(run) == 0)
+      return Failure{"a worker answers what nobody asked: " + line.substr(0, 100)};
+    return work_.done(lost ? work_.lost(run, *rest ? rest + 1 : rest) : line);
+  }
+  // Its runs go to another, unless they have brought several down.
   Outcome died(Worker& worker) {
-    const std::optional<std::size_t> run = worker.run;
+    const std::set<std::size_t> runs = std::move(worker.runs);
     end(worker);
-    worker.run.reset();
-    if (!run) return Done{};
+    worker.runs.clear();
     if (!work_.go_on()) return Done{};
-    if (++tries_[*run] >= kTries) return work_.done(work_.lost(*run));
-    queue_.push_front(*run);
+    for (const std::size_t run : runs) {
+      if (++tries_[run] < kTries) {
+        queue_.push_front(run);
+      } else if (const Outcome done = work_.done(
+                     work_.lost(run, "the process of this run ended three times before its end"));
+                 !done) {
+        return done;
+      }
+    }
     return Done{};
   }
 

@@ -10,13 +10,16 @@
 namespace h6::study {
 
 struct Work {
-  std::vector<std::string> command;  // of a worker: it reads numbers of runs, a line each, and
-                                     // answers each with one line
+  std::string program = "/proc/self/exe";  // a file, or a name in PATH
+  // Of a worker: it reads numbers of runs, a line each, and answers each with one line: a row,
+  // "?RUN SENTENCE" for a run that is lost, "!SENTENCE" when it cannot go on.
+  std::vector<std::string> command;
   std::size_t processes = 1;
+  std::size_t ahead = 1;  // runs that a process has at a time
   std::vector<std::size_t> runs;
   std::function<Outcome(const std::string& line)> done;
-  // Gives the line of a run whose process died every time.
-  std::function<std::string(std::size_t run)> lost;
+  // Gives the line of a run that no process could end.
+  std::function<std::string(std::size_t run, const std::string& why)> lost;
   std::function<bool()> go_on;  // asked now and then; false: ends soon
 };
 

@@ -11,9 +11,18 @@
 Units are SI. A pose is (x, y, z, qw, qx, qy, qz) of a body's mesh frame, a velocity and a wrench are the
 linear part before the angular one. An array that is called a view shares memory with what it came from.
 """
-import numpy as _np
+import sys as _sys
 
-from ._hapsix import *  # noqa: F401,F403
+try:
+    import numpy as _np
+except ImportError:
+    raise ImportError(f"hapsix needs NumPy, which {_sys.executable} does not have: install it there, or use "
+                      "the Python that has it (Debian: /usr/bin/python3 and python3-numpy)") from None
+try:
+    from ._hapsix import *  # noqa: F401,F403
+except ModuleNotFoundError:
+    raise ImportError(f"hapsix was built for another version of Python than {_sys.executable}, which is "
+                      f"{_sys.version_info.major}.{_sys.version_info.minor}") from None
 
 
 def columns(frames, hands=1):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Assembly tasks with the interface of Gymnasium; Gymnasium itself is used where it is installed.
 
-    env = hapsix.env.AssemblyEnv()                      # peg in hole
+    env = hapsix.env.AssemblyEnv()                      # peg in hole; TASKS has the others
     observation, info = env.reset(seed=1)
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
@@ -57,6 +57,7 @@ class Task:
     reach: float = 5e-4        # most way of the hand in an action [m]
     turn: float = np.radians(0.5)   # most turn of the hand in an action [rad]
     lead: float = 5e-3         # the hand stays this near to the part [m]
+    lead_turn: float = np.radians(30)  # ... and turned against it by no more than this [rad]
     frames: int = 10           # that an action lasts: 10 ms at 1 kHz
     actions: int = 400         # after which an episode is truncated
     max_contacts: int = 1000   # room in each session
@@ -67,6 +68,23 @@ PEG_IN_HOLE = Task("peg-in-hole", start=(0, 0, 17e-3), goal=(0, 0, -15e-3), spre
 # The shaft must be turned so that its 24 teeth meet the gaps.
 SHAFT_IN_HUB = Task("spline-hub-1k", start=(0, 0, 45e-3), goal=(0, 0, 0), spread=(1e-3, 1e-3, 1e-3),
                     tilt=np.radians(3), tolerance=5e-4, max_contacts=2000)
+# The thread, with a pitch of 4 mm, lets the nut down only as it turns: by one turn and a half.
+NUT_ON_BOLT = Task("nut-on-bolt", start=(0, 0, 3e-3), goal=(0, 0, -6e-3), spread=(5e-4, 5e-4, 5e-4),
+                   tilt=np.radians(2), tolerance=5e-4, turn=np.radians(4), lead=2e-3, max_contacts=2000)
+# The gear of 18 teeth must be turned so that they meet the gaps of two other gears at once.
+GEAR_MESH = Task("gear-train", start=(0, 0, 20e-3), goal=(0, 0, 0), spread=(1e-3, 1e-3, 1e-3),
+                 tilt=np.radians(3), tolerance=5e-4, max_contacts=2000)
+TASKS = {"peg-in-hole": PEG_IN_HOLE, "shaft-in-hub": SHAFT_IN_HUB, "nut-on-bolt": NUT_ON_BOLT,
+         "gear-mesh": GEAR_MESH}
+
+
+def _task_of(task):
+    if isinstance(task, Task):
+        return task
+    if task in TASKS:
+        return TASKS[task]
+    raise ValueError(f"there is no task {task!r}: " + ", ".join(TASKS))
+
 
 OBSERVATION = 22
 _MM, _FORCE, _TORQUE = 1e-3, 10.0, 0.1
@@ -84,6 +102,23 @@ def _turned(q, turns):
     return out / np.linalg.norm(out, axis=1, keepdims=True)
 
 
+def _times(p, q):
+    """Products of quaternions (n, 4)."""
+    w = p[:, 0] * q[:, 0] - np.sum(p[:, 1:] * q[:, 1:], axis=1)
+    v = p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] + np.cross(p[:, 1:], q[:, 1:])
+    return np.concatenate((w[:, None], v), axis=1)
+
+
+def _near(q, to, most):
+    """Quaternions q (n, 4), turned back so far that each is within `most` [rad] of `to`."""
+    between = _times(q, to * (1, -1, -1, -1))
+    between = np.where(between[:, :1] < 0, -between, between)
+    sine = np.linalg.norm(between[:, 1:], axis=1, keepdims=True)
+    angle = 2 * np.arctan2(sine, between[:, :1])
+    turns = between[:, 1:] * (most / np.maximum(sine, 1e-12))
+    return np.where(angle > most, _turned(to, turns), q)
+
+
 class AssemblyVectorEnv:
     """num_envs episodes of a task side by side. With autoreset an episode that ends begins anew in the
     same step: infos["final"] has its index and infos["final_observation"] its last observation.
@@ -91,9 +126,12 @@ class AssemblyVectorEnv:
     observation (num_envs, 22) float32: way to the goal (3) [mm], quaternion (4), velocity (6) [mm/s,
     rad/s], wrench on the hand (6) [10 N, 0.1 N m], way from the part to the hand (3) [mm]
     action (num_envs, 6) in -1 .. 1: way (3) and turn (3) of the hand, in units of the task's reach and turn
+
+    task: one of TASKS, by name, or a Task of your own. threads: 0: one for each core.
     """
 
     def __init__(self, num_envs=1, task=PEG_IN_HOLE, threads=0, autoreset=True):
+        task = _task_of(task)
         self.task, self.num_envs, self.autoreset = task, num_envs, autoreset
         self._scene = hapsix.Scene(task.scene)
         definition = self._scene.definition()
@@ -146,12 +184,16 @@ class AssemblyVectorEnv:
         how much nearer the part came [mm], less a hundredth for each newton beyond 5, and 10 at the goal.
         """
         task, b = self.task, self._batch
-        actions = np.clip(np.asarray(actions, float).reshape(self.num_envs, 6), -1, 1)
+        actions = np.asarray(actions, float).reshape(self.num_envs, 6)
+        if np.isnan(actions).any():
+            raise ValueError("an action is not a number")
+        actions = np.clip(actions, -1, 1)
         before = np.linalg.norm(self._goal - b.body[:, 0, :3], axis=1)
         ahead = b.pose[:, 0, :3] + task.reach * actions[:, :3] - b.body[:, 0, :3]
         length = np.linalg.norm(ahead, axis=1, keepdims=True)
         b.pose[:, 0, :3] = b.body[:, 0, :3] + ahead * np.minimum(1, task.lead / np.maximum(length, 1e-12))
-        b.pose[:, 0, 3:] = _turned(b.pose[:, 0, 3:], task.turn * actions[:, 3:])
+        turned = _turned(b.pose[:, 0, 3:], task.turn * actions[:, 3:])
+        b.pose[:, 0, 3:] = _near(turned, b.body[:, 0, 3:7], task.lead_turn)
         b.step(task.frames)
         self._age += 1
         distance = np.linalg.norm(self._goal - b.body[:, 0, :3], axis=1)

@@ -311,6 +311,78 @@ class Environments(unittest.TestCase):
         np.testing.assert_array_equal(*hashes)
         self.assertEqual((observations.shape, rewards.shape), ((6, 22), (6,)))
 
+    @staticmethod
+    def screw(observation):
+        """Presses down and turns: the thread, or the teeth, let the part down."""
+        action = np.zeros(6)
+        action[:2] = observation[:2] / 0.5
+        action[2] = -1
+        action[3:5] = -2 * observation[4:6] * np.sign(observation[3]) / np.radians(0.5)
+        action[5] = -1
+        return np.clip(action, -1, 1)
+
+    def test_a_nut_goes_down_its_bolt_as_it_is_turned_and_not_as_it_is_pushed(self):
+        env = hapsix.env.AssemblyEnv("nut-on-bolt")
+        observation, _ = env.reset(seed=3)
+        for _ in range(120):
+            observation, _, terminated, _, info = env.step([0, 0, -1, 0, 0, 0])
+        self.assertFalse(terminated)
+        self.assertLess(observation[2], -2)  # it stands on the thread
+        self.assertGreater(info["contacts"], 0)
+        observation, total, turned = env.reset(seed=3)[0], 0, 0
+        for _ in range(env._many.task.actions):
+            observation, reward, terminated, truncated, info = env.step(self.screw(observation))
+            total, turned = total + reward, turned + np.degrees(env._many.task.turn)
+            if terminated or truncated:
+                break
+        self.assertTrue(terminated)
+        self.assertGreater(turned, 360)
+        self.assertGreater(total, 12)
+
+    def test_a_shaft_and_a_gear_go_in_as_their_teeth_find_the_gaps(self):
+        for task, turn in (("shaft-in-hub", 0.0), ("gear-mesh", 0.0)):
+            env = hapsix.env.AssemblyEnv(task)
+            upright = env._many._upright
+            for seed in (1, 2):
+                observation, _ = env.reset(seed=seed)
+                for _ in range(env._many.task.actions):
+                    off = hapsix.env._times(observation[None, 3:7].astype(float), upright[None] * (1, -1, -1, -1))[0]
+                    off *= np.sign(off[0])
+                    action = np.zeros(6)
+                    action[:2] = observation[:2] / 0.5
+                    action[3:] = -2 * off[1:] / np.radians(0.5)
+                    if np.abs(observation[:2]).max() < 0.2 and np.linalg.norm(off[1:]) < 4e-3:
+                        action[2] = -1
+                    observation, _, terminated, truncated, info = env.step(np.clip(action, -1, 1))
+                    if terminated or truncated:
+                        break
+                self.assertTrue(terminated, (task, seed, observation))
+
+    def test_every_task_starts_free_and_ends_by_truncation_when_nothing_is_done(self):
+        for name, task in hapsix.env.TASKS.items():
+            short = hapsix.env.dataclasses.replace(task, actions=3)
+            env = hapsix.env.AssemblyEnv(short)
+            first, _ = env.reset(seed=1)
+            again, _ = env.reset(seed=1)
+            other, _ = env.reset(seed=2)
+            np.testing.assert_array_equal(first, again, name)
+            self.assertFalse(np.array_equal(first, other), name)
+            for k in range(3):
+                observation, _, terminated, truncated, info = env.step(np.zeros(6))
+                self.assertEqual((terminated, truncated), (False, k == 2), name)
+                self.assertTrue(np.isfinite(observation).all())
+            self.assertEqual(info["contacts"], 0, name)
+
+    def test_wrong_tasks_and_actions_are_refused_in_a_sentence(self):
+        with self.assertRaisesRegex(ValueError, "nut-on-bolt"):
+            hapsix.env.AssemblyEnv("screw-driver")
+        env = hapsix.env.AssemblyEnv()
+        env.reset(seed=1)
+        for wrong in (np.zeros(5), np.full(6, np.nan)):
+            with self.assertRaises(ValueError):
+                env.step(wrong)
+        env.step(np.full(6, np.inf))  # as far as an action goes
+
     def test_an_episode_that_ends_in_a_crowd_begins_anew(self):
         task = hapsix.env.dataclasses.replace(hapsix.env.PEG_IN_HOLE, actions=5)
         many = hapsix.env.AssemblyVectorEnv(3, task)
@@ -320,6 +392,19 @@ class Environments(unittest.TestCase):
             self.assertEqual(truncated.all(), k == 4)
         self.assertEqual(infos["final_observation"].shape, (3, 22))
         self.assertLess(observations[0, 2], -30)  # above the block again
+
+
+class Imports(unittest.TestCase):
+    def imported(self, code):
+        """What a Python with another surrounding says of `import hapsix`."""
+        return subprocess.run([sys.executable, "-c", code + "\nimport hapsix"], capture_output=True, text=True)
+
+    def test_a_python_without_numpy_hears_what_is_missing(self):
+        said = self.imported("import sys; sys.modules['numpy'] = None")
+        self.assertIn("hapsix needs NumPy", said.stderr.splitlines()[-1])
+        self.assertNotIn("During handling", said.stderr)
+        said = self.imported("import sys; sys.modules['hapsix._hapsix'] = None")
+        self.assertIn("another version of Python", said.stderr.splitlines()[-1])
 
 
 class Stubs(unittest.TestCase):

@@ -84,10 +84,10 @@ TEST_CASE(
   std::mt19937_64 random(5);
   int kills = 0;
   std::size_t most = 0;
-  while (!fs::exists(box.file("killed/runs.csv")) && kills < 8) {
+  while (!fs::exists(box.file("killed/runs.csv")) && kills < 20) {
     auto process =
         std::make_unique<Process>(box, Args{"study", "study.json", "-o", "killed", "--jobs", "2"});
-    std::this_thread::sleep_for(std::chrono::milliseconds(400 + random() % 1000));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200 + random() % 800));
     const std::vector<pid_t> study = children(getpid());
     const auto workers = study.empty() ? study : children(study.front());
     if (kills % 2 && !workers.empty()) {  // a worker first: its run goes to another process

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,8 @@ using namespace h6::io;
 namespace {
 
 const std::vector<std::string>& machines() {
-  static const std::vector<std::string> names = {"piston-in-bore", "gear-train", "wire-bundle",
-                                                 "spline-hub-1k"};
+  static const std::vector<std::string> names = {"piston-in-bore", "gear-train", "nut-on-bolt",
+                                                 "wire-bundle", "spline-hub-1k"};
   return names;
 }
 
@@ -107,6 +108,19 @@ TEST_CASE("the gears mesh with play where the idler comes to stand") {
   const h6Pose meshed = {{0, 0, 0}, part_of(scene).pose.q};
   CHECK(clearance(scene, meshed) > 0.15 * kMm);
   CHECK(clearance(scene, {{0, 0, 0}, product(turn_by({0, 0, 0.15}), meshed.q)}) == 0);
+}
+
+TEST_CASE("the thread lets the nut down as it turns, and by no other way") {
+  const Scene scene = made("nut-on-bolt");
+  const auto nut_at = [&](double mm, double turns) {
+    return clearance(scene, {{0, 0, mm * kMm}, turn_by({0, 0, 2 * std::numbers::pi * turns})});
+  };
+  CHECK(nut_at(0, 0) > 0.05 * kMm);  // its thread is in line with the bolt's at every whole turn
+  CHECK(nut_at(-6, -1.5) > 0.05 * kMm);
+  CHECK(nut_at(-6, -1) == 0);
+  CHECK(nut_at(-6, 1.5) > 0.05 * kMm);  // half a turn is half a turn
+  CHECK(nut_at(-5, 1.25) == 0);         // but a left-handed one does not fit
+  CHECK(nut_at(-5, -1.25) > 0.05 * kMm);
 }
 
 TEST_CASE("each hand of the alphas goes half of the way of alpha-shortcut") {

@@ -34,7 +34,7 @@ Scene scene_of(const std::string& name) {
 std::vector<SceneName> small_scenes() {
   static const std::set<std::string> others = {
       "engine-bay",  "landing-gear",  "alphas-in-two-hands", "piston-in-bore", "gear-train",
-      "wire-bundle", "spline-hub-1k", "spline-hub-10k",      "spline-hub-100k"};
+      "nut-on-bolt", "wire-bundle",  "spline-hub-1k",       "spline-hub-10k", "spline-hub-100k"};
   std::vector<SceneName> out;
   for (const SceneName& entry : scene_names())
     if (!others.count(entry.name)) out.push_back(entry);

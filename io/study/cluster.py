@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""cluster.py - does the runs of a study on the workers of a scheduler of Dask's distributed.
+
+The program starts it with: ADDRESS STUDY SCENE PROGRAM VERSION SIMD. It reads numbers of runs, a line
+each, and answers each with one line: its row, "?RUN SENTENCE" for a run that no worker could end, or
+"!SENTENCE" when the whole study cannot go on. Workers need the program in the same version and nothing
+else of this tree. Files go to them by the hash of their content, once for each worker.
+"""
+import hashlib
+import json
+import os
+import queue
+import sys
+import threading
+
+try:
+    import distributed
+except ImportError:
+    if sys.executable != "/usr/bin/python3" and os.path.exists("/usr/bin/python3"):
+        os.execv("/usr/bin/python3", ["python3", "-c", sys.orig_argv[2]] + sys.argv[1:])
+    print("!--scheduler needs Dask's distributed: Debian's python3-distributed, or `pip install distributed`",
+          flush=True)
+    sys.exit(1)
+
+
+def with_assets(value, base, assets):
+    """The JSON value with every file that it names replaced by the name that it has on workers."""
+    if isinstance(value, dict):
+        return {k: with_assets(v, base, assets) for k, v in value.items()}
+    if isinstance(value, list):
+        return [with_assets(v, base, assets) for v in value]
+    if not isinstance(value, str) or not os.path.isfile(os.path.join(base, value)):
+        return value
+    with open(os.path.join(base, value), "rb") as file:
+        content = file.read()
+    digest = hashlib.sha256(content).hexdigest()
+    assets[digest] = content
+    return digest + "-" + os.path.basename(value)
+
+
+def same(content):
+    return content
+
+
+def do_run(run, job, digests, *contents):
+    """On a worker: the row of a run, from a process that it keeps for the next one."""
+    import hashlib, os, queue, shutil, subprocess, tempfile  # noqa: E401
+    from distributed import get_worker
+    worker = get_worker()
+    pools = worker.__dict__.setdefault("_hapsix_studies", {})
+    pool = pools.setdefault(job["key"], queue.SimpleQueue())
+
+    def start():
+        program = os.environ.get("HAPSIX_PROGRAM") or (
+            job["program"] if os.path.exists(job["program"]) else shutil.which("hapsix"))
+        if not program:
+            raise LookupError(f"the worker {worker.address} has no program hapsix: install it, or set HAPSIX_PROGRAM")
+        environment = dict(os.environ, HAPSIX_SIMD=job["simd"])
+        said = subprocess.run([program, "--version"], capture_output=True, text=True, env=environment)
+        if said.returncode != 0 or said.stdout.split(",")[0] != job["version"]:
+            raise LookupError(f"the worker {worker.address} has another program: "
+                              f"{(said.stdout + said.stderr).strip()}; this is {job['version']}, SIMD {job['simd']}")
+        folder = os.path.join(tempfile.gettempdir(), "hapsix-study-" + job["key"])
+        if not os.path.exists(folder):
+            aside = tempfile.mkdtemp(prefix="hapsix-study-")
+            files = {"study.json": job["study"].encode(), "scene.json": job["scene"].encode()}
+            for digest, content in zip(digests, contents):
+                if hashlib.sha256(content).hexdigest() != digest:
+                    raise LookupError(f"an asset came to {worker.address} with another content")
+                for name in job["names"]:
+                    if name.startswith(digest):
+                        files[name] = content
+            for name, content in files.items():
+                with open(os.path.join(aside, name), "wb") as file:
+                    file.write(content)
+            try:
+                os.rename(aside, folder)  # whole, or that of another worker on this machine
+            except OSError:
+                shutil.rmtree(aside, ignore_errors=True)
+        return subprocess.Popen([program, "study", os.path.join(folder, "study.json"), "-o", folder, "--worker"],
+                                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+    try:
+        try:
+            process = pool.get_nowait()
+        except queue.Empty:
+            process = start()
+    except LookupError as error:
+        return "!" + str(error)
+    try:
+        process.stdin.write(f"{run}\n")
+        process.stdin.flush()
+        row = process.stdout.readline()
+    except OSError:
+        row = ""
+    if not row.endswith("\n"):
+        process.kill()
+        process.wait()
+        raise RuntimeError("the process of this run ended")  # Dask tries it again
+    pool.put(process)
+    return row[:-1]
+
+
+def describe(study, scene, program, version, simd):
+    assets = {}
+    with open(scene) as file:
+        text = json.dumps(with_assets(json.load(file), os.path.dirname(os.path.abspath(scene)), assets))
+    with open(study) as file:
+        plan = json.load(file)
+    plan = with_assets(plan, os.path.dirname(os.path.abspath(scene)), assets)
+    plan["scene"] = "scene.json"
+    job = {"study": json.dumps(plan), "scene": text, "program": program, "version": version, "simd": simd,
+           "names": sorted(set(names_in(json.loads(text), assets) + names_in(plan, assets)))}
+    job["key"] = hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()[:24]
+    return job, assets
+
+
+def names_in(value, assets):
+    if isinstance(value, dict):
+        return [n for v in value.values() for n in names_in(v, assets)]
+    if isinstance(value, list):
+        return [n for v in value for n in names_in(v, assets)]
+    return [value] if isinstance(value, str) and value[:64] in assets else []
+
+
+def main():
+    address, study, scene, program, version, simd = sys.argv[1:7]
+    try:
+        client = distributed.Client(address, timeout="10s", set_as_default=True)
+    except (OSError, ValueError, TimeoutError) as error:
+        print(f"!no scheduler answers at {address}: {' '.join(str(error).split())[:200]}", flush=True)
+        return 1
+    job, assets = describe(study, scene, program, version, simd)
+    # An asset is a task that gives its content, so it outlives any worker.
+    held = [client.submit(same, content, key="hapsix-asset-" + digest) for digest, content in assets.items()]
+    answers, mine = queue.SimpleQueue(), os.urandom(4).hex()
+
+    def done(run):
+        def tell(future):
+            try:
+                answers.put(future.result(timeout=30))
+            except distributed.CancelledError:
+                answers.put(f"!the scheduler at {address} is gone")
+            except Exception as error:
+                answers.put(f"?{run} {' '.join(str(error).split())[:200]}")
+        return tell
+
+    futures = []
+
+    def ask():
+        for line in sys.stdin:
+            run = int(line)
+            future = client.submit(do_run, run, job, list(assets), *held, key=f"hapsix-{job['key']}-{mine}-{run}",
+                                   pure=False, retries=3)
+            future.add_done_callback(done(run))
+            futures.append(future)
+        answers.put(None)
+    threading.Thread(target=ask, daemon=True).start()
+    while (answer := answers.get()) is not None:
+        try:
+            print(answer, flush=True)
+        except OSError:
+            break
+        if answer.startswith("!"):
+            break
+    client.cancel([f for f in futures if not f.done()])
+    os._exit(0)  # not client.close(): a scheduler that is gone would be waited for
+
+
+sys.exit(main())

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""hapsix study --scheduler: on three workers of which one is killed, the table is that of this machine."""
+import glob
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+try:
+    import distributed  # noqa: F401
+except ImportError:
+    if sys.executable != "/usr/bin/python3" and os.path.exists("/usr/bin/python3"):
+        os.execv("/usr/bin/python3", ["/usr/bin/python3"] + sys.argv)
+    print("skipped: Dask's distributed is not installed (python3-distributed)")
+    sys.exit(77)
+PROGRAM = os.environ["HAPSIX_PROGRAM"]
+PLAN = {"hapsix_study": 1, "scene": "peg-in-hole",
+        "vary": {"contact.method": ["firm", "global"]},
+        "draw": {"bodies.peg.pose.p.x": {"low": -0.2, "high": 0.2}}, "repeats": 12, "seed": 3}
+
+
+class Cluster:
+    """A scheduler and workers on this machine, each a process with files of its own."""
+
+    def __init__(self, folder, workers, environment):
+        self.folder, self.environment, self.started = folder, environment, []
+        self.file = os.path.join(folder, "scheduler.json")
+        self.start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+                   "--scheduler-file", self.file)
+        until = time.monotonic() + 300
+        while not os.path.exists(self.file) and time.monotonic() < until:
+            time.sleep(0.1)
+        with open(self.file) as file:
+            self.address = json.load(file)["address"]
+        self.workers = [self.start("distributed.cli.dask_worker", self.address, "--nthreads", "1", "--no-nanny",
+                                   "--no-dashboard", "--local-directory", os.path.join(folder, str(i)))
+                        for i in range(workers)]
+
+    def start(self, module, *arguments):
+        log = open(os.path.join(self.folder, f"log-{len(self.started)}"), "w")
+        process = subprocess.Popen([sys.executable, "-m", module, *arguments], stdout=log, stderr=log,
+                                   env=self.environment, start_new_session=True)
+        self.started.append(process)
+        return process
+
+    def close(self):
+        for process in self.started:
+            try:
+                os.killpg(process.pid, signal.SIGKILL)
+            except OSError:
+                pass
+            process.wait()
+
+
+class Studies(unittest.TestCase):
+    def setUp(self):
+        held = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self.addCleanup(held.cleanup)
+        self.folder = held.name
+        os.mkdir(self.at("tmp"))
+        self.environment = dict(os.environ, HAPSIX_CACHE=self.at("cache"), TMPDIR=self.at("tmp"))
+
+    def at(self, name):
+        return os.path.join(self.folder, name)
+
+    def study(self, out, *arguments, wait=True, plan="study.json"):
+        process = subprocess.Popen([PROGRAM, "study", self.at(plan), "-o", self.at(out), *arguments],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self.environment)
+        if not wait:
+            return process
+        said = process.communicate()
+        return process.returncode, said[1]
+
+    def table(self, out, name="runs.csv"):
+        try:
+            with open(os.path.join(self.at(out), name)) as file:
+                return file.read()
+        except FileNotFoundError:
+            return ""
+
+    def write(self, name, value):
+        with open(self.at(name), "w") as file:
+            json.dump(value, file)
+
+    def test_three_workers_of_which_one_is_killed_give_the_table_of_this_machine(self):
+        # A scene of files, so that meshes must reach the workers.
+        subprocess.run([PROGRAM, "scene", "export", "peg-in-hole", self.at("scene")], check=True,
+                       capture_output=True, env=self.environment)
+        self.write("study.json", dict(PLAN, scene="scene/scene.json"))
+        self.assertEqual(self.study("here", "--jobs", "2")[0], 0)
+        # The workers bake their own: nothing but the scheduler joins them to this program.
+        cluster = Cluster(self.folder, 3, dict(self.environment, HAPSIX_CACHE=self.at("far")))
+        self.addCleanup(cluster.close)
+        process = self.study("there", "--scheduler", cluster.address, wait=False)
+        until = time.monotonic() + 300
+        while self.table("there", "runs.csv.part").count("\n") < 4 and time.monotonic() < until:
+            time.sleep(0.05)
+        os.killpg(random.Random(1).choice(cluster.workers).pid, signal.SIGKILL)
+        error = process.communicate()[1]
+        self.assertEqual(process.returncode, 0, error)
+        self.assertEqual(self.table("there"), self.table("here"))
+        self.assertEqual(self.table("there").count("\n"), 25)
+        self.assertTrue(glob.glob(self.at("tmp/hapsix-study-*/*-block.stl")), "the mesh came by its hash")
+
+    def test_a_study_that_is_killed_goes_on_there(self):
+        self.write("study.json", dict(PLAN, repeats=6))
+        self.assertEqual(self.study("here", "--jobs", "2")[0], 0)
+        cluster = Cluster(self.folder, 2, self.environment)
+        self.addCleanup(cluster.close)
+        process = self.study("there", "--scheduler", cluster.address, wait=False)
+        until = time.monotonic() + 300
+        while self.table("there", "runs.csv.part").count("\n") < 3 and time.monotonic() < until:
+            time.sleep(0.05)
+        process.kill()
+        process.communicate()
+        code, error = self.study("there", "--scheduler", cluster.address)
+        self.assertEqual(code, 0, error)
+        self.assertEqual(self.table("there"), self.table("here"))
+
+    def test_a_missing_scheduler_and_a_wrong_program_get_one_sentence(self):
+        self.write("study.json", dict(PLAN, repeats=1))
+        code, error = self.study("none", "--scheduler", "tcp://127.0.0.1:9")
+        self.assertEqual((code, error.strip().count("\n")), (1, 0), error)
+        self.assertIn("no scheduler answers", error)
+        wrong = dict(self.environment, HAPSIX_PROGRAM="/bin/true")
+        cluster = Cluster(self.folder, 1, wrong)
+        self.addCleanup(cluster.close)
+        code, error = self.study("wrong", "--scheduler", cluster.address)
+        self.assertEqual((code, error.strip().count("\n")), (1, 0), error)
+        self.assertIn("has another program", error)
+        self.assertEqual(self.table("wrong"), "")
+
+
+if __name__ == "__main__":
+    unittest.main()
