@@ -57,6 +57,7 @@ const Rooms& below() {
     room("runtime/examples", {"contract"});
 
     room("device", {"contract", "sched"});
+    room("device/plugins", {"contract"});
 
     room("io/file", {"contract", "sched"});
     room("io/mesh", {"contract", "sched", "kernels/bake", "io/file"});
@@ -126,9 +127,9 @@ const std::vector<std::pair<std::string, std::set<std::string>>> packages = {
     {"H5", {"io/record", "io/deform"}},
     {"xxhash", {"io/file"}},
     {"pugixml", {"io/mesh"}},
-    {"nlohmann/", {"io"}},
+    {"nlohmann/", {"io", "device/plugins"}},
     {"CLI/", {"io/cli"}},
-    {"boost/", {"io/view"}},
+    {"boost/", {"io/view", "device/plugins"}},
     {"meshoptimizer", {"io/view"}},
     {"zlib.h", {"io"}},
     {"hidapi", {"device"}},

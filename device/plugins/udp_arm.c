@@ -8,7 +8,6 @@
  * frame's command is read in the next frame. */
 #include <arpa/inet.h>
 #include <errno.h>
-#include <math.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <stdatomic.h>
@@ -19,6 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "device/plugins/grip.h"
 #include "device/plugins/udp_arm_protocol.h"
 #include "hapsix/device_plugin.h"
 
@@ -37,14 +37,6 @@ static double now(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static void rotate(const double q[4], const double v[3], double out[3]) {
-  const double t[3] = {2 * (q[2] * v[2] - q[3] * v[1]), 2 * (q[3] * v[0] - q[1] * v[2]),
-                       2 * (q[1] * v[1] - q[2] * v[0])};
-  out[0] = v[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
-  out[1] = v[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
-  out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
 }
 
 static void send_command(Device* d, uint32_t motors, const h6PluginCommand* from) {
@@ -156,23 +148,14 @@ static int read_device(void* device, double time, h6PluginSample* out) {
   /* An old sample's pose is still the best estimate; its velocity is not, and counts as 0. */
   const int silent = d->waits != 0 && now() - d->waits > 1e-3 * UDP_ARM_SILENCE;
   const UdpArmSample* s = &d->newest;
-  const double *a = s->turned, *b = d->start.home_orientation;
-  double* q = out->orientation;
-  q[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
-  q[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
-  q[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
-  q[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
-  double at_home[3], lever[3];
-  rotate(b, d->start.grip, at_home);
-  rotate(q, d->start.grip, lever);
-  const double *w = s->angular, *l = lever;
-  const double swing[3] = {w[1] * l[2] - w[2] * l[1], w[2] * l[0] - w[0] * l[2],
-                           w[0] * l[1] - w[1] * l[0]};
+  Grip grip;
+  memcpy(grip.moved, s->moved, sizeof grip.moved);
+  memcpy(grip.turned, s->turned, sizeof grip.turned);
   for (int i = 0; i < 3; ++i) {
-    out->position[i] = d->start.home_position[i] + at_home[i] + s->moved[i] - lever[i];
-    out->linear[i] = silent ? 0 : s->linear[i] - swing[i];
-    out->angular[i] = silent ? 0 : w[i];
+    grip.linear[i] = silent ? 0 : s->linear[i];
+    grip.angular[i] = silent ? 0 : s->angular[i];
   }
+  h6_sample_of_grip(&d->start, &grip, out);
   out->buttons = s->buttons;
   out->sequence = s->number;
   return 0;

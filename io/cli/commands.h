@@ -20,6 +20,7 @@ struct Program {
 
 void add_new(CLI::App& app, Program& program);
 void add_bake(CLI::App& app, Program& program);
+void add_export(CLI::App& app, Program& program);
 void add_report(CLI::App& app, Program& program);
 void add_run(CLI::App& app, Program& program);
 void add_check(CLI::App& app, Program& program);

@@ -143,6 +143,7 @@ int main(int argc, char** argv) {
   add_check(app, program);
   add_run(app, program);
   add_report(app, program);
+  add_export(app, program);
   add_replay(app, program);
   add_info(app, program);
   add_devices(app, program);

@@ -122,6 +122,26 @@ Outcome write_field(const std::filesystem::path& file, const FieldData& field,
   }
 }
 
+Outcome write_level_set(const std::filesystem::path& file, const FieldData& field) {
+  try {
+    openvdb::initialize();
+    return write_aside(file, [&](const std::filesystem::path& path) -> Outcome {
+      const openvdb::GridPtrVec all = grids_of(field);
+      std::vector<std::string> ours;
+      for (auto meta = all[0]->beginMeta(); meta != all[0]->endMeta(); ++meta)
+        if (meta->first.rfind("hapsix_", 0) == 0) ours.push_back(meta->first);
+      for (const std::string& name : ours) all[0]->removeMeta(name);
+      openvdb::io::File out(path.string());
+      out.write({all[0]});
+      out.close();
+      return scan_vdb(path) ? Outcome(Done{})
+                            : Failure{"it could not be written whole: is the disk full?"};
+    });
+  } catch (const std::exception& e) {
+    return Failure{"cannot write " + file.string() + ": " + e.what()};
+  }
+}
+
 Result<FieldData> read_field(const std::filesystem::path& file) {
   const std::string name = file.string();
   const Result<std::optional<std::int32_t>> format = scan_vdb(file);

@@ -15,6 +15,9 @@ enum class Compression { none, blosc };
 // a file does not keep another order.
 Outcome write_field(const std::filesystem::path& file, const FieldData& field,
                     Compression compression = Compression::blosc);
+// The distance alone, as a level set of floats without our metadata: programs that know no grids of
+// integers read it (pyopenvdb.readAll), and read_field reads it as that of another program.
+Outcome write_level_set(const std::filesystem::path& file, const FieldData& field);
 // Fields of this program are read back bit for bit; fields of another version are refused. A .vdb
 // of another program is read when it has one level set of floats: a far grid of safe bounds is
 // derived from its narrow band and background.

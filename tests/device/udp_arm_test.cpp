@@ -21,12 +21,15 @@
 #include "device/plugin.h"
 #include "hapsix/hapsix.h"
 #include "hapsix/vector.h"
+#include "tests/device/floor.h"
 #include "tests/support/near.h"
 #include "tests/support/reports.h"
 #include "tests/support/sanitized.h"
 
 using namespace h6;
 using namespace h6::device;
+using h6::test::Floor;
+using h6::test::force;
 
 namespace {
 
@@ -70,43 +73,6 @@ class ArmProcess {
 
 // A busy machine may delay the arm's process; the test must not fail for that.
 PluginFile at(int port) { return {library, {{"port", std::to_string(port)}, {"timeout", "300"}}}; }
-
-// A floor at z = 0 and a part of one point, 5 mm above it, 1 kHz.
-struct Floor {
-  std::vector<float> d = std::vector<float>(512), far_grid = std::vector<float>(8);
-  float zero = 0, up = 1;
-  std::int32_t brick = 0;
-  std::uint32_t rows[2] = {0, 1};
-  h6Model* model = nullptr;
-  h6Session* session = nullptr;
-  h6BodyDef body[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
-  h6HandDef hand = h6DefaultHandDef();
-  Floor() {
-    for (int i = 0; i < 512; ++i) d[static_cast<std::size_t>(i)] = 5e-3f * (i / 64 - 4);
-    for (std::size_t i = 0; i < 8; ++i) far_grid[i] = d[i < 4 ? 0 : 511];
-    h6FieldDef field{};
-    field.origin = {-0.02, -0.02, -0.02}, field.voxel_size = 5e-3;
-    for (int& bricks : field.bricks) bricks = 1;
-    field.brick_index = &brick, field.samples = d.data(), field.brick_count = 1;
-    field.far_grid = far_grid.data(), field.band = 5e-3;
-    const h6ShellDef tip{1, &zero, &zero, &zero, &zero, &zero, &up, NULL,
-                         1, rows,  rows,  &zero, rows,  rows,  {}};
-    h6ModelDef parts = h6DefaultModelDef();
-    parts.fields = &field, parts.field_count = 1, parts.shells = &tip, parts.shell_count = 1;
-    h6Error error{};
-    model = h6CreateModel(&parts, &error);
-    REQUIRE_MESSAGE(model, error.message);
-    body[0].fixed = true, body[0].field = 0, body[1].shell = 0, body[1].pose.p.z = 5e-3;
-    hand.body = 1;
-    h6SessionDef def = h6DefaultSessionDef();
-    def.bodies = body, def.body_count = 2, def.hands = &hand, def.hand_count = 1;
-    session = h6CreateSession(model, &def, &error);
-    REQUIRE_MESSAGE(session, error.message);
-  }
-  ~Floor() { h6DestroySession(session), h6DestroyModel(model); }
-};
-
-double force(const h6FrameRecord& r) { return norm(r.command[0].wrench.force); }
 
 }  // namespace
 

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// replayed_contacts.h - the contacts of a frame of a recording, which holds none: they are computed
+// again.
+#pragma once
+#include <vector>
+
+#include "io/run/recorded_session.h"
+#include "io/view/report.h"
+
+namespace h6::cli {
+
+// Of the frame that was stepped last, in the order of the bodies; touching ones only.
+struct ReplayedContact {
+  io::view::ReportContact contact;  // world frame [m]
+  std::size_t body, with;           // whose shell's point touches, whose field
+  std::uint32_t point;              // of the shell
+  float load;                       // force along the normal over k [m]
+};
+std::vector<ReplayedContact> replayed_contacts(const RecordedSession& session);
+
+}  // namespace h6::cli

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// hapsix export: what it writes has what the recording or the field has.
+#include <map>
+
+#include "tests/io/cli/program.h"
+
+using namespace h6::test;
+
+namespace {
+
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> out;
+  std::istringstream in(line);
+  for (std::string cell; std::getline(in, cell, ',');) out.push_back(cell);
+  return out;
+}
+std::size_t column(const std::string& head, const std::string& name) {
+  const auto all = cells(head);
+  const auto found = std::find(all.begin(), all.end(), name);
+  REQUIRE_MESSAGE(found != all.end(), name);
+  return static_cast<std::size_t>(found - all.begin());
+}
+
+}  // namespace
+
+TEST_CASE("a recording as CSV: a row for each frame, and every contact of every frame") {
+  const Sandbox box;
+  REQUIRE(run(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.8", "--record",
+                   "run.h5"}).code == 0);
+  const Ended done = run(box, {"export", "run.h5", "-o", "run.csv", "--contacts", "c.csv"});
+  REQUIRE_MESSAGE(done.code == 0, done.err);
+  std::istringstream frames(slurp(box.file("run.csv"))), contacts(slurp(box.file("c.csv")));
+  std::string head, line, contact_head;
+  std::getline(frames, head), std::getline(contacts, contact_head);
+  const std::size_t count_at = column(head, "contacts"), depth_at = column(head, "max_depth"),
+                    width = cells(head).size();
+  column(head, "hand_pose_qw"), column(head, "wrench_fz"), column(head, "stage_us_weights");
+  std::map<std::string, std::pair<int, double>> found;  // by frame: contacts, the deepest
+  const std::size_t frame_at = column(contact_head, "frame"),
+                    contact_depth = column(contact_head, "depth"),
+                    weight = column(contact_head, "weight"), with = column(contact_head, "with");
+  while (std::getline(contacts, line)) {
+    const auto c = cells(line);
+    REQUIRE(c.size() == cells(contact_head).size());
+    auto& [n, deepest] = found[c[frame_at]];
+    ++n;
+    deepest = std::max(deepest, std::stod(c[contact_depth]));
+    CHECK((std::stod(c[weight]) >= 0 && std::stod(c[weight]) <= 1));
+    CHECK(c[with] == "\"block\"");
+  }
+  const std::size_t number = column(head, "frame");
+  std::size_t rows = 0, touching = 0;
+  while (std::getline(frames, line)) {
+    const auto c = cells(line);
+    REQUIRE(c.size() == width);
+    ++rows;
+    const auto& [n, deepest] = found[c[number]];
+    CHECK(n == std::stoi(c[count_at]));
+    if (n == 0) continue;
+    ++touching;
+    CHECK(std::fabs(deepest - std::stod(c[depth_at])) < 1e-6 * deepest + 1e-12);
+  }
+  CHECK(rows == 800);
+  CHECK(touching > 10);
+}
+
+TEST_CASE("a field as a plain level set is read back, and by OpenVDB's Python where it is there") {
+  const Sandbox box;
+  REQUIRE(run(box, {"scene", "export", "box-on-plates", "."}).code == 0);
+  REQUIRE(run(box, {"bake", "field", "small.stl", "--units", "mm", "--voxels", "32", "-o",
+                   "field.vdb"}).code == 0);
+  const Ended done = run(box, {"export", "field.vdb", "-o", "plain.vdb"});
+  REQUIRE_MESSAGE(done.code == 0, done.err);
+  CHECK(run(box, {"info", "plain.vdb"}).code == 0);
+  const std::string folder = "cd " + box.folder().string() + " && ";
+  if (std::system("/usr/bin/python3 -c 'import pyopenvdb' 2> /dev/null") != 0) {
+    MESSAGE("skipped: no python3-openvdb here");
+    return;
+  }
+  CHECK(std::system((folder + "/usr/bin/python3 -c \"import pyopenvdb as v; g = "
+                              "v.readAll('plain.vdb')[0]; assert len(g) == 1; assert g[0].name == "
+                              "'distance' and g[0].activeVoxelCount() > 1000\"")
+                        .c_str()) == 0);
+}
+
+TEST_CASE("what cannot be exported gets one sentence, and no file is made") {
+  const Sandbox box;
+  spill(box.file("run.h5"), "no recording");
+  for (const Args& wrong : {Args{"export", "run.h5", "-o", "out.csv"},
+                            Args{"export", "run.h5", "-o", "out.mcap"},
+                            Args{"export", "run.h5", "-o", "out.vdb"},
+                            Args{"export", "none.vdb", "-o", "out.vdb"},
+                            Args{"export", "none.vdb", "-o", "out.vdb", "--contacts", "c.csv"}}) {
+    const Ended e = run(box, wrong);
+    CAPTURE(e.err);
+    CHECK(e.code != 0);
+    CHECK(std::count(e.err.begin(), e.err.end(), '\n') == 1);
+    CHECK(box.files() == std::set<std::string>{"run.h5"});
+  }
+}
