@@ -4,10 +4,8 @@
 #include <hapsix/hapsix.h>
 #include <math.h>
 #include <stdio.h>
-enum { B = 7 };                   /* bricks along each axis */
-static const double voxel = 1e-3; /* [m] */
-static const double low = -28e-3; /* node (0,0,0) [m] */
-
+enum { B = 7 };                                      /* bricks along each axis */
+static const double voxel = 1e-3, low = -28e-3; /* of node (0,0,0) [m] */
 /* Signed distance at a node: the obstacle is everything outside of the ball. */
 static double at(int i, int j, int k) {
   const double x = low + voxel * i, y = low + voxel * j, z = low + voxel * k;
@@ -40,7 +38,10 @@ int main(void) {
     nx[i] = -(float)cos(t), ny[i] = -(float)sin(t), nz[i] = z[i] = radius[i] = 0;
     x[i] = -5e-3f * nx[i], y[i] = -5e-3f * ny[i], point[i] = i, none[i] = 0;
   }
-  h6ShellDef ring = {N, x, y, z, nx, ny, nz, NULL, 1, first, point, radius, none, none, {0}};
+  h6ShellDef ring = h6DefaultShellDef();
+  ring.point_count = N, ring.x = x, ring.y = y, ring.z = z, ring.nx = nx, ring.ny = ny, ring.nz = nz;
+  ring.level_count = 1, ring.level_first = first, ring.node_point = point;
+  ring.node_radius = radius, ring.node_first_child = ring.node_child_count = none;
   h6ModelDef parts = h6DefaultModelDef();
   parts.fields = &bowl, parts.field_count = 1, parts.shells = &ring, parts.shell_count = 1;
   h6Error error;
@@ -52,9 +53,8 @@ int main(void) {
   h6Session* session = model ? h6CreateSession(model, &def, &error) : NULL;
   if (!session) return fprintf(stderr, "%s\n", error.message), 1;
   for (int i = 0; i < 5000; ++i) h6Step(session, NULL, NULL);
-  const h6Vec3 p = h6GetBody(session, 1).pose.p;
-  /* sqrt(20^2 - 5^2) = 19.36 mm, wherever it slides */
-  printf("the ring is %.2f mm from the middle of the bowl\n",
-         1e3 * sqrt(p.x * p.x + p.y * p.y + p.z * p.z));
+  const h6Vec3 p = h6GetBody(session, 1).pose.p; /* sqrt(20^2 - 5^2) = 19.36 mm off */
+  const double off = sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
+  printf("the ring is %.2f mm from the middle of the bowl\n", 1e3 * off);
   return h6DestroySession(session), h6DestroyModel(model), 0;
 }
