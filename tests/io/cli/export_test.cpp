@@ -24,7 +24,7 @@ std::size_t column(const std::string& head, const std::string& name) {
 }  // namespace
 
 TEST_CASE("a recording as CSV: a row for each frame, and every contact of every frame") {
-  const Sandbox box;
+  Sandbox box;
   REQUIRE(run(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.8", "--record",
                    "run.h5"}).code == 0);
   const Ended done = run(box, {"export", "run.h5", "-o", "run.csv", "--contacts", "c.csv"});
@@ -65,7 +65,7 @@ TEST_CASE("a recording as CSV: a row for each frame, and every contact of every 
 }
 
 TEST_CASE("a field as a plain level set is read back, and by OpenVDB's Python where it is there") {
-  const Sandbox box;
+  Sandbox box;
   REQUIRE(run(box, {"scene", "export", "box-on-plates", "."}).code == 0);
   REQUIRE(run(box, {"bake", "field", "small.stl", "--units", "mm", "--voxels", "32", "-o",
                    "field.vdb"}).code == 0);
@@ -84,7 +84,7 @@ TEST_CASE("a field as a plain level set is read back, and by OpenVDB's Python wh
 }
 
 TEST_CASE("what cannot be exported gets one sentence, and no file is made") {
-  const Sandbox box;
+  Sandbox box;
   spill(box.file("run.h5"), "no recording");
   for (const Args& wrong : {Args{"export", "run.h5", "-o", "out.csv"},
                             Args{"export", "run.h5", "-o", "out.mcap"},
