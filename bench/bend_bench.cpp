@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "hapsix/vector.h"
 #include "tests/support/bridge.h"
 
 namespace {
