@@ -229,7 +229,7 @@ TEST_CASE(
     "words that are no command, option, method, device or scene are named, with what is near") {
   Sandbox box;
   mistake(box, {}, 2, {"bake", "run", "info"});
-  mistake(box, {"bake"}, 2, {"field or shell"});
+  mistake(box, {"bake"}, 2, {"field, shell or deformable"});
   refused(box, {"scene"}, 2, {"list or export"});
   mistake(box, {"bok"}, 2, {"'bok'", "'bake'"});
   refused(box, {"bake", "feld"}, 2, {"'feld'", "'field'"});

@@ -22,8 +22,9 @@ TEST_CASE("every member of every definition has its row") {
   every_member_has_a_row<h6HandDef>(hand_settings(), 2);
   for (const Setting& row : hand_settings())
     if (row.stands_among()) every_member_has_a_row<h6HandFilterDef>(*row.inside, 0);
-  // Three arrays with their counts, the contact's definition, the tasks, the allocator.
-  every_member_has_a_row<h6SessionDef>(session_settings(), 9);
+  // Three arrays with their counts, the contact's definition, the tasks, the allocator,
+  // the workers.
+  every_member_has_a_row<h6SessionDef>(session_settings(), 10);
   every_member_has_a_row<h6LoopDef>(loop_settings(), 0);
   every_member_has_a_row<h6Pose>(pose_settings(), 0);
 }
