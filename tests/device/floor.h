@@ -34,8 +34,8 @@ struct Floor {
     for (int& bricks : field.bricks) bricks = 1;
     field.brick_index = &brick, field.samples = d.data(), field.brick_count = 1;
     field.far_grid = far_grid.data(), field.band = 5e-3;
-    const h6ShellDef tip{1, &zero, &zero, &zero, &zero, &zero, &up, NULL,
-                         1, rows,  rows,  &zero, rows,  rows,  {}};
+    const h6ShellDef tip{1, &zero, &zero, &zero, &zero, &zero, &up,     NULL,
+                         1, rows,  rows,  &zero, rows,  rows,  nullptr, {}};
     h6ModelDef parts = h6DefaultModelDef();
     parts.fields = &field, parts.field_count = 1, parts.shells = &tip, parts.shell_count = 1;
     h6Error error{};
@@ -98,8 +98,9 @@ class FloorRun {
       return (r.report.status & H6_DEVICE_LOST) && force(r) == 0;
     }));
     const h6Cause cause = rows.back().command[0].cause;
-    CHECK_MESSAGE((cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_WATCHDOG || cause == H6_CAUSE_LATE),
-                  std::string(h6CauseName(cause)));
+    CHECK_MESSAGE(
+        (cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_WATCHDOG || cause == H6_CAUSE_LATE),
+        std::string(h6CauseName(cause)));
     mend();
     REQUIRE(until([](const h6FrameRecord& r) { return !(r.report.status & H6_DEVICE_LOST); }));
     const std::size_t back = rows.size();

@@ -367,7 +367,8 @@ typedef struct h6Contacts {
   const float*    rx; const float* ry; const float* rz; /* arm: from the centre of mass; of a shell that
                                                     bends: from that of the body it touches   [m]  */
   const float*    tx; const float* ty; const float* tz; /* torque direction T                      */
-  const float*    weight;                        /* share of the stiffness                         */
+  const float*    weight;                        /* share of the stiffness; `series` and `firm`:
+                                                    load / depth, >= 0, may exceed 1               */
   const uint32_t* point;                         /* index into the shell's points                  */
   const int32_t*  field_body;                    /* the body whose field it touches                */
   const float*    load;                          /* force along N over k: weight * depth; `series`:

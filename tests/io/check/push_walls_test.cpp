@@ -128,8 +128,8 @@ using Model = std::unique_ptr<h6Model, decltype(&h6DestroyModel)>;
 Model point_against(const FieldData& field, const Vec3& along) {
   const float zero[1] = {0}, n[3] = {float(-along.x), float(-along.y), float(-along.z)};
   const std::uint32_t first[2] = {0, 1}, none[1] = {0};
-  const h6ShellDef shell{1, zero,  zero, zero, n,    n + 1, n + 2, nullptr,
-                         1, first, none, zero, none, none,  {}};
+  const h6ShellDef shell{1, zero,  zero, zero, n,    n + 1, n + 2,   nullptr,
+                         1, first, none, zero, none, none,  nullptr, {}};
   const h6FieldDef def = field.def();
   h6ModelDef model{};
   model.fields = &def, model.field_count = 1, model.shells = &shell, model.shell_count = 1;

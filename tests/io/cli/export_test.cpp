@@ -38,14 +38,17 @@ TEST_CASE("a recording as CSV: a row for each frame, and every contact of every 
   std::map<std::string, std::pair<int, double>> found;  // by frame: contacts, the deepest
   const std::size_t frame_at = column(contact_head, "frame"),
                     contact_depth = column(contact_head, "depth"),
-                    weight = column(contact_head, "weight"), with = column(contact_head, "with");
+                    weight = column(contact_head, "weight"), load = column(contact_head, "load"),
+                    with = column(contact_head, "with");
   while (std::getline(contacts, line)) {
     const auto c = cells(line);
     REQUIRE(c.size() == cells(contact_head).size());
     auto& [n, deepest] = found[c[frame_at]];
     ++n;
     deepest = std::max(deepest, std::stod(c[contact_depth]));
-    CHECK((std::stod(c[weight]) >= 0 && std::stod(c[weight]) <= 1));
+    const double of = std::stod(c[weight]), loaded = std::stod(c[load]);
+    CHECK(of >= 0);
+    CHECK(std::fabs(of * std::stod(c[contact_depth]) - loaded) <= 1e-5 * loaded + 1e-15);
     CHECK(c[with] == "\"block\"");
   }
   const std::size_t number = column(head, "frame");
