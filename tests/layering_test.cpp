@@ -71,7 +71,7 @@ const Rooms& below() {
     room("io/deform",
          {"contract", "sched", "io/file", "io/mesh", "io/field", "io/bake", "io/record"});
     room("io/scene", {"contract", "sched", "runtime/settings", "io/file", "io/mesh", "io/field",
-                      "io/bake", "io/shell"});
+                      "io/bake", "io/shell", "io/deform"});
     room("io/propose", {"contract", "sched", "io/file", "io/mesh", "io/field", "io/bake",
                         "io/shell", "io/check", "io/scene"});
     room("io/scenes", {"contract", "io/file", "io/mesh", "io/shell", "io/scene"});

@@ -4,8 +4,8 @@
 //   hapsix export run.h5 -o run.csv [--contacts contacts.csv]
 //   hapsix export bay.vdb -o plain.vdb
 //
-// A recording holds no contacts; they are computed again, and a recording that cannot be replayed has
-// none to export.
+// A recording holds no contacts; they are computed again, and a recording that cannot be replayed
+// has none to export.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
@@ -13,12 +13,13 @@
 #include <nlohmann/json.hpp>
 
 #include "io/cli/commands.h"
-#include "io/cli/replayed_contacts.h"
 #include "io/console/checks.h"
 #include "io/field/field_file.h"
 #include "io/file/csv.h"
 #include "io/file/write_aside.h"
 #include "io/record/to_csv.h"
+#include "io/run/recorded_session.h"
+#include "io/view/replayed_contacts.h"
 
 namespace h6::cli {
 namespace {
@@ -74,15 +75,15 @@ Outcome export_frames(const ExportOptions& o, const io::Recording& head, const C
 void append_contacts(const RecordedSession& session, const h6FrameRecord& frame, std::string& out) {
   const auto& bodies = session.loaded().bodies;
   const auto& names = session.loaded().scene.bodies;
-  for (const ReplayedContact& c : replayed_contacts(session)) {
+  for (const auto& c : io::view::replayed_contacts(session.loaded(), session.session())) {
     const io::view::ReportContact& r = c.contact;
     char text[320];
     std::snprintf(text, sizeof text,
                   "%.6f,%llu,%zu,%u,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,",
                   frame.time, static_cast<unsigned long long>(frame.report.frame), c.body, c.point,
                   r.position[0], r.position[1], r.position[2], r.normal[0], r.normal[1],
-                  r.normal[2], r.torque_direction[0], r.torque_direction[1],
-                  r.torque_direction[2], r.weight, r.depth, c.load);
+                  r.normal[2], r.torque_direction[0], r.torque_direction[1], r.torque_direction[2],
+                  r.weight, r.depth, c.load);
     out += text;
     out += io::csv_quoted(names[c.body].name) + ',' +
            io::csv_quoted(c.with < bodies.size() ? names[c.with].name : "") + '\n';
@@ -169,14 +170,16 @@ void add_export(CLI::App& app, Program& program) {
   command->add_option("FILE", o->input, "A recording (.h5) or a field (.vdb)")
       ->required()
       ->option_text("FILE");
-  command->add_option("-o,--output", o->output,
-                      "Frames: a row each, all columns, SI units; or the field's distance as one "
-                      "grid of floats, for programs that read no others")
+  command
+      ->add_option("-o,--output", o->output,
+                   "Frames: a row each, all columns, SI units; or the field's distance as one "
+                   "grid of floats, for programs that read no others")
       ->required()
       ->option_text("OUT.csv|OUT.vdb");
-  command->add_option("--contacts", o->contacts,
-                      "Every contact of every frame, computed again: place, normal, torque "
-                      "direction, weight, depth, load, parts")
+  command
+      ->add_option("--contacts", o->contacts,
+                   "Every contact of every frame, computed again: place, normal, torque "
+                   "direction, weight, depth, load, parts")
       ->option_text("CONTACTS.csv")
       ->check(ends_with(".csv"));
   command->callback([&program, o] {

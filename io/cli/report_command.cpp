@@ -9,12 +9,12 @@
 #include <nlohmann/json.hpp>
 
 #include "io/cli/commands.h"
-#include "io/cli/replayed_contacts.h"
 #include "io/cli/report_files.h"
 #include "io/console/checks.h"
 #include "io/file/write_aside.h"
 #include "io/run/recorded_session.h"
 #include "io/view/page.h"
+#include "io/view/replayed_contacts.h"
 #include "io/view/report.h"
 
 namespace h6::cli {
@@ -86,9 +86,10 @@ class Reporter {
         if (sample < shown.size() && shown[sample] == done) {
           if (session) {
             std::vector<io::view::ReportContact> contacts;
-            for (const ReplayedContact& c : replayed_contacts(*session))
+            for (const auto& c : io::view::replayed_contacts(session->loaded(), session->session()))
               contacts.push_back(c.contact);
             run.contacts(sample, std::move(contacts));
+            run.bend(sample, io::view::replayed_bends(session->loaded(), session->session()));
           }
           ++sample;
         }

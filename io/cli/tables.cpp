@@ -116,8 +116,10 @@ std::string assets(const io::LoadedScene& scene) {
                  a.body.c_str(), a.nodes[0], a.nodes[1], a.nodes[2], a.bricks, 1e3 * a.voxel_size,
                  origin(scene, a), a.seconds);
     else
-      out += format("  shell of %-10.80s %zu points on %d levels, %s in %.2f s", a.body.c_str(),
-                    a.points, a.levels, origin(scene, a), a.seconds);
+      out += format(
+          "  shell of %-10.80s %zu points on %d levels, %s in %.2f s%s", a.body.c_str(), a.points,
+          a.levels, origin(scene, a), a.seconds,
+          a.modes ? format(", bends by %zu modes from %.3g Hz", a.modes, a.lowest_hz).c_str() : "");
   }
   return out;
 }

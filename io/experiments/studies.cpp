@@ -48,6 +48,11 @@ const std::vector<StudyKind>& studies() {
          return study_industrial("gear-train", columns, console);
        },
        true},
+      {"bridge-and-dinosaur", "Fig. 14: a rigid dinosaur on a bridge that bends",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("bridge-and-dinosaur", columns, console);
+       },
+       true},
       {"alphas-in-two-hands", "cf. Fig. 9: the alphas in two hands",
        [](const auto& columns, const auto& console) {
          return study_industrial("alphas-in-two-hands", columns, console);

@@ -141,7 +141,7 @@ ordered_json assets_json(const io::LoadedScene& loaded) {
                     {"dims", a.nodes},
                     {"bricks", a.bricks}});
     else
-      asset.update({{"points", a.points}, {"levels", a.levels}});
+      asset.update({{"points", a.points}, {"levels", a.levels}, {"modes", a.modes}});
     assets.push_back(asset);
   }
   return assets;

@@ -49,4 +49,17 @@ std::string asset_hash(const ShellData& s) {
   return columns.text();
 }
 
+std::string asset_hash(const std::string& shell, const ReducedModel& m) {
+  const double numbers[] = {m.mass_damping, m.stiffness_damping};
+  return Columns()
+      .add(shell)
+      .add(numbers, sizeof numbers)
+      .add(m.mesh.vertices)
+      .add(m.basis)
+      .add(m.linear)
+      .add(m.quadratic)
+      .add(m.cubic)
+      .text();
+}
+
 }  // namespace h6::io

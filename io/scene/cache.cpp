@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "io/bake/plan.h"
+#include "io/deform/deformable_file.h"
 #include "io/field/raw_field.h"
 #include "io/file/free_memory.h"
 #include "io/shell/shell_file.h"
@@ -150,6 +151,17 @@ Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options,
         return bake_shell(mesh.mesh, options, &told.warnings, progress);
       },
       [](const fs::path& file, const ShellData& shell) { return write_shell(file, shell); });
+}
+
+Result<ReducedModel> cached_bend(const SolidMesh& solid, const ReduceOptions& options,
+                                 Cached* cached, const Progress& progress) {
+  return through_cache<ReducedModel>(
+      reduction_key(solid, options), ".h5", true, cached,
+      [](const fs::path& file) { return read_deformable(file); },
+      [&](Cached&) { return reduce(solid, options, nullptr, progress); },
+      [](const fs::path& file, const ReducedModel& model) {
+        return write_deformable(file, model);
+      });
 }
 
 }  // namespace h6::io

@@ -5,12 +5,14 @@
 #include <string>
 
 #include "hapsix/result.h"
+#include "io/deform/reduce.h"
 #include "io/scene/asset_key.h"
 
 namespace h6::io {
 
 // Returns $HAPSIX_CACHE, else $XDG_CACHE_HOME/hapsix, else ~/.cache/hapsix; empty when none of the
-// variables is set. The folder holds KEY.field and KEY.ply.
+// variables is set. The folder holds KEY.field, KEY.ply
+// and KEY.h5.
 std::filesystem::path cache_folder();
 
 // How an asset was obtained.
@@ -28,5 +30,9 @@ Result<FieldData> cached_field(const HashedMesh& mesh, const FieldBake& options,
                                const Progress& progress = {}, bool keep = true);
 Result<ShellData> cached_shell(const HashedMesh& mesh, const ShellBake& options, Cached* cached,
                                const Progress& progress = {}, bool keep = true);
+
+// The reduced model of a solid, as KEY.h5.
+Result<ReducedModel> cached_bend(const SolidMesh& solid, const ReduceOptions& options,
+                                 Cached* cached, const Progress& progress = {});
 
 }  // namespace h6::io

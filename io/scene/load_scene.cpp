@@ -5,6 +5,8 @@
 #include <chrono>
 #include <map>
 
+#include "io/deform/bent_shell.h"
+#include "io/deform/deformable_file.h"
 #include "io/field/field_file.h"
 #include "io/mesh/mesh_file.h"
 #include "io/scene/asset_hash.h"
@@ -18,6 +20,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::vector<h6Vec3> points_of(const ShellData& shell) {
+  std::vector<h6Vec3> points;
+  points.reserve(shell.size());
+  for (std::size_t i = 0; i < shell.size(); ++i)
+    points.push_back({shell.x[i], shell.y[i], shell.z[i]});
+  return points;
 }
 
 class Loader {
@@ -54,6 +64,8 @@ class Loader {
       Result<int> index = shell(body);
       if (!index) return index.failure();
       def.shell = *index;
+      if (body.shell->bends)
+        if (Outcome done = bend(body, *index); !done) return done;
     }
     if (Outcome done = mass(body, def); !done) return done;
     out_.bodies.push_back(def);
@@ -90,7 +102,7 @@ class Loader {
   // content is the same; else it reads the baked file, or bakes the mesh through the cache.
   template <class Data, class Source, class Read, class Bake, class Describe>
   Result<int> obtain(const SceneBody& body, const Source& source, Kept<Data>& kept, Read read,
-                     Bake bake, Describe describe) {
+                     Bake bake, Describe describe, bool shared = true) {
     const auto start = Clock::now();
     LoadedAsset asset;
     asset.body = body.name;
@@ -102,7 +114,8 @@ class Loader {
       mesh = &hashes_.try_emplace(*found, **found).first->second;
       key = asset_key(*mesh, source.bake);
     }
-    if (const auto known = kept.index.find(key); known != kept.index.end()) return known->second;
+    const std::string place = shared ? key : key + " of " + body.name;
+    if (const auto known = kept.index.find(place); known != kept.index.end()) return known->second;
     Cached cached;
     Result<Data> data =
         mesh ? bake(*mesh, source.bake, &cached, progress_, source.keep) : read(source.file);
@@ -115,7 +128,7 @@ class Loader {
     asset.seconds = since(start);
     describe(*data, asset);
     out_.assets.push_back(asset);
-    return keep(kept, key, std::move(*data));
+    return keep(kept, place, std::move(*data));
   }
 
   template <class Data>
@@ -151,7 +164,8 @@ class Loader {
       asset.levels = static_cast<int>(data.level_points.size());
     };
     if (!body.shell->points)
-      return obtain(body, *body.shell, shells_, read_shell, cached_shell, describe);
+      return obtain(body, *body.shell, shells_, read_shell, cached_shell, describe,
+                    !body.shell->bends);
     const auto start = Clock::now();
     Result<ShellData> built = build_shell(*body.shell->points, body.shell->bake.levels);
     if (!built) return built.failure();
@@ -162,6 +176,31 @@ class Loader {
     describe(*built, asset);
     out_.assets.push_back(asset);
     return keep(shells_, "points of " + body.name, std::move(*built));
+  }
+
+  // The shell is the last one, since no other body shares it.
+  Outcome bend(const SceneBody& body, int index) {
+    const auto start = Clock::now();
+    const ShellData& shell = shells_.all[static_cast<std::size_t>(index)];
+    const BendSource& source = *body.shell->bends;
+    Cached cached;
+    Result<ReducedModel> model = source.solid
+                                     ? cached_bend(*source.solid, source.reduce, &cached, progress_)
+                                     : read_deformable(source.file);
+    if (!model) return model.failure();
+    Result<BentShell> bent = bend_shell(std::move(*model), points_of(shell),
+                                        source.solid ? "its model" : source.file.string());
+    if (!bent) return bent.failure();
+    for (const std::string& w : cached.warnings)
+      out_.warnings.push_back("body '" + body.name + "': " + w);
+    LoadedAsset& asset = out_.assets.back();
+    asset.hash = asset_hash(asset.hash, *bent->model);
+    asset.modes = bent->model->modes;
+    asset.lowest_hz = bent->model->frequency.front();
+    asset.outside = bent->farthest;
+    asset.seconds += since(start);
+    bent_.push_back({out_.bodies.size(), static_cast<std::size_t>(index), std::move(*bent)});
+    return Done{};
   }
 
   // Takes the mass properties that the scene states. It derives the rest from the mesh as a uniform
@@ -201,12 +240,7 @@ class Loader {
   }
 
   void keep_points() {
-    for (const ShellData& data : shells_.all) {
-      std::vector<h6Vec3>& points = out_.shell_points.emplace_back();
-      points.reserve(data.size());
-      for (std::size_t i = 0; i < data.size(); ++i)
-        points.push_back({data.x[i], data.y[i], data.z[i]});
-    }
+    for (const ShellData& data : shells_.all) out_.shell_points.push_back(points_of(data));
   }
 
   Outcome make_model() {
@@ -214,14 +248,24 @@ class Loader {
     std::vector<h6ShellDef> shells;
     for (const FieldData& f : fields_.all) fields.push_back(f.def());
     for (const ShellData& s : shells_.all) shells.push_back(s.def());
+    std::vector<h6DeformableDef> bends;
+    bends.reserve(bent_.size());
+    for (const Bent& b : bent_) shells[b.shell].deformable = &bends.emplace_back(b.how.def());
     h6ModelDef def = h6DefaultModelDef();
     def.fields = fields.data(), def.field_count = fields.size();
     def.shells = shells.data(), def.shell_count = shells.size();
     h6Error error{};
     out_.model.reset(h6CreateModel(&def, &error));
     if (!out_.model) return Failure{error.message};
+    out_.bends.resize(out_.bodies.size());
+    for (Bent& b : bent_) out_.bends[b.body] = std::move(b.how.model);
     return Done{};
   }
+
+  struct Bent {
+    std::size_t body, shell;
+    BentShell how;
+  };
 
   LoadedScene& out_;
   const Progress& progress_;
@@ -229,6 +273,7 @@ class Loader {
   std::map<const Mesh*, HashedMesh> hashes_;
   Kept<FieldData> fields_;
   Kept<ShellData> shells_;
+  std::vector<Bent> bent_;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "hapsix/hapsix.h"
 #include "hapsix/result.h"
 #include "io/file/progress.h"
+#include "io/deform/reduced_model.h"
 #include "io/scene/field_mesh.h"
 #include "io/scene/scene.h"
 
@@ -30,6 +31,9 @@ struct LoadedAsset {
   std::size_t bricks = 0;      // field
   std::size_t points = 0;      // shell
   int levels = 0;              // shell
+  std::size_t modes = 0;       // shell that bends; 0: rigid
+  double lowest_hz = 0;        // shell that bends: of its slowest small vibration [Hz]
+  double outside = 0;          // shell that bends: how far its points lie outside the model [m]
 };
 
 struct ModelDeleter {
@@ -46,6 +50,7 @@ struct LoadedScene {
   // are in `scene`, the others in `meshes`.
   std::vector<std::unique_ptr<FieldMesh>> field_meshes;
   std::vector<double> field_voxels;  // the finest of each field [m]
+  std::vector<std::unique_ptr<const ReducedModel>> bends;  // by body; null where it is rigid
   std::vector<std::unique_ptr<const Mesh>> meshes;
   std::vector<LoadedAsset> assets;
   std::vector<std::string> warnings;

@@ -76,10 +76,22 @@ class SceneReader {
     }
     out.file = existing(o, "file", at);
     for (const auto& [key, value] : o.items())
-      if (key != "file")
+      if (key != "file" && key != "bends")
         throw Complaint{inside(at, key),
                         "has no meaning beside \"file\": that is baked, in metres"};
     return out;
+  }
+
+  void read_bends(const Json& o, const std::string& at, SceneBody& body) const {
+    body.shell->bends = BendSource{existing(o, "bends", at), {}, {}};
+    if (!body.fixed)
+      throw Complaint{inside(at, "bends"),
+                      "a body that bends stands still: give \"" + shown(body.name) +
+                          "\" \"fixed\": true"};
+    if (body.field)
+      throw Complaint{inside(at, "bends"),
+                      "a body that bends touches by its shell; others cannot touch its \"field\", "
+                      "so leave that out"};
   }
 
   void read_body(const Json& o, const std::string& at) {
@@ -90,9 +102,11 @@ class SceneReader {
     if (o.contains("field"))
       body.field =
           read_source<FieldSource>(o["field"], field_source_settings(), inside(at, "field"));
-    if (o.contains("shell"))
+    if (o.contains("shell")) {
       body.shell =
           read_source<ShellSource>(o["shell"], shell_source_settings(), inside(at, "shell"));
+      if (o["shell"].contains("bends")) read_bends(o["shell"], inside(at, "shell"), body);
+    }
     if (!body.field && !body.shell)
       throw Complaint{at,
                       "needs a \"shell\" (it touches others), a \"field\" (others touch it) or "

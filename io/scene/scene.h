@@ -13,6 +13,7 @@
 
 #include "hapsix/hapsix.h"
 #include "io/bake/bake_field.h"
+#include "io/deform/reduce.h"
 #include "io/mesh/mesh_file.h"
 #include "io/shell/bake_shell.h"
 
@@ -35,11 +36,18 @@ struct FieldSource {
   std::optional<Unit> unit;  // of `mesh`; if not set, the scene's unit
   bool keep = true;
 };
+// How a shell bends: the file of a reduced model or, in generated scenes, the solid to reduce.
+struct BendSource {
+  std::filesystem::path file;  // .h5, in metres, in the frame of the shell's mesh
+  std::optional<SolidMesh> solid;
+  ReduceOptions reduce;
+};
 struct ShellSource {
   std::filesystem::path mesh, file;
   std::optional<Mesh> mesh_data;
   std::optional<PointCloud> points;
   ShellBake bake;
+  std::optional<BendSource> bends;
   std::optional<Unit> unit;
   bool keep = true;
 };

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "io/deform/deformable_file.h"
 #include "io/file/write_aside.h"
+#include "io/scene/cache.h"
 #include "io/scene/scene_file.h"
 #include "io/scene/scene_settings.h"
 #include "io/scene/setting_json.h"
@@ -128,7 +130,23 @@ class SceneWriter {
     return out;
   }
 
+  std::string bends_json(const BendSource& bends, const std::string& stem) {
+    if (!bends.solid) return copy_file(bends.file);
+    const std::string name = unused(stem + "_bends", ".h5");
+    if (!files_) return name;
+    const Result<ReducedModel> model = cached_bend(*bends.solid, bends.reduce, nullptr);
+    if (!model) throw WriteFailed{model.failure()};
+    must(write_deformable(folder_ / name, *model));
+    return name;
+  }
+
   OrderedJson shell_json(const ShellSource& shell, const std::string& stem) {
+    OrderedJson out = rigid_shell_json(shell, stem);
+    if (shell.bends) out["bends"] = bends_json(*shell.bends, stem);
+    return out;
+  }
+
+  OrderedJson rigid_shell_json(const ShellSource& shell, const std::string& stem) {
     OrderedJson out;
     if (!shell.file.empty()) return {{"file", copy_file(shell.file)}};
     if (shell.points) {

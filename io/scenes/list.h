@@ -17,6 +17,7 @@ Scene rod_between_tubes();
 Scene alpha_shortcut();
 Scene alpha_solution();
 Scene alphas_in_two_hands();
+Scene bridge_and_dinosaur();
 Scene engine_bay();
 Scene gear_train();
 Scene landing_gear();

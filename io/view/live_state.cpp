@@ -74,6 +74,7 @@ void LiveState::contacts(const h6LoopView& view) {
   poses_.clear();
   for (std::size_t b = 0; b < view.body_count; ++b) append_pose(poses_, view.bodies[b]);
   for (std::vector<float>* column : {&p_, &n_, &t_, &w_, &d_}) column->clear();
+  bends_.assign(view.bends, view.bends + view.bend_count);
   stiffness_ = {};
   deepest_ = {};
   for (std::size_t i = 0; i < view.row_count; ++i) {
@@ -168,6 +169,7 @@ Message LiveState::state_message() {
   }
   envelope.add("poses", poses_);
   envelope.add("hands", hands);
+  envelope.add("bends", bends_);
   envelope.add("contact_p", p_);
   envelope.add("contact_n", n_);
   envelope.add("contact_t", t_);

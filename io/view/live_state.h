@@ -53,7 +53,7 @@ class LiveState {
   h6Status status_ = 0;  // of all rows since the last message
   h6Cause cause_ = H6_CAUSE_NONE;
   std::uint64_t late_[3] = {};
-  std::vector<float> rows_, poses_, p_, n_, t_, w_, d_;
+  std::vector<float> rows_, poses_, bends_, p_, n_, t_, w_, d_;
   std::vector<std::uint32_t> frame_bins_, wake_bins_;
   std::array<double, 6> stiffness_{};  // net, sum of w k N N^T: xx yy zz xy xz yz [N/m]
 };

@@ -1,35 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/cli/replayed_contacts.h"
+#include "io/view/replayed_contacts.h"
 
-namespace h6::cli {
+#include "hapsix/vector.h"
 
-std::vector<ReplayedContact> replayed_contacts(const RecordedSession& s) {
+namespace h6::io::view {
+
+std::vector<ReplayedContact> replayed_contacts(const LoadedScene& scene, const h6Session* session) {
   std::vector<ReplayedContact> all;
-  const auto& loaded = s.loaded();
-  for (std::size_t b = 0; b < loaded.bodies.size(); ++b) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const auto body = static_cast<std::int32_t>(b);
-    const h6Contacts c = h6GetContacts(s.session(), body);
+    const h6Contacts c = h6GetContacts(session, body);
     if (!c.count) continue;
-    const h6BodyState state = h6GetBody(s.session(), body);
-    const h6Quat& q = state.pose.q;
-    // Contact arms start at the centre of mass.
-    const double m[3] = {loaded.bodies[b].com.x, loaded.bodies[b].com.y, loaded.bodies[b].com.z};
-    const double u[3] = {q.x, q.y, q.z}, p[3] = {state.pose.p.x, state.pose.p.y, state.pose.p.z};
-    double centre[3];
-    for (int a = 0; a < 3; ++a) {
-      const int i = (a + 1) % 3, j = (a + 2) % 3;
-      const auto cross = [&](int k) {
-        const int l = (k + 1) % 3, n = (k + 2) % 3;
-        return u[l] * m[n] - u[n] * m[l];
-      };
-      centre[a] = p[a] + m[a] + 2 * (q.w * cross(a) + u[i] * cross(j) - u[j] * cross(i));
-    }
+    // Arms begin at the centre of mass: of a shell that bends, at that of the body it touches.
+    const std::int32_t from = scene.bends[b] ? c.field_body[0] : body;
+    const h6Vec3 centre =
+        place(h6GetBody(session, from).pose, scene.bodies[static_cast<std::size_t>(from)].com);
     for (std::size_t i = 0; i < c.count; ++i) {
       if (!(c.depth[i] > 0)) continue;
-      io::view::ReportContact r{};
-      r.position = {static_cast<float>(centre[0] + c.rx[i]),
-                    static_cast<float>(centre[1] + c.ry[i]),
-                    static_cast<float>(centre[2] + c.rz[i])};
+      ReportContact r{};
+      r.position = {static_cast<float>(centre.x + c.rx[i]), static_cast<float>(centre.y + c.ry[i]),
+                    static_cast<float>(centre.z + c.rz[i])};
       r.normal = {c.nx[i], c.ny[i], c.nz[i]};
       r.torque_direction = {c.tx[i], c.ty[i], c.tz[i]};
       r.weight = c.weight[i];
@@ -40,4 +30,15 @@ std::vector<ReplayedContact> replayed_contacts(const RecordedSession& s) {
   return all;
 }
 
-}  // namespace h6::cli
+std::vector<float> replayed_bends(const LoadedScene& scene, const h6Session* session) {
+  std::vector<float> all;
+  double q[H6_MAX_MODES];
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const std::size_t r =
+        h6GetDeformation(session, static_cast<std::int32_t>(b), q, nullptr, H6_MAX_MODES);
+    all.insert(all.end(), q, q + r);
+  }
+  return all;
+}
+
+}  // namespace h6::io::view

@@ -4,18 +4,21 @@
 #pragma once
 #include <vector>
 
-#include "io/run/recorded_session.h"
+#include "io/scene/load_scene.h"
 #include "io/view/report.h"
 
-namespace h6::cli {
+namespace h6::io::view {
 
 // Of the frame that was stepped last, in the order of the bodies; touching ones only.
 struct ReplayedContact {
-  io::view::ReportContact contact;  // world frame [m]
-  std::size_t body, with;           // whose shell's point touches, whose field
-  std::uint32_t point;              // of the shell
-  float load;                       // force along the normal over k [m]
+  ReportContact contact;   // world frame [m]
+  std::size_t body, with;  // whose shell's point touches, whose field
+  std::uint32_t point;     // of the shell
+  float load;              // force along the normal over k [m]
 };
-std::vector<ReplayedContact> replayed_contacts(const RecordedSession& session);
+std::vector<ReplayedContact> replayed_contacts(const LoadedScene& scene, const h6Session* session);
 
-}  // namespace h6::cli
+// The coordinates of the bodies that bend, one body after another [m sqrt(kg)].
+std::vector<float> replayed_bends(const LoadedScene& scene, const h6Session* session);
+
+}  // namespace h6::io::view

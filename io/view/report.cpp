@@ -170,6 +170,11 @@ void ReportRun::contacts(std::size_t sample, std::vector<ReportContact> all) {
   contacts_[sample] = std::move(all);
 }
 
+void ReportRun::bend(std::size_t sample, const std::vector<float>& q) {
+  replay_bends_.resize(sample * q.size());
+  replay_bends_.insert(replay_bends_.end(), q.begin(), q.end());
+}
+
 // Fills the envelope with the report's head and arrays.
 class ReportWriter {
  public:
@@ -193,6 +198,7 @@ class ReportWriter {
     envelope_.add("replay_t" + n, r.replay_t_);
     envelope_.add("replay_body" + n, r.replay_body_);
     envelope_.add("replay_hand" + n, r.replay_hand_);
+    envelope_.add("replay_bends" + n, r.replay_bends_);
     contacts(r, n, origin, step);
     const double frames = static_cast<double>(std::max<std::uint64_t>(1, r.seen_));
     const ordered_json summary = ordered_json::parse(r.summary_, nullptr, false);

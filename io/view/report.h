@@ -37,6 +37,8 @@ class ReportRun {
   // The frames whose contacts the replay shows, ascending; contacts(i, ...) sets those of the i-th.
   const std::vector<std::uint64_t>& replay_frames() const { return replay_frames_; }
   void contacts(std::size_t sample, std::vector<ReportContact> all);
+  // Of the same frames, the coordinates of the bodies that bend, in the order of the scene.
+  void bend(std::size_t sample, const std::vector<float>& q);
 
  private:
   friend class ReportWriter;
@@ -58,7 +60,7 @@ class ReportRun {
   std::size_t late_left_out_ = 0;
   LateJudge judge_;
   Span span_;
-  std::vector<float> rows_, replay_t_, replay_body_, replay_hand_;
+  std::vector<float> rows_, replay_t_, replay_body_, replay_hand_, replay_bends_;
   std::vector<std::uint64_t> replay_frames_;
   std::vector<std::vector<ReportContact>> contacts_;
   std::array<std::vector<float>, H6_STAGE_COUNT> stage_us_;

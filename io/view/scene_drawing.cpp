@@ -110,6 +110,24 @@ std::vector<float> points_of(const SceneBody& body, std::vector<std::string>& re
   return points;
 }
 
+// Displacements of the drawn vertices for each mode, 16 bits in steps of `step`: (vertices x r x
+// 3).
+std::vector<std::int16_t> modes_of(const Drawn& d, const ReducedModel& model, double& step) {
+  std::vector<h6Vec3> points;
+  for (std::size_t v = 0; v < d.position.size(); v += 3)
+    points.push_back({d.origin.x + d.step * (d.position[v] + 32768),
+                      d.origin.y + d.step * (d.position[v + 1] + 32768),
+                      d.origin.z + d.step * (d.position[v + 2] + 32768)});
+  const std::vector<double> modes = modes_at(model, points);
+  double most = 1e-30;
+  for (const double m : modes) most = std::max(most, std::fabs(m));
+  step = most / 32767;
+  std::vector<std::int16_t> out;
+  out.reserve(modes.size());
+  for (const double m : modes) out.push_back(static_cast<std::int16_t>(std::lround(m / step)));
+  return out;
+}
+
 ordered_json pose_json(const h6Pose& p) {
   return {p.p.x, p.p.y, p.p.z, p.q.w, p.q.x, p.q.y, p.q.z};
 }
@@ -149,6 +167,12 @@ ordered_json draw_scene(const LoadedScene& loaded, const DrawLimits& limits, Env
       head["step"] = d.step;
       envelope.add("position" + number, d.position);
       envelope.add("index" + number, d.index);
+      if (const auto& model = loaded.bends[i]) {
+        double step = 0;
+        envelope.add("modes" + number, modes_of(d, *model, step));
+        head["modes"] = model->modes;
+        head["mode_step"] = step;
+      }
       d = {};
     } else if (const auto points = points_of(body, remarks); !points.empty()) {
       envelope.add("points" + number, points);

@@ -12,6 +12,9 @@ LoopView::LoopView(const h6Session& s, std::size_t contacts) {
   slots_.prepare([&](Slot& slot) {
     for (const Body& body : s.bodies) slot.body.push_back(mesh_pose(body));
     slot.contact.resize(contacts);
+    std::size_t modes = 0;
+    for (const Deformation& d : s.bends) modes += static_cast<std::size_t>(d.modes);
+    slot.bend.resize(modes);
   });
 }
 
@@ -53,14 +56,16 @@ void LoopView::write(const h6Session& s, double time) {
       slot.contact[slot.rows++] = row_of(c, i, arm_origin(s.bodies[shell.body]), shell.body);
     skip = i - c.count;
   }
+  double* bend = slot.bend.data();
+  for (const Deformation& d : s.bends) bend = std::copy_n(d.q, d.modes, bend);
   slots_.publish();
 }
 
 bool LoopView::read(h6LoopView* out) {
   const Slot* slot = slots_.newest();
   if (!slot) return false;
-  *out = {slot->frame,    slot->time, slot->body.size(),    slot->body.data(),
-          slot->contacts, slot->rows, slot->contact.data(), {}};
+  *out = {slot->frame, slot->time,           slot->body.size(), slot->body.data(), slot->contacts,
+          slot->rows,  slot->contact.data(), slot->bend.size(), slot->bend.data(), {}};
   return true;
 }
 

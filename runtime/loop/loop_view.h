@@ -26,6 +26,7 @@ class LoopView {
     std::size_t contacts = 0, rows = 0;
     std::vector<h6Pose> body;
     std::vector<h6ViewContact> contact;
+    std::vector<double> bend;
   };
   sched::LatestValue<Slot> slots_;
 };

@@ -17,6 +17,8 @@ struct Slow {
 constexpr Slow kSlow[] = {
     {"spline-hub-10k", "a frame takes milliseconds; --scenes spline-hub-10k runs it"},
     {"spline-hub-100k", "a frame takes tens of milliseconds; --scenes spline-hub-100k runs it"},
+    {"bridge-and-dinosaur",
+     "each variation takes the modes of 85,018 points anew; --scenes bridge-and-dinosaur runs it"},
     {"engine-bay", "each variation bakes 505,276 triangles anew; --scenes engine-bay runs it"},
     {"landing-gear",
      "each variation bakes 1,789,551 triangles anew; --scenes landing-gear runs it"}};

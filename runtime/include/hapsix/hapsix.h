@@ -275,7 +275,9 @@ typedef struct h6LoopView {
   size_t   body_count;    const h6Pose* bodies;         /* mesh frame -> world, after the step     */
   size_t   contact_count;                               /* all there are                           */
   size_t   row_count;     const h6ViewContact* contacts;/* all, or evenly picked ones              */
-  uint64_t reserved[4];
+  size_t   bend_count;    const double* bends;          /* q of the bodies whose shells bend, one body
+                                                           after another   [m sqrt(kg)]            */
+  uint64_t reserved[2];
 } h6LoopView;
 H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
 /* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused). Devices get the time of the frames,

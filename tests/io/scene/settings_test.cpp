@@ -19,7 +19,7 @@ TEST_CASE("every member of a scene's structs has its row") {
   every_member_has_a_row<SceneVerdict>(target_settings(), 1);  // forbidden
   // mesh, file, unit, and the data of a generated scene: mesh_data or points, and keep.
   every_member_has_a_row<FieldSource>(field_source_settings(), 5);
-  every_member_has_a_row<ShellSource>(shell_source_settings(), 6);
+  every_member_has_a_row<ShellSource>(shell_source_settings(), 7);  // and bends
   for (const Setting& row : field_source_settings())
     if (row.stands_among())
       every_member_has_a_row<FieldBake>(*row.inside, 3);  // threads, shift, grow_thin

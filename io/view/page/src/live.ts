@@ -105,6 +105,7 @@ function settings(c: any) {
 function show(packet: Packet) {
   const h = packet.head;
   view.poses(floats(packet, 'poses'));
+  view.bends(floats(packet, 'bends'));
   const hand = floats(packet, 'hands');
   if (!drag?.held && !headset?.holds) view.handAt(hand);
   const contacts = {

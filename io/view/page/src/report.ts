@@ -313,6 +313,7 @@ class Replay {
         body.quaternion.set(bodies[7 * k + 4], bodies[7 * k + 5], bodies[7 * k + 6], bodies[7 * k + 3]);
       }
       this.view.handAt(hands, 7 * k);
+      this.view.bends(floats(this.packet, `replay_bends${this.run}`), k * this.view.bendCount());
       this.view.contacts(c, this.packet.head.voxel);
       this.showOthers();
       if (this.framing) this.frameCamera(c);

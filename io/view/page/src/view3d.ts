@@ -16,6 +16,17 @@ export interface BodyHead {
   com: number[];
   origin?: number[];   // of quantised positions [m]
   step?: number;
+  modes?: number;      // of a body that bends
+  mode_step?: number;
+}
+
+// The drawn vertices of a body that bends.
+interface Bend {
+  shape: THREE.BufferGeometry;
+  rest: Float32Array;   // (3 n) [m]
+  modes: Int16Array;    // (n r 3), in steps of `step`
+  count: number;        // r
+  step: number;
 }
 
 export interface Contacts {
@@ -63,6 +74,7 @@ export class View3D {
   private colour = new THREE.Color();
   private heads: BodyHead[] = [];
   private others: THREE.Object3D[] = [];
+  private bending: Bend[] = [];
   private centre = new THREE.Vector3();     // of the scene, world [m]
   private up = 'z';
   private seat: THREE.Matrix4 | null = null; // the camera's place, while a headset moves it
@@ -192,8 +204,35 @@ export class View3D {
     const shape = new THREE.BufferGeometry();
     shape.setAttribute('position', new THREE.BufferAttribute(position, 3));
     shape.setIndex(new THREE.BufferAttribute(index, 1));
+    const modes = packet.arrays.get(`modes${i}`);
+    if (modes instanceof Int16Array && head.modes && head.mode_step)
+      this.bending.push({ shape, rest: position.slice(), modes, count: head.modes, step: head.mode_step });
     return shape;
   }
+
+  // Bends bodies: `q` has their coordinates from `at` on, one body after another.
+  bends(q: Float32Array, at = 0) {
+    for (const { shape, rest, modes, count, step } of this.bending) {
+      if (at + count > q.length) return;
+      const place = shape.getAttribute('position') as THREE.BufferAttribute;
+      const out = place.array as Float32Array;
+      for (let v = 0, m = 0; v < rest.length; v += 3) {
+        let x = 0, y = 0, z = 0;
+        for (let j = 0; j < count; ++j, m += 3) {
+          const s = q[at + j];
+          x += s * modes[m], y += s * modes[m + 1], z += s * modes[m + 2];
+        }
+        out[v] = rest[v] + step * x;
+        out[v + 1] = rest[v + 1] + step * y;
+        out[v + 2] = rest[v + 2] + step * z;
+      }
+      place.needsUpdate = true;
+      at += count;
+    }
+  }
+
+  // How many coordinates all bodies that bend have together.
+  bendCount(): number { return this.bending.reduce((sum, b) => sum + b.count, 0); }
 
   poses(all: Float32Array) {
     this.bodies.forEach((body, i) => { if (7 * i + 6 < all.length) setPose(body, all, 7 * i); });

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/deform/bent_shell.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace h6::io {
+
+h6DeformableDef BentShell::def() const {
+  h6DeformableDef out = h6DefaultDeformableDef();
+  out.mode_count = static_cast<std::uint32_t>(model->modes);
+  out.modes = modes.data();
+  out.linear = model->linear.data();
+  out.quadratic = model->quadratic.data();
+  out.cubic = model->cubic.data();
+  out.alpha = model->mass_damping;
+  out.beta = model->stiffness_damping;
+  return out;
+}
+
+Result<BentShell> bend_shell(ReducedModel model, const std::vector<h6Vec3>& points,
+                             const std::string& name) {
+  if (model.free)
+    return Failure{name +
+                   ": a model that is fixed nowhere would float away, since the body of a shell "
+                   "that bends stands still; bake it with --fix-box"};
+  BentShell out;
+  const std::vector<double> modes = modes_at(model, points, &out.farthest);
+  h6Vec3 low = points.front(), high = low;
+  for (const h6Vec3& p : points) low = min(low, p), high = max(high, p);
+  if (out.farthest > 0.5 * norm(high - low)) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  ": points of the shell lie up to %.4g m outside its elements; it must be in "
+                  "metres, in the frame of the shell's mesh",
+                  out.farthest);
+    return Failure{name + text};
+  }
+  out.modes.assign(modes.begin(), modes.end());
+  out.model = std::make_unique<const ReducedModel>(std::move(model));
+  return out;
+}
+
+}  // namespace h6::io
