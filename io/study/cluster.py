@@ -17,7 +17,7 @@ try:
     import distributed
 except ImportError:
     if sys.executable != "/usr/bin/python3" and os.path.exists("/usr/bin/python3"):
-        os.execv("/usr/bin/python3", ["python3", "-c", sys.orig_argv[2]] + sys.argv[1:])
+        os.execv("/usr/bin/python3", ["/usr/bin/python3", "-c", sys.orig_argv[2]] + sys.argv[1:])
     print("!--scheduler needs Dask's distributed: Debian's python3-distributed, or `pip install distributed`",
           flush=True)
     sys.exit(1)
