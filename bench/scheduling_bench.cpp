@@ -12,6 +12,7 @@
 #include <benchmark/benchmark.h>
 
 #include <oneapi/tbb/flow_graph.h>
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/partitioner.h>
 #include <oneapi/tbb/task_arena.h>
@@ -169,6 +170,9 @@ double at(std::vector<double>& t, double p) {
 void compare(benchmark::State& state, std::unique_ptr<World> world, bool paced) {
   constexpr int kWays = 4, kBlock = 50, kBlocks = 24, kWarm = 10;
   const char* const names[kWays] = {"alone", "resident", "arena", "graph"};
+  // The resident helper keeps one worker of TBB for itself, so the arenas need another one.
+  const oneapi::tbb::global_control allowance(
+      oneapi::tbb::global_control::max_allowed_parallelism, kThreads + 1);
   Arena2 tasks[2];
   tasks[1].build_graph();
   Session sessions[kWays];
