@@ -3,10 +3,14 @@
 #include <doctest/doctest.h>
 #include "tests/support/near.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <memory>
 #include <string>
 
 #include "io/deform/deformable_file.h"
+#include "io/deform/solid_file.h"
 #include "io/mesh/mesh_file.h"
 #include "io/scene/load_scene.h"
 #include "io/scenes/shapes.h"
@@ -181,4 +185,56 @@ TEST_CASE("a body that cannot bend as the scene says is refused in one sentence"
   REQUIRE(write_stl(elsewhere.folder.path / "beam.stl",
                     box_mesh({1, 0, 0}, h6Vec3{1, 0, 0} + kBeam), Unit::mm));
   says(elsewhere, "outside its elements");
+}
+
+TEST_CASE(
+    "a real bridge of hexahedra carries a box that is dragged on it, less than half a voxel deep") {
+  const char* given = std::getenv("HAPSIX_TEST_DATA");
+  const fs::path data = fs::path(given ? given : "") / "deformable";
+  if (!given || !fs::exists(data)) {
+    MESSAGE("skipped: no real models");
+    return;
+  }
+  const Folder folder;
+  Result<SolidMesh> solid = read_solid(data / "simpleBridge.veg", Unit::m);
+  REQUIRE_MESSAGE(solid, solid.error());
+  fix_box(*solid, {-11, -1, -2}, {-9.4, 4, 2}), fix_box(*solid, {9.4, -1, -2}, {11, 4, 2});
+  ReduceOptions options;
+  options.modes = 10;
+  const Result<ReducedModel> model = reduce(*solid, options);
+  REQUIRE_MESSAGE(model, model.error());
+  REQUIRE(write_deformable(folder.path / "bridge.h5", *model));
+  REQUIRE(write_stl(folder.path / "box.stl", box_mesh({-0.6, 0, -0.6}, {0.6, 1, 0.6}), Unit::m));
+  fs::copy_file(data / "simpleBridge.obj", folder.path / "bridge.obj");
+  folder.write("hand.csv",
+               "t,x,y,z,qw,qx,qy,qz\n0,0,0.3,0,1,0,0,0\n1,0,-0.6,0,1,0,0,0\n2,1,-0.6,0,1,0,0,0\n");
+  const Result<Scene> scene = read_scene(folder.write("scene.json", R"({"hapsix": 1, "units": "m",
+    "contact": {"stiffness": 1e4},
+    "coupling": {"stiffness": 1000, "max_depth_voxels": 0.5},
+    "bodies": [
+      {"name": "bridge", "fixed": true,
+       "shell": {"mesh": "bridge.obj", "points": 20000, "bends": "bridge.h5"}},
+      {"name": "box", "mass": 5, "pose": {"p": [0, 0.3, 0], "q": [1, 0, 0, 0]},
+       "field": {"mesh": "box.stl", "voxel_size": 0.02}}],
+    "hands": [{"body": "box", "path": "hand.csv"}]})"));
+  REQUIRE_MESSAGE(scene, scene.error());
+  Run run(*scene);
+  int touched = 0;
+  double deepest = 0;
+  for (int i = 0; i < 2000; ++i) {
+    run.frames(1);
+    const h6FrameReport report = h6GetFrame(run.session);
+    touched += report.contacts > 0;
+    if (i >= 1300)  // the box has landed and is dragged
+      deepest = std::max<double>(deepest, report.max_depth_voxels);
+  }
+  CHECK(touched > 1000);
+  CHECK(deepest < 0.5);
+  double q[H6_MAX_MODES];
+  REQUIRE(h6GetDeformation(run.session, 0, q, nullptr, H6_MAX_MODES) == 10);
+  const auto modes = modes_at(*run.loaded->bends[0], {{1, 0.1, 0}});
+  double down = 0;
+  for (std::size_t j = 0; j < 10; ++j) down += q[j] * modes[3 * j + 1];
+  MESSAGE("the bridge gives way by " << -1e3 * down << " mm");
+  CHECK(down < 0);
 }
