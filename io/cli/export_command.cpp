@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // export_command.cpp - hapsix export: recordings and fields in forms that other programs read.
 //
-//   hapsix export run.h5 -o run.csv [--contacts contacts.csv]
+//   hapsix export run.h5 -o run.csv [--contacts contacts.csv] [--bends bends.csv]
 //   hapsix export bay.vdb -o plain.vdb
 //
-// A recording holds no contacts; they are computed again, and a recording that cannot be replayed
-// has none to export.
+// A recording holds neither contacts nor the shapes of bodies that bend; both are computed again,
+// and a recording that cannot be replayed has none to export.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
@@ -27,7 +27,7 @@ namespace {
 constexpr std::uint64_t kPiece = 4096;
 
 struct ExportOptions {
-  std::string input, output, contacts;
+  std::string input, output, contacts, bends;
 };
 
 bool ends(const std::string& text, const std::string& ending) {
@@ -90,22 +90,65 @@ void append_contacts(const RecordedSession& session, const h6FrameRecord& frame,
   }
 }
 
-Outcome export_contacts(const ExportOptions& o, const io::Recording& head, const Console& console) {
+constexpr char kContactsHead[] =
+    "t,frame,body,point,x,y,z,nx,ny,nz,tx,ty,tz,weight,depth,load,part,with\n";
+
+std::size_t most_modes(const io::LoadedScene& scene) {
+  std::size_t most = 0;
+  for (const auto& model : scene.bends) most = std::max(most, model ? model->modes : 0);
+  return most;
+}
+
+std::string bends_head(const io::LoadedScene& scene) {
+  std::string out = "t,frame,body";
+  for (std::size_t j = 1; j <= most_modes(scene); ++j) out += ",q" + std::to_string(j);
+  return out + '\n';
+}
+
+// A row for each body that bends; one with fewer modes than another has empty cells.
+void append_bends(const RecordedSession& session, const h6FrameRecord& frame, std::string& out) {
+  const io::LoadedScene& scene = session.loaded();
+  const std::size_t most = most_modes(scene);
+  char text[64];
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    double q[H6_MAX_MODES];
+    const std::size_t r =
+        h6GetDeformation(session.session(), static_cast<std::int32_t>(b), q, nullptr, H6_MAX_MODES);
+    if (r == 0) continue;
+    std::snprintf(text, sizeof text, "%.6f,%llu,", frame.time,
+                  static_cast<unsigned long long>(frame.report.frame));
+    out += text + io::csv_quoted(scene.scene.bodies[b].name);
+    for (std::size_t j = 0; j < most; ++j) {
+      std::snprintf(text, sizeof text, ",%.17g", j < r ? q[j] : 0.0);
+      out += j < r ? text : ",";
+    }
+    out += '\n';
+  }
+}
+
+using Append = void (*)(const RecordedSession&, const h6FrameRecord&, std::string&);
+
+// Steps the recording again and writes what `append` says of each frame.
+Outcome export_again(const std::string& input, const std::string& output, const io::Recording& head,
+                     const Console& console, Append append) {
   std::vector<std::string> remarks;
   Result<std::unique_ptr<RecordedSession>> session =
-      RecordedSession::open(o.input, head, {}, console.progress(), remarks);
+      RecordedSession::open(input, head, {}, console.progress(), remarks);
   console.warn(remarks);
-  if (!session) return Failure{"its contacts cannot be computed again: " + session.error()};
-  return io::write_aside(o.contacts, [&](const std::filesystem::path& path) -> Outcome {
+  if (!session) return Failure{"it cannot be replayed: " + session.error()};
+  const io::LoadedScene& scene = (*session)->loaded();
+  if (append == append_bends && most_modes(scene) == 0)
+    return Failure{"nothing in its scene bends, so there is nothing to write to " + output};
+  return io::write_aside(output, [&](const std::filesystem::path& path) -> Outcome {
     std::ofstream out(path, std::ios::binary);
-    out << "t,frame,body,point,x,y,z,nx,ny,nz,tx,ty,tz,weight,depth,load,part,with\n";
-    Outcome all = each_piece(o.input, head.frame_count, console,
+    out << (append == append_bends ? bends_head(scene) : kContactsHead);
+    Outcome all = each_piece(input, head.frame_count, console,
                              [&](std::vector<h6FrameRecord>& frames) -> Outcome {
                                std::string text;
                                for (const h6FrameRecord& frame : frames) {
                                  const auto stepped = (*session)->step(frame);
                                  if (!stepped) return stepped.failure();
-                                 append_contacts(**session, **stepped, text);
+                                 append(**session, **stepped, text);
                                }
                                out << text;
                                return out ? Outcome(Done{}) : flushed(out);
@@ -120,7 +163,11 @@ Outcome export_recording(const ExportOptions& o, const Console& console, std::ui
   if (!head->remark.empty()) console.log(o.input + ": " + head->remark);
   frames = head->frame_count;
   if (Outcome written = export_frames(o, *head, console); !written) return written;
-  return o.contacts.empty() ? Outcome(Done{}) : export_contacts(o, *head, console);
+  if (!o.contacts.empty())
+    if (Outcome done = export_again(o.input, o.contacts, *head, console, append_contacts); !done)
+      return done;
+  if (!o.bends.empty()) return export_again(o.input, o.bends, *head, console, append_bends);
+  return Done{};
 }
 
 Outcome export_field(const ExportOptions& o) {
@@ -140,11 +187,12 @@ int export_command(const Console& console, const ExportOptions& o) {
     return console.fail(field ? "a field is exported to a file that ends in .vdb"
                               : "a recording is exported to a file that ends in .csv",
                         kUsage);
-  if (field && !o.contacts.empty())
-    return console.fail("--contacts is for recordings, and " + o.input + " is a field", kUsage);
+  if (field && !(o.contacts.empty() && o.bends.empty()))
+    return console.fail("--contacts and --bends are for recordings, and " + o.input + " is a field",
+                        kUsage);
   if (Outcome there = field ? check_input(o.input) : check_recording(o.input); !there)
     return console.fail(there.error());
-  for (const std::string& file : {o.output, o.contacts})
+  for (const std::string& file : {o.output, o.contacts, o.bends})
     if (Outcome place = check_output(file); !file.empty() && !place)
       return console.fail(place.error());
   std::uint64_t frames = 0;
@@ -153,11 +201,13 @@ int export_command(const Console& console, const ExportOptions& o) {
   nlohmann::ordered_json said{{"exported", o.output}};
   if (!field) said["frames"] = frames;
   if (!o.contacts.empty()) said["contacts"] = o.contacts;
+  if (!o.bends.empty()) said["bends"] = o.bends;
   console.result(said);
   if (!console.json && field) std::printf("%s: one level set of floats\n", o.output.c_str());
   if (!console.json && !field)
-    std::printf("%s: %llu frames%s%s\n", o.output.c_str(), static_cast<unsigned long long>(frames),
-                o.contacts.empty() ? "" : ", contacts in ", o.contacts.c_str());
+    std::printf("%s: %llu frames%s%s%s%s\n", o.output.c_str(),
+                static_cast<unsigned long long>(frames), o.contacts.empty() ? "" : ", contacts in ",
+                o.contacts.c_str(), o.bends.empty() ? "" : ", shapes in ", o.bends.c_str());
   return kOk;
 }
 
@@ -181,6 +231,12 @@ void add_export(CLI::App& app, Program& program) {
                    "Every contact of every frame, computed again: place, normal, torque "
                    "direction, weight, depth, load, parts")
       ->option_text("CONTACTS.csv")
+      ->check(ends_with(".csv"));
+  command
+      ->add_option("--bends", o->bends,
+                   "The coordinates of every body that bends in every frame, computed again "
+                   "[m sqrt(kg)]")
+      ->option_text("BENDS.csv")
       ->check(ends_with(".csv"));
   command->callback([&program, o] {
     program.work = [&program, o] { return export_command(program.console, *o); };

@@ -25,8 +25,13 @@ std::size_t column(const std::string& head, const std::string& name) {
 
 TEST_CASE("a recording as CSV: a row for each frame, and every contact of every frame") {
   Sandbox box;
-  REQUIRE(run(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.8", "--record",
-                   "run.h5"}).code == 0);
+  REQUIRE(
+      run(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.8", "--record", "run.h5"})
+          .code == 0);
+  const Ended rigid = run(box, {"export", "run.h5", "-o", "run.csv", "--bends", "q.csv"});
+  CHECK(rigid.code == 1);
+  CHECK_MESSAGE(rigid.err.find("nothing in its scene bends") != std::string::npos, rigid.err);
+  CHECK(box.files().count("q.csv") == 0);
   const Ended done = run(box, {"export", "run.h5", "-o", "run.csv", "--contacts", "c.csv"});
   REQUIRE_MESSAGE(done.code == 0, done.err);
   std::istringstream frames(slurp(box.file("run.csv"))), contacts(slurp(box.file("c.csv")));
@@ -70,8 +75,9 @@ TEST_CASE("a recording as CSV: a row for each frame, and every contact of every 
 TEST_CASE("a field as a plain level set is read back, and by OpenVDB's Python where it is there") {
   Sandbox box;
   REQUIRE(run(box, {"scene", "export", "box-on-plates", "."}).code == 0);
-  REQUIRE(run(box, {"bake", "field", "small.stl", "--units", "mm", "--voxels", "32", "-o",
-                   "field.vdb"}).code == 0);
+  REQUIRE(
+      run(box, {"bake", "field", "small.stl", "--units", "mm", "--voxels", "32", "-o", "field.vdb"})
+          .code == 0);
   const Ended done = run(box, {"export", "field.vdb", "-o", "plain.vdb"});
   REQUIRE_MESSAGE(done.code == 0, done.err);
   CHECK(run(box, {"info", "plain.vdb"}).code == 0);
@@ -86,14 +92,57 @@ TEST_CASE("a field as a plain level set is read back, and by OpenVDB's Python wh
                         .c_str()) == 0);
 }
 
+TEST_CASE(
+    "shapes of a body that bends as CSV: a row for each frame, bent while something presses") {
+  Sandbox box;
+  REQUIRE(run(box, {"scene", "export", "box-on-plates", "."}).code == 0);
+  const Ended baked =
+      run(box, {"bake", "deformable", "large.stl", "--units", "mm", "--cell", "1", "--young", "1e5",
+                "--poisson", "0.4", "--density", "1000", "--modes", "4",
+                "--fix-box=-21,-12,-3,-7,-10.9,1", "-o", "plate.h5"});
+  REQUIRE_MESSAGE(baked.code == 0, baked.err);
+  spill(box.file("hand.csv"),
+        "t,x,y,z,qw,qx,qy,qz\n0,-31.75,8,2.2,1,0,0,0\n0.2,-31.75,8,1,1,0,0,0\n0.4,-31.75,8,1,1,0,0,"
+        "0\n");
+  spill(box.file("bend.json"), R"({"hapsix": 1, "units": "mm", "contact": {"stiffness": 1e4},
+    "bodies": [
+      {"name": "plate", "fixed": true,
+       "shell": {"mesh": "large.stl", "points": 2000, "bends": "plate.h5"}},
+      {"name": "tool", "mass": 0.05, "pose": {"p": [-31.75, 8, 2.2], "q": [1, 0, 0, 0]},
+       "field": {"mesh": "small.stl", "voxel_size": 0.15}}],
+    "hands": [{"body": "tool", "path": "hand.csv"}]})");
+  const Ended ran = run(box, {"run", "bend.json", "--virtual-time", "--record", "bend.h5"});
+  REQUIRE_MESSAGE(ran.code == 0, ran.err);
+  const Ended done = run(box, {"export", "bend.h5", "-o", "bend.csv", "--bends", "q.csv"});
+  REQUIRE_MESSAGE(done.code == 0, done.err);
+  std::istringstream shapes(slurp(box.file("q.csv")));
+  std::string head, line;
+  std::getline(shapes, head);
+  CHECK(head == "t,frame,body,q1,q2,q3,q4");
+  double first = 0, last = 0;
+  int rows = 0;
+  while (std::getline(shapes, line)) {
+    const auto c = cells(line);
+    REQUIRE(c.size() == 7);
+    CHECK(c[2] == "\"plate\"");
+    double size = 0;
+    for (std::size_t j = 3; j < 7; ++j) size += std::fabs(std::stod(c[j]));
+    (rows++ ? last : first) = size;
+  }
+  CHECK(rows == 400);
+  CHECK(first == 0);
+  CHECK(last > 0);
+  const Ended none = run(box, {"export", "bend.h5", "-o", "bend.csv", "--bends", "no/q.csv"});
+  CHECK(none.code != 0);
+}
+
 TEST_CASE("what cannot be exported gets one sentence, and no file is made") {
   Sandbox box;
   spill(box.file("run.h5"), "no recording");
-  for (const Args& wrong : {Args{"export", "run.h5", "-o", "out.csv"},
-                            Args{"export", "run.h5", "-o", "out.mcap"},
-                            Args{"export", "run.h5", "-o", "out.vdb"},
-                            Args{"export", "none.vdb", "-o", "out.vdb"},
-                            Args{"export", "none.vdb", "-o", "out.vdb", "--contacts", "c.csv"}}) {
+  for (const Args& wrong :
+       {Args{"export", "run.h5", "-o", "out.csv"}, Args{"export", "run.h5", "-o", "out.mcap"},
+        Args{"export", "run.h5", "-o", "out.vdb"}, Args{"export", "none.vdb", "-o", "out.vdb"},
+        Args{"export", "none.vdb", "-o", "out.vdb", "--contacts", "c.csv"}}) {
     const Ended e = run(box, wrong);
     CAPTURE(e.err);
     CHECK(e.code != 0);
