@@ -4,8 +4,10 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/support/bridge.h"
@@ -279,4 +281,33 @@ TEST_CASE("a definition of a deformable is checked, and its functions take wrong
   CHECK(v[0] == 0);
   CHECK(v[2] == 7);
   CHECK(scene.q() == std::vector<double>{1e-3, 2e-3, 3e-3});
+}
+
+TEST_CASE("a viewer of a loop gets the coordinates of the body that bends") {
+  const auto vibrate = [](BallOnBridge& scene) {
+    scene.def.hand_count = 0;
+    scene.bodies[1].pose = pose(0, 0, 0.5);  // far away
+    REQUIRE(scene.open());
+    const std::vector<double> q(8, 1e-3);
+    REQUIRE(h6SetDeformation(scene.session, 0, q.data(), nullptr, 8));
+  };
+  BallOnBridge scene(600, 8), again(600, 8);
+  vibrate(scene), vibrate(again);
+  h6LoopDef def = h6DefaultLoopDef();
+  def.duration = 0.2, def.realtime = false, def.view_contacts = 64;
+  h6Loop* loop = h6StartLoop(scene.session, nullptr, &def, nullptr);
+  REQUIRE(loop);
+  h6LoopView view{};
+  for (int i = 0; i < 30000 && view.frame < 50; ++i) {
+    h6ReadView(loop, &view);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  REQUIRE(view.frame >= 50);
+  REQUIRE(view.bend_count == 8);
+  const std::vector<double> seen(view.bends, view.bends + 8);
+  h6DestroyLoop(loop);
+  do {
+    h6Step(again.session, nullptr, nullptr);
+  } while (h6GetFrame(again.session).frame < view.frame);
+  CHECK(again.q() == seen);
 }
