@@ -171,8 +171,8 @@ void compare(benchmark::State& state, std::unique_ptr<World> world, bool paced) 
   constexpr int kWays = 4, kBlock = 50, kBlocks = 24, kWarm = 10;
   const char* const names[kWays] = {"alone", "resident", "arena", "graph"};
   // The resident helper keeps one worker of TBB for itself, so the arenas need another one.
-  const oneapi::tbb::global_control allowance(
-      oneapi::tbb::global_control::max_allowed_parallelism, kThreads + 1);
+  const oneapi::tbb::global_control allowance(oneapi::tbb::global_control::max_allowed_parallelism,
+                                              kThreads + 1);
   Arena2 tasks[2];
   tasks[1].build_graph();
   Session sessions[kWays];

@@ -90,8 +90,9 @@ void append_contacts(const RecordedSession& session, const h6FrameRecord& frame,
   }
 }
 
-constexpr char kContactsHead[] =
-    "t,frame,body,point,x,y,z,nx,ny,nz,tx,ty,tz,weight,depth,load,part,with\n";
+std::string contacts_head(const io::LoadedScene&) {
+  return "t,frame,body,point,x,y,z,nx,ny,nz,tx,ty,tz,weight,depth,load,part,with\n";
+}
 
 std::size_t most_modes(const io::LoadedScene& scene) {
   std::size_t most = 0;
@@ -99,7 +100,9 @@ std::size_t most_modes(const io::LoadedScene& scene) {
   return most;
 }
 
+// Empty where nothing bends.
 std::string bends_head(const io::LoadedScene& scene) {
+  if (most_modes(scene) == 0) return "";
   std::string out = "t,frame,body";
   for (std::size_t j = 1; j <= most_modes(scene); ++j) out += ",q" + std::to_string(j);
   return out + '\n';
@@ -126,29 +129,32 @@ void append_bends(const RecordedSession& session, const h6FrameRecord& frame, st
   }
 }
 
-using Append = void (*)(const RecordedSession&, const h6FrameRecord&, std::string&);
+// A table that is made by stepping a recording again: its first line, and the rows of a frame.
+struct Table {
+  std::string (*head)(const io::LoadedScene&);
+  void (*append)(const RecordedSession&, const h6FrameRecord&, std::string&);
+};
 
-// Steps the recording again and writes what `append` says of each frame.
 Outcome export_again(const std::string& input, const std::string& output, const io::Recording& head,
-                     const Console& console, Append append) {
+                     const Console& console, const Table& table) {
   std::vector<std::string> remarks;
   Result<std::unique_ptr<RecordedSession>> session =
       RecordedSession::open(input, head, {}, console.progress(), remarks);
   console.warn(remarks);
   if (!session) return Failure{"it cannot be replayed: " + session.error()};
-  const io::LoadedScene& scene = (*session)->loaded();
-  if (append == append_bends && most_modes(scene) == 0)
+  const std::string first_line = table.head((*session)->loaded());
+  if (first_line.empty())
     return Failure{"nothing in its scene bends, so there is nothing to write to " + output};
   return io::write_aside(output, [&](const std::filesystem::path& path) -> Outcome {
     std::ofstream out(path, std::ios::binary);
-    out << (append == append_bends ? bends_head(scene) : kContactsHead);
+    out << first_line;
     Outcome all = each_piece(input, head.frame_count, console,
                              [&](std::vector<h6FrameRecord>& frames) -> Outcome {
                                std::string text;
                                for (const h6FrameRecord& frame : frames) {
                                  const auto stepped = (*session)->step(frame);
                                  if (!stepped) return stepped.failure();
-                                 append(**session, **stepped, text);
+                                 table.append(**session, **stepped, text);
                                }
                                out << text;
                                return out ? Outcome(Done{}) : flushed(out);
@@ -164,9 +170,12 @@ Outcome export_recording(const ExportOptions& o, const Console& console, std::ui
   frames = head->frame_count;
   if (Outcome written = export_frames(o, *head, console); !written) return written;
   if (!o.contacts.empty())
-    if (Outcome done = export_again(o.input, o.contacts, *head, console, append_contacts); !done)
+    if (Outcome done =
+            export_again(o.input, o.contacts, *head, console, {contacts_head, append_contacts});
+        !done)
       return done;
-  if (!o.bends.empty()) return export_again(o.input, o.bends, *head, console, append_bends);
+  if (!o.bends.empty())
+    return export_again(o.input, o.bends, *head, console, {bends_head, append_bends});
   return Done{};
 }
 

@@ -25,17 +25,17 @@ Result<BentShell> bend_shell(ReducedModel model, const std::vector<h6Vec3>& poin
                    ": a model that is fixed nowhere would float away, since the body of a shell "
                    "that bends stands still; bake it with --fix-box"};
   BentShell out;
-  const std::vector<double> modes = modes_at(model, points, &out.farthest);
+  double outside = 0;
+  const std::vector<double> modes = modes_at(model, points, &outside);
   h6Vec3 low = points.front(), high = low;
   for (const h6Vec3& p : points) low = min(low, p), high = max(high, p);
-  if (out.farthest > 0.5 * norm(high - low)) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  ": points of the shell lie up to %.4g m outside its elements; it must be in "
-                  "metres, in the frame of the shell's mesh",
-                  out.farthest);
-    return Failure{name + text};
-  }
+  const double size = norm(high - low);
+  char text[160];
+  std::snprintf(text, sizeof text, ": points of the shell lie up to %.4g m outside its elements",
+                outside);
+  if (outside > 0.5 * size)
+    return Failure{name + text + "; it must be in metres, in the frame of the shell's mesh"};
+  if (outside > 0.02 * size) out.remark = name + text + ", where they follow the nearest element";
   out.modes.assign(modes.begin(), modes.end());
   out.model = std::make_unique<const ReducedModel>(std::move(model));
   return out;

@@ -14,7 +14,7 @@ namespace h6::io {
 
 std::string asset_hash(const FieldData& field);
 std::string asset_hash(const ShellData& shell);
-// Of a shell, given by its hash, that bends by this model.
+// The hash of a shell that bends: of the rigid shell's hash and the model by which it bends.
 std::string asset_hash(const std::string& shell, const ReducedModel& bends);
 
 }  // namespace h6::io

@@ -193,11 +193,12 @@ class Loader {
     if (!bent) return bent.failure();
     for (const std::string& w : cached.warnings)
       out_.warnings.push_back("body '" + body.name + "': " + w);
+    if (!bent->remark.empty()) out_.warnings.push_back("body '" + body.name + "': " + bent->remark);
     LoadedAsset& asset = out_.assets.back();
     asset.hash = asset_hash(asset.hash, *bent->model);
     asset.modes = bent->model->modes;
     asset.lowest_hz = bent->model->frequency.front();
-    asset.outside = bent->farthest;
+    asset.from_cache &= !source.solid || cached.hit;
     asset.seconds += since(start);
     bent_.push_back({out_.bodies.size(), static_cast<std::size_t>(index), std::move(*bent)});
     return Done{};

@@ -8,8 +8,8 @@
 
 #include "hapsix/hapsix.h"
 #include "hapsix/result.h"
-#include "io/file/progress.h"
 #include "io/deform/reduced_model.h"
+#include "io/file/progress.h"
 #include "io/scene/field_mesh.h"
 #include "io/scene/scene.h"
 
@@ -33,7 +33,6 @@ struct LoadedAsset {
   int levels = 0;              // shell
   std::size_t modes = 0;       // shell that bends; 0: rigid
   double lowest_hz = 0;        // shell that bends: of its slowest small vibration [Hz]
-  double outside = 0;          // shell that bends: how far its points lie outside the model [m]
 };
 
 struct ModelDeleter {
@@ -49,7 +48,7 @@ struct LoadedScene {
   // The mesh of each field of the model; null for a field that came from a file. Some of the meshes
   // are in `scene`, the others in `meshes`.
   std::vector<std::unique_ptr<FieldMesh>> field_meshes;
-  std::vector<double> field_voxels;  // the finest of each field [m]
+  std::vector<double> field_voxels;                        // the finest of each field [m]
   std::vector<std::unique_ptr<const ReducedModel>> bends;  // by body; null where it is rigid
   std::vector<std::unique_ptr<const Mesh>> meshes;
   std::vector<LoadedAsset> assets;

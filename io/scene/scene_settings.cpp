@@ -158,10 +158,11 @@ const Setting kFieldRows[] = {
 const SettingTable kField = settings_of("FieldSource", kFieldRows);
 const Setting kShellRows[] = {
     kMeshRow, by_hand("file", Kind::text, "baked shell (.ply), in metres; instead of mesh"),
-    by_hand("bends", Kind::text,
-            "reduced model (.h5 of 'hapsix bake deformable', in metres, in the frame of the mesh) by "
-            "which the shell bends; its body is fixed, has no field and touches one other body; "
-            "default: rigid"),
+    by_hand(
+        "bends", Kind::text,
+        "reduced model (.h5 of 'hapsix bake deformable', in metres, in the frame of the mesh) by "
+        "which the shell bends; its body is fixed, has no field and touches one other body; "
+        "default: rigid"),
     units_of_the_mesh(), h6::object<&ShellSource::bake>("", kShellBake, "how the mesh is baked")};
 const SettingTable kShell = settings_of("ShellSource", kShellRows);
 

@@ -9,7 +9,8 @@
 
 namespace h6::io::view {
 
-// Of the frame that was stepped last, in the order of the bodies; touching ones only.
+// A contact that touches, of the frame that was stepped last. Contacts stand in the order of
+// bodies.
 struct ReplayedContact {
   ReportContact contact;   // world frame [m]
   std::size_t body, with;  // whose shell's point touches, whose field

@@ -37,7 +37,8 @@ class ReportRun {
   // The frames whose contacts the replay shows, ascending; contacts(i, ...) sets those of the i-th.
   const std::vector<std::uint64_t>& replay_frames() const { return replay_frames_; }
   void contacts(std::size_t sample, std::vector<ReportContact> all);
-  // Of the same frames, the coordinates of the bodies that bend, in the order of the scene.
+  // bend(i, ...) sets the coordinates of the bodies that bend in the i-th of these frames, one body
+  // after another.
   void bend(std::size_t sample, const std::vector<float>& q);
 
  private:

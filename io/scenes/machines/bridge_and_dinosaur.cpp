@@ -74,7 +74,7 @@ SolidMesh bridge_solid() {
   return out;
 }
 
-// The skin of the cells. Every point of it lies on a face of a hexahedron, so the modes fit it.
+// The skin of the cells. Every vertex of it lies on a face of a hexahedron, so the modes fit it.
 class Skin {
  public:
   void add_faces(const Place& cell) {

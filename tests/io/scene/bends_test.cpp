@@ -185,6 +185,13 @@ TEST_CASE("a body that cannot bend as the scene says is refused in one sentence"
   REQUIRE(write_stl(elsewhere.folder.path / "beam.stl",
                     box_mesh({1, 0, 0}, h6Vec3{1, 0, 0} + kBeam), Unit::mm));
   says(elsewhere, "outside its elements");
+  const BeamBench near;  // the mesh stands out of the model by 30 mm
+  REQUIRE(write_stl(near.folder.path / "beam.stl", box_mesh({0, 0, 0}, kBeam + h6Vec3{0.03, 0, 0}),
+                    Unit::mm));
+  const auto loaded = load_scene(*near.read());
+  REQUIRE_MESSAGE(loaded, loaded.error());
+  REQUIRE((*loaded)->warnings.size() == 1);
+  CHECK((*loaded)->warnings[0].find("outside its elements") != std::string::npos);
 }
 
 TEST_CASE(
