@@ -87,10 +87,10 @@ Path nut_path(const h6Pose& start) {
   };
   for (int i = 0; i < 12; ++i) quarter(1, 0.15);
   // The thread holds it against a pull, and against a push to the side.
-  hand.wait(0.2).move_by({0, 0, 5 * kMm}, 0.05).wait(0.2).move_by({0, 0, -5 * kMm}, 0.05);
-  hand.move_by({3 * kMm, 0, 0}, 0.05).wait(0.2).move_by({-3 * kMm, 0, 0}, 0.05);
+  hand.wait(0.5).move_by({0, 0, 5 * kMm}, 0.05).wait(0.5).move_by({0, 0, -5 * kMm}, 0.05);
+  hand.move_by({3 * kMm, 0, 0}, 0.05).wait(0.5).move_by({-3 * kMm, 0, 0}, 0.05);
   for (int i = 0; i < 12; ++i) quarter(-1, 0.15);
-  return hand.wait(0.3).rows();
+  return hand.wait(0.5).rows();
 }
 
 }  // namespace
