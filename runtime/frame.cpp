@@ -133,9 +133,12 @@ void couple_and_step(h6Session& s, const Settings& set, bool last) {
     for (std::size_t h = 0; h < s.hands.size(); ++h) {
       Hand& hand = s.hands[h];
       couple(set, hand, s.bodies[hand.body], s.acting[hand.body], status);
-      if (last) observe_hand(set, s.bodies, s.shells, hand, s.devices[h]);
+      // A port starts from what is stored before the first step moves anything.
+      if (last || !s.devices[h].port.known())
+        observe_hand(set, s.bodies, s.shells, hand, s.devices[h]);
     }
-    if (s.substeps.count > 1) stop_impacts(set, s.bodies, s.shells, s.acting);
+    if (s.substeps.count > 1 && set.integrator == H6_IMPLICIT)
+      stop_impacts(set, s.bodies, s.shells, s.acting);
     if (set.contact.passivity) damp_contacts(set, s.bodies, s.shells, s.acting, s.hands, status);
     if (set.net_stiffness && last) report_net_stiffness(s.bodies, s.shells, s.report);
   });

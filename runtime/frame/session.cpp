@@ -330,8 +330,7 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
       .gravity = from(def->gravity),
       .net_stiffness = def->net_stiffness,
       .max_contacts = def->max_contacts,
-      // Explicit steps are for comparison; the damper of an impact is too stiff for them.
-      .max_substeps = def->integrator == H6_EXPLICIT ? 1 : def->max_substeps};
+      .max_substeps = def->max_substeps};
   s->anytime.budget_ns = 1e3 * def->frame_budget_us;
   s->anytime.period_ns = 1e9 * s->settings.dt;
   bool ready = false;

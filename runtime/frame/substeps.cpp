@@ -2,11 +2,13 @@
 // substeps.cpp - bounds the motion of points relative to the fields that they are near.
 #include "runtime/frame/substeps.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "runtime/contact/traverse_pair.h"
 #include "runtime/frame/session.h"
+#include "runtime/motion/motion_stages.h"
 
 namespace h6 {
 namespace {
@@ -91,10 +93,50 @@ bool within_reach(const h6Session& s, const Pair& pair) {
   return overlap(grown(a.shell, a.reach + b.reach), b.field);
 }
 
+// An explicit step may be this share of the longest one that is stable.
+constexpr double kExplicitShare = 0.7;
+
+// The explicit steps of `dt` in all that an inertia m needs on a spring k with a damper b:
+// symplectic Euler is stable where k h^2 + 2 b h < 4 m.
+double explicit_steps(double m, double k, double b, double dt) {
+  return dt * k / (std::sqrt(b * b + 4 * kExplicitShare * m * k) - b);
+}
+
+// The steps that a free body needs under its hands and one wall of the contacts' stiffness. The
+// rule must not enter, since explicit steps are there to show how much stiffer than one wall a rule
+// is.
+double explicit_steps(const h6Session& s, std::size_t body) {
+  const Body& b = s.bodies[body];
+  const h6ContactDef& contact = s.settings.contact;
+  const double wall = contact.stiffness, turned_wall = wall * b.radius * b.radius;
+  double k = wall, damper = contact.damping * wall;
+  double turn_k = turned_wall, turn_damper = contact.damping * turned_wall;
+  for (const Hand& hand : s.hands) {
+    if (static_cast<std::size_t>(hand.body) != body) continue;
+    const h6CouplingDef& c = hand.coupling;
+    k += c.stiffness, turn_k += c.rotational_stiffness;
+    damper += coupling_damper(c, c.stiffness, b.mass);
+    turn_damper += coupling_damper(c, c.rotational_stiffness, mean_inertia(b));
+  }
+  const double dt = s.settings.dt, shift = explicit_steps(b.mass, k, damper, dt);
+  if (b.translation_only) return shift;
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(b.inertia, Eigen::EigenvaluesOnly);
+  return std::max(shift, explicit_steps(axes.eigenvalues()[0], turn_k, turn_damper, dt));
+}
+
+Substeps plan_explicit(const h6Session& s) {
+  double needed = 1;
+  for (std::size_t i = 0; i < s.bodies.size(); ++i)
+    if (is_free(s.bodies[i])) needed = std::max(needed, std::ceil(explicit_steps(s, i)));
+  const double most = s.settings.max_substeps;
+  return {static_cast<std::uint32_t>(std::min(needed, most)), needed};
+}
+
 }  // namespace
 
 Substeps plan_substeps(h6Session& s) {
   if (s.settings.max_substeps == 1) return {};
+  if (s.settings.integrator == H6_EXPLICIT) return plan_explicit(s);
   for (Deformation& d : s.bends) d.pace = s.settings.dt * bend_reach(d, d.v);
   note_reach(s, s.settings.dt, 1, true);
   find_near_pairs(s);
@@ -122,7 +164,7 @@ double share_of_way(const Substeps& plan, bool held, std::uint32_t i) {
 }
 
 bool slow_down(h6Session& s, double dt) {
-  if (s.settings.max_substeps == 1) return false;
+  if (s.settings.max_substeps == 1 || s.settings.integrator == H6_EXPLICIT) return false;
   for (Deformation& d : s.bends) d.pace = bend_reach(d, d.step);
   note_reach(s, dt, 1 / s.substeps.needed, false);
   find_near_pairs(s);

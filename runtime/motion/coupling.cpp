@@ -96,9 +96,8 @@ void couple_admittance(Hand& hand, const Body& body, LinearWrench& acting, h6Sta
 Pull pull_of(h6Gradient gradient, const h6CouplingDef& c, const Body& body,
              const RigidState& target, const RigidState& pulled) {
   const bool at_rest = c.mode == H6_COUPLING_STATIC;
-  // The damper of a spring, for a body with this inertia.
   const auto damper = [&](double k, double inertia) {
-    return at_rest ? body.lag * k : 2 * c.damping_ratio * std::sqrt(k * inertia);
+    return at_rest ? body.lag * k : coupling_damper(c, k, inertia);
   };
   const Spring forward{c.stiffness, damper(c.stiffness, body.mass), c.max_force};
   const Link force =
@@ -113,7 +112,7 @@ Pull pull_of(h6Gradient gradient, const h6CouplingDef& c, const Body& body,
   if (body.translation_only) return pull;
 
   const double k = c.rotational_stiffness;
-  const Spring turning{k, damper(k, body.inertia.trace() / 3), c.max_torque};
+  const Spring turning{k, damper(k, mean_inertia(body)), c.max_torque};
   const Vec3 theta = log_rotation(target.q * pulled.q.conjugate());
   const Link torque = link(turning, theta, target.w - pulled.w, at_rest, gradient == H6_EXACT);
   f.tail<3>() = torque.f;

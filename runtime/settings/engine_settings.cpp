@@ -227,7 +227,7 @@ constexpr Setting kSessionRows[] = {
     whole<&h6SessionDef::max_substeps>(
         "max_substeps", 16, between(1, 64),
         "a frame takes up to this many steps, as many as keep every point near a field from moving "
-        "farther than a fifth of a voxel in one"),
+        "farther than a fifth of a voxel in one; explicit: as many as hands and one wall need"),
     flag<&h6SessionDef::net_stiffness>(
         "net_stiffness", "report the extreme stiffness of all contacts together in every frame"),
     whole<&h6SessionDef::threads>("threads", 1, between(1, 64),

@@ -316,8 +316,8 @@ typedef struct h6SessionDef {
                                  4096 and 16 for each shell body (H6_PAIRS_LEFT_OUT)               */
   uint32_t     max_substeps;  /* most steps that a frame takes so that no point near a field moves
                                  farther than a fifth of a voxel in a step, 1 .. 64; default
-                                 16. 1, and explicit steps: a frame takes one step, however far it
-                                 goes. METHOD.md, Sec. 8                                           */
+                                 16. 1: one step, however far it goes. The explicit integrator takes
+                                 as many as hands and one wall need. METHOD.md, Sec. 8             */
   bool         net_stiffness; /* report the extreme eigenvalues of the weighted stiffness          */
   uint32_t     threads;       /* that share a frame's work, 1 .. 64: the calling one and resident
                                  helpers, or `tasks`; at most one for each core helps              */

@@ -302,6 +302,41 @@ TEST_CASE("an impact takes energy and gives none, with either integrator") {
   }
 }
 
+TEST_CASE("an explicit frame takes the steps that its hand and one wall of stiffness k need") {
+  // 100 kg need one step. The lighter the box, the shorter the step: 4 m / (k h^2) bounds it.
+  std::uint32_t before = 1;
+  for (const double mass : {100.0, 1e-2, 1e-3, 1e-4}) {
+    CAPTURE(mass);
+    double fastest[2] = {};
+    for (const bool many : {false, true}) {
+      BoxOnFloor box;
+      box.bodies[1].mass = mass;
+      for (int i = 0; i < 3; ++i) box.bodies[1].inertia[i] = mass * 5e-5;
+      box.def.integrator = H6_EXPLICIT;
+      box.def.contact.method = H6_METHOD_GAUSS3;  // one wall: k in all
+      box.def.max_substeps = many ? 64 : 1;
+      box.open();
+      h6DeviceSample down = hand_at(pose(0, 0, 4 * mm));
+      for (int i = 0; i < 1500; ++i) {
+        h6Step(box.session, &down, nullptr);
+        if (i > 1000) fastest[many] = std::max(fastest[many], norm(box.body().velocity.linear));
+      }
+      const std::uint32_t steps = h6GetFrame(box.session).substeps;
+      if (many) {
+        CHECK(steps >= before);
+        CHECK((mass == 100) == (steps == 1));
+        before = steps;
+      } else {
+        CHECK(steps == 1);
+      }
+    }
+    if (mass == 100) continue;  // still falling
+    CHECK(fastest[true] < 1e-4);
+    if (mass < 5e-3) CHECK(fastest[false] > 0.01);
+  }
+  CHECK(before >= 8);
+}
+
 TEST_CASE("a body that is put somewhere else does not remember the speed that it gained") {
   BoxOnFloor fallen, fresh;
   for (BoxOnFloor* box : {&fallen, &fresh}) {
