@@ -168,15 +168,17 @@ Outcome export_recording(const ExportOptions& o, const Console& console, std::ui
   if (!head) return head.failure();
   if (!head->remark.empty()) console.log(o.input + ": " + head->remark);
   frames = head->frame_count;
-  if (Outcome written = export_frames(o, *head, console); !written) return written;
+  // The frames come last, since a recording that cannot be replayed writes nothing then.
+  if (!o.bends.empty())
+    if (Outcome done = export_again(o.input, o.bends, *head, console, {bends_head, append_bends});
+        !done)
+      return done;
   if (!o.contacts.empty())
     if (Outcome done =
             export_again(o.input, o.contacts, *head, console, {contacts_head, append_contacts});
         !done)
       return done;
-  if (!o.bends.empty())
-    return export_again(o.input, o.bends, *head, console, {bends_head, append_bends});
-  return Done{};
+  return export_frames(o, *head, console);
 }
 
 Outcome export_field(const ExportOptions& o) {

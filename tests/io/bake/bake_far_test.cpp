@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The far grid at a million random points: safe everywhere, and tight.
+// The far grid at a million random points: safe everywhere, and tight. The band: as wide as asked.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "io/bake/bake_field.h"
@@ -81,4 +83,37 @@ TEST_CASE(
                 return Vec3{s, t, 0.2 * s * t};
               }),
         small_bake(96), 200000);
+}
+
+TEST_CASE(
+    "bake_field: as wide as the band is asked, so deep is depth the distance to the surface") {
+  const Mesh mesh = turned(box({0, 0, 0}, {1, 0.8, 0.7}), 0.3, 0.5);
+  const Judge judge(mesh);
+  double deepest = 0;
+  for (const double band : {1.0, 3.0, 5.5, 8.0}) {
+    FieldBake options = small_bake(64);
+    options.band_voxels = band;
+    const FieldData field = must_bake(mesh, options);
+    CHECK(field.band == doctest::Approx(band * field.voxel_size));
+    std::size_t within = 0, wrong = 0;
+    double deep = 0;
+    for_nodes(field, [&](std::array<int, 3> n, double d) {
+      if (n[0] % 2 != 0 || n[1] % 3 != 0) return;
+      const double u = judge.distance(node_position(field, n));
+      if (u > field.band) return;
+      ++within;
+      wrong += std::fabs(std::fabs(d) - u) > 1e-5;
+      deep = std::min(deep, d);
+    });
+    CHECK(within > 500);
+    CHECK(wrong == 0);
+    CHECK(-deep > (band - 0.2) * field.voxel_size);
+    CHECK(-deep > deepest);  // force goes on growing
+    deepest = -deep;
+  }
+  for (const double band : {0.5, 8.5, 1e9, std::nan("")}) {
+    FieldBake options = small_bake(64);
+    options.band_voxels = band;
+    CHECK_FALSE(bake_field(mesh, options, nullptr));
+  }
 }
