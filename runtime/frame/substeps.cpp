@@ -99,12 +99,12 @@ constexpr double kExplicitShare = 0.7;
 // The explicit steps of `dt` in all that an inertia m needs on a spring k with a damper b:
 // symplectic Euler is stable where k h^2 + 2 b h < 4 m.
 double explicit_steps(double m, double k, double b, double dt) {
-  return dt * k / (std::sqrt(b * b + 4 * kExplicitShare * m * k) - b);
+  const double limit = 4 * kExplicitShare * m;
+  return dt * (b + std::sqrt(b * b + limit * k)) / limit;
 }
 
-// The steps that a free body needs under its hands and one wall of the contacts' stiffness. The
-// rule must not enter, since explicit steps are there to show how much stiffer than one wall a rule
-// is.
+// The steps that a free body needs under its hands and one wall of the contacts' stiffness. They do
+// not depend on the rule, because explicit steps show how much stiffer than one wall a rule is.
 double explicit_steps(const h6Session& s, std::size_t body) {
   const Body& b = s.bodies[body];
   const h6ContactDef& contact = s.settings.contact;
@@ -112,7 +112,7 @@ double explicit_steps(const h6Session& s, std::size_t body) {
   double k = wall, damper = contact.damping * wall;
   double turn_k = turned_wall, turn_damper = contact.damping * turned_wall;
   for (const Hand& hand : s.hands) {
-    if (static_cast<std::size_t>(hand.body) != body) continue;
+    if (static_cast<std::size_t>(hand.body) != body || hand.mode == H6_ADMITTANCE) continue;
     const h6CouplingDef& c = hand.coupling;
     k += c.stiffness, turn_k += c.rotational_stiffness;
     damper += coupling_damper(c, c.stiffness, b.mass);
@@ -128,8 +128,9 @@ Substeps plan_explicit(const h6Session& s) {
   double needed = 1;
   for (std::size_t i = 0; i < s.bodies.size(); ++i)
     if (is_free(s.bodies[i])) needed = std::max(needed, std::ceil(explicit_steps(s, i)));
-  const double most = s.settings.max_substeps;
-  return {static_cast<std::uint32_t>(std::min(needed, most)), needed};
+  // Where the budget is too small the step is only too long: no hand must stay behind its way.
+  const double count = std::min<double>(needed, s.settings.max_substeps);
+  return {static_cast<std::uint32_t>(count), count};
 }
 
 }  // namespace

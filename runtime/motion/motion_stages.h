@@ -66,8 +66,8 @@ void send(HandDevice& device, Hand& hand, Body& body, double dt, h6DeviceCommand
 void follow_device(const HandDevice& device, const Body& body, RigidState& state,
                    const h6BodyState& wanted, const h6DeviceCommand& passed, double h);
 
-// The damper that makes a hand's spring of stiffness k critical for an inertia, times the coupling's
-// damping ratio.
+// The damper that makes a hand's spring of stiffness k critical for an inertia, times the
+// coupling's damping ratio.
 inline double coupling_damper(const h6CouplingDef& c, double k, double inertia) {
   return 2 * c.damping_ratio * std::sqrt(k * inertia);
 }

@@ -125,6 +125,7 @@ TEST_CASE("the explicit step has the stability limit of the theory and the impli
     scene.def.contact.stiffness = k;
     scene.def.contact.damping = 0;
     scene.def.integrator = integrator;
+    scene.def.max_substeps = 1;
     scene.hand.coupling.max_force = 5;
     scene.open();
     scene.hold(pose(0, 0, 4 * mm), 1500);
