@@ -34,8 +34,22 @@ let paused = false, clutched = false;
 let recording = false;  // as the program said last; the button shows it when the page draws
 let pace = 1;
 
-function ask(request: object) {
+function send(request: object) {
   if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
+}
+
+// A move of the hand waits for the next one, so that there are not too many. What is asked after it
+// must not overtake it: a late move would undo `back`.
+let waits = 0;
+function askHand() {
+  clearTimeout(waits);
+  waits = 0;
+  send({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] });
+}
+
+function ask(request: object) {
+  if (waits) askHand();
+  send(request);
 }
 
 function chip(id: string, text: string, kind: string) {
@@ -56,19 +70,13 @@ function load(packet: Packet) {
   const choice = $<HTMLSelectElement>('method');
   for (const name of scene.methods) choice.add(new Option(name, name));
   const com = scene.hand_body >= 0 ? scene.bodies[scene.hand_body].com : [0, 0, 0];
-  let waiting = false;
   drag = new Drag(view, new THREE.Vector3(...(com as [number, number, number])), {
     begin() { ask({ do: 'grab', on: true }); },
     move(p, q) {
       view.handAt([p.x, p.y, p.z, q.w, q.x, q.y, q.z]);
-      if (waiting) return;
-      waiting = true;
-      setTimeout(() => {
-        waiting = false;
-        ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] });
-      }, 12);
+      if (!waits) waits = window.setTimeout(askHand, 12);
     },
-    end() { ask({ do: 'hand', p: drag!.p.toArray(), q: [drag!.q.w, drag!.q.x, drag!.q.y, drag!.q.z] }); },
+    end: askHand,
   });
   steer = new Steer(drag, clutch);
   headset = new Headset(view, drag, (on) => {
