@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // bind_assets.cpp - meshes, fields, shells, models and scenes; what they hold is seen through
 // views.
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
 #include "python/bindings.h"
 
 namespace hapsix::python {
@@ -9,17 +13,32 @@ namespace {
 struct PyMesh {
   Mesh mesh;
 };
+// Baked or read, or made of a program's own arrays.
+struct OwnField {
+  h6FieldDef def = h6DefaultFieldDef();
+  std::vector<float> samples, far_grid;
+  std::vector<std::int32_t> brick_index;
+};
 struct PyField {
   Field field;
+  std::unique_ptr<OwnField> own = {};
   h6FieldDef def() const {
+    if (own) return own->def;
     h6FieldDef out{};
     h6GetField(field, &out);
     return out;
   }
 };
+struct OwnShell {
+  h6ShellDef def = h6DefaultShellDef();
+  std::vector<float> columns, radius;  // x, y, z, nx, ny, nz, one after the other
+  std::vector<std::uint32_t> level_first, point, none;
+};
 struct PyShell {
   Shell shell;
+  std::unique_ptr<OwnShell> own = {};
   h6ShellDef def() const {
+    if (own) return own->def;
     h6ShellDef out{};
     h6GetShell(shell, &out);
     return out;
@@ -181,9 +200,71 @@ void add_meshes(py::module_& m) {
           "odd_edges, components, closed, low, high [m], volume [m^3], names");
 }
 
+// An array of three or four axes, z before y before x, of which `sizes` are as told.
+template <class T>
+std::vector<T> copied(const Rows<T>& array, const std::vector<py::ssize_t>& sizes,
+                      const char* sentence) {
+  if (!std::equal(sizes.begin(), sizes.end(), array.shape(), array.shape() + array.ndim()))
+    throw py::value_error(sentence);
+  return {array.data(), array.data() + array.size()};
+}
+
+std::shared_ptr<PyField> own_field(const Rows<float>& samples, const Rows<std::int32_t>& index,
+                                   const Rows<float>& far_grid, const Numbers<h6Vec3>& origin,
+                                   double voxel_size, double band) {
+  if (index.ndim() != 3) throw py::value_error("brick_index must have the shape (bz, by, bx)");
+  const py::ssize_t z = index.shape(0), y = index.shape(1), x = index.shape(2);
+  for (const py::ssize_t bricks : {x, y, z})
+    if (bricks < 1 || bricks > 256) throw py::value_error("there may be 1 .. 256 bricks a side");
+  auto own = std::make_unique<OwnField>();
+  own->brick_index = copied(index, {z, y, x}, "");
+  own->far_grid = copied(far_grid, {z + 1, y + 1, x + 1},
+                         "far_grid must have the shape (bz + 1, by + 1, bx + 1)");
+  const py::ssize_t count = samples.ndim() > 0 ? samples.shape(0) : 0;
+  own->samples = copied(samples, {count, 8, 8, 8}, "samples must have the shape (bricks, 8, 8, 8)");
+  h6FieldDef& d = own->def;
+  d.origin = struct_of<h6Vec3>(origin), d.voxel_size = voxel_size, d.band = band;
+  d.bricks[0] = static_cast<std::int32_t>(x), d.bricks[1] = static_cast<std::int32_t>(y);
+  d.bricks[2] = static_cast<std::int32_t>(z);
+  d.brick_index = own->brick_index.data(), d.far_grid = own->far_grid.data();
+  d.samples = own->samples.data(), d.brick_count = static_cast<std::size_t>(count);
+  return std::make_shared<PyField>(PyField{Field(), std::move(own)});
+}
+
+// One level: every point is a node without children.
+std::shared_ptr<PyShell> own_shell(const Rows<double>& points, const Rows<double>& normals) {
+  const std::size_t n = rows_of(points, 3, "points");
+  if (rows_of(normals, 3, "normals") != n)
+    throw py::value_error("normals must have a row for each point");
+  if (n > std::numeric_limits<std::uint32_t>::max()) throw py::value_error("too many points");
+  auto own = std::make_unique<OwnShell>();
+  own->columns.resize(6 * n), own->radius.assign(n, 0);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t c = 0; c < 3; ++c) {
+      own->columns[c * n + i] = static_cast<float>(points.data()[3 * i + c]);
+      own->columns[(3 + c) * n + i] = static_cast<float>(normals.data()[3 * i + c]);
+    }
+  own->level_first = {0, static_cast<std::uint32_t>(n)};
+  own->point.resize(n), own->none.assign(n, 0);
+  std::iota(own->point.begin(), own->point.end(), 0u);
+  h6ShellDef& d = own->def;
+  const float* column = own->columns.data();
+  d.point_count = n, d.level_count = 1;
+  for (const float** to : {&d.x, &d.y, &d.z, &d.nx, &d.ny, &d.nz}) *to = column, column += n;
+  d.level_first = own->level_first.data(), d.node_point = own->point.data();
+  d.node_radius = own->radius.data();
+  d.node_first_child = d.node_child_count = own->none.data();
+  return std::make_shared<PyShell>(PyShell{Shell(), std::move(own)});
+}
+
 void add_fields(py::module_& m) {
   py::class_<PyField, std::shared_ptr<PyField>>(
       m, "Field", "A signed distance field in sparse bricks. Its arrays are views without copies.")
+      .def(py::init(&own_field), py::arg("samples"), py::arg("brick_index"), py::arg("far_grid"),
+           py::kw_only(), py::arg("origin"), py::arg("voxel_size"), py::arg("band"),
+           "A field of your own: arrays as the properties of these names show them, copied. Where "
+           "they are no field, Model says why. Every cell with a point nearer than band [m] to the "
+           "surface must have its 8 nodes in bricks, and far_grid must not exceed the distance.")
       .def_static(
           "read",
           [](const std::string& file) {
@@ -195,6 +276,7 @@ void add_fields(py::module_& m) {
       .def(
           "write",
           [](const PyField& f, const std::string& file) {
+            if (f.own) throw py::value_error("only a field that was baked or read can be written");
             py::gil_scoped_release release;
             h6Error error{};
             if (!h6WriteField(f.field, file.c_str(), &error)) throw Error(error);
@@ -250,6 +332,11 @@ void add_shells(py::module_& m) {
   py::class_<PyShell, std::shared_ptr<PyShell>> shell(
       m, "Shell", "Points that may touch, coarse ones first. Its arrays are views without copies.");
   shell
+      .def(
+          py::init(&own_shell), py::arg("points"), py::arg("normals"),
+          "A shell of your own: points (n, 3) [m] and their inward unit normals (n, 3), copied, in "
+          "one level: each is looked at in every frame near the field. For more than some "
+          "thousand points bake_shell is faster.")
       .def_static(
           "read",
           [](const std::string& file) {
@@ -261,6 +348,7 @@ void add_shells(py::module_& m) {
       .def(
           "write",
           [](const PyShell& s, const std::string& file) {
+            if (s.own) throw py::value_error("only a shell that was baked or read can be written");
             py::gil_scoped_release release;
             h6Error error{};
             if (!h6WriteShell(s.shell, file.c_str(), &error)) throw Error(error);

@@ -226,6 +226,11 @@ class Definition:
 
 class Field:
     """A signed distance field in sparse bricks. Its arrays are views without copies."""
+    def __init__(self, samples: ArrayLike, brick_index: ArrayLike, far_grid: ArrayLike, *, origin: Sequence[float], voxel_size: float, band: float) -> None:
+        """A field of your own: arrays as the properties of these names show them, copied.
+        Where they are no field, Model says why. Every cell with a point nearer than band
+        [m] to the surface must have its 8 nodes in bricks, and far_grid must not exceed
+        the distance."""
     @property
     def band(self) -> float:
         """[m]"""
@@ -498,6 +503,10 @@ class Session:
 
 class Shell:
     """Points that may touch, coarse ones first. Its arrays are views without copies."""
+    def __init__(self, points: ArrayLike, normals: ArrayLike) -> None:
+        """A shell of your own: points (n, 3) [m] and their inward unit normals (n, 3),
+        copied, in one level: each is looked at in every frame near the field. For more
+        than some thousand points bake_shell is faster."""
     def __len__(self) -> int:
         ...
     @property

@@ -164,6 +164,25 @@ class Mistakes(unittest.TestCase):
         with self.assertRaises(TypeError):
             SCENE.definition().bodies[0].pose[2] = 1  # a tuple: nothing changes in vain
 
+    def test_arrays_that_are_no_field_or_shell_are_refused(self):
+        one = dict(samples=np.ones((1, 8, 8, 8)), brick_index=[[[0]]], far_grid=np.ones((2, 2, 2)))
+        places = dict(origin=(0, 0, 0), voxel_size=1e-3, band=1e-3)
+        field = hapsix.Field(**one, **places)
+        self.assertEqual(field.samples.shape, (1, 8, 8, 8))
+        self.sentence(ValueError, lambda: field.write(os.path.join(tempfile.mkdtemp(), "a.vdb")))
+        for wrong in (dict(samples=np.ones((1, 8, 8))), dict(brick_index=[0]), dict(brick_index=np.zeros((0, 1, 1))),
+                      dict(far_grid=np.ones((2, 2, 3)))):
+            self.sentence(ValueError, lambda: hapsix.Field(**{**one, **wrong}, **places))
+        for wrong in (dict(voxel_size=0.0), dict(voxel_size=float("nan")), dict(origin=(0, 0, float("inf")))):
+            of = hapsix.Field(**one, **{**places, **wrong})
+            self.sentence(hapsix.Error, lambda: hapsix.Model([of], []))
+        for wrong in (dict(brick_index=[[[7]]]), dict(samples=np.full((1, 8, 8, 8), np.nan))):
+            of = hapsix.Field(**{**one, **wrong}, **places)
+            self.sentence(hapsix.Error, lambda: hapsix.Model([of], []))
+        self.sentence(ValueError, lambda: hapsix.Shell(np.zeros((3, 3)), np.zeros((2, 3))))
+        for points, normals in ((np.zeros((0, 3)), np.zeros((0, 3))), (np.full((2, 3), np.nan), np.eye(3)[:2])):
+            self.sentence(hapsix.Error, lambda: hapsix.Model([], [hapsix.Shell(points, normals)]))
+
     def test_a_bake_can_be_cancelled_and_passes_an_exception_on(self):
         big = np.random.default_rng(1).normal(size=(60000, 3))
         mesh = hapsix.Mesh(big, np.arange(60000).reshape(-1, 3))
