@@ -66,8 +66,11 @@ Varied varied(const std::string& key, const Json& given) {
     const bool log = given.value("log", false);
     if (log && !(from > 0 && to > 0)) throw Mistake{where + ": log needs 'from' and 'to' above 0"};
     for (std::uint64_t i = 0; i < count; ++i) {
-      const double s = count > 1 ? static_cast<double>(i) / static_cast<double>(count - 1) : 0;
-      out.values.push_back(log ? from * std::pow(to / from, s) : from + (to - from) * s);
+      // The product comes first: steps of 0.04 are then 0.04 and not 0.03999…
+      const double at = static_cast<double>(i),
+                   last = std::max(1.0, static_cast<double>(count) - 1);
+      out.values.push_back(log ? from * std::pow(to / from, at / last)
+                               : from + (to - from) * at / last);
     }
   }
   if (out.values.empty())
