@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // bend_step.cpp - one time step of the modes of a body that bends, together with the rigid body
 // that it touches. METHOD.md, Sec. 10; Barbic & James 2005 (implicit Newmark, one Newton step).
+// Contacts push with the force of the step's end, so that both bodies get the same impulse.
 //
 // The modes move by dq = h (v + w/2), v' = v + w, the rigid body by h (u + du). What w adds to the
 // wrench on the rigid body is linear in du, so it joins that body's own wrench and derivatives:
@@ -18,7 +19,7 @@ namespace {
 // the shift of the body).
 using Right = Eigen::Matrix<double, Eigen::Dynamic, 7, Eigen::ColMajor, H6_MAX_MODES, 7>;
 
-// (2/h + alpha) I + (beta + h/2) df/dq + h/2 K + D of the contacts, and the right-hand sides.
+// (2/h + alpha) I + (beta + h/2) df/dq + h K + 2 D of the contacts, and the right-hand sides.
 struct System {
   ModalMatrix A;
   Right b;
@@ -41,15 +42,15 @@ System system_of(const Settings& set, Deformation& d, const Vec6& u, bool rests)
   s.b.col(0) = -2 * (f + bend.alpha * v + bend.beta * Kv) - h * Kv;
   if (!d.touches) return s;
   const RowMatrix Kc = d.sums.K(), Dc = d.sums.D();
-  s.A += 0.5 * h * Kc.bottomRightCorner(r, r) + Dc.bottomRightCorner(r, r);
+  s.A += h * Kc.bottomRightCorner(r, r) + 2 * Dc.bottomRightCorner(r, r);
   s.b.col(0) += 2 * ModalVector::Map(d.sums.force + 6, r);
-  s.b.col(0) -= h * Kc.bottomRightCorner(r, r).lazyProduct(v);
-  s.b.col(0) += h * Kc.bottomLeftCorner(r, 6).lazyProduct(u);
-  s.b.rightCols<6>() = h * Kc.bottomLeftCorner(r, 6);
+  s.b.col(0) -= 2 * h * Kc.bottomRightCorner(r, r).lazyProduct(v);
+  s.b.col(0) += 2 * h * Kc.bottomLeftCorner(r, 6).lazyProduct(u);
+  s.b.rightCols<6>() = 2 * h * Kc.bottomLeftCorner(r, 6);
   if (rests)
     s.b.rightCols<6>() /= h;
   else
-    s.b.rightCols<6>() += Dc.bottomLeftCorner(r, 6);
+    s.b.rightCols<6>() += 2 * Dc.bottomLeftCorner(r, 6);
   return s;
 }
 

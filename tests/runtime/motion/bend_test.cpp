@@ -224,6 +224,40 @@ TEST_CASE("what does not go with a body that bends is refused with one sentence"
   CHECK(refusal(two).empty());
 }
 
+// The one mode of the plate is a shift along z: two rigid bodies in a straight impact.
+TEST_CASE("an impact gives the body that bends the momentum that the part loses, in every frame") {
+  constexpr double mass = 0.2;
+  for (const h6Method method : {H6_METHOD_FIRM, H6_METHOD_ROBUST, H6_METHOD_GLOBAL}) {
+    CAPTURE(std::string(h6MethodName(method)));
+    BallOnBridge scene(3000, 1);
+    BridgeArrays& plate = scene.bridge;
+    for (std::size_t i = 0; i < plate.modes.size(); ++i)
+      plate.modes[i] = i % 3 == 2 ? float(1 / std::sqrt(mass)) : 0.0f;
+    std::fill(plate.normal_modes.begin(), plate.normal_modes.end(), 0.0f);
+    plate.linear[0] = 1e-9, plate.quadratic[0] = plate.cubic[0] = 0;
+    const Model loose({def_of(scene.field)}, {plate.def()});
+    scene.def.hand_count = 0;
+    scene.def.contact.method = method;
+    scene.bodies[1].pose.p.z += 1 * mm;
+    scene.bodies[1].velocity.linear.z = -0.2;
+    h6Session* session = h6CreateSession(loose.handle, &scene.def, nullptr);
+    REQUIRE(session);
+    double most = 0, fastest = 0;
+    for (int i = 0; i < 100; ++i) {
+      h6Step(session, nullptr, nullptr);
+      double v = 0;
+      h6GetDeformation(session, 0, nullptr, &v, 1);
+      const double plate_momentum = std::sqrt(mass) * v;
+      const double ball_momentum = scene.bodies[1].mass * h6GetBody(session, 1).velocity.linear.z;
+      most = std::max(most, std::fabs(plate_momentum + ball_momentum + 0.2 * scene.bodies[1].mass));
+      fastest = std::max(fastest, std::fabs(v));
+    }
+    h6DestroySession(session);
+    CHECK(fastest > 0.02);
+    CHECK(most < 1e-9);
+  }
+}
+
 TEST_CASE("without listed pairs the one moving field touches the bridge") {
   BallOnBridge scene(3000, 5);
   scene.def.pair_count = 0;
