@@ -53,6 +53,16 @@ const std::vector<StudyKind>& studies() {
          return study_industrial("bridge-and-dinosaur", columns, console);
        },
        true},
+      {"clip-and-rod", "a rod snaps into a clip that bends",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("clip-and-rod", columns, console);
+       },
+       true},
+      {"hose-in-bracket", "a hose that bends in the eye of a bracket",
+       [](const auto& columns, const auto& console) {
+         return study_industrial("hose-in-bracket", columns, console);
+       },
+       true},
       {"alphas-in-two-hands", "cf. Fig. 9: the alphas in two hands",
        [](const auto& columns, const auto& console) {
          return study_industrial("alphas-in-two-hands", columns, console);

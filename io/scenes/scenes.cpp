@@ -42,6 +42,8 @@ constexpr Entry kScenes[] = {
     {"bridge-and-dinosaur",
      "a dinosaur presses and drags on a bridge that bends, 20 modes (Fig. 14)",
      bridge_and_dinosaur},
+    {"clip-and-rod", "a rod snaps into a clip that bends, and out again", clip_and_rod},
+    {"hose-in-bracket", "a hose that bends goes through the eye of a bracket", hose_in_bracket},
     {"wire-bundle", "a bar dragged over a loom of wires two voxels thick", wire_bundle},
     {"spline-hub-1k", "a splined shaft turned in its hub, 1,000 points on its driven flanks",
      spline_hub_1k},

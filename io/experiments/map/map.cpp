@@ -19,6 +19,8 @@ constexpr Slow kSlow[] = {
     {"spline-hub-100k", "a frame takes tens of milliseconds; --scenes spline-hub-100k runs it"},
     {"bridge-and-dinosaur",
      "each variation takes the modes of 85,018 points anew; --scenes bridge-and-dinosaur runs it"},
+    {"clip-and-rod", "each variation takes the modes anew; --scenes clip-and-rod runs it"},
+    {"hose-in-bracket", "each variation takes the modes anew; --scenes hose-in-bracket runs it"},
     {"engine-bay", "each variation bakes 505,276 triangles anew; --scenes engine-bay runs it"},
     {"landing-gear",
      "each variation bakes 1,789,551 triangles anew; --scenes landing-gear runs it"}};

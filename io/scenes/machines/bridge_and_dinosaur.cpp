@@ -2,12 +2,11 @@
 // bridge_and_dinosaur.cpp - an elastic bridge, fixed at both ends, and a rigid dinosaur that a hand
 // presses on it: the sizes of Fig. 14 of Xu & Barbic 2016, with shapes of our own.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 
 #include "io/scenes/industrial/assembly.h"
 #include "io/scenes/list.h"
+#include "io/scenes/machines/hex_body.h"
 
 namespace h6::io {
 namespace {
@@ -19,19 +18,11 @@ constexpr double kCrown = 8, kEnd = 60, kRise = 25;  // thickness in the middle 
 constexpr double kParapet = 12;                      // height above the roadway [mm]
 constexpr int kAlong = 80, kAcross = 12, kThrough = 4;  // cells of the roadway
 constexpr int kParapetCells = 2;
-constexpr int kSplit = 3;  // parts of a cell's edge in the surface mesh: 59,000 triangles
 constexpr double kYoung = 1e6, kPoisson = 0.4, kDensity = 1000;  // a soft rubber
 constexpr double kVoxel = 0.75;                                  // of the dinosaur's field [mm]
 constexpr double kRoadway = kEnd + kRise;                        // height of the crown [mm]
 
-using Place = std::array<int, 3>;  // along, across, up
-
-bool is_solid(const Place& cell) {
-  const auto [i, j, k] = cell;
-  if (i < 0 || i >= kAlong || j < 0 || j >= kAcross || k < 0 || k >= kThrough + kParapetCells)
-    return false;
-  return k < kThrough || j == 0 || j == kAcross - 1;
-}
+using Place = HexBody::Place;  // along, across, up
 
 // A corner of the cells [m].
 h6Vec3 corner(const Place& at) {
@@ -43,82 +34,17 @@ h6Vec3 corner(const Place& at) {
   return kMm * h6Vec3{0.5 * kLength * u, kWidth * (double(at[1]) / kAcross - 0.5), z};
 }
 
-template <class Do>
-void each_cell(Do&& handle) {
-  for (int k = 0; k < kThrough + kParapetCells; ++k)
-    for (int j = 0; j < kAcross; ++j)
-      for (int i = 0; i < kAlong; ++i)
-        if (is_solid({i, j, k})) handle(Place{i, j, k});
-}
-
-// The cells as hexahedra, fixed at both ends.
-SolidMesh bridge_solid() {
-  SolidMesh out;
-  out.materials.push_back({"rubber", kYoung, kPoisson, kDensity});
-  std::map<Place, std::uint32_t> index;
-  const auto vertex = [&](const Place& at) {
-    const auto [found, fresh] = index.try_emplace(at, std::uint32_t(out.vertices.size()));
-    if (fresh) out.vertices.push_back(corner(at));
-    return found->second;
-  };
-  each_cell([&](const Place& c) {
-    SolidElement hex{{}, 8, 0};
-    constexpr int kX[] = {0, 1, 1, 0}, kY[] = {0, 0, 1, 1};
-    for (int n = 0; n < 8; ++n)
-      hex.corner[std::size_t(n)] = vertex({c[0] + kX[n % 4], c[1] + kY[n % 4], c[2] + n / 4});
-    out.elements.push_back(hex);
-  });
-  for (const auto& [at, number] : index)
-    if (at[0] == 0 || at[0] == kAlong) out.fixed.push_back(number);
-  std::sort(out.fixed.begin(), out.fixed.end());
+// A roadway with parapets, fixed at both ends.
+HexBody bridge_body() {
+  HexBody out;
+  out.cells = {kAlong, kAcross, kThrough + kParapetCells};
+  out.split = 3;  // 59,000 triangles
+  out.material = {"rubber", kYoung, kPoisson, kDensity};
+  out.at = corner;
+  out.solid = [](const Place& c) { return c[2] < kThrough || c[1] == 0 || c[1] == kAcross - 1; };
+  out.fixed = [](const Place& at) { return at[0] == 0 || at[0] == kAlong; };
   return out;
 }
-
-// The skin of the cells. Every vertex of it lies on a face of a hexahedron, so the modes fit it.
-class Skin {
- public:
-  void add_faces(const Place& cell) {
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int side : {0, 1}) {
-        Place next = cell;
-        next[std::size_t(axis)] += side ? 1 : -1;
-        if (!is_solid(next)) add_face(cell, axis, side);
-      }
-  }
-  Mesh mesh() && { return std::move(mesh_); }
-
- private:
-  void add_face(const Place& cell, int axis, int side) {
-    const std::size_t a = std::size_t(axis), b = (a + 1) % 3, c = (a + 2) % 3;
-    Place low = cell;
-    low[a] += side;
-    const auto at = [&](int u, int v) {
-      Place fine{kSplit * low[0], kSplit * low[1], kSplit * low[2]};
-      fine[b] += u, fine[c] += v;
-      const auto [found, fresh] = index_.try_emplace(fine, std::uint32_t(mesh_.vertices.size()));
-      if (!fresh) return found->second;
-      h6Vec3 p{};
-      for (int n = 0; n < 4; ++n) {  // bilinear, as the face of a hexahedron is
-        Place end = low;
-        end[b] += n % 2, end[c] += n / 2;
-        const double s = double(u) / kSplit, t = double(v) / kSplit;
-        p = p + (n % 2 ? s : 1 - s) * (n / 2 ? t : 1 - t) * corner(end);
-      }
-      mesh_.vertices.push_back(p);
-      return found->second;
-    };
-    for (int u = 0; u < kSplit; ++u)
-      for (int v = 0; v < kSplit; ++v) {
-        std::array<std::uint32_t, 4> q{at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)};
-        if (side == 0) std::swap(q[1], q[3]);  // seen from outside
-        mesh_.triangles.push_back({q[0], q[1], q[2]});
-        mesh_.triangles.push_back({q[0], q[2], q[3]});
-      }
-  }
-
-  Mesh mesh_;
-  std::map<Place, std::uint32_t> index_;
-};
 
 // Four legs on z = 0, a body with a tail and a long neck, a head.
 Mesh dinosaur_mesh() {
@@ -170,17 +96,7 @@ Scene bridge_and_dinosaur() {
       "bridge-and-dinosaur",
       "A rigid dinosaur of 56,192 triangles is pressed on a rubber bridge that bends by 20 modes "
       "and carries the points, dragged along it, turned, and lifted off at once.");
-  SceneBody bridge;
-  bridge.name = "bridge";
-  bridge.fixed = true;
-  bridge.shell.emplace();
-  Skin skin;
-  each_cell([&](const Place& cell) { skin.add_faces(cell); });
-  bridge.shell->mesh_data = std::move(skin).mesh();
-  bridge.shell->bake.points = 85018;
-  bridge.shell->bends.emplace();
-  bridge.shell->bends->solid = bridge_solid();
-  scene.bodies.push_back(std::move(bridge));
+  scene.bodies.push_back(bending("bridge", bridge_body(), 85018));
   SceneBody dinosaur = obstacle("dinosaur", dinosaur_mesh(), kMm * kVoxel);
   dinosaur.fixed = false;
   dinosaur.mass = 0.2;

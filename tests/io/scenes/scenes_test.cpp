@@ -33,8 +33,8 @@ Scene scene_of(const std::string& name) {
 // to make, and the machines. industrial_scenes_test.cpp and machines_test.cpp check those.
 std::vector<SceneName> small_scenes() {
   static const std::set<std::string> others = {
-      "bridge-and-dinosaur", "engine-bay",     "landing-gear",   "alphas-in-two-hands",
-      "piston-in-bore",      "gear-train",     "nut-on-bolt",    "wire-bundle",
+      "bridge-and-dinosaur", "clip-and-rod",   "hose-in-bracket", "engine-bay",  "landing-gear",
+      "alphas-in-two-hands", "piston-in-bore", "gear-train",      "nut-on-bolt", "wire-bundle",
       "spline-hub-1k",       "spline-hub-10k", "spline-hub-100k"};
   std::vector<SceneName> out;
   for (const SceneName& entry : scene_names())
