@@ -15,14 +15,14 @@ const hapsix = (...args) => execFileSync(program, args, { cwd: folder, stdio: 'i
 const browser = await Browser.open(process.env.HAPSIX_CHROMIUM);
 const shoot = async (name) => { await browser.picture(join(pictures, `${name}.png`)); console.log(`${name}.png`); };
 
-async function live(args, work) {
+async function live(args, work, after = 4000) {
   const run = spawn(program, [...args, '--view', '--no-browser'], { cwd: folder, stdio: ['ignore', 'ignore', 'pipe'] });
   let said = '';
   run.stderr.on('data', (text) => { said += text; });
   try {
     await browser.go(await until(() => said.match(/view: (http:\/\/\S+)/)?.[1], 'the run prints an address', 120));
     await until(async () => (await browser.value('window.hapsix?.state()?.contacts ?? 0')) > 0, 'something touches', 120);
-    await wait(4000);
+    await wait(after);
     await work();
   } finally {
     run.kill('SIGTERM');
@@ -53,6 +53,18 @@ try {
     await shoot('phone');
     await browser.size(1100, 740);
   });
+  for (const [scene, after] of [['bridge-and-dinosaur', 1500], ['hose-in-bracket', 400], ['clip-and-rod', 0]])
+    await live(['run', scene], async () => {
+      await browser.value('window.hapsix.ask({ do: "pace", pace: 0.05 })');  // it holds still for the picture
+      if (scene !== 'bridge-and-dinosaur')  // all of it, since the part is small or goes far
+        await browser.value(`(() => {
+          const v = window.hapsix.view, to = v.centre.clone().divideScalar(v.radius);
+          v.camera.position.sub(v.orbit.target).setLength(2.6).add(to);
+          v.orbit.target.copy(to);
+        })()`);
+      await wait(2000);
+      await shoot(scene.split('-')[0]);
+    }, after);
   for (const method of ['global', 'firm'])
     hapsix('run', 'alpha-shortcut', '--virtual-time', '--duration', '8', '--method', method, '--record', `${method}.h5`);
   hapsix('report', 'global.h5', 'firm.h5', '-o', 'report.html');
