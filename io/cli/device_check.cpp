@@ -94,6 +94,9 @@ SampleCount watch_device(const h6Device& device, double seconds, const EachFrame
   return frames.count;
 }
 
+// The noise of sensors. [m], [rad]
+constexpr double kStill = 1e-5;
+
 CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each) {
   constexpr double kPi = 3.14159265358979323846;
   CheckResult result;
@@ -132,6 +135,11 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
                torque = std::min(0.1 * c.max_torque, 1.0);
   bool going = true;
   for (int i = 0; i < 500 && going; ++i) going = go_on({});
+  // The motors of some have no power before.
+  if (going && device.arm && device.arm(device.self) != 0) {
+    result.trouble = "the device cannot be armed";
+    going = false;
+  }
   // A device without motors may show the force with a light.
   for (int i = 0; i < 1000 && going && c.dof_out == 0; ++i) going = go_on({{0, 0, force}, {}});
   for (const bool turn : {false, true})
@@ -147,6 +155,10 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
     if (result.trouble.empty() && p.moved < -2e-4)
       result.trouble = "pushed by " + p.what +
                        " it moved the other way: an axis or a sign is wrong, or a person pushed";
+  const auto stood = [](const Push& p) { return std::fabs(p.moved) < kStill; };
+  if (result.trouble.empty() && !result.pushes.empty() &&
+      std::all_of(result.pushes.begin(), result.pushes.end(), stood))
+    result.trouble = "no push moved the handle: the motors have no power, or a person holds it";
   return result;
 }
 

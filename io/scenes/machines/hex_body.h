@@ -4,7 +4,6 @@
 #include <array>
 #include <functional>
 
-#include "io/deform/solid_mesh.h"
 #include "io/scene/scene.h"
 
 namespace h6::io {

@@ -123,6 +123,22 @@ TEST_CASE("a check pushes along every axis with a tenth of the rating, and tells
   CHECK(json["samples"]["frames"] == 3500);
 }
 
+TEST_CASE("a check arms a device whose motors have no power before") {
+  Sandbox box;
+  for (const std::string name : {"dhd", "hdapi", "haption"}) {
+    CAPTURE(name);
+    const Json json = result_of(
+        box,
+        {"devices",
+         "plugin:" + plugins + name + ".so?timeout=500&library=" + plugins + name + "_standin.so",
+         "--test"});
+    CHECK(json["passed"] == true);
+    REQUIRE(json["pushes"].size() >= 6);
+    for (int i = 0; i < 6; ++i)
+      CHECK(json["pushes"][i]["moved"] > 5e-5);  // [m]; a tenth of 1.5 to 5 N
+  }
+}
+
 TEST_CASE("watching counts what comes, for as long as asked") {
   Sandbox box;
   const Json json = result_of(
