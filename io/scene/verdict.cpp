@@ -200,14 +200,18 @@ bool VerdictWatch::chatters_now(double time) const {
   const auto [low, high] = std::minmax_element(window_.depth.begin(), window_.depth.end());
   const double mean = slide();
   const double about2 = sum / static_cast<double>(window_.speed2.size()) - mean * mean;
-  return about2 > kChatterSpeed * kChatterSpeed ||
-         *high - *low > kChatterDepth;
+  return about2 > kChatterSpeed * kChatterSpeed || *high - *low > kChatterDepth;
 }
 
 // Call it before the frame enters the window, so that a phase that ends here is judged by its own
 // frames only.
-void VerdictWatch::watch_stillness(double time, const h6Pose& hand) {
-  if (!first_ && mean_motion2(still_hand_, hand) <= kStillMotion * kStillMotion) return;
+void VerdictWatch::watch_stillness(double time, const h6Pose& hand, const h6Velocity& velocity) {
+  // A hand that sets out has its velocity a frame before it is elsewhere, and the coupling's damper
+  // already pulls.
+  const double leaves = kStillMotion * rate_;
+  if (!first_ && mean_motion2(still_hand_, hand) <= kStillMotion * kStillMotion &&
+      mean_speed2(velocity.linear, velocity.angular, hand.q) <= leaves * leaves)
+    return;
   if (!first_ && chatters_now(last_time_)) chattered_ = true;
   still_hand_ = hand;
   still_since_ = time;
@@ -233,7 +237,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   entered_ = entered_ || entered(body.pose);
   touched_ = touched_ || max_depth_voxels > 0;
 
-  watch_stillness(time, hand);
+  watch_stillness(time, hand, hand_velocity);
   // Take the speed from poses, so that it does not depend on the velocity of the integrator.
   const double dt = first_ || time <= last_time_ ? 1 / rate_ : time - last_time_;
   const double speed2 = first_ ? 0 : mean_motion2(last_body_.pose, body.pose) / (dt * dt);

@@ -20,7 +20,8 @@
 //
 // Speeds are root mean squares (RMS) over all shell points, so that rotation counts like
 // translation. Stillness is measured on the shell points as if they moved with the hand: the hand
-// is still while they stay within 0.02 mm (RMS) of their places at the start of the phase.
+// is still while they stay within 0.02 mm (RMS) of their places at the start of the phase, and no
+// velocity of the hand takes them farther in one frame.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -71,7 +72,7 @@ class VerdictWatch {
   double mean_speed2(const h6Vec3& origin_velocity, const h6Vec3& angular, const h6Quat& q) const;
   double mean_motion2(const h6Pose& from, const h6Pose& to) const;
   bool entered(const h6Pose& body) const;
-  void watch_stillness(double time, const h6Pose& hand);
+  void watch_stillness(double time, const h6Pose& hand, const h6Velocity& velocity);
   bool chatters_now(double time) const;
   bool arrived() const;
 

@@ -288,6 +288,22 @@ TEST_CASE("chatter in a still phase is not forgotten when the hand moves on") {
         }) == Verdict::chatters);
 }
 
+TEST_CASE("a hand that sets out no longer rests, and its pull is no chatter") {
+  // Its velocity comes a frame before its motion, and moves the body by 0.05 mm in that frame.
+  const auto sets_out = [](double speed) {
+    return judge(0.8, [=](double t) {
+      Moment m = calm(t);
+      if (t < 0.6 - 1e-9) return m;
+      m.hand_velocity.linear.y = speed;
+      m.body.pose.p.y = 0.05e-3 + 0.05 * (t - 0.6);
+      m.hand.p.y = 0.05 * (t - 0.6);
+      return m;
+    });
+  };
+  CHECK(sets_out(0.05) == Verdict::held);
+  CHECK(sets_out(0) == Verdict::chatters);  // a kick at rest
+}
+
 TEST_CASE("a hand that creeps is not still, one that trembles by micrometres is") {
   const auto hand_moves = [](auto&& z) {
     return judge(0.8, [&](double t) {
