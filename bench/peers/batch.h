@@ -18,7 +18,7 @@ struct BatchRow {
 
 // 1, 64, 1,024 and 16,384 sessions; the rows of the engine come first. A step of the engine is
 // whole (contacts, weights, coupling, motion). A step of the others is the contacts of the two
-// meshes at the pose that the session has reached, and each of their threads has meshes of its own.
+// meshes at the pose that the session has reached; two cores are two processes of theirs.
 Result<std::vector<BatchRow>> compare_batches(const io::Progress& progress);
 
 }  // namespace h6::peers
