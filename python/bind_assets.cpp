@@ -11,7 +11,7 @@ namespace hapsix::python {
 namespace {
 
 struct PyMesh {
-  Mesh mesh;
+  Unlocked<Mesh> mesh;
 };
 // Baked or read, or made of a program's own arrays.
 struct OwnField {
@@ -20,7 +20,7 @@ struct OwnField {
   std::vector<std::int32_t> brick_index;
 };
 struct PyField {
-  Field field;
+  Unlocked<Field> field;
   std::unique_ptr<OwnField> own = {};
   h6FieldDef def() const {
     if (own) return own->def;
@@ -35,7 +35,7 @@ struct OwnShell {
   std::vector<std::uint32_t> level_first, point, none;
 };
 struct PyShell {
-  Shell shell;
+  Unlocked<Shell> shell;
   std::unique_ptr<OwnShell> own = {};
   h6ShellDef def() const {
     if (own) return own->def;
@@ -216,6 +216,7 @@ std::shared_ptr<PyField> own_field(const Rows<float>& samples, const Rows<std::i
   const py::ssize_t z = index.shape(0), y = index.shape(1), x = index.shape(2);
   for (const py::ssize_t bricks : {x, y, z})
     if (bricks < 1 || bricks > 256) throw py::value_error("there may be 1 .. 256 bricks a side");
+  py::gil_scoped_release release;
   auto own = std::make_unique<OwnField>();
   own->brick_index = copied(index, {z, y, x}, "");
   own->far_grid = copied(far_grid, {z + 1, y + 1, x + 1},
@@ -237,6 +238,7 @@ std::shared_ptr<PyShell> own_shell(const Rows<double>& points, const Rows<double
   if (rows_of(normals, 3, "normals") != n)
     throw py::value_error("normals must have a row for each point");
   if (n > std::numeric_limits<std::uint32_t>::max()) throw py::value_error("too many points");
+  py::gil_scoped_release release;
   auto own = std::make_unique<OwnShell>();
   own->columns.resize(6 * n), own->radius.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i)

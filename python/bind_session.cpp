@@ -237,6 +237,7 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
       .def(
           "restart_fit",
           [](S& s) {
+            py::gil_scoped_release release;
             h6Error error{};
             if (!h6RestartFit(s.session, &error)) throw Error(error);
           },

@@ -43,6 +43,20 @@ T struct_of(const Numbers<T>& numbers) {
   return value;
 }
 
+// A handle that is destroyed without the interpreter's lock: that may take milliseconds.
+template <class Handle>
+struct Unlocked : Handle {
+  Unlocked() = default;
+  Unlocked(Handle&& handle) : Handle(std::move(handle)) {}  // NOLINT: it is that handle
+  Unlocked(Unlocked&&) = default;
+  Unlocked& operator=(Unlocked&&) = default;
+  ~Unlocked() {
+    if (!this->get() || !PyGILState_Check()) return;
+    py::gil_scoped_release release;
+    static_cast<Handle&>(*this) = Handle();
+  }
+};
+
 // An array over memory that `owner` keeps. Strides in bytes.
 template <class T>
 py::array view(const T* data, std::vector<py::ssize_t> shape, std::vector<py::ssize_t> strides,
@@ -107,10 +121,10 @@ class ProgressOf {
 
 // A model that a program made, or that of a scene, which must live as long.
 struct PyScene {
-  Scene scene;
+  Unlocked<Scene> scene;
 };
 struct PyModel {
-  Model own;
+  Unlocked<Model> own;
   std::shared_ptr<PyScene> scene;
   const h6Model* get() const { return scene ? h6GetSceneModel(scene->scene) : own.get(); }
 };
@@ -143,7 +157,7 @@ struct Definition {
 
 struct PySession {
   std::shared_ptr<PyModel> model;
-  Session session;
+  Unlocked<Session> session;
   std::size_t hands = 0, bodies = 0;
   double rate = 0;
   std::array<h6DeviceSample, H6_MAX_HANDS> samples;

@@ -30,11 +30,15 @@ unsigned machine_threads() {
   return static_cast<unsigned>(oneapi::tbb::info::default_concurrency());
 }
 
-void parallel_for(std::size_t count, unsigned threads,
-                  const std::function<void(std::size_t)>& body) {
+unsigned usable_threads(unsigned threads) {
   // TBB warns when asked for more threads than the machine has.
   const unsigned most = machine_threads();
-  if (threads == 0 || threads > most) threads = most;
+  return threads == 0 || threads > most ? most : threads;
+}
+
+void parallel_for(std::size_t count, unsigned threads,
+                  const std::function<void(std::size_t)>& body) {
+  threads = usable_threads(threads);
   if (threads == 1 || count < 2) {
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;

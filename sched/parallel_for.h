@@ -14,5 +14,7 @@ void parallel_for(std::size_t count, unsigned threads,
 
 // How many threads the machine has.
 unsigned machine_threads();
+// How many threads such a number asks for: 0, and more than the machine has, are all of them.
+unsigned usable_threads(unsigned threads);
 
 }  // namespace h6::sched

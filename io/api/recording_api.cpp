@@ -46,7 +46,8 @@ h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, h6Error
   if (!file || !def || (!def->scene && !def->session))
     return fill(error, H6_ERROR_ARGUMENT, "a recorder needs a file, and a scene or a session"),
            nullptr;
-  if (!understood(*def, error)) return nullptr;
+  if (!understood(*def, error) || (def->session && !understood(*def->session, error)))
+    return nullptr;
   return guarded(error, static_cast<h6Recorder*>(nullptr), [&]() -> h6Recorder* {
     const h6SessionDef session = def->session ? *def->session : def->scene->loaded->session_def();
     if (session.hand_count > H6_MAX_HANDS || !(session.rate > 0))

@@ -258,8 +258,7 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
     std::vector<std::uint64_t> used;  // (tiles) bricks with a triangle
     std::vector<std::size_t> place;   // (tiles) number of pairs, later where the next one goes
   };
-  std::vector<Worker> workers(
-      std::min<std::size_t>(threads != 0 ? threads : sched::machine_threads(), slices));
+  std::vector<Worker> workers(std::min<std::size_t>(sched::usable_threads(threads), slices));
   std::atomic<std::size_t> next{0}, total{0};
   sched::parallel_for(workers.size(), threads, [&](std::size_t w) {
     Worker& mine = workers[w];

@@ -19,7 +19,7 @@ struct Rings {
   Large<std::uint32_t> triangle;
   Rings(const Surface& surface, unsigned threads)
       : first(surface.vertices.size() + 1, 0), triangle(3 * surface.triangles.size()) {
-    const std::size_t ranges = threads == 0 ? sched::machine_threads() : threads;
+    const std::size_t ranges = sched::usable_threads(threads);
     const std::size_t vertices = surface.vertices.size();
     const auto corners = [&](auto&& take) {
       sched::parallel_for(ranges, threads, [&](std::size_t range) {

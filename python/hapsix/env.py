@@ -230,6 +230,8 @@ class AssemblyEnv(_Base):
 
     def reset(self, *, seed=None, options=None):
         """observation (22,), info"""
+        if _Base is not object:
+            super().reset(seed=seed)
         observations, info = self._many.reset(seed=seed)
         return observations[0], info
 

@@ -82,7 +82,7 @@ bool check_rows(const h6ContactArrays& in, bool series, double lever, h6Error* e
 
 bool check_arrays(const h6ContactDef& def, const h6ContactArrays& in, double voxel, double lever,
                   h6Error* error) {
-  if (!check_contact(def, error)) return false;
+  if (!check_contact(def, error) || !check_reserved(in, "contacts: ", error)) return false;
   if (in.count > kMostContacts)
     return fail(error, "at most %zu contacts, there are %zu", kMostContacts, in.count);
   if (in.count && (!in.normals || !in.arms || !in.depths))

@@ -287,9 +287,13 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
   if (session->workers) return fail(error, kOfWorkers);
   if (!session->hands.empty() && !devices)
     return fail(error, "a loop needs one device for each of %zu hands", session->hands.size());
-  for (std::size_t h = 0; h < session->hands.size(); ++h)
+  for (std::size_t h = 0; h < session->hands.size(); ++h) {
     if (!devices[h].read || !devices[h].write)
       return fail(error, "device %zu has no read or no write", h);
+    if (!check_reserved(devices[h], "device: ", error) ||
+        !check_reserved(devices[h].capabilities, "device: capabilities: ", error))
+      return false;
+  }
   for (std::size_t h = 0; h < session->hands.size(); ++h)
     if (!speaks(devices[h], session->hands[h].mode))
       return fail(error,

@@ -93,6 +93,37 @@ TEST_CASE("a definition that asks for what only a later version knows is refused
   CHECK(std::string(error.message).find("field 0: reserved") == 0);
 }
 
+TEST_CASE("so are a loop, its devices, and contacts to be weighed") {
+  OnePart scene = box_on_floor();
+  h6Session* session = h6CreateSession(scene.model.handle, &scene.def, nullptr);
+  REQUIRE(session);
+  const auto refused = [&](auto change) {
+    h6Device device = h6DefaultDevice();
+    device.read = [](void*, double, h6DeviceSample*) { return 1; };
+    device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+    device.stop = [](void*) {};
+    device.capabilities.modes = H6_IMPEDANCE;
+    h6LoopDef loop = h6DefaultLoopDef();
+    change(device, loop);
+    h6Error error{};
+    CHECK(h6StartLoop(session, &device, &loop, &error) == nullptr);
+    return std::string(error.message);
+  };
+  CHECK(refused([](h6Device& d, h6LoopDef&) { d.reserved[3] = 1; }).find("device: reserved") == 0);
+  CHECK(refused([](h6Device& d, h6LoopDef&) {
+          d.capabilities.reserved[7] = 1;
+        }).find("device: capabilities: reserved") == 0);
+  CHECK(refused([](h6Device&, h6LoopDef& l) { l.reserved[0] = 1; }).find("loop: reserved") == 0);
+  h6DestroySession(session);
+  const h6ContactDef contact = h6DefaultContactDef();
+  h6ContactArrays arrays = h6DefaultContactArrays();
+  arrays.reserved[0] = 1;
+  h6Error error{};
+  CHECK(h6WeighContacts(&contact, &arrays, mm, 10 * mm, nullptr, nullptr, nullptr, nullptr,
+                        &error) != 0);
+  CHECK(std::string(error.message).find("contacts: reserved") == 0);
+}
+
 TEST_CASE("a code stands beside every sentence") {
   OnePart scene = box_on_floor();
   scene.bodies[1].mass = std::nan("");
