@@ -32,9 +32,9 @@ using io::view::ViewRequest;
 
 constexpr auto kPicture = std::chrono::microseconds(16667);
 constexpr auto kBackground = std::chrono::seconds(1);
-constexpr double kMostDepth = 2;  // where a run may begin again [voxel]; check_start refuses 3
-constexpr double kGlide = 2;      // of a hand that is let go there, to its path [s]
-constexpr std::size_t kWaiting = 256;        // most requests of the page that may wait
+constexpr double kMostDepth = 2;       // where a run may begin again [voxel]; check_start refuses 3
+constexpr double kGlide = 2;           // of a hand that is let go there, to its path [s]
+constexpr std::size_t kWaiting = 256;  // most requests of the page that may wait
 constexpr std::size_t kViewContacts = 2000;  // most contacts drawn as arrows
 
 // Carries requests from the server's thread to the program's.
@@ -341,9 +341,9 @@ class Viewer : public RunObserver {
   std::shared_ptr<device::Steering> steering_;
   device::Steering::Wish wish_;
   h6Vec3 offset_{};
-  std::vector<h6Pose> bodies_;      // in the newest picture
+  std::vector<h6Pose> bodies_;        // in the newest picture
   std::optional<Place> kept_, from_;  // from_: where this run began; none: the scene's start
-  std::vector<h6BodyDef> placed_;   // of a run that began elsewhere
+  std::vector<h6BodyDef> placed_;     // of a run that began elsewhere
   std::vector<PartOverlap> overlaps_;
   std::size_t greeted_ = 0;  // open pages that know of `overlaps_`
   RunSetup* setup_ = nullptr;
@@ -359,7 +359,7 @@ class Viewer : public RunObserver {
 void add_view_options(CLI::App& command, ViewOptions& view) {
   command.add_flag("--view", view.on,
                    "Show it live in a browser, where the part can be taken in hand; ends with "
-                   "Ctrl-C, or after --duration");
+                   "Ctrl-C, or when a duration that was asked for is over");
   command.add_option("--port", view.port, "Port of the view on 127.0.0.1; default: any free one")
       ->option_text("NUMBER")
       ->check(whole_within(0, 65535));

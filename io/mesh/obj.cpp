@@ -146,9 +146,12 @@ class ObjReader {
 }  // namespace
 
 Mesh read_obj(const MeshSource& whole) {
-  // Some programs write the zero that ends a string.
+  // Some programs write the zero that ends a string, and a new line behind it.
   MeshSource source = whole;
-  source.bytes = source.bytes.substr(0, source.bytes.find_last_not_of('\0') + 1);
+  const std::string_view after("\0\r\n", 3);
+  if (const std::size_t end = source.bytes.find_last_not_of(after) + 1;
+      source.bytes.find('\0', end) != std::string_view::npos)
+    source.bytes = source.bytes.substr(0, end);
   if (source.bytes.substr(0, 4096).find('\0') != std::string_view::npos)
     source.fail("this is not text, so no OBJ; was another file renamed?");
   return ObjReader(source).read();

@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -132,6 +133,21 @@ TEST_CASE("silence, garbage, halves and old numbers: zero force, lost, armed onl
     CAPTURE(static_cast<int>(says));
     run.check_loss([&] { program.says = says; }, [&] { program.says = Says::poses; });
   }
+}
+
+TEST_CASE("a program that ends is a lost device, and one that is started again counts from 1") {
+  const int port = free_port();
+  auto program = std::make_unique<Program>(port);
+  Floor floor;
+  auto opened = PluginDevice::open(at(port), floor.body[1].pose, {});
+  REQUIRE_MESSAGE(opened, (opened ? "" : opened.error()));
+  FloorRun run(floor, (*opened)->device());
+  program->z = -0.02;
+  run.check_loss([&] { program.reset(); },
+                 [&] {
+                   program = std::make_unique<Program>(port);
+                   program->z = -0.02;
+                 });
 }
 
 TEST_CASE("a second program is ignored while the first one sends") {

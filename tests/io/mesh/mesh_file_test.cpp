@@ -89,8 +89,9 @@ TEST_CASE("an OBJ may end with the zeros of a string, but have none inside") {
   const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   const auto plain = parse_mesh(text, "a.obj");
   REQUIRE(plain);
-  for (const std::size_t zeros : {1, 3}) {
-    const auto ended = parse_mesh(text + std::string(zeros, '\0'), "a.obj");
+  for (const std::string& end : {std::string(1, '\0'), std::string(3, '\0'), std::string("\0\n", 2),
+                                 std::string("\0\r\n", 3)}) {
+    const auto ended = parse_mesh(text + end, "a.obj");
     REQUIRE_MESSAGE(ended, ended.error());
     CHECK(samples::same_bits(*ended, *plain));
   }
