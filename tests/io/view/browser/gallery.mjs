@@ -44,7 +44,7 @@ try {
     await browser.scheme('dark');
   });
   await live(['run', 'alpha-shortcut'], async () => {
-    await shoot('alpha');
+    await shoot('view');
     await browser.value(`(() => { const b = document.getElementById('slice-on'); b.checked = true; b.dispatchEvent(new Event('input')); })()`);
     await wait(2500);
     await shoot('slice');
