@@ -124,6 +124,12 @@ int run_command(const Console& console, const std::vector<std::string>& names,
   if (!console.json) {
     std::printf("%s\ndeepest contact over time [voxel]\n%s", table({*summary}).c_str(),
                 depth_strip(*summary).c_str());
+    if (const auto& entry = summary->forbidden) {
+      const h6Vec3 p = (1 / io::metres((*loaded)->scene.unit)) * entry->place;
+      std::printf(
+          "the part was in a forbidden region, first at %.3f s, with a point at (%g, %g, %g) %s\n",
+          entry->time, p.x, p.y, p.z, io::unit_name((*loaded)->scene.unit));
+    }
     for (const std::string& remark : remarks(*summary))
       std::printf("%s\n", printable(remark).c_str());
     if (const std::string late = late_table(*summary); !late.empty())

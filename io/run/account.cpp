@@ -12,10 +12,10 @@ namespace {
 using nlohmann::ordered_json;
 
 // Figures of the summary that follow from the rows.
-constexpr const char* kFigures[] = {"contacts",      "max_depth_voxels", "verdict",   "pop_through",
-                                    "remarks",       "frame_us",         "stage_us",  "wakeup_us",
-                                    "final_pose",    "hand_pose",        "max_force", "max_torque",
-                                    "net_stiffness", "state_hash"};
+constexpr const char* kFigures[] = {"contacts",   "max_depth_voxels", "verdict",   "pop_through",
+                                    "forbidden",  "remarks",          "frame_us",  "stage_us",
+                                    "wakeup_us",  "final_pose",       "hand_pose", "max_force",
+                                    "max_torque", "net_stiffness",    "state_hash"};
 
 // Whether the rows do not tell of an event.
 bool given(const io::RecordingEvent& event) {

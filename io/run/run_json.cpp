@@ -89,6 +89,13 @@ ordered_json through_json(const PopThroughReport& r, double scale) {
   return out;
 }
 
+// The first time in a forbidden box; null: never.
+ordered_json forbidden_json(const RunTotals& run, double scale) {
+  if (!run.forbidden) return nullptr;
+  const h6Vec3 p = scale * run.forbidden->place;
+  return {{"time", run.forbidden->time}, {"place", {p.x, p.y, p.z}}};
+}
+
 // Lengths in the scene's units.
 ordered_json overlaps_json(const std::vector<PartOverlap>& overlaps, double scale) {
   ordered_json all = ordered_json::array();
@@ -174,6 +181,7 @@ ordered_json to_json(const RunSummary& s, const io::LoadedScene& loaded, bool vi
       {"max_depth_voxels", s.max_depth_voxels},
       {"verdict", io::verdict_name(s.verdict)},
       {"pop_through", through_json(s.through, scale)},
+      {"forbidden", forbidden_json(s, scale)},
       {"remarks", remarks(s)},
       {"frame_us", spread(s.frame_us)},
       {"stage_us", stages_json(s)},

@@ -103,6 +103,7 @@ std::string RunTally::left_behind() const {
 RunTotals RunTally::totals(const io::Progress& progress) const {
   RunTotals out = out_;
   out.through = through_.judge(progress);
+  out.forbidden = verdict_.entry();
   out.verdict = verdict_.verdict(out.through.first.has_value());
   if (loaded_.hands.empty() && out.verdict == io::Verdict::held) out.verdict = io::Verdict::unheld;
   out.left_behind = left_behind();

@@ -3,6 +3,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "hapsix/hapsix.h"
@@ -16,6 +17,7 @@ namespace h6::cli {
 struct RunTotals {
   io::Verdict verdict = io::Verdict::untouched;
   PopThroughReport through;
+  std::optional<io::VerdictWatch::Entry> forbidden;  // the first time in a forbidden box
   // A sentence if the body ends more than three voxels from a hand that rests, with a coupling that
   // pulls as hard as it may; else empty.
   std::string left_behind;

@@ -171,18 +171,18 @@ double VerdictWatch::mean_motion2(const h6Pose& from, const h6Pose& to) const {
                      {middle.w * scale, middle.x * scale, middle.y * scale, middle.z * scale});
 }
 
-bool VerdictWatch::entered(const h6Pose& body) const {
-  if (clusters_.empty()) return false;
+std::optional<h6Vec3> VerdictWatch::entered(const h6Pose& body) const {
+  if (clusters_.empty()) return std::nullopt;
   const Rotation r(body.q);
   for (const Cluster& cluster : clusters_) {
     const h6Vec3 centre = body.p + r * cluster.centre;
     for (const Box& box : rules_.forbidden) {
       if (!touches(box, centre, cluster.radius)) continue;
       for (std::uint32_t i = cluster.first; i < cluster.first + cluster.count; ++i)
-        if (contains(box, body.p + r * points_[i])) return true;
+        if (const h6Vec3 p = body.p + r * points_[i]; contains(box, p)) return p;
     }
   }
-  return false;
+  return std::nullopt;
 }
 
 double VerdictWatch::slide() const {
@@ -234,7 +234,8 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   peak_hand_speed2_ =
       std::max(peak_hand_speed2_, mean_speed2(hand_velocity.linear, hand_velocity.angular, hand.q));
 
-  entered_ = entered_ || entered(body.pose);
+  if (!entry_)
+    if (const auto place = entered(body.pose)) entry_ = Entry{time, *place};
   touched_ = touched_ || max_depth_voxels > 0;
 
   watch_stillness(time, hand, hand_velocity);
@@ -265,7 +266,7 @@ bool VerdictWatch::arrived() const {
 Verdict VerdictWatch::verdict(bool popped_through) const {
   const double limit = kUnstableFactor * std::max(kLeastPeakSpeed, std::sqrt(peak_hand_speed2_));
   if (!finite_ || peak_speed2_ > limit * limit) return Verdict::unstable;
-  if (entered_ || popped_through) return Verdict::through;
+  if (entry_ || popped_through) return Verdict::through;
   if (chattered_ || (!first_ && chatters_now(last_time_))) return Verdict::chatters;
   if (last_depth_ > H6_DEEPEST_FIT) return Verdict::sunk;
   if (rules_.target) return arrived() ? Verdict::arrived : Verdict::stuck;

@@ -25,6 +25,7 @@
 #pragma once
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,12 @@ class VerdictWatch {
   void frame(double time, const h6Pose& hand, const h6Velocity& hand_velocity,
              const h6BodyState& body, double max_depth_voxels, bool state_finite);
   Verdict verdict(bool popped_through = false) const;
+  // When and where a shell point or the centre of mass first was in a forbidden box.
+  struct Entry {
+    double time;   // [s]
+    h6Vec3 place;  // world frame [m]
+  };
+  const std::optional<Entry>& entry() const { return entry_; }
   // Whether the hand has been still for at least 0.2 s, and how far (RMS over the points) the body
   // is from it [m]. Both mean the last frame.
   bool hand_rests() const { return !first_ && last_time_ - still_since_ >= kRest; }
@@ -71,7 +78,7 @@ class VerdictWatch {
   void cluster_points(std::size_t first, std::size_t count);
   double mean_speed2(const h6Vec3& origin_velocity, const h6Vec3& angular, const h6Quat& q) const;
   double mean_motion2(const h6Pose& from, const h6Pose& to) const;
-  bool entered(const h6Pose& body) const;
+  std::optional<h6Vec3> entered(const h6Pose& body) const;
   void watch_stillness(double time, const h6Pose& hand, const h6Velocity& velocity);
   bool chatters_now(double time) const;
   bool arrived() const;
@@ -83,7 +90,8 @@ class VerdictWatch {
   double second_[6] = {};  // mean of p pT over the points, xx yy zz xy xz yz [m^2]
   double rate_;
   double peak_hand_speed2_ = 0, peak_speed2_ = 0;
-  bool finite_ = true, entered_ = false, touched_ = false, chattered_ = false, first_ = true;
+  std::optional<Entry> entry_;
+  bool finite_ = true, touched_ = false, chattered_ = false, first_ = true;
   double still_since_ = 0, last_time_ = 0;
   h6Pose still_hand_{};  // pose of the hand at the start of the still phase
   h6Pose last_hand_{};

@@ -69,11 +69,12 @@ std::string base64(const std::string& bytes) {
   return out;
 }
 
-// Where and when a point first passed through the environment [m, s], from the summary of
-// `hapsix run`; null when none did or the summary does not say.
+// Where and when a point first passed through the environment, or else was in a forbidden region
+// [m, s], from the summary of `hapsix run`; null when none did or the summary does not say.
 ordered_json popped_through(const ordered_json& summary) {
   try {
-    const ordered_json& first = summary.at("pop_through").at("first");
+    ordered_json first = summary.at("pop_through").at("first");
+    if (first.is_null()) first = summary.value("forbidden", ordered_json());
     const Result<Unit> unit = unit_from_name(summary.at("units"));
     if (first.is_null() || !unit) return nullptr;
     ordered_json place = ordered_json::array();

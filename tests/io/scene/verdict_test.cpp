@@ -170,6 +170,20 @@ TEST_CASE("a hand at rest does not make slow settling unstable") {
         }) == Verdict::held);
 }
 
+TEST_CASE("the first time and place in a forbidden box are kept") {
+  SceneVerdict rules;
+  rules.forbidden = {{{0.01449, -1, -1}, {1, 1, 1}}};  // points at x = 10 mm enter after 4.5 mm
+  VerdictWatch watch(rules, cube(), {0, 0, 0}, kRate);
+  for (int i = 0; i < 300; ++i) {
+    const Moment m = calm(1e-3 * i);
+    watch.frame(1e-3 * i, m.hand, m.hand_velocity, m.body, m.depth, m.finite);
+    CHECK(watch.entry().has_value() == (i >= 90));
+  }
+  REQUIRE(watch.entry());
+  CHECK(watch.entry()->time == doctest::Approx(0.09));
+  CHECK(watch.entry()->place.x == doctest::Approx(0.0145));
+}
+
 TEST_CASE("one shell point in a forbidden box for one frame is through") {
   SceneVerdict rules;
   rules.forbidden.push_back({{0.0195, 0.009, 0.009}, {0.5, 0.5, 0.5}});

@@ -40,6 +40,8 @@ test('it opens from disk and shows both runs', async () => {
   const text = await browser.value('document.body.innerText');
   for (const word of ['global', 'robust', 'through', 'held', 'Late frames', 'Configuration'])
     assert.ok(text.includes(word), word);
+  // Under `global` the part enters the forbidden region; the report opens there.
+  assert.match(text, /What matters most: a point passes through, at [1-9]/);
   await wait(800);
   await browser.picture(join(pictures, 'report-top.png'));
 });
