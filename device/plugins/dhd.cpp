@@ -85,7 +85,7 @@ class Dhd final : public VendorDevice {
     // The watchdog is one of the calls for experts.
     watched_ = calls_.dhdEnableExpertMode() >= 0 && calls_.dhdSetWatchdog(duration, id_) >= 0;
     (void)calls_.dhdDisableExpertMode();
-    // Whatever it cut off is not switched on again without a person.
+    // A force that the watchdog cut off comes back only after a person armed the device.
     if (watched_) late_ = std::min(late_, watchdog_);
   }
   void disconnect() override {

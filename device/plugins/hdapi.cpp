@@ -120,7 +120,8 @@ class Hdapi final : public VendorDevice {
     s.buttons = static_cast<unsigned>(buttons);
     return true;
   }
-  // The stylus must have been calibrated, or places are wrong. Done while no force is rendered.
+  // The stylus must have been calibrated, or places are wrong. This runs while no force is
+  // rendered.
   bool calibrated() {
     const unsigned state = calls_.hdCheckCalibration();
     if (state == HD_CALIBRATION_NEEDS_UPDATE) calls_.hdUpdateCalibration(style_);

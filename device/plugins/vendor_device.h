@@ -100,7 +100,7 @@ class VendorDevice {
   void close();
 
  protected:
-  // What an adapter brings. connect fills in name and degrees of freedom, and may lower the
+  // An adapter brings these. connect fills in name and degrees of freedom, and may lower the
   // ratings.
   virtual bool option(const std::string& key, const std::string& value, std::string& wrong) = 0;
   virtual const char* own_options() const = 0;
@@ -295,7 +295,7 @@ inline bool VendorDevice::fault() {
   return false;
 }
 
-// What it did since its first state ever: a device that was plugged in again has the same axes.
+// Motion counts from the first state ever, so a device that was plugged in again has the same home.
 inline void VendorDevice::put(const State& s) {
   if (!first_) first_ = std::make_unique<State>(s);
   Heard h;

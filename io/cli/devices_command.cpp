@@ -248,9 +248,10 @@ void add_devices(CLI::App& app, Program& program) {
   CLI::Option* watch = devices->add_flag("--watch", o->watch,
                                          "Show pose, buttons and axes as they come, without force");
   devices
-      ->add_flag("--test", o->test,
-                 "Check its samples, then push along every axis with 10 % of its rating: keep your "
-                 "hands off")
+      ->add_flag(
+          "--test", o->test,
+          "Check its samples, arm it, and push along every axis with 10 % of its rating: keep your "
+          "hands off")
       ->excludes(watch);
   devices->add_option("--duration", o->duration, "Of --watch; default: until Ctrl-C")
       ->option_text("SECONDS")

@@ -18,14 +18,14 @@ constexpr double kVoxel = 0.25;               // of the rod's field [mm]
 constexpr double kPlay = 0.1, kThick = 2, kWidth = 12;   // [mm]
 constexpr double kArc = 110, kLip = 85, kLipRadius = 4;  // half the arc, a lip [degrees], [mm]
 constexpr int kAlong = 72, kAcross = 6, kThrough = 3;    // cells
-// A hard rubber: the clip opens by a tenth of its width for less than the contacts can push.
+// The arms open for about 1 N, a quarter of what half a voxel of contact gives.
 constexpr double kYoung = 4e8, kPoisson = 0.4, kDensity = 950;
 constexpr double kFixed = 20;  // of the arc, on each side of its top [degrees]
 
 constexpr double rad(double degrees) { return degrees * std::numbers::pi / 180; }
 
-// Of the section at s in [-1, 1] along the middle line: its place in x and z, and its direction,
-// which is how far it has turned from +x towards -z.
+// A section of the clip: its place in x and z [mm], and the direction of the middle line there, as
+// the angle from +x towards -z. `s` runs from -1 to 1 along the middle line.
 struct Section {
   double x, z, turn;
 };
@@ -67,7 +67,7 @@ Mesh rod_mesh() {
   return a.sound(a.triangles());
 }
 
-// In, pulled at along its axis and down, and out against the lips.
+// The rod goes in, is pulled 1 mm back, and leaves between the lips.
 Path rod_path(const h6Pose& start) {
   HandPath hand(start);
   hand.wait(0.1).move_by({0, 0, -start.p.z}, 0.08).wait(0.5);

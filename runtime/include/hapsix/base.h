@@ -5,9 +5,9 @@
  * whole contract between the engine and a program that embeds it.
  *
  * A program that was compiled with an earlier 0.1 runs with this library unchanged. Definitions, and
- * records that may grow, end in `reserved`: a member that comes later takes words of it, so no size, no offset and no
- * array changes, and a zero there means "as before". A program writes zeros there: it begins with the
- * default function of the definition. A definition with other words is refused, since it asks for
+ * records that may grow, end in `reserved`: a member that comes later takes words of it, so no size,
+ * no offset and no array changes, and a zero there means "as before". A program writes zeros there: it
+ * begins with the default function of the definition. A definition with other words is refused, since it asks for
  * something that this library does not know. Enumerations grow at their end.
  */
 #ifndef HAPSIX_BASE_H
@@ -128,7 +128,8 @@ typedef struct h6Tasks {
 } h6Tasks;
 
 /* Called when one of the engine's own assertions fails; return 0 to go on, else the process
- * stops. A library that was built with NDEBUG, as a release is, has none and never calls it. Set before any other call; NULL restores the default (a line on stderr, then stop). */
+ * stops. Set before any other call; NULL restores the default (a line on stderr, then stop). A library
+ * that was built with NDEBUG, as a release is, has no assertions and never calls it. */
 typedef int (*h6AssertHandler)(const char* condition, const char* file, int line);
 H6_API void h6SetAssertHandler(h6AssertHandler handler);
 H6_API int h6AssertFailed(const char* condition, const char* file, int line);
