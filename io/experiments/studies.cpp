@@ -2,72 +2,36 @@
 #include "io/experiments/studies.h"
 
 namespace h6::cli {
+namespace {
+
+// A scene under every method; it runs only when it is asked for.
+StudyKind by_name(const char* scene, const char* about) {
+  return {scene, about,
+          [scene](const auto& columns, const auto& console) {
+            return study_industrial(scene, columns, console);
+          },
+          true};
+}
+
+}  // namespace
 
 const std::vector<StudyKind>& studies() {
   static const std::vector<StudyKind> kinds = {
       {"global", "where the paper says global scaling fails", study_global},
       {"two-planes", "Fig. 4: stiffness of two inclined planes", study_two_planes},
       {"alpha-pushes", "Fig. 8: the alpha pushed in many ways", study_pushes},
-      {"engine-bay", "Figs. 1, 10: a starter motor forced in its engine bay",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("engine-bay", columns, console);
-       },
-       true},
-      {"landing-gear", "Figs. 1, 11: an actuator forced in a landing gear",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("landing-gear", columns, console);
-       },
-       true},
-      {"wire-bundle", "cf. Fig. 12: a bar dragged over a loom",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("wire-bundle", columns, console);
-       },
-       true},
-      {"spline-hub-1k", "a splined shaft in its hub, 1,000 points on driven flanks",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("spline-hub-1k", columns, console);
-       },
-       true},
-      {"spline-hub-10k", "the same with 10,000",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("spline-hub-10k", columns, console);
-       },
-       true},
-      {"spline-hub-100k", "the same with 100,000",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("spline-hub-100k", columns, console);
-       },
-       true},
-      {"piston-in-bore", "cf. Fig. 10: a piston in its bore",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("piston-in-bore", columns, console);
-       },
-       true},
-      {"gear-train", "a gear turned against two others",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("gear-train", columns, console);
-       },
-       true},
-      {"bridge-and-dinosaur", "Fig. 14: a rigid dinosaur on a bridge that bends",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("bridge-and-dinosaur", columns, console);
-       },
-       true},
-      {"clip-and-rod", "a rod snaps into a clip that bends",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("clip-and-rod", columns, console);
-       },
-       true},
-      {"hose-in-bracket", "a hose that bends in the eye of a bracket",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("hose-in-bracket", columns, console);
-       },
-       true},
-      {"alphas-in-two-hands", "cf. Fig. 9: the alphas in two hands",
-       [](const auto& columns, const auto& console) {
-         return study_industrial("alphas-in-two-hands", columns, console);
-       },
-       true},
+      by_name("engine-bay", "Figs. 1, 10: a starter motor forced in its engine bay"),
+      by_name("landing-gear", "Figs. 1, 11: an actuator forced in a landing gear"),
+      by_name("wire-bundle", "cf. Fig. 12: a bar dragged over a loom"),
+      by_name("spline-hub-1k", "a splined shaft in its hub, 1,000 points on driven flanks"),
+      by_name("spline-hub-10k", "the same with 10,000"),
+      by_name("spline-hub-100k", "the same with 100,000"),
+      by_name("piston-in-bore", "cf. Fig. 10: a piston in its bore"),
+      by_name("gear-train", "a gear turned against two others"),
+      by_name("bridge-and-dinosaur", "Fig. 14: a rigid dinosaur on a bridge that bends"),
+      by_name("clip-and-rod", "a rod snaps into a clip that bends"),
+      by_name("hose-in-bracket", "a hose that bends in the eye of a bracket"),
+      by_name("alphas-in-two-hands", "cf. Fig. 9: the alphas in two hands"),
       {"forced-paths", "a starter motor forced through its engine bay",
        [](const auto& columns, const auto& console) {
          return study_forced_paths("engine-bay", columns, console, 50);

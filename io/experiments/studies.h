@@ -2,6 +2,8 @@
 // studies.h - studies of the methods beside the table of scenes: how stable and how smooth each
 // method is, and how much it depends on the sampling.
 #pragma once
+#include <functional>
+
 #include "io/experiments/report.h"
 
 namespace h6::cli {
@@ -9,7 +11,7 @@ namespace h6::cli {
 struct StudyKind {
   const char* name;
   const char* about;
-  Study (*run)(const std::vector<MethodColumn>& columns, const Console& console);
+  std::function<Study(const std::vector<MethodColumn>& columns, const Console& console)> run;
   bool long_run = false;  // takes minutes, so it runs only when it is named
 };
 const std::vector<StudyKind>& studies();

@@ -178,4 +178,14 @@ SceneHand path_hand(const std::string& body, Path path) {
   return hand;
 }
 
+void add_led(Scene& scene, SceneBody part, double mass, Path path) {
+  part.fixed = false;
+  part.mass = mass;
+  part.pose = path.front().pose;
+  scene.verdict.target = path.back().pose;
+  scene.verdict.tolerance = kMm, scene.verdict.tolerance_angle = 0.05;
+  scene.hands.push_back(path_hand(part.name, std::move(path)));
+  scene.bodies.push_back(std::move(part));
+}
+
 }  // namespace h6::io

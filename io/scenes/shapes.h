@@ -60,5 +60,7 @@ Scene common_scene(const std::string& name, const std::string& about);
 SceneBody obstacle(const std::string& name, Mesh mesh, double voxel_size);
 // A hand that leads a body along a path.
 SceneHand path_hand(const std::string& body, Path path);
+// Frees an obstacle, which a hand then leads along a path; the scene's target is the path's end.
+void add_led(Scene& scene, SceneBody part, double mass, Path path);
 
 }  // namespace h6::io

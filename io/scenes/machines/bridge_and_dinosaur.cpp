@@ -97,14 +97,8 @@ Scene bridge_and_dinosaur() {
       "A rigid dinosaur of 56,192 triangles is pressed on a rubber bridge that bends by 20 modes "
       "and carries the points, dragged along it, turned, and lifted off at once.");
   scene.bodies.push_back(bending("bridge", bridge_body(), 85018));
-  SceneBody dinosaur = obstacle("dinosaur", dinosaur_mesh(), kMm * kVoxel);
-  dinosaur.fixed = false;
-  dinosaur.mass = 0.2;
-  dinosaur.pose.p = {0, 0, (kRoadway + 4) * kMm};
-  scene.hands.push_back(path_hand("dinosaur", dinosaur_path(dinosaur.pose)));
-  scene.verdict.target = scene.hands.back().path.back().pose;
-  scene.verdict.tolerance = kMm, scene.verdict.tolerance_angle = 0.05;
-  scene.bodies.push_back(std::move(dinosaur));
+  add_led(scene, obstacle("dinosaur", dinosaur_mesh(), kMm * kVoxel), 0.2,
+          dinosaur_path({{0, 0, (kRoadway + 4) * kMm}, {1, 0, 0, 0}}));
   return scene;
 }
 

@@ -84,14 +84,8 @@ Scene clip_and_rod() {
       "The clip holds it against a small pull, and lets it go at a greater one.");
   scene.contact.stiffness = 4e4;
   scene.bodies.push_back(bending("clip", clip_body(), 20000));
-  SceneBody rod = obstacle("rod", rod_mesh(), kMm * kVoxel);
-  rod.fixed = false;
-  rod.mass = 0.05;
-  rod.pose.p = {0, 0, -26 * kMm};
-  scene.hands.push_back(path_hand("rod", rod_path(rod.pose)));
-  scene.verdict.target = scene.hands.back().path.back().pose;
-  scene.verdict.tolerance = kMm, scene.verdict.tolerance_angle = 0.05;
-  scene.bodies.push_back(std::move(rod));
+  add_led(scene, obstacle("rod", rod_mesh(), kMm * kVoxel), 0.05,
+          rod_path({{0, 0, -26 * kMm}, {1, 0, 0, 0}}));
   return scene;
 }
 

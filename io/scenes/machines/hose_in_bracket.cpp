@@ -69,14 +69,8 @@ Scene hose_in_bracket() {
       "A rubber hose that bends by 20 modes goes through the eye of a bracket, which slides along "
       "it, bends it aside and leaves it again.");
   scene.bodies.push_back(bending("hose", hose_body(), 30000));
-  SceneBody bracket = obstacle("bracket", bracket_mesh(), kMm * kVoxel);
-  bracket.fixed = false;
-  bracket.mass = 0.1;
-  bracket.pose.p = {(kLength + 10) * kMm, 0, 0};
-  scene.hands.push_back(path_hand("bracket", bracket_path(bracket.pose)));
-  scene.verdict.target = scene.hands.back().path.back().pose;
-  scene.verdict.tolerance = kMm, scene.verdict.tolerance_angle = 0.05;
-  scene.bodies.push_back(std::move(bracket));
+  add_led(scene, obstacle("bracket", bracket_mesh(), kMm * kVoxel), 0.1,
+          bracket_path({{(kLength + 10) * kMm, 0, 0}, {1, 0, 0, 0}}));
   return scene;
 }
 

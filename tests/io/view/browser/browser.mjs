@@ -2,6 +2,7 @@
 // Drives headless Chromium over its DevTools protocol: opens a page, evaluates in it, uses the mouse.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import WebSocket from 'ws';
@@ -18,6 +19,8 @@ export async function until(what, sentence, seconds = 60) {
     await wait(100);
   }
 }
+
+const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 export class Browser {
   problems = [];  // console errors and exceptions of the page
@@ -81,6 +84,19 @@ export class Browser {
   // 'light' or 'dark', as the system would have it.
   async scheme(value) {
     await this.send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value }] });
+  }
+  // What axe-core finds serious or critical on the page, light and dark; lesser findings are printed.
+  async graveFindings() {
+    const all = [];
+    for (const value of ['light', 'dark']) {
+      await this.scheme(value);
+      await wait(500);
+      const found = await this.value(`(async () => { ${axe}; const r = await window.axe.run(document, { resultTypes: ['violations'] });
+        return r.violations.map((v) => ({ id: v.id, impact: v.impact, where: v.nodes.map((n) => n.target.join(' ') + ': ' + n.failureSummary) })); })()`);
+      console.log(`# ${value}: ${found.length} findings ${found.map((v) => v.id).join(' ')}`);
+      all.push(...found.filter((v) => v.impact === 'serious' || v.impact === 'critical').map((v) => ({ scheme: value, ...v })));
+    }
+    return all;
   }
   async key(type, key, more = {}) {
     await this.send('Input.dispatchKeyEvent', { type, key, code: key, windowsVirtualKeyCode: { ArrowLeft: 37, ArrowUp: 38, ArrowRight: 39, ArrowDown: 40, PageUp: 33, PageDown: 34, ' ': 32 }[key] ?? 0, ...more });
