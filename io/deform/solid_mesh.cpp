@@ -19,7 +19,9 @@ std::string figure(double value) {
 }
 
 std::string place(const h6Vec3& p) {
-  return "(" + figure(p.x) + ", " + figure(p.y) + ", " + figure(p.z) + ") m";
+  char text[96];
+  std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g) m", p.x, p.y, p.z);
+  return text;
 }
 
 Outcome check_material(const SolidMaterial& m) {
