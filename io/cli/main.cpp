@@ -68,6 +68,18 @@ std::string mistake(const CLI::App& app, const CLI::ParseError& error) {
   return what + (what.back() == '?' ? " '" : "; '") + command + " --help' tells more";
 }
 
+// The parser's own words behind an option ("Excludes: --jobs", a name given twice) explain nothing.
+class Help : public CLI::Formatter {
+ public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    if (option->get_positional()) return "";
+    std::string words = CLI::Formatter::make_option_opts(option);
+    for (const char* end : {" Needs:", " Excludes:"})
+      words.erase(std::min(words.find(end), words.size()));
+    return words;
+  }
+};
+
 // Whether --json was given, wherever the parser stopped.
 bool has_json_flag(int argc, char** argv) {
   return std::any_of(argv + 1, argv + argc,
@@ -119,6 +131,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  app.formatter(std::make_shared<Help>());
   app.get_formatter()->column_width(26);
   // Subcommands inherit these settings.
   app.footer("Every command takes --json. Exit code: 0 done, 1 failed, 2 wrong usage.");

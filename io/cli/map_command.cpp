@@ -10,12 +10,14 @@
 #include "io/console/checks.h"
 #include "io/experiments/map/map_page.h"
 #include "io/file/write_aside.h"
+#include "io/study/scheduler.h"
 
 namespace h6::cli {
 namespace {
 
 struct Options {
-  std::string methods, scenes, only, csv, report;
+  std::string methods, scenes, only, csv, report, scheduler;
+  bool worker = false;
   MapOptions map;
 };
 
@@ -50,12 +52,66 @@ Outcome choose(Options& o) {
   return Done{};
 }
 
+// What a worker needs to draw the same variations.
+std::vector<std::string> words_of(const Options& o) {
+  std::vector<std::string> out = {"map", "--variations", std::to_string(o.map.variations), "--seed",
+                                  std::to_string(o.map.seed)};
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) out.insert(out.end(), {option, value});
+  };
+  add("--methods", o.methods), add("--scenes", o.scenes), add("--only", o.only);
+  return out;
+}
+
+void serve_map(const MapOptions& options) {
+  MapPlan plan = plan_map(options);
+  study::serve([&](std::size_t job) {
+    if (job >= plan.jobs.size()) return std::string("!a worker is asked for what it has not planned");
+    run_job(options, plan, job);
+    return std::to_string(job) + " " + job_line(plan, job);
+  });
+}
+
+Result<std::vector<MapScene>> map_on_scheduler(const Options& o, const Console& console) {
+  MapPlan plan = plan_map(o.map);
+  study::Work work;
+  study::use_scheduler(o.scheduler, words_of(o), work);
+  std::size_t done = 0;
+  for (std::size_t job = 0; job < plan.jobs.size(); ++job) work.runs.push_back(job);
+  const io::Progress progress = console.progress();
+  work.go_on = [&] {
+    return progress("variations",
+                    static_cast<double>(done) / static_cast<double>(plan.jobs.size())) &&
+           !interrupted.load();
+  };
+  work.done = [&](const std::string& line) -> Outcome {
+    std::size_t end = 0;
+    const std::size_t job = std::stoul(line, &end);
+    if (!take_job_line(plan, job, line.substr(end)))
+      return Failure{"a worker gave no runs: " + line.substr(0, 100)};
+    ++done;
+    return Done{};
+  };
+  work.lost = [&](std::size_t job, const std::string& why) {
+    MapPlan::Job& lost = plan.jobs[job];
+    plan.scenes[lost.scene].variations[lost.variation].error = why;
+    return std::to_string(job) + " " + job_line(plan, job);
+  };
+  if (!work.runs.empty())
+    if (const Outcome shared = study::share_out(work); !shared) return Failure{shared.error()};
+  return finish_map(std::move(plan));
+}
+
 int map_command(const Console& console, Options& o) {
   if (Outcome chosen = choose(o); !chosen) return console.fail(chosen.error(), kUsage);
+  if (o.worker) return serve_map(o.map), kOk;
   for (const std::string& file : {o.csv, o.report})
     if (Outcome good = file.empty() ? Outcome(Done{}) : check_output(file); !good)
       return console.fail(good.error());
-  const std::vector<MapScene> scenes = run_map(o.map, console);
+  const Result<std::vector<MapScene>> ran =
+      o.scheduler.empty() ? Result(run_map(o.map, console)) : map_on_scheduler(o, console);
+  if (!ran) return console.fail(ran.error());
+  const std::vector<MapScene>& scenes = *ran;
   if (interrupted.load()) return console.fail("interrupted");
   const MapReport report{o.map, scenes};
   if (!console.json) std::printf("%s", report.text(false).c_str());
@@ -98,6 +154,12 @@ void add_map(CLI::App& app, Program& program) {
   map->add_option("--jobs", o->map.jobs, "Threads; the figures do not depend on it")
       ->check(whole_within(1, 256))
       ->capture_default_str();
+  map->add_option("--scheduler", o->scheduler,
+                  "Do the runs on the workers of this scheduler of Dask's distributed; the same "
+                  "figures, as far as they have this machine's SIMD target")
+      ->option_text("ADDRESS")
+      ->excludes("--jobs");
+  map->add_flag("--worker", o->worker)->group("");
   map->add_option("--csv", o->csv, "A row for each run")
       ->check(ends_with(".csv"))
       ->option_text("FILE.csv");

@@ -15,9 +15,9 @@
 #include "io/file/write_aside.h"
 #include "io/run/try_run.h"
 #include "io/scene/load_scene.h"
-#include "io/study/cluster.h"
 #include "io/study/picture.h"
 #include "io/study/plan.h"
+#include "io/study/scheduler.h"
 #include "io/study/table.h"
 #include "io/study/workers.h"
 
@@ -97,30 +97,13 @@ void use_processes(const Program& program, const Options& o, study::Work& work) 
   work.processes = o.jobs ? o.jobs : std::max(1u, std::thread::hardware_concurrency());
 }
 
-// "hapsix 0.1.0" of "hapsix 0.1.0, 12.2.0, SIMD AVX3 AVX2", and "AVX3".
-void use_scheduler(const Options& o, const study::Plan& plan, study::Work& work) {
-  const std::string info = h6BuildInfo(), simd = info.substr(info.find("SIMD ") + 5);
-  std::error_code error;
-  work.program = "python3";
-  work.command = {"python3",
-                  "-c",
-                  study::kClusterProgram,
-                  o.scheduler,
-                  o.file,
-                  plan.scene_file().string(),
-                  fs::read_symlink("/proc/self/exe", error).string(),
-                  info.substr(0, info.find(',')),
-                  simd.substr(0, simd.find(' '))};
-  work.ahead = 4096;  // their numbers fit into a pipe; the scheduler knows what each worker has
-}
-
 Outcome do_runs(const Program& program, const Options& o, const study::Plan& plan,
                 study::Table& table) {
   study::Work work;
   if (o.scheduler.empty())
     use_processes(program, o, work);
   else
-    use_scheduler(o, plan, work);
+    study::use_scheduler(o.scheduler, {"study", o.file, plan.scene_file().string()}, work);
   for (std::size_t run = 0; run < plan.runs(); ++run)
     if (!table.has(run)) work.runs.push_back(run);
   work.processes = std::min(work.processes, work.runs.size());
@@ -203,7 +186,7 @@ void add_study(CLI::App& app, Program& program) {
       "study",
       "A scene over ranges of its settings, in several processes: a row of a table for each run");
   auto o = std::make_shared<Options>();
-  command->add_option("study", o->file, "STUDY.json")->required()->option_text("STUDY.json");
+  command->add_option("STUDY.json", o->file, "A scene and what varies; see below")->required();
   command
       ->add_option(
           "-o,--output", o->folder,

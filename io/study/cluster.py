@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""cluster.py - does the runs of a study on the workers of a scheduler of Dask's distributed.
+"""cluster.py - does the runs of a study or a map on the workers of a scheduler of Dask's distributed.
 
-The program starts it with: ADDRESS STUDY SCENE PROGRAM VERSION SIMD. It reads numbers of runs, a line
-each, and answers each with one line: its row, "?RUN SENTENCE" for a run that no worker could end, or
-"!SENTENCE" when the whole study cannot go on. Workers need the program in the same version and nothing
-else of this tree. Files go to them by the hash of their content, once for each worker.
+The program starts it with: ADDRESS PROGRAM VERSION SIMD, then `study STUDY SCENE` or the arguments of
+`hapsix map`. It reads numbers of runs, a line each, and answers each with one line: its row, "?RUN
+SENTENCE" for a run that no worker could end, or "!SENTENCE" when nothing can go on. Workers need the
+program in the same version and nothing else of this tree. Files go to them by the hash of their content,
+once for each worker.
 """
 import hashlib
 import json
@@ -63,7 +64,7 @@ def do_run(run, job, digests, *contents):
         folder = os.path.join(tempfile.gettempdir(), "hapsix-study-" + job["key"])
         if not os.path.exists(folder):
             aside = tempfile.mkdtemp(prefix="hapsix-study-")
-            files = {"study.json": job["study"].encode(), "scene.json": job["scene"].encode()}
+            files = {name: text.encode() for name, text in job["texts"].items()}
             for digest, content in zip(digests, contents):
                 if hashlib.sha256(content).hexdigest() != digest:
                     raise LookupError(f"an asset came to {worker.address} with another content")
@@ -77,8 +78,9 @@ def do_run(run, job, digests, *contents):
                 os.rename(aside, folder)  # whole, or that of another worker on this machine
             except OSError:
                 shutil.rmtree(aside, ignore_errors=True)
-        return subprocess.Popen([program, "study", os.path.join(folder, "study.json"), "-o", folder, "--worker"],
-                                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+        words = [word.replace("@FOLDER@", folder) for word in job["words"]]
+        return subprocess.Popen([program, *words, "--worker"], stdin=subprocess.PIPE,
+                                stdout=subprocess.PIPE, text=True, env=environment)
     try:
         try:
             process = pool.get_nowait()
@@ -100,7 +102,8 @@ def do_run(run, job, digests, *contents):
     return row[:-1]
 
 
-def describe(study, scene, program, version, simd):
+def describe_study(study, scene):
+    """What the workers get of a study: its job and the content of its files."""
     assets = {}
     with open(scene) as file:
         text = json.dumps(with_assets(json.load(file), os.path.dirname(os.path.abspath(scene)), assets))
@@ -108,10 +111,9 @@ def describe(study, scene, program, version, simd):
         plan = json.load(file)
     plan = with_assets(plan, os.path.dirname(os.path.abspath(scene)), assets)
     plan["scene"] = "scene.json"
-    job = {"study": json.dumps(plan), "scene": text, "program": program, "version": version, "simd": simd,
-           "names": sorted(set(names_in(json.loads(text), assets) + names_in(plan, assets)))}
-    job["key"] = hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()[:24]
-    return job, assets
+    return {"words": ["study", "@FOLDER@/study.json", "-o", "@FOLDER@"],
+            "texts": {"study.json": json.dumps(plan), "scene.json": text},
+            "names": sorted(set(names_in(json.loads(text), assets) + names_in(plan, assets)))}, assets
 
 
 def names_in(value, assets):
@@ -123,13 +125,16 @@ def names_in(value, assets):
 
 
 def main():
-    address, study, scene, program, version, simd = sys.argv[1:7]
+    address, program, version, simd, *words = sys.argv[1:]
     try:
         client = distributed.Client(address, timeout="10s", set_as_default=True)
     except (OSError, ValueError, TimeoutError) as error:
         print(f"!no scheduler answers at {address}: {' '.join(str(error).split())[:200]}", flush=True)
         return 1
-    job, assets = describe(study, scene, program, version, simd)
+    job, assets = describe_study(*words[1:]) if words[0] == "study" else (
+        {"words": words, "texts": {}, "names": []}, {})
+    job.update(program=program, version=version, simd=simd)
+    job["key"] = hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()[:24]
     # An asset is a task that gives its content, so it outlives any worker.
     held = [client.submit(same, content, key="hapsix-asset-" + digest) for digest, content in assets.items()]
     answers, mine = queue.SimpleQueue(), os.urandom(4).hex()

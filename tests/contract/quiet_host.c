@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/* quiet_host.c - a program with an allocator, tasks and messages of its own: the engine allocates
+/* quiet_host.c - a program with an allocator, a pool and a log of its own: the engine allocates
  * nothing after creation, starts no thread and writes nothing to stdout and stderr. */
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +27,50 @@ static void* allocate(void* user, size_t bytes, size_t alignment) {
 static void release(void* user, void* memory, size_t bytes) {
   (void)user, (void)bytes, free(memory);
 }
+
+/* The pool: one thread, which takes one task at a time. */
+static struct {
+  pthread_t thread;
+  pthread_mutex_t lock;
+  pthread_cond_t changed;
+  void (*task)(void*);
+  void* context;
+  enum { IDLE, GIVEN, RUNS, ENDS } state;
+  long ran;
+} pool = {.lock = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER};
+
+static void* work(void* unused) {
+  pthread_mutex_lock(&pool.lock);
+  while (pool.state != ENDS) {
+    if (pool.state != GIVEN) {
+      pthread_cond_wait(&pool.changed, &pool.lock);
+      continue;
+    }
+    pool.state = RUNS, ++pool.ran;
+    pthread_mutex_unlock(&pool.lock);
+    pool.task(pool.context);
+    pthread_mutex_lock(&pool.lock);
+    pool.state = IDLE;
+    pthread_cond_broadcast(&pool.changed);
+  }
+  pthread_mutex_unlock(&pool.lock);
+  return unused;
+}
+static void* enqueue(void* user, void (*task)(void*), void* context) {
+  (void)user;
+  pthread_mutex_lock(&pool.lock);
+  pool.task = task, pool.context = context, pool.state = GIVEN;
+  pthread_cond_broadcast(&pool.changed);
+  pthread_mutex_unlock(&pool.lock);
+  return &pool;
+}
+static void finish(void* user, void* handle) {
+  (void)user, (void)handle;
+  pthread_mutex_lock(&pool.lock);
+  if (pool.state == GIVEN) pool.state = IDLE; /* it has not begun and never will */
+  while (pool.state == RUNS) pthread_cond_wait(&pool.changed, &pool.lock);
+  pthread_mutex_unlock(&pool.lock);
+}
 static void parallel_for(void* user, size_t count, void (*body)(void*, size_t), void* context) {
   (void)user;
   for (size_t i = 0; i < count; ++i) body(context, i), ++tasks;
@@ -46,11 +91,14 @@ int main(int argc, char** argv) {
   const int out = open(said, O_RDWR | O_CREAT | O_TRUNC, 0600), terminal = dup(1);
   dup2(out, 1), dup2(out, 2);
   h6SetLogHandler(log_line, NULL);
+  pthread_create(&pool.thread, NULL, work, NULL);
+  const int of_host = threads();
   h6ModelDef parts = h6DefaultModelDef();
   parts.allocator.allocate = allocate, parts.allocator.release = release;
   parts.parallel_for = parallel_for;
   h6SessionDef def = h6DefaultSessionDef();
   def.allocator = parts.allocator;
+  def.threads = 2, def.tasks.enqueue = enqueue, def.tasks.finish = finish;
   h6Error error;
   h6Model* model = floor_and_tip(parts, &error);
   h6Session* session = model ? hold_tip(model, def, &error) : NULL;
@@ -65,16 +113,29 @@ int main(int argc, char** argv) {
     h6GetRecord(session, &in, &felt, &row);
   }
   const long allocated = of_heap - heap_before + of_ours - ours_before;
-  const int running = threads();
+  const int running = threads() - of_host;
+  /* A start inside the floor is told to the log. */
+  h6BodyDef body[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
+  body[0].fixed = true, body[0].field = 0;
+  body[1].shell = 0, body[1].pose.p.x = body[1].pose.p.y = 4e-3, body[1].pose.p.z = 2e-3;
+  def.bodies = body, def.body_count = 2;
+  h6Session* inside = model ? h6CreateSession(model, &def, &error) : NULL;
+  h6DestroySession(inside);
   /* Refusals are sentences for the caller, and no text for the terminal. */
   def.rate = -1;
   const bool refused = h6CreateSession(model, &def, &error) == NULL && error.code != H6_NO_ERROR;
   h6DestroySession(session), h6DestroyModel(model);
+  pthread_mutex_lock(&pool.lock);
+  pool.state = ENDS;
+  pthread_cond_broadcast(&pool.changed);
+  pthread_mutex_unlock(&pool.lock);
+  pthread_join(pool.thread, NULL);
   struct stat written;
   fstat(out, &written);
   dup2(terminal, 1);
-  dprintf(1, "%ld allocations in 2000 steps, %d thread, %ld bytes said, %ld tasks, %s\n", allocated,
-          running, (long)written.st_size, tasks,
-          refused && ours_before > 0 ? "refused" : "not refused");
+  dprintf(1, "%ld allocations in 2000 steps, %d threads, %ld bytes said, %ld tasks, %s, %ld line, %s\n",
+          allocated, running, (long)written.st_size, tasks,
+          refused && ours_before > 0 ? "refused" : "not refused", lines,
+          pool.ran > 0 ? "helped by the pool" : "never helped");
   return 0;
 }

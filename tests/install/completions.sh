@@ -12,7 +12,8 @@ if command -v man >/dev/null && [ -n "$(command -v groff || true)" ]; then
   [ -z "$said" ] || fail "the man page: $said"
 fi
 count=0
-for command in "" bake "bake field" "bake shell" "bake deformable" check run report replay info devices scene demo experiments map study; do
+for command in "" new bake "bake field" "bake shell" "bake deformable" check run report export replay info devices scene "scene list" \
+  "scene export" demo experiments map study; do
   for option in $("$PROGRAM" $command --help | grep -oE '^ +(-[a-zA-Z],)?--[a-z-]+' | grep -oE -- '--[a-z-]+'); do
     grep -qF -- "$(sed 's/-/\\-/g' <<<"$option")" "$WORK/hapsix.1" || fail "the man page lacks $option of '$command'"
     count=$((count + 1))

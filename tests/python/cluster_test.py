@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""hapsix study --scheduler: on three workers of which one is killed, the table is that of this machine."""
+"""hapsix study and map with --scheduler: on workers of which one is killed, tables are those of this machine."""
 import glob
 import json
 import os
@@ -121,6 +121,28 @@ class Studies(unittest.TestCase):
         code, error = self.study("there", "--scheduler", cluster.address)
         self.assertEqual(code, 0, error)
         self.assertEqual(self.table("there"), self.table("here"))
+
+    def test_a_map_there_has_the_rows_of_this_machine_though_a_worker_is_killed(self):
+        def rows(name, *arguments):
+            process = subprocess.Popen(
+                [PROGRAM, "map", "--scenes", "cone-in-gap,box-over-wire", "--methods", "global", "--variations", "3",
+                 "--csv", self.at(name), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                env=self.environment)
+            return process
+        here = rows("here.csv")
+        said_here = here.communicate()[0]
+        cluster = Cluster(self.folder, 2, self.environment)
+        self.addCleanup(cluster.close)
+        there = rows("there.csv", "--scheduler", cluster.address)
+        time.sleep(2)
+        os.killpg(cluster.workers[0].pid, signal.SIGKILL)
+        said_there, error = there.communicate()
+        self.assertEqual((here.returncode, there.returncode), (0, 0), error)
+        self.assertEqual(said_there, said_here)
+        with open(self.at("here.csv")) as one, open(self.at("there.csv")) as two:
+            table = one.read()
+            self.assertEqual(two.read(), table)
+        self.assertGreater(table.count("\n"), 2 * 3 * 2 * 3)
 
     def test_a_missing_scheduler_and_a_wrong_program_get_one_sentence(self):
         self.write("study.json", dict(PLAN, repeats=1))

@@ -2,6 +2,8 @@
 #include "io/experiments/map/map.h"
 
 #include <algorithm>
+#include <bit>
+#include <nlohmann/json.hpp>
 
 #include "io/experiments/probe.h"
 #include "io/scenes/scenes.h"
@@ -121,24 +123,69 @@ std::vector<MethodColumn> map_methods() {
   return out;
 }
 
-std::vector<MapScene> run_map(const MapOptions& options, const Console& console) {
-  std::vector<MapScene> out;
+MapPlan plan_map(const MapOptions& options) {
+  MapPlan out;
   for (const std::string& name : options.scenes.empty() ? map_scene_names() : options.scenes)
-    out.push_back(planned(name, options));
-  std::vector<std::function<void()>> jobs;
-  for (std::size_t s = out.size(); s-- > 0;)  // in reverse: the last scenes take longest
-    if (out[s].left_out.empty())
-      for (MapVariation& v : out[s].variations)
-        jobs.push_back(
-            [&scene = out[s], &v, &options] { run_variation(scene, options.methods, v); });
-  run_jobs(jobs, console, "variations", options.jobs);
-  for (MapScene& scene : out) {  // a scene that can never be varied has no rows
+    out.scenes.push_back(planned(name, options));
+  for (std::size_t s = out.scenes.size(); s-- > 0;)  // in reverse: the last scenes take longest
+    if (out.scenes[s].left_out.empty())
+      for (std::size_t v = 0; v < out.scenes[s].variations.size(); ++v) out.jobs.push_back({s, v});
+  return out;
+}
+
+void run_job(const MapOptions& options, MapPlan& plan, std::size_t job) {
+  MapScene& scene = plan.scenes[plan.jobs[job].scene];
+  run_variation(scene, options.methods, scene.variations[plan.jobs[job].variation]);
+}
+
+std::string job_line(const MapPlan& plan, std::size_t job) {
+  const MapVariation& v = plan.scenes[plan.jobs[job].scene].variations[plan.jobs[job].variation];
+  const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
+  nlohmann::json runs = nlohmann::json::array();
+  for (const MapRun& r : v.runs)
+    runs.push_back({static_cast<int>(r.verdict), r.held, r.torque_noise, bits(r.depth),
+                    bits(r.late_speed), bits(r.late_depth_swing), r.error});
+  nlohmann::json newtons = nlohmann::json::array();
+  for (const double n : v.newtons) newtons.push_back(bits(n));
+  return nlohmann::json{{"error", v.error}, {"newtons", newtons}, {"runs", runs}}.dump(
+      -1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+bool take_job_line(MapPlan& plan, std::size_t job, const std::string& line) try {
+  MapVariation& v = plan.scenes[plan.jobs[job].scene].variations[plan.jobs[job].variation];
+  const auto number = [](const nlohmann::json& x) {
+    return std::bit_cast<double>(x.get<std::uint64_t>());
+  };
+  const nlohmann::json all = nlohmann::json::parse(line);
+  v.error = all.at("error");
+  for (std::size_t i = 0; i < kMapForces; ++i) v.newtons[i] = number(all.at("newtons").at(i));
+  v.runs.clear();
+  for (const nlohmann::json& r : all.at("runs"))
+    v.runs.push_back({static_cast<io::Verdict>(r.at(0).get<int>()), r.at(1), r.at(2),
+                      number(r.at(3)), number(r.at(4)), number(r.at(5)), r.at(6)});
+  return true;
+} catch (const nlohmann::json::exception&) {
+  return false;
+}
+
+// A scene that can never be varied has no rows.
+std::vector<MapScene> finish_map(MapPlan&& plan) {
+  for (MapScene& scene : plan.scenes) {
     const auto made = [](const MapVariation& v) { return v.error.empty(); };
     const auto& all = scene.variations;
     if (scene.left_out.empty() && !all.empty() && std::none_of(all.begin(), all.end(), made))
       scene.left_out = all.front().error;
   }
-  return out;
+  return std::move(plan.scenes);
+}
+
+std::vector<MapScene> run_map(const MapOptions& options, const Console& console) {
+  MapPlan plan = plan_map(options);
+  std::vector<std::function<void()>> jobs;
+  for (std::size_t i = 0; i < plan.jobs.size(); ++i)
+    jobs.push_back([&, i] { run_job(options, plan, i); });
+  run_jobs(jobs, console, "variations", options.jobs);
+  return finish_map(std::move(plan));
 }
 
 }  // namespace h6::cli

@@ -60,6 +60,21 @@ struct MapScene {
 
 std::vector<MapScene> run_map(const MapOptions& options, const Console& console);
 
+// The map in parts, for runs on other machines. A job is one variation of one scene.
+struct MapPlan {
+  std::vector<MapScene> scenes;  // with their variations drawn and nothing run
+  struct Job {
+    std::size_t scene, variation;
+  };
+  std::vector<Job> jobs;
+};
+MapPlan plan_map(const MapOptions& options);
+void run_job(const MapOptions& options, MapPlan& plan, std::size_t job);
+// The runs of a job as one line of text, and back to the bit. False: this is no such line.
+std::string job_line(const MapPlan& plan, std::size_t job);
+bool take_job_line(MapPlan& plan, std::size_t job, const std::string& line);
+std::vector<MapScene> finish_map(MapPlan&& plan);
+
 // The method's net stiffness on a flat wall, in k: the slope of the contact force of a box's bottom
 // of 20 x 20 mm with 40 x 40 points that is pressed onto a plate. Zero when it cannot be measured.
 double wall_stiffness(const h6ContactDef& contact, const MethodColumn& method);

@@ -164,6 +164,22 @@ TEST_CASE("sentences that no call returns go to the log, and nowhere without one
   CHECK(lines.size() == 1);
 }
 
+TEST_CASE("a program hears of a failed assertion and says whether it goes on") {
+  static std::vector<std::string> heard;
+  h6SetAssertHandler([](const char* condition, const char* file, int line) {
+    heard.push_back(std::string(condition) + " " + file + ":" + std::to_string(line));
+    return 0;
+  });
+  const int went_on = h6AssertFailed("1 < 0", "here.cpp", 7);
+  h6SetAssertHandler([](const char*, const char*, int) { return 1; });
+  const int stopped = h6AssertFailed("2 < 0", "here.cpp", 8);
+  h6SetAssertHandler(nullptr);
+  CHECK(went_on == 0);
+  CHECK(stopped == 1);
+  REQUIRE(heard.size() == 1);
+  CHECK(heard[0] == "1 < 0 here.cpp:7");
+}
+
 TEST_CASE("of two threads that step one session, one steps and the other gets a fault") {
   OnePart scene = box_on_floor();
   scene.bodies[1].pose = pose(0, 0, 6 * mm);
