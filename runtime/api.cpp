@@ -244,7 +244,9 @@ void h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* inp
   HandDevice& to = *device;
   to.guard.repeat(input->asked);
   to.lost = (input->asked & H6_ASKED_LOST) != 0;
-  to.overdue = input->overdue > 0 ? std::min(input->overdue, kMost) : 0;
+  const bool slow = (input->asked & H6_ASKED_SLOW) != 0;
+  (slow ? to.missed : to.overdue) = input->overdue > 0 ? std::min(input->overdue, kMost) : 0;
+  (slow ? to.overdue : to.missed) = 0;
 }
 void h6GetSafety(const h6Session* session, int32_t hand, h6HandSafety* out) {
   if (!out) return;

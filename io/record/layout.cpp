@@ -47,7 +47,7 @@ const std::vector<Column>& columns() {
        "state", true},
       {"sequence", n32, 1, hand + offsetof(h6DeviceSample, sequence), hands, "1", "sequence", true},
       {"safety_asked", n32, 1, input + offsetof(h6SafetyInput, asked), sizeof(h6SafetyInput),
-       "bits: 1 arm, 2 disarm, 4 lost, 8 from a fault, 16 from disarmed; fault << 8",
+       "bits: 1 arm, 2 disarm, 4 lost, 8 from a fault, 16 from disarmed, 32 slow; fault << 8",
        "safety_asked", true},
       {"overdue", real, 1, input + offsetof(h6SafetyInput, overdue), sizeof(h6SafetyInput), "s",
        "overdue", true},

@@ -37,27 +37,27 @@ void DeviceWatch::set(const h6SafetyDef& def, const h6DeviceCapabilities& device
 // A device may rest, and its encoders with it, so the same pose alone proves nothing. Three things
 // do: a sample count that stands still, a freeze time in the rating, or a velocity that would have
 // changed the pose.
-bool DeviceWatch::hangs(const h6DeviceSample& sample, double dt) {
+bool DeviceWatch::hangs(const h6DeviceSample& sample, double since) {
   const bool counts = sample.sequence != 0 || last_.sequence != 0;
   const bool same =
       seen_ && (counts ? sample.sequence == last_.sequence : same_bits(sample, last_));
-  same_for_ = same ? same_for_ + dt : 0;
+  same_for_ = same ? same_for_ + since : 0;
   if (!same) return false;
   const double limit = freeze_time_ > 0 ? freeze_time_ : counts ? kCountedFreeze : 0;
-  const double slack = 0.5 * dt;  // sums of dt round
+  constexpr double slack = 1e-6;  // sums of frames round
   if (limit > 0 && same_for_ >= limit - slack) return true;
   if (simulated_) return false;  // a simulated device, or a program's own samples
   const double speed = speed_of(from(sample.velocity.linear), from(sample.velocity.angular));
   return same_for_ > kSlowest + slack && speed * same_for_ > jump_;
 }
 
-void DeviceWatch::see(const h6DeviceSample& sample, bool usable, double dt) {
+void DeviceWatch::see(const h6DeviceSample& sample, bool usable, double since) {
   usable_ = usable;
   jumped_ = false;
-  since_ += dt;
+  since_ += since;
   held_ = dead_man_ == 0 || (usable && (sample.buttons & dead_man_) != 0);
   if (!usable) return;
-  frozen_ = hangs(sample, dt);
+  frozen_ = hangs(sample, since);
   if (seen_) {
     const Vec3 way = from(sample.pose.p) - from(last_.pose.p);
     const Vec3 turn = log_rotation(from(sample.pose.q).normalized() *

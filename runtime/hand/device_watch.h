@@ -16,8 +16,9 @@ class DeviceWatch {
  public:
   void set(const h6SafetyDef& def, const h6DeviceCapabilities& device);
 
-  // Once a frame of `dt` seconds, with the device's own sample. `usable`: it is finite.
-  void see(const h6DeviceSample& sample, bool usable, double dt);
+  // Once a frame, `since` seconds after the last one, with the device's own sample. `usable`: it is
+  // finite.
+  void see(const h6DeviceSample& sample, bool usable, double since);
 
   bool seen() const { return seen_; }      // a usable sample has come in some frame
   bool usable() const { return usable_; }  // this frame's sample is usable
@@ -28,7 +29,7 @@ class DeviceWatch {
   double speed() const { return speed_; }
 
  private:
-  bool hangs(const h6DeviceSample& sample, double dt);
+  bool hangs(const h6DeviceSample& sample, double since);
   double jump_ = 0.02, freeze_time_ = 0;
   bool simulated_ = false;
   std::uint32_t dead_man_ = 0;

@@ -202,7 +202,8 @@ void OutputGuard::suffer(h6Cause cause, double seconds) {
   if (trouble_ >= limits_.decay_time - 1e-9) fault(cause);
 }
 
-void OutputGuard::note(const DeviceWatch& watch, bool lost, double overdue, double dt) {
+void OutputGuard::note(const DeviceWatch& watch, bool lost, const Delay& delay, double dt) {
+  const double overdue = delay.overdue, elapsed = dt + delay.missed;
   const bool hangs = watch.seen() && watch.frozen();
   may_arm_ = !lost && watch.seen() && watch.usable() && !hangs;
   speed_ = watch.speed();
@@ -210,6 +211,7 @@ void OutputGuard::note(const DeviceWatch& watch, bool lost, double overdue, doub
   falling_ = H6_CAUSE_NONE;
   if (lost) asked_ |= H6_ASKED_LOST;
   input_ = {asked_, overdue};
+  if (delay.missed > 0) input_ = {asked_ | H6_ASKED_SLOW, delay.missed};
   if (lost) fault(H6_CAUSE_DEVICE_LOST);
   if (overdue > 0) note_cause(H6_CAUSE_LATE);  // also after a fault of another cause
   const bool trouble = overdue > 0 || hangs || !watch.usable();
@@ -220,21 +222,21 @@ void OutputGuard::note(const DeviceWatch& watch, bool lost, double overdue, doub
     if (!watch.held()) grace_ = 0;  // the gain falls already
     // The frame after the last command counts as no delay, once.
     if (overdue > 0) suffer(H6_CAUSE_LATE, grace_ > 0 ? overdue : overdue + dt);
-    if (hangs) suffer(H6_CAUSE_FROZEN, dt);
-    if (!watch.usable()) suffer(H6_CAUSE_BAD_SAMPLE, dt);
+    if (hangs) suffer(H6_CAUSE_FROZEN, elapsed);
+    if (!watch.usable()) suffer(H6_CAUSE_BAD_SAMPLE, elapsed);
   }
   if (armed() && !trouble) {
     if (speed_ >= limits_.cut_speed && (watch.held() || gain_ > 0)) fault(H6_CAUSE_OVERSPEED);
     if (watch.held()) {
       rise(dt);
     } else {
-      fall(dt);
+      fall(elapsed);
       falling_ = H6_CAUSE_DEAD_MAN;
       note_cause(falling_);
     }
   }
   if (!armed_ && fault_ == H6_CAUSE_NONE) {
-    fall(dt + overdue);
+    fall(elapsed + overdue);
     falling_ = H6_CAUSE_DISARMED;
     note_cause(falling_);
   }

@@ -66,9 +66,14 @@ class OutputGuard {
   void set_limits(const SafetyLimits& limits) { limits_ = limits; }
   const SafetyLimits& limits() const { return limits_; }
 
-  // Begins a frame. `lost`: the device could not be read or written. `overdue`: how much later than
-  // one frame after the last command the next one comes; 0: it is in time [s].
-  void note(const DeviceWatch& watch, bool lost, double overdue, double dt);
+  struct Delay {
+    double overdue = 0;  // how much later than a frame after the last command the next one comes [s]
+    double missed = 0;   // how much longer than dt the last frame lasted, its command in time [s]
+  };
+  // Begins a frame. `lost`: the device could not be read or written. A command that is overdue is
+  // trouble. Missed time is not, but the device felt the last command for that long, so the clocks
+  // of other troubles count it.
+  void note(const DeviceWatch& watch, bool lost, const Delay& delay, double dt);
   // Adds a cause of this frame, from a stage before the chain.
   void note_cause(h6Cause cause) { causes_ |= 1u << cause; }
 

@@ -42,6 +42,7 @@ struct h6Loop {
   std::atomic<int> request{kNothing};
   h6::DeviceGate gate;
   std::int64_t sent_at = 0;                       // time of the last commands, 0: none yet [ns]
+  std::int64_t read_at = 0;                       // ... and samples
   std::uint64_t trips = 0;                        // trips of the watchdog that were handled
   bool stepped = false;                           // this tick was a frame
   bool joined = false;                            // the session may be another loop's now
@@ -115,9 +116,13 @@ void read_devices(h6Loop& loop, double time) {
     if (loop.devices[h].read(loop.devices[h].self, time, &loop.samples[h]) != 0) lose(loop, h);
   if (loop.def.virtual_time || loop.sent_at == 0) return;
   // No command is late for a device that lives in the time of frames.
-  const double since = 1e-9 * static_cast<double>(sched::now_ns() - loop.sent_at);
+  const std::int64_t now = sched::now_ns(), before = loop.read_at;
+  loop.read_at = now;
+  const double since = 1e-9 * static_cast<double>(now - loop.sent_at),
+               lasted = before == 0 ? 0 : 1e-9 * static_cast<double>(now - before);
   for (std::size_t h = 0; h < s.hands.size(); ++h)
-    if (!loop.devices[h].capabilities.frame_time) note_interval(s.devices[h], s.settings.dt, since);
+    if (!loop.devices[h].capabilities.frame_time)
+      note_interval(s.devices[h], s.settings.dt, since, lasted);
 }
 
 // Replaces commands that were computed before the devices were stopped.

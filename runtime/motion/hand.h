@@ -34,12 +34,14 @@ struct HandDevice {
   // The caller sets these for the next frame.
   bool lost = false;   // the device could not be read or written
   double overdue = 0;  // how much too late the next command comes [s]
+  double missed = 0;   // how much longer than dt the last frame lasted, its command in time [s]
   bool passivity = false;
   HandPort port;
 };
 
 void set_rating(HandDevice& device, const h6DeviceCapabilities& capabilities);
 // `seconds`: the time from the last command to the next one, which is late when a frame is missing.
-void note_interval(HandDevice& device, double dt, double seconds);
+// `lasted`: the time from the begin of the last frame to that of the next one; 0: not known.
+void note_interval(HandDevice& device, double dt, double seconds, double lasted = 0);
 
 }  // namespace h6

@@ -25,10 +25,10 @@ bool watched(HandDevice& device, const h6DeviceSample& given, double dt, h6Statu
   const bool finite = usable(given.pose, given.velocity), good = finite && !device.lost;
   if (device.lost) status |= H6_DEVICE_LOST;
   if (!finite) status |= H6_HAND_NOT_FINITE;
-  device.watch.see(given, good, dt);
-  device.guard.note(device.watch, device.lost, device.overdue, dt);
+  device.watch.see(given, good, dt + device.overdue + device.missed);
+  device.guard.note(device.watch, device.lost, {device.overdue, device.missed}, dt);
   device.lost = false;
-  device.overdue = 0;
+  device.overdue = device.missed = 0;
   return good;
 }
 
@@ -39,8 +39,9 @@ void set_rating(HandDevice& device, const h6DeviceCapabilities& capabilities) {
   device.watch.set(device.safety, capabilities);
 }
 
-void note_interval(HandDevice& device, double dt, double seconds) {
+void note_interval(HandDevice& device, double dt, double seconds, double lasted) {
   device.overdue = seconds > 2 * dt ? std::min(seconds, kMost) - dt : 0;
+  device.missed = device.overdue == 0 && lasted > 1.5 * dt ? std::min(lasted, kMost) - dt : 0;
 }
 
 void accept(HandDevice& device, Hand& hand, const Body& body, const h6DeviceSample& given,

@@ -161,14 +161,17 @@ H6_API void h6NoteInterval(h6Session* session, double seconds);
  * repeats a recorded run to the bit, also where outputs move bodies (admittance modes). */
 typedef struct h6SafetyInput {
   uint32_t asked;         /* H6_ASKED_*; a fault's h6Cause in the byte from bit 8 on               */
-  double   overdue;       /* how late the command of this step comes                          [s]  */
+  double   overdue;       /* how late the command of this step comes; with H6_ASKED_SLOW: how much
+                             longer than a step the last one lasted                           [s]  */
 } h6SafetyInput;
 enum {
   H6_ASKED_ARM          = 1u << 0,
   H6_ASKED_DISARM       = 1u << 1, /* after an H6_ASKED_ARM of the same step                       */
   H6_ASKED_LOST         = 1u << 2, /* the device could not be read, or written before              */
   H6_ASKED_FROM_FAULT   = 1u << 3, /* H6_ASKED_ARM found a fault and cleared it                    */
-  H6_ASKED_FROM_DISARMED= 1u << 4  /* H6_ASKED_ARM found the hand disarmed                         */
+  H6_ASKED_FROM_DISARMED= 1u << 4, /* H6_ASKED_ARM found the hand disarmed                         */
+  H6_ASKED_SLOW         = 1u << 5  /* the command comes in time, after a step that took longer than
+                                      its time: `overdue` moves the chain's clocks on, and no more */
 };
 H6_API h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand);
 H6_API void          h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input);

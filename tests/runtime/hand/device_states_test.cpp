@@ -38,10 +38,10 @@ struct Chain {
     REQUIRE(force() == kForce);
     REQUIRE(state() == H6_ACTIVE);
   }
-  double step(bool lost = false, double overdue = 0) {
+  double step(bool lost = false, double overdue = 0, double missed = 0) {
     h6Status status = 0;
-    watch.see(sample, finite(sample.pose) && !lost, kFrame);
-    guard.note(watch, lost, overdue, kFrame);
+    watch.see(sample, finite(sample.pose) && !lost, kFrame + overdue + missed);
+    guard.note(watch, lost, {overdue, missed}, kFrame);
     command = guard.pass({{kForce, 0, 0}, {}}, {}, kFrame, &status);
     return force();
   }
@@ -134,6 +134,22 @@ TEST_CASE("a device with a freeze time is frozen when its samples repeat for tha
   }
   for (int i = 0; i < 99; ++i) REQUIRE(chain.step() == kForce);
   chain.decays(H6_CAUSE_FROZEN);
+}
+
+TEST_CASE("frames that last three times as long: no trouble, and the clocks of troubles run on") {
+  const double missed = 2 * kFrame;
+  Chain chain(0, 0.05);
+  for (int i = 0; i < 300; ++i) {
+    chain.sample.pose.p.x += 1e-9;
+    REQUIRE(chain.step(false, 0, missed) == kForce);
+  }
+  CHECK(chain.command.causes == 0);
+  // 50 ms of equal samples, a frame on hold and 20 ms of decay.
+  int frames = 0;
+  while (chain.step(false, 0, missed) > 0) ++frames;
+  CHECK(frames >= 16);
+  CHECK(frames <= 24);
+  CHECK(chain.says(H6_CAUSE_FROZEN));
 }
 
 TEST_CASE("a pose that stands still with a velocity is frozen") {
@@ -245,7 +261,7 @@ TEST_CASE("before the first sample a device is absent, and the first sample find
   for (int i = 0; i < 100; ++i) {
     if (i == 50) sample.pose.p.x = 0;
     watch.see(sample, finite(sample.pose), kFrame);
-    guard.note(watch, false, 0, kFrame);
+    guard.note(watch, false, {}, kFrame);
     CHECK(guard.state() == (i < 50 ? H6_ABSENT : H6_READY));
     CHECK(guard.pass({{1, 0, 0}, {}}, {}, kFrame, &status).wrench.force.x == 0);
   }

@@ -49,7 +49,7 @@ struct Chain {
   void begin(bool lost = false, double overdue = 0) {
     status = 0;
     watch.see(sample, finite(sample.pose) && !lost, kFrame);
-    guard.note(watch, lost, overdue, kFrame);
+    guard.note(watch, lost, {overdue}, kFrame);
   }
   h6DeviceCommand step(const h6Wrench& wanted, const h6Velocity& hand = kStill) {
     begin();

@@ -30,6 +30,10 @@ struct Pusher {
   std::atomic<bool> refuses{false};
   int fail_read_at = -1, fail_write_at = -1, nan_at = -1;
   int reads = 0;
+  int hangs_at = -1;
+  std::chrono::microseconds write_takes{0};
+  double hung = 0;
+  std::uint64_t counted = 0;
 
   h6Device device() {
     h6Device d{};
@@ -37,12 +41,16 @@ struct Pusher {
     d.capabilities.max_force = 20, d.capabilities.max_torque = 2;
     d.read = [](void* self, double t, h6DeviceSample* out) {
       auto& p = *static_cast<Pusher*>(self);
+      if (p.hangs_at < 0 || p.reads < p.hangs_at) p.hung = t, ++p.counted;
+      t = p.hung;
       *out = hand_at(pose(0, 0, (5.2 - 3 * std::min(1.0, 10 * t)) * mm));
+      if (p.hangs_at >= 0) out->sequence = p.counted;
       if (p.reads == p.nan_at) out->pose.p.x = NAN;
       return p.reads++ == p.fail_read_at ? -1 : 0;
     };
     d.write = [](void* self, double, const h6DeviceCommand* c) {
       auto& p = *static_cast<Pusher*>(self);
+      if (p.write_takes.count() > 0) std::this_thread::sleep_for(p.write_takes);
       p.written.push_back(*c);
       ++p.writes;
       return static_cast<int>(p.written.size()) - 1 == p.fail_write_at ? -1 : 0;
@@ -162,6 +170,34 @@ TEST_CASE("a device that fails gets zero force from then on, with the cause") {
       REQUIRE(scene.pusher.written[i].wrench.force.z == 0);
       REQUIRE(scene.pusher.written[i].cause == H6_CAUSE_DEVICE_LOST);
     }
+  }
+}
+
+TEST_CASE("slow frames: a device that hangs loses its force by the clock on the wall") {
+  Scene scene;
+  // Each write takes 2.2 ms, and from the 100th reading on the sample is the same.
+  scene.pusher.write_takes = std::chrono::microseconds(2200);
+  scene.pusher.hangs_at = 100;
+  const Scene::Run run = scene.run(0.4, false);
+  std::size_t frozen = 0, slow = 0, zero = 0;
+  for (const h6FrameRecord& row : run.records) {
+    const bool pushes = row.command[0].wrench.force.z > 0;
+    slow += (row.safety_input[0].asked & H6_ASKED_SLOW) != 0;
+    if (row.report.frame > 100 && pushes) ++frozen;
+    if (row.report.frame > 100 && !pushes) ++zero;
+  }
+  CHECK(slow > 50);
+  CHECK(zero > 0);
+  CHECK(frozen < 40);  // 70 at one millisecond a frame
+  // With the same input of the chain, the frames come out the same to the bit.
+  Scene again;
+  const h6Device device = again.pusher.device();
+  h6SetRating(again.session, 0, &device.capabilities);
+  for (const h6FrameRecord& row : run.records) {
+    h6SetSafetyInput(again.session, 0, &row.safety_input[0]);
+    h6DeviceCommand command;
+    h6Step(again.session, &row.hand[0], &command);
+    REQUIRE(command.wrench.force.z == row.command[0].wrench.force.z);
   }
 }
 
