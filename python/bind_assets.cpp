@@ -397,7 +397,8 @@ void add_models(py::module_& m) {
                                                 "Fields and shells, immutable, shared by sessions.")
       .def(py::init(&make_model), py::arg("fields"), py::arg("shells"))
       .def_property_readonly("bytes",
-                             [](const PyModel& model) { return h6ModelBytes(model.get()); })
+                             [](const PyModel& model) { return h6ModelBytes(model.get()); },
+                             "memory that the model holds")
       .def("sample_field", &sample_field, py::arg("field"), py::arg("points"),
            "points (n, 3) in the field's mesh frame [m] -> distance (n,) [m], gradient (n, 3), "
            "exact "
@@ -434,7 +435,8 @@ void add_scenes(py::module_& m) {
                                auto model = std::make_shared<PyModel>();
                                model->scene = scene;
                                return model;
-                             })
+                             },
+                             "made of the scene's parts; it lives as long as the scene")
       .def(
           "definition",
           [](const PyScene& scene) {

@@ -185,9 +185,9 @@ void add_batch(py::module_& m) {
            "7), or "
            "where the definition puts them. Samples start there, at rest.")
       .def("__len__", &Batch::count)
-      .def_property_readonly("hands", &Batch::hands)
-      .def_property_readonly("threads", &Batch::threads)
-      .def_property_readonly("model", &Batch::model)
+      .def_property_readonly("hands", &Batch::hands, "how many each session has")
+      .def_property_readonly("threads", &Batch::threads, "that step the sessions")
+      .def_property_readonly("model", &Batch::model, "that all sessions share")
       .def_property_readonly("pose", hand_rows(&Batch::pose, true),
                              "(count, hands, 7) samples, to be written [m]")
       .def_property_readonly("velocity", hand_rows(&Batch::velocity, true),

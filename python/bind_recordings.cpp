@@ -76,14 +76,17 @@ void add_reader(py::module_& m) {
            "['hand'] (n, 8), ['command'], ['body'], ...; the member names of h6FrameRecord")
       .def_property_readonly(
           "rate", [](const PyRecording& r) { return r.info.rate; }, "[Hz]")
-      .def_property_readonly("hands", [](const PyRecording& r) { return r.info.hands; })
+      .def_property_readonly(
+          "hands", [](const PyRecording& r) { return r.info.hands; }, "how many each frame has")
       .def_property_readonly(
           "whole", [](const PyRecording& r) { return r.info.whole; }, "False: the run was killed")
       .def_property_readonly(
           "scene", [](const PyRecording& r) { return r.info.scene; }, "JSON, or ''")
       .def_property_readonly(
           "summary", [](const PyRecording& r) { return r.info.summary; }, "JSON, or ''")
-      .def_property_readonly("program", [](const PyRecording& r) { return r.info.program; })
+      .def_property_readonly(
+          "program", [](const PyRecording& r) { return r.info.program; },
+          "name and version of what recorded it")
       .def_property_readonly("events", &events_of, "list of (time [s], what, detail)");
 }
 

@@ -258,11 +258,14 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
       .def(
           "note_interval", [](S& s, double seconds) { h6NoteInterval(s.session, seconds); },
           py::arg("seconds"), "From the last commands to the next [s], for a loop in real time.")
-      .def_property_readonly("hands", [](const S& s) { return s.hands; })
-      .def_property_readonly("bodies", [](const S& s) { return s.bodies; })
+      .def_property_readonly(
+          "hands", [](const S& s) { return s.hands; }, "how many there are")
+      .def_property_readonly(
+          "bodies", [](const S& s) { return s.bodies; }, "how many there are")
       .def_property_readonly(
           "rate", [](const S& s) { return s.rate; }, "[Hz]")
-      .def_property_readonly("model", [](const S& s) { return s.model; });
+      .def_property_readonly(
+          "model", [](const S& s) { return s.model; }, "whose fields and shells it uses");
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ class Batch:
         """(count,) points that touch"""
     @property
     def hands(self) -> int:
-        ...
+        """how many each session has"""
     @property
     def max_depth(self) -> NDArray[Any]:
         """(count,) [m]"""
@@ -46,7 +46,7 @@ class Batch:
         """(count,)"""
     @property
     def model(self) -> Model:
-        ...
+        """that all sessions share"""
     @property
     def pose(self) -> NDArray[Any]:
         """(count, hands, 7) samples, to be written [m]"""
@@ -64,7 +64,7 @@ class Batch:
         all."""
     @property
     def threads(self) -> int:
-        ...
+        """that step the sessions"""
     @property
     def velocity(self) -> NDArray[Any]:
         """(count, hands, 6) of the samples [m/s, rad/s]"""
@@ -323,7 +323,7 @@ class Model:
         ...
     @property
     def bytes(self) -> int:
-        ...
+        """memory that the model holds"""
     def sample_field(self, field: int, points: ArrayLike) -> tuple:
         """points (n, 3) in the field's mesh frame [m] -> distance (n,) [m], gradient (n,
         3), exact (n,) bool: a sample, not a bound"""
@@ -359,10 +359,10 @@ class Recording:
         names of h6FrameRecord"""
     @property
     def hands(self) -> int:
-        ...
+        """how many each frame has"""
     @property
     def program(self) -> str:
-        ...
+        """name and version of what recorded it"""
     @property
     def rate(self) -> float:
         """[Hz]"""
@@ -422,7 +422,7 @@ class Scene:
         """[s]"""
     @property
     def model(self) -> Model:
-        ...
+        """made of the scene's parts; it lives as long as the scene"""
     def path(self, hand: int, time: float) -> tuple:
         """Where the scene's hand wants to be at a time [s]: pose (7,), velocity (6,)."""
 
@@ -434,7 +434,7 @@ class Session:
         """Clears faults and starts again softly."""
     @property
     def bodies(self) -> int:
-        ...
+        """how many there are"""
     def body(self, body: int) -> NDArray[Any]:
         """(13,) pose (7) and velocity (6) of a body; a copy"""
     @property
@@ -464,10 +464,10 @@ class Session:
         [m], ['frame_us'], ['state_hash'], ...; a copy"""
     @property
     def hands(self) -> int:
-        ...
+        """how many there are"""
     @property
     def model(self) -> Model:
-        ...
+        """whose fields and shells it uses"""
     def note_interval(self, seconds: float) -> None:
         """From the last commands to the next [s], for a loop in real time."""
     @property

@@ -19,9 +19,10 @@ import hapsix
 try:
     import gymnasium
     from gymnasium.spaces import Box
+    from gymnasium.vector import VectorEnv as _VectorBase
     _Base = gymnasium.Env
 except ImportError:
-    _Base = object
+    _Base = _VectorBase = object
 
     class Box:
         """What Gymnasium's Box is here: bounds, a shape, samples."""
@@ -119,9 +120,17 @@ def _near(q, to, most):
     return np.where(angle > most, _turned(to, turns), q)
 
 
-class AssemblyVectorEnv:
-    """num_envs episodes of a task side by side. With autoreset an episode that ends begins anew in the
-    same step: infos["final"] has its index and infos["final_observation"] its last observation.
+def _autoreset_mode(same_step):
+    """What Gymnasium's vector environments say in their metadata, from version 1.1 on."""
+    modes = getattr(getattr(globals().get("gymnasium"), "vector", None), "AutoresetMode", None)
+    return {"autoreset_mode": modes.SAME_STEP if same_step else modes.DISABLED} if modes else {}
+
+
+class AssemblyVectorEnv(_VectorBase):
+    """num_envs episodes of a task side by side, with the interface of gymnasium.vector.VectorEnv. With
+    autoreset an episode that ends begins anew in the same step: infos["_final_obs"] (num_envs,) says which
+    ended, and infos["final_obs"] (num_envs, 22) has their last observations. Without it they go on until
+    reset(options={"reset_mask": (num_envs,) bool}) begins those anew.
 
     observation (num_envs, 22) float32: way to the goal (3) [mm], quaternion (4), velocity (6) [mm/s,
     rad/s], wrench on the hand (6) [10 N, 0.1 N m], way from the part to the hand (3) [mm]
@@ -130,8 +139,14 @@ class AssemblyVectorEnv:
     task: one of TASKS, by name, or a Task of your own. threads: 0: one for each core.
     """
 
+    metadata = {"render_modes": []}
+    render_mode = None
+    spec = None
+    closed = False
+
     def __init__(self, num_envs=1, task=PEG_IN_HOLE, threads=0, autoreset=True):
         task = _task_of(task)
+        self.metadata = dict(self.metadata, **_autoreset_mode(autoreset))
         self.task, self.num_envs, self.autoreset = task, num_envs, autoreset
         self._scene = hapsix.Scene(task.scene)
         definition = self._scene.definition()
@@ -144,7 +159,17 @@ class AssemblyVectorEnv:
         self.action_space = Box(-1, 1, (num_envs, 6), np.float32)
         self._goal = np.asarray(task.goal, float)
         self._age = np.zeros(num_envs, int)
-        self._random = np.random.default_rng()
+        self._seed(None)
+
+    def _seed(self, seed):
+        """One generator an episode, so that its starts do not depend on the others."""
+        if seed is None or np.ndim(seed) == 0:
+            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{len(seeds)} seeds for {self.num_envs} environments")
+        self._starts = [np.random.default_rng(s) for s in seeds]
 
     @property
     def batch(self):
@@ -152,18 +177,25 @@ class AssemblyVectorEnv:
         return self._batch
 
     def reset(self, *, seed=None, options=None):
-        """All episodes begin anew: observations, infos. The same seed gives the same starts."""
+        """All episodes begin anew, or those of options["reset_mask"]: observations, infos. The same seed
+        gives the same starts; episode i has seed + i, or seed[i] of a list."""
         if seed is not None:
-            self._random = np.random.default_rng(seed)
-        self._begin(np.arange(self.num_envs))
+            self._seed(seed)
+        which = np.arange(self.num_envs)
+        if options and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"])
+            if mask.shape != (self.num_envs,) or mask.dtype != bool:
+                raise ValueError(f"reset_mask is ({self.num_envs},) of bool, not {mask.shape} of {mask.dtype}")
+            which = np.flatnonzero(mask)
+        self._begin(which)
         return self._observe(), {}
 
     def _begin(self, which):
         n = len(which)
         poses = np.empty((n, 1, 7))
-        poses[:, 0, :3] = self.task.start + self._random.uniform(-1, 1, (n, 3)) * self.task.spread
-        turns = self._random.uniform(-1, 1, (n, 3)) * self.task.tilt
-        poses[:, 0, 3:] = _turned(np.tile(self._upright, (n, 1)), turns)
+        drawn = np.array([self._starts[i].uniform(-1, 1, 6) for i in which]).reshape(n, 6)
+        poses[:, 0, :3] = self.task.start + drawn[:, :3] * self.task.spread
+        poses[:, 0, 3:] = _turned(np.tile(self._upright, (n, 1)), drawn[:, 3:] * self.task.tilt)
         self._batch.reset(which.tolist(), poses)
         self._age[which] = 0
 
@@ -202,17 +234,17 @@ class AssemblyVectorEnv:
         truncated = ~terminated & (self._age >= task.actions)
         rewards = (before - distance) / _MM - 0.01 * np.maximum(force - 5, 0) + 10.0 * terminated
         infos = {"distance": distance, "force": force, "contacts": b.contacts.copy(), "max_depth": b.max_depth.copy()}
-        ended = np.flatnonzero(terminated | truncated)
+        ended = terminated | truncated
         observations = self._observe()
-        if self.autoreset and len(ended):
-            infos["final_observation"] = observations[ended].copy()
-            infos["final"] = ended
-            self._begin(ended)
+        if self.autoreset and ended.any():
+            infos["final_obs"], infos["_final_obs"] = observations, ended
+            self._begin(np.flatnonzero(ended))
             observations = self._observe()
         return observations, rewards, terminated, truncated, infos
 
-    def close(self):
+    def close(self, **kwargs):
         """Nothing is held open."""
+        self.closed = True
 
 
 class AssemblyEnv(_Base):

@@ -409,8 +409,54 @@ class Environments(unittest.TestCase):
         for k in range(5):
             observations, _, terminated, truncated, infos = many.step(np.zeros((3, 6)))
             self.assertEqual(truncated.all(), k == 4)
-        self.assertEqual(infos["final_observation"].shape, (3, 22))
+        self.assertEqual(infos["final_obs"].shape, (3, 22))
+        self.assertTrue(infos["_final_obs"].all())
         self.assertLess(observations[0, 2], -30)  # above the block again
+
+    def test_an_episode_in_a_crowd_starts_as_it_does_alone(self):
+        many = hapsix.env.AssemblyVectorEnv(3, autoreset=False)
+        together, _ = many.reset(seed=7)
+        listed, _ = many.reset(seed=[7, 8, 9])
+        np.testing.assert_array_equal(listed, together)
+        for i in range(3):
+            alone, _ = hapsix.env.AssemblyEnv().reset(seed=7 + i)
+            np.testing.assert_array_equal(alone, together[i])
+        many.step(np.ones((3, 6)))
+        some, _ = many.reset(options={"reset_mask": np.array([False, True, False])})
+        self.assertEqual((some[:, 21] == 0).tolist(), [False, True, False])  # its hand is at the part again
+        for wrong in ([1, 0, 1], np.ones(2, bool)):
+            with self.assertRaises(ValueError):
+                many.reset(options={"reset_mask": np.array(wrong)})
+        with self.assertRaises(ValueError):
+            many.reset(seed=[1, 2])
+
+    def test_where_gymnasium_is_installed_its_classes_are_the_bases(self):
+        # A stand-in with the names of Gymnasium 1.1, which Debian 12 does not have.
+        code = """
+import sys, types, enum
+def module(name, **names):
+    sys.modules[name] = types.ModuleType(name)
+    vars(sys.modules[name]).update(names)
+    return sys.modules[name]
+class Env:
+    def reset(self, *, seed=None, options=None): self.seeded = seed
+class VectorEnv: pass
+class Box:
+    def __init__(self, low, high, shape, dtype): self.shape = shape
+Mode = enum.Enum("AutoresetMode", "NEXT_STEP SAME_STEP DISABLED")
+spaces, vector = module("gymnasium.spaces", Box=Box), module("gymnasium.vector", VectorEnv=VectorEnv, AutoresetMode=Mode)
+module("gymnasium", Env=Env, spaces=spaces, vector=vector)
+import hapsix, hapsix.env
+one, many = hapsix.env.AssemblyEnv(), hapsix.env.AssemblyVectorEnv(2)
+assert isinstance(one, Env) and isinstance(many, VectorEnv)
+assert many.metadata["autoreset_mode"] is Mode.SAME_STEP
+assert hapsix.env.AssemblyVectorEnv(2, autoreset=False).metadata["autoreset_mode"] is Mode.DISABLED
+one.reset(seed=4)
+assert one.seeded == 4 and isinstance(many.single_action_space, Box)
+many.reset(seed=1), many.step([[0] * 6] * 2), many.close()
+"""
+        said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        self.assertEqual((said.returncode, said.stderr), (0, ""))
 
 
 class Imports(unittest.TestCase):
@@ -437,6 +483,10 @@ class Stubs(unittest.TestCase):
         for name, value in vars(hapsix).items():
             if not name.startswith("_") and callable(value):
                 self.assertTrue(value.__doc__, name)
+            if not name.startswith("_") and isinstance(value, type):
+                for member, about in vars(value).items():
+                    if not member.startswith("_"):
+                        self.assertTrue((getattr(about, "__doc__", "") or "").strip(), f"{name}.{member}")
 
 
 if __name__ == "__main__":
