@@ -33,7 +33,7 @@ h6Scene* h6ReadScene(const char* name, const h6SceneDef* def, h6Error* error) {
     Result<Scene> scene = find(name, used.outside);
     if (!scene) return fill(error, reading(name), scene.error()), nullptr;
     Result<std::unique_ptr<LoadedScene>> loaded =
-        load_scene(std::move(*scene), progress_of(used.progress, used.user));
+        load_scene(std::move(*scene), progress_of(used.progress, used.user), used.allocator);
     if (loaded) log_all((*loaded)->warnings);
     return wrap<h6Scene>(std::move(loaded), H6_ERROR_CONTENT, error);
   });

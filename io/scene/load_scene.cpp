@@ -253,6 +253,7 @@ class Loader {
     bends.reserve(bent_.size());
     for (const Bent& b : bent_) shells[b.shell].deformable = &bends.emplace_back(b.how.def());
     h6ModelDef def = h6DefaultModelDef();
+    def.allocator = out_.allocator;
     def.fields = fields.data(), def.field_count = fields.size();
     def.shells = shells.data(), def.shell_count = shells.size();
     h6Error error{};
@@ -309,11 +310,14 @@ h6SessionDef LoadedScene::session_def() const {
   def.rate = scene.rate;
   def.max_substeps = scene.max_substeps;
   def.net_stiffness = scene.net_stiffness;
+  def.allocator = allocator;
   return def;
 }
 
-Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress) {
+Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress,
+                                                const h6Allocator& allocator) {
   auto out = std::make_unique<LoadedScene>();
+  out->allocator = allocator;
   out->scene = std::move(scene);
   if (Outcome done = Loader(*out, progress).run(); !done) return done.failure();
   return out;

@@ -53,6 +53,7 @@ struct LoadedScene {
   std::vector<std::unique_ptr<const Mesh>> meshes;
   std::vector<LoadedAsset> assets;
   std::vector<std::string> warnings;
+  h6Allocator allocator{};  // of the model and of sessions; zero: the C library's
 
   int body_index(const std::string& name) const;
   const std::vector<h6Vec3>& watched_points() const;  // shell of the first hand's body
@@ -62,6 +63,7 @@ struct LoadedScene {
 };
 
 // Reads and bakes all assets, then builds the model. An error names the body and the file.
-Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress = {});
+Result<std::unique_ptr<LoadedScene>> load_scene(Scene scene, const Progress& progress = {},
+                                                const h6Allocator& allocator = {});
 
 }  // namespace h6::io

@@ -11,6 +11,10 @@
  * NULL. Nothing is printed: what a bake repaired or doubts goes to the handler of h6SetLogHandler. Any
  * thread may call, and different threads may read one mesh, field, shell or scene at a time; a recorder
  * or a recording belongs to one thread at a time, never the haptic one. Definitions grow as base.h says.
+ *
+ * What reads and bakes takes its memory from the C library, and so do OpenVDB, Embree, HDF5 and TBB
+ * below it, which have no other way. What a session uses, model and session, comes from a program's
+ * allocator: h6ModelDef.allocator, h6SessionDef.allocator, or h6SceneDef.allocator for both.
  */
 #ifndef HAPSIX_IO_H
 #define HAPSIX_IO_H
@@ -162,7 +166,8 @@ typedef struct h6SceneDef {
   bool       outside;     /* the scene may name files outside its folder: only for scenes you trust */
   h6Progress progress;
   void*      user;
-  uint64_t   reserved[8];
+  h6Allocator allocator;  /* of its model, and of the session's definition; zero: the C library's   */
+  uint64_t   reserved[5];
 } h6SceneDef;
 H6_API h6SceneDef h6DefaultSceneDef(void);
 

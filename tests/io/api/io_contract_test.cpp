@@ -202,6 +202,40 @@ TEST_CASE("a generated scene runs, is recorded, and its rows are read back to th
   h6DestroyRecording(recording), h6DestroySession(session), h6DestroyScene(scene);
 }
 
+TEST_CASE("a scene's model and session take their memory from the program, and give it back") {
+  struct Heap {
+    std::size_t bytes = 0, calls = 0;
+  } heap;
+  h6SceneDef def = h6DefaultSceneDef();
+  def.allocator.user = &heap;
+  def.allocator.allocate = [](void* user, std::size_t bytes, std::size_t alignment) {
+    static_cast<Heap*>(user)->bytes += bytes, ++static_cast<Heap*>(user)->calls;
+    return std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  };
+  def.allocator.release = [](void* user, void* memory, std::size_t bytes) {
+    static_cast<Heap*>(user)->bytes -= bytes;
+    std::free(memory);
+  };
+  h6Scene* scene = h6ReadScene("box-on-wall", &def, nullptr);
+  REQUIRE(scene);
+  const std::size_t of_model = heap.bytes;
+  CHECK(of_model >= h6ModelBytes(h6GetSceneModel(scene)));
+  h6SessionDef with;
+  h6GetSceneSession(scene, &with);
+  h6Session* session = h6CreateSession(h6GetSceneModel(scene), &with, nullptr);
+  REQUIRE(session);
+  CHECK(heap.bytes > of_model);
+  const std::size_t calls = heap.calls;
+  h6DeviceSample sample = h6DefaultDeviceSample();
+  h6DeviceCommand command;
+  for (int i = 0; i < 100; ++i) h6Step(session, &sample, &command);
+  CHECK(heap.calls == calls);
+  h6DestroySession(session);
+  CHECK(heap.bytes == of_model);
+  h6DestroyScene(scene);
+  CHECK(heap.bytes == 0);
+}
+
 TEST_CASE("what a bake repaired goes to the log, and nothing to the terminal") {
   const Log log;
   std::vector<std::uint32_t> open(kFaces[0], kFaces[0] + 30);  // a box without a side
