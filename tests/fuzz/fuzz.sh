@@ -32,7 +32,7 @@ for target in $targets; do
   [ "$target" = contract ] && part=engine
   [ -f "tests/fuzz/words/$target" ] && words=(-dict="tests/fuzz/words/$target")
   HAPSIX_FUZZ=$target build/fuzz/hapsix_fuzz_$part "${words[@]}" -max_len="$(most "$target")" \
-    -max_total_time="$each" -timeout=20 -rss_limit_mb=4000 \
+    -max_total_time="$each" -timeout=100 ${HAPSIX_FUZZ_SEED:+-seed="$HAPSIX_FUZZ_SEED"} -rss_limit_mb=4000 \
     -print_final_stats=1 -print_funcs=0 -artifact_prefix="$kept/" "$learnt" "tests/fuzz/corpus/$target" \
     >"$log" 2>&1 || true
   runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")

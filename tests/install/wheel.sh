@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The wheel that `pip install .` makes, installed without a network and used. Not part of ctest, since
+# making it runs the build.
+. "$(dirname "$0")/common.sh"
+python=/usr/bin/python3
+$python -c 'import numpy, pybind11' 2>/dev/null || [ -e /usr/include/pybind11/pybind11.h ] || skip "pybind11 is not installed"
+$python -c 'import numpy' 2>/dev/null || skip "NumPy is not installed"
+cd "$SOURCE"
+$python -c "import sys; sys.path.insert(0, 'python/build_backend'); import wheel; wheel.build_wheel('$WORK')" \
+  >"$WORK/log" 2>&1 || { tail -n 30 "$WORK/log" >&2; fail "the wheel"; }
+if $python -m pip --version >/dev/null 2>&1; then
+  $python -m pip install --quiet --no-index --no-deps --target "$WORK/site" "$WORK"/hapsix-*.whl
+else
+  $python -m zipfile -e "$WORK"/hapsix-*.whl "$WORK/site"
+fi
+cd "$WORK"
+PYTHONPATH=$WORK/site $python "$SOURCE/python/examples/hello.py" >"$WORK/said" || fail "hello.py"
+PYTHONPATH=$WORK/site $python -c "import hapsix; assert hapsix.__file__.startswith('$WORK')" || fail "another hapsix"
+grep -E '^[0-9]+ frames, at most 0\.[0-9]+ voxels deep' "$WORK/said" >/dev/null || fail "hello.py says: $(cat "$WORK/said")"
