@@ -85,6 +85,26 @@ export class Browser {
   async scheme(value) {
     await this.send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value }] });
   }
+  // How far the part is behind the hand [part of the scene's radius], and what the run says.
+  async follow() {
+    return this.value(`(() => {
+      const h = window.hapsix, p = h.view.bodies[h.view.hand].position, g = h.drag && h.drag().held ? h.drag().p : h.view.ghost.position, s = h.state();
+      return { behind: p.distanceTo(g) / h.view.radius, contacts: s.contacts, late: s.late ?? null, place: p.toArray() };
+    })()`);
+  }
+  // Moves the hand by `go` until the part touches and stays behind; then it must still do so.
+  async meetsWall(go, what) {
+    for (let i = 0; i < 60; ++i) {
+      await go(i);
+      const now = await this.follow();
+      if (!(now.contacts > 0 && now.behind > 0.03)) continue;
+      await wait(500);
+      const later = await this.follow();
+      if (!(later.contacts > 0 && later.behind > 0.03)) continue;
+      return console.log(`# ${what}: ${later.contacts} contacts, ${(100 * later.behind).toFixed(0)} % of the radius behind the hand, late frames so far: ${JSON.stringify(later.late)}`);
+    }
+    throw new Error(`${what}: the part never stays behind the hand in contact: ${JSON.stringify(await this.follow())}`);
+  }
   // What axe-core finds serious or critical on the page, light and dark; lesser findings are printed.
   async graveFindings() {
     const all = [];

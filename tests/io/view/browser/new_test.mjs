@@ -108,9 +108,14 @@ test('arrow keys move the hand, with Shift they turn it, and Space presses the b
   }
   const moved = await hand();
   assert.ok(apart(first, moved, 3, 7) < 1e-6);
+  await until(async () => apart(first, (await browser.follow()).place, 0, 3) > 0.005 * size, 'the part follows');
   await browser.key('rawKeyDown', 'ArrowRight', { modifiers: 8 });
   await until(async () => apart(moved, await hand(), 3, 7) > 0.02, 'Shift turns the hand');
   await browser.key('keyUp', 'ArrowRight', { modifiers: 8 });
+  // Down until the part meets the wall that the path led it to.
+  await browser.key('rawKeyDown', 'ArrowDown');
+  await browser.meetsWall(() => wait(150), 'by keys');
+  await browser.key('keyUp', 'ArrowDown');
   // Space on a button is that button's, not pause.
   const time = (await state()).time;
   await browser.value('document.getElementById("clutch").focus()');
@@ -138,6 +143,12 @@ test('a gamepad moves and turns the hand', async () => {
   await browser.value('window.pad.axes[2] = 1');
   await until(async () => apart(rest, await hand(), 3, 7) > 0.02, 'the other stick turns it');
   await browser.value('window.pad.axes[2] = 0');
+  await browser.value('window.pad.axes[1] = -1');
+  const low = await browser.follow();
+  await until(async () => apart(low.place, (await browser.follow()).place, 0, 3) > 0.02 * size, 'up: the part follows');
+  await browser.value('window.pad.axes[1] = 1');
+  await browser.meetsWall(() => wait(150), 'by a gamepad');
+  await browser.value('window.pad.axes[1] = 0');
 });
 
 test('a program that stands still is seen to be stale, and recovers', async () => {

@@ -74,6 +74,50 @@ test('the scrubber moves the part, and contacts are there', async () => {
   await browser.picture(join(pictures, 'report-replay.png'));
 });
 
+test('CSV has a row for each moment of each run, and PNG is the picture', async () => {
+  // The page saves by a link; the link is kept and not followed.
+  await browser.value(`window.saved = {}; HTMLAnchorElement.prototype.click = function () {
+    const name = this.download;
+    window.saved[name] = fetch(this.href).then((r) => r.arrayBuffer()).then((b) => Array.from(new Uint8Array(b)));
+  }`);
+  const saved = async (button, ending) => {
+    await browser.value(`document.getElementById('${button}').click()`);
+    const name = await until(() => browser.value(`Object.keys(window.saved).find((n) => n.endsWith('${ending}'))`), `${button} saves`, 20);
+    return Buffer.from(await browser.value(`window.saved[${JSON.stringify(name)}]`));
+  };
+  const rows = (await saved('csv', '.csv')).toString().trim().split('\n');
+  const columns = rows[0].split(',');
+  assert.ok(columns.length >= 5 && rows.length > 100, `${rows.length} rows of ${rows[0]}`);
+  for (const row of rows.slice(1)) {
+    assert.equal(row.split(',').length, columns.length, row);
+    assert.ok(row.split(',').slice(1).every((x) => Number.isFinite(Number(x))), row);
+  }
+  for (const run of ['global', 'robust']) assert.ok(rows.some((row) => row.startsWith(run) || row.startsWith(`"${run}`)), run);
+  const png = await saved('png', '.png');
+  assert.equal(png.subarray(1, 4).toString(), 'PNG');
+  assert.ok(png.readUInt32BE(16) > 300 && png.length > 5000, `${png.readUInt32BE(16)} wide, ${png.length} bytes`);
+});
+
+test('on a telephone nothing is cut off, and on paper there are no controls', async () => {
+  await browser.size(375, 812);
+  await until(async () => await browser.value('innerWidth === 375'), 'the size is in force');
+  await wait(1000);
+  assert.ok(await browser.value('document.documentElement.scrollWidth <= 375'), 'nothing beside the page');
+  const space = await browser.value('document.getElementById("space").getBoundingClientRect().width');
+  assert.ok(space > 300 && space <= 375, `${space} pixels for the parts`);
+  await browser.picture(join(pictures, 'report-375.png'));
+  await browser.size(1280, 860);
+  await browser.send('Emulation.setEmulatedMedia', { media: 'print' });
+  const shown = (id) => browser.value(`document.getElementById('${id}').offsetParent !== null`);
+  for (const id of ['csv', 'png', 'scrub']) assert.equal(await shown(id), false, `${id} is not printed`);
+  assert.ok((await browser.value('document.body.innerText')).includes('Late frames'));
+  const { data } = await browser.send('Page.printToPDF', { printBackground: true });
+  const pdf = Buffer.from(data, 'base64');
+  assert.equal(pdf.subarray(0, 4).toString(), '%PDF');
+  assert.ok(pdf.length > 20000, `${pdf.length} bytes`);
+  await browser.send('Emulation.setEmulatedMedia', { media: '' });
+});
+
 test('nothing was fetched and no error occurred', async () => {
   assert.deepEqual(browser.problems, []);
   assert.equal(await browser.value('performance.getEntriesByType("resource").filter((r) => r.name.startsWith("http")).length'), 0);
