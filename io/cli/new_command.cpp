@@ -133,6 +133,24 @@ std::string trial_sentence(const Trial& t) {
   return text;
 }
 
+// What a newcomer should know about a trial that did not go well; null where it did.
+const char* doubt_of(io::Verdict verdict) {
+  switch (verdict) {
+    case io::Verdict::through:
+      return "in the trial the part went through a wall: 'hapsix check' says what the walls hold; a "
+             "smaller \"voxel\" of the environment or a smaller \"max_force\" of the hand holds more";
+    case io::Verdict::chatters:
+      return "in the trial the part trembled: a heavier part, more \"damping\" or a lower \"stiffness\" "
+             "of the contact calms it";
+    case io::Verdict::unstable:
+    case io::Verdict::sunk:
+      return "the trial failed: a smaller \"voxel\" of the environment, a smaller \"max_force\" of the "
+             "hand or a lower \"stiffness\" of the contact may help";
+    default:
+      return nullptr;
+  }
+}
+
 struct Made {
   std::unique_ptr<io::LoadedScene> loaded;
   Trial trial;
@@ -248,6 +266,8 @@ int new_command(const Console& console, const NewOptions& o) {
   if (!console.json) std::printf("scene: %s\n", file.c_str());
   if (!made->trial.first_contact)
     console.warn({"the part touched nothing in the trial: move it by hand in the view"});
+  else if (const char* doubt = doubt_of(made->trial.totals.verdict))
+    console.warn({doubt});
   if (!wants_view(console, o)) {
     if (!console.json) std::printf("see it: hapsix run %s --view\n", file.c_str());
     console.result(made->json);

@@ -16,6 +16,7 @@ constexpr double kChatterSpeed = 2e-3;     // RMS over points and window [m/s]
 constexpr double kChatterDepth = 0.1;      // peak to peak [voxels]
 constexpr double kUnstableFactor = 100;    // times the hand's peak speed
 constexpr double kLeastPeakSpeed = 10e-3;  // [m/s]
+constexpr double kCatchUp = 1;             // for the way to the hand at the start [s]
 constexpr std::size_t kClusterSize = 48;
 
 struct Rotation {
@@ -234,6 +235,7 @@ void VerdictWatch::frame(double time, const h6Pose& hand, const h6Velocity& hand
   peak_hand_speed2_ =
       std::max(peak_hand_speed2_, mean_speed2(hand_velocity.linear, hand_velocity.angular, hand.q));
 
+  if (first_) start_lag2_ = mean_motion2(hand, body.pose);
   if (!entry_)
     if (const auto place = entered(body.pose)) entry_ = Entry{time, *place};
   touched_ = touched_ || max_depth_voxels > 0;
@@ -264,7 +266,9 @@ bool VerdictWatch::arrived() const {
 }
 
 Verdict VerdictWatch::verdict(bool popped_through) const {
-  const double limit = kUnstableFactor * std::max(kLeastPeakSpeed, std::sqrt(peak_hand_speed2_));
+  const double limit =
+      kUnstableFactor *
+      std::max({kLeastPeakSpeed, std::sqrt(peak_hand_speed2_), std::sqrt(start_lag2_) / kCatchUp});
   if (!finite_ || peak_speed2_ > limit * limit) return Verdict::unstable;
   if (entry_ || popped_through) return Verdict::through;
   if (chattered_ || (!first_ && chatters_now(last_time_))) return Verdict::chatters;

@@ -4,6 +4,8 @@
 // A run gets the first verdict that applies, in this order:
 //   unstable  a state was not finite, or a body was faster than 100x the hand's peak speed. A peak
 //             below 10 mm/s counts as 10 mm/s, so that a hand at rest still allows small motions.
+//             A body that starts away from the hand flies to it: as if the hand had moved that far
+//             in a second.
 //   through   a shell point passed through the environment's mesh (pop_through.h, which the caller
 //             asks), or a shell point or the centre of mass was in a forbidden box
 //   chatters  the hand was still for at least 0.2 s, and in the last 0.2 s of that phase the RMS
@@ -89,7 +91,7 @@ class VerdictWatch {
   h6Vec3 com_, mean_{};    // mean_ is the mean of the points, mesh frame [m]
   double second_[6] = {};  // mean of p pT over the points, xx yy zz xy xz yz [m^2]
   double rate_;
-  double peak_hand_speed2_ = 0, peak_speed2_ = 0;
+  double peak_hand_speed2_ = 0, peak_speed2_ = 0, start_lag2_ = 0;
   std::optional<Entry> entry_;
   bool finite_ = true, touched_ = false, chattered_ = false, first_ = true;
   double still_since_ = 0, last_time_ = 0;

@@ -83,6 +83,32 @@ TEST_CASE("the guides have no command outside the blocks that are run") {
                     " has commands in a block of '", other, "'");
 }
 
+// Those in a sentence name scenes and files that only a reader has.
+TEST_CASE("every command in a sentence has words and options that the program knows") {
+  static const std::regex command("`hapsix ([^`]+)`"), option("--[a-z-]+");
+  std::vector<fs::path> files = all_guides();
+  files.push_back(fs::path(HAPSIX_SOURCE_DIR) / "README.md");
+  Sandbox box;
+  int seen = 0;
+  for (const fs::path& file : files) {
+    const std::string text = slurp(file);
+    for (std::sregex_iterator it(text.begin(), text.end(), command), end; it != end; ++it, ++seen) {
+      const std::string said = (*it)[1].str();
+      std::istringstream words(said);
+      std::string first, second;
+      words >> first >> second;
+      Args help = {first, "--help"};
+      if (first == "bake" || first == "scene") help = {first, second, "--help"};
+      const Ended ended = run(box, help);
+      CHECK_MESSAGE(ended.code == 0, file.filename(), ": hapsix ", said);
+      for (std::sregex_iterator o(said.begin(), said.end(), option), none; o != none; ++o)
+        CHECK_MESSAGE(ended.out.find(o->str()) != std::string::npos, file.filename(), ": hapsix ",
+                      said);
+    }
+  }
+  CHECK(seen > 15);
+}
+
 TEST_CASE("links of the guides lead somewhere") {
   static const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
   int seen = 0;

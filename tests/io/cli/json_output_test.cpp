@@ -183,6 +183,19 @@ TEST_CASE("scene list, scene export and demo") {
     const std::string name = scene.value("name", "");
     CHECK(name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos);
   }
+  // For people: the same names in one column, and what they are about in another.
+  std::istringstream lines(run(box, {"scene", "list"}).out);
+  std::size_t rows = 0, column = 0;
+  for (std::string line; std::getline(lines, line) && !line.empty(); ++rows) {
+    REQUIRE(rows < list["scenes"].size());
+    const std::string name = list["scenes"][rows]["name"], about = list["scenes"][rows]["about"];
+    const std::size_t at = line.find(about);
+    CHECK(line.rfind(name + "  ", 0) == 0);
+    REQUIRE(at != std::string::npos);
+    if (rows == 0) column = at;
+    CHECK(at == column);
+  }
+  CHECK(rows == list["scenes"].size());
   const Json exported = result_of(box, {"scene", "export", "box-on-wall", "a/new/folder"});
   CHECK(exported["file"] == "a/new/folder/scene.json");
   CHECK(fs::exists(box.file("a/new/folder/scene.json")));
@@ -213,6 +226,15 @@ TEST_CASE("without --json the result is on stdout and nothing else, and help goe
                                              {"info"},
                                              {"scene"},
                                              {"scene", "export"},
+                                             {"new"},
+                                             {"check"},
+                                             {"replay"},
+                                             {"report"},
+                                             {"export"},
+                                             {"devices"},
+                                             {"experiments"},
+                                             {"map"},
+                                             {"study"},
                                              {"demo"}}) {
     Args args = words;
     args.push_back("--help");
@@ -221,6 +243,13 @@ TEST_CASE("without --json the result is on stdout and nothing else, and help goe
     CHECK(help.err.empty());
     CHECK(help.out.find("Usage: hapsix") != std::string::npos);
     CHECK(help.out.find("--json") != std::string::npos);
+    for (const char* leftover : {"Excludes:", "Needs:", "REQUIRED", "FILE FILE", "{false}", "(1x)"})
+      CHECK_MESSAGE(help.out.find(leftover) == std::string::npos, leftover);
   }
   CHECK(run(box, {"--version"}).out.rfind("hapsix ", 0) == 0);
+  for (const Args& words : std::vector<Args>{{"--json", "--version"}, {"--version", "--json"}}) {
+    const Json version = one_object(run(box, words));
+    has(version, {"hapsix", "simd_targets"});
+    CHECK(!version["simd_targets"].empty());
+  }
 }

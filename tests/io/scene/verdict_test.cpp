@@ -148,6 +148,24 @@ TEST_CASE("unstable begins at 100 times the hand's peak speed, wherever in the r
   CHECK(with_speed(5.1) == Verdict::unstable);
 }
 
+TEST_CASE("a body that flies half a metre to a hand at rest is not unstable for that") {
+  const auto flies = [](double start) {
+    return [start](double t) {  // critically damped, 20 rad/s
+      Moment m;
+      const double e = std::exp(-20 * t), x = start * (1 + 20 * t) * e;
+      m.body = {at(x, 0, 0), {{-start * 400 * t * e, 0, 0}, {}}};
+      m.depth = -1;
+      return m;
+    };
+  };
+  CHECK(judge(1.0, flies(0.5)) == Verdict::untouched);  // up to 3.7 m/s
+  CHECK(judge(1.0, [&](double t) {
+          Moment m = flies(0.5)(t);
+          if (t > 0.3 && t < 0.31) m.body.velocity.linear.x = 51;
+          return m;
+        }) == Verdict::unstable);
+}
+
 TEST_CASE("spinning counts as speed") {
   // RMS distance of the cube's 26 points and centre from the z axis: sqrt(2 * 2/3) * 10 mm.
   const double arm = std::sqrt(36.0 / 27.0) * 0.01;
