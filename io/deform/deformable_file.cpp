@@ -10,6 +10,7 @@
 #include "io/file/content_hash.h"
 #include "io/file/json.h"
 #include "io/file/write_aside.h"
+#include "io/record/first_in_child.h"
 #include "io/record/stored.h"
 
 namespace h6::io {
@@ -251,22 +252,7 @@ Result<ordered_json> parse_config(const Source& source, const std::string& text)
   return json;
 }
 
-}  // namespace
-
-Outcome write_deformable(const fs::path& file, const ReducedModel& model) {
-  const Arrays arrays = to_arrays(model);
-  const std::string text = config_text(model);
-  return write_aside(file, [&](const fs::path& aside) -> Outcome {
-    const LibraryLock lock;
-    const Handle h5 =
-        H5Fcreate(aside.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, recording::file_access());
-    if (h5.ok() && put_all(h5, text, arrays)) return Done{};
-    return Failure{"Cannot write " + file.string() + ": " + recording::library_reason() + "."};
-  });
-}
-
-Result<ReducedModel> read_deformable(const fs::path& file) {
-  const LibraryLock lock;
+Result<ReducedModel> read_here(const fs::path& file) {
   const Result<Source> source = open_source(file);
   if (!source) return source.failure();
   const Result<std::string> text = read_text(*source);
@@ -293,12 +279,38 @@ Result<ReducedModel> read_deformable(const fs::path& file) {
   return model;
 }
 
+}  // namespace
+
+Outcome write_deformable(const fs::path& file, const ReducedModel& model) {
+  const Arrays arrays = to_arrays(model);
+  const std::string text = config_text(model);
+  return write_aside(file, [&](const fs::path& aside) -> Outcome {
+    const LibraryLock lock;
+    const Handle h5 =
+        H5Fcreate(aside.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, recording::file_access());
+    if (h5.ok() && put_all(h5, text, arrays)) return Done{};
+    return Failure{"Cannot write " + file.string() + ": " + recording::library_reason() + "."};
+  });
+}
+
+Result<ReducedModel> read_deformable(const fs::path& file) {
+  const LibraryLock lock;
+  if (const Outcome survives =
+          recording::first_in_child(file, "a model", [&] { (void)read_here(file); });
+      !survives)
+    return survives.failure();
+  return read_here(file);
+}
+
 bool is_deformable(const fs::path& file) {
   const LibraryLock lock;
-  const Result<Source> source = open_source(file);
-  if (!source) return false;
-  const Result<std::string> text = read_text(*source);
-  return text && text->find(kKind) != std::string::npos;
+  const auto says_so = [&] {
+    const Result<Source> source = open_source(file);
+    if (!source) return false;
+    const Result<std::string> text = read_text(*source);
+    return text && text->find(kKind) != std::string::npos;
+  };
+  return recording::first_in_child(file, "its kind", [&] { (void)says_so(); }) && says_so();
 }
 
 }  // namespace h6::io

@@ -3,8 +3,21 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <new>
 
 #include "tests/fuzz/targets.h"
+
+// The sanitizer's own `new` ends the program where the standard's throws: for a size that no machine
+// has, which packages catch.
+void* operator new(std::size_t bytes) {
+  if (void* memory = std::malloc(bytes ? bytes : 1)) return memory;
+  throw std::bad_alloc();
+}
+void* operator new[](std::size_t bytes) { return operator new(bytes); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace {
 const h6::fuzz::Target* target = nullptr;
