@@ -207,7 +207,8 @@ void add_study(CLI::App& app, Program& program) {
       "STUDY.json: {\"hapsix_study\": 1, \"scene\": \"peg-in-hole\",\n"
       "  \"vary\": {\"contact.method\": [\"firm\", \"global\"],\n"
       "           \"bodies.block.field.offset\": {\"from\": 0, \"to\": 0.4, \"count\": 5}},\n"
-      "  \"draw\": {\"bodies.peg.pose.p.x\": {\"low\": -0.2, \"high\": 0.2}}, \"repeats\": 20}");
+      "  \"draw\": {\"bodies.peg.pose.p.x\": {\"low\": -0.2, \"high\": 0.2}}, \"repeats\": 20}\n\n" +
+      command->get_footer());
   command->callback(
       [&program, o] { program.work = [&program, o] { return study_command(program, *o); }; });
 }

@@ -136,6 +136,49 @@ TEST_CASE(
   CHECK(none.code != 0);
 }
 
+TEST_CASE("every contact as HDF5 columns: the same as in CSV") {
+  if (std::system("/usr/bin/python3 -c 'import h5py' 2> /dev/null") != 0) {
+    MESSAGE("skipped: no h5py");
+    return;
+  }
+  Sandbox box;
+  REQUIRE(
+      run(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.8", "--record", "run.h5"})
+          .code == 0);
+  for (const char* to : {"c.csv", "c.h5"}) {
+    const Ended done = run(box, {"export", "run.h5", "-o", "run.csv", "--contacts", to});
+    REQUIRE_MESSAGE(done.code == 0, done.err);
+  }
+  spill(box.file("compare.py"), R"(
+import csv, h5py
+with h5py.File("c.h5") as h5, open("c.csv") as text:
+    names, columns = list(h5.attrs["names"]), {name: h5[name][()] for name in h5}
+    rows = list(csv.DictReader(text))
+    assert len(rows) > 1000 and all(len(column) == len(rows) for column in columns.values())
+    for i, row in enumerate(rows):
+        assert row["part"] == names[columns["body"][i]] and row["with"] == names[columns["with"][i]]
+        for name, column in columns.items():
+            if name != "with":
+                assert abs(float(row[name]) - float(column[i])) <= 1e-6 * max(1e-3, abs(column[i])), (i, name)
+    assert h5["depth"].attrs["units"] == "m" and h5["frame"].dtype == "uint64"
+)");
+  CHECK(std::system(("cd '" + box.folder().string() + "' && /usr/bin/python3 compare.py").c_str()) == 0);
+}
+
+TEST_CASE("a file that brings the HDF5 library down gets one sentence, and the program goes on") {
+  Sandbox box;
+  const fs::path found =
+      fs::path(HAPSIX_SOURCE_DIR) / "tests/fuzz/findings/deformable/heap-at-nowhere";
+  fs::copy_file(found, box.file("bad.h5"));
+  for (const Args& words : {Args{"info", "bad.h5"}, Args{"replay", "bad.h5"},
+                            Args{"export", "bad.h5", "-o", "out.csv"}}) {
+    const Ended e = run(box, words);
+    CAPTURE(e.err);
+    CHECK(e.code == 1);
+    CHECK(std::count(e.err.begin(), e.err.end(), '\n') == 1);
+  }
+}
+
 TEST_CASE("what cannot be exported gets one sentence, and no file is made") {
   Sandbox box;
   spill(box.file("run.h5"), "no recording");
