@@ -89,25 +89,6 @@ Result<Loaded> load(const std::string& path) {
 
 bool sensible(double value) { return value >= 0 && value <= 1e9; }
 
-// The name of a capability that makes no sense, for an error sentence; empty if all are valid.
-std::string nonsense(const h6PluginCapabilities& c) {
-  if (!std::memchr(c.name, 0, sizeof c.name)) return "name without an end";
-  if (c.dof_in != 3 && c.dof_in != 6) return "dof_in, which must be 3 or 6";
-  if (c.dof_out != 0 && c.dof_out != 3 && c.dof_out != 6) return "dof_out, which must be 0, 3 or 6";
-  constexpr std::uint32_t modes =
-      H6_PLUGIN_IMPEDANCE | H6_PLUGIN_ADMITTANCE | H6_PLUGIN_PSEUDO_ADMITTANCE;
-  if (c.modes == 0 || (c.modes & ~modes)) return "modes";
-  const double figures[] = {c.max_force,    c.max_torque, c.max_force_rate, c.max_torque_rate,
-                            c.max_velocity, c.rate,       c.freeze_time};
-  for (const double figure : figures)
-    if (!sensible(figure)) return "ratings, which must be 0 or more";
-  for (int i = 0; i < 3; ++i)
-    if (!(std::fabs(c.workspace_min[i]) <= 1e6 && std::fabs(c.workspace_max[i]) <= 1e6 &&
-          c.workspace_min[i] <= c.workspace_max[i]))
-      return "workspace";
-  return "";
-}
-
 Result<void*> open_in(const h6DevicePluginV1& plugin, const PluginFile& file, const h6Pose& home,
                       const h6Vec3& grip, h6PluginCapabilities& capabilities) {
   std::vector<h6PluginOption> options;
@@ -122,7 +103,7 @@ Result<void*> open_in(const h6DevicePluginV1& plugin, const PluginFile& file, co
     error[sizeof error - 1] = '\0';
     return Failure{file.path + ": " + (error[0] ? error : "its open failed and did not say why")};
   }
-  if (const std::string what = nonsense(capabilities); !what.empty()) {
+  if (const std::string what = nonsense_in(capabilities); !what.empty()) {
     plugin.close(device);
     return Failure{file.path + ": its capabilities make no sense: " + what};
   }
@@ -264,6 +245,24 @@ Result<std::shared_ptr<Opening>> open_here(const PluginFile& file, const h6Pose&
 }
 
 }  // namespace
+
+std::string nonsense_in(const h6PluginCapabilities& c) {
+  if (!std::memchr(c.name, 0, sizeof c.name)) return "name without an end";
+  if (c.dof_in != 3 && c.dof_in != 6) return "dof_in, which must be 3 or 6";
+  if (c.dof_out != 0 && c.dof_out != 3 && c.dof_out != 6) return "dof_out, which must be 0, 3 or 6";
+  constexpr std::uint32_t modes =
+      H6_PLUGIN_IMPEDANCE | H6_PLUGIN_ADMITTANCE | H6_PLUGIN_PSEUDO_ADMITTANCE;
+  if (c.modes == 0 || (c.modes & ~modes)) return "modes";
+  const double figures[] = {c.max_force,    c.max_torque, c.max_force_rate, c.max_torque_rate,
+                            c.max_velocity, c.rate,       c.freeze_time};
+  for (const double figure : figures)
+    if (!sensible(figure)) return "ratings, which must be 0 or more";
+  for (int i = 0; i < 3; ++i)
+    if (!(std::fabs(c.workspace_min[i]) <= 1e6 && std::fabs(c.workspace_max[i]) <= 1e6 &&
+          c.workspace_min[i] <= c.workspace_max[i]))
+      return "workspace";
+  return "";
+}
 
 Result<std::unique_ptr<PluginDevice>> PluginDevice::open(const PluginFile& file, const h6Pose& home,
                                                          const h6Vec3& grip, double patience) {

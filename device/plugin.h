@@ -25,6 +25,9 @@ struct PluginFile {
   std::vector<std::pair<std::string, std::string>> options;
 };
 
+// The name of a capability that makes no sense, for an error sentence; empty if all are valid.
+std::string nonsense_in(const h6PluginCapabilities& capabilities);
+
 class PluginDevice {
  public:
   // `home` and `grip` as in h6PluginStart. A probe or an open that takes longer than `patience`

@@ -29,10 +29,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
 
+#include "device/plugins/bridge_message.h"
 #include "device/plugins/mailbox.h"
 
 namespace {
@@ -40,7 +40,6 @@ namespace {
 using h6::plugin::Heard;
 using h6::plugin::Mailbox;
 using h6::plugin::now;
-using nlohmann::json;
 
 constexpr double kOwner = 1;  // a program silent for so long gives its place away [s]
 
@@ -48,24 +47,6 @@ struct Options {
   int port = 47807;
   double timeout = 0.02, max_force = 10, max_torque = 1;
 };
-
-struct Pose {
-  double p[3], q[4] = {1, 0, 0, 0};
-};
-
-// `count` finite numbers; false also where it is not there and must be.
-bool numbers(const json& from, const char* key, int count, double most, bool must, double* out) {
-  const auto found = from.find(key);
-  if (found == from.end()) return !must;
-  if (!found->is_array() || found->size() != static_cast<std::size_t>(count)) return false;
-  for (int i = 0; i < count; ++i) {
-    const json& x = (*found)[static_cast<std::size_t>(i)];
-    if (!x.is_number()) return false;
-    out[i] = x.get<double>();
-    if (!std::isfinite(out[i]) || std::fabs(out[i]) > most) return false;
-  }
-  return true;
-}
 
 class Bridge {
  public:
@@ -96,27 +77,18 @@ class Bridge {
     }
   }
   bool take(std::string_view text, bool owner) {
-    const json in = json::parse(text, nullptr, false);
-    if (!in.is_object()) return false;
-    const auto n = in.find("n"), buttons = in.find("buttons");
-    if (n == in.end() || !n->is_number_integer()) return false;
-    const std::int64_t number = n->get<std::int64_t>();
-    if (owner && number <= number_ && now() - heard_at_ < kOwner) return false;
-    Pose pose;
+    h6::plugin::BridgeMessage in;
+    if (!h6::plugin::parse_bridge(text, in)) return false;
+    if (owner && in.number <= number_ && now() - heard_at_ < kOwner) return false;
+    if (!first_) first_ = std::make_unique<h6::plugin::BridgeMessage>(in);
     Heard h;
-    if (!numbers(in, "p", 3, 100, true, pose.p) || !numbers(in, "q", 4, 2, false, pose.q) ||
-        !numbers(in, "v", 3, 100, false, h.grip.linear) ||
-        !numbers(in, "w", 3, 1000, false, h.grip.angular))
-      return false;
-    const double* q = pose.q;
-    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(std::fabs(length - 1) < 0.1)) return false;
-    for (double& c : pose.q) c /= length;
-    if (!first_) first_ = std::make_unique<Pose>(pose);
-    h6_turned(pose.q, first_->q, h.grip.turned);
-    for (int i = 0; i < 3; ++i) h.grip.moved[i] = pose.p[i] - first_->p[i];
-    if (buttons != in.end() && buttons->is_number_unsigned()) h.buttons = buttons->get<unsigned>();
-    number_ = number;
+    h6_turned(in.q, first_->q, h.grip.turned);
+    for (int i = 0; i < 3; ++i) {
+      h.grip.moved[i] = in.p[i] - first_->p[i];
+      h.grip.linear[i] = in.v[i], h.grip.angular[i] = in.w[i];
+    }
+    h.buttons = in.buttons;
+    number_ = in.number;
     h.sequence = ++count_;
     h.at = heard_at_ = now();
     box_.put(h);
@@ -140,7 +112,7 @@ class Bridge {
   double heard_at_ = -kOwner;
   std::int64_t number_ = 0;
   std::uint64_t count_ = 0;
-  std::unique_ptr<Pose> first_;
+  std::unique_ptr<h6::plugin::BridgeMessage> first_;
   std::atomic<bool> ended_{false};
   std::thread thread_;  // last: it uses the members above
 };

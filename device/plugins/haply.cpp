@@ -27,6 +27,7 @@
 #include <string>
 #include <thread>
 
+#include "device/plugins/haply_message.h"
 #include "device/plugins/mailbox.h"
 
 namespace {
@@ -37,6 +38,8 @@ namespace websocket = beast::websocket;
 using boost::system::error_code;
 using h6::plugin::Heard;
 using h6::plugin::Mailbox;
+using h6::plugin::HaplySaid;
+using h6::plugin::HaplyState;
 using nlohmann::json;
 using Stream = websocket::stream<beast::tcp_stream>;
 
@@ -49,60 +52,6 @@ struct Options {
   double timeout = 0.1;  // [s]
   double max_force = 3;  // [N]
 };
-
-// Three finite numbers of {"x", "y", "z"}.
-bool vector(const json& from, double out[3]) {
-  const char* names[] = {"x", "y", "z"};
-  for (int i = 0; i < 3; ++i) {
-    const auto found = from.find(names[i]);
-    if (found == from.end() || !found->is_number()) return false;
-    out[i] = found->get<double>();
-    if (!std::isfinite(out[i]) || std::fabs(out[i]) > 100) return false;
-  }
-  return true;
-}
-
-// The first entry of a list of devices that has a state; null: there is none.
-const json* device_in(const json& all, const char* kind) {
-  const auto list = all.find(kind);
-  if (list == all.end() || !list->is_array() || list->empty() || !list->front().is_object())
-    return nullptr;
-  return &list->front();
-}
-const json* member(const json* of, const char* name) {
-  if (!of || !of->is_object()) return nullptr;
-  const auto found = of->find(name);
-  return found != of->end() && found->is_object() ? &*found : nullptr;
-}
-
-struct State {
-  double position[3], velocity[3] = {}, orientation[4] = {1, 0, 0, 0};
-  unsigned buttons = 0;
-  bool grip = false;
-};
-
-bool read_grip(const json& all, State& out) {
-  for (const char* kind : {"wireless_verse_grip", "verse_grip"}) {
-    const json* state = member(device_in(all, kind), "state");
-    const json* q = member(state, "orientation");
-    if (!q) continue;
-    const auto w = q->find("w");
-    double xyz[3];
-    if (w == q->end() || !w->is_number() || !vector(*q, xyz)) return false;
-    const double length = std::sqrt(w->get<double>() * w->get<double>() + xyz[0] * xyz[0] +
-                                    xyz[1] * xyz[1] + xyz[2] * xyz[2]);
-    if (!(std::fabs(length - 1) < 0.1)) return false;
-    out.orientation[0] = w->get<double>() / length;
-    for (int i = 0; i < 3; ++i) out.orientation[i + 1] = xyz[i] / length;
-    out.grip = true;
-    if (const json* buttons = member(state, "buttons"))
-      for (int i = 0; i < 3; ++i)
-        if (buttons->value(std::string(1, static_cast<char>('a' + i)), json(false)) == json(true))
-          out.buttons |= 1u << i;
-    return true;
-  }
-  return true;  // without a VerseGrip the part does not turn
-}
 
 // The service's connection, on a thread of its own.
 class Service {
@@ -156,26 +105,20 @@ class Service {
   bool take() {
     const auto bytes = buffer_.cdata();
     const char* text = static_cast<const char*>(bytes.data());
-    const json all = json::parse(text, text + bytes.size(), nullptr, false);
+    HaplyState state;
+    const HaplySaid said = h6::plugin::parse_haply({text, bytes.size()}, state);
     buffer_.consume(buffer_.size());
-    if (!all.is_object()) return false;
-    const json* inverse = device_in(all, "inverse3");
-    const json* state = member(inverse, "state");
-    if (!state) return id_.empty();  // before the first state it may speak of other things
-    State s;
-    const json *p = member(state, "cursor_position"), *v = member(state, "cursor_velocity");
-    if (!p || !vector(*p, s.position) || (v && !vector(*v, s.velocity)) || !read_grip(all, s))
-      return false;
-    const auto id = inverse->find("device_id");
-    if (id == inverse->end() || !id->is_string()) return false;
-    id_ = id->get<std::string>();
-    put(s);
+    // Before the first state it may speak of other things.
+    if (said == HaplySaid::other) return id_.empty();
+    if (said == HaplySaid::nonsense) return false;
+    id_ = state.id;
+    put(state);
     return true;
   }
   // What it did since the first state ever: a service that was started again has the same axes, and
   // the handle is where it is.
-  void put(const State& s) {
-    if (!first_) first_ = std::make_unique<State>(s);
+  void put(const HaplyState& s) {
+    if (!first_) first_ = std::make_unique<HaplyState>(s);
     Heard h;
     h6_turned(s.orientation, first_->orientation, h.grip.turned);
     for (int i = 0; i < 3; ++i) {
@@ -209,7 +152,7 @@ class Service {
   std::unique_ptr<Stream> stream_;
   beast::flat_buffer buffer_;
   std::string id_, said_;
-  std::unique_ptr<State> first_;
+  std::unique_ptr<HaplyState> first_;
   std::uint64_t count_ = 0;
   std::atomic<bool> grip_{false}, connected_{false};
   std::thread thread_;

@@ -15,8 +15,8 @@ found=0
 # Small inputs find as much as large ones, and many more of them fit into a second.
 most() {
   case $1 in
-    hid|path|script|gz|device) echo 256 ;;
-    obj|request|contract) echo 512 ;;
+    hid|path|script|gz|device|bridge|plugin) echo 256 ;;
+    obj|request|contract|haply) echo 512 ;;
     stl|ply|mesh_gz|scene|shell|dae|gltf|glb) echo 1500 ;;
     field) echo 25000 ;;
     vdb|log) echo 40000 ;;

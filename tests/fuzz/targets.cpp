@@ -15,6 +15,9 @@
 #include <vector>
 
 #include "device/device_spec.h"
+#include "device/plugin.h"
+#include "device/plugins/bridge_message.h"
+#include "device/plugins/haply_message.h"
 #include "device/scripted_hand.h"
 #include "device/spacemouse_report.h"
 #include "io/deform/deformable_file.h"
@@ -153,6 +156,37 @@ void take_hid(std::string_view bytes) {
                               state);
 }
 
+void take_bridge(std::string_view bytes) {
+  plugin::BridgeMessage in;
+  if (!plugin::parse_bridge(bytes, in)) return;
+  const double length = std::hypot(std::hypot(in.q[0], in.q[1]), std::hypot(in.q[2], in.q[3]));
+  promise(std::fabs(length - 1) < 1e-9, "a hand has an orientation");
+  for (int i = 0; i < 3; ++i)
+    promise(std::fabs(in.p[i]) <= 100 && std::fabs(in.v[i]) <= 100 && std::fabs(in.w[i]) <= 1000,
+            "a hand's pose and velocity are in range");
+}
+
+void take_haply(std::string_view bytes) {
+  plugin::HaplyState s;
+  if (plugin::parse_haply(bytes, s) != plugin::HaplySaid::state) return;
+  const double* q = s.orientation;
+  const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+  promise(std::fabs(length - 1) < 1e-9 && s.buttons < 8, "a grip has an orientation");
+  for (int i = 0; i < 3; ++i)
+    promise(std::fabs(s.position[i]) <= 100 && std::fabs(s.velocity[i]) <= 100,
+            "a cursor is in range");
+}
+
+// What a plug-in says of its device.
+void take_plugin(std::string_view bytes) {
+  h6PluginCapabilities can{};
+  std::memcpy(&can, bytes.data(), std::min(bytes.size(), sizeof can));
+  if (!device::nonsense_in(can).empty()) return;
+  promise(std::strlen(can.name) < sizeof can.name, "a name ends");
+  for (const double rating : {can.max_force, can.max_torque, can.max_velocity, can.rate, can.freeze_time})
+    promise(rating >= 0 && rating <= 1e9, "a rating is a number");
+}
+
 void take_gz(std::string_view bytes) {
   const auto text = io::gunzip(bytes, "x.gz");
   if (!text) check_sentence(text.error());
@@ -208,6 +242,8 @@ constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},    {"obj", take_mesh<kO
                                {"vdb", take_vdb},           {"scene", take_scene},
                                {"path", take_path},         {"script", take_script},
                                {"device", take_spec},       {"hid", take_hid},
+                               {"bridge", take_bridge},     {"haply", take_haply},
+                               {"plugin", take_plugin},
                                {"request", take_request},   {"recording", take_recording},
                                {"log", take_log},           {"contract", take_contract},
                                {"veg", take_solid<kVeg>},   {"msh", take_solid<kMsh>},
