@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bridge_message.h - what a program sends to the bridge: a pose as JSON, from anyone on this machine.
+// bridge_message.h - what a program sends to the bridge: a pose as JSON, from anyone on this
+// machine.
 #pragma once
 #include <cmath>
 #include <cstddef>
@@ -17,7 +18,8 @@ struct BridgeMessage {
 };
 
 // `count` finite numbers; false also where it is not there and must be.
-inline bool numbers(const nlohmann::json& from, const char* key, int count, double most, bool must, double* out) {
+inline bool numbers(const nlohmann::json& from, const char* key, int count, double most, bool must,
+                    double* out) {
   const auto found = from.find(key);
   if (found == from.end()) return !must;
   if (!found->is_array() || found->size() != static_cast<std::size_t>(count)) return false;

@@ -56,7 +56,8 @@ inline bool read_grip(const nlohmann::json& all, HaplyState& out) {
     out.grip = true;
     if (const nlohmann::json* buttons = member(state, "buttons"))
       for (int i = 0; i < 3; ++i)
-        if (buttons->value(std::string(1, static_cast<char>('a' + i)), nlohmann::json(false)) == nlohmann::json(true))
+        if (buttons->value(std::string(1, static_cast<char>('a' + i)), nlohmann::json(false)) ==
+            nlohmann::json(true))
           out.buttons |= 1u << i;
     return true;
   }

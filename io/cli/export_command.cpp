@@ -4,9 +4,9 @@
 //   hapsix export run.h5 -o run.csv [--contacts contacts.csv|contacts.h5] [--bends bends.csv]
 //   hapsix export bay.vdb -o plain.vdb
 //
-// A recording holds neither contacts nor the shapes of bodies that bend; both are computed again to the
-// bit, and a recording that cannot be replayed has none to export. 3,000 contacts at 1 kHz would be some
-// 300 MB for each second of a run.
+// A recording holds neither contacts nor the shapes of bodies that bend; both are computed again to
+// the bit, and a recording that cannot be replayed has none to export. 3,000 contacts at 1 kHz
+// would be some 300 MB for each second of a run.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
@@ -74,16 +74,26 @@ Outcome export_frames(const ExportOptions& o, const io::Recording& head, const C
   });
 }
 
-// A contact's row. `body` and `with` are indices of the scene's bodies; `with` is their number where
-// a contact is with none of them.
+// A contact's row. `body` and `with` are indices of the scene's bodies; `with` is their number
+// where a contact is with none of them.
 const std::vector<io::TableColumn>& contact_columns() {
-  static const std::vector<io::TableColumn> columns = {
-      {"t", "s"},       {"frame", "1", true}, {"body", "index into names", true},
-      {"point", "1", true}, {"x", "m"},       {"y", "m"},
-      {"z", "m"},       {"nx", "1"},          {"ny", "1"},
-      {"nz", "1"},      {"tx", "1"},          {"ty", "1"},
-      {"tz", "1"},      {"weight", "1"},      {"depth", "m"},
-      {"load", "m: force along the normal over k"},    {"with", "index into names", true}};
+  static const std::vector<io::TableColumn> columns = {{"t", "s"},
+                                                       {"frame", "1", true},
+                                                       {"body", "index into names", true},
+                                                       {"point", "1", true},
+                                                       {"x", "m"},
+                                                       {"y", "m"},
+                                                       {"z", "m"},
+                                                       {"nx", "1"},
+                                                       {"ny", "1"},
+                                                       {"nz", "1"},
+                                                       {"tx", "1"},
+                                                       {"ty", "1"},
+                                                       {"tz", "1"},
+                                                       {"weight", "1"},
+                                                       {"depth", "m"},
+                                                       {"load", "m: force along the normal over k"},
+                                                       {"with", "index into names", true}};
   return columns;
 }
 
@@ -116,7 +126,11 @@ void append_contacts(const RecordedSession& session, const h6FrameRecord& frame,
     const double* const row = &rows[at];
     char text[32];
     for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
-      std::snprintf(text, sizeof text, columns[c].whole ? "%.0f," : c == 0 ? "%.6f," : "%.9g,", row[c]);
+      std::snprintf(text, sizeof text,
+                    columns[c].whole ? "%.0f,"
+                    : c == 0         ? "%.6f,"
+                                     : "%.9g,",
+                    row[c]);
       out += text;
     }
     out += name(row[2]) + ',' + name(row[columns.size() - 1]) + '\n';

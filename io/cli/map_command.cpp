@@ -66,7 +66,8 @@ std::vector<std::string> words_of(const Options& o) {
 void serve_map(const MapOptions& options) {
   MapPlan plan = plan_map(options);
   study::serve([&](std::size_t job) {
-    if (job >= plan.jobs.size()) return std::string("!a worker is asked for what it has not planned");
+    if (job >= plan.jobs.size())
+      return std::string("!a worker is asked for what it has not planned");
     run_job(options, plan, job);
     return std::to_string(job) + " " + job_line(plan, job);
   });

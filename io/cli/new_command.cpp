@@ -137,14 +137,18 @@ std::string trial_sentence(const Trial& t) {
 const char* doubt_of(io::Verdict verdict) {
   switch (verdict) {
     case io::Verdict::through:
-      return "in the trial the part went through a wall: 'hapsix check' says what the walls hold; a "
-             "smaller \"voxel\" of the environment or a smaller \"max_force\" of the hand holds more";
+      return "in the trial the part went through a wall: 'hapsix check' says what the walls hold; "
+             "a "
+             "smaller \"voxel\" of the environment or a smaller \"max_force\" of the hand holds "
+             "more";
     case io::Verdict::chatters:
-      return "in the trial the part trembled: a heavier part, more \"damping\" or a lower \"stiffness\" "
+      return "in the trial the part trembled: a heavier part, more \"damping\" or a lower "
+             "\"stiffness\" "
              "of the contact calms it";
     case io::Verdict::unstable:
     case io::Verdict::sunk:
-      return "the trial failed: a smaller \"voxel\" of the environment, a smaller \"max_force\" of the "
+      return "the trial failed: a smaller \"voxel\" of the environment, a smaller \"max_force\" of "
+             "the "
              "hand or a lower \"stiffness\" of the contact may help";
     default:
       return nullptr;

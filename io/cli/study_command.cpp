@@ -15,6 +15,7 @@
 #include "io/file/write_aside.h"
 #include "io/run/try_run.h"
 #include "io/scene/load_scene.h"
+#include "io/study/parquet.h"
 #include "io/study/picture.h"
 #include "io/study/plan.h"
 #include "io/study/scheduler.h"
@@ -176,6 +177,9 @@ int study_command(const Program& program, const Options& o) {
                         std::to_string(plan->runs()) + " runs; the same command goes on");
   if (const Outcome finished = table->finish(); !finished) return console.fail(finished.error());
   if (const Outcome drawn = draw(o, *plan, *table); !drawn) return console.fail(drawn.error());
+  const fs::path parquet = fs::path(table->file()).replace_extension(".parquet");
+  if (const Result<bool> packed = study::write_parquet(table->file(), parquet); !packed)
+    console.warn({"the table is CSV only: " + packed.error()});
   return report(console, *table);
 }
 
@@ -188,10 +192,10 @@ void add_study(CLI::App& app, Program& program) {
   auto o = std::make_shared<Options>();
   command->add_option("STUDY.json", o->file, "A scene and what varies; see below")->required();
   command
-      ->add_option(
-          "-o,--output", o->folder,
-          "Its folder: runs.csv and runs.svg in the end. A study that was killed goes on where it "
-          "was")
+      ->add_option("-o,--output", o->folder,
+                   "Its folder: runs.csv and runs.svg in the end, and runs.parquet where Python "
+                   "has pyarrow. A study that was killed goes on where it "
+                   "was")
       ->required()
       ->option_text("FOLDER");
   command->add_option("--jobs", o->jobs, "Processes; default: one for each core")
@@ -207,7 +211,8 @@ void add_study(CLI::App& app, Program& program) {
       "STUDY.json: {\"hapsix_study\": 1, \"scene\": \"peg-in-hole\",\n"
       "  \"vary\": {\"contact.method\": [\"firm\", \"global\"],\n"
       "           \"bodies.block.field.offset\": {\"from\": 0, \"to\": 0.4, \"count\": 5}},\n"
-      "  \"draw\": {\"bodies.peg.pose.p.x\": {\"low\": -0.2, \"high\": 0.2}}, \"repeats\": 20}\n\n" +
+      "  \"draw\": {\"bodies.peg.pose.p.x\": {\"low\": -0.2, \"high\": 0.2}}, \"repeats\": "
+      "20}\n\n" +
       command->get_footer());
   command->callback(
       [&program, o] { program.work = [&program, o] { return study_command(program, *o); }; });

@@ -81,8 +81,8 @@ Outcome ColumnsFile::append(const std::vector<double>& rows) {
       if (p.columns[c].whole) whole[i] = static_cast<std::uint64_t>(column[i]);
     }
     if (H5Dset_extent(p.datasets[c], &now) < 0 ||
-        !write_rows(p.datasets[c], p.columns[c].whole ? H5T_NATIVE_UINT64 : H5T_NATIVE_DOUBLE, first,
-                    count,
+        !write_rows(p.datasets[c], p.columns[c].whole ? H5T_NATIVE_UINT64 : H5T_NATIVE_DOUBLE,
+                    first, count,
                     p.columns[c].whole ? static_cast<const void*>(whole.data()) : column.data()))
       return p.failed();
   }

@@ -162,7 +162,8 @@ with h5py.File("c.h5") as h5, open("c.csv") as text:
                 assert abs(float(row[name]) - float(column[i])) <= 1e-6 * max(1e-3, abs(column[i])), (i, name)
     assert h5["depth"].attrs["units"] == "m" and h5["frame"].dtype == "uint64"
 )");
-  CHECK(std::system(("cd '" + box.folder().string() + "' && /usr/bin/python3 compare.py").c_str()) == 0);
+  CHECK(std::system(
+            ("cd '" + box.folder().string() + "' && /usr/bin/python3 compare.py").c_str()) == 0);
 }
 
 TEST_CASE("a file that brings the HDF5 library down gets one sentence, and the program goes on") {

@@ -145,6 +145,36 @@ TEST_CASE("a study says what is wrong before it runs, and keeps another's table"
   CHECK(slurp(box.file("kept/runs.csv")) == table);
 }
 
+TEST_CASE("the table is Parquet too where Python has pyarrow") {
+  Sandbox box;
+  // A stand-in that writes what it was given: Debian 12 has no pyarrow.
+  fs::create_directories(box.file("python/pyarrow"));
+  spill(box.file("python/pyarrow/__init__.py"), "def string(): return 'text'\n");
+  spill(box.file("python/pyarrow/csv.py"),
+        "def ConvertOptions(column_types): return column_types\n"
+        "def read_csv(name, convert_options): return open(name).read(), convert_options\n");
+  spill(box.file("python/pyarrow/parquet.py"),
+        "def write_table(table, name):\n"
+        "    assert table[1]['state_hash'] == 'text'\n"
+        "    open(name, 'w').write('PAR1' + table[0])\n");
+  spill(box.file("study.json"), R"({"hapsix_study": 1, "scene": "box-on-wall", "repeats": 2})");
+  ::setenv("PYTHONPATH", box.file("python").c_str(), 1);
+  const Ended with = run(box, {"study", "study.json", "-o", "with"});
+  spill(box.file("python/pyarrow/parquet.py"), "def write_table(table, name): raise OSError\n");
+  const Ended fails = run(box, {"study", "study.json", "-o", "fails"});
+  spill(box.file("python/pyarrow/__init__.py"), "raise ImportError\n");
+  const Ended without = run(box, {"study", "study.json", "-o", "without"});
+  ::unsetenv("PYTHONPATH");
+  REQUIRE_MESSAGE(with.code == 0, with.err);
+  CHECK(slurp(box.file("with/runs.parquet")) == "PAR1" + slurp(box.file("with/runs.csv")));
+  CHECK(fails.code == 0);
+  CHECK_MESSAGE(fails.err.find("pyarrow failed on fails/runs.csv") != std::string::npos, fails.err);
+  CHECK(without.code == 0);
+  CHECK(without.err.find("pyarrow") == std::string::npos);
+  for (const char* name : {"fails/runs.parquet", "without/runs.parquet"})
+    CHECK(!fs::exists(box.file(name)));
+}
+
 TEST_CASE("a run that fails has a row that says why, and the others have theirs") {
   Sandbox box;
   // The peg starts 20 mm to the side: more than 3 voxels deep in the block, which a run refuses.
