@@ -137,19 +137,15 @@ std::string trial_sentence(const Trial& t) {
 const char* doubt_of(io::Verdict verdict) {
   switch (verdict) {
     case io::Verdict::through:
-      return "in the trial the part went through a wall: 'hapsix check' says what the walls hold; "
-             "a "
-             "smaller \"voxel\" of the environment or a smaller \"max_force\" of the hand holds "
-             "more";
+      return "in the trial the part went through a wall; a smaller \"voxel_size\" of the field or a "
+             "smaller \"max_force\" of the coupling holds more, and 'hapsix check' says how much";
     case io::Verdict::chatters:
-      return "in the trial the part trembled: a heavier part, more \"damping\" or a lower "
-             "\"stiffness\" "
-             "of the contact calms it";
+      return "in the trial the part trembled; a heavier part, more \"damping\" or a lower "
+             "\"stiffness\" of the contact calms it";
     case io::Verdict::unstable:
     case io::Verdict::sunk:
-      return "the trial failed: a smaller \"voxel\" of the environment, a smaller \"max_force\" of "
-             "the "
-             "hand or a lower \"stiffness\" of the contact may help";
+      return "the trial failed; a smaller \"voxel_size\" of the field, a smaller \"max_force\" of "
+             "the coupling or a lower \"stiffness\" of the contact may help";
     default:
       return nullptr;
   }
