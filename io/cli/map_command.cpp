@@ -138,23 +138,25 @@ void add_map(CLI::App& app, Program& program) {
       "map",
       "How robust the weight methods are: many variations of every scene, compared in pairs");
   auto o = std::make_shared<Options>();
-  map->add_option("--variations", o->map.variations, "Variations of each scene")
+  map->add_option("--variations", o->map.variations, "Variations of each scene; default 36")
       ->check(whole_within(1, 100000))
-      ->capture_default_str();
-  map->add_option("--seed", o->map.seed, "Another seed draws other variations")
+      ->option_text("N");
+  map->add_option("--seed", o->map.seed, "Another seed draws other variations; default 1")
       ->check(whole_within(0, 1LL << 53))
-      ->capture_default_str();
+      ->option_text("SEED");
   std::string methods;
   for (const MethodColumn& m : map_methods()) methods += (methods.empty() ? "" : ",") + m.name;
   map->add_option("--methods", o->methods,
-                  "Weight methods, such as robust,gauss6+facing; default: " + methods);
+                  "Weight methods, such as robust,gauss6+facing; default: " + methods)
+      ->option_text("NAMES");
   map->add_option("--scenes", o->scenes,
-                  "Scenes, such as cone-in-gap,peg-in-hole; default: all that are made quickly");
+                  "Scenes, such as cone-in-gap,peg-in-hole; default: all that are made quickly")
+      ->option_text("NAMES");
   map->add_option("--only", o->only, "One variation alone, with every run")
       ->option_text("SCENE:INDEX");
-  map->add_option("--jobs", o->map.jobs, "Threads; the figures do not depend on it")
+  map->add_option("--jobs", o->map.jobs, "Threads, default 2; the figures do not depend on it")
       ->check(whole_within(1, 256))
-      ->capture_default_str();
+      ->option_text("N");
   map->add_option("--scheduler", o->scheduler,
                   "Do the runs on the workers of this scheduler of Dask's distributed; the same "
                   "figures, as far as they have this machine's SIMD target")

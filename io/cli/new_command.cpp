@@ -93,10 +93,10 @@ std::string slurp(const fs::path& file) {
 }
 
 // A scene that someone changed by hand is not overwritten.
-Outcome write_scene(const NewOptions& o, const std::string& text, const io::Scene& scene,
-                    const fs::path& path_file) {
+Outcome write_scene(const NewOptions& o, bool over, const std::string& text,
+                    const io::Scene& scene, const fs::path& path_file) {
   std::error_code error;
-  if (!o.force && fs::exists(o.out, error) && slurp(o.out) != text)
+  if (!over && fs::exists(o.out, error) && slurp(o.out) != text)
     return Failure{o.out +
                    " is there already and is another scene: choose a name with -o, or "
                    "overwrite it with --force"};
@@ -179,11 +179,17 @@ class NewScene {
     if (!console_.json) console_.log(assets(**loaded));
     Result<io::StartPlace> start = io::find_start(*plan, **loaded);
     if (!start) return start.failure();
-    tell(start->choices);
-    if (Outcome written = write(*files, **loaded); !written) return written.failure();
-    const Result<Trial> trial = try_run(**loaded);
+    Result<Trial> trial = attempt(*start, *files, **loaded);
     if (!trial) return trial.failure();
-    tell({{"tried", trial_sentence(*trial)}});
+    if (start->overlaps && doubt_of(trial->totals.verdict)) {
+      // Where the overlap is no fit, the way out of it leads through a wall.
+      Result<io::StartPlace> other = io::find_start(*plan, **loaded, true);
+      if (other) {
+        start = std::move(other);
+        trial = attempt(*start, *files, **loaded);
+        if (!trial) return trial.failure();
+      }
+    }
     Made made{std::move(*loaded), *trial, std::move(json_)};
     fill(made, *start);
     return made;
@@ -199,6 +205,16 @@ class NewScene {
     }
   }
 
+  // Tells of a start, writes the scene with it, and tries it.
+  Result<Trial> attempt(const io::StartPlace& start, const Files& files, io::LoadedScene& loaded) {
+    tell(start.choices);
+    if (Outcome written = write(files, loaded); !written) return written.failure();
+    written_ = true;
+    Result<Trial> trial = try_run(loaded);
+    if (trial) tell({{"tried", trial_sentence(*trial)}});
+    return trial;
+  }
+
   // Writes the files, and reads the scene again as `run` will.
   Outcome write(const Files& files, io::LoadedScene& loaded) {
     if (Outcome copied = copy_files(files); !copied) return copied;
@@ -207,7 +223,7 @@ class NewScene {
         "made by 'hapsix new' of " + std::to_string(files.names.size()) + " meshes";
     const std::string text =
         io::proposal_text(loaded.scene, files.names, path_file.filename().string());
-    if (Outcome written = write_scene(o_, text, loaded.scene, path_file); !written) return written;
+    if (Outcome written = write_scene(o_, o_.force || written_, text, loaded.scene, path_file); !written) return written;
     Result<io::Scene> read = io::read_scene(o_.out);
     if (!read) return read.failure();
     loaded.scene = std::move(*read);
@@ -219,6 +235,7 @@ class NewScene {
   void fill(Made& made, const io::StartPlace& start) const {
     const io::LoadedScene& l = *made.loaded;
     const double scale = 1 / io::metres(l.scene.unit);
+    const char* const doubt = doubt_of(made.trial.totals.verdict);
     ordered_json choices = std::move(made.json["choices"]);
     made.json = {
         {"scene", o_.out},
@@ -238,6 +255,7 @@ class NewScene {
           {"contacts_max", made.trial.totals.contacts_max},
           {"max_depth_voxels", made.trial.totals.max_depth_voxels},
           {"verdict", io::verdict_name(made.trial.totals.verdict)}}},
+        {"doubt", doubt ? ordered_json(doubt) : ordered_json()},
         {"seconds", std::chrono::duration<double>(Clock::now() - begun_).count()},
         {"choices", std::move(choices)}};
   }
@@ -246,6 +264,7 @@ class NewScene {
   const NewOptions& o_;
   Clock::time_point begun_;
   ordered_json json_{{"choices", ordered_json::array()}};
+  bool written_ = false;  // the scene there is this command's own
 };
 
 // The view opens where someone sits at a terminal, or when it is asked for.

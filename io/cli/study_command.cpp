@@ -199,7 +199,8 @@ void add_study(CLI::App& app, Program& program) {
       ->required()
       ->option_text("FOLDER");
   command->add_option("--jobs", o->jobs, "Processes; default: one for each core")
-      ->check(whole_within(1, 1024));
+      ->check(whole_within(1, 1024))
+      ->option_text("N");
   command
       ->add_option("--scheduler", o->scheduler,
                    "Do the runs on the workers of this scheduler of Dask's distributed; the same "

@@ -56,8 +56,9 @@ struct StartPlace {
   std::vector<Chosen> choices;
 };
 // `loaded` is the loaded scene of the plan. Chooses a start and proves with the engine that nothing
-// overlaps there; fails if none is found. Leaves the start in `loaded`.
-Result<StartPlace> find_start(const ScenePlan& plan, LoadedScene& loaded);
+// overlaps there; fails if none is found. Leaves the start in `loaded`. `outside`: not in a given place
+// where the parts overlap, even a little.
+Result<StartPlace> find_start(const ScenePlan& plan, LoadedScene& loaded, bool outside = false);
 
 // The scene as JSON with what is not a default, short lists on one line. Body `i` has the mesh file
 // meshes[i]; the hand follows the path file `path`.

@@ -47,14 +47,14 @@ class StartFinder {
     gap_ = std::max(kGap * plan.size, 4 * plan.voxel);
   }
 
-  Result<StartPlace> find() {
+  Result<StartPlace> find(bool not_inside) {
     Result<Overlap> given = overlap({});
     if (!given) return given.failure();
     if (given->points == 0 && plan_.way->inside({}) == 0) return near(plan_.way->nearest({}));
     choose_way_out();
     const bool fits = !given->unknown && given->depth_voxels <= kFitting &&
                       plan_.way->inside({}, kFitting * plan_.voxel) == 0;
-    if (fits) return fit(*given);
+    if (fits && !not_inside) return fit(*given);
     return outside(*given);
   }
 
@@ -216,8 +216,8 @@ class StartFinder {
 
 }  // namespace
 
-Result<StartPlace> find_start(const ScenePlan& plan, LoadedScene& loaded) {
-  Result<StartPlace> start = StartFinder(plan, loaded).find();
+Result<StartPlace> find_start(const ScenePlan& plan, LoadedScene& loaded, bool outside) {
+  Result<StartPlace> start = StartFinder(plan, loaded).find(outside);
   if (start) loaded.scene.hands[0].path = start->path;
   return start;
 }

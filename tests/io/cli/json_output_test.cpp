@@ -243,7 +243,7 @@ TEST_CASE("without --json the result is on stdout and nothing else, and help goe
     CHECK(help.err.empty());
     CHECK(help.out.find("Usage: hapsix") != std::string::npos);
     CHECK(help.out.find("--json") != std::string::npos);
-    for (const char* leftover : {"Excludes:", "Needs:", "REQUIRED", "FILE FILE", "{false}", "(1x)"})
+    for (const char* leftover : {"Excludes:", "Needs:", "REQUIRED", "FILE FILE", "{false}", "(1x)", " UINT", " TEXT", " INT"})
       CHECK_MESSAGE(help.out.find(leftover) == std::string::npos, leftover);
   }
   CHECK(run(box, {"--version"}).out.rfind("hapsix ", 0) == 0);

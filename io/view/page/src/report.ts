@@ -61,10 +61,13 @@ const verdicts: Record<string, [string, string]> = {
 
 interface Moment { time: number; what: string }
 
+// Causes of the safety chain that end the force, by their names.
+const faults = new Set(['not finite', 'device lost', 'overspeed', 'pose jump', 'bad sample', 'frozen', 'watchdog']);
+
 // The escape, else the first fault, else the deepest contact.
 function moment(run: any, rows: Float32Array): Moment {
   if (run.through) return { time: run.through.t, what: 'a point passes through' };
-  const fault = run.events.find((e: any) => /fault|not finite|lost/.test(e.what));
+  const fault = run.events.find((e: any) => faults.has(e.what));
   if (fault) return { time: fault.t, what: fault.what };
   let at = 0;
   for (let i = 0; i < rows.length; i += 6) if (rows[i + 4] > rows[at + 4]) at = i;
@@ -175,7 +178,7 @@ function lists(head: any) {
   else $('late').textContent = 'none';
   // Late frames have a list of their own.
   long($('events'), ['run', 'time [s]', 'what', 'detail'], head.runs.flatMap((r: any, i: number) =>
-    r.events.filter((e: any) => e.what !== 'late').map((e: any) => [swatch(i, r.label), e.t.toFixed(3), e.what, e.detail])));
+    r.events.filter((e: any) => !/^late(:|$)/.test(e.what)).map((e: any) => [swatch(i, r.label), e.t.toFixed(3), e.what, e.detail])));
   head.runs.forEach((r: any, i: number) => {
     const fold = document.createElement('details');
     const top = document.createElement('summary');
@@ -200,6 +203,7 @@ class Replay {
     view.load(packet);
     view.copies(packet.head.runs.map((_: any, i: number) => colours[i % colours.length]));
     $<HTMLInputElement>('others').disabled = packet.head.runs.length < 2;
+    $<HTMLInputElement>('others').checked = packet.head.runs.length > 1;
     $<HTMLInputElement>('others').onchange = () => { this.shown = -1; };
     $('key').onclick = () => this.toMoment();
     const which = $<HTMLSelectElement>('which');
@@ -233,8 +237,13 @@ class Replay {
   }
 
   // The samples of contacts are fewer than the frames: the nearest one that has some.
-  private frameCamera(c: Contacts) {
+  private frameCamera(k: number) {
     this.framing = false;
+    const samples = floats(this.packet, `replay_t${this.run}`).length;
+    let c = this.contacts(k);
+    for (let away = 1; away < samples && !c.d.length; ++away)
+      for (const near of [k - away, k + away])
+        if (near >= 0 && near < samples && !c.d.length) c = this.contacts(near);
     const through = this.packet.head.runs[this.run].through;
     let deepest = 0;
     for (let i = 1; i < c.d.length; ++i) if (c.d[i] > c.d[deepest]) deepest = i;
@@ -316,7 +325,7 @@ class Replay {
       this.view.bends(floats(this.packet, `replay_bends${this.run}`), k * this.view.bendCount());
       this.view.contacts(c, this.packet.head.voxel);
       this.showOthers();
-      if (this.framing) this.frameCamera(c);
+      if (this.framing) this.frameCamera(k);
       $('n-contacts').textContent = String(c.w.length);
       $('n-depth').textContent = c.d.length ? (Math.max(...c.d) / this.packet.head.voxel).toFixed(2) : '0';
     }

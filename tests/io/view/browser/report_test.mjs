@@ -41,6 +41,8 @@ test('it opens from disk and shows both runs', async () => {
   // Under `global` the part enters the forbidden region; the report opens there.
   assert.match(text, /What matters most: a point passes through, at [1-9]/);
   await wait(800);
+  assert.equal(await browser.value('document.getElementById("others").checked'), true, 'both runs in space');
+  assert.doesNotMatch(await browser.value('document.getElementById("events").innerText'), /\blate: /, 'late frames have their own list');
   await browser.picture(join(pictures, 'report-top.png'));
 });
 
