@@ -20,7 +20,8 @@ namespace {
 
 bool whole(const h6StepArrays& a) {
   const auto unknown = [](std::uint64_t word) { return word != 0; };
-  return (a.sessions || a.count == 0) && a.hands <= H6_MAX_HANDS && a.steps > 0 &&
+  constexpr std::size_t most = SIZE_MAX / sizeof(h6Session*);  // that an array can hold
+  return (a.sessions || a.count == 0) && a.count <= most && a.hands <= H6_MAX_HANDS && a.steps > 0 &&
          (a.pose || a.hands == 0 || a.count == 0) &&
          std::none_of(std::begin(a.reserved), std::end(a.reserved), unknown);
 }

@@ -211,7 +211,8 @@ int devices_command(const Console& console, DevicesOptions o) {
   if (!opened) return console.fail(opened.error());
   ordered_json json = capabilities(*opened, o.device);
   if (!console.json) {
-    std::printf("%s: %u in, %u out, %g N, %g N m\n", opened->device.capabilities.name,
+    std::printf("%s: %u in, %u out, %g N, %g N m\n",
+                printable(opened->device.capabilities.name).c_str(),
                 opened->device.capabilities.dof_in, opened->device.capabilities.dof_out,
                 opened->device.capabilities.max_force, opened->device.capabilities.max_torque);
     if (!opened->about.empty()) std::printf("%s\n", printable(opened->about).c_str());

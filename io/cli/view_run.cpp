@@ -288,8 +288,11 @@ class Viewer : public RunObserver {
     }
     struct stat exists;
     int n = 1;
+    // A name of a stranger's scene leads to no other folder.
+    std::string name = loaded_.scene.name;
+    std::replace(name.begin(), name.end(), '/', '_');
     do
-      record_ = options_.folder + "/" + loaded_.scene.name + "-view-" + std::to_string(n++) + ".h5";
+      record_ = options_.folder + "/" + name + "-view-" + std::to_string(n++) + ".h5";
     while ((stat(record_.c_str(), &exists) == 0 ||
             stat((record_ + ".part").c_str(), &exists) == 0) &&  // left by a killed run
            n < 10000);

@@ -180,6 +180,7 @@ void take_haply(std::string_view bytes) {
 // What a plug-in says of its device.
 void take_plugin(std::string_view bytes) {
   h6PluginCapabilities can{};
+  if (bytes.empty()) return;
   std::memcpy(&can, bytes.data(), std::min(bytes.size(), sizeof can));
   if (!device::nonsense_in(can).empty()) return;
   promise(std::strlen(can.name) < sizeof can.name, "a name ends");

@@ -369,6 +369,7 @@ TEST_CASE("wrong arguments of a call on many sessions are refused") {
     CHECK(h6GetFrame(crowd.handles[0]).state_hash == 0);
   };
   refuses([](h6StepArrays& a) { a.sessions = nullptr; });
+  refuses([](h6StepArrays& a) { a.count = SIZE_MAX; });
   refuses([](h6StepArrays& a) { a.pose = nullptr; });
   refuses([](h6StepArrays& a) { a.steps = 0; });
   refuses([](h6StepArrays& a) { a.hands = UINT32_MAX; });
