@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bridge_message.h - what a program sends to the bridge: a pose as JSON, from anyone on this
-// machine.
+// bridge_message.h - a pose as JSON, which any program on this machine may send to the bridge.
 #pragma once
 #include <cmath>
 #include <cstddef>
@@ -17,7 +16,7 @@ struct BridgeMessage {
   unsigned buttons = 0;
 };
 
-// `count` finite numbers; false also where it is not there and must be.
+// Reads `count` finite numbers up to `most`. A missing key is false only where it `must` be there.
 inline bool numbers(const nlohmann::json& from, const char* key, int count, double most, bool must,
                     double* out) {
   const auto found = from.find(key);
@@ -32,7 +31,7 @@ inline bool numbers(const nlohmann::json& from, const char* key, int count, doub
   return true;
 }
 
-// False: it is no such message, and `out` is to be left alone.
+// Returns false, with `out` half filled, when the text is no such message.
 inline bool parse_bridge(std::string_view text, BridgeMessage& out) {
   const nlohmann::json in = nlohmann::json::parse(text, nullptr, false);
   if (!in.is_object()) return false;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// haply_message.h - the states that Haply's service sends, as JSON.
+// haply_message.h - the states that Haply's service sends, as JSON. `out` is half filled where a
+// function fails.
 #pragma once
 #include <cmath>
 #include <nlohmann/json.hpp>

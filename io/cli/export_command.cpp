@@ -5,8 +5,8 @@
 //   hapsix export bay.vdb -o plain.vdb
 //
 // A recording holds neither contacts nor the shapes of bodies that bend; both are computed again to
-// the bit, and a recording that cannot be replayed has none to export. 3,000 contacts at 1 kHz
-// would be some 300 MB for each second of a run.
+// the bit, and a recording that cannot be replayed has none to export. 3,000 contacts of 17
+// numbers at 1 kHz would be 0.4 GB for each second of a run.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>

@@ -52,7 +52,7 @@ Outcome choose(Options& o) {
   return Done{};
 }
 
-// What a worker needs to draw the same variations.
+// The arguments with which a worker draws the same variations.
 std::vector<std::string> words_of(const Options& o) {
   std::vector<std::string> out = {"map", "--variations", std::to_string(o.map.variations), "--seed",
                                   std::to_string(o.map.seed)};
@@ -67,7 +67,7 @@ void serve_map(const MapOptions& options) {
   MapPlan plan = plan_map(options);
   study::serve([&](std::size_t job) {
     if (job >= plan.jobs.size())
-      return std::string("!a worker is asked for what it has not planned");
+      return std::string("!a worker is asked for a variation that its map does not have");
     run_job(options, plan, job);
     return std::to_string(job) + " " + job_line(plan, job);
   });

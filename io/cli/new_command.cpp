@@ -93,8 +93,8 @@ std::string slurp(const fs::path& file) {
 }
 
 // A scene that someone changed by hand is not overwritten.
-Outcome write_scene(const NewOptions& o, bool over, const std::string& text,
-                    const io::Scene& scene, const fs::path& path_file) {
+Outcome write_scene(const NewOptions& o, bool over, const std::string& text, const io::Scene& scene,
+                    const fs::path& path_file) {
   std::error_code error;
   if (!over && fs::exists(o.out, error) && slurp(o.out) != text)
     return Failure{o.out +
@@ -133,11 +133,12 @@ std::string trial_sentence(const Trial& t) {
   return text;
 }
 
-// What a newcomer should know about a trial that did not go well; null where it did.
+// A sentence of advice after a trial that did not go well; null where it did.
 const char* doubt_of(io::Verdict verdict) {
   switch (verdict) {
     case io::Verdict::through:
-      return "in the trial the part went through a wall; a smaller \"voxel_size\" of the field or a "
+      return "in the trial the part went through a wall; a smaller \"voxel_size\" of the field or "
+             "a "
              "smaller \"max_force\" of the coupling holds more, and 'hapsix check' says how much";
     case io::Verdict::chatters:
       return "in the trial the part trembled; a heavier part, more \"damping\" or a lower "
@@ -223,7 +224,9 @@ class NewScene {
         "made by 'hapsix new' of " + std::to_string(files.names.size()) + " meshes";
     const std::string text =
         io::proposal_text(loaded.scene, files.names, path_file.filename().string());
-    if (Outcome written = write_scene(o_, o_.force || written_, text, loaded.scene, path_file); !written) return written;
+    if (Outcome written = write_scene(o_, o_.force || written_, text, loaded.scene, path_file);
+        !written)
+      return written;
     Result<io::Scene> read = io::read_scene(o_.out);
     if (!read) return read.failure();
     loaded.scene = std::move(*read);

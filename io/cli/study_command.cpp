@@ -194,8 +194,7 @@ void add_study(CLI::App& app, Program& program) {
   command
       ->add_option("-o,--output", o->folder,
                    "Its folder: runs.csv and runs.svg in the end, and runs.parquet where Python "
-                   "has pyarrow. A study that was killed goes on where it "
-                   "was")
+                   "has pyarrow. A study that was killed goes on where it was")
       ->required()
       ->option_text("FOLDER");
   command->add_option("--jobs", o->jobs, "Processes; default: one for each core")

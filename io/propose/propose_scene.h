@@ -56,8 +56,8 @@ struct StartPlace {
   std::vector<Chosen> choices;
 };
 // `loaded` is the loaded scene of the plan. Chooses a start and proves with the engine that nothing
-// overlaps there; fails if none is found. Leaves the start in `loaded`. `outside`: not in a given place
-// where the parts overlap, even a little.
+// overlaps there; fails if none is found. Leaves the start in `loaded`, or
+// `loaded` as it was. `outside`: not in a given place where the parts overlap, even a little.
 Result<StartPlace> find_start(const ScenePlan& plan, LoadedScene& loaded, bool outside = false);
 
 // The scene as JSON with what is not a default, short lists on one line. Body `i` has the mesh file

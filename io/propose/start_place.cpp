@@ -217,7 +217,9 @@ class StartFinder {
 }  // namespace
 
 Result<StartPlace> find_start(const ScenePlan& plan, LoadedScene& loaded, bool outside) {
+  const h6Vec3 given = loaded.bodies.back().pose.p;
   Result<StartPlace> start = StartFinder(plan, loaded).find(outside);
+  if (!start) loaded.bodies.back().pose.p = loaded.scene.bodies.back().pose.p = given;
   if (start) loaded.scene.hands[0].path = start->path;
   return start;
 }

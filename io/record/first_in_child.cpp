@@ -15,13 +15,13 @@
 #include <ctime>
 #include <string>
 
-// A sanitizer would call back into a fuzzer that the child inherits.
+// The child inherits a fuzzer, and the sanitizer would report to it.
 extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));
 
 namespace h6::io::recording {
 namespace {
 
-// What tells a file from another one, and from itself after a change.
+// It differs from that of any other file, and changes with the file.
 struct Identity {
   dev_t device = 0;
   ino_t number = 0;

@@ -10,7 +10,8 @@ case "${1:-}" in ""|[0-9]*) targets=$all ;; *) targets=$1; shift ;; esac
 seconds=${1:-60}
 each=$((seconds / $(echo $targets | wc -w)))
 [ "$each" -ge 1 ] || each=1
-# Not the mismatch of new and delete: fuzzer.cpp replaces both, and libFuzzer has its own.
+# fuzzer.cpp replaces new and delete, and libFuzzer frees memory of its own new with them. So a mismatch
+# of the two is not reported.
 export ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1:alloc_dealloc_mismatch=0
 found=0
 # Small inputs find as much as large ones, and many more of them fit into a second.

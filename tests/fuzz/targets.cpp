@@ -177,7 +177,7 @@ void take_haply(std::string_view bytes) {
             "a cursor is in range");
 }
 
-// What a plug-in says of its device.
+// The capabilities that a plug-in states.
 void take_plugin(std::string_view bytes) {
   h6PluginCapabilities can{};
   if (bytes.empty()) return;

@@ -12,9 +12,9 @@
  * thread may call, and different threads may read one mesh, field, shell or scene at a time; a recorder
  * or a recording belongs to one thread at a time, never the haptic one. Definitions grow as base.h says.
  *
- * What reads and bakes takes its memory from the C library, and so do OpenVDB, Embree, HDF5 and TBB
- * below it, which have no other way. What a session uses, model and session, comes from a program's
- * allocator: h6ModelDef.allocator, h6SessionDef.allocator, or h6SceneDef.allocator for both.
+ * Reading and baking take their memory from the C library, as do OpenVDB, Embree, HDF5 and TBB below
+ * them, which offer no other way. A model and a session take theirs from the program's allocator:
+ * h6ModelDef.allocator, h6SessionDef.allocator, or h6SceneDef.allocator for both.
  */
 #ifndef HAPSIX_IO_H
 #define HAPSIX_IO_H
@@ -223,7 +223,8 @@ typedef struct h6RecordingInfo {
 } h6RecordingInfo;
 typedef struct h6RecordingEvent { double time; const char* what; const char* detail; } h6RecordingEvent;
 
-/* Opens a recording, or what a killed run left of one. */
+/* Opens a recording, or what a killed run left of one. A forked child reads a foreign file first,
+ * since HDF5 crashes on some damaged ones. */
 H6_API h6Recording* h6ReadRecording(const char* file, h6Error* error);
 H6_API void         h6DestroyRecording(h6Recording* recording);
 H6_API void         h6GetRecording(const h6Recording* recording, h6RecordingInfo* out);

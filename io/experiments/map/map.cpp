@@ -159,6 +159,9 @@ bool take_job_line(MapPlan& plan, std::size_t job, const std::string& line) try 
   const nlohmann::json all = nlohmann::json::parse(line);
   v.error = all.at("error");
   for (std::size_t i = 0; i < kMapForces; ++i) v.newtons[i] = number(all.at("newtons").at(i));
+  const std::size_t scene = plan.jobs[job].scene;
+  const std::size_t whole = kMapForces * kMapTables * plan.scenes[scene].stiffer.size();
+  if (all.at("runs").size() != (v.error.empty() ? whole : 0)) return false;
   v.runs.clear();
   for (const nlohmann::json& r : all.at("runs"))
     v.runs.push_back({static_cast<io::Verdict>(r.at(0).get<int>()), r.at(1), r.at(2),

@@ -42,6 +42,7 @@ Json check_runs(Sandbox& box, const Json& made, const std::string& file = "scene
   CHECK(ran["verdict"] == "held");
   CHECK(ran["max_depth_voxels"] < 1);
   CHECK(made["trial"]["verdict"] == ran["verdict"]);
+  CHECK(made["doubt"].is_null());
   CHECK(made["trial"]["contacts_max"] == ran["contacts"]["max"]);
   return scene;
 }
