@@ -124,8 +124,14 @@ std::string try_it(const PluginFile& file, const h6Pose& home, const h6Vec3& gri
   return "";
 }
 
-[[noreturn]] void be_the_child(int answer_to, const PluginFile& file, const h6Pose& home,
-                               const h6Vec3& grip) {
+// Work on the plug-in of `path` that may crash or hang. Returns a sentence, empty when it
+// succeeded.
+struct Trial {
+  const std::string& path;
+  std::function<std::string()> work;
+};
+
+[[noreturn]] void be_the_child(int answer_to, const Trial& trial) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // a plug-in that hangs does not outlive this program
   for (const int number : {SIGINT, SIGTERM, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT})
     signal(number, SIG_DFL);
@@ -134,9 +140,9 @@ std::string try_it(const PluginFile& file, const h6Pose& home, const h6Vec3& gri
   dup2(STDERR_FILENO, STDOUT_FILENO);  // stdout may be a JSON object of the parent's
   std::string answer = "+";
   try {
-    answer += try_it(file, home, grip);
+    answer += trial.work();
   } catch (...) {
-    answer += file.path + ": threw an exception out of C";
+    answer += trial.path + ": threw an exception out of C";
   }
   (void)!write(answer_to, answer.data(), answer.size());
   _exit(0);
@@ -178,15 +184,15 @@ std::string seconds_text(double seconds) {
   return text;
 }
 
-Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, double patience) {
+Outcome in_child(const Trial& trial, double patience) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    return Failure{file.path + ": cannot be tried out, no pipe (" + std::strerror(errno) + ")"};
+    return Failure{trial.path + ": cannot be tried out, no pipe (" + std::strerror(errno) + ")"};
   std::fflush(nullptr);  // else the child would write buffered output a second time
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
-    be_the_child(ends[1], file, home, grip);
+    be_the_child(ends[1], trial);
   }
   close(ends[1]);
   std::string heard;
@@ -194,18 +200,18 @@ Outcome probe(const PluginFile& file, const h6Pose& home, const h6Vec3& grip, do
   bool in_time = child > 0 && listen(ends[0], end, heard);
   close(ends[0]);
   if (child < 0)
-    return Failure{file.path + ": cannot be tried out, no process (" + std::strerror(errno) + ")"};
+    return Failure{trial.path + ": cannot be tried out, no process (" + std::strerror(errno) + ")"};
   int status = 0;
   in_time = over(child, in_time ? end : Clock::now(), status) && in_time;
   if (!in_time)
-    return Failure{file.path + ": its open did not end within " + seconds_text(patience) +
+    return Failure{trial.path + ": its open did not end within " + seconds_text(patience) +
                    ": it hangs, or waits for a device that is not there"};
   if (heard == "+") return Done{};
   if (!heard.empty()) return Failure{heard.substr(1)};
   if (WIFSIGNALED(status))
-    return Failure{file.path + ": crashed while it was opened (" + strsignal(WTERMSIG(status)) +
+    return Failure{trial.path + ": crashed while it was opened (" + strsignal(WTERMSIG(status)) +
                    "): a fault of the plug-in"};
-  return Failure{file.path + ": ended the process while it was opened (exit code " +
+  return Failure{trial.path + ": ended the process while it was opened (exit code " +
                  std::to_string(WEXITSTATUS(status)) + ")"};
 }
 
@@ -239,8 +245,8 @@ Result<std::shared_ptr<Opening>> open_here(const PluginFile& file, const h6Pose&
   if (!in_time)
     return Failure{file.path + ": its open did not end within " + seconds_text(patience) +
                    " the second time: it cannot be opened again after a close"};
+  // After a failure the library stays loaded, because its destructor may hang.
   if (o->wrong.empty()) return o;
-  if (o->loaded.library) dlclose(o->loaded.library);
   return Failure{o->wrong};
 }
 
@@ -264,13 +270,22 @@ std::string nonsense_in(const h6PluginCapabilities& c) {
   return "";
 }
 
+Outcome PluginDevice::loads(const std::string& path, double patience) {
+  const auto load_it = [&] {
+    const Result<Loaded> loaded = load(path);
+    return loaded ? std::string{} : loaded.error();
+  };
+  return in_child({path, load_it}, patience);
+}
+
 Result<std::unique_ptr<PluginDevice>> PluginDevice::open(const PluginFile& file, const h6Pose& home,
                                                          const h6Vec3& grip, double patience) {
   std::error_code ignored;
   if (file.path.empty()) return Failure{"a plug-in needs its file: plugin:PATH"};
   if (!std::filesystem::exists(file.path, ignored))
     return Failure{file.path + ": there is no such file"};
-  if (Outcome good = probe(file, home, grip, patience); !good) return good.failure();
+  const Trial trial{file.path, [&] { return try_it(file, home, grip); }};
+  if (Outcome good = in_child(trial, patience); !good) return good.failure();
   const Result<std::shared_ptr<Opening>> opened = open_here(file, home, grip, patience);
   if (!opened) return opened.failure();
   const Opening& o = **opened;

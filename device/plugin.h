@@ -36,6 +36,8 @@ class PluginDevice {
   // no sense.
   static Result<std::unique_ptr<PluginDevice>> open(const PluginFile& file, const h6Pose& home,
                                                     const h6Vec3& grip, double patience = 10);
+  // Whether the library can be loaded and is a plug-in for this program. No device is opened.
+  static Outcome loads(const std::string& path, double patience = 10);
   ~PluginDevice();
   PluginDevice(const PluginDevice&) = delete;
   PluginDevice& operator=(const PluginDevice&) = delete;

@@ -2,12 +2,14 @@
 #include "io/cli/device_check.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <thread>
 
 #include "hapsix/vector.h"
+#include "io/run/open_device.h"
 
 namespace h6::cli {
 namespace {
@@ -62,15 +64,48 @@ class Frames {
     begun = Clock::now();
     lost = device_.write(device_.self, time, &command) != 0 || lost;
     count.write_us_max = std::max(count.write_us_max, us_since(begun));
+    beat.fetch_add(1, std::memory_order_relaxed);
   }
   h6DeviceSample sample{};
   SampleCount count;
   double time = 0;
   bool lost = false, good = true;
+  std::atomic<std::uint64_t> beat{0};    // whole frames
+  std::atomic<bool> stood_still{false};  // the vigil has stopped the device
 
  private:
   const h6Device& device_;
   Clock::time_point next_;
+};
+
+// Watches the frames from a thread of its own. It stops the device after 20 ms without one, because
+// the last command may still push, and calls `hangs` after kDriverSilence. It counts turns, not
+// time: a program that was stopped goes on after it.
+class Vigil {
+ public:
+  Vigil(const h6Device& device, Frames& frames, const std::function<void()>& hangs)
+      : thread_([this, &device, &frames, &hangs] {
+          std::uint64_t seen = 0;
+          for (int still = 0; !end_.load(); std::this_thread::sleep_for(kTurn)) {
+            const std::uint64_t now = frames.beat.load(std::memory_order_relaxed);
+            still = now == seen ? still + 1 : 0;
+            seen = now;
+            if (still == 20 / kTurn.count()) {
+              frames.stood_still.store(true);
+              std::thread([device] { device.stop(device.self); }).detach();  // it may hang, too
+            }
+            if (still == std::lround(1e3 * kDriverSilence) / kTurn.count()) hangs();
+          }
+        }) {}
+  ~Vigil() {
+    end_.store(true);
+    thread_.join();
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kTurn{5};
+  std::atomic<bool> end_{false};
+  std::thread thread_;
 };
 
 // Why the check must stop; empty when it may go on.
@@ -79,13 +114,17 @@ std::string danger(const Frames& f, const h6Pose& start) {
   if (!f.good) return "the device sent what is no place or no rotation";
   if (norm(f.sample.velocity.linear) > 1) return "the device moved faster than 1 m/s";
   if (norm(f.sample.pose.p - start.p) > 0.1) return "the device moved farther than 0.1 m";
+  if (f.stood_still.load())
+    return "no frame came for 20 ms, and the device was stopped: test again";
   return "";
 }
 
 }  // namespace
 
-SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each) {
+SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each,
+                         const std::function<void()>& hangs) {
   Frames frames(device);
+  const Vigil vigil(device, frames, hangs);
   while (frames.time < seconds) {
     frames.run({});
     if (!each(frames.time, frames.sample, frames.lost)) break;
@@ -97,10 +136,12 @@ SampleCount watch_device(const h6Device& device, double seconds, const EachFrame
 // The noise of sensors. [m], [rad]
 constexpr double kStill = 1e-5;
 
-CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each) {
+CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each,
+                                   const std::function<void()>& hangs) {
   constexpr double kPi = 3.14159265358979323846;
   CheckResult result;
   Frames frames(device);
+  const Vigil vigil(device, frames, hangs);
   h6Pose start{};
   const auto go_on = [&](const h6Wrench& wrench) {
     frames.run(wrench);

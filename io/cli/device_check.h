@@ -33,14 +33,18 @@ struct CheckResult {
 // Called once a frame. It returns false to end the check.
 using EachFrame = std::function<bool(double time, const h6DeviceSample&, bool lost)>;
 
-// Reads at 1 kHz and commands nothing but zero.
-SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each);
+// Reads at 1 kHz and commands nothing but zero. `hangs` is called on another thread when the driver
+// has not come back for kDriverSilence; nothing can end this thread then, so it ends the process.
+SampleCount watch_device(const h6Device& device, double seconds, const EachFrame& each,
+                         const std::function<void()>& hangs);
 
-// Takes samples for half a second and arms the device. Then pushes for 0.4 s along and about every axis; each push
-// rises smoothly to 10 % of the rating (at most 10 N or 1 N m) and falls again. A device that
-// renders no force gets a constant command for a second instead. The check commands zero, stops the
-// device and ends at once when the device is lost, sends an invalid pose, moves faster than 1 m/s
-// or farther than 0.1 m, or when `each` returns false. It fails where no push moves the handle.
-CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each);
+// Takes samples for half a second and arms the device. Then pushes for 0.4 s along and about every
+// axis; each push rises smoothly to 10 % of the rating (at most 10 N or 1 N m) and falls again. A
+// device that renders no force gets a constant command for a second instead. The check commands
+// zero, stops the device and ends at once when the device is lost, sends an invalid pose, moves
+// faster than 1 m/s or farther than 0.1 m, when 20 ms pass without a frame, or when `each` returns
+// false. It fails where no push moves the handle. `hangs` as above.
+CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each,
+                                   const std::function<void()>& hangs);
 
 }  // namespace h6::cli

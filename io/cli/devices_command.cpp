@@ -148,12 +148,19 @@ class LiveView {
   double next_ = 0;
 };
 
+std::function<void()> gives_up(const Console& console, const OpenedDevice& opened) {
+  return [&] {
+    end_without_driver(console, std::string("'") + opened.device.capabilities.name + "'");
+  };
+}
+
 int watch(const Console& console, const OpenedDevice& opened, ordered_json json, double seconds) {
   if (console.json && seconds == 0) seconds = 3;
   SampleCount seen;
   {
     LiveView view(console, opened);
-    seen = watch_device(opened.device, seconds > 0 ? seconds : 1e9, std::ref(view));
+    seen = watch_device(opened.device, seconds > 0 ? seconds : 1e9, std::ref(view),
+                        gives_up(console, opened));
   }
   json["samples"] = counts(seen);
   console.result(json);
@@ -170,7 +177,7 @@ int test(const Console& console, const OpenedDevice& opened, ordered_json json) 
   CheckResult result;
   {
     LiveView view(console, opened);
-    result = check_device_by_pushes(opened.device, std::ref(view));
+    result = check_device_by_pushes(opened.device, std::ref(view), gives_up(console, opened));
   }
   json["samples"] = counts(result.samples);
   ordered_json pushes = ordered_json::array();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // main.cpp - the program hapsix: parses and dispatches; exits with 0 (done), 1 (failed) or 2 (wrong
 // usage).
+#include <signal.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -123,6 +124,33 @@ __attribute__((section(".preinit_array"), used)) void (*const first)(int, char**
                                                                      char**) = before_packages;
 #endif
 
+// Does the work of the command line. Returns the exit code.
+int work(const Program& program) {
+  try {
+    return program.console.finish(program.work());
+  } catch (const std::system_error& e) {
+    if (e.code() != std::errc::resource_unavailable_try_again)
+      return program.console.fail(std::string("unexpected: ") + e.what());
+    return program.console.fail(
+        "the system gives no thread: raise 'ulimit -u', or end other programs");
+  } catch (const std::bad_alloc&) {
+    return program.console.fail(
+        "out of memory: use a larger voxel, fewer points or a smaller file");
+  } catch (const std::exception& e) {
+    return program.console.fail(std::string("unexpected: ") + e.what());
+  }
+}
+
+// Returns `code`, for the end of main. The destructor of a plug-in's library may hang, so the
+// process ends after 5 s without it.
+int leave(int code) {
+  static int kept;
+  kept = code;
+  signal(SIGALRM, [](int) { _exit(kept); });
+  alarm(5);
+  return code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -189,17 +217,5 @@ int main(int argc, char** argv) {
   if (const char* why = h6::kernels::force_target_from_environment())
     return program.console.fail(why, kUsage);
   install_signal_handlers();
-  try {
-    return program.console.finish(program.work());
-  } catch (const std::system_error& e) {
-    if (e.code() != std::errc::resource_unavailable_try_again)
-      return program.console.fail(std::string("unexpected: ") + e.what());
-    return program.console.fail(
-        "the system gives no thread: raise 'ulimit -u', or end other programs");
-  } catch (const std::bad_alloc&) {
-    return program.console.fail(
-        "out of memory: use a larger voxel, fewer points or a smaller file");
-  } catch (const std::exception& e) {
-    return program.console.fail(std::string("unexpected: ") + e.what());
-  }
+  return leave(work(program));
 }

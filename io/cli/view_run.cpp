@@ -117,6 +117,7 @@ class Viewer : public RunObserver {
   void begin(RunSetup& setup, h6Loop* loop, Note note) override {
     setup_ = &setup;
     loop_ = loop;
+    pace_ = 1;
     note_ = std::move(note);
     offset_ = {};
     tell_settings(setup.session.get());
@@ -142,6 +143,9 @@ class Viewer : public RunObserver {
     publish();
     return !again_;
   }
+
+  // A driver that may hang is no simulated hand and has the full pace.
+  bool paused() const override { return pace_ < 0.01; }
 
   void end() override {
     loop_ = nullptr;
@@ -243,7 +247,8 @@ class Viewer : public RunObserver {
     if (!setup_->devices.real_time.empty())  // a slower pace would give it too few commands
       return server_->say(io::view::LiveState::note("the device '" + setup_->devices.real_time +
                                                     "' lives on the clock: no slow motion"));
-    h6SetPace(loop_, set.pace);
+    pace_ = set.pace;
+    h6SetPace(loop_, pace_);
   }
   void act(const io::view::Reset&) {
     record_.clear();
@@ -291,8 +296,7 @@ class Viewer : public RunObserver {
     // A name of a stranger's scene leads to no other folder.
     std::string name = loaded_.scene.name;
     std::replace(name.begin(), name.end(), '/', '_');
-    do
-      record_ = options_.folder + "/" + name + "-view-" + std::to_string(n++) + ".h5";
+    do record_ = options_.folder + "/" + name + "-view-" + std::to_string(n++) + ".h5";
     while ((stat(record_.c_str(), &exists) == 0 ||
             stat((record_ + ".part").c_str(), &exists) == 0) &&  // left by a killed run
            n < 10000);
@@ -354,6 +358,7 @@ class Viewer : public RunObserver {
   Note note_;
   std::string record_;
   bool again_ = false;
+  double pace_ = 1;
   Clock::time_point next_, published_;
 };
 

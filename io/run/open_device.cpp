@@ -3,7 +3,9 @@
 #include "io/run/open_device.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -285,9 +287,10 @@ Outcome check_device(const std::string& text) {
 Outcome check_device_file(const std::string& text) {
   const Result<DeviceSpec> spec = device::parse_device_spec(text);
   std::error_code error;
-  if (!spec || spec->name != "plugin" || std::filesystem::is_regular_file(spec->target, error))
-    return Done{};
-  return Failure{"the plug-in " + spec->target + ": there is no such file"};
+  if (!spec || spec->name != "plugin") return Done{};
+  if (!std::filesystem::is_regular_file(spec->target, error))
+    return Failure{"the plug-in " + spec->target + ": there is no such file"};
+  return device::PluginDevice::loads(spec->target);
 }
 
 Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& place) {
@@ -310,6 +313,15 @@ Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& pla
     out = hand_by_name(spec.name, place.path, place.grip);
   if (out) out->real_time = find_kind(spec.name)->real_time;
   return out;
+}
+
+void end_without_driver(const Console& console, const std::string& names) {
+  set_signal_hook(nullptr, nullptr);
+  const int code = console.fail("the device " + names + " has not answered for " +
+                                std::to_string(std::lround(kDriverSilence)) +
+                                " s: its driver hangs, and the program ends without it");
+  std::fflush(nullptr);
+  std::_Exit(code);
 }
 
 }  // namespace h6::cli

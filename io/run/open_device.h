@@ -9,6 +9,7 @@
 
 #include "device/hand_path.h"
 #include "hapsix/result.h"
+#include "io/console/console.h"
 
 namespace h6::cli {
 
@@ -23,7 +24,8 @@ const std::vector<DeviceKind>& device_kinds();
 
 // Checks that `text` names a device and that its options are valid. It opens nothing.
 Outcome check_device(const std::string& text);
-// Fails when a plug-in's file is missing, so that nobody waits for a bake to hear it.
+// Fails when a plug-in's file is missing or no plug-in, so that nobody waits for a bake to hear it.
+// The library is loaded in a child process, and no device is opened.
 Outcome check_device_file(const std::string& text);
 
 // The scene and the held body, as far as a device needs to know them.
@@ -43,5 +45,11 @@ struct OpenedDevice {
 };
 
 Result<OpenedDevice> open_device(const std::string& text, const DevicePlace& place);
+
+constexpr double kDriverSilence = 10;  // [s] without a frame, after which a driver counts as hung
+
+// Ends the process with kFailed and a sentence: a thread hangs in the driver of the device `names`,
+// and nothing can end it.
+[[noreturn]] void end_without_driver(const Console& console, const std::string& names);
 
 }  // namespace h6::cli

@@ -22,6 +22,8 @@ class RunObserver {
   virtual void rows(const h6FrameRecord* rows, std::size_t count) = 0;
   // Called every few milliseconds. Return false to end the run.
   virtual bool turn() = 0;
+  // True while the observer holds the frames back; else their absence means that a driver hangs.
+  virtual bool paused() const { return false; }
   virtual void end() {}
 };
 

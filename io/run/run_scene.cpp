@@ -3,7 +3,6 @@
 #include "io/run/run_scene.h"
 
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "io/file/free_memory.h"
 #include "io/file/write_aside.h"
 #include "io/mesh/mesh_file.h"
 #include "io/run/run_observer.h"
@@ -30,7 +30,6 @@ struct LoopDeleter {
 };
 
 constexpr double kTraceSeconds = 10;
-constexpr double kSilence = 10;  // [s] without a frame, after which the hands are given up
 
 Outcome open_session(const RunOptions& options, RunSetup& run) {
   h6SessionDef& def = run.def;
@@ -64,11 +63,10 @@ Outcome tell_overlaps(const RunSetup& run, const RunOptions& options, const Cons
 }
 
 // As many records as 10 s have, so that a writer that a loaded machine starves loses none, within a
-// 16th of the memory of the machine. Of a minute more the inputs are kept: 14 MB a hand.
+// 16th of the free memory. Of a minute more the inputs are kept: 14 MB a hand.
 std::size_t ring_frames(double rate) {
-  const double pages = static_cast<double>(std::max(0L, sysconf(_SC_PHYS_PAGES))),
-               bytes = static_cast<double>(std::max(0L, sysconf(_SC_PAGESIZE)));
-  const double most = pages * bytes / 16 / sizeof(h6FrameRecord);
+  const double free = static_cast<double>(io::free_memory().value_or(UINT64_MAX));
+  const double most = free / 16 / sizeof(h6FrameRecord);
   return static_cast<std::size_t>(std::max(4096.0, std::min(10 * rate, most)));
 }
 
@@ -125,8 +123,8 @@ class LiveRun {
       std::this_thread::sleep_for(std::chrono::milliseconds(turn));
       // Turns are counted, not time: a program that was stopped goes on after it.
       silent_ += 1e-3 * turn;
-      if (options_.observer && !interrupted.load()) silent_ = 0;  // it may pause
-      if (silent_ > kSilence) give_up();
+      if (options_.observer && options_.observer->paused() && !interrupted.load()) silent_ = 0;
+      if (silent_ > kDriverSilence) give_up();
     }
     h6JoinLoop(loop_.get(), &summary_.loop);
     set_signal_hook(nullptr, nullptr);
@@ -195,11 +193,7 @@ class LiveRun {
     std::string names;
     for (const h6Device& device : run_.devices.devices)
       names += (names.empty() ? "'" : ", '") + std::string(device.capabilities.name) + "'";
-    const int code = console_.fail("the device " + names + " has not answered for " +
-                                   std::to_string(std::lround(kSilence)) +
-                                   " s: its driver hangs, and the run ends without it");
-    std::fflush(nullptr);
-    std::_Exit(code);
+    end_without_driver(console_, names);
   }
 
   // Without a hand, the rows hold no body.

@@ -252,7 +252,8 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   loop.ring->push(row);
 }
 
-constexpr int kHelperPriority = 79;  // below the haptic thread's
+constexpr std::int64_t kTakeOverTime = 2'000'000'000;  // longest wait of h6ChangeSession [ns]
+constexpr int kHelperPriority = 79;                    // below the haptic thread's
 
 void note_grant(h6LoopReport& report, const sched::RealtimeGrant& grant) {
   std::snprintf(report.granted, sizeof report.granted, "%s", grant.text);
@@ -422,6 +423,7 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
     return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;
   if (const int core = loop->core; core >= 0) next->team->set_realtime(loop->helper_priority, core);
   loop->offered.store(next, std::memory_order_release);
+  const std::int64_t give_up = sched::now_ns() + kTakeOverTime;
   while (true) {
     if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire)) {
       before->owner = Owner::nobody;
@@ -430,6 +432,14 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
     if (!loop->thread->running() && loop->offered.exchange(nullptr)) {
       next->owner = Owner::nobody;
       return fail(error, "the loop has ended"), nullptr;
+    }
+    // The loop may take the offer at this instant; then it gives the former session back soon.
+    if (sched::now_ns() > give_up && loop->offered.exchange(nullptr)) {
+      next->owner = Owner::nobody;
+      return fail(error, H6_ERROR_BUSY,
+                  "no frame began for 2 s: a device's driver hangs, or nobody reads the records of "
+                  "virtual time"),
+             nullptr;
     }
     sched::sleep_until_ns(sched::now_ns() + 100000);
   }

@@ -24,12 +24,16 @@ enum {
   ASLEEP, /* closes all descriptors, then hangs */
   AGAIN,  /* hangs when it is opened a second time; its first option is a file that tells */
   CLOSES, /* hangs in its close, after more than one read */
-  STUCK   /* hangs in its 50th read */
+  STUCK,  /* hangs in its 50th read */
+  ENDS    /* hangs in its destructor */
 };
 
 static int reads = 0;
 static void hang(void) {
   for (;;) sleep(1);
+}
+__attribute__((destructor)) static void end(void) {
+  if (WRONG == ENDS) hang();
 }
 
 static int open_it(const h6PluginStart* start, h6PluginCapabilities* can, void** device,

@@ -292,8 +292,8 @@ H6_API void   h6SetPace(h6Loop* loop, double pace);
  * overlaps too and `next` relieves. Friction springs stay stretched where both have friction. Filters
  * and safety limits of the hands stay as they were.
  * Returns the previous session, which the caller destroys; or NULL with `error` filled, and nothing
- * has changed. Waits for the frame in progress. One thread at a time may call it, not the haptic
- * thread. */
+ * has changed. Waits for the frame in progress, 2 s at most (H6_ERROR_BUSY: a driver hangs). One thread
+ * at a time may call it, not the haptic thread. */
 H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);
 /* The same between two steps of a program that steps by itself. False: `error` is filled, no change. */
 H6_API bool   h6TakeOver(h6Session* next, const h6Session* before, h6Error* error);

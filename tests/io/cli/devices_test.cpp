@@ -99,12 +99,21 @@ TEST_CASE(
     CHECK(std::count(ended.err.begin(), ended.err.end(), '\n') == 1);
     CHECK(ended.err.size() < 600);
   }
-  // A run refuses the device too, and before it bakes anything if it can.
-  for (const auto& [device, code] :
-       {std::pair<std::string, int>{"plugin:" + plugins + "bad_crash.so", 1}, {"plugin", 2}}) {
-    const Ended ended = run(box, {"run", "box-on-wall", "--device", device, "--json"});
-    CHECK(ended.code == code);
+  // A run refuses the device too, before it bakes anything unless the device had to be opened.
+  struct {
+    std::string device;
+    int code;
+    bool baked;
+  } runs[] = {{"plugin", 2, false},
+              {"plugin:absent.so", 1, false},
+              {"plugin:" + plugins + "bad_abi.so", 1, false},
+              {"plugin:" + plugins + "bad_crash.so", 1, true}};
+  for (const auto& r : runs) {
+    CAPTURE(r.device);
+    const Ended ended = run(box, {"run", "box-on-wall", "--device", r.device, "--json"});
+    CHECK(ended.code == r.code);
     CHECK(one_object(ended).contains("error"));
+    CHECK(fs::is_empty(box.cache()) == !r.baked);
   }
 }
 
@@ -249,8 +258,25 @@ TEST_CASE("a plug-in that hangs in a read or in its close does not hang the run"
   CHECK(kept["whole"] == false);
   CHECK(kept["frames"] == 49);
 
-  const Ended closes = run(box, {"run", "box-on-wall", "--duration", "0.2", "--device",
-                                 "plugin:" + plugins + "bad_closes.so"});
-  CHECK(closes.in_time);
-  CHECK(closes.code == 0);
+  for (const char* name : {"bad_closes.so", "bad_ends.so"}) {
+    const Ended ended = run(
+        box, {"run", "box-on-wall", "--duration", "0.2", "--device", "plugin:" + plugins + name});
+    CHECK_MESSAGE(ended.in_time, name);
+    CHECK_MESSAGE(ended.code == 0, name);
+  }
+}
+
+TEST_CASE("a plug-in that hangs in a read hangs neither the view nor the check of devices") {
+  Sandbox box, view_box, watch_box;
+  const std::string stuck = "plugin:" + plugins + "bad_stuck.so";
+  Process view(view_box, {"run", "box-on-wall", "--view", "--no-browser", "--device", stuck}),
+      watch(watch_box, {"devices", stuck, "--watch"}), test(box, {"devices", stuck, "--test"});
+  for (Process* process : {&view, &watch, &test}) {
+    const Ended ended = process->wait();
+    INFO("stderr: ", ended.err);
+    CHECK(ended.in_time);
+    CHECK(ended.code == 1);
+    const bool no_page = process == &view && ended.err.find("node") != std::string::npos;
+    CHECK((no_page || ended.err.find("has not answered for 10 s") != std::string::npos));
+  }
 }

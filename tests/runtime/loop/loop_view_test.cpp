@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -179,6 +180,34 @@ TEST_CASE("a loop that has ended takes no session") {
   h6Session* next = h6CreateSession(scene.model.handle, &scene.def, nullptr);
   CHECK(h6ChangeSession(run.loop, next, nullptr) == nullptr);
   h6DestroySession(next);
+}
+
+TEST_CASE("a session is not taken over while a device hangs, and the caller gets it back") {
+  Scene scene;
+  std::atomic<bool> hangs{true};
+  h6Device device = Scene::device();
+  device.self = &hangs;
+  device.read = [](void* self, double, h6DeviceSample* out) {
+    while (static_cast<std::atomic<bool>*>(self)->load())
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    *out = hand_at(pose(0, 0, 5.2 * mm));
+    return 0;
+  };
+  h6LoopDef def = h6DefaultLoopDef();
+  def.realtime = false;
+  h6Loop* loop = h6StartLoop(scene.session, &device, &def, nullptr);
+  REQUIRE(loop);
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // the first read has begun
+  h6Session* next = h6CreateSession(scene.model.handle, &scene.def, nullptr);
+  h6Error error{};
+  CHECK(h6ChangeSession(loop, next, &error) == nullptr);
+  CHECK(error.code == H6_ERROR_BUSY);
+  hangs = false;
+  h6Session* old = h6ChangeSession(loop, next, &error);
+  CHECK(old == scene.session);  // it was free to be offered again
+  h6DestroyLoop(loop);
+  scene.session = next;
+  h6DestroySession(old);
 }
 
 TEST_CASE("in a pause time stands still; in slow motion devices see the time of the frames") {
