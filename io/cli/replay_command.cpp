@@ -145,9 +145,12 @@ class Replay {
     replayed_->judge(progress);
     if (!options_.verify || divergence) return Done{};
     changed = recording_.unsealed;
-    if (changed.empty()) changed = account_->first_difference(progress);
+    reason_ = "does not fit its seal";
+    if (!changed.empty()) return Done{};
+    changed = account_->first_difference(progress);
+    reason_ = "does not follow from the frames";
     if (interrupted.load()) return Failure{"interrupted while the summary was compared"};
-    return Done{};
+    return changed.empty() ? compare_attributes() : Done{};
   }
 
   ordered_json json() const {
@@ -203,7 +206,8 @@ class Replay {
           "\nevery one of %" PRIu64
           " frames is the same to the bit: %s on %u thread%s\n%s"
           "computed again: contacts, depths, stiffness, poses, velocities, commands, causes, "
-          "states, status, events, the summary's figures\n%s: scene, the hand's samples, "
+          "states, status, events, the summary's figures; attributes against what they repeat\n"
+          "%s: scene, the hand's samples, "
           "deadlines, measured times, notes\n",
           replayed_->totals.frames, kernels::target_name(), session_->threads(),
           session_->threads() == 1 ? "" : "s", short_sentence().c_str(),
@@ -215,10 +219,7 @@ class Replay {
 
   // Describes the divergence in a sentence.
   std::string sentence() const {
-    if (!divergence)
-      return changed + " was changed after it was recorded: it " +
-             (recording_.unsealed.empty() ? "does not follow from the frames"
-                                          : "does not fit its seal");
+    if (!divergence) return changed + " was changed after it was recorded: it " + reason_;
     if (!divergence->where)
       return "frame " + std::to_string(divergence->frame) + " (" + number(divergence->time, 4) +
              " s) was changed after it was recorded: its seal does not fit, while all that can be "
@@ -255,6 +256,14 @@ class Replay {
     divergence =
         Divergence{row.report.frame, row.time, where, row.report.state_hash, now.report.state_hash};
     return false;
+  }
+
+  Outcome compare_attributes() {
+    Result<std::string> attribute = io::first_changed_attribute(options_.file, recording_);
+    if (!attribute) return attribute.failure();
+    changed = *attribute;
+    reason_ = "is not what the recording says elsewhere";
+    return Done{};
   }
 
   Outcome gap(std::uint64_t expected, std::uint64_t found) {
@@ -297,6 +306,7 @@ class Replay {
   std::uint64_t short_ = 0;                  // frames so far of which the recording has only inputs
   std::uint64_t late_ = 0, late_again_ = 0;  // frames late by their own clock; again over a period
   double late_most_us_ = 0;
+  const char* reason_ = "";  // of `changed`
   bool sealed_ = false;
   std::optional<io::RowSeal> seal_;
   std::optional<Account> account_;

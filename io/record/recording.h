@@ -113,6 +113,13 @@ std::optional<RowDifference> first_difference(const h6FrameRecord& recorded,
                                               const h6FrameRecord& replayed, std::size_t hands,
                                               const std::vector<std::string>& columns);
 
+// Compares the attributes of `file`, which other programs read, with the texts of `recording` that
+// they repeat, and units and column names with those that this version writes. Returns the first
+// that differs, "the attribute rate of /config", or nothing. Attributes that the file lacks, or has
+// besides, are no difference. Fails when the file cannot be read.
+Result<std::string> first_changed_attribute(const std::filesystem::path& file,
+                                            const Recording& recording);
+
 // Turns the log that a killed run left beside `file` into `file`; an older file there is kept as
 // FILE.before (.before-2, ...). A log that is cut off or damaged gives the frames before that
 // place. Returns what was done in one sentence, or nothing when there is no log or a run still

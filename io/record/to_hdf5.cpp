@@ -138,14 +138,18 @@ bool put_events(hid_t file, const LogSource& from, std::uint64_t& seal) {
   return true;
 }
 
+bool put_summary_text(hid_t file, const std::string& text, std::uint64_t seal) {
+  const Handle group = H5Gcreate2(file, "summary", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  return group.ok() && put_whole(group, text) && put_text(group, "json", text) &&
+         put_seal(group, seal);
+}
+
 bool put_summary(hid_t file, const LogSource& from, std::uint64_t seal) {
   if (!from.index.summary) return true;
   std::vector<std::byte> payload;
   if (!read_payload(from.log, *from.index.summary, payload)) return false;
   const std::string text(reinterpret_cast<const char*>(payload.data()), payload.size());
-  const Handle group = H5Gcreate2(file, "summary", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  return group.ok() && put_whole(group, text) && put_text(group, "json", text) &&
-         put_seal(group, seal_of_summary(seal, from.index.row_count, text));
+  return put_summary_text(file, text, seal_of_summary(seal, from.index.row_count, text));
 }
 
 // HDF5 cannot close a file whose last pages do not fit on the disk, so check for room first.
@@ -187,6 +191,14 @@ Outcome write_hdf5(const File& log, const fs::path& out) {
       H5Fflush(h5, H5F_SCOPE_GLOBAL) < 0)
     return Failure{library_reason()};
   return Done{};
+}
+
+bool put_empty(hid_t file, const RecordingHead& head, const std::string& summary) {
+  const File no_log;
+  const LogSource from{no_log, LogIndex{"", 1, {}, {}, {}, 0, 0}, head};
+  std::uint64_t seal = 0;
+  return put_head(file, head, "") && put_frames(file, from) && put_events(file, from, seal) &&
+         put_summary_text(file, summary, seal);
 }
 
 Outcome publish(const File& log, const fs::path& file, bool keep_older, fs::path* kept) {

@@ -67,6 +67,30 @@ std::vector<std::string> datasets_of(const fs::path& file) {
   return names;
 }
 
+// Gives an attribute another value: a number one more, a text one letter more in its last cell.
+void change_attribute(const fs::path& file, const std::string& object, const char* name) {
+  const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT),
+              at = H5Oopen(h5, object.c_str(), H5P_DEFAULT), a = H5Aopen(at, name, H5P_DEFAULT),
+              type = H5Aget_type(a), space = H5Aget_space(a);
+  const auto cells = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space));
+  REQUIRE(cells > 0);
+  if (H5Tget_class(type) == H5T_STRING) {
+    std::vector<char*> texts(cells);
+    REQUIRE(H5Aread(a, type, texts.data()) >= 0);
+    const std::string longer = std::string(texts.back()) + "x";
+    std::vector<const char*> changed(texts.begin(), texts.end());
+    changed.back() = longer.c_str();
+    REQUIRE(H5Awrite(a, type, changed.data()) >= 0);
+    H5Dvlen_reclaim(type, space, H5P_DEFAULT, texts.data());
+  } else {
+    double number = 0;
+    REQUIRE(H5Aread(a, H5T_NATIVE_DOUBLE, &number) >= 0);
+    ++number;
+    REQUIRE(H5Awrite(a, H5T_NATIVE_DOUBLE, &number) >= 0);
+  }
+  H5Sclose(space), H5Tclose(type), H5Aclose(a), H5Oclose(at), H5Fclose(h5);
+}
+
 // Replaces `from` by `to`, which has the same length, in the head of a recording.
 void change_head(const fs::path& file, const std::string& from, const std::string& to) {
   REQUIRE(from.size() == to.size());
@@ -257,6 +281,31 @@ TEST_CASE("a changed head, event or summary is found, and named") {
     const std::string said = Json::parse(ended.out)["error"];
     CHECK(said.find(change.named) != std::string::npos);
     CHECK(said.find("was changed after it was recorded") != std::string::npos);
+  }
+}
+
+TEST_CASE("an attribute that no longer repeats what the recording says is found, and named") {
+  Sandbox box;
+  result_of(box,
+            {"run", "peg-in-hole", "--virtual-time", "--duration", "0.1", "--record", "good.h5"});
+  struct Change {
+    const char *object, *name;
+  };
+  for (const Change& change :
+       {Change{"config", "rate"}, Change{"config", "hands"}, Change{"config", "version"},
+        Change{"config", "json"}, Change{"config", "run"}, Change{"config", "program"},
+        Change{"config", "simd_target"}, Change{"config", "asset_hashes"},
+        Change{"config", "cause_names"}, Change{"config", "units"}, Change{"summary", "json"},
+        Change{"frames/wrench", "units"}, Change{"frames/body_pose", "columns"},
+        Change{"events/t", "units"}}) {
+    const std::string named = "the attribute " + std::string(change.name) + " of /" + change.object;
+    CAPTURE(named);
+    fs::copy_file(box.file("good.h5"), box.file("bad.h5"), fs::copy_options::overwrite_existing);
+    change_attribute(box.file("bad.h5"), change.object, change.name);
+    const Ended ended = run(box, {"replay", "bad.h5", "--verify", "--json"});
+    CHECK(ended.code == 1);
+    const std::string said = Json::parse(ended.out)["error"];
+    CHECK(said.find(named) == 0);
   }
 }
 
