@@ -19,6 +19,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "io/file/free_memory.h"
 #include "io/file/gunzip.h"
 #include "io/file/text_scan.h"
 #include "io/file/write_aside.h"
@@ -136,11 +137,10 @@ Result<Mesh> caught(const std::string& name, const Work& work) {
 
 // ---- the file -----------------------------------------------------------------------------------
 
-// The most bytes of a file, inflated: half of the memory, since a reader needs as much again.
+// The most bytes of a file, inflated: half of the free memory, since a reader needs as much again.
 std::size_t most_bytes() {
-  const auto pages = static_cast<std::size_t>(std::max(1L, sysconf(_SC_PHYS_PAGES)));
-  const auto page = static_cast<std::size_t>(std::max(1L, sysconf(_SC_PAGE_SIZE)));
-  return std::min(std::size_t{8} << 30, pages / 2 * page);
+  constexpr std::uint64_t kMost = std::uint64_t{8} << 30;
+  return std::min(kMost, free_memory().value_or(kMost) / 2);
 }
 
 class OpenFile {

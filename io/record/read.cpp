@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "io/file/free_memory.h"
 #include "io/record/layout.h"
 #include "io/record/seal.h"
 #include "io/record/stored.h"
@@ -108,12 +109,10 @@ Outcome read_column(const Source& source, const Column& column, const Stored& st
 
 // Linux grants more memory than the machine has and kills the program later, without a message.
 Outcome check_memory(const fs::path& file, std::uint64_t frames) {
-  const long pages = ::sysconf(_SC_PHYS_PAGES), bytes = ::sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || bytes <= 0) return Done{};
-  const auto half = static_cast<std::uint64_t>(pages) / 2 * static_cast<std::uint64_t>(bytes);
+  const std::uint64_t half = free_memory().value_or(UINT64_MAX) / 2;
   if (frames <= half / sizeof(h6FrameRecord)) return Done{};
   return Failure{file.string() + ": " + std::to_string(frames) +
-                 " frames are more than fit into half of this machine's memory: read it in pieces"};
+                 " frames are more than fit into half of the free memory: read it in pieces"};
 }
 
 // In the order of columns(); without a dataset where an older file has none.
