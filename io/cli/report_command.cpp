@@ -71,13 +71,20 @@ class Reporter {
     const std::vector<std::uint64_t>& shown = run.replay_frames();
     std::size_t sample = 0;
     std::uint64_t done = 0;
+    double deepest = 0;  // so far [voxel]
     for (std::uint64_t at = 0; at < count; at += kPiece) {
       Result<io::Recording> piece = io::read_recording(file, {at, kPiece});
       if (!piece) return piece.failure();
       for (h6FrameRecord& row : piece->frames) {
         if (session) {
           const auto stepped = session->step(row);
+          if (stepped && (row.late & H6_LATE_COMPUTE))
+            run.stepped_again(row.report.frame, (*stepped)->report.frame_us);
           if (stepped && row.inputs_only) row = **stepped;
+          if (stepped && row.report.max_depth_voxels > deepest) {
+            deepest = row.report.max_depth_voxels;
+            note_tightest(*session, row.time, run);
+          }
           if (!stepped) {
             leave_out("contacts of " + file + " end early: " + stepped.error());
             session = nullptr;
@@ -100,6 +107,24 @@ class Reporter {
         return Failure{"interrupted"};
     }
     return Done{};
+  }
+
+  // The deepest contact of the frame that `session` was stepped to last.
+  static void note_tightest(const RecordedSession& session, double time, io::view::ReportRun& run) {
+    const io::LoadedScene& loaded = session.loaded();
+    const auto all = io::view::replayed_contacts(loaded, session.session());
+    const auto at = std::max_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+      return a.contact.depth < b.contact.depth;
+    });
+    if (at == all.end()) return;
+    const io::Unit unit = session.run().unit;
+    const double metres = io::metres(unit);
+    const auto& p = at->contact.position;
+    run.tightest({time,
+                  {p[0] / metres, p[1] / metres, p[2] / metres},
+                  io::unit_name(unit),
+                  loaded.scene.bodies[at->body].name,
+                  loaded.scene.bodies[at->with].name});
   }
 
   void leave_out(const std::string& why) {

@@ -33,6 +33,13 @@ std::string LateFrame::sentence() const {
   return text;
 }
 
+void LateFrame::stepped_again(double us, double period_us) {
+  again_us = us;
+  if (cause != LateCause::doubt) return;
+  if (us > period_us) cause = LateCause::own;
+  if (2 * us < period_us) cause = LateCause::machine;
+}
+
 void LateJudge::row(const h6FrameRecord& r, const Tell& tell) {
   Row row;
   row.frame = {r.time,

@@ -31,6 +31,10 @@ struct LateFrame {
   double late_us = 0, wakeup_us = 0, cpu_us = 0, frame_us = 0;
   std::size_t like = 0;  // of own, machine, doubt: how many neighbours had at least as much to do
   double like_us = 0;    // the most CPU time that one of them took
+  double again_us = -1;  // the same frame, stepped again afterwards; negative: it was not
+  // Sets again_us. A doubt ends where the frame takes over a period again, or less than half of
+  // one.
+  void stepped_again(double us, double period_us);
   std::string sentence() const;
 };
 

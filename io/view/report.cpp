@@ -85,6 +85,12 @@ ordered_json popped_through(const ordered_json& summary) {
   }
 }
 
+ordered_json tightest_json(const std::optional<TightestPlace>& t) {
+  if (!t) return nullptr;
+  return {
+      {"t", t->time}, {"place", t->place}, {"unit", t->unit}, {"part", t->part}, {"other", t->other}};
+}
+
 }  // namespace
 
 ReportRun::ReportRun(std::string label, RecordingHead head, std::uint64_t frames)
@@ -135,7 +141,9 @@ void ReportRun::row(const h6FrameRecord& r) {
   ++seen_;
 }
 
-void ReportRun::late_frame(const LateFrame& late) {
+void ReportRun::late_frame(LateFrame late) {
+  if (const auto again = again_us_.find(late.frame); again != again_us_.end())
+    late.stepped_again(again->second, 1e6 / head_.rate);
   if (late_frames_.size() < kLateFrames)
     late_frames_.push_back(late);
   else
@@ -220,6 +228,7 @@ class ReportWriter {
                       {"frame", l.frame},
                       {"cause", late_cause_name(l.cause)},
                       {"frame_us", l.frame_us},
+                      {"again_us", l.again_us < 0 ? ordered_json() : ordered_json(l.again_us)},
                       {"wakeup_us", l.wakeup_us}});
     for (std::size_t i = 0; i < std::min(kEvents, r.events_.size()); ++i)
       events.push_back(
@@ -240,6 +249,7 @@ class ReportWriter {
          {"contacts_mean", r.contacts_sum_ / frames},
          {"contacts_max", r.contacts_max_},
          {"depth_max", r.depth_max_},
+         {"tightest", tightest_json(r.tightest_)},
          {"force_max", r.force_max_},
          {"frame_us", spread(r.frame_us_)},
          {"stages", stages},

@@ -9,7 +9,9 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,13 +28,26 @@ struct ReportContact {
   float weight, depth;                                      // share, [m]
 };
 
+// The deepest contact of a run, when a replay has shown it.
+struct TightestPlace {
+  double time;                  // [s]
+  std::array<double, 3> place;  // world frame, in `unit`
+  std::string unit;             // the scene's, "mm"
+  std::string part, other;      // bodies: the one with the shell, the one with the field
+};
+
 // A recording for a report, handed over in pieces and in order.
 class ReportRun {
  public:
   // `frames` is the number of all its frames.
   ReportRun(std::string label, RecordingHead head, std::uint64_t frames);
   void add(const std::vector<h6FrameRecord>& frames);
+  // The time of a late frame that was stepped again for the report [us]; before add() of that
+  // frame.
+  void stepped_again(std::uint64_t frame, double us) { again_us_[frame] = us; }
   void events(std::vector<RecordingEvent> events, std::string summary_json);
+
+  void tightest(TightestPlace place) { tightest_ = std::move(place); }
 
   // The frames whose contacts the replay shows, ascending; contacts(i, ...) sets those of the i-th.
   const std::vector<std::uint64_t>& replay_frames() const { return replay_frames_; }
@@ -51,7 +66,7 @@ class ReportRun {
     std::array<float, 5> low{}, high{};
   };
   void row(const h6FrameRecord& r);
-  void late_frame(const LateFrame& late);
+  void late_frame(LateFrame late);
   void close_span();
 
   std::string label_;
@@ -67,6 +82,8 @@ class ReportRun {
   std::array<std::vector<float>, H6_STAGE_COUNT> stage_us_;
   std::vector<float> frame_us_;
   std::vector<LateFrame> late_frames_;
+  std::map<std::uint64_t, double> again_us_;
+  std::optional<TightestPlace> tightest_;
   std::vector<RecordingEvent> events_;
   double contacts_sum_ = 0, depth_max_ = 0, force_max_ = 0, end_ = 0;
   std::uint32_t contacts_max_ = 0;

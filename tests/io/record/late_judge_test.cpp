@@ -77,6 +77,24 @@ TEST_CASE("without frames that had as much to do, or with some half as long, the
   for (const LateFrame& late : judged(rows)) CHECK(late.cause == LateCause::doubt);
 }
 
+TEST_CASE(
+    "stepped again, a frame in doubt shows whose time it was; near a period the doubt stays") {
+  const auto doubtful = [] { return judged(calm(row(150, 9000, 500, H6_LATE_COMPUTE))).at(0); };
+  LateFrame dear = doubtful(), cheap = doubtful(), near = doubtful();
+  CHECK(dear.again_us < 0);
+  dear.stepped_again(1200, 1000);
+  cheap.stepped_again(80, 1000);
+  near.stepped_again(700, 1000);
+  CHECK(dear.cause == LateCause::own);
+  CHECK(cheap.cause == LateCause::machine);
+  CHECK(near.cause == LateCause::doubt);
+  CHECK(near.again_us == 700);
+  // The processor's scheduler said it; a frame stepped again says nothing else.
+  LateFrame stolen = judged(calm(row(150, 9000, 500, H6_LATE_STOLEN))).at(0);
+  stolen.stepped_again(1200, 1000);
+  CHECK(stolen.cause == LateCause::stolen);
+}
+
 TEST_CASE("the clock's other causes stay, and each late frame is told once and in order") {
   std::vector<h6FrameRecord> rows;
   for (std::uint64_t i = 0; i < 1000; ++i)

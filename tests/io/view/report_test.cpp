@@ -33,13 +33,19 @@ std::string from_base64(const std::string& text) {
   return out;
 }
 
-// The head of the data in the report of one run with this summary.
-json head_of(const std::string& summary) {
+view::ReportRun run_of(const std::vector<h6FrameRecord>& frames, const std::string& summary,
+                       double again_us = -1) {
   RecordingHead head;
   head.rate = 1000, head.hands = 1;
-  view::ReportRun run("run", head, 2);
-  run.add(std::vector<h6FrameRecord>(2));
+  view::ReportRun run("run", head, frames.size());
+  if (again_us >= 0) run.stepped_again(frames.front().report.frame, again_us);
+  run.add(frames);
   run.events({{0.25, "through", "what"}}, summary);
+  return run;
+}
+
+// The head of the data in the report of this run.
+json head_of(view::ReportRun run) {
   std::vector<view::ReportRun> runs;
   runs.push_back(std::move(run));
   const Result<std::string> html = view::make_report(runs, nullptr, "");
@@ -61,8 +67,9 @@ TEST_CASE("a report marks in metres where a point passed through, when its summa
     MESSAGE("skipped: built without node and npm");
     return;
   }
-  const json run = head_of(R"({"verdict": "through", "units": "mm", "pop_through":
-      {"computed": true, "first": {"time": 0.25, "place": [1, 2, -3000]}}})")["runs"][0];
+  const std::vector<h6FrameRecord> two(2);
+  const json run = head_of(run_of(two, R"({"verdict": "through", "units": "mm", "pop_through":
+      {"computed": true, "first": {"time": 0.25, "place": [1, 2, -3000]}}})"))["runs"][0];
   CHECK(run["verdict"] == "through");
   CHECK(run["through"]["t"] == 0.25);
   CHECK(run["through"]["place"][1].get<double>() == doctest::Approx(2e-3));
@@ -73,5 +80,23 @@ TEST_CASE("a report marks in metres where a point passed through, when its summa
        {"", "{}", R"({"units": "mm", "pop_through": {"first": null}})",
         R"({"units": "yard", "pop_through": {"first": {"time": 1, "place": [0, 0, 0]}}})",
         R"({"units": "mm", "pop_through": {"first": {"time": "now", "place": 7}}})"})
-    CHECK(head_of(summary)["runs"][0]["through"].is_null());
+    CHECK(head_of(run_of(two, summary))["runs"][0]["through"].is_null());
+}
+
+TEST_CASE("a report says what a late frame took when it was stepped again, and whose time it was") {
+  if (view::report_page().empty()) {
+    MESSAGE("skipped: built without node and npm");
+    return;
+  }
+  h6FrameRecord late{};
+  late.report.frame = 7;
+  late.late = H6_LATE_COMPUTE, late.late_us = 500, late.cpu_us = 1500;
+  const auto told = [&](double again_us) {
+    return head_of(run_of({late}, "", again_us))["runs"][0]["late_frames"][0];
+  };
+  CHECK(told(-1)["again_us"].is_null());
+  CHECK(told(-1)["cause"] == "own computation or the machine");
+  CHECK(told(40)["again_us"] == 40);
+  CHECK(told(40)["cause"] == "the machine");
+  CHECK(told(1400)["cause"] == "own computation");
 }

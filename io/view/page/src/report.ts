@@ -104,6 +104,8 @@ function summary(head: any, moments: Moment[]) {
     if (scene.about && !same) line(`Tried: ${scene.about}`);
     line(`Contacts share stiffness by ‘${r.method}’. Up to ${r.contacts_max} at once, ${r.depth_max.toFixed(2)} voxel deep at most, ${r.force_max.toFixed(1)} N in the hand.`);
     line(`What matters most: ${moments[i].what}, at ${moments[i].time.toFixed(2)} s.`);
+    const tight = r.tightest;
+    if (tight) line(`Tightest place: ‘${tight.part}’ in ‘${tight.other}’ at ${tight.place.map((x: number) => x.toPrecision(4)).join(', ')} ${tight.unit}, at ${tight.t.toFixed(2)} s.`);
     line(late ? `${late} of ${r.frames} frames were late.` : `None of ${r.frames} frames was late.`);
     $('summary').append(card);
   });
@@ -173,8 +175,8 @@ function lists(head: any) {
   const count = document.createElement('div');
   table(count, ['run', 'own computation', 'wake-up', 'stolen by the machine'],
     head.runs.map((r: any, i: number) => [swatch(i, r.label), String(r.late.compute), String(r.late.wakeup), String(r.late.stolen)]));
-  const late = head.runs.flatMap((r: any, i: number) => r.late_frames.map((l: any) => [swatch(i, r.label), l.t.toFixed(3), String(l.frame), l.cause, short(l.frame_us), short(l.wakeup_us)]));
-  if (late.length) { $('late').append(count); const rest = document.createElement('div'); $('late').append(rest); long(rest, ['run', 'time [s]', 'frame', 'cause', 'frame', 'wake-up'], late); }
+  const late = head.runs.flatMap((r: any, i: number) => r.late_frames.map((l: any) => [swatch(i, r.label), l.t.toFixed(3), String(l.frame), l.cause, short(l.frame_us), l.again_us === null ? '' : short(l.again_us), short(l.wakeup_us)]));
+  if (late.length) { $('late').append(count); const rest = document.createElement('div'); $('late').append(rest); long(rest, ['run', 'time [s]', 'number', 'cause', 'frame', 'stepped again', 'wake-up'], late); }
   else $('late').textContent = 'none';
   // Late frames have a list of their own.
   long($('events'), ['run', 'time [s]', 'what', 'detail'], head.runs.flatMap((r: any, i: number) =>

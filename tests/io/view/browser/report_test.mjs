@@ -40,6 +40,7 @@ test('it opens from disk and shows both runs', async () => {
     assert.ok(text.includes(word), word);
   // Under `global` the part enters the forbidden region; the report opens there.
   assert.match(text, /What matters most: a point passes through, at [1-9]/);
+  assert.match(text, /Tightest place: ‘.+’ in ‘.+’ at (-?[0-9.e-]+, ){2}-?[0-9.e-]+ m?m, at [0-9.]+ s/);
   await wait(800);
   assert.equal(await browser.value('document.getElementById("others").checked'), true, 'both runs in space');
   assert.doesNotMatch(await browser.value('document.getElementById("events").innerText'), /\blate: /, 'late frames have their own list');
