@@ -184,6 +184,13 @@ TEST_CASE("a start far from the hand, a scene without hands and a part that sink
   ended = run(box, {"run", "scene.json", "--virtual-time", "--json"});
   CHECK(ended.err.find("no hands") != std::string::npos);
   CHECK(one_object(ended)["verdict"] == "untouched");
+  // It starts a quarter of a voxel deep and is pushed out, and no hand held it.
+  scene["contact"] = {{"fit", "tight"}};
+  scene["bodies"][1]["pose"] = {{"p", {0, 0, -20.5}}};
+  spill(box.file("scene.json"), scene.dump());
+  const Json alone = result_of(box, {"run", "scene.json", "--virtual-time"});
+  CHECK(alone["contacts"]["max"] > 0);
+  CHECK(alone["verdict"] == "unheld");
 }
 
 // Real pairs: assembled, free in place, threaded, and in frames of their own.
