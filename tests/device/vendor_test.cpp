@@ -235,27 +235,31 @@ TEST_CASE("pressed on a floor, it gives up to its rating, or to a lower one of t
   }
 }
 
-TEST_CASE("an error, a place of NaN and a call that stalls: zero force, lost, armed only by hand") {
+TEST_CASE("every fault of a vendor's device in the loop: zero force, lost, armed only by hand") {
   for (const Vendor& v : vendors()) {
     Floor floor;
     const auto device = opened(v, floor.body[1].pose);
     FloorRun run(floor, device->device());
     v.standin->hand[v.of[2]] = -0.02;
-    for (const Fault fault : {Fault::error, Fault::not_finite, Fault::stall}) {
+    int faults = 0;
+    for (const Fault fault : {Fault::error, Fault::write, Fault::not_finite, Fault::garbage,
+                              Fault::stall, Fault::unplugged}) {
+      if (fault == Fault::unplugged && v.name == "hdapi") continue;  // it does not open anew
       CAPTURE(v.name);
       CAPTURE(static_cast<int>(fault));
+      ++faults;
       run.check_loss([&] { v.standin->fault = fault; },
                      [&] {
-                       if (fault != Fault::stall) {
-                         CHECK(norm_of(v.standin->force) == 0);
-                         CHECK(!v.standin->power);
-                       }
+                       // A device that does not answer cannot tell what it feels.
+                       const bool answers = fault != Fault::stall && fault != Fault::unplugged;
+                       if (answers) CHECK(!v.standin->power);
+                       if (answers && fault != Fault::write) CHECK(norm_of(v.standin->force) == 0);
                        v.standin->most = 0;
-                       v.standin->fault = Fault::none;
+                       // `unplugged` ends when it is opened anew.
+                       if (fault != Fault::unplugged) v.standin->fault = Fault::none;
                      });
     }
-    // The last one ended with the third arming after the first.
-    CHECK(v.standin->powered >= 3);
+    CHECK(v.standin->powered >= faults);
   }
 }
 

@@ -302,7 +302,9 @@ typedef struct h6HandDef {
 typedef struct h6SessionDef {
   const h6BodyDef* bodies; size_t body_count;  /* at least 1; the storage is reserved once         */
   const h6PairDef* pairs;  size_t pair_count;  /* 0: every moving shell against every other field;
-                                                  two moving bodies: the shell of the first listed */
+                                                  two moving bodies: the shell of the first listed.
+                                                  Each takes some 90 bytes, and 10^7 some 7 s at the
+                                                  creation                                         */
   const h6HandDef* hands;  size_t hand_count;  /* at most H6_MAX_HANDS                             */
   h6ContactDef contact;
   h6Integrator integrator;

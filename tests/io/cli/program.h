@@ -89,8 +89,8 @@ class Sandbox {
   int streams_ = 0;
 };
 
-// A running program. `terminal` >= 0 (an end of a pty) becomes its stderr; the constructor closes
-// it here. `most_bytes` > 0 limits the size of its files, as on a full disk.
+// A running program. `terminal` >= 0 (an end of a pty) becomes its stdin and stderr; the constructor
+// closes it here. `most_bytes` > 0 limits the size of its files, as on a full disk.
 class Process {
  public:
   Process(Sandbox& box, const Args& args, const std::string& cache = "", int terminal = -1,
@@ -112,6 +112,7 @@ class Process {
     setenv("HAPSIX_CACHE", keep.c_str(), 1);
     signal(SIGINT, SIG_DFL);  // a shell without job control starts its jobs with SIGINT ignored
     redirect(open(out_.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
+    if (terminal >= 0) dup2(terminal, STDIN_FILENO);
     redirect(terminal >= 0 ? terminal : open(err_.c_str(), O_WRONLY | O_CREAT, 0600),
              STDERR_FILENO);
     const rlimit limit{most_bytes, most_bytes};

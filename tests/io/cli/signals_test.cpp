@@ -56,6 +56,9 @@ struct Terminal {
       return text.find(word) != std::string::npos;
     });
   }
+  void type(const std::string& line) const {
+    CHECK(write(mine, line.data(), line.size()) == static_cast<ssize_t>(line.size()));
+  }
   std::string read_all() {
     close(theirs);
     theirs = -1;
@@ -219,6 +222,29 @@ TEST_CASE("a second Ctrl-C does not wait") {
   CHECK(ended.in_time);
   CHECK(ended.code != 0);
   CHECK(box.files() == before);
+}
+
+TEST_CASE("on a terminal the unit of a part of sixty metres is asked for, and the answer counts") {
+  for (const auto& [answer, longest] :
+       {std::pair<const char*, double>{"mm\n", 0.06}, {"in\n", 1.524}, {"ells\n", 0}}) {
+    CAPTURE(answer);
+    Sandbox box;
+    spill(box.file("large.stl"), stl(box_facets(60)));
+    Terminal terminal;
+    if (terminal.theirs < 0) {
+      MESSAGE("skipped: this machine gives no pseudo-terminal");
+      return;
+    }
+    Process process(box, {"bake", "field", "large.stl", "-o", "large.vdb", "--voxels", "32"}, "",
+                    dup(terminal.theirs));
+    CHECK(terminal.says("In which unit is it"));
+    terminal.type(answer);
+    CHECK(process.wait().code == (longest > 0 ? 0 : 1));
+    CHECK(fs::exists(box.file("large.vdb")) == (longest > 0));
+    if (longest == 0) continue;
+    const Json info = result_of(box, {"info", "large.vdb"});
+    CHECK(info["voxel_size_m"].get<double>() == doctest::Approx(longest / 30).epsilon(0.05));
+  }
 }
 
 TEST_CASE("a bar shows progress on a terminal, for long work only, and is wiped away") {
