@@ -14,10 +14,19 @@
 
 namespace h6::io {
 
+// Whether this is the sentence of cancelled work (io/file/progress.h), and not one that names a
+// file with that word in its name.
+inline bool says_cancelled(const std::string& sentence) {
+  const std::string end = ": cancelled";
+  return sentence == "cancelled" ||
+         (sentence.size() > end.size() &&
+          sentence.compare(sentence.size() - end.size(), end.size(), end) == 0);
+}
+
 inline void fill(h6Error* error, h6ErrorCode code, const std::string& sentence) {
   if (!error) return;
   std::snprintf(error->message, sizeof error->message, "%s", sentence.c_str());
-  error->code = sentence.find("cancelled") != std::string::npos ? H6_ERROR_CANCELLED : code;
+  error->code = says_cancelled(sentence) ? H6_ERROR_CANCELLED : code;
 }
 
 // The code of a failure to read `file`.

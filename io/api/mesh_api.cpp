@@ -79,7 +79,7 @@ h6Mesh* h6ReadMesh(const char* file, h6Unit unit, h6Error* error) {
 
 h6Mesh* h6ParseMesh(const void* bytes, size_t count, const char* name, h6Unit unit,
                     h6Error* error) {
-  if (!bytes || !name || !is_unit(unit))
+  if (!bytes || count > PTRDIFF_MAX || !name || !is_unit(unit))
     return fill(error, H6_ERROR_ARGUMENT, "bytes, a name and a unit are needed"), nullptr;
   return guarded(error, static_cast<h6Mesh*>(nullptr), [&] {
     const std::string text(static_cast<const char*>(bytes), count);

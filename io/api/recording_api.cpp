@@ -43,21 +43,31 @@ extern "C" {
 h6RecorderDef h6DefaultRecorderDef(void) { return {}; }
 
 h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, h6Error* error) {
-  if (!file || !def || (!def->scene && !def->session))
+  if (!file || !*file || !def || (!def->scene && !def->session))
     return fill(error, H6_ERROR_ARGUMENT, "a recorder needs a file, and a scene or a session"),
            nullptr;
   if (!understood(*def, error) || (def->session && !understood(*def->session, error)))
     return nullptr;
   return guarded(error, static_cast<h6Recorder*>(nullptr), [&]() -> h6Recorder* {
     const h6SessionDef session = def->session ? *def->session : def->scene->loaded->session_def();
-    if (session.hand_count > H6_MAX_HANDS || !(session.rate > 0))
-      return fill(error, H6_ERROR_ARGUMENT, "the session's hands or rate cannot be"), nullptr;
-    return wrap<h6Recorder>(Recorder::create(file, head_of(*def, session)), H6_ERROR_FILE, error);
+    if (session.hand_count < 1 || session.hand_count > H6_MAX_HANDS)
+      return fill(error, H6_ERROR_ARGUMENT, "a recording has 1 to 8 hands"), nullptr;
+    if (!(session.rate > 0 && session.rate <= 1e6))
+      return fill(error, H6_ERROR_RANGE, "the rate must be above 0 and at most 1000000 Hz"),
+             nullptr;
+    if (!h6MethodName(session.contact.method))
+      return fill(error, H6_ERROR_RANGE, "contact.method must be one of h6Method"), nullptr;
+    const RecordingHead head = head_of(*def, session);
+    if (def->scene) {  // or nobody could replay it
+      const Result<Scene> again = read_scene_text(head.scene_json, "the session");
+      if (!again) return fill(error, H6_ERROR_RANGE, again.error()), nullptr;
+    }
+    return wrap<h6Recorder>(Recorder::create(file, head), H6_ERROR_FILE, error);
   });
 }
 
 bool h6RecordFrames(h6Recorder* recorder, const h6FrameRecord* rows, size_t count, h6Error* error) {
-  if (!recorder || (count && !rows))
+  if (!recorder || (count && !rows) || count > PTRDIFF_MAX / sizeof *rows)
     return fill(error, H6_ERROR_ARGUMENT, "a recorder and rows are needed"), false;
   return guarded(error, false, [&] {
     return finish(recorder->recorder->frames(rows, count), H6_ERROR_FILE, error);

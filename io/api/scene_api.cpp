@@ -11,7 +11,8 @@ using namespace h6::io;
 namespace {
 
 Result<Scene> find(const std::string& name, bool outside) {
-  if (std::filesystem::exists(name)) return read_scene(name, outside);
+  std::error_code unreachable;  // a name that no file can have
+  if (std::filesystem::exists(name, unreachable)) return read_scene(name, outside);
   for (const SceneName& known : scene_names())
     if (known.name == name) return make_scene(name);
   return Failure{name + ": there is neither such a file nor such a generated scene"};

@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // hapsix.hpp: handles own, move and let go; spans show what the C functions give; a failure throws
-// its sentence and code.
+// its sentence and code. And what arguments_test.cpp leaves of wrong arguments, from outside.
 #include <doctest/doctest.h>
 
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <regex>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "hapsix/batch.h"
 #include "hapsix/io.h"
-// After io.h, for its handles.
+// After batch.h and io.h, for their handles.
 #include "hapsix/hapsix.hpp"
 #include "runtime/examples/floor.h"
 
@@ -106,4 +114,230 @@ TEST_CASE("records of a loop come as the part of the room that was filled") {
   REQUIRE(rows.size() == 50);
   CHECK(rows.back().report.frame == 49);
   CHECK(hapsix::read_records(loop, room).empty());
+}
+
+TEST_CASE("spans and rows of no object are empty, and a handle of nothing throws") {
+  CHECK(hapsix::contacts(nullptr, 0).depth().empty());
+  CHECK(hapsix::overlaps(nullptr).empty());
+  std::vector<h6FrameRecord> room(2);
+  CHECK(hapsix::read_records(nullptr, room).empty());
+  CHECK_THROWS_AS(hapsix::create_session(nullptr, {}, {}), hapsix::Error);
+  const hapsix::Workers none;
+  CHECK((none.get() == nullptr && h6WorkerThreads(none) == 0));
+}
+
+// ---- wrong arguments ----------------------------------------------------------------------------
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Held {
+  hapsix::Model model =
+      hapsix::Model::make([](h6Error* e) { return floor_and_tip(h6DefaultModelDef(), e); });
+  hapsix::Session session = hapsix::Session::make(
+      [this](h6Error* e) { return hold_tip(model, h6DefaultSessionDef(), e); });
+};
+
+}  // namespace
+
+TEST_CASE("a number that names nothing has no name, and a name that nothing has gives no number") {
+  for (const int odd : {-1, 99, INT32_MAX, INT32_MIN}) {
+    CHECK(h6StageName(static_cast<h6Stage>(odd)) == nullptr);
+    CHECK(h6CauseName(static_cast<h6Cause>(odd)) == nullptr);
+    CHECK(h6DeviceStateName(static_cast<h6DeviceState>(odd)) == nullptr);
+    CHECK(h6MethodName(static_cast<h6Method>(odd)) == nullptr);
+  }
+  CHECK(h6StageName(H6_STAGE_COUNT) == nullptr);
+  CHECK(h6CauseName(H6_CAUSE_COUNT) == nullptr);
+  CHECK(h6DeviceStateName(H6_DEVICE_STATE_COUNT) == nullptr);
+  CHECK(h6MethodName(H6_METHOD_COUNT) == nullptr);
+  for (const h6Status odd : {0u, 3u, 1u << 14, 1u << 31, UINT32_MAX})
+    CHECK(h6StatusName(odd) == nullptr);
+  h6Method method = H6_METHOD_CLUSTER;
+  std::uint32_t pieces = 7;
+  CHECK(h6MethodFromName(nullptr, &method, &pieces) == -1);
+  const std::string too_long(100000, '+');
+  for (const char* odd :
+       {"", "+", "firm+", "firm++", "firmer", "FIRM", " firm", "+facing", too_long.c_str()})
+    CHECK(h6MethodFromName(odd, &method, &pieces) == -1);
+  CHECK((method == H6_METHOD_CLUSTER && pieces == 7));
+  CHECK(h6MethodFromName("firm", nullptr, nullptr) == 0);
+}
+
+TEST_CASE("a sentence or a handler that is NULL is left out") {
+  std::vector<std::string> lines;
+  h6SetLogHandler(
+      [](void* user, h6LogLevel, const char* sentence) {
+        static_cast<std::vector<std::string>*>(user)->push_back(sentence);
+      },
+      &lines);
+  h6Log(H6_LOG_NOTE, nullptr), h6Log(static_cast<h6LogLevel>(99), "odd level");
+  h6SetLogHandler(nullptr, &lines);
+  h6Log(H6_LOG_WARNING, "to nobody");
+  CHECK(lines == std::vector<std::string>{"odd level"});
+  static int asked;
+  asked = 0;
+  h6SetAssertHandler([](const char*, const char*, int) { return ++asked, 0; });
+  CHECK(h6AssertFailed(nullptr, nullptr, -1) == 0);
+  CHECK(asked == 1);
+  h6SetAssertHandler(nullptr);
+}
+
+TEST_CASE("a field is not sampled where there is none, or without room, and no bits are written") {
+  const Held held;
+  const double place[3] = {4e-3, 4e-3, 5e-3};
+  double distance = 7, gradient[3] = {7, 7, 7};
+  std::uint8_t exact = 7;
+  for (const std::int32_t odd : {-1, 1, INT32_MAX, INT32_MIN})
+    CHECK(h6SampleField(held.model, odd, place, 1, &distance, gradient, &exact) == -1);
+  CHECK(h6SampleField(nullptr, 0, place, 1, &distance, gradient, &exact) == -1);
+  CHECK(h6SampleField(held.model, 0, nullptr, 1, &distance, gradient, &exact) == -1);
+  CHECK(h6SampleField(held.model, 0, nullptr, SIZE_MAX, &distance, gradient, &exact) == -1);
+  CHECK(h6SampleField(held.model, 0, place, 1, nullptr, gradient, &exact) == -1);
+  CHECK(h6SampleField(held.model, 0, nullptr, 0, nullptr, nullptr, nullptr) == 0);
+  CHECK((distance == 7 && gradient[2] == 7 && exact == 7));
+  CHECK(h6SampleField(held.model, 0, place, 1, &distance, nullptr, nullptr) == 0);
+  CHECK(distance == doctest::Approx(1e-3));
+  for (const double odd : {std::nan(""), kInfinity, -kInfinity, 1e300}) {
+    const double nowhere[3] = {4e-3, odd, 5e-3};
+    CHECK(h6SampleField(held.model, 0, nowhere, 1, &distance, gradient, &exact) == 0);
+    CHECK(exact == 0);
+  }
+}
+
+TEST_CASE("records, reports and views of nothing are zeros, and room that is NULL is not written") {
+  const Held held;
+  const h6DeviceSample sample = h6DefaultDeviceSample();
+  h6DeviceCommand command;
+  h6Step(held.session, &sample, &command), h6Step(held.session, &sample, nullptr);
+  h6FrameRecord row;
+  const auto empty = [&row] { return row.report.frame == 0 && row.report.state_hash == 0; };
+  h6GetRecord(held.session, &sample, &command, &row);
+  CHECK_FALSE(empty());
+  h6GetRecord(nullptr, &sample, &command, &row);
+  CHECK(empty());
+  row.report.frame = 7, h6GetRecord(held.session, nullptr, &command, &row);
+  CHECK(empty());
+  row.report.frame = 7, h6GetRecord(held.session, &sample, nullptr, &row);
+  CHECK(empty());
+  h6GetRecord(held.session, &sample, &command, nullptr);
+  h6HandSafety safety;
+  for (const std::int32_t odd : {-1, 1, INT32_MAX}) {
+    safety.state = H6_LOST;
+    h6GetSafety(held.session, odd, &safety);
+    CHECK(safety.state == H6_ABSENT);
+  }
+  h6GetSafety(nullptr, 0, &safety), h6GetSafety(held.session, 0, nullptr);
+  CHECK(safety.state == H6_ABSENT);
+  h6LoopReport report;
+  report.frames = 7;
+  h6JoinLoop(nullptr, &report), h6JoinLoop(nullptr, nullptr);
+  CHECK(report.frames == 0);
+}
+
+TEST_CASE("a loop's room that is NULL is not written, and a wild pace is the usual one") {
+  const Held held;
+  h6Device device = h6DefaultDevice();
+  h6LoopDef def = h6DefaultLoopDef();
+  def.virtual_time = true, def.realtime = false, def.duration = 0.05, def.view_contacts = 10;
+  h6Error error{};
+  CHECK(h6StartLoop(held.session, nullptr, &def, &error) == nullptr);
+  CHECK(error.code == H6_ERROR_ARGUMENT);
+  CHECK(h6StartLoop(held.session, &device, &def, nullptr) == nullptr);  // it has no functions
+  device.read = [](void*, double, h6DeviceSample* out) {
+    *out = h6DefaultDeviceSample();
+    return 0;
+  };
+  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+  for (const double wild : {std::nan(""), kInfinity, -1.0}) {
+    h6LoopDef odd = def;
+    odd.duration = wild;
+    CHECK(h6StartLoop(held.session, &device, &odd, &error) == nullptr);
+    CHECK(error.code == H6_ERROR_RANGE);
+  }
+  for (std::size_t h6LoopDef::*count :
+       {&h6LoopDef::ring_frames, &h6LoopDef::ring_inputs, &h6LoopDef::view_contacts}) {
+    h6LoopDef odd = def;
+    odd.*count = SIZE_MAX;
+    CHECK(h6StartLoop(held.session, &device, &odd, nullptr) == nullptr);
+  }
+  const hapsix::Loop loop = hapsix::start_loop(held.session, {&device, 1}, def);
+  for (const double wild : {std::nan(""), kInfinity, -1.0}) h6SetPace(loop, wild);
+  CHECK(h6ChangeSession(loop, nullptr, &error) == nullptr);
+  CHECK(error.code == H6_ERROR_ARGUMENT);
+  CHECK(h6ReadRecords(loop, nullptr, SIZE_MAX) == 0);
+  CHECK_FALSE(h6ReadView(loop, nullptr));
+  h6JoinLoop(loop, nullptr);
+  std::vector<h6FrameRecord> rows(50);
+  CHECK(h6ReadRecords(loop, rows.data(), 0) == 0);
+  CHECK(h6ReadRecords(loop, rows.data(), SIZE_MAX) == 50);  // all that there are
+}
+
+TEST_CASE("workers that cannot be are not made, and a call without arrays steps nothing") {
+  h6WorkersDef def = h6DefaultWorkersDef();
+  h6Error error{};
+  for (const std::uint32_t wild : {65u, UINT32_MAX}) {
+    def.threads = wild;
+    CHECK(h6CreateWorkers(&def, &error) == nullptr);
+    CHECK(error.code == H6_ERROR_RANGE);
+    CHECK(h6CreateWorkers(&def, nullptr) == nullptr);
+  }
+  CHECK(h6WorkerThreads(nullptr) == 0);
+  h6DestroyWorkers(nullptr);
+  const Held held;
+  h6Session* const session = held.session;
+  const h6Pose pose = h6DefaultDeviceSample().pose;
+  h6Status status = 7;
+  h6StepArrays arrays = h6DefaultStepArrays();
+  arrays.sessions = &session, arrays.count = 1, arrays.pose = &pose, arrays.status = &status;
+  const auto refused = [](h6StepArrays a, auto change) {
+    change(a);
+    return h6StepMany(nullptr, &a) == H6_OUTPUT_FAULT;
+  };
+  CHECK(h6StepMany(nullptr, nullptr) == H6_OUTPUT_FAULT);
+  CHECK(refused(arrays, [](h6StepArrays& a) { a.sessions = nullptr; }));
+  CHECK(refused(arrays, [](h6StepArrays& a) { a.pose = nullptr; }));
+  CHECK(refused(arrays, [](h6StepArrays& a) { a.count = SIZE_MAX; }));
+  CHECK(refused(arrays, [](h6StepArrays& a) { a.hands = UINT32_MAX; }));
+  CHECK(refused(arrays, [](h6StepArrays& a) { a.steps = 0; }));
+  CHECK(status == 7);
+  CHECK(h6GetFrame(session).state_hash == 0);
+  h6Session* const nobody = nullptr;
+  arrays.sessions = &nobody;
+  CHECK(h6StepMany(nullptr, &arrays) == H6_OUTPUT_FAULT);
+  CHECK(status == H6_OUTPUT_FAULT);
+}
+
+TEST_CASE("every function of the contract with an argument stands in a test of wrong arguments") {
+  namespace fs = std::filesystem;
+  const fs::path root = fs::path(__FILE__).parent_path().parent_path().parent_path();
+  const auto text_of = [&](const fs::path& file) {
+    std::ifstream in(root / file);
+    REQUIRE_MESSAGE(in, file);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  std::string tests = text_of("tests/runtime/frame/arguments_test.cpp");
+  // In these two files they are the last part.
+  for (const char* file :
+       {"tests/contract/handles_test.cpp", "tests/io/api/io_contract_test.cpp"}) {
+    const std::string text = text_of(file);
+    const std::size_t first = text.find("\n// ---- wrong arguments");
+    REQUIRE(first != std::string::npos);
+    tests += text.substr(first);
+  }
+  std::vector<fs::path> headers{"io/api/hapsix/io.h"};
+  for (const auto& entry : fs::directory_iterator(root / "runtime/include/hapsix"))
+    headers.push_back(fs::relative(entry.path(), root));
+  static const std::regex declared(R"(\nH6_API[^;(]*\b(h6[A-Z]\w*)\s*\((?!void\)))");
+  std::size_t functions = 0;
+  for (const fs::path& header : headers) {
+    const std::string text = text_of(header);
+    for (std::sregex_iterator it(text.begin(), text.end(), declared), end; it != end; ++it) {
+      const std::string name = (*it)[1];
+      ++functions;
+      CHECK_MESSAGE(std::regex_search(tests, std::regex("\\b" + name + "\\(")), name);
+    }
+  }
+  CHECK(functions > 90);
 }

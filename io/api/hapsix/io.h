@@ -7,10 +7,11 @@
  *   h6CreateRecorder -> h6RecordFrames -> h6FinishRecorder;   h6ReadRecording -> h6GetRecordingFrames
  *
  * Units are SI, poses and lengths as in types.h. A function that fails gives NULL or false and fills
- * `error`, which may be NULL; after NULL for an object it fails or gives zeros. Destroy functions take
- * NULL. Nothing is printed: what a bake repaired or doubts goes to the handler of h6SetLogHandler. Any
- * thread may call, and different threads may read one mesh, field, shell or scene at a time; a recorder
- * or a recording belongs to one thread at a time, never the haptic one. Definitions grow as base.h says.
+ * `error`, which may be NULL; for a NULL object, a -1 or an index past the end it fails, or gives NULL,
+ * zeros or the default. Destroy functions take NULL. Nothing is printed: what a bake repaired or doubts
+ * goes to the handler of h6SetLogHandler. Any thread may call, and different threads may read one mesh,
+ * field, shell or scene at a time; a recorder or a recording belongs to one thread at a time, never the
+ * haptic one. Definitions grow as base.h says.
  *
  * Reading and baking take their memory from the C library, as do OpenVDB, Embree, HDF5 and TBB below
  * them, which offer no other way. A model and a session take theirs from the program's allocator:
