@@ -98,9 +98,9 @@ class FloorRun {
       return (r.report.status & H6_DEVICE_LOST) && force(r) == 0;
     }));
     const h6Cause cause = rows.back().command[0].cause;
-    CHECK_MESSAGE(
-        (cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_WATCHDOG || cause == H6_CAUSE_LATE),
-        std::string(h6CauseName(cause)));
+    CHECK_MESSAGE((cause == H6_CAUSE_DEVICE_LOST || cause == H6_CAUSE_WATCHDOG ||
+                   cause == H6_CAUSE_LATE || cause == H6_CAUSE_FROZEN),
+                  std::string(h6CauseName(cause)));
     mend();
     REQUIRE(until([](const h6FrameRecord& r) { return !(r.report.status & H6_DEVICE_LOST); }));
     const std::size_t back = rows.size();

@@ -13,7 +13,7 @@ const program = process.env.HAPSIX_PROGRAM, pictures = process.env.HAPSIX_PICTUR
 mkdirSync(pictures, { recursive: true });
 const require = createRequire(import.meta.url);
 const iwer = readFileSync(join(dirname(require.resolve('iwer/package.json')), 'build/iwer.min.js'), 'utf8');
-let browser, run;
+let browser, run, address;
 const state = () => browser.value('window.hapsix?.state()');
 
 before(async () => {
@@ -25,7 +25,7 @@ before(async () => {
   run = spawn(program, ['run', 'peg-in-hole', '--view', '--no-browser'], { stdio: ['ignore', 'ignore', 'pipe'] });
   let said = '';
   run.stderr.on('data', (text) => { said += text; });
-  const address = await until(() => said.match(/view: (http:\/\/\S+)/)?.[1], 'the run prints an address', 120);
+  address = await until(() => said.match(/view: (http:\/\/\S+)/)?.[1], 'the run prints an address', 120);
   await browser.go(address);
   await until(async () => await browser.value('Boolean(window.hapsix?.state())'), 'a state arrives');
 }, { timeout: 180000 });
@@ -158,6 +158,46 @@ test('a headset shows the scene on a table; the grip of a controller takes the p
   assert.ok(apart(left, await hand(), 0, 7) < 1e-9, 'the hand stays where it is');
   await browser.value('document.getElementById("headset").click()');
   await until(async () => await browser.value('document.getElementById("headset").getAttribute("aria-pressed") === "false"'), 'the session ends');
+});
+
+// Lifts the part out of its hole, which it follows, and presses it on the block beside the hole: there
+// it stays behind the hand.
+async function touches(press, move, release) {
+  await browser.go(address);  // without what the tests before left in the page
+  await until(async () => await browser.value('Boolean(window.hapsix?.state())'), 'a state arrives');
+  await browser.value('window.hapsix.ask({ do: "reset" })');
+  await until(async () => (await state()).time < 2 && (await state()).time > 0.1, 'a new run');
+  await browser.value('window.hapsix.ask({ do: "pace", pace: 0.02 })');  // its hand presses it ever deeper
+  const place = () => browser.value('window.hapsix.view.bodies[window.hapsix.view.hand].position.toArray()');
+  const { x, y } = await onPart(), size = await radius(), before = await place();
+  let at = [x, y];
+  const to = async (dx, dy) => { at = [at[0] + dx, at[1] + dy]; await move(...at); await wait(60); };
+  await press(x, y);
+  await to(0, -5);
+  await browser.value('window.hapsix.ask({ do: "pace", pace: 1 })');
+  for (let i = 0; i < 40; ++i) await to(0, -5);
+  await until(async () => (await state()).contacts === 0, 'it is free');
+  assert.ok((await place())[2] - before[2] > 0.1 * size, 'the part follows');
+  for (let i = 0; i < 15; ++i) await to(5, 0);
+  let touched = null;
+  for (let i = 0; i < 80 && !touched; ++i) {
+    await to(0, 4);
+    const s = await state();
+    if (s.contacts > 0 && s.lag > 0.02 * size) touched = s;
+  }
+  const part = await place(), wanted = await hand();
+  await release(...at);
+  assert.ok(touched, 'it touches and stays behind');
+  assert.ok(part[2] - wanted[2] > 0.01 * size, 'the hand is below the part');
+}
+
+test('the mouse leads the part into contact', () => touches(
+  (x, y) => browser.mouse('mousePressed', x, y), (x, y) => browser.mouse('mouseMoved', x, y),
+  (x, y) => browser.mouse('mouseReleased', x, y)));
+
+test('a finger leads the part into contact', () => {
+  const touch = (type) => (x, y) => browser.send('Input.dispatchTouchEvent', { type, touchPoints: type === 'touchEnd' ? [] : [{ x, y, id: 0 }] });
+  return touches(touch('touchStart'), touch('touchMove'), touch('touchEnd'));
 });
 
 test('a kept place is come back to, with the hand where it was; the stiffness of the hand is set', async () => {
