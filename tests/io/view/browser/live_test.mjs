@@ -93,6 +93,65 @@ test('dragging the part into the obstacle makes contacts, and the part lags behi
   await browser.mouse('mouseReleased', pushed.x, pushed.y);
 });
 
+test('at 900 x 640 nothing moves or is cut off while the part is dragged', async () => {
+  await browser.size(900, 640);
+  await wait(600);
+  const boxes = () => browser.value(`['header', '#space canvas', 'aside', '#strips'].map((name) => {
+    const b = document.querySelector(name).getBoundingClientRect();
+    return [name, Math.round(b.left), Math.round(b.top), Math.round(b.width), Math.round(b.height)].join(' ');
+  })`);
+  const before = await boxes(), seen = new Set();
+  const at = await browser.value(`(() => {
+    const v = window.hapsix.view, box = v.renderer.domElement.getBoundingClientRect(), hit = window.hapsix.pointOn(v.hand);
+    return hit && { x: box.left + hit.x * box.width, y: box.top + hit.y * box.height };
+  })()`);
+  assert.ok(at, 'the part can be seen');
+  await browser.mouse('mousePressed', at.x, at.y);
+  for (let i = 1; i <= 12; ++i) {
+    await browser.mouse('mouseMoved', at.x + 5 * i, at.y + 3 * i);
+    await wait(60);
+    seen.add(JSON.stringify(await boxes()));
+  }
+  await browser.picture(join(pictures, 'live-900x640.png'));
+  await browser.mouse('mouseReleased', at.x + 60, at.y + 36);
+  assert.deepEqual([...seen], [JSON.stringify(before)]);
+  // The header has one row of buttons, and each strip lies in the window.
+  const rows = await browser.value(`[...new Set([...document.querySelectorAll('header button')].map((b) => Math.round(b.getBoundingClientRect().top)))].length`);
+  assert.equal(rows, 1);
+  const cut = await browser.value(`[...document.querySelectorAll('#strips canvas')].filter((c) => c.getBoundingClientRect().bottom > innerHeight + 1).length`);
+  assert.equal(cut, 0);
+  assert.ok(await browser.value(`document.querySelector('#space canvas').getBoundingClientRect().height`) > 150, 'room for the scene');
+  await browser.size(1280, 860);
+  await wait(400);
+});
+
+test('what is drawn is explained: arrows, sphere, ellipsoid, units of the strips', async () => {
+  const text = await browser.value('document.body.textContent');
+  for (const words of ['contacts: share of stiffness 0', 'length by depth', 'where the hand is', 'deepest point', 'normals N',
+    'torque directions T', 'along a long axis the part is stopped', 'force [N]', 'torque [mN·m]', 'depth [voxel]'])
+    assert.ok(text.includes(words), words);
+  assert.ok(await browser.value('document.querySelectorAll("#strips .u-title").length') >= 4, 'each strip has its title');
+});
+
+test('Space does what the focused button says, and pauses elsewhere', async () => {
+  const pressed = (id) => browser.value(`document.getElementById('${id}').getAttribute('aria-pressed')`);
+  const space = async () => {
+    for (const type of ['rawKeyDown', 'char', 'keyUp'])
+      await browser.send('Input.dispatchKeyEvent', { type, key: ' ', code: 'Space', text: ' ', windowsVirtualKeyCode: 32 });
+    await wait(300);
+  };
+  await browser.value(`document.getElementById('clutch').focus()`);
+  await space();
+  assert.deepEqual([await pressed('clutch'), await pressed('pause')], ['true', 'false']);
+  await space();
+  assert.equal(await pressed('clutch'), 'false');
+  await browser.value('document.activeElement.blur()');
+  await space();
+  assert.equal(await pressed('pause'), 'true');
+  await space();
+  assert.equal(await pressed('pause'), 'false');
+});
+
 test('pause stands still, reset begins again, recording leaves a file', async () => {
   await browser.value(`document.getElementById('pause').click()`);
   await wait(500);
