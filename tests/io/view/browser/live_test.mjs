@@ -118,6 +118,8 @@ test('at 900 x 640 nothing moves or is cut off while the part is dragged', async
   // The header has one row of buttons, and each strip lies in the window.
   const rows = await browser.value(`[...new Set([...document.querySelectorAll('header button')].map((b) => Math.round(b.getBoundingClientRect().top)))].length`);
   assert.equal(rows, 1);
+  // Once the part is let go, nothing is wrong, and each chip can be read.
+  await until(async () => await browser.value(`(() => { const w = document.querySelector('header .what'); return w.scrollWidth <= w.clientWidth + 1; })()`), 'no chip is cut off', 20);
   const cut = await browser.value(`[...document.querySelectorAll('#strips canvas')].filter((c) => c.getBoundingClientRect().bottom > innerHeight + 1).length`);
   assert.equal(cut, 0);
   assert.ok(await browser.value(`document.querySelector('#space canvas').getBoundingClientRect().height`) > 150, 'room for the scene');
