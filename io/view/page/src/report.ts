@@ -59,19 +59,20 @@ const verdicts: Record<string, [string, string]> = {
   unstable: ['bad', 'The motion was unstable.'],
 };
 
-interface Moment { time: number; what: string }
+interface Moment { time: number; what: string; kind: 'escape' | 'fault' | 'deepest' }
 
 // Causes of the safety chain that end the force, by their names.
 const faults = new Set(['not finite', 'device lost', 'overspeed', 'pose jump', 'bad sample', 'frozen', 'watchdog']);
 
 // The escape, else the first fault, else the deepest contact.
 function moment(run: any, rows: Float32Array): Moment {
-  if (run.through) return { time: run.through.t, what: 'a point passes through' };
+  if (run.through) return { time: run.through.t, what: 'a point passes through', kind: 'escape' };
   const fault = run.events.find((e: any) => faults.has(e.what));
-  if (fault) return { time: fault.t, what: fault.what };
+  if (fault) return { time: fault.t, what: fault.what, kind: 'fault' };
   let at = 0;
   for (let i = 0; i < rows.length; i += 6) if (rows[i + 4] > rows[at + 4]) at = i;
-  return rows.length && rows[at + 4] > 0 ? { time: rows[at], what: `deepest, ${rows[at + 4].toFixed(2)} voxel` } : { time: 0, what: 'start' };
+  const touched = rows.length > 0 && rows[at + 4] > 0;
+  return { time: touched ? rows[at] : 0, what: touched ? `deepest, ${rows[at + 4].toFixed(2)} voxel` : 'start', kind: 'deepest' };
 }
 
 function parsed(text: string): any {
@@ -225,7 +226,7 @@ class Replay {
   private name() {
     const m = this.moments[this.run];
     $('moment').textContent = `${this.packet.head.runs[this.run].label}: ${m.what}, at ${m.time.toFixed(2)} s`;
-    $('key').textContent = this.packet.head.runs[this.run].through ? 'to the escape' : 'to the deepest';
+    $('key').textContent = `to the ${m.kind}`;
   }
 
   // Shows a run at the moment that matters, with the camera on the place.

@@ -47,6 +47,26 @@ test('it opens from disk and shows both runs', async () => {
   await browser.picture(join(pictures, 'report-top.png'));
 });
 
+test('a run that faults opens at its fault, and a held one where it is deepest', async () => {
+  const record = (name, device) => execFileSync(program, ['run', 'box-on-wall', '--virtual-time', '--duration', '2', '--device', device, '--record', join(folder, name)], { stdio: 'ignore' });
+  record('fault.h5', 'bad-operator?kinds=nan&every=0.5&seed=3');
+  record('held.h5', 'simulated');
+  for (const [name, kind, what] of [['fault', 'fault', /^bad sample$/], ['held', 'deepest', /^deepest, 0\.[0-9]+ voxel$/]]) {
+    const html = join(folder, `${name}.html`);
+    execFileSync(program, ['report', join(folder, `${name}.h5`), '-o', html], { stdio: 'ignore' });
+    await browser.go(pathToFileURL(html).href);
+    await until(() => browser.value(`Boolean(window.hapsix?.ready && window.hapsix.head.runs[0].label === '${name}')`), 'the report is ready');
+    const [moment] = await browser.value('window.hapsix.moments');
+    assert.equal(moment.kind, kind);
+    assert.match(moment.what, what);
+    assert.ok(moment.time > 0 && moment.time <= 2, `${moment.time} s`);
+    assert.ok(Math.abs(await browser.value('Number(document.getElementById("scrub").value)') - moment.time) < 0.01, 'it opens there');
+    assert.equal(await browser.value('document.getElementById("key").textContent'), `to the ${kind}`);
+  }
+  await browser.go(pathToFileURL(report).href);
+  await until(() => browser.value('Boolean(window.hapsix?.ready && window.hapsix.head.runs.length === 2)'), 'the first report is back');
+});
+
 test('axe-core has no serious finding in the report, light and dark', async () => {
   assert.deepEqual(await browser.graveFindings(), []);
 });
