@@ -223,39 +223,70 @@ WallPushes WallPusher::push(std::span<const WallPlace> places, double force,
 
 namespace {
 
-// Narrows a bracket of forces. A place that holds a force holds less too, so while the bracket
-// closes only places are pushed at that let its upper end through; in the end all are, again.
+// Of so many places: the thinnest ones, and as many from everywhere.
+constexpr std::size_t kThinnest = 16, kSpread = 16;
+
+std::vector<WallPlace> sample_of(std::span<const WallPlace> places) {
+  if (places.size() <= kThinnest + kSpread) return {places.begin(), places.end()};
+  std::vector<WallPlace> sorted(places.begin(), places.end());
+  std::stable_sort(sorted.begin(), sorted.end(), [](const WallPlace& l, const WallPlace& r) {
+    return l.thickness < r.thickness;
+  });
+  std::vector<WallPlace> out(sorted.begin(), sorted.begin() + kThinnest);
+  const std::size_t rest = sorted.size() - kThinnest;
+  for (std::size_t i = 0; i < kSpread; ++i)
+    out.push_back(sorted[kThinnest + i * (rest - 1) / (kSpread - 1)]);
+  return out;
+}
+
+// Narrows a bracket of forces at a sample of the places, and then pushes at all with what is found
+// less a spare. Places that let this through are the next sample. A place that holds a force holds
+// less too, so while a bracket closes only places are pushed at that let its upper end through. On
+// a cube, pushing at all places in every step took four times as long.
 class Search {
  public:
   Search(const WallPusher& pusher, std::span<const WallPlace> places, unsigned threads,
          const Progress& progress)
       : pusher_(pusher),
         all_(places),
-        weak_(places.begin(), places.end()),
+        weak_(sample_of(places)),
         threads_(threads),
         progress_(progress) {}
 
   bool cancelled() const { return cancelled_; }
   // unit: the force of a voxel of depth [N].
   HeldForce run(double unit) {
-    const double least = kLeast * unit, most = kMost * unit;
-    double low = 0, high = unit;
-    while (high < most && holds(high, all_)) low = high, high *= 2;
+    const double least = kLeast * unit;
+    double force = kSpare * largest_of_sample(unit, kMost * unit, least);
+    while (force >= kSpare * least && !holds(force, all_))
+      force = kSpare * largest_of_sample(force, force, least);
+    out_.force = force >= kSpare * least ? force : 0;
+    if (out_.force == 0) (void)holds(least, all_);  // counts them
+    return out_;
+  }
+
+ private:
+  // The largest force that the sample holds, to a tenth; 0: it does not hold `least`. The search
+  // begins at `high` and goes on to `most`, which is not tried; if `high` is `most`, it is known to
+  // come through.
+  double largest_of_sample(double high, double most, double least) {
+    double low = 0;
+    bool fails = high == most;
+    while (!fails && high < most) {
+      fails = !holds(high, weak_);
+      if (!fails) low = high, high *= 2;
+    }
     while (low == 0 && high > least)
       if (holds(high / 2, weak_))
         low = high / 2;
       else
         high /= 2;
-    while (low > 0 && high > kFine * low && high < most) {
+    while (fails && low > 0 && high > kFine * low) {
       const double middle = std::sqrt(low * high);
       (holds(middle, weak_) ? low : high) = middle;
     }
-    for (low *= kSpare; low >= kSpare * least && !holds(low, all_);) low *= kSpare;
-    out_.force = low >= kSpare * least ? low : 0;
-    return out_;
+    return low;
   }
-
- private:
   bool holds(double force, std::span<const WallPlace> places) {
     cancelled_ |= progress_ && !progress_("pushing at walls", std::min(0.95, 0.07 * runs_++));
     if (cancelled_) return true;
@@ -270,7 +301,7 @@ class Search {
 
   const WallPusher& pusher_;
   std::span<const WallPlace> all_;
-  std::vector<WallPlace> weak_;  // those that let the bracket's upper end through
+  std::vector<WallPlace> weak_;  // the sample: those that let the bracket's upper end through
   unsigned threads_;
   const Progress& progress_;
   HeldForce out_;
