@@ -27,7 +27,6 @@ typedef struct Device {
   int socket;
   uint32_t number;
   UdpArmSample newest;
-  double heard;    /* arrival time of `newest` [s] */
   double waits;    /* time of the oldest command without an answer; 0: none [s] */
   double patience; /* longest wait for an answer [s] */
   atomic_int stopped;
@@ -58,12 +57,7 @@ static void take_samples(Device* d) {
   for (int n = 0; n < 100; ++n) {
     const ssize_t bytes = recv(d->socket, &s, sizeof s, MSG_DONTWAIT | MSG_TRUNC);
     if (bytes < 0 && errno != ECONNREFUSED) return;
-    if (bytes != (ssize_t)sizeof s || s.mark != UDP_ARM_SAMPLE) continue;
-    if ((int32_t)(s.number - d->newest.number) < 0 && now() - d->heard < 1)
-      continue; /* older than `newest` */
-    d->newest = s;
-    d->heard = now();
-    d->waits = 0;
+    if (bytes >= 0 && udp_arm_take(&s, (size_t)bytes, d->number, &d->newest)) d->waits = 0;
   }
 }
 

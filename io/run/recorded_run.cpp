@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "io/file/json.h"
 #include "io/scene/scene_file.h"
@@ -19,6 +21,14 @@ using Json = nlohmann::ordered_json;
 Json list(const h6Vec3& v) { return {v.x, v.y, v.z}; }
 h6Vec3 vec3(const Json& v) {
   return {v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
+}
+
+// A whole number that fits. JSON's own reader makes some number of one that does not.
+template <class Whole>
+Whole whole(const Json& v) {
+  if (!v.is_number_unsigned() || v.get<std::uint64_t>() > std::numeric_limits<Whole>::max())
+    throw std::out_of_range("a whole number is out of range");
+  return v.get<Whole>();
 }
 
 Json body_json(const h6BodyDef& b) {
@@ -69,8 +79,8 @@ Json rating_json(const h6DeviceCapabilities& c) {
 h6DeviceCapabilities rating(const Json& o) {
   h6DeviceCapabilities c{};
   std::snprintf(c.name, sizeof c.name, "%s", o.at("name").get<std::string>().c_str());
-  c.dof_in = o.at("dof_in").get<std::uint32_t>();
-  c.dof_out = o.at("dof_out").get<std::uint32_t>();
+  c.dof_in = whole<std::uint32_t>(o.at("dof_in"));
+  c.dof_out = whole<std::uint32_t>(o.at("dof_out"));
   c.max_force = o.at("max_force").get<double>();
   c.max_torque = o.at("max_torque").get<double>();
   c.max_force_rate = o.at("max_force_rate").get<double>();
@@ -79,7 +89,7 @@ h6DeviceCapabilities rating(const Json& o) {
   c.workspace_min = vec3(o.at("workspace_min"));
   c.workspace_max = vec3(o.at("workspace_max"));
   c.rate = o.at("rate").get<double>();
-  c.modes = o.at("modes").get<std::uint32_t>();
+  c.modes = whole<std::uint32_t>(o.at("modes"));
   c.freeze_time = o.value("freeze_time", 0.0);  // older recordings lack these two keys
   c.frame_time = o.value("frame_time", false);
   return c;
@@ -202,7 +212,7 @@ Outcome take_settings(const std::string& text, h6ContactDef& contact, h6Coupling
     h6CouplingDef held = coupling;
     if (h6MethodFromName(o.at("method").get<std::string>().c_str(), &to.method, &to.pieces) != 0)
       return unreadable;
-    to.pieces = o.at("pieces").get<std::uint32_t>();
+    to.pieces = whole<std::uint32_t>(o.at("pieces"));
     for (const auto& [key, value] : {std::pair{"stiffness", &to.stiffness},
                                      {"epsilon", &to.epsilon},
                                      {"epsilon_normal", &to.epsilon_normal},
@@ -250,10 +260,10 @@ Result<RecordedRun> recorded_run(const RecordingHead& head) {
     run.scene_file = all.at("scene_file").get<std::string>();
     if (const Result<Unit> unit = unit_from_name(all.at("units").get<std::string>()); unit)
       run.unit = *unit;
-    run.threads = all.at("threads").get<std::uint32_t>();
+    run.threads = whole<std::uint32_t>(all.at("threads"));
     run.virtual_time = all.at("virtual_time").get<bool>();
-    run.max_contacts = all.at("max_contacts").get<std::size_t>();
-    run.max_pairs = all.value("max_pairs", std::size_t{0});
+    run.max_contacts = whole<std::size_t>(all.at("max_contacts"));
+    if (all.contains("max_pairs")) run.max_pairs = whole<std::size_t>(all["max_pairs"]);
     run.frame_budget_us = all.value("frame_budget_us", 0.0);
     run.gravity = vec3(all.at("gravity"));
     for (const Json& body : all.at("bodies")) run.bodies.push_back(body_def(body));

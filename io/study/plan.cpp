@@ -9,6 +9,7 @@
 #include "hapsix/hapsix.h"
 #include "io/file/content_hash.h"
 #include "io/file/json.h"
+#include "io/scene/check.h"
 #include "io/scene/scene_file.h"
 #include "io/scenes/scenes.h"
 
@@ -19,6 +20,7 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr std::size_t kMostRuns = 1000000;
+constexpr std::size_t kLongestKey = 300;  // each word is a level of JSON, and those cost stack
 
 struct Varied {
   std::string key;
@@ -51,7 +53,7 @@ void refuse_others(const Json& object, const std::vector<std::string>& known,
                    const std::string& where) {
   for (const auto& [key, value] : object.items())
     if (std::find(known.begin(), known.end(), key) == known.end())
-      throw Mistake{where + " has an unknown key '" + key + "'"};
+      throw Mistake{where + " has an unknown key '" + io::shown(key) + "'"};
 }
 
 Varied varied(const std::string& key, const Json& given) {
@@ -69,8 +71,10 @@ Varied varied(const std::string& key, const Json& given) {
       // The product comes first: steps of 0.04 are then 0.04 and not 0.03999…
       const double at = static_cast<double>(i),
                    last = std::max(1.0, static_cast<double>(count) - 1);
-      out.values.push_back(log ? from * std::pow(to / from, at / last)
-                               : from + (to - from) * at / last);
+      const double value =
+          log ? from * std::pow(to / from, at / last) : from + (to - from) * at / last;
+      if (!std::isfinite(value)) throw Mistake{where + ": 'from' and 'to' are too far apart"};
+      out.values.push_back(value);
     }
   }
   if (out.values.empty())
@@ -82,7 +86,23 @@ Drawn drawn(const std::string& key, const Json& given) {
   const std::string where = "draw '" + key + "'";
   if (!given.is_object()) throw Mistake{where + " must be {\"low\", \"high\"}"};
   refuse_others(given, {"low", "high"}, where);
-  return {key, number_of(given, "low", where), number_of(given, "high", where)};
+  const Drawn out{key, number_of(given, "low", where), number_of(given, "high", where)};
+  if (!std::isfinite(out.high - out.low))
+    throw Mistake{where + ": 'low' and 'high' are too far apart"};
+  return out;
+}
+
+std::size_t check_runs(std::size_t runs) {
+  if (runs < 1 || runs > kMostRuns)
+    throw Mistake{"these are " + std::to_string(runs) + " or more runs: 1 to " +
+                  std::to_string(kMostRuns)};
+  return runs;
+}
+
+void check_key(const std::string& key) {
+  if (key.size() > kLongestKey)
+    throw Mistake{"the key '" + io::shown(key) + "' is longer than " + std::to_string(kLongestKey) +
+                  " bytes"};
 }
 
 // A number in [0, 1) that depends on these three alone.
@@ -132,7 +152,10 @@ void each_file(io::Scene& scene, Use&& use) {
     for (fs::path* file : {&source->mesh, &source->file})
       if (!file->empty()) use(*file);
   };
-  for (io::SceneBody& body : scene.bodies) both(body.field), both(body.shell);
+  for (io::SceneBody& body : scene.bodies) {
+    both(body.field), both(body.shell);
+    if (body.shell && body.shell->bends) use(body.shell->bends->file);
+  }
 }
 
 std::string content_of(const fs::path& file) {
@@ -150,7 +173,8 @@ Result<fs::path> scene_file_of(const std::string& name, const fs::path& study,
   const fs::path exported = folder / "scene";
   if (fs::exists(exported / "scene.json", error)) return exported / "scene.json";
   Result<io::Scene> made = io::make_scene(name);
-  if (!made) return Failure{name + ": there is neither such a file nor such a generated scene"};
+  if (!made)
+    return Failure{io::shown(name) + ": there is neither such a file nor such a generated scene"};
   // Aside first: a kill leaves no half scene.
   const fs::path aside = folder / "scene.unfinished";
   fs::remove_all(aside, error);
@@ -163,7 +187,8 @@ Result<fs::path> scene_file_of(const std::string& name, const fs::path& study,
 }  // namespace
 
 struct Plan::Parts {
-  fs::path file;  // of the scene
+  fs::path file;         // of the scene
+  bool outside = false;  // its files may lie outside its folder
   io::Scene base;
   Json scene;  // of the base
   std::vector<Varied> vary;
@@ -200,16 +225,33 @@ struct Plan::Parts {
     refuse_others(study, {"hapsix_study", "scene", "vary", "draw", "repeats", "seed"}, "the study");
     const Json given_vary = study.value("vary", Json::object());
     const Json given_draw = study.value("draw", Json::object());
-    for (const auto& [key, given] : given_vary.items()) vary.push_back(varied(key, given));
-    for (const auto& [key, given] : given_draw.items()) draws.push_back(drawn(key, given));
     repeats = whole_of(study, "repeats", 1, kMostRuns);
     seed = whole_of(study, "seed", 1, std::uint64_t{1} << 53);
-    for (const Varied& v : vary) keys.push_back(v.key);
-    for (const Drawn& d : draws) keys.push_back(d.key);
-    double runs = static_cast<double>(repeats);
-    for (const Varied& v : vary) runs *= static_cast<double>(v.values.size());
-    if (runs < 1 || runs > kMostRuns)
-      throw Mistake{"these are " + Json(runs).dump() + " runs: 1 to " + std::to_string(kMostRuns)};
+    std::size_t runs = check_runs(repeats);
+    for (const auto& [key, given] : given_vary.items()) {
+      check_key(key);
+      vary.push_back(varied(key, given));
+      // Counted here, many long lists never stand in memory together.
+      runs = check_runs(runs * vary.back().values.size());
+      keys.push_back(key);
+    }
+    for (const auto& [key, given] : given_draw.items()) {
+      check_key(key);
+      draws.push_back(drawn(key, given));
+      keys.push_back(key);
+    }
+  }
+  // Files that vary lie beside the scene, as its own do, and no stranger's study reads others.
+  Outcome settle_files(io::Scene& scene) const {
+    fs::path strange;
+    each_file(scene, [&](fs::path& f) {
+      f = (file.parent_path() / f).lexically_normal();
+      if (!outside && !io::lies_below(f, file)) strange = f;
+    });
+    if (strange.empty()) return Done{};
+    return Failure{io::shown(strange.string()) +
+                   " lies outside the folder of the scene file: move it there, or give "
+                   "--allow-outside if you trust the study"};
   }
   void identify(const Json& study) {
     std::ostringstream out;
@@ -248,6 +290,7 @@ Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outsi
         *at == folder / "scene" / "scene.json" ? io::read_scene(*at) : io::read_scene(*at, outside);
     if (!base) return base.failure();
     parts->file = *at;
+    parts->outside = outside;
     parts->base = std::move(*base);
     each_file(parts->base, [](fs::path& f) { f = fs::absolute(f).lexically_normal(); });
     parts->scene = Json::parse(io::scene_text(parts->base));
@@ -288,6 +331,7 @@ Result<io::Scene> Plan::scene(std::size_t run) const {
   }
   Result<io::Scene> scene = io::read_scene_text(text.dump(), "run " + std::to_string(run));
   if (!scene) return scene;
+  if (const Outcome settled = parts_->settle_files(*scene); !settled) return settled.failure();
   for (std::size_t h = 0; h < scene->hands.size() && h < parts_->base.hands.size(); ++h)
     scene->hands[h].path = parts_->base.hands[h].path;
   return scene;

@@ -17,6 +17,8 @@
 #include <set>
 #include <thread>
 
+#include "io/view/view_door.h"
+
 namespace h6::io::view {
 namespace {
 
@@ -34,33 +36,11 @@ constexpr int kUnseen = 2;
 // A page in the background does not draw, and sees nothing; it gets a message now and then.
 constexpr auto kPatience = std::chrono::seconds(1);
 
-// Takes the same time for wrong and right guesses, so the time tells nothing about the token.
-bool same(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  unsigned char differ = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    differ = static_cast<unsigned char>(differ | (a[i] ^ b[i]));
-  return differ == 0;
-}
-
 std::string random_token() {
   std::random_device random;
   char text[33];
   std::snprintf(text, sizeof text, "%08x%08x%08x%08x", random(), random(), random(), random());
   return text;
-}
-
-// The value of `token` in "/path?a=b&token=T"; empty when there is none.
-std::string_view token_of(std::string_view target) {
-  const auto query = target.find('?');
-  if (query == std::string_view::npos) return {};
-  std::string_view rest = target.substr(query + 1);
-  while (!rest.empty()) {
-    const std::string_view part = rest.substr(0, rest.find('&'));
-    if (part.substr(0, 6) == "token=") return part.substr(6);
-    rest.remove_prefix(std::min(rest.size(), part.size() + 1));
-  }
-  return {};
 }
 
 std::string_view view_of(beast::string_view s) { return {s.data(), s.size()}; }
@@ -72,7 +52,8 @@ struct ViewServer::Body {
   class Connection;
 
   ServerOptions options;
-  std::string page, port_text;
+  Door door;
+  std::string page;
   Receive receive;
   // These two are declared before io: io's destructor runs handlers that change them.
   std::size_t connections = 0;
@@ -88,12 +69,6 @@ struct ViewServer::Body {
 
   void accept();
   void count_ready();
-  bool known_host(std::string_view host) const {
-    return host == "127.0.0.1:" + port_text || host == "localhost:" + port_text;
-  }
-  bool known_origin(std::string_view origin) const {
-    return origin.substr(0, 7) == "http://" && known_host(origin.substr(7));
-  }
 };
 
 // An open page: one message is being sent, the newest live message waits behind it.
@@ -185,8 +160,8 @@ class ViewServer::Body::Client : public std::enable_shared_from_this<Client> {
   beast::flat_buffer buffer_;
   std::deque<Message> queue_;
   Message live_, sending_;
-  bool open_ = false, paced_ = false;  // paced: it says what it has seen
-  int unseen_ = 0;                     // live messages sent since it said so
+  bool open_ = false, paced_ = false;                // paced: it says what it has seen
+  int unseen_ = 0;                                   // live messages sent since it said so
   std::chrono::steady_clock::time_point sent_at_{};  // of the last live message
 };
 
@@ -227,29 +202,16 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
   }
   void answer() {
     const auto& request = parser_->get();
-    const std::string_view target = view_of(request.target());
-    const std::string_view path = target.substr(0, target.find('?'));
-    if (!body_.known_host(view_of(request[http::field::host])))
-      return reply(http::status::forbidden, "not this host");
-    if (path != "/" && path != "/live")
-      return reply(http::status::not_found, "there is only one page here");
-    if (!same(token_of(target), body_.options.token))
-      return reply(http::status::forbidden,
-                   "the token is missing: open the whole address that hapsix printed");
-    const bool upgrade = websocket::is_upgrade(request);
-    if (path == "/live") {
-      if (!upgrade) return reply(http::status::upgrade_required, "this address is for a WebSocket");
-      if (!body_.known_origin(view_of(request[http::field::origin])))
-        return reply(http::status::forbidden, "not from this page");
-      if (body_.watching.size() >= body_.options.max_clients)
-        return reply(http::status::service_unavailable, "enough clients are watching already");
-      stream_.expires_never();
-      std::make_shared<Client>(body_, stream_.release_socket())->start(request);
-      return;
-    }
-    if (request.method() != http::verb::get && request.method() != http::verb::head)
-      return reply(http::status::method_not_allowed, "only GET is supported");
-    reply(http::status::ok, {});
+    const bool reads = request.method() == http::verb::get || request.method() == http::verb::head;
+    const Answer answer =
+        answer_to({view_of(request.target()), view_of(request[http::field::host]),
+                   view_of(request[http::field::origin]), reads, websocket::is_upgrade(request)},
+                  body_.door);
+    if (answer.status != 101) return reply(http::int_to_status(answer.status), answer.refusal);
+    if (body_.watching.size() >= body_.options.max_clients)
+      return reply(http::status::service_unavailable, "enough clients are watching already");
+    stream_.expires_never();
+    std::make_shared<Client>(body_, stream_.release_socket())->start(request);
   }
 
   // Sends the page, or a refusal.
@@ -266,7 +228,7 @@ class ViewServer::Body::Connection : public std::enable_shared_from_this<Connect
     r.set("Content-Security-Policy",
           "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
           "img-src data: blob:; connect-src 'self' ws://127.0.0.1:" +
-              body_.port_text + " ws://localhost:" + body_.port_text + "; frame-ancestors 'none'");
+              body_.door.port + " ws://localhost:" + body_.door.port + "; frame-ancestors 'none'");
     r.body() = good ? body_.page : std::string(refusal) + "\n";
     r.keep_alive(false);
     r.prepare_payload();
@@ -314,7 +276,7 @@ Result<std::unique_ptr<ViewServer>> ViewServer::open(const ServerOptions& option
                                                      Receive receive) {
   auto body = std::make_unique<Body>();
   body->options = options;
-  if (body->options.token.empty()) body->options.token = random_token();
+  body->door.token = options.token.empty() ? random_token() : options.token;
   body->page = std::move(page);
   body->receive = std::move(receive);
   error_code failed;
@@ -326,7 +288,7 @@ Result<std::unique_ptr<ViewServer>> ViewServer::open(const ServerOptions& option
   if (failed)
     return Failure{"the view cannot listen on 127.0.0.1:" + std::to_string(options.port) + " (" +
                    failed.message() + "): choose another port with --port"};
-  body->port_text = std::to_string(body->acceptor.local_endpoint().port());
+  body->door.port = std::to_string(body->acceptor.local_endpoint().port());
   Body* raw = body.get();
   raw->accept();
   raw->thread = std::thread([raw] { raw->io.run(); });
@@ -347,7 +309,7 @@ ViewServer::~ViewServer() {
 }
 
 std::string ViewServer::address() const {
-  return "http://127.0.0.1:" + body_->port_text + "/?token=" + body_->options.token;
+  return "http://127.0.0.1:" + body_->door.port + "/?token=" + body_->door.token;
 }
 
 void ViewServer::greet(Message message) {

@@ -18,6 +18,7 @@
 #include "device/plugin.h"
 #include "device/plugins/bridge_message.h"
 #include "device/plugins/haply_message.h"
+#include "device/plugins/udp_arm_protocol.h"
 #include "device/scripted_hand.h"
 #include "device/spacemouse_report.h"
 #include "io/deform/deformable_file.h"
@@ -38,11 +39,6 @@ namespace h6::fuzz {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Every refusal is one sentence that a terminal can show.
-void check_sentence(const std::string& sentence) {
-  promise(!sentence.empty() && sentence.size() < 5000, "an error is one sentence");
-}
 
 template <const char* Name>
 void take_mesh(std::string_view bytes) {
@@ -177,6 +173,43 @@ void take_haply(std::string_view bytes) {
             "a cursor is in range");
 }
 
+void check_arm(const UdpArmSample& s) {
+  promise(s.mark == UDP_ARM_SAMPLE, "a sample has its mark");
+  const double length =
+      std::hypot(std::hypot(s.turned[0], s.turned[1]), std::hypot(s.turned[2], s.turned[3]));
+  promise(std::fabs(length - 1) < 0.011, "a grip has an orientation");
+  for (int i = 0; i < 3; ++i)
+    promise(std::fabs(s.moved[i]) <= 100 && std::fabs(s.linear[i]) <= 100 &&
+                std::fabs(s.angular[i]) <= 1000,
+            "a grip is in range");
+}
+
+// Four bytes: the number at which it begins. Then datagrams, each behind two bytes: how many
+// commands were sent before it, and its size.
+void take_udp_arm(std::string_view bytes) {
+  UdpArmSample newest{};
+  if (bytes.size() < sizeof newest.number) return;
+  std::memcpy(&newest.number, bytes.data(), sizeof newest.number);
+  std::uint64_t sent = newest.number, answered = sent;  // these do not wrap
+  for (std::size_t at = sizeof newest.number; at + 2 <= bytes.size();) {
+    sent += static_cast<std::uint8_t>(bytes[at]);
+    const std::size_t size =
+        std::min<std::size_t>(static_cast<std::uint8_t>(bytes[at + 1]), bytes.size() - at - 2);
+    const std::vector<char> datagram(bytes.begin() + static_cast<long>(at) + 2,
+                                     bytes.begin() + static_cast<long>(at + 2 + size));
+    at += 2 + size;
+    const UdpArmSample before = newest;
+    if (!udp_arm_take(datagram.data(), size, static_cast<std::uint32_t>(sent), &newest)) {
+      promise(std::memcmp(&before, &newest, sizeof newest) == 0, "what is refused changes nothing");
+      continue;
+    }
+    promise(size == sizeof newest, "a sample has its size");
+    check_arm(newest);
+    answered += static_cast<std::uint32_t>(newest.number - before.number);
+    promise(answered <= sent, "numbers never go back, and answer what was sent");
+  }
+}
+
 // The capabilities that a plug-in states.
 void take_plugin(std::string_view bytes) {
   h6PluginCapabilities can{};
@@ -184,7 +217,8 @@ void take_plugin(std::string_view bytes) {
   std::memcpy(&can, bytes.data(), std::min(bytes.size(), sizeof can));
   if (!device::nonsense_in(can).empty()) return;
   promise(std::strlen(can.name) < sizeof can.name, "a name ends");
-  for (const double rating : {can.max_force, can.max_torque, can.max_velocity, can.rate, can.freeze_time})
+  for (const double rating :
+       {can.max_force, can.max_torque, can.max_velocity, can.rate, can.freeze_time})
     promise(rating >= 0 && rating <= 1e9, "a rating is a number");
 }
 
@@ -235,20 +269,37 @@ void take_log(std::string_view bytes) {
   fs::remove(file, ignored);
 }
 
-constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},    {"obj", take_mesh<kObj>},
-                               {"ply", take_mesh<kPly>},    {"gltf", take_mesh<kGltf>},
-                               {"glb", take_mesh<kGlb>},    {"dae", take_mesh<kDae>},
-                               {"mesh_gz", take_mesh<kGz>}, {"gz", take_gz},
-                               {"shell", take_shell},       {"field", take_field},
-                               {"vdb", take_vdb},           {"scene", take_scene},
-                               {"path", take_path},         {"script", take_script},
-                               {"device", take_spec},       {"hid", take_hid},
-                               {"bridge", take_bridge},     {"haply", take_haply},
+constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},
+                               {"obj", take_mesh<kObj>},
+                               {"ply", take_mesh<kPly>},
+                               {"gltf", take_mesh<kGltf>},
+                               {"glb", take_mesh<kGlb>},
+                               {"dae", take_mesh<kDae>},
+                               {"mesh_gz", take_mesh<kGz>},
+                               {"gz", take_gz},
+                               {"shell", take_shell},
+                               {"field", take_field},
+                               {"vdb", take_vdb},
+                               {"scene", take_scene},
+                               {"path", take_path},
+                               {"script", take_script},
+                               {"device", take_spec},
+                               {"hid", take_hid},
+                               {"bridge", take_bridge},
+                               {"haply", take_haply},
                                {"plugin", take_plugin},
-                               {"request", take_request},   {"recording", take_recording},
-                               {"log", take_log},           {"contract", take_contract},
-                               {"veg", take_solid<kVeg>},   {"msh", take_solid<kMsh>},
-                               {"vtk", take_solid<kVtk>},   {"deformable", take_deformable}};
+                               {"request", take_request},
+                               {"recording", take_recording},
+                               {"log", take_log},
+                               {"contract", take_contract},
+                               {"veg", take_solid<kVeg>},
+                               {"msh", take_solid<kMsh>},
+                               {"vtk", take_solid<kVtk>},
+                               {"deformable", take_deformable},
+                               {"study", take_study},
+                               {"run_text", take_run_text},
+                               {"udp_arm", take_udp_arm},
+                               {"http", take_http}};
 
 }  // namespace
 

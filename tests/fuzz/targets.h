@@ -27,6 +27,14 @@ inline void promise(bool holds, const char* what) {
 // Writes the bytes to a file of that name in a folder of this process in memory. Returns its name.
 std::string as_file(std::string_view bytes, const char* name);
 
+// Every refusal is one sentence that a terminal can show.
+inline void check_sentence(const std::string& sentence) {
+  promise(!sentence.empty() && sentence.size() < 5000, "an error is one sentence");
+}
+
 void take_contract(std::string_view bytes);  // contract.cpp
+void take_http(std::string_view bytes);      // http.cpp
+void take_run_text(std::string_view bytes);  // run_text.cpp
+void take_study(std::string_view bytes);     // study.cpp
 
 }  // namespace h6::fuzz
