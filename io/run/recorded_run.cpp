@@ -105,9 +105,7 @@ fs::path find_part(const fs::path& was, const fs::path& recording) {
   return {};
 }
 
-template <class Source>
-Outcome find_source(Source& source, const std::string& body, const fs::path& recording) {
-  fs::path& named = source.mesh.empty() ? source.file : source.mesh;
+Outcome find_file(fs::path& named, const std::string& body, const fs::path& recording) {
   const fs::path found = find_part(named, recording);
   if (found.empty())
     return Failure{"body '" + body + "': " + named.string() +
@@ -138,10 +136,14 @@ Outcome find_parts(Scene& scene, const RecordedRun& run, const fs::path& recordi
     return Failure{
         "its scene was neither a file nor a generated one, so its parts cannot be found"};
   for (SceneBody& body : scene.bodies) {
+    std::vector<fs::path*> files;
     if (body.field)
-      if (Outcome found = find_source(*body.field, body.name, recording); !found) return found;
+      files.push_back(body.field->mesh.empty() ? &body.field->file : &body.field->mesh);
     if (body.shell)
-      if (Outcome found = find_source(*body.shell, body.name, recording); !found) return found;
+      files.push_back(body.shell->mesh.empty() ? &body.shell->file : &body.shell->mesh);
+    if (body.shell && body.shell->bends) files.push_back(&body.shell->bends->file);
+    for (fs::path* file : files)
+      if (Outcome found = find_file(*file, body.name, recording); !found) return found;
   }
   return Done{};
 }
@@ -233,15 +235,19 @@ Outcome take_settings(const std::string& text, h6ContactDef& contact, h6Coupling
 }
 
 std::string recorded_scene_text(Scene scene) {
+  const auto make_absolute = [](fs::path& file) {
+    std::error_code failed;
+    if (!file.empty()) file = fs::absolute(file, failed);
+  };
   const auto settle = [&](auto& source) {
     if (!source) return;
     if (!source->unit) source->unit = scene.unit;  // the scene's own changes below
-    for (fs::path* file : {&source->mesh, &source->file}) {
-      std::error_code failed;
-      if (!file->empty()) *file = fs::absolute(*file, failed);
-    }
+    make_absolute(source->mesh), make_absolute(source->file);
   };
-  for (SceneBody& body : scene.bodies) settle(body.field), settle(body.shell);
+  for (SceneBody& body : scene.bodies) {
+    settle(body.field), settle(body.shell);
+    if (body.shell && body.shell->bends) make_absolute(body.shell->bends->file);
+  }
   scene.unit = Unit::m;
   return scene_text(scene);
 }

@@ -321,6 +321,18 @@ std::vector<std::string> Plan::values(std::size_t run) const {
   return out;
 }
 
+namespace {
+
+std::vector<Json> paths_of(const Json& scene) {
+  std::vector<Json> paths;
+  if (scene.contains("hands"))
+    for (const Json& hand : scene["hands"])
+      paths.push_back(hand.is_object() ? hand.value("path", Json()) : Json());
+  return paths;
+}
+
+}  // namespace
+
 Result<io::Scene> Plan::scene(std::size_t run) const {
   Json text = parts_->scene;
   const std::vector<Json> values = parts_->values(run);
@@ -329,6 +341,8 @@ Result<io::Scene> Plan::scene(std::size_t run) const {
   } catch (const Mistake& mistake) {
     return Failure{mistake.sentence};
   }
+  if (paths_of(text) != paths_of(parts_->scene))
+    return Failure{"the path of a hand cannot vary: a study has one, read with its scene"};
   Result<io::Scene> scene = io::read_scene_text(text.dump(), "run " + std::to_string(run));
   if (!scene) return scene;
   if (const Outcome settled = parts_->settle_files(*scene); !settled) return settled.failure();

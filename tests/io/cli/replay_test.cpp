@@ -360,6 +360,21 @@ TEST_CASE("files come back to the bit, from where they were or from beside the r
   CHECK(gone.err.find("ball.stl is not there any more") != std::string::npos);
 }
 
+TEST_CASE(
+    "a scene that bends comes back to the bit, from any folder, and from beside the recording") {
+  Sandbox box;
+  REQUIRE(run(box, {"scene", "export", "clip-and-rod", "scene"}).code == 0);
+  result_of(box, {"run", "scene/scene.json", "--virtual-time", "--duration", "0.2", "--record",
+                  "run.h5"});
+  CHECK(result_of(box, {"replay", "run.h5", "--verify"})["same"] == true);
+  fs::rename(box.file("scene"), box.file("moved"));
+  const Ended gone = run(box, {"replay", "run.h5", "--verify"});
+  CHECK(gone.code == 1);
+  CHECK(gone.err.find("is not there any more") != std::string::npos);
+  fs::rename(box.file("run.h5"), box.file("moved/run.h5"));
+  CHECK(result_of(box, {"replay", "moved/run.h5", "--verify"})["same"] == true);
+}
+
 TEST_CASE("a baked file that was changed since is told from the one that was recorded") {
   Sandbox box;
   Json scene = ball_and_block(box);

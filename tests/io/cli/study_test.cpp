@@ -132,6 +132,9 @@ TEST_CASE("a study says what is wrong before it runs, and keeps another's table"
   refused(changed("\"to\": 0.4", "\"two\": 0.4"), "unknown key 'two'");
   refused(changed("\"repeats\": 8", "\"repeats\": 900000"), "runs: 1 to");
   refused(changed("\"high\": 0.2", "\"high\": \"a\""), "needs a number 'high'");
+  refused(
+      changed("\"contact.method\": [\"firm\", \"global\"]", "\"hands.0.path\": [\"other.csv\"]"),
+      "the path of a hand cannot vary");
   CHECK(run(box, {"study", "none.json", "-o", "bad"}).code == 1);
   CHECK(run(box, {"study", "bad.json"}).code == 2);
 
