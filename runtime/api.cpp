@@ -91,6 +91,17 @@ Body* body_at(const h6Session* s, std::int32_t i) {
 HandDevice* device_at(const h6Session* s, std::int32_t i) {
   return s ? at(std::span<HandDevice>(s->devices), i) : nullptr;
 }
+// The same for a function that changes it, which a loop's session refuses.
+HandDevice* own_device_at(const h6Session* s, std::int32_t i) {
+  return s && !run_by_loop(*s) ? device_at(s, i) : nullptr;
+}
+// Leaves a request to the loop that runs the session; false: none does. It may only take force
+// away.
+bool ask_loop(h6Session& s, std::uint32_t request) {
+  if (!run_by_loop(s)) return false;
+  s.asked.fetch_or(request);
+  return true;
+}
 
 }  // namespace
 
@@ -131,7 +142,7 @@ void h6GetRecord(const h6Session* session, const h6DeviceSample* samples,
 }
 
 void h6SetCoarse(h6Session* session, uint32_t pairs, uint32_t points) {
-  if (!session) return;
+  if (!session || run_by_loop(*session)) return;
   session->anytime.forced = pairs;
   session->anytime.forced_points = std::bit_floor(std::min(points, 8u));
 }
@@ -207,31 +218,30 @@ double h6GetVoxel(const h6Session* session, int32_t body) {
 }
 
 void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities) {
-  HandDevice* device = device_at(session, hand);
+  HandDevice* device = own_device_at(session, hand);
   if (device && capabilities) set_rating(*device, *capabilities);
 }
 void h6Fault(h6Session* session, h6Cause cause) {
   const std::uint32_t number = raw_number(cause);
   if (!session || number == H6_CAUSE_NONE || number >= H6_CAUSE_COUNT) return;
-  for (HandDevice& device : session->devices) device.guard.fault(cause);
+  if (!ask_loop(*session, 1u << number)) fault_all(*session, cause);
 }
 void h6Arm(h6Session* session) {
-  if (!session) return;
+  if (!session || run_by_loop(*session)) return;
   for (HandDevice& device : session->devices) device.guard.arm();
 }
 void h6Rearm(h6Session* session) { h6Arm(session); }
 void h6Disarm(h6Session* session) {
-  if (!session) return;
-  for (HandDevice& device : session->devices) device.guard.disarm();
+  if (session && !ask_loop(*session, kAskDisarm)) disarm_all(*session);
 }
 void h6LoseDevice(h6Session* session, int32_t hand) {
   HandDevice* device = device_at(session, hand);
-  if (!device) return;
+  if (!device || ask_loop(*session, 1u << H6_CAUSE_DEVICE_LOST)) return;
   device->lost = true;
-  h6Fault(session, H6_CAUSE_DEVICE_LOST);
+  fault_all(*session, H6_CAUSE_DEVICE_LOST);
 }
 void h6NoteInterval(h6Session* session, double seconds) {
-  if (!session) return;
+  if (!session || run_by_loop(*session)) return;
   for (HandDevice& device : session->devices) note_interval(device, session->settings.dt, seconds);
 }
 h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand) {
@@ -239,7 +249,7 @@ h6SafetyInput h6GetSafetyInput(const h6Session* session, int32_t hand) {
   return device ? device->guard.input() : h6SafetyInput{};
 }
 void h6SetSafetyInput(h6Session* session, int32_t hand, const h6SafetyInput* input) {
-  HandDevice* device = device_at(session, hand);
+  HandDevice* device = own_device_at(session, hand);
   if (!device || !input) return;
   HandDevice& to = *device;
   to.guard.repeat(input->asked);

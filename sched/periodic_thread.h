@@ -55,6 +55,7 @@ class PeriodicThread {
   ~PeriodicThread();  // asks it to stop, and joins
   void request_stop() { stop_.store(true, std::memory_order_relaxed); }
   void join();
+  bool is_this() const { return thread_.get_id() == std::this_thread::get_id(); }
   bool running() const { return running_.load(std::memory_order_acquire); }
 
  private:

@@ -154,7 +154,8 @@ void each_file(io::Scene& scene, Use&& use) {
   };
   for (io::SceneBody& body : scene.bodies) {
     both(body.field), both(body.shell);
-    if (body.shell && body.shell->bends) use(body.shell->bends->file);
+    if (body.shell && body.shell->bends && !body.shell->bends->file.empty())
+      use(body.shell->bends->file);
   }
 }
 

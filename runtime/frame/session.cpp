@@ -295,6 +295,26 @@ void log_overlaps(const h6Session& s) {
 }  // namespace
 }  // namespace h6
 
+namespace h6 {
+
+void fault_all(h6Session& s, h6Cause cause) {
+  for (HandDevice& device : s.devices) device.guard.fault(cause);
+}
+
+void disarm_all(h6Session& s) {
+  for (HandDevice& device : s.devices) device.guard.disarm();
+}
+
+void take_asked(h6Session& s) {
+  if (s.asked.load(std::memory_order_relaxed) == 0) return;
+  const std::uint32_t asked = s.asked.exchange(0);
+  if (asked & kAskDisarm) disarm_all(s);
+  for (std::uint32_t cause = 1; cause < H6_CAUSE_COUNT; ++cause)
+    if (asked >> cause & 1) fault_all(s, static_cast<h6Cause>(cause));
+}
+
+}  // namespace h6
+
 using namespace h6;
 
 extern "C" {
@@ -322,15 +342,14 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   s->allocator = def->allocator;
   s->workers = def->workers;
   s->owner = idle_owner(*s);
-  s->settings = {
-      .contact = def->contact,
-      .integrator = def->integrator,
-      .gradient = def->gradient,
-      .dt = 1 / def->rate,
-      .gravity = from(def->gravity),
-      .net_stiffness = def->net_stiffness,
-      .max_contacts = def->max_contacts,
-      .max_substeps = def->max_substeps};
+  s->settings = {.contact = def->contact,
+                 .integrator = def->integrator,
+                 .gradient = def->gradient,
+                 .dt = 1 / def->rate,
+                 .gravity = from(def->gravity),
+                 .net_stiffness = def->net_stiffness,
+                 .max_contacts = def->max_contacts,
+                 .max_substeps = def->max_substeps};
   s->anytime.budget_ns = 1e3 * def->frame_budget_us;
   s->anytime.period_ns = 1e9 * s->settings.dt;
   bool ready = false;

@@ -27,6 +27,8 @@ enum class Owner { nobody, workers, step, loop };
 struct h6Session {
   const h6Model* model = nullptr;
   std::atomic<h6::Owner> owner{h6::Owner::nobody};
+  // What other threads asked for while a loop runs it: bit n is a fault of cause n, or kAskDisarm.
+  std::atomic<std::uint32_t> asked{0};
   h6Workers* workers = nullptr;  // whose scratch it borrows; null: it has its own
   h6Allocator allocator{};
   h6::Settings settings;
@@ -64,6 +66,14 @@ namespace h6 {
 // Who owns the session while nobody steps it.
 inline Owner idle_owner(const h6Session& s) { return s.workers ? Owner::workers : Owner::nobody; }
 inline bool run_by_loop(const h6Session& s) { return s.owner.load() == Owner::loop; }
+
+inline constexpr std::uint32_t kAskDisarm = 1u << 31;
+static_assert(H6_CAUSE_COUNT < 31);
+
+// For the thread that steps the session. take_asked does what other threads asked for.
+void fault_all(h6Session& s, h6Cause cause);
+void disarm_all(h6Session& s);
+void take_asked(h6Session& s);
 
 // The shell body with this body's index, or null.
 inline ShellBody* find_shell(const h6Session& s, std::int32_t body) {

@@ -96,18 +96,19 @@ void end_output(h6Loop& loop) {
 void take_requests(h6Loop& loop) {
   const int request = loop.request.exchange(kNothing);
   if (request == kArm) arm_hands(loop);
-  if (request == kDisarm) h6Disarm(loop.session);
+  if (request == kDisarm) disarm_all(*loop.session);
   if (loop.watchdog && loop.watchdog->trips() != loop.trips) {
     loop.trips = loop.watchdog->trips();
-    h6Fault(loop.session, H6_CAUSE_WATCHDOG);
+    fault_all(*loop.session, H6_CAUSE_WATCHDOG);
   }
-  if (loop.gate.halted()) h6Fault(loop.session, H6_CAUSE_STOPPED);
+  if (loop.gate.halted()) fault_all(*loop.session, H6_CAUSE_STOPPED);
 }
 
 // A device that cannot be read or written is lost. All outputs go to zero and stay there.
 void lose(h6Loop& loop, std::size_t hand) {
   loop.session->report.status |= H6_DEVICE_LOST;
-  h6LoseDevice(loop.session, static_cast<std::int32_t>(hand));
+  loop.session->devices[hand].lost = true;
+  fault_all(*loop.session, H6_CAUSE_DEVICE_LOST);
 }
 
 void read_devices(h6Loop& loop, double time) {
@@ -161,6 +162,7 @@ void change_session(h6Loop& loop) {
   h6Session* next = loop.offered.exchange(nullptr, std::memory_order_acquire);
   if (!next) return;  // the offer was withdrawn
   take_over(*next, *loop.session);
+  next->asked.fetch_or(loop.session->asked.exchange(0));
   loop.given_back.store(loop.session, std::memory_order_release);
   loop.session = next;
   ++loop.record.settings;
@@ -186,6 +188,7 @@ bool tick(h6Loop& loop, const sched::TickTiming& before, double wakeup_us) {
   for (std::size_t h = 0; h < s.hands.size(); ++h) last[h] = loop.commands[h];
   take_requests(loop);
   read_devices(loop, time);
+  take_asked(s);  // a device may ask in its read
   frame(s, loop.samples, loop.commands);
   const bool sent = write_devices(loop, time, last);
   if (before.late != sched::Late::no) s.report.status |= H6_LATE;
@@ -338,7 +341,7 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     for (std::size_t h = 0; h < session->hands.size(); ++h) {
       loop->devices[h] = devices[h];
       loop->samples[h].pose.q.w = 1;
-      h6SetRating(session, static_cast<std::int32_t>(h), &devices[h].capabilities);
+      set_rating(session->devices[h], devices[h].capabilities);
     }
     session->anytime.no_clock = used.virtual_time;
     loop->report.grant.core = -1;
@@ -464,10 +467,11 @@ void h6HaltAll(void) { sched::halt_all(); }
 
 void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
   if (out) *out = {};
-  if (!loop) return;
+  if (!loop || loop->thread->is_this()) return;
   loop->thread->join();
   loop->gate.stop_all();
   if (!loop->joined) {
+    take_asked(*loop->session);  // too late for a frame
     loop->session->team->set_realtime(0, -1);
     loop->session->owner = Owner::nobody;
     loop->joined = true;
@@ -494,6 +498,7 @@ void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
 void h6DestroyLoop(h6Loop* loop) {
   if (!loop) return;
   h6RequestStop(loop);
+  if (loop->thread->is_this()) return;  // the thread cannot outlive what it runs in
   h6JoinLoop(loop, nullptr);
   delete loop;
 }

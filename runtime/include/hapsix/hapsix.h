@@ -15,9 +15,10 @@
  * and everything that only reads a model. A session belongs to one thread at a time: of two threads in
  * h6Step at once, the second gets H6_OUTPUT_FAULT, and nothing changes. While a loop runs a session it
  * belongs to the loop's thread: h6Step then gives H6_OUTPUT_FAULT, another h6StartLoop, h6TakeOver and
- * h6RestartFit fail with H6_ERROR_BUSY, h6SetBody does nothing, and what the h6Get functions give may
- * change under the reader's eyes: a loop has records and views instead. A session or model must not be
- * destroyed while another call uses it. */
+ * h6RestartFit fail with H6_ERROR_BUSY, the functions that set anything do nothing, but for h6Fault,
+ * h6LoseDevice and h6Disarm, which only take force away, and what the h6Get functions give may change
+ * under the reader's eyes: a loop has records and views instead. A session or model must not be
+ * destroyed while another call uses it. Create functions and h6LoopRunning: any thread. */
 #ifndef HAPSIX_H
 #define HAPSIX_H
 
@@ -147,7 +148,8 @@ H6_API void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabili
 /* A session begins armed. h6Disarm lets every output decay to zero. h6Fault latches every output at
  * zero at once, for this cause. h6Arm clears faults and starts again softly; it does nothing for a hand
  * whose device is absent, lost, frozen or sends samples that are not finite. h6Rearm is the same as
- * h6Arm. While a loop runs, use only the loop's own functions below. */
+ * h6Arm. While a loop runs the session, h6Fault and h6Disarm act in its next frame, from any thread;
+ * h6Arm does nothing, since only h6ArmLoop arms a loop's devices, too. */
 H6_API void h6Arm(h6Session* session);
 H6_API void h6Disarm(h6Session* session);
 H6_API void h6Fault(h6Session* session, h6Cause cause);
@@ -309,7 +311,8 @@ H6_API void   h6DisarmLoop(h6Loop* loop);
 H6_API void   h6HaltLoop(h6Loop* loop);
 H6_API void   h6HaltAll(void);
 /* Waits for the loop's end, stops the devices and writes the report, unless `out` is NULL. Records can
- * be read until h6DestroyLoop. */
+ * be read until h6DestroyLoop. One thread at a time, not the haptic thread: there h6JoinLoop gives zeros
+ * and h6DestroyLoop only asks the loop to end. */
 H6_API void         h6JoinLoop(h6Loop* loop, h6LoopReport* out);
 H6_API void         h6DestroyLoop(h6Loop* loop);
 

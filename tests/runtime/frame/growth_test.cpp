@@ -3,7 +3,9 @@
 // are refused, codes stand beside sentences, and a session has one owner at a time.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -238,6 +240,111 @@ TEST_CASE("while a loop runs a session, others are refused and change nothing") 
   h6DestroyLoop(loop);
   CHECK(h6Step(scene.session, &sample, &command) == H6_OUTPUT_FAULT);
   h6DestroyLoop(next);
+}
+
+TEST_CASE("other threads can take force away from a loop's session, and give none") {
+  OnePart scene = box_on_floor();
+  scene.bodies[1].pose = pose(0, 0, 6 * mm);
+  scene.open();
+  h6Device device = h6DefaultDevice();
+  device.capabilities.frame_time = true;
+  device.capabilities.max_force = 0.2;
+  device.read = [](void*, double t, h6DeviceSample* out) {  // pressed down
+    *out = hand_at(pose(0, 0, (6 - 3 * std::min(1.0, 5 * t)) * mm));
+    return 0;
+  };
+  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+  device.stop = [](void*) {};
+  h6LoopDef def = h6DefaultLoopDef();
+  def.realtime = false, def.duration = 0, def.ring_frames = 20000;
+  h6Error error{};
+  h6Loop* loop = h6StartLoop(scene.session, &device, &def, &error);
+  REQUIRE_MESSAGE(loop, error.message);
+  std::vector<h6FrameRecord> rows(20000);
+  double most = 0;
+  h6FrameRecord newest{};
+  const auto force = [](const h6FrameRecord& r) { return r.command[0].wrench.force.z; };
+  const auto frames = [&](int count) {  // whole frames that begin after this call
+    const std::uint64_t end = newest.report.frame + static_cast<std::uint64_t>(count);
+    for (int i = 0; i < 30000 && newest.report.frame < end; ++i) {
+      const std::size_t n = h6ReadRecords(loop, rows.data(), rows.size());
+      for (std::size_t k = 0; k < n; ++k) most = std::max(most, force(rows[k]));
+      if (n > 0) newest = rows[n - 1];
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  };
+  frames(600);
+  CHECK(force(newest) > 0.19);
+  h6DeviceCapabilities strong{};
+  strong.max_force = 50;
+  h6SetRating(scene.session, 0, &strong);
+  frames(300);
+  CHECK(most <= 0.2 + 1e-9);
+
+  h6Fault(scene.session, H6_CAUSE_OVERSPEED);
+  frames(20);
+  CHECK(force(newest) == 0);
+  CHECK(newest.command[0].cause == H6_CAUSE_OVERSPEED);
+  h6Arm(scene.session), h6Rearm(scene.session);
+  const h6SafetyInput armed{H6_ASKED_ARM, 0};
+  h6SetSafetyInput(scene.session, 0, &armed);
+  h6NoteInterval(scene.session, 10);
+  h6SetCoarse(scene.session, 1, 1);
+  most = 0;
+  frames(300);
+  CHECK(most == 0);
+  CHECK(newest.report.coarse_pairs == 0);
+  h6ArmLoop(loop);
+  frames(600);
+  CHECK(force(newest) > 0.19);
+
+  h6Disarm(scene.session);
+  frames(300);
+  CHECK(force(newest) == 0);
+  h6ArmLoop(loop);
+  frames(600);
+  CHECK(force(newest) > 0.19);
+  h6LoseDevice(scene.session, 0);
+  frames(20);
+  CHECK(force(newest) == 0);
+  CHECK(newest.command[0].cause == H6_CAUSE_DEVICE_LOST);
+  h6Fault(scene.session, H6_CAUSE_OVERSPEED);  // perhaps too late for a frame
+  h6DestroyLoop(loop);
+  CHECK(safety_of(scene.session, 0).fault != H6_CAUSE_NONE);
+}
+
+TEST_CASE("a device that ends its own loop asks for the end, and the program joins") {
+  OnePart scene = box_on_floor();
+  scene.open();
+  struct Ends {
+    h6Loop* loop = nullptr;
+    std::atomic<int> reads{0};
+  } ends;
+  h6Device device = h6DefaultDevice();
+  device.self = &ends;
+  device.capabilities.frame_time = true;
+  device.read = [](void* self, double, h6DeviceSample* out) {
+    auto& e = *static_cast<Ends*>(self);
+    *out = hand_at(pose(0, 0, 6 * mm));
+    h6LoopReport report;
+    std::memset(&report, 0xff, sizeof report);
+    if (++e.reads != 50) return 0;
+    h6JoinLoop(e.loop, &report);
+    const int bad = report.frames != 0;
+    h6DestroyLoop(e.loop);
+    return bad;
+  };
+  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+  device.stop = [](void*) {};
+  h6LoopDef def = h6DefaultLoopDef();
+  def.realtime = false, def.duration = 0;
+  ends.loop = h6StartLoop(scene.session, &device, &def, nullptr);
+  REQUIRE(ends.loop);
+  h6LoopReport report;
+  h6JoinLoop(ends.loop, &report);
+  CHECK(report.frames == 50);
+  CHECK((report.status & H6_DEVICE_LOST) == 0);
+  h6DestroyLoop(ends.loop);
 }
 
 TEST_CASE("a program that steps by itself gets the rows that a loop would give") {
