@@ -35,6 +35,15 @@ class Batch {
     arrays_.max_depth = max_depth.data(), arrays_.max_depth_voxels = max_depth_voxels.data();
     arrays_.state_hash = state_hash.data();
   }
+  Batch(const Batch&) = delete;
+  Batch& operator=(const Batch&) = delete;
+  // Without the interpreter's lock, as `Unlocked`: thousands of sessions take milliseconds.
+  ~Batch() {
+    std::optional<py::gil_scoped_release> release;
+    if (PyGILState_Check()) release.emplace();
+    sessions_.clear();  // before the workers that they name
+    workers_ = Workers();
+  }
 
   h6Status step(std::uint32_t steps) {
     const Turn turn(busy_);

@@ -28,7 +28,7 @@ void declare_rows() {
 namespace {
 
 struct PyRecording {
-  Recording recording;
+  Unlocked<Recording> recording;
   h6RecordingInfo info{};
 };
 
@@ -92,7 +92,7 @@ void add_reader(py::module_& m) {
 
 struct PyRecorder {
   std::shared_ptr<PyScene> scene;
-  Recorder recorder;
+  Unlocked<Recorder> recorder;
   void add(const h6FrameRecord* rows, std::size_t count) {
     h6Error error{};
     if (!h6RecordFrames(recorder, rows, count, &error)) throw Error(error);

@@ -119,6 +119,25 @@ class Sessions(unittest.TestCase):
             self.assertEqual(columns["command_wrench_force_x"][-1], session.command[0, 0])
             self.assertEqual(len(recording.frames(290, 100)), 11)
 
+    def test_a_recording_is_a_table_of_pandas(self):
+        try:
+            import pandas
+        except ImportError:
+            self.skipTest("pandas is not installed (python3-pandas)")
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "run.h5")
+            recorder = hapsix.Recorder(file, SCENE)
+            recorder.record(pressed(frames=1).follow(np.array([[SCENE.path(0, 1e-3 * i)[0]] for i in range(670)])))
+            recorder.finish()
+            rows = hapsix.Recording(file).frames()
+            frames = pandas.DataFrame(hapsix.columns(rows))
+        self.assertEqual(len(frames), 670)
+        touching = frames[frames.contacts > 0]
+        self.assertEqual(len(touching), (rows["report"]["contacts"] > 0).sum())
+        self.assertGreater(len(touching), 0)
+        self.assertEqual(touching.max_depth.max(), rows["report"]["max_depth"].max())
+        self.assertEqual(frames.command_wrench_force_x.iloc[-1], rows["command"]["wrench"]["force"]["x"][-1, 0])
+
     def test_weights_share_the_stiffness_of_equal_contacts(self):
         n = 40
         normals = np.tile([0, 0, 1.0], (n, 1))
@@ -255,21 +274,54 @@ class Many(unittest.TestCase):
         thread.join()
         self.assertGreater(refused, 0)
 
-    def test_other_python_threads_run_while_a_session_steps(self):
-        session, ticks, done = pressed(frames=300), [0], [False]
+    def assert_others_run(self, prepare, work):
+        """Another Python thread has a turn while work(prepare()) runs. Python takes the lock from nobody
+        here, so a call that keeps it gives no turn. Destroying takes milliseconds, in which a busy
+        machine may not wake the other thread, so there are several tries."""
+        turns, done, interval = [0], threading.Event(), sys.getswitchinterval()
 
         def count():
-            while not done[0]:
-                ticks[0] += 1
+            while not done.wait(1e-4):
+                turns[0] += 1
         thread = threading.Thread(target=count)
-        poses = np.tile(session.pose, (30000, 1, 1))
+        sys.setswitchinterval(1000)
         thread.start()
-        before = ticks[0]
-        session.follow(poses)
-        counted = ticks[0] - before
-        done[0] = True
-        thread.join()
-        self.assertGreater(counted, 0)
+        try:
+            for _ in range(20):
+                things = prepare()
+                before = turns[0]
+                work(things)
+                if turns[0] > before:
+                    return
+        finally:
+            sys.setswitchinterval(interval)
+            done.set()
+            thread.join()
+        self.fail("no other thread had a turn")
+
+    def test_other_python_threads_have_no_turn_in_a_call_that_keeps_the_lock(self):
+        with self.assertRaisesRegex(AssertionError, "no other thread"):
+            self.assert_others_run(lambda: range(30000), sum)
+
+    def test_other_python_threads_run_while_a_session_steps(self):
+        session = pressed(frames=300)
+        poses = np.tile(session.pose, (30000, 1, 1))
+        self.assert_others_run(lambda: poses, session.follow)
+
+    def test_other_python_threads_run_while_a_batch_or_recording_is_destroyed(self):
+        definition = SCENE.definition()
+        definition.max_contacts = 1000
+        # The list has the last reference, so the batch is destroyed as the list is emptied.
+        self.assert_others_run(lambda: [hapsix.Batch(SCENE.model, definition, 2000, 1)], list.clear)
+        with tempfile.TemporaryDirectory() as folder:
+            frames = pressed(frames=1).follow(np.array([[SCENE.path(0, 1e-3 * i)[0]] for i in range(5000)]))
+            names = iter(os.path.join(folder, f"{i}.h5") for i in range(20))
+
+            def unfinished():
+                recorder = hapsix.Recorder(next(names), SCENE)
+                recorder.record(frames)
+                return [recorder]
+            self.assert_others_run(unfinished, list.clear)
 
 
 class Environments(unittest.TestCase):
