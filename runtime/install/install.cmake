@@ -23,6 +23,10 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/hapsixConfigVersion
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hapsixConfig.cmake
   ${CMAKE_CURRENT_BINARY_DIR}/hapsixConfigVersion.cmake DESTINATION ${config} COMPONENT libhapsix-dev)
 file(RELATIVE_PATH to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+set(highway)
+if(H6_HIGHWAY)
+  set(highway "-lhwy ")
+endif()
 configure_file(hapsix.pc.in hapsix.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/hapsix.pc
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT libhapsix-dev)

@@ -22,7 +22,7 @@ took() { local start=$SECONDS; "${@:2}" >"$WORK/log" 2>&1 || { tail -n 30 "$WORK
 took "the package lists" inside 'apt-get update'
 took "the packages" inside 'apt-get install -y --no-install-recommends /packages/*.deb'
 grep -E '^(Need to get|After this)' "$WORK/log" || true
-took "a compiler" inside 'apt-get install -y --no-install-recommends gcc g++ libc6-dev cmake make pkg-config libtbb-dev libhwy-dev'
+took "a compiler" inside 'apt-get install -y --no-install-recommends gcc g++ libc6-dev cmake make pkg-config libtbb-dev'
 took "find_package" inside 'cmake -S /try -B /try/build -DHOW=find_package -DPROGRAM=/try/hello.c && cmake --build /try/build'
 inside '/try/build/consumer' | says_right "find_package, shared"
 inside '/try/build/consumer_static' | says_right "find_package, static"

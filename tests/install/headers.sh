@@ -4,6 +4,7 @@
 . "$(dirname "$0")/common.sh"
 stage
 count=0
+command -v clang >/dev/null || echo "without clang"
 for header in $(cd "$STAGE/include" && ls hapsix/*.h hapsix/*.hpp 2>/dev/null); do
   for compiler in gcc clang; do
     command -v $compiler >/dev/null || continue

@@ -1,23 +1,30 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Both libraries show the contract and nothing else, so nothing of a program can take the place of
-# what is inside: not a symbol of the same name, and not Eigen compiled for another machine.
+# what is inside: not a symbol of the same name, not Eigen compiled for another machine, and on x86 not
+# another Highway, which would choose our SIMD target.
 . "$(dirname "$0")/common.sh"
 stage
 PROGRAM=$SOURCE/runtime/examples/hello.c
-STATIC="$LIB/libhapsix.a -ltbb -lhwy -lstdc++ -lpthread -lm"
+STATIC="$LIB/libhapsix.a $(sed -n 's/^Libs\.private: //p' "$LIB/pkgconfig/hapsix.pc")"
 shown() { awk 'NF > 1 && $(NF-1) ~ /^[A-TV-Zuvwi]$/ {print $NF}' | sed 's/@.*//' | grep -vE '^(h6[A-Z][A-Za-z]*|HAPSIX_0)$' || true; }
 [ -z "$(nm "$LIB/libhapsix.a" | shown)" ] || fail "the archive shows $(nm "$LIB/libhapsix.a" | shown | head -3)"
 [ -z "$(nm -D --defined-only "$LIB/libhapsix.so" | shown)" ] || fail "the library shows more than the contract"
 [ "$(nm -D --defined-only "$LIB/libhapsix.so" | grep -c ' T h6')" -ge 60 ] || fail "the contract is not there"
 
-# A program that defines every weak symbol of ours, each as a trap. Against plain archives it must
-# fall into one, or this test proves nothing.
+case $(uname -m) in x86_64 | i?86)
+  { nm -C "$LIB/libhapsix.a"; for library in "$LIB"/libhapsix*.so; do nm -DC "$library"; done; } >"$WORK/symbols"
+  grep -E ' U .*\bhwy::' "$WORK/symbols" && fail "the libraries ask the program's Highway" ;;
+esac
+
+# A program that defines every weak symbol of ours, and Highway's answer to what the machine can do, each
+# as a trap. Against plain archives it must fall into one, or this test proves nothing.
 boxes=$(find "$BUILD" -name libhapsix_runtime.a -o -name libhapsix_kernels.a -o -name libhapsix_sched.a -o -name libhapsix_contract.a)
 nm -D --defined-only /usr/lib/*/libstdc++.so.6 | awk '{print $NF}' | sed 's/@.*//' | sort -u >"$WORK/standard"
 nm $boxes | awk 'NF > 1 && $(NF-1) ~ /^[VWuvw]$/ && NF == 3 {print $NF}' | sort -u | comm -23 - "$WORK/standard" >"$WORK/weak"
 [ "$(wc -l <"$WORK/weak")" -ge 100 ] || fail "no weak symbols to try"
 grep -q Eigen "$WORK/weak" || fail "no weak symbol of Eigen to try"
+case $(uname -m) in x86_64 | i?86) echo _ZN3hwy16SupportedTargetsEv >>"$WORK/weak" ;; esac
 { echo .text; sed 's/.*/.globl &\n&: ud2/' "$WORK/weak"; echo '.section .note.GNU-stack'; } >"$WORK/traps.s"
 gcc -std=c99 -I "$STAGE/include" -c "$PROGRAM" -o "$WORK/program.o"
 gcc -c "$WORK/traps.s" -o "$WORK/traps.o"
