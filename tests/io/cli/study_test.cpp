@@ -192,3 +192,26 @@ TEST_CASE("a run that fails has a row that says why, and the others have theirs"
   CHECK(fields(rows[2])[3] == "error");
   CHECK(rows[2].find("deep") != std::string::npos);
 }
+
+TEST_CASE("the study of the examples runs, each of its rows") {
+  Sandbox box;
+  // The example lies at the same place in every tree; one repeat of each combination is enough.
+  const fs::path root = fs::path(__FILE__).parent_path() / "../../..";
+  Json study = Json::parse(slurp(root / "io/examples/clearance.json"));
+  study["repeats"] = 1;
+  std::size_t runs = 1;
+  for (const auto& [key, values] : study["vary"].items())
+    runs *= values.is_array() ? values.size() : values["count"].get<std::size_t>();
+  spill(box.file("study.json"), study.dump());
+  const std::vector<std::string> rows = lines(whole_table(box, "out", "2"));  // none has failed
+  REQUIRE(rows.size() == 1 + runs);
+  CHECK(runs == 20);
+  const std::vector<std::string> names = fields(rows[0]);
+  const auto frames = std::find(names.begin(), names.end(), "frames");
+  REQUIRE(frames != names.end());
+  for (std::size_t run = 0; run < runs; ++run) {
+    CAPTURE(rows[1 + run]);
+    CHECK(fields(rows[1 + run]).at(0) == std::to_string(run));
+    CHECK(fields(rows[1 + run]).at(static_cast<std::size_t>(frames - names.begin())) == "1400");
+  }
+}
