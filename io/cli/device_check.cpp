@@ -78,7 +78,7 @@ class Frames {
   Clock::time_point next_;
 };
 
-// Watches the frames from a thread of its own. It stops the device after 20 ms without one, because
+// Watches the frames from a thread of its own. It stops the device after 0.1 s without one, because
 // the last command may still push, and calls `hangs` after kDriverSilence. It counts turns, not
 // time: a program that was stopped goes on after it.
 class Vigil {
@@ -90,21 +90,26 @@ class Vigil {
             const std::uint64_t now = frames.beat.load(std::memory_order_relaxed);
             still = now == seen ? still + 1 : 0;
             seen = now;
-            if (still == 20 / kTurn.count()) {
-              frames.stood_still.store(true);
-              std::thread([device] { device.stop(device.self); }).detach();  // it may hang, too
-            }
+            if (still == 100 / kTurn.count() && !stopper_.joinable())
+              stopper_ = std::thread([this, &device, &frames] {  // it may hang, too
+                device.stop(device.self);
+                frames.stood_still.store(true);
+                stopped_.store(true);
+              });
+            if (still == 0 && stopped_.exchange(false)) stopper_.join();
             if (still == std::lround(1e3 * kDriverSilence) / kTurn.count()) hangs();
           }
         }) {}
   ~Vigil() {
     end_.store(true);
     thread_.join();
+    if (stopper_.joinable()) stopper_.join();
   }
 
  private:
   static constexpr std::chrono::milliseconds kTurn{5};
-  std::atomic<bool> end_{false};
+  std::atomic<bool> end_{false}, stopped_{false};
+  std::thread stopper_;  // of `thread_`, which starts it
   std::thread thread_;
 };
 
@@ -114,8 +119,6 @@ std::string danger(const Frames& f, const h6Pose& start) {
   if (!f.good) return "the device sent what is no place or no rotation";
   if (norm(f.sample.velocity.linear) > 1) return "the device moved faster than 1 m/s";
   if (norm(f.sample.pose.p - start.p) > 0.1) return "the device moved farther than 0.1 m";
-  if (f.stood_still.load())
-    return "no frame came for 20 ms, and the device was stopped: test again";
   return "";
 }
 
@@ -139,10 +142,12 @@ constexpr double kStill = 1e-5;
 CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each,
                                    const std::function<void()>& hangs) {
   constexpr double kPi = 3.14159265358979323846;
+  constexpr int kMostStops = 20;
   CheckResult result;
   Frames frames(device);
   const Vigil vigil(device, frames, hangs);
   h6Pose start{};
+  int stops = 0;  // of the device, by the vigil
   const auto go_on = [&](const h6Wrench& wrench) {
     frames.run(wrench);
     if (frames.count.frames == 1) start = frames.sample.pose;
@@ -156,8 +161,17 @@ CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each
     Push p;
     p.what = std::string(torque ? "torque " : "force ") + (sign < 0 ? "-" : "+") + names[axis];
     p.applied = most;
-    const h6Pose before = frames.sample.pose;
+    h6Pose before = frames.sample.pose;
     for (int i = 0; i < 400; ++i) {
+      if (frames.stood_still.exchange(false)) {
+        // The machine stood still, and the vigil has stopped the device: the push begins anew.
+        if (++stops > kMostStops) result.trouble = "the machine stands still again and again";
+        if (device.arm && device.arm(device.self) != 0)
+          result.trouble = "the device cannot be armed again after the machine stood still";
+        if (!result.trouble.empty()) return false;
+        before = frames.sample.pose;
+        i = 0;
+      }
       h6Wrench w{};
       part(torque ? w.torque : w.force, axis) = sign * most * 0.5 * (1 - std::cos(kPi * i / 200));
       if (!go_on(w)) return false;

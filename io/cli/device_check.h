@@ -42,8 +42,9 @@ SampleCount watch_device(const h6Device& device, double seconds, const EachFrame
 // axis; each push rises smoothly to 10 % of the rating (at most 10 N or 1 N m) and falls again. A
 // device that renders no force gets a constant command for a second instead. The check commands
 // zero, stops the device and ends at once when the device is lost, sends an invalid pose, moves
-// faster than 1 m/s or farther than 0.1 m, when 20 ms pass without a frame, or when `each` returns
-// false. It fails where no push moves the handle. `hangs` as above.
+// faster than 1 m/s or farther than 0.1 m, or when `each` returns false. Where no frame comes for
+// 0.1 s it stops the device; when frames come again it arms the device and repeats the push. It
+// fails where no push moves the handle. `hangs` as above.
 CheckResult check_device_by_pushes(const h6Device& device, const EachFrame& each,
                                    const std::function<void()>& hangs);
 

@@ -129,7 +129,7 @@ TEST_CASE("a check pushes along every axis with a tenth of the rating, and tells
     CHECK(push["moved"] > 1e-3);  // [m]; 1 N on 500 N/m moves 2 mm
   }
   CHECK(json["samples"]["failed"] == 0);
-  CHECK(json["samples"]["frames"] == 3500);
+  CHECK(json["samples"]["frames"] >= 3500);  // more where the machine stood still
 }
 
 TEST_CASE("a check arms a device whose motors have no power before") {
