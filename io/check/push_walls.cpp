@@ -242,8 +242,7 @@ std::vector<WallPlace> sample_of(std::span<const WallPlace> places) {
 // Narrows a bracket of forces at a sample of the places, and then pushes at all with what is found.
 // Places that let this through are the next sample. In the end all are pushed at with a spare less.
 // A place that holds a force holds less too, so while a bracket closes only places are pushed at
-// that let its upper end through. On a cube, pushing at all places in every step took four times as
-// long.
+// that let its upper end through. On a cube, pushing at all places in every step took twice as long.
 class Search {
  public:
   Search(const WallPusher& pusher, std::span<const WallPlace> places, unsigned threads,
