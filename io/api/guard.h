@@ -17,10 +17,7 @@ namespace h6::io {
 // Whether this is the sentence of cancelled work (io/file/progress.h), and not one that names a
 // file with that word in its name.
 inline bool says_cancelled(const std::string& sentence) {
-  const std::string end = ": cancelled";
-  return sentence == "cancelled" ||
-         (sentence.size() > end.size() &&
-          sentence.compare(sentence.size() - end.size(), end.size(), end) == 0);
+  return sentence == "cancelled" || sentence.ends_with(": cancelled");
 }
 
 inline void fill(h6Error* error, h6ErrorCode code, const std::string& sentence) {

@@ -6,7 +6,7 @@
 
 namespace h6::io::view {
 
-// What a request must know: only the printed address has the token.
+// The secret and the port that a request must name. Only the printed address has the token.
 struct Door {
   std::string token;  // an empty one opens nothing
   std::string port;   // decimal

@@ -27,7 +27,8 @@ enum class Owner { nobody, workers, step, loop };
 struct h6Session {
   const h6Model* model = nullptr;
   std::atomic<h6::Owner> owner{h6::Owner::nobody};
-  // What other threads asked for while a loop runs it: bit n is a fault of cause n, or kAskDisarm.
+  // Requests of other threads while a loop runs it: bit n asks for a fault of cause n, the last bit
+  // is kAskDisarm.
   std::atomic<std::uint32_t> asked{0};
   h6Workers* workers = nullptr;  // whose scratch it borrows; null: it has its own
   h6Allocator allocator{};
@@ -70,7 +71,7 @@ inline bool run_by_loop(const h6Session& s) { return s.owner.load() == Owner::lo
 inline constexpr std::uint32_t kAskDisarm = 1u << 31;
 static_assert(H6_CAUSE_COUNT < 31);
 
-// For the thread that steps the session. take_asked does what other threads asked for.
+// For the thread that steps the session. take_asked carries out the requests of other threads.
 void fault_all(h6Session& s, h6Cause cause);
 void disarm_all(h6Session& s);
 void take_asked(h6Session& s);

@@ -498,7 +498,7 @@ void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
 void h6DestroyLoop(h6Loop* loop) {
   if (!loop) return;
   h6RequestStop(loop);
-  if (loop->thread->is_this()) return;  // the thread cannot outlive what it runs in
+  if (loop->thread->is_this()) return;  // the thread still uses the loop
   h6JoinLoop(loop, nullptr);
   delete loop;
 }

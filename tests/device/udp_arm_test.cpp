@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // udp_arm_test.cpp - the example plug-in: a session at 1 kHz and an arm in another process, reached
 // through UDP; the arm is killed and started again.
+#include <arpa/inet.h>
 #include <dlfcn.h>
 #include <doctest/doctest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -19,6 +23,7 @@
 #include <vector>
 
 #include "device/plugin.h"
+#include "device/plugins/udp_arm_protocol.h"
 #include "hapsix/hapsix.h"
 #include "hapsix/vector.h"
 #include "tests/device/floor.h"
@@ -75,6 +80,55 @@ class ArmProcess {
 PluginFile at(int port) { return {library, {{"port", std::to_string(port)}, {"timeout", "300"}}}; }
 
 }  // namespace
+
+TEST_CASE("a place of NaN reaches the host in a frame, and not as a silence of the arm") {
+  const int arm = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in here{};
+  here.sin_family = AF_INET;
+  here.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof here;
+  REQUIRE(bind(arm, reinterpret_cast<sockaddr*>(&here), size) == 0);
+  REQUIRE(getsockname(arm, reinterpret_cast<sockaddr*>(&here), &size) == 0);
+  const timeval patience{0, 50000};
+  setsockopt(arm, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  std::atomic<bool> end{false}, broken{false};
+  std::thread answers([&] {
+    UdpArmCommand command;
+    sockaddr_in from{};
+    for (socklen_t length = sizeof from; !end; length = sizeof from) {
+      auto* const to = reinterpret_cast<sockaddr*>(&from);
+      if (recvfrom(arm, &command, sizeof command, 0, to, &length) != sizeof command) continue;
+      UdpArmSample sample{};
+      sample.mark = UDP_ARM_SAMPLE, sample.number = command.number, sample.turned[0] = 1;
+      if (broken) sample.moved[2] = std::nan("");
+      (void)sendto(arm, &sample, sizeof sample, 0, to, length);
+    }
+  });
+  auto opened = PluginDevice::open(at(ntohs(here.sin_port)), {{}, {1, 0, 0, 0}}, {});
+  if (opened) {
+    h6DeviceSample sample{};
+    const h6DeviceCommand zero{};
+    int lost = 0;
+    // Until the place is no number, or the arm counts as lost.
+    const auto frames = [&](int most) {
+      for (int i = 0; i < most && std::isfinite(sample.pose.p.z) && lost == 0; ++i) {
+        lost += (*opened)->read(0, sample) != 0;
+        CHECK((*opened)->write(0, zero) == 0);
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    };
+    frames(20);
+    CHECK(std::isfinite(sample.pose.p.z));
+    broken = true;
+    frames(3000);
+    CHECK(std::isnan(sample.pose.p.z));
+    CHECK(lost == 0);
+  }
+  end = true;
+  answers.join();
+  close(arm);
+  REQUIRE_MESSAGE(opened, (opened ? "" : opened.error()));
+}
 
 TEST_CASE("every command that is waited for is answered; the round trip is printed") {
   ArmProcess arm;

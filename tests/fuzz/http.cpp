@@ -64,7 +64,7 @@ void check_admitted(const Knock& knock, unsigned status) {
           "a WebSocket comes from this page");
 }
 
-// What is let in here is let in nowhere else, and not with anything longer.
+// A request that this door lets in is refused at any other door, and with any longer token.
 void check_others(Knock knock) {
   for (std::size_t i = 0; i < kToken.size(); ++i) {
     Door other = kDoor;

@@ -29,6 +29,15 @@ OnePart box_on_floor() {
                  bottom_face(10 * mm, 10 * mm, 5 * mm, 12, 12));
 }
 
+// A device in the time of frames that takes every command. Tests give it a read.
+h6Device simulated_device() {
+  h6Device device = h6DefaultDevice();
+  device.capabilities.frame_time = true;
+  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+  device.stop = [](void*) {};
+  return device;
+}
+
 // Why a session of this scene is refused.
 h6Error refusal(OnePart& scene) {
   h6Error error{};
@@ -100,7 +109,7 @@ TEST_CASE("so are a loop, its devices, and contacts to be weighed") {
   h6Session* session = h6CreateSession(scene.model.handle, &scene.def, nullptr);
   REQUIRE(session);
   const auto refused = [&](auto change) {
-    h6Device device = h6DefaultDevice();
+    h6Device device = simulated_device();
     device.read = [](void*, double, h6DeviceSample*) { return 1; };
     device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
     device.stop = [](void*) {};
@@ -206,14 +215,11 @@ TEST_CASE("while a loop runs a session, others are refused and change nothing") 
   OnePart scene = box_on_floor();
   scene.bodies[1].pose = pose(0, 0, 6 * mm);
   scene.open();
-  h6Device device = h6DefaultDevice();
-  device.capabilities.frame_time = true;
+  h6Device device = simulated_device();
   device.read = [](void*, double, h6DeviceSample* out) {
     *out = hand_at(pose(0, 0, 6 * mm));
     return 0;
   };
-  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
-  device.stop = [](void*) {};
   h6LoopDef def = h6DefaultLoopDef();
   def.realtime = false;
   h6Error error{};
@@ -246,15 +252,12 @@ TEST_CASE("other threads can take force away from a loop's session, and give non
   OnePart scene = box_on_floor();
   scene.bodies[1].pose = pose(0, 0, 6 * mm);
   scene.open();
-  h6Device device = h6DefaultDevice();
-  device.capabilities.frame_time = true;
+  h6Device device = simulated_device();
   device.capabilities.max_force = 0.2;
   device.read = [](void*, double t, h6DeviceSample* out) {  // pressed down
     *out = hand_at(pose(0, 0, (6 - 3 * std::min(1.0, 5 * t)) * mm));
     return 0;
   };
-  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
-  device.stop = [](void*) {};
   h6LoopDef def = h6DefaultLoopDef();
   def.realtime = false, def.duration = 0, def.ring_frames = 20000;
   h6Error error{};
@@ -320,9 +323,8 @@ TEST_CASE("a device that ends its own loop asks for the end, and the program joi
     h6Loop* loop = nullptr;
     std::atomic<int> reads{0};
   } ends;
-  h6Device device = h6DefaultDevice();
+  h6Device device = simulated_device();
   device.self = &ends;
-  device.capabilities.frame_time = true;
   device.read = [](void* self, double, h6DeviceSample* out) {
     auto& e = *static_cast<Ends*>(self);
     *out = hand_at(pose(0, 0, 6 * mm));
@@ -334,8 +336,6 @@ TEST_CASE("a device that ends its own loop asks for the end, and the program joi
     h6DestroyLoop(e.loop);
     return bad;
   };
-  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
-  device.stop = [](void*) {};
   h6LoopDef def = h6DefaultLoopDef();
   def.realtime = false, def.duration = 0;
   ends.loop = h6StartLoop(scene.session, &device, &def, nullptr);
