@@ -86,7 +86,7 @@ export class View3D {
       const sentence = document.createElement('p');
       sentence.textContent = 'This browser offers no WebGL, so the parts cannot be drawn here. Allow hardware'
         + ' acceleration, or WebGL by software, in its settings, or use another browser.';
-      where.append(sentence);
+      where.replaceChildren(sentence);  // a legend of nothing would lie over it
       throw error;
     }
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));

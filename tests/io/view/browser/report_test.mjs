@@ -151,7 +151,9 @@ test('a browser without WebGL says so, and shows all but the parts', async () =>
   try {
     await poor.go(pathToFileURL(report).href);
     await until(() => poor.value('Boolean(window.hapsix?.ready)'), 'the report is ready');
-    assert.match(await poor.value('document.getElementById("space").innerText'), /no WebGL/);
+    const space = await poor.value('document.getElementById("space").innerText');
+    assert.match(space, /no WebGL/);
+    assert.doesNotMatch(space, /share of stiffness/, 'no legend lies over it');
     const text = await poor.value('document.body.innerText');
     for (const word of ['global', 'robust', 'Late frames', 'Configuration']) assert.ok(text.includes(word), word);
     await poor.picture(join(pictures, 'report-no-webgl.png'));
