@@ -57,6 +57,38 @@ py::array frames_of(PyRecording& r, std::uint64_t first, std::optional<std::uint
                                                  : py::array(out[py::slice(0, got, 1)]);
 }
 
+std::size_t modes_of(const PyRecording& r) {
+  std::size_t modes = 0;
+  h6RecordingBend bend;
+  for (std::size_t i = 0; h6GetRecordingBend(r.recording, i, &bend); ++i) modes += bend.modes;
+  return modes;
+}
+
+py::dict bends_of(PyRecording& r, std::uint64_t first, std::optional<std::uint64_t> count) {
+  const std::uint64_t left = r.info.frames - std::min(first, r.info.frames);
+  const std::uint64_t rows = std::min(left, count.value_or(left));
+  const std::size_t modes = modes_of(r);
+  py::dict out;
+  if (modes == 0) return out;
+  py::array_t<double> all({static_cast<std::size_t>(rows), modes});
+  double* to = all.mutable_data();
+  h6Error error{};
+  std::int64_t got;
+  {
+    py::gil_scoped_release release;
+    got = h6GetRecordingBends(r.recording, first, to, rows, &error);
+  }
+  if (got < 0) throw Error(error);
+  h6RecordingBend bend;
+  std::size_t from = 0;
+  for (std::size_t i = 0; h6GetRecordingBend(r.recording, i, &bend); from += bend.modes, ++i) {
+    const auto start = static_cast<py::ssize_t>(from),
+               end = static_cast<py::ssize_t>(from + bend.modes);
+    out[py::int_(bend.body)] = all[py::make_tuple(py::slice(0, got, 1), py::slice(start, end, 1))];
+  }
+  return out;
+}
+
 py::list events_of(const PyRecording& r) {
   py::list out;
   for (std::size_t i = 0; i < r.info.events; ++i)
@@ -74,6 +106,10 @@ void add_reader(py::module_& m) {
            "Rows first .. first + count as a structured array: ['time'] [s], "
            "['report']['contacts'], "
            "['hand'] (n, 8), ['command'], ['body'], ...; the member names of h6FrameRecord")
+      .def("bends", &bends_of, py::arg("first") = 0, py::arg("count") = py::none(),
+           "The same frames of the bodies that bend: {index of the body: (n, r) coordinates q "
+           "[m sqrt(kg)]}, NaN where they are not known; {} where nothing bends, and of older "
+           "recordings.")
       .def_property_readonly(
           "rate", [](const PyRecording& r) { return r.info.rate; }, "[Hz]")
       .def_property_readonly(
@@ -93,11 +129,25 @@ void add_reader(py::module_& m) {
 struct PyRecorder {
   std::shared_ptr<PyScene> scene;
   Unlocked<Recorder> recorder;
-  void add(const h6FrameRecord* rows, std::size_t count) {
+  void add(const h6FrameRecord* rows, std::size_t count, const std::vector<double>& q = {}) {
     h6Error error{};
-    if (!h6RecordFrames(recorder, rows, count, &error)) throw Error(error);
+    if (!h6RecordFramesWithBends(recorder, rows, count, q.empty() ? nullptr : q.data(), q.size(),
+                                 &error))
+      throw Error(error);
   }
 };
+
+// q of all bodies that bend, one after another.
+std::vector<double> q_of(const PySession& s) {
+  std::vector<double> all;
+  double q[H6_MAX_MODES];
+  for (std::size_t b = 0; b < s.bodies; ++b) {
+    const std::size_t modes =
+        h6GetDeformation(s.session, static_cast<std::int32_t>(b), q, nullptr, H6_MAX_MODES);
+    all.insert(all.end(), q, q + modes);
+  }
+  return all;
+}
 
 std::shared_ptr<PyRecorder> make_recorder(const std::string& file, std::shared_ptr<PyScene> scene,
                                           std::shared_ptr<Definition> definition,
@@ -133,7 +183,7 @@ void add_recorder(py::module_& m) {
             h6FrameRecord row;
             py::gil_scoped_release release;
             h6GetRecord(s.session, s.samples.data(), s.commands.data(), &row);
-            r.add(&row, 1);
+            r.add(&row, 1, r.scene ? q_of(s) : std::vector<double>{});
           },
           py::arg("session"), "Adds the session's last frame.")
       .def(
@@ -144,7 +194,9 @@ void add_recorder(py::module_& m) {
             py::gil_scoped_release release;
             r.add(data, count);
           },
-          py::arg("frames"), "Adds the rows that Session.follow returned.")
+          py::arg("frames"),
+          "Adds the rows that Session.follow returned; shapes of bodies that bend are not in them "
+          "and stand as NaN.")
       .def(
           "finish",
           [](PyRecorder& r, const std::optional<std::string>& summary) {

@@ -161,6 +161,12 @@ py::array_t<double> body_of(const PySession& s, std::int32_t body) {
   return out;
 }
 
+py::array_t<double> deformation_of(const PySession& s, std::int32_t body) {
+  double q[H6_MAX_MODES];
+  const std::size_t modes = h6GetDeformation(s.session, body_at(s, body), q, nullptr, H6_MAX_MODES);
+  return py::array_t<double>(static_cast<py::ssize_t>(modes), q);
+}
+
 py::dict safety_of(const PySession& s, std::int32_t hand) {
   h6HandSafety safety;
   h6GetSafety(s.session, hand_at(s, hand), &safety);
@@ -215,6 +221,8 @@ void add_steps(py::class_<PySession, SessionPtr>& c) {
 void add_state(py::class_<PySession, SessionPtr>& c) {
   using S = PySession;
   c.def("body", &body_of, py::arg("body"), "(13,) pose (7) and velocity (6) of a body; a copy")
+      .def("deformation", &deformation_of, py::arg("body"),
+           "(r,) coordinates q of a body whose shell bends [m sqrt(kg)], a copy; (0,) of others")
       .def(
           "set_body",
           [](S& s, std::int32_t body, const Numbers<h6Pose>& pose,

@@ -12,6 +12,7 @@ using namespace h6::io;
 
 struct h6Recorder {
   std::unique_ptr<Recorder> recorder;
+  std::size_t modes = 0;  // of all bodies of its scene that bend
 };
 struct h6Recording {
   std::filesystem::path file;
@@ -29,6 +30,11 @@ RecordingHead head_of(const h6RecorderDef& def, const h6SessionDef& session) {
     head.scene_json = scene_text(scene);
     for (const LoadedAsset& asset : def.scene->loaded->assets)
       head.asset_hashes.push_back(asset.hash);
+    const auto& bends = def.scene->loaded->bends;
+    for (std::size_t b = 0; b < bends.size(); ++b)
+      if (bends[b])
+        head.bends.push_back(
+            {static_cast<std::uint32_t>(b), scene.bodies[b].name, bends[b]->modes});
   }
   head.rate = session.rate;
   head.hands = session.hand_count;
@@ -62,15 +68,27 @@ h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, h6Error
       const Result<Scene> again = read_scene_text(head.scene_json, "the session");
       if (!again) return fill(error, H6_ERROR_RANGE, again.error()), nullptr;
     }
-    return wrap<h6Recorder>(Recorder::create(file, head), H6_ERROR_FILE, error);
+    h6Recorder* made = wrap<h6Recorder>(Recorder::create(file, head), H6_ERROR_FILE, error);
+    if (made) made->modes = modes_of(head.bends);
+    return made;
   });
 }
 
 bool h6RecordFrames(h6Recorder* recorder, const h6FrameRecord* rows, size_t count, h6Error* error) {
+  return h6RecordFramesWithBends(recorder, rows, count, nullptr, 0, error);
+}
+
+bool h6RecordFramesWithBends(h6Recorder* recorder, const h6FrameRecord* rows, size_t count,
+                             const double* bends, size_t modes, h6Error* error) {
   if (!recorder || (count && !rows) || count > PTRDIFF_MAX / sizeof *rows)
     return fill(error, H6_ERROR_ARGUMENT, "a recorder and rows are needed"), false;
+  if (bends && modes != recorder->modes)
+    return fill(error, H6_ERROR_ARGUMENT,
+                "the bodies of the recorder's scene bend by " + std::to_string(recorder->modes) +
+                    " modes, not " + std::to_string(modes)),
+           false;
   return guarded(error, false, [&] {
-    return finish(recorder->recorder->frames(rows, count), H6_ERROR_FILE, error);
+    return finish(recorder->recorder->frames(rows, count, bends), H6_ERROR_FILE, error);
   });
 }
 
@@ -119,6 +137,27 @@ int64_t h6GetRecordingFrames(h6Recording* recording, uint64_t first, h6FrameReco
     Result<Recording> part = read_recording(recording->file, {first, count});
     if (!part) return fill(error, H6_ERROR_CONTENT, part.error()), -1;
     std::copy(part->frames.begin(), part->frames.end(), out);
+    return static_cast<std::int64_t>(part->frames.size());
+  });
+}
+
+bool h6GetRecordingBend(const h6Recording* recording, size_t bend, h6RecordingBend* out) {
+  if (!recording || !out || bend >= recording->head.head.bends.size()) return false;
+  const RecordedBend& found = recording->head.head.bends[bend];
+  *out = {static_cast<std::int32_t>(found.body), found.name.c_str(), found.modes, {}};
+  return true;
+}
+
+int64_t h6GetRecordingBends(h6Recording* recording, uint64_t first, double* out, size_t count,
+                            h6Error* error) {
+  if (!recording || (count && !out))
+    return fill(error, H6_ERROR_ARGUMENT, "a recording and room are needed"), -1;
+  return guarded(error, std::int64_t{-1}, [&]() -> std::int64_t {
+    Result<Recording> part = read_recording(recording->file, {first, count});
+    if (!part) return fill(error, H6_ERROR_CONTENT, part.error()), -1;
+    if (modes_of(part->head.bends) != modes_of(recording->head.head.bends))
+      return fill(error, H6_ERROR_CONTENT, "the recording was replaced since it was opened"), -1;
+    std::copy(part->bends.begin(), part->bends.end(), out);
     return static_cast<std::int64_t>(part->frames.size());
   });
 }

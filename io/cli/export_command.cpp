@@ -4,8 +4,9 @@
 //   hapsix export run.h5 -o run.csv [--contacts contacts.csv|contacts.h5] [--bends bends.csv]
 //   hapsix export bay.vdb -o plain.vdb
 //
-// A recording holds neither contacts nor the shapes of bodies that bend; both are computed again to
-// the bit, and a recording that cannot be replayed has none to export. 3,000 contacts of 17
+// A recording holds no contacts; they are computed again to the bit, and a recording that cannot be
+// replayed has none to export. So are the shapes of bodies that bend where an older recording lacks
+// them. 3,000 contacts of 17
 // numbers at 1 kHz would be 0.4 GB for each second of a run.
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -37,16 +38,16 @@ bool ends(const std::string& text, const std::string& ending) {
          text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
 }
 
-using Rows = std::function<Outcome(std::vector<h6FrameRecord>&)>;
+using Pieces = std::function<Outcome(const io::Recording&)>;
 
 // Calls `use` with all frames of a recording, some thousand at a time.
 Outcome each_piece(const std::string& file, std::uint64_t count, const Console& console,
-                   const Rows& use) {
+                   const Pieces& use) {
   const io::Progress progress = console.progress();
   for (std::uint64_t at = 0; at < count; at += kPiece) {
     Result<io::Recording> piece = io::read_recording(file, {at, kPiece});
     if (!piece) return piece.failure();
-    if (Outcome used = use(piece->frames); !used) return used;
+    if (Outcome used = use(*piece); !used) return used;
     const std::uint64_t done = std::min(count, at + kPiece);
     if (progress && !progress("exporting", static_cast<double>(done) / static_cast<double>(count)))
       return Failure{"interrupted"};
@@ -62,14 +63,14 @@ Outcome flushed(std::ofstream& out) {
 Outcome export_frames(const ExportOptions& o, const io::Recording& head, const Console& console) {
   return io::write_aside(o.output, [&](const std::filesystem::path& path) -> Outcome {
     std::ofstream out(path, std::ios::binary);
-    out << io::csv_head(head.head.hands);
-    Outcome all = each_piece(o.input, head.frame_count, console,
-                             [&](std::vector<h6FrameRecord>& frames) -> Outcome {
-                               std::string text;
-                               io::append_csv(frames, head.head.hands, text);
-                               out << text;
-                               return out ? Outcome(Done{}) : flushed(out);
-                             });
+    out << io::csv_head(head.head);
+    Outcome all =
+        each_piece(o.input, head.frame_count, console, [&](const io::Recording& piece) -> Outcome {
+          std::string text;
+          io::append_csv(piece, text);
+          out << text;
+          return out ? Outcome(Done{}) : flushed(out);
+        });
     return all ? flushed(out) : all;
   });
 }
@@ -144,39 +145,65 @@ std::string contacts_head(const io::LoadedScene&) {
   return out + "part,with\n";
 }
 
-std::size_t most_modes(const io::LoadedScene& scene) {
+using Bends = std::vector<io::RecordedBend>;
+
+std::size_t most_modes(const Bends& bends) {
   std::size_t most = 0;
-  for (const auto& model : scene.bends) most = std::max(most, model ? model->modes : 0);
+  for (const io::RecordedBend& bend : bends) most = std::max(most, bend.modes);
   return most;
 }
 
-// Empty where nothing bends.
-std::string bends_head(const io::LoadedScene& scene) {
-  if (most_modes(scene) == 0) return "";
+std::string bends_head(const Bends& bends) {
   std::string out = "t,frame,body";
-  for (std::size_t j = 1; j <= most_modes(scene); ++j) out += ",q" + std::to_string(j);
+  for (std::size_t j = 1; j <= most_modes(bends); ++j) out += ",q" + std::to_string(j);
   return out + '\n';
 }
 
 // A row for each body that bends; one with fewer modes than another has empty cells.
-void append_bends(const RecordedSession& session, const h6FrameRecord& frame, std::string& out) {
-  const io::LoadedScene& scene = session.loaded();
-  const std::size_t most = most_modes(scene);
+void append_bends(const Bends& bends, const double* q, const h6FrameRecord& frame,
+                  std::string& out) {
+  const std::size_t most = most_modes(bends);
   char text[64];
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    double q[H6_MAX_MODES];
-    const std::size_t r =
-        h6GetDeformation(session.session(), static_cast<std::int32_t>(b), q, nullptr, H6_MAX_MODES);
-    if (r == 0) continue;
+  for (const io::RecordedBend& bend : bends) {
     std::snprintf(text, sizeof text, "%.6f,%llu,", frame.time,
                   static_cast<unsigned long long>(frame.report.frame));
-    out += text + io::csv_quoted(scene.scene.bodies[b].name);
+    out += text + io::csv_quoted(bend.name);
     for (std::size_t j = 0; j < most; ++j) {
-      std::snprintf(text, sizeof text, ",%.17g", j < r ? q[j] : 0.0);
-      out += j < r ? text : ",";
+      std::snprintf(text, sizeof text, ",%.17g", j < bend.modes ? *q++ : 0.0);
+      out += j < bend.modes ? text : ",";
     }
     out += '\n';
   }
+}
+
+Outcome export_recorded_bends(const ExportOptions& o, const io::Recording& head,
+                              const Console& console) {
+  const Bends& bends = head.head.bends;
+  return io::write_aside(o.bends, [&](const std::filesystem::path& path) -> Outcome {
+    std::ofstream out(path, std::ios::binary);
+    out << bends_head(bends);
+    Outcome all =
+        each_piece(o.input, head.frame_count, console, [&](const io::Recording& piece) -> Outcome {
+          std::string text;
+          for (std::size_t i = 0; i < piece.frames.size(); ++i)
+            append_bends(bends, piece.bends.data() + i * io::modes_of(bends), piece.frames[i],
+                         text);
+          out << text;
+          return out ? Outcome(Done{}) : flushed(out);
+        });
+    return all ? flushed(out) : all;
+  });
+}
+
+// Those of a recording that lacks them. The first line is empty where nothing bends.
+std::string computed_bends_head(const io::LoadedScene& scene) {
+  const Bends bends = recorded_bends(scene);
+  return bends.empty() ? "" : bends_head(bends);
+}
+
+void append_computed_bends(const RecordedSession& session, const h6FrameRecord& frame,
+                           std::string& out) {
+  append_bends(recorded_bends(session.loaded()), session.bends().data(), frame, out);
 }
 
 // A table that is made by stepping a recording again: its first line, and the rows of a frame.
@@ -189,8 +216,8 @@ struct Table {
 Outcome step_again(RecordedSession& session, const std::string& input, std::uint64_t count,
                    const Console& console, const std::function<void(const h6FrameRecord&)>& each,
                    const std::function<Outcome()>& piece) {
-  return each_piece(input, count, console, [&](std::vector<h6FrameRecord>& frames) -> Outcome {
-    for (const h6FrameRecord& frame : frames) {
+  return each_piece(input, count, console, [&](const io::Recording& rows) -> Outcome {
+    for (const h6FrameRecord& frame : rows.frames) {
       const auto stepped = session.step(frame);
       if (!stepped) return stepped.failure();
       each(**stepped);
@@ -261,10 +288,13 @@ Outcome export_recording(const ExportOptions& o, const Console& console, std::ui
   if (!head->remark.empty()) console.log(o.input + ": " + head->remark);
   frames = head->frame_count;
   // The frames come last, since a recording that cannot be replayed writes nothing then.
-  if (!o.bends.empty())
-    if (Outcome done = export_again(o.input, o.bends, *head, console, {bends_head, append_bends});
-        !done)
-      return done;
+  if (!o.bends.empty()) {
+    const Outcome done = head->head.bends.empty()
+                             ? export_again(o.input, o.bends, *head, console,
+                                            {computed_bends_head, append_computed_bends})
+                             : export_recorded_bends(o, *head, console);
+    if (!done) return done;
+  }
   if (!o.contacts.empty()) {
     const Outcome done =
         ends(o.contacts, ".h5")

@@ -97,7 +97,8 @@ class Replay {
     head_ = recording_.head;
     columns_ = recording_.columns;
     sealed_ = std::find(columns_.begin(), columns_.end(), "seal") != columns_.end();
-    seal_.emplace(head_.hands, columns_);
+    seal_.emplace(head_, columns_);
+    comparison_.emplace(head_, columns_);
     frames_ = recording_.frame_count;
     if (!recording_.remark.empty()) remarks.push_back(recording_.remark);
     Result<std::unique_ptr<RecordedSession>> opened =
@@ -134,8 +135,9 @@ class Replay {
         note_late(row, **now);
         if (!options_.verify) continue;
         account_->row(row);
-        const std::uint64_t seal = seal_->next(row);
-        if (!same(row, **now, !sealed_ || piece->seals[i] == seal)) break;
+        const double* q = piece->bends.data() + i * io::modes_of(head_.bends);
+        const std::uint64_t seal = seal_->next(row, q);
+        if (!same(row, q, **now, !sealed_ || piece->seals[i] == seal)) break;
       }
       if (!progress("replaying " + session_->loaded().scene.name,
                     static_cast<double>(expected) / static_cast<double>(frames_)))
@@ -205,7 +207,8 @@ class Replay {
       std::printf(
           "\nevery one of %" PRIu64
           " frames is the same to the bit: %s on %u thread%s\n%s"
-          "computed again: contacts, depths, stiffness, poses, velocities, commands, causes, "
+          "computed again: contacts, depths, stiffness, poses, velocities, shapes, commands, "
+          "causes, "
           "states, status, events, the summary's figures; attributes against what they repeat\n"
           "%s: scene, the hand's samples, "
           "deadlines, measured times, notes\n",
@@ -249,9 +252,10 @@ class Replay {
  private:
   static constexpr std::uint64_t kPiece = 4096;
 
-  bool same(const h6FrameRecord& row, const h6FrameRecord& now, bool seal_fits) {
+  // `q`: of all bodies that bend, as recorded.
+  bool same(const h6FrameRecord& row, const double* q, const h6FrameRecord& now, bool seal_fits) {
     const auto where =
-        row.inputs_only ? std::nullopt : io::first_difference(row, now, head_.hands, columns_);
+        row.inputs_only ? std::nullopt : comparison_->first(row, q, now, session_->bends().data());
     if (!where && seal_fits) return true;
     divergence =
         Divergence{row.report.frame, row.time, where, row.report.state_hash, now.report.state_hash};
@@ -309,6 +313,7 @@ class Replay {
   const char* reason_ = "";  // of `changed`
   bool sealed_ = false;
   std::optional<io::RowSeal> seal_;
+  std::optional<io::RowComparison> comparison_;
   std::optional<Account> account_;
   std::unique_ptr<RecordedSession> session_;
   std::optional<Figures> recorded_, replayed_;

@@ -162,7 +162,9 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
   const double duration = change.path ? change.path->back().t : loaded.duration();
   RunTally tally(loaded, def.rate, duration);
   const auto frames = static_cast<std::uint64_t>(duration * def.rate + 0.5);
+  const std::vector<io::RecordedBend> bends = recorded_bends(loaded);
   std::vector<h6FrameRecord> rows;
+  std::vector<double> q;  // of `rows`
   for (std::uint64_t i = 0; i < frames && !interrupted.load(); ++i) {
     h6FrameRecord& r = rows.emplace_back();
     r = {};
@@ -175,13 +177,12 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
     deepest.frame(run.session.get(), contacts, before);
     tally.frame(r, elastic_wrench(contacts, def.contact.stiffness).force);
     if (change.each) change.each(r, contacts);
-    if (!recorder)
-      rows.clear();
-    else if (rows.size() == 100) {
-      if (Outcome done = recorder->frames(rows.data(), rows.size()); !done)
+    append_bends(run.session.get(), bends, q);
+    if (recorder && rows.size() < 100) continue;
+    if (recorder)
+      if (Outcome done = recorder->frames(rows.data(), rows.size(), q.data()); !done)
         return out.error = done.error(), out;
-      rows.clear();
-    }
+    rows.clear(), q.clear();
   }
   static_cast<RunTotals&>(out) = tally.totals();
   out.frame_us_p50 = tally.times().frame_us.percentile(50);
@@ -190,7 +191,7 @@ RunFigures run_experiment(const io::LoadedScene& loaded, const RunChange& change
     out.stage_us_p50[s] = tally.times().stage_us[s].percentile(50);
   out.deepest = deepest.found();
   if (recorder) {
-    Outcome done = recorder->frames(rows.data(), rows.size());
+    Outcome done = recorder->frames(rows.data(), rows.size(), q.data());
     const nlohmann::ordered_json summary{{"method", change.method.name},
                                          {"verdict", io::verdict_name(out.verdict)},
                                          {"max_depth_voxels", out.max_depth_voxels}};

@@ -81,7 +81,7 @@ Result<std::string> compare(const fs::path& file, const Recording& recording) {
   if (!h5.ok()) return Failure{"cannot read " + file.string() + ": " + library_reason()};
   std::string changed;
   // An older program, whose recordings lack a column, may have had other names and units.
-  const bool of_today = recording.columns.size() == columns().size();
+  const bool of_today = recording.columns.size() == columns(recording.head.bends).size();
   for (const char* group : {"config", "summary"})
     if (changed.empty()) changed = changed_in(expected, h5, group, H5I_GROUP, of_today);
   const auto datasets = [&](const char* folder, const std::vector<std::string>& names) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // compare.cpp - the first difference of two rows of a recording.
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <sstream>
 
@@ -14,30 +15,45 @@ using namespace recording;
 // These bits of the status follow from times and from devices.
 constexpr h6Status kGiven = H6_LATE | H6_DEVICE_LOST;
 
-bool among(const std::vector<std::string>& names, const char* name) {
+bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// What a replay computes, in the order of a frame.
-const std::vector<const Column*>& computed() {
-  static const std::vector<const Column*> all = [] {
-    std::vector<const Column*> found;
-    for (const char* name :
-         {"t", "frame", "contacts", "max_depth", "max_depth_voxels", "missed_depth_voxels",
-          "net_stiffness", "coarse_pairs", "coarse_points", "substeps", "body_pose",
-          "body_velocity", "wrench", "command_pose", "cause", "causes", "state", "status", "hash"})
-      for (const Column& column : columns())
-        if (std::strcmp(column.name, name) == 0) found.push_back(&column);
-    return found;
-  }();
-  return all;
+// What a replay computes, in the order of a frame; bodies that bend come before the others.
+std::vector<Column> computed(const std::vector<RecordedBend>& bends) {
+  std::vector<Column> found;
+  const std::vector<Column> all = columns(bends);
+  for (const char* name : {"t",
+                           "frame",
+                           "contacts",
+                           "max_depth",
+                           "max_depth_voxels",
+                           "missed_depth_voxels",
+                           "net_stiffness",
+                           "coarse_pairs",
+                           "coarse_points",
+                           "substeps",
+                           "bends",
+                           "body_pose",
+                           "body_velocity",
+                           "wrench",
+                           "command_pose",
+                           "cause",
+                           "causes",
+                           "state",
+                           "status",
+                           "hash"})
+    for (const Column& column : all)
+      if (column.name == name || (column.part == Part::bends && std::strcmp(name, "bends") == 0))
+        found.push_back(column);
+  return found;
 }
 
 // Whether a column follows from the inputs of the safety chain.
 bool by_safety(const Column& column) {
-  return column.offset >= offsetof(h6FrameRecord, command) &&
+  return column.part == Part::record && column.offset >= offsetof(h6FrameRecord, command) &&
          column.offset < offsetof(h6FrameRecord, safety_input) && column.per_hand() &&
-         std::strncmp(column.name, "body", 4) != 0;
+         !column.name.starts_with("body");
 }
 
 std::string label(const Column& column, std::size_t cell) {
@@ -64,30 +80,47 @@ double number_at(Cell cell, const std::byte* at) {
   return value;
 }
 
-const std::byte* cells(const h6FrameRecord& row, const Column& column, std::size_t hand) {
-  return reinterpret_cast<const std::byte*>(&row) + column.offset + hand * column.stride;
+const std::byte* cells(const Column& column, const h6FrameRecord& row, const double* bends,
+                       std::size_t hand) {
+  const void* part = column.part == Part::bends ? static_cast<const void*>(bends) : &row;
+  return static_cast<const std::byte*>(part) + column.offset + hand * column.stride;
+}
+
+// A program may record rows without the shapes of bodies that bend.
+bool known(const Column& column, const std::byte* at) {
+  return column.part != Part::bends || !std::isnan(number_at(column.cell, at));
 }
 
 }  // namespace
 
-std::optional<RowDifference> first_difference(const h6FrameRecord& recorded,
-                                              const h6FrameRecord& replayed, std::size_t hands,
-                                              const std::vector<std::string>& present) {
+RowComparison::RowComparison(const RecordingHead& head, const std::vector<std::string>& present)
+    : hands_(head.hands) {
   const bool safety = among(present, "safety_asked") && among(present, "overdue");
+  std::vector<Column> compared = computed(head.bends);
+  std::erase_if(compared, [&](const Column& column) {
+    return !among(present, column.name) ||
+           ((by_safety(column) || column.name == "status") && !safety);
+  });
+  columns_ = std::make_shared<const std::vector<Column>>(std::move(compared));
+}
+
+std::optional<RowDifference> RowComparison::first(const h6FrameRecord& recorded,
+                                                  const double* recorded_bends,
+                                                  const h6FrameRecord& replayed,
+                                                  const double* replayed_bends) const {
   h6FrameRecord now = replayed;
   now.report.status =
       static_cast<h6Status>((now.report.status & ~kGiven) | (recorded.report.status & kGiven));
-  for (const Column* column : computed()) {
-    if ((by_safety(*column) || std::strcmp(column->name, "status") == 0) && !safety) continue;
-    const std::size_t bytes = cell_bytes(column->cell);
-    for (std::size_t h = 0; h < (column->per_hand() ? hands : 1); ++h) {
-      const std::byte *a = cells(recorded, *column, h), *b = cells(now, *column, h);
-      if (std::memcmp(a, b, column->width * bytes) == 0 || !among(present, column->name)) continue;
+  for (const Column& column : *columns_) {
+    const std::size_t bytes = cell_bytes(column.cell);
+    for (std::size_t h = 0; h < (column.per_hand() ? hands_ : 1); ++h) {
+      const std::byte *a = cells(column, recorded, recorded_bends, h),
+                      *b = cells(column, now, replayed_bends, h);
+      if (std::memcmp(a, b, column.width * bytes) == 0 || !known(column, a)) continue;
       std::size_t i = 0;
       while (std::memcmp(a + i * bytes, b + i * bytes, bytes) == 0) ++i;
-      return RowDifference{column->name, label(*column, i), h,
-                           number_at(column->cell, a + i * bytes),
-                           number_at(column->cell, b + i * bytes)};
+      return RowDifference{column.name, label(column, i), h, number_at(column.cell, a + i * bytes),
+                           number_at(column.cell, b + i * bytes)};
     }
   }
   return std::nullopt;

@@ -14,7 +14,7 @@ static_assert(H6_STAGE_COUNT == 7 && H6_CAUSE_COUNT == 20, "names below, format 
 static_assert(offsetof(h6FrameReport, net_stiffness_max) ==
               offsetof(h6FrameReport, net_stiffness_min) + sizeof(double));
 
-const std::vector<Column>& columns() {
+const std::vector<Column>& common_columns() {
   using R = h6FrameRecord;
   constexpr auto report = offsetof(R, report), hand = offsetof(R, hand), body = offsetof(R, body),
                  command = offsetof(R, command), input = offsetof(R, safety_input);
@@ -79,9 +79,35 @@ const std::vector<Column>& columns() {
       {"status", n32, 1, report + offsetof(h6FrameReport, status), 0, "bits of h6Status", "status"},
       {"hash", n64, 1, report + offsetof(h6FrameReport, state_hash), 0, "1", "hash"},
       {"frame", n64, 1, report + offsetof(h6FrameReport, frame), 0, "1", "frame"},
-      {"seal", n64, 1, 0, 0, "hash of this row and the seal before", "seal", true, true},
+      {"seal", n64, 1, 0, 0, "hash of this row and the seal before", "seal", true, Part::seal},
   };
   return all;
+}
+
+std::vector<Column> columns(const std::vector<RecordedBend>& bends) {
+  std::vector<Column> all = common_columns();
+  std::size_t offset = 0;
+  for (const RecordedBend& bend : bends) {
+    std::string labels;
+    for (std::size_t j = 1; j <= bend.modes; ++j)
+      labels += (j > 1 ? " q" : "q") + std::to_string(j);
+    all.push_back({"bend_" + std::to_string(bend.body), Cell::real, bend.modes, offset, 0,
+                   "m sqrt(kg)", labels, false, Part::bends, bend.name});
+    offset += bend.modes * sizeof(double);
+  }
+  return all;
+}
+
+std::string wrong_bends(const std::vector<RecordedBend>& bends) {
+  for (std::size_t i = 0; i < bends.size(); ++i) {
+    const std::string body = "body " + std::to_string(bends[i].body);
+    if (bends[i].modes < 1 || bends[i].modes > H6_MAX_MODES)
+      return body + " bends by " + std::to_string(bends[i].modes) + " modes; 1 to " +
+             std::to_string(H6_MAX_MODES) + " can be recorded";
+    if (i > 0 && bends[i].body <= bends[i - 1].body)
+      return body + " is out of order among the bodies that bend";
+  }
+  return "";
 }
 
 const std::vector<std::string>& stage_names() {
@@ -118,7 +144,7 @@ hid_t cell_type(Cell cell) {
 std::vector<hsize_t> shape(const Column& column, hsize_t rows, std::size_t hands) {
   std::vector<hsize_t> dims = {rows};
   if (column.per_hand()) dims.push_back(hands);
-  if (column.width > 1) dims.push_back(column.width);
+  if (column.width > 1 || column.part == Part::bends) dims.push_back(column.width);
   return dims;
 }
 
@@ -126,51 +152,59 @@ std::size_t row_bytes(const Column& column, std::size_t hands) {
   return column.width * cell_bytes(column.cell) * (column.per_hand() ? hands : 1);
 }
 
-void pack(const Column& column, std::size_t hands, const h6FrameRecord* from, std::size_t count,
-          std::vector<std::byte>& out) {
+namespace {
+
+// Where the cells of a column are in memory: of the first row, from row to row.
+template <class Byte, class Rows>
+std::pair<Byte*, std::size_t> place(const Column& column, const Rows& rows) {
+  switch (column.part) {
+    case Part::bends:
+      return {reinterpret_cast<Byte*>(rows.bends) + column.offset, rows.modes * sizeof(double)};
+    case Part::seal:
+      return {reinterpret_cast<Byte*>(rows.seals), sizeof(std::uint64_t)};
+    default:
+      return {reinterpret_cast<Byte*>(rows.records) + column.offset, sizeof(h6FrameRecord)};
+  }
+}
+
+}  // namespace
+
+void pack(const Column& column, std::size_t hands, const Rows& from, std::vector<std::byte>& out) {
   const std::size_t bytes = column.width * cell_bytes(column.cell);
   const std::size_t times = column.per_hand() ? hands : 1;
-  out.resize(count * times * bytes);
+  out.resize(from.count * times * bytes);
   std::byte* to = out.data();
-  for (std::size_t i = 0; i < count; ++i)
+  const auto [first, row] = place<const std::byte>(column, from);
+  for (std::size_t i = 0; i < from.count; ++i)
     for (std::size_t h = 0; h < times; ++h, to += bytes)
-      std::memcpy(to,
-                  reinterpret_cast<const std::byte*>(from + i) + column.offset + h * column.stride,
-                  bytes);
+      std::memcpy(to, first + i * row + h * column.stride, bytes);
 }
 
-void unpack(const Column& column, std::size_t hands, const std::byte* from, std::size_t count,
-            h6FrameRecord* out) {
+void unpack(const Column& column, std::size_t hands, const std::byte* from,
+            const RoomForRows& out) {
   const std::size_t bytes = column.width * cell_bytes(column.cell);
   const std::size_t times = column.per_hand() ? hands : 1;
-  for (std::size_t i = 0; i < count; ++i)
+  const auto [first, row] = place<std::byte>(column, out);
+  for (std::size_t i = 0; i < out.count; ++i)
     for (std::size_t h = 0; h < times; ++h, from += bytes)
-      std::memcpy(reinterpret_cast<std::byte*>(out + i) + column.offset + h * column.stride, from,
-                  bytes);
+      std::memcpy(first + i * row + h * column.stride, from, bytes);
 }
 
-std::vector<std::byte> pack_chunks(std::size_t hands, std::size_t chunk_rows,
-                                   const h6FrameRecord* from, const std::uint64_t* seals,
-                                   std::size_t count) {
-  std::vector<std::byte> out(columns().size() * sizeof(std::uint32_t)), rows, shuffled;
-  for (std::size_t i = 0; i < columns().size(); ++i) {
-    const Column& column = columns()[i];
-    if (column.apart) {
-      rows.resize(count * sizeof *seals);
-      std::memcpy(rows.data(), seals, rows.size());
-    } else {
-      pack(column, hands, from, count, rows);
-    }
-    rows.resize(chunk_rows * row_bytes(column, hands));  // zeros where rows are still to come
-    shuffle(rows, cell_bytes(column.cell), shuffled);
+std::vector<std::byte> pack_chunks(const std::vector<Column>& columns, std::size_t hands,
+                                   std::size_t chunk_rows, const Rows& from) {
+  std::vector<std::byte> out(columns.size() * sizeof(std::uint32_t)), rows, shuffled;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    pack(columns[i], hands, from, rows);
+    rows.resize(chunk_rows * row_bytes(columns[i], hands));  // zeros where rows are still to come
+    shuffle(rows, cell_bytes(columns[i].cell), shuffled);
     const auto bytes = static_cast<std::uint32_t>(deflate(shuffled, out));
     std::memcpy(out.data() + i * sizeof bytes, &bytes, sizeof bytes);
   }
   return out;
 }
 
-bool find_chunks(const std::vector<std::byte>& payload, std::vector<Span>& chunks) {
-  const std::size_t count = columns().size();
+bool find_chunks(const std::vector<std::byte>& payload, std::size_t count,
+                 std::vector<Span>& chunks) {
   std::size_t at = count * sizeof(std::uint32_t);
   chunks.clear();
   if (payload.size() < at) return false;

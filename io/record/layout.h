@@ -3,7 +3,8 @@
 //
 //   /config    whole, seal; attributes: version, json, asset_hashes, simd_target, program, run,
 //              rate, hands, stage_names, cause_names, state_names, units
-//   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns
+//   /frames    one dataset a column of `columns`, rows are frames; attributes: units, columns, and
+//              body, of bend_N
 //   /events    t, what, detail, seal
 //   /summary   whole, seal; attribute json; the group exists once the run has ended
 //
@@ -29,20 +30,26 @@ constexpr std::uint32_t format_version = 1;
 
 enum class Cell { real, natural32, natural64 };
 
+enum class Part { record, bends, seal };
+
 // A dataset of /frames and its place in h6FrameRecord: `width` cells at `offset`, and for each
-// further hand `stride` bytes later. Stride 0: once a frame.
+// further hand `stride` bytes later. Stride 0: once a frame. Of bodies that bend: `offset` bytes
+// into the row of all their q.
 struct Column {
-  const char* name;
+  std::string name;
   Cell cell;
   std::size_t width, offset, stride;
-  const char* units;
-  const char* labels;  // of the cells in a row, separated by blanks
+  std::string units;
+  std::string labels;  // of the cells in a row, separated by blanks
   bool later = false;  // older recordings lack it and get zeros
-  bool apart = false;  // no part of h6FrameRecord: the seals
+  Part part = Part::record;
+  std::string body = "";  // that bends: its name
   bool per_hand() const { return stride != 0; }
 };
 
-const std::vector<Column>& columns();
+// Those of every recording, then one of each body that bends.
+const std::vector<Column>& common_columns();
+std::vector<Column> columns(const std::vector<RecordedBend>& bends);
 const std::vector<std::string>& stage_names();
 const std::vector<std::string>& cause_names();
 const std::vector<std::string>& state_names();
@@ -53,24 +60,33 @@ hid_t cell_type(Cell cell);  // as on disk; a constant of the library, do not cl
 std::vector<hsize_t> shape(const Column& column, hsize_t rows, std::size_t hands);
 std::size_t row_bytes(const Column& column, std::size_t hands);
 
-// To and from the packed rows of a dataset; not for columns that stand apart.
-void pack(const Column& column, std::size_t hands, const h6FrameRecord* from, std::size_t count,
-          std::vector<std::byte>& out);
-void unpack(const Column& column, std::size_t hands, const std::byte* from, std::size_t count,
-            h6FrameRecord* out);
+// Frames in memory.
+template <class Record, class Number, class Seal>
+struct RowsOf {
+  Record* records = nullptr;
+  Number* bends = nullptr;  // (count x modes)
+  Seal* seals = nullptr;    // (count)
+  std::size_t count = 0, modes = 0;
+};
+using Rows = RowsOf<const h6FrameRecord, const double, const std::uint64_t>;
+using RoomForRows = RowsOf<h6FrameRecord, double, std::uint64_t>;
 
-// The payload of a LogKind::rows record: the chunk of each column with `count` rows, filled up
-// with zeros to `chunk_rows`. `seals` has one number a row.
-std::vector<std::byte> pack_chunks(std::size_t hands, std::size_t chunk_rows,
-                                   const h6FrameRecord* from, const std::uint64_t* seals,
-                                   std::size_t count);
+// To and from the packed rows of a dataset.
+void pack(const Column& column, std::size_t hands, const Rows& from, std::vector<std::byte>& out);
+void unpack(const Column& column, std::size_t hands, const std::byte* from, const RoomForRows& out);
+
+// The payload of a LogKind::rows record: the chunk of each column with the rows, filled up with
+// zeros to `chunk_rows`.
+std::vector<std::byte> pack_chunks(const std::vector<Column>& columns, std::size_t hands,
+                                   std::size_t chunk_rows, const Rows& from);
 struct Span {
   const std::byte* from;
   std::size_t bytes;
 };
-// The inverse: the compressed chunks, in the order of columns(). False when the sizes do not add
-// up.
-bool find_chunks(const std::vector<std::byte>& payload, std::vector<Span>& chunks);
+// The inverse: the compressed chunks of so many columns, in their order. False when the sizes do
+// not add up.
+bool find_chunks(const std::vector<std::byte>& payload, std::size_t count,
+                 std::vector<Span>& chunks);
 
 // Any HDF5 object, released at the end of the scope.
 class Handle {
@@ -116,6 +132,9 @@ Handle file_access();
 
 // read_recording of one HDF5 file, without the lock.
 Result<Recording> read_hdf5(const std::filesystem::path& file, FrameRange range);
+
+// Why these cannot be the bodies that bend, in words; or nothing.
+std::string wrong_bends(const std::vector<RecordedBend>& bends);
 
 // The head from the JSON text of /config/whole.
 Result<RecordingHead> parse_head(const std::string& text);

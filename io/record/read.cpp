@@ -69,8 +69,7 @@ Result<std::string> read_whole_text(const Source& source, const char* folder) {
 }
 
 // Whether every number of a packed column is one of its enumerators or sets of bits.
-bool means_something(const char* column, const std::vector<std::byte>& packed) {
-  const std::string_view name = column;
+bool means_something(std::string_view name, const std::vector<std::byte>& packed) {
   const std::uint32_t most = name == "cause"          ? H6_CAUSE_COUNT - 1
                              : name == "causes"       ? (1u << H6_CAUSE_COUNT) - 1
                              : name == "state"        ? H6_DEVICE_STATE_COUNT - 1
@@ -87,6 +86,7 @@ bool means_something(const char* column, const std::vector<std::byte>& packed) {
 Outcome read_column(const Source& source, const Column& column, const Stored& stored, hsize_t first,
                     Recording& out) {
   std::vector<std::byte> packed;
+  const std::size_t modes = modes_of(out.head.bends);
   // Pieces end where chunks end, so that each chunk is inflated once.
   const hsize_t piece =
       std::max<hsize_t>(1, rows_at_once / std::max<hsize_t>(1, stored.chunk_rows)) *
@@ -96,37 +96,37 @@ Outcome read_column(const Source& source, const Column& column, const Stored& st
     const hsize_t count = std::min(piece - row % piece, end - row);
     if (Outcome read = read_rows(source, stored, row, count, packed); !read) return read;
     if (!means_something(column.name, packed))
-      return source.wrong("/frames/" + std::string(column.name) +
-                          " has a number that means nothing");
-    if (column.apart)
-      std::memcpy(out.seals.data() + (row - first), packed.data(), packed.size());
-    else
-      unpack(column, out.head.hands, packed.data(), count, out.frames.data() + (row - first));
+      return source.wrong("/frames/" + column.name + " has a number that means nothing");
+    const hsize_t at = row - first;
+    unpack(column, out.head.hands, packed.data(),
+           {out.frames.data() + at, out.bends.data() + at * modes, out.seals.data() + at, count,
+            modes});
     row += count;
   }
   return Done{};
 }
 
 // Linux grants more memory than the machine has and kills the program later, without a message.
-Outcome check_memory(const fs::path& file, std::uint64_t frames) {
+Outcome check_memory(const fs::path& file, std::uint64_t frames, std::size_t modes) {
   const std::uint64_t half = free_memory().value_or(UINT64_MAX) / 2;
-  if (frames <= half / sizeof(h6FrameRecord)) return Done{};
+  if (frames <= half / (sizeof(h6FrameRecord) + modes * sizeof(double))) return Done{};
   return Failure{file.string() + ": " + std::to_string(frames) +
                  " frames are more than fit into half of the free memory: read it in pieces"};
 }
 
 // In the order of columns(); without a dataset where an older file has none.
-Result<std::vector<Stored>> open_columns(const Source& source, std::size_t hands) {
+Result<std::vector<Stored>> open_columns(const Source& source, const std::vector<Column>& columns,
+                                         std::size_t hands) {
   const Result<Handle> group = open_group(source, "/frames");
   if (!group) return group.failure();
   std::vector<Stored> open;
-  for (const Column& column : columns()) {
-    if (column.later && H5Lexists(*group, column.name, H5P_DEFAULT) == 0) {
+  for (const Column& column : columns) {
+    if (column.later && H5Lexists(*group, column.name.c_str(), H5P_DEFAULT) == 0) {
       open.emplace_back();
       continue;
     }
     Result<Stored> stored =
-        open_stored(source, *group, "/frames", column.name, cell_type(column.cell));
+        open_stored(source, *group, "/frames", column.name.c_str(), cell_type(column.cell));
     if (!stored) return stored.failure();
     const hsize_t rows = stored->dims[0];
     if (stored->dims != shape(column, rows, hands))
@@ -140,19 +140,21 @@ Result<std::vector<Stored>> open_columns(const Source& source, std::size_t hands
 }
 
 Outcome read_frames(const Source& source, FrameRange range, Recording& out) {
-  const Result<std::vector<Stored>> open = open_columns(source, out.head.hands);
+  const std::vector<Column> all = columns(out.head.bends);
+  const std::size_t modes = modes_of(out.head.bends);
+  const Result<std::vector<Stored>> open = open_columns(source, all, out.head.hands);
   if (!open) return open.failure();
   const hsize_t rows = (*open)[0].dims[0], first = std::min<hsize_t>(range.first, rows);
   const hsize_t wanted = std::min<hsize_t>(range.count, rows - first);
-  if (Outcome room = check_memory(source.file, wanted); !room) return room;
+  if (Outcome room = check_memory(source.file, wanted, modes); !room) return room;
   out.frame_count = rows;
   out.frames.resize(wanted, h6FrameRecord{});
+  out.bends.resize(wanted * modes);
   for (std::size_t i = 0; i < open->size(); ++i) {
     if (!(*open)[i].dataset.ok()) continue;
-    out.columns.push_back(columns()[i].name);
-    if (columns()[i].apart) out.seals.resize(wanted);
-    if (Outcome read = read_column(source, columns()[i], (*open)[i], first, out); !read)
-      return read;
+    out.columns.push_back(all[i].name);
+    if (all[i].part == Part::seal) out.seals.resize(wanted);
+    if (Outcome read = read_column(source, all[i], (*open)[i], first, out); !read) return read;
   }
   return Done{};
 }
@@ -235,6 +237,20 @@ Outcome read_summary(const Source& source, Recording& out) {
   return Done{};
 }
 
+// Throws what is no list of bodies that bend.
+std::vector<RecordedBend> parse_bends(const json& all) {
+  std::vector<RecordedBend> bends;
+  for (const json& bend : all) {
+    const double body = bend.at("body").get<double>(), modes = bend.at("modes").get<double>();
+    const bool whole = body >= 0 && body <= INT32_MAX && body == std::floor(body) && modes >= 1 &&
+                       modes <= H6_MAX_MODES && modes == std::floor(modes);
+    bends.push_back({whole ? static_cast<std::uint32_t>(body) : 0,
+                     bend.at("name").get<std::string>(),
+                     whole ? static_cast<std::size_t>(modes) : 0});
+  }
+  return bends;
+}
+
 }  // namespace
 
 Result<RecordingHead> parse_head(const std::string& text) {
@@ -255,6 +271,8 @@ Result<RecordingHead> parse_head(const std::string& text) {
     if (!(hands >= 1 && hands <= H6_MAX_HANDS && hands == std::floor(hands)))
       return Failure{"the number of hands is not 1 to " + std::to_string(H6_MAX_HANDS)};
     head.hands = static_cast<std::size_t>(hands);
+    if (all.contains("bends")) head.bends = parse_bends(all["bends"]);
+    if (const std::string wrong = wrong_bends(head.bends); !wrong.empty()) return Failure{wrong};
   } catch (const json::exception& problem) {
     return Failure{std::string("its head: ") + problem.what()};
   }

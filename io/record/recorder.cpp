@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -37,15 +38,23 @@ std::vector<std::byte> bytes_of(const void* from, std::size_t count) {
   return {bytes, bytes + count};
 }
 
+nlohmann::json bends_json(const std::vector<RecordedBend>& bends) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const RecordedBend& bend : bends)
+    all.push_back({{"body", bend.body}, {"name", bend.name}, {"modes", bend.modes}});
+  return all;
+}
+
 std::string whole_head(const RecordingHead& head) {
-  const nlohmann::json all = {{"version", format_version},
-                              {"json", head.scene_json},
-                              {"asset_hashes", head.asset_hashes},
-                              {"simd_target", head.simd_target},
-                              {"program", head.program},
-                              {"rate", head.rate},
-                              {"hands", head.hands},
-                              {"run", head.run_json}};
+  nlohmann::json all = {{"version", format_version},
+                        {"json", head.scene_json},
+                        {"asset_hashes", head.asset_hashes},
+                        {"simd_target", head.simd_target},
+                        {"program", head.program},
+                        {"rate", head.rate},
+                        {"hands", head.hands},
+                        {"run", head.run_json}};
+  if (!head.bends.empty()) all["bends"] = bends_json(head.bends);
   return all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -83,6 +92,7 @@ Outcome check_head(const fs::path& file, const RecordingHead& head) {
                             std::to_string(H6_MAX_HANDS) + " can be recorded");
   if (!(head.rate > 0 && head.rate <= 1e6))
     return refuse(file, "the rate must be above 0 and at most 1000000 Hz");
+  if (const std::string wrong = wrong_bends(head.bends); !wrong.empty()) return refuse(file, wrong);
   if (!head.scene_json.empty() && !is_json_object(head.scene_json))
     return refuse(file, "the scene is not one JSON object");
   return Done{};
@@ -91,19 +101,23 @@ Outcome check_head(const fs::path& file, const RecordingHead& head) {
 }  // namespace
 
 struct Recorder::Body {
-  Body(fs::path place, std::size_t hand_count, double rate)
+  Body(fs::path place, const RecordingHead& head)
       : file(std::move(place)),
         log_name(part_of(file)),
-        hands(hand_count),
-        chunk_rows(static_cast<std::size_t>(std::clamp(rate / 4, 16.0, 4096.0))),
-        seal(hand_count) {}
+        columns(recording::columns(head.bends)),
+        hands(head.hands),
+        modes(modes_of(head.bends)),
+        chunk_rows(static_cast<std::size_t>(std::clamp(head.rate / 4, 16.0, 4096.0))),
+        seal(head) {}
 
   const fs::path file, log_name;
-  const std::size_t hands, chunk_rows;  // a chunk takes a quarter of a second, within bounds
+  const std::vector<Column> columns;
+  const std::size_t hands, modes, chunk_rows;  // a chunk takes a quarter of a second, within bounds
   File log;
   std::uint64_t log_end = 0;  // [bytes]
 
   std::vector<h6FrameRecord> rows;  // of the chunk that is not full yet
+  std::vector<double> bends;        // (rows x modes)
   std::vector<std::uint64_t> seals;
   RowSeal seal;
   std::uint64_t first = 0;          // number of rows[0]
@@ -115,7 +129,8 @@ struct Recorder::Body {
 
   Outcome create(const RecordingHead& head);
   Outcome usable() const;
-  Outcome add(const h6FrameRecord* records, std::size_t count);
+  Outcome add(const h6FrameRecord* records, const double* q, std::size_t count);
+  void keep(const h6FrameRecord* records, const double* q, std::size_t count);
   Outcome write_rows();
   Outcome write_event(const RecordingEvent& event);
   Outcome write(LogRecord record, const std::vector<std::byte>& payload);
@@ -152,6 +167,7 @@ Outcome Recorder::Body::create(const RecordingHead& head) {
     return refuse(file, std::strerror(error));
   }
   rows.reserve(chunk_rows);
+  bends.reserve(chunk_rows * modes);
   seals.reserve(chunk_rows);
   open = true;
   return Done{};
@@ -163,18 +179,28 @@ Outcome Recorder::Body::usable() const {
   return Done{};
 }
 
-Outcome Recorder::Body::add(const h6FrameRecord* records, std::size_t count) {
+void Recorder::Body::keep(const h6FrameRecord* records, const double* q, std::size_t count) {
+  rows.insert(rows.end(), records, records + count);
+  const std::size_t end = bends.size();
+  bends.resize(end + count * modes, std::numeric_limits<double>::quiet_NaN());
+  if (q) std::copy_n(q, count * modes, bends.data() + end);
+  for (std::size_t i = 0; i < count; ++i)
+    seals.push_back(seal.next(records[i], bends.data() + end + i * modes));
+}
+
+Outcome Recorder::Body::add(const h6FrameRecord* records, const double* q, std::size_t count) {
   if (Outcome can = usable(); !can) return can;
   while (count > 0) {
     const std::size_t part = std::min(count, chunk_rows - rows.size());
     if (rows.size() == logged) waiting_since = Clock::now();
-    rows.insert(rows.end(), records, records + part);
-    for (std::size_t i = 0; i < part; ++i) seals.push_back(seal.next(records[i]));
+    keep(records, q, part);
     records += part, count -= part;
+    if (q) q += part * modes;
     if (rows.size() < chunk_rows) break;
     if (Outcome written = write_rows(); !written) return written;
     first += chunk_rows;
     rows.clear();
+    bends.clear();
     seals.clear();
     logged = 0;
   }
@@ -191,7 +217,8 @@ Outcome Recorder::Body::write_rows() {
   record.count = static_cast<std::uint32_t>(rows.size());
   logged = rows.size();
   logged_until = rows.back().time;
-  return write(record, pack_chunks(hands, chunk_rows, rows.data(), seals.data(), rows.size()));
+  const Rows all{rows.data(), bends.data(), seals.data(), rows.size(), modes};
+  return write(record, pack_chunks(columns, hands, chunk_rows, all));
 }
 
 Outcome Recorder::Body::write_event(const RecordingEvent& event) {
@@ -258,7 +285,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& file,
     const fs::path place = followed(file);
     if (Outcome may = may_replace(place); !may) return may.failure();
     if (Outcome fine = check_head(file, head); !fine) return fine.failure();
-    auto body = std::make_unique<Body>(place, head.hands, head.rate);
+    auto body = std::make_unique<Body>(place, head);
     if (Outcome created = body->create(head); !created) return created.failure();
     return std::unique_ptr<Recorder>(new Recorder(std::move(body)));
   } catch (const std::exception& problem) {
@@ -266,8 +293,8 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& file,
   }
 }
 
-Outcome Recorder::frames(const h6FrameRecord* records, std::size_t count) {
-  return body_->guarded([&] { return body_->add(records, count); });
+Outcome Recorder::frames(const h6FrameRecord* records, std::size_t count, const double* bends) {
+  return body_->guarded([&] { return body_->add(records, bends, count); });
 }
 
 Outcome Recorder::event(const RecordingEvent& event) {

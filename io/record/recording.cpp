@@ -50,6 +50,12 @@ Result<Recording> read_log(const File& log, FrameRange range) {
 
 }  // namespace
 
+std::size_t modes_of(const std::vector<RecordedBend>& bends) {
+  std::size_t modes = 0;
+  for (const RecordedBend& bend : bends) modes += bend.modes;
+  return modes;
+}
+
 Result<Recording> read_recording(const fs::path& name, FrameRange range) {
   const fs::path file = file_of(name);
   try {
@@ -60,9 +66,11 @@ Result<Recording> read_recording(const fs::path& name, FrameRange range) {
       read = read_log(log, range);
     } else {
       const LibraryLock lock;
-      // One frame leads through all that HDF5 looks up; the others are bytes at places that it knows.
-      const Outcome survives = first_in_child(
-          file, "a recording", [&] { (void)read_hdf5(file, {range.first, 1}); });
+      // One frame leads through all that HDF5 looks up; the others are bytes at places that it
+      // knows.
+      const Outcome survives = first_in_child(file, "a recording", [&] {
+        (void)read_hdf5(file, {range.first, 1});
+      });
       read = survives ? read_hdf5(file, range) : survives.failure();
     }
     if (read && !read->whole)

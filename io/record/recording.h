@@ -13,7 +13,8 @@
 // /frames/{hand_pose, hand_velocity, hand_wrench, buttons, sequence, body_pose, body_velocity,
 // wrench, command_pose, cause, causes, state, safety_asked, overdue} (n, hands) or (n, hands,
 // width), with units and column names as attributes; /config, /events/{t, what, detail, seal},
-// /summary. Numbers are read back bit for bit. Every frame has the gravest cause and all causes,
+// /summary. Each body that bends has /frames/bend_N (n, r), its coordinates q; N is its index in
+// the scene. Numbers are read back bit for bit. Every frame has the gravest cause and all causes,
 // the device's state, and the inputs of its safety chain. An event marks the first frame of each
 // cause. /config and /summary hold their attributes a second time, as the text that read_recording
 // reads.
@@ -29,6 +30,18 @@
 #include "hapsix/result.h"
 
 namespace h6::io {
+namespace recording {
+struct Column;
+}
+
+// A body whose shell bends.
+struct RecordedBend {
+  std::uint32_t body;  // index in the scene
+  std::string name;
+  std::size_t modes;  // r, 1 .. H6_MAX_MODES
+};
+
+std::size_t modes_of(const std::vector<RecordedBend>& bends);  // of all together
 
 // The facts about a run that do not change with the frames: JSON and attributes under /config.
 struct RecordingHead {
@@ -37,8 +50,9 @@ struct RecordingHead {
   std::string simd_target;                // kernels in use, "AVX3"
   double rate = 1000;                     // [Hz]
   std::size_t hands = 1;
-  std::string program;   // name and version
-  std::string run_json;  // how it was run, see recorded_run.h; may be empty
+  std::string program;              // name and version
+  std::string run_json;             // how it was run, see recorded_run.h; may be empty
+  std::vector<RecordedBend> bends;  // in the order of bodies; older files have none
 };
 
 struct RecordingEvent {
@@ -62,7 +76,8 @@ class Recorder {
   ~Recorder();
   // After a failure (a full disk) nothing more is written and each call gives the same sentence;
   // the frames before it stay in the log and can be read.
-  Outcome frames(const h6FrameRecord* records, std::size_t count);
+  // `bends`: (count x all modes) q of the bodies that bend [m sqrt(kg)]; null: NaN is recorded.
+  Outcome frames(const h6FrameRecord* records, std::size_t count, const double* bends = nullptr);
   Outcome event(const RecordingEvent& event);
   // `summary_json` is one JSON object, for /summary. Makes the HDF5 file: some 2 s for an hour.
   Outcome finish(const std::string& summary_json);
@@ -76,6 +91,7 @@ class Recorder {
 struct Recording {
   RecordingHead head;
   std::vector<h6FrameRecord> frames;
+  std::vector<double> bends;  // (frames x all modes) q; NaN where it is not known  [m sqrt(kg)]
   std::vector<RecordingEvent> events;
   std::string summary_json;       // empty: the run did not end
   bool whole = true;              // false: the run did not end; the frames up to then are here
@@ -107,11 +123,21 @@ struct RowDifference {
   std::size_t hand = 0;      // of columns with one row a hand
   double a = 0, b = 0;       // as numbers; of hashes only the leading digits
 };
-// `columns`: of the recording; only these are compared. Without the inputs of the safety chain
-// (older recordings), commands and states are left out.
-std::optional<RowDifference> first_difference(const h6FrameRecord& recorded,
-                                              const h6FrameRecord& replayed, std::size_t hands,
-                                              const std::vector<std::string>& columns);
+class RowComparison {
+ public:
+  // `columns`: of the recording; only these are compared. Without the inputs of the safety chain
+  // (older recordings), commands and states are left out.
+  RowComparison(const RecordingHead& head, const std::vector<std::string>& columns);
+  // `bends`: the rows' q of all bodies that bend. Where the recorded one is not known, it is left
+  // out.
+  std::optional<RowDifference> first(const h6FrameRecord& recorded, const double* recorded_bends,
+                                     const h6FrameRecord& replayed,
+                                     const double* replayed_bends) const;
+
+ private:
+  std::size_t hands_;
+  std::shared_ptr<const std::vector<recording::Column>> columns_;  // that are compared, in order
+};
 
 // Compares the attributes of `file`, which other programs read, with the texts of `recording` that
 // they repeat, and units and column names with those that this version writes. Returns the first

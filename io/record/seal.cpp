@@ -9,23 +9,25 @@
 
 namespace h6::io {
 
-using recording::columns;
+using recording::Column;
 
-RowSeal::RowSeal(std::size_t hands) : hands_(hands) {
-  for (std::size_t i = 0; i < columns().size(); ++i)
-    if (!columns()[i].apart) columns_.push_back(i);
-}
+RowSeal::RowSeal(const RecordingHead& head) : RowSeal(head, {}) {}
 
-RowSeal::RowSeal(std::size_t hands, const std::vector<std::string>& present) : RowSeal(hands) {
-  std::erase_if(columns_, [&](std::size_t i) {
-    return std::find(present.begin(), present.end(), columns()[i].name) == present.end();
+RowSeal::RowSeal(const RecordingHead& head, const std::vector<std::string>& present)
+    : hands_(head.hands), modes_(modes_of(head.bends)) {
+  std::vector<Column> sealed = recording::columns(head.bends);
+  std::erase_if(sealed, [&](const Column& column) {
+    return column.part == recording::Part::seal ||
+           (!present.empty() &&
+            std::find(present.begin(), present.end(), column.name) == present.end());
   });
+  columns_ = std::make_shared<const std::vector<Column>>(std::move(sealed));
 }
 
-std::uint64_t RowSeal::next(const h6FrameRecord& row) {
+std::uint64_t RowSeal::next(const h6FrameRecord& row, const double* bends) {
   row_.clear();
-  for (const std::size_t i : columns_) {
-    recording::pack(columns()[i], hands_, &row, 1, cells_);
+  for (const Column& column : *columns_) {
+    recording::pack(column, hands_, {&row, bends, nullptr, 1, modes_}, cells_);
     row_.insert(row_.end(), cells_.begin(), cells_.end());
   }
   return last_ = hash_on(last_, row_.data(), row_.size());

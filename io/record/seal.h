@@ -15,14 +15,15 @@ namespace h6::io {
 // file was changed, by accident or by hand. It does not stop a forger, who can compute it too.
 class RowSeal {
  public:
-  explicit RowSeal(std::size_t hands);  // of a new recording
+  explicit RowSeal(const RecordingHead& head);  // of a new recording
   // `columns`: those of the recording, which may lack newer ones.
-  RowSeal(std::size_t hands, const std::vector<std::string>& columns);
-  std::uint64_t next(const h6FrameRecord& row);
+  RowSeal(const RecordingHead& head, const std::vector<std::string>& columns);
+  // `bends`: q of all bodies that bend.
+  std::uint64_t next(const h6FrameRecord& row, const double* bends);
 
  private:
-  std::size_t hands_;
-  std::vector<std::size_t> columns_;  // indices into recording::columns()
+  std::size_t hands_, modes_;
+  std::shared_ptr<const std::vector<recording::Column>> columns_;
   std::vector<std::byte> cells_, row_;
   std::uint64_t last_ = 0;
 };

@@ -12,6 +12,7 @@ namespace {
 
 using recording::Cell;
 using recording::Column;
+using recording::Part;
 
 template <class T>
 void append_number(const std::byte*& from, std::string& out) {
@@ -23,17 +24,21 @@ void append_number(const std::byte*& from, std::string& out) {
 }
 
 void append_cell(Cell cell, const std::byte*& from, std::string& out) {
-  if (cell == Cell::real) append_number<double>(from, out);
-  else if (cell == Cell::natural32) append_number<std::uint32_t>(from, out);
-  else append_number<std::uint64_t>(from, out);
+  if (cell == Cell::real)
+    append_number<double>(from, out);
+  else if (cell == Cell::natural32)
+    append_number<std::uint32_t>(from, out);
+  else
+    append_number<std::uint64_t>(from, out);
 }
 
 }  // namespace
 
-std::string csv_head(std::size_t hands) {
+std::string csv_head(const RecordingHead& head) {
+  const std::size_t hands = head.hands;
   std::string out;
-  for (const Column& column : recording::columns()) {
-    if (column.apart) continue;
+  for (const Column& column : recording::columns(head.bends)) {
+    if (column.part == Part::seal) continue;
     std::istringstream labels(column.labels);
     std::vector<std::string> cells;
     for (std::string label; labels >> label;) cells.push_back(label);
@@ -41,20 +46,24 @@ std::string csv_head(std::size_t hands) {
       for (std::size_t i = 0; i < column.width; ++i) {
         if (!out.empty()) out += ',';
         out += column.name;
-        if (column.width > 1) out += "_" + (i < cells.size() ? cells[i] : std::to_string(i));
+        if (column.width > 1 || column.part == Part::bends)
+          out += "_" + (i < cells.size() ? cells[i] : std::to_string(i));
         if (column.per_hand() && hands > 1) out += "_" + std::to_string(hand);
       }
   }
   return out + '\n';
 }
 
-void append_csv(const std::vector<h6FrameRecord>& frames, std::size_t hands, std::string& out) {
+void append_csv(const Recording& piece, std::string& out) {
+  const std::vector<Column> columns = recording::columns(piece.head.bends);
+  const std::size_t hands = piece.head.hands, modes = modes_of(piece.head.bends);
   std::vector<std::byte> row;
-  for (const h6FrameRecord& frame : frames) {
+  for (std::size_t i = 0; i < piece.frames.size(); ++i) {
     bool first = true;
-    for (const Column& column : recording::columns()) {
-      if (column.apart) continue;
-      recording::pack(column, hands, &frame, 1, row);
+    for (const Column& column : columns) {
+      if (column.part == Part::seal) continue;
+      recording::pack(column, hands,
+                      {&piece.frames[i], piece.bends.data() + i * modes, nullptr, 1, modes}, row);
       const std::byte* from = row.data();
       for (const std::byte* end = from + recording::row_bytes(column, hands); from < end;) {
         if (!first) out += ',';

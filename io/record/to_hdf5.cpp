@@ -75,19 +75,21 @@ struct LogSource {
 bool put_frames(hid_t file, const LogSource& from) {
   const Handle group = H5Gcreate2(file, "frames", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   std::vector<Handle> datasets;
-  for (const Column& column : columns()) {
-    datasets.push_back(make_dataset(group, column.name, cell_type(column.cell),
+  for (const Column& column : columns(from.head.bends)) {
+    datasets.push_back(make_dataset(group, column.name.c_str(), cell_type(column.cell),
                                     from.index.row_count,
                                     shape(column, from.index.chunk_rows, from.head.hands)));
     const hid_t made = datasets.back();
     if (made < 0 || !put_text(made, "units", column.units) ||
-        !put_text(made, "columns", column.labels))
+        !put_text(made, "columns", column.labels) ||
+        (column.part == Part::bends && !put_text(made, "body", column.body)))
       return false;
   }
   std::vector<std::byte> payload;
   for (const Payload& rows : from.index.rows) {
     std::vector<Span> chunks;
-    if (!read_payload(from.log, rows, payload) || !find_chunks(payload, chunks)) return false;
+    if (!read_payload(from.log, rows, payload) || !find_chunks(payload, datasets.size(), chunks))
+      return false;
     for (std::size_t i = 0; i < datasets.size(); ++i) {
       const hsize_t at[3] = {rows.record.first, 0, 0};
       if (H5Dwrite_chunk(datasets[i], H5P_DEFAULT, 0, at, chunks[i].bytes, chunks[i].from) < 0)
@@ -153,8 +155,8 @@ bool put_summary(hid_t file, const LogSource& from, std::uint64_t seal) {
 }
 
 // HDF5 cannot close a file whose last pages do not fit on the disk, so check for room first.
-Outcome check_room(const fs::path& out, const LogIndex& index) {
-  const std::uint64_t chunks = (index.rows.size() + 1) * columns().size();
+Outcome check_room(const fs::path& out, const LogIndex& index, std::size_t columns) {
+  const std::uint64_t chunks = (index.rows.size() + 1) * columns;
   const std::uint64_t needed = index.end + chunks * 128 + (256 << 10);
   rlimit limit{};
   std::error_code failed;
@@ -181,7 +183,8 @@ Outcome write_hdf5(const File& log, const fs::path& out) {
   Result<RecordingHead> head = parse_head(index->head);
   if (!head) return head.failure();
   const LogSource from{log, std::move(*index), std::move(*head)};
-  if (Outcome room = check_room(out, from.index); !room) return room;
+  if (Outcome room = check_room(out, from.index, columns(from.head.bends).size()); !room)
+    return room;
   const LibraryLock lock;
   // The library's oldest file format, which is its default: MATLAB reads it.
   const Handle h5 = H5Fcreate(out.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, file_access());

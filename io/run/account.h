@@ -16,7 +16,7 @@ class Account {
  public:
   // `recording`: head, events and summary; it must outlive this object.
   Account(const io::LoadedScene& loaded, const io::Recording& recording, bool virtual_time);
-  void row(const h6FrameRecord& row) { (void)watch_.rows(&row, 1); }
+  void row(const h6FrameRecord& row) { (void)watch_.rows(&row, nullptr, 1); }
   // After the last row: the first thing that differs, "event 3 (clamped)" or "max_force of its
   // summary". Empty: nothing does. It may take a while.
   std::string first_difference(const io::Progress& progress);

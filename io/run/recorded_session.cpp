@@ -23,6 +23,12 @@ void take_target(const std::string& recorded, std::vector<std::string>& remarks)
                       kernels::target_name() + ", bits will differ");
 }
 
+bool same_bends(const std::vector<io::RecordedBend>& a, const std::vector<io::RecordedBend>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
+    return x.body == y.body && x.modes == y.modes;
+  });
+}
+
 bool has_column(const io::Recording& recording, const char* name) {
   const std::vector<std::string>& all = recording.columns;
   return std::find(all.begin(), all.end(), name) != all.end();
@@ -46,8 +52,11 @@ Result<std::unique_ptr<RecordedSession>> RecordedSession::open(const std::filesy
   if (!loaded) return loaded.failure();
   s->loaded_ = std::move(*loaded);
   s->hands_ = head.hands;
+  s->bends_ = recorded_bends(*s->loaded_);
   if (s->loaded_->hands.size() != head.hands)
     return Failure{"its scene has another number of hands than its rows"};
+  if (!head.bends.empty() && !same_bends(head.bends, s->bends_))
+    return Failure{"other bodies of its scene bend than its rows say"};
   h6SessionDef& def = s->def_ = s->loaded_->session_def();
   s->hand_defs_ = s->loaded_->hands;
   def.hands = s->hand_defs_.data();
@@ -162,6 +171,8 @@ Result<const h6FrameRecord*> RecordedSession::step(const h6FrameRecord& recorded
     h6GetSafety(session_.get(), static_cast<std::int32_t>(h), &safety);
     now_.state[h] = safety.state;
   }
+  now_bends_.clear();
+  append_bends(session_.get(), bends_, now_bends_);
   return &now_;
 }
 

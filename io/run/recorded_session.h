@@ -36,6 +36,9 @@ class RecordedSession {
   // when.
   Result<const h6FrameRecord*> step(const h6FrameRecord& recorded);
 
+  // q of all bodies that bend after the last step, one body after another [m sqrt(kg)].
+  const std::vector<double>& bends() const { return now_bends_; }
+
   const io::LoadedScene& loaded() const { return *loaded_; }
   const io::RecordedRun& run() const { return run_; }
   const h6Session* session() const { return session_.get(); }
@@ -65,6 +68,8 @@ class RecordedSession {
   h6Pose sent_[H6_MAX_HANDS] = {};  // the poses of the recorded commands before
   bool any_sent_ = false;
   h6FrameRecord now_{};
+  std::vector<io::RecordedBend> bends_;
+  std::vector<double> now_bends_;
 };
 
 }  // namespace h6::cli

@@ -96,7 +96,8 @@ class LiveRun {
         console_(console),
         watch_(run.loaded, run.def.rate, summary, run.recorder.get()),
         trace_(static_cast<std::size_t>(kTraceSeconds * run.def.rate)),
-        progress_(options.observer ? io::Progress{} : console.progress()) {}
+        progress_(options.observer ? io::Progress{} : console.progress()),
+        bends_(rows_.size() * io::modes_of(recorded_bends(run.loaded))) {}
 
   Outcome start(const h6LoopDef& def) {
     if (!options_.virtual_time) rise_above_load();
@@ -149,9 +150,10 @@ class LiveRun {
 
  private:
   void drain() {
-    while (std::size_t n = h6ReadRecords(loop_.get(), rows_.data(), rows_.size())) {
+    while (std::size_t n =
+               h6ReadRecordsWithBends(loop_.get(), rows_.data(), bends_.data(), rows_.size())) {
       silent_ = 0;
-      if (recorded_) recorded_ = watch_.rows(rows_.data(), n);
+      if (recorded_) recorded_ = watch_.rows(rows_.data(), bends_.data(), n);
       n = keep_whole(n);
       if (n == 0) continue;
       if (options_.observer) options_.observer->rows(rows_.data(), n);
@@ -214,6 +216,7 @@ class LiveRun {
   io::view::Trace trace_;
   io::Progress progress_;
   std::vector<h6FrameRecord> rows_ = std::vector<h6FrameRecord>(256);
+  std::vector<double> bends_;  // (rows x modes) q
   double silent_ = 0;          // [s] since the last row
   double faulty_since_ = -1;   // time of a row [s]; negative: no hand is faulty
   Outcome recorded_ = Done{};  // after a failure the run ends and no more rows are watched

@@ -7,6 +7,25 @@
 
 namespace h6::cli {
 
+std::vector<io::RecordedBend> recorded_bends(const io::LoadedScene& loaded) {
+  std::vector<io::RecordedBend> bends;
+  for (std::size_t b = 0; b < loaded.bends.size(); ++b)
+    if (loaded.bends[b])
+      bends.push_back(
+          {static_cast<std::uint32_t>(b), loaded.scene.bodies[b].name, loaded.bends[b]->modes});
+  return bends;
+}
+
+void append_bends(const h6Session* session, const std::vector<io::RecordedBend>& bends,
+                  std::vector<double>& out) {
+  for (const io::RecordedBend& bend : bends) {
+    const std::size_t end = out.size();
+    out.resize(end + bend.modes);
+    h6GetDeformation(session, static_cast<std::int32_t>(bend.body), out.data() + end, nullptr,
+                     bend.modes);
+  }
+}
+
 RunSetup::RunSetup(const io::LoadedScene& scene)
     : loaded(scene), def(scene.session_def()), hand_defs(scene.hands), hands(scene.scene.hands) {
   def.hands = hand_defs.data();
@@ -83,6 +102,7 @@ Outcome RunSetup::open_recording() {
   head.simd_target = kernels::target_name();
   head.rate = def.rate;
   head.hands = def.hand_count;
+  head.bends = recorded_bends(loaded);
   head.program = "hapsix " + std::to_string(H6_VERSION_MAJOR) + "." +
                  std::to_string(H6_VERSION_MINOR) + "." + std::to_string(H6_VERSION_PATCH);
   Result<std::unique_ptr<io::Recorder>> created = io::Recorder::create(record, head);

@@ -20,6 +20,12 @@ struct SessionRelease {
 };
 using SessionPtr = std::unique_ptr<h6Session, SessionRelease>;
 
+// The bodies of a scene that bend, as a recording names them.
+std::vector<io::RecordedBend> recorded_bends(const io::LoadedScene& loaded);
+// Their q now, one body after another, appended to `out` [m sqrt(kg)].
+void append_bends(const h6Session* session, const std::vector<io::RecordedBend>& bends,
+                  std::vector<double>& out);
+
 // A run in preparation. Change `def`, `hand_defs` and `hands` as needed, then call open().
 struct RunSetup {
   explicit RunSetup(const io::LoadedScene& scene);

@@ -22,9 +22,9 @@ RunWatch::RunWatch(const io::LoadedScene& loaded, double rate, RunSummary& summa
   last_state_.fill(H6_ACTIVE);  // a device that is active from the start is no event
 }
 
-Outcome RunWatch::rows(const h6FrameRecord* rows, std::size_t count) {
+Outcome RunWatch::rows(const h6FrameRecord* rows, const double* bends, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) row(rows[i]);
-  return recorder_ ? recorder_->frames(rows, count) : Outcome(Done{});
+  return recorder_ ? recorder_->frames(rows, count, bends) : Outcome(Done{});
 }
 
 void RunWatch::note(const std::string& what, const std::string& detail) {

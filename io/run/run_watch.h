@@ -14,7 +14,8 @@ class RunWatch {
  public:
   // Fills `summary`. `rate` is in frames per second. `recorder` may be null.
   RunWatch(const io::LoadedScene& loaded, double rate, RunSummary& summary, io::Recorder* recorder);
-  Outcome rows(const h6FrameRecord* rows, std::size_t count);
+  // `bends`: q of all bodies that bend, a row for each frame.
+  Outcome rows(const h6FrameRecord* rows, const double* bends, std::size_t count);
   // Adds an event that the frames do not show.
   void note(const std::string& what, const std::string& detail);
   // Judges the run, which may take a while.

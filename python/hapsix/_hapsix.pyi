@@ -342,7 +342,8 @@ class Recorder:
         """Adds the session's last frame."""
     @overload
     def record(self, frames: ArrayLike) -> None:
-        """Adds the rows that Session.follow returned."""
+        """Adds the rows that Session.follow returned; shapes of bodies that bend are not
+        in them and stand as NaN."""
 
 class Recording:
     """A recorded run, or what a killed run left of one."""
@@ -350,6 +351,10 @@ class Recording:
         ...
     def __len__(self) -> int:
         ...
+    def bends(self, first: int = 0, count: Optional[int] = None) -> dict:
+        """The same frames of the bodies that bend: {index of the body: (n, r) coordinates
+        q [m sqrt(kg)]}, NaN where they are not known; {} where nothing bends, and of
+        older recordings."""
     @property
     def events(self) -> list:
         """list of (time [s], what, detail)"""
@@ -453,6 +458,9 @@ class Session:
         """Contacts of a shell body in the last frame, as views."""
     def coupling(self, hand: int) -> Coupling:
         """The Coupling in use, with derived values."""
+    def deformation(self, body: int) -> NDArray[Any]:
+        """(r,) coordinates q of a body whose shell bends [m sqrt(kg)], a copy; (0,) of
+        others"""
     def disarm(self) -> None:
         """Lets every output decay to zero."""
     def follow(self, poses: ArrayLike) -> NDArray[Any]:

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <vector>
 
 #include "runtime/frame/session.h"
 #include "runtime/loop/device_gate.h"
@@ -37,7 +38,8 @@ struct h6Loop {
   double due = 1;            // the next frame runs when this reaches 1
   std::unique_ptr<h6::RecordRing> ring;
   h6FrameRecord record{};
-  h6LoopReport report{};  // belongs to the haptic thread until that has ended
+  std::vector<double> bends;  // q of the bodies that bend, after the frame
+  h6LoopReport report{};      // belongs to the haptic thread until that has ended
   std::atomic<bool> stop{false};
   std::atomic<int> request{kNothing};
   h6::DeviceGate gate;
@@ -252,7 +254,9 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   if (loop.def.virtual_time)
     while (loop.ring->full() && !loop.stop.load(std::memory_order_relaxed) && !loop.gate.halted())
       sched::sleep_until_ns(sched::now_ns() + 200000);
-  loop.ring->push(row);
+  double* to = loop.bends.data();
+  for (const Deformation& d : s.bends) to = std::copy_n(d.q, d.modes, to);
+  loop.ring->push(row, loop.bends.data());
 }
 
 constexpr std::int64_t kTakeOverTime = 2'000'000'000;  // longest wait of h6ChangeSession [ns]
@@ -348,8 +352,11 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     loop->frames = static_cast<std::uint64_t>(used.duration / session->settings.dt + 0.5);
     if (used.duration > 0 && loop->frames == 0) loop->frames = 1;
     if (used.ring_frames) {
+      std::size_t modes = 0;
+      for (const Deformation& d : session->bends) modes += static_cast<std::size_t>(d.modes);
+      loop->bends.resize(modes);
       loop->ring = std::make_unique<RecordRing>(used.ring_frames, used.ring_inputs,
-                                                session->hands.size(), session->allocator);
+                                                session->hands.size(), modes, session->allocator);
       if (!loop->ring->ready()) {
         fail(error, H6_ERROR_MEMORY, "no memory for %zu records: lower ring_frames",
              used.ring_frames);
@@ -406,7 +413,10 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
 }
 
 size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity) {
-  return loop && out && loop->ring ? loop->ring->pop(out, capacity) : 0;
+  return h6ReadRecordsWithBends(loop, out, nullptr, capacity);
+}
+size_t h6ReadRecordsWithBends(h6Loop* loop, h6FrameRecord* out, double* bends, size_t capacity) {
+  return loop && out && loop->ring ? loop->ring->pop(out, bends, capacity) : 0;
 }
 bool h6ReadView(h6Loop* loop, h6LoopView* out) {
   return loop && out && loop->view && loop->view->read(out);

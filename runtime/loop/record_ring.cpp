@@ -2,6 +2,7 @@
 #include "runtime/loop/record_ring.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace h6 {
 namespace {
@@ -17,15 +18,26 @@ T* fill(Buffer<T>& buffer, const h6Allocator& allocator, std::size_t count) {
 }  // namespace
 
 RecordRing::RecordRing(std::size_t records, std::size_t inputs, std::size_t hands,
-                       const h6Allocator& allocator)
+                       std::size_t modes, const h6Allocator& allocator)
     : hands_(hands),
       each_(std::max<std::size_t>(1, hands)),
+      modes_(modes),
+      records_(records),
       whole_(fill(record_memory_, allocator, records), records),
       inputs_(fill(input_memory_, allocator, std::max<std::size_t>(1, inputs * each_)),
-              inputs * each_) {}
+              inputs * each_) {
+  fill(bend_memory_, allocator, std::max<std::size_t>(1, records * modes));
+}
 
-void RecordRing::push(const h6FrameRecord& row) {
-  if (whole_.push(row)) return;
+void RecordRing::push(const h6FrameRecord& row, const double* bends) {
+  // Asked once: the reader may make room at any time, and a record is pushed with its bends or not
+  // at all. Its slot is free until then.
+  if (!whole_.full()) {
+    if (modes_ > 0) std::copy_n(bends, modes_, bend_memory_.data + pushed_ % records_ * modes_);
+    whole_.push(row);
+    ++pushed_;
+    return;
+  }
   if (!inputs_.room_for(each_)) {
     ++lost_;
     return;
@@ -40,18 +52,26 @@ void RecordRing::push(const h6FrameRecord& row) {
 // Once inputs are in their ring, the other one stays full until this thread pops. So when no inputs
 // are seen first, no record that is seen then comes after inputs; and when some are seen, every
 // record of a frame before them can be seen, too.
-std::size_t RecordRing::pop(h6FrameRecord* out, std::size_t room) {
-  std::size_t count = 0;
-  while (count < room) {
+std::size_t RecordRing::pop(h6FrameRecord* out, double* bends, std::size_t room) {
+  for (std::size_t i = 0; i < room; ++i) {
+    double* const q = bends ? bends + i * modes_ : nullptr;
     const Input* inputs = inputs_.front();
-    if (!inputs) return count + whole_.pop(out + count, room - count);
     const h6FrameRecord* record = whole_.front();
-    if (record && record->report.frame < inputs->frame)
-      whole_.pop(&out[count++], 1);
-    else
-      pop_inputs(out[count++]);
+    if (!inputs && !record) return i;
+    if (record && (!inputs || record->report.frame < inputs->frame)) {
+      pop_whole(out[i], q);
+      continue;
+    }
+    pop_inputs(out[i]);
+    if (q) std::fill_n(q, modes_, std::numeric_limits<double>::quiet_NaN());
   }
-  return count;
+  return room;
+}
+
+void RecordRing::pop_whole(h6FrameRecord& out, double* bends) {
+  if (bends) std::copy_n(bend_memory_.data + popped_ % records_ * modes_, modes_, bends);
+  ++popped_;
+  whole_.pop(&out, 1);
 }
 
 void RecordRing::pop_inputs(h6FrameRecord& out) {

@@ -267,6 +267,7 @@ TEST_CASE("a loop's room that is NULL is not written, and a wild pace is the usu
   CHECK(h6ChangeSession(loop, nullptr, &error) == nullptr);
   CHECK(error.code == H6_ERROR_ARGUMENT);
   CHECK(h6ReadRecords(loop, nullptr, SIZE_MAX) == 0);
+  CHECK(h6ReadRecordsWithBends(loop, nullptr, nullptr, SIZE_MAX) == 0);
   CHECK_FALSE(h6ReadView(loop, nullptr));
   h6JoinLoop(loop, nullptr);
   std::vector<h6FrameRecord> rows(50);
@@ -318,9 +319,10 @@ TEST_CASE("every function of the contract with an argument stands in a test of w
     return std::string(std::istreambuf_iterator<char>(in), {});
   };
   std::string tests = text_of("tests/runtime/frame/arguments_test.cpp");
-  // In these two files they are the last part.
+  // In these files they are the last part.
   for (const char* file :
-       {"tests/contract/handles_test.cpp", "tests/io/api/io_contract_test.cpp"}) {
+       {"tests/contract/handles_test.cpp", "tests/io/api/bends_contract_test.cpp",
+        "tests/io/api/io_contract_test.cpp"}) {
     const std::string text = text_of(file);
     const std::size_t first = text.find("\n// ---- wrong arguments");
     REQUIRE(first != std::string::npos);

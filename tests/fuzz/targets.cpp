@@ -246,6 +246,10 @@ std::string sealed_log(std::string_view bytes) {
         crc32_z(0, reinterpret_cast<const Bytef*>(&log[at + skip]), end - at - skip));
     std::memcpy(&log[at], &record, sizeof record);
     at = end;
+  promise(recording->bends.size() == recording->frames.size() * io::modes_of(recording->head.bends),
+          "a shape for each frame");
+  for (const io::RecordedBend& bend : recording->head.bends)
+    promise(bend.modes >= 1 && bend.modes <= H6_MAX_MODES, "a body bends by its modes");
   }
   return log;
 }

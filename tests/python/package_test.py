@@ -119,6 +119,32 @@ class Sessions(unittest.TestCase):
             self.assertEqual(columns["command_wrench_force_x"][-1], session.command[0, 0])
             self.assertEqual(len(recording.frames(290, 100)), 11)
 
+    def test_a_recording_has_the_shapes_of_bodies_that_bend(self):
+        scene = hapsix.Scene("clip-and-rod")
+        session = hapsix.Session(scene.model, scene.definition())
+        self.assertEqual(session.deformation(1).shape, (0,))
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "bend.h5")
+            recorder = hapsix.Recorder(file, scene)
+            stepped = []
+            for i in range(400):
+                session.step(scene.path(0, 1e-3 * i)[0])
+                recorder.record(session)
+                stepped.append(session.deformation(0))
+            recorder.record(session.follow(np.array([[scene.path(0, 0.4)[0]]])))
+            recorder.finish()
+            bends = hapsix.Recording(file).bends()
+            self.assertEqual(list(bends), [0])
+            np.testing.assert_array_equal(bends[0][:400], np.array(stepped))
+            self.assertGreater(float(np.abs(bends[0][:400]).max()), 0)
+            self.assertTrue(np.isnan(bends[0][400:]).all())
+            np.testing.assert_array_equal(hapsix.Recording(file).bends(100, 20)[0], bends[0][100:120])
+            rigid = os.path.join(folder, "rigid.h5")
+            recorder = hapsix.Recorder(rigid, SCENE)
+            recorder.record(pressed(frames=3))
+            recorder.finish()
+            self.assertEqual(hapsix.Recording(rigid).bends(), {})
+
     def test_a_recording_is_a_table_of_pandas(self):
         try:
             import pandas

@@ -208,6 +208,12 @@ H6_API h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, 
 /* Rows as h6ReadRecords gives them, or h6GetRecord. Call it at least every 50 ms, also with count 0. */
 H6_API bool        h6RecordFrames(h6Recorder* recorder, const h6FrameRecord* rows, size_t count,
                                   h6Error* error);
+/* The same with the shapes of bodies that bend: row i of `bends`, `modes` numbers, is q of all these
+ * bodies after frame i, one body after another, as h6ReadRecordsWithBends gives them [m sqrt(kg)];
+ * h6GetDeformation gives them after a step. NULL, or h6RecordFrames: NaN is recorded, not known. Refused
+ * where the bodies of the recorder's scene do not bend by so many modes; without a scene, by none. */
+H6_API bool        h6RecordFramesWithBends(h6Recorder* recorder, const h6FrameRecord* rows, size_t count,
+                                           const double* bends, size_t modes, h6Error* error);
 /* Makes the file. `summary`: one JSON object, or NULL. */
 H6_API bool        h6FinishRecorder(h6Recorder* recorder, const char* summary, h6Error* error);
 H6_API void        h6DestroyRecorder(h6Recorder* recorder); /* unfinished: the recording says so    */
@@ -232,6 +238,20 @@ H6_API void         h6GetRecording(const h6Recording* recording, h6RecordingInfo
 /* Reads `count` frames from `first` on; fewer at the end. Returns how many; -1: `error` is filled. */
 H6_API int64_t      h6GetRecordingFrames(h6Recording* recording, uint64_t first, h6FrameRecord* out,
                                          size_t count, h6Error* error);
+/* A body that bends, of which the recording has q, in the order of bodies. False: there is none. Older
+ * recordings have none. */
+typedef struct h6RecordingBend {
+  int32_t     body;        /* index in the scene or session                                         */
+  const char* name;        /* of the body, or ""                                                    */
+  size_t      modes;       /* r                                                                     */
+  uint64_t    reserved[4];
+} h6RecordingBend;
+H6_API bool         h6GetRecordingBend(const h6Recording* recording, size_t bend,
+                                       h6RecordingBend* out);
+/* q of all these bodies in `count` frames from `first` on: (count x sum of r), one body after another
+ * [m sqrt(kg)]; NaN where it is not known. Returns the rows; fewer at the end. -1: `error` is filled. */
+H6_API int64_t      h6GetRecordingBends(h6Recording* recording, uint64_t first, double* out,
+                                        size_t count, h6Error* error);
 H6_API bool         h6GetRecordingEvent(const h6Recording* recording, size_t event,
                                         h6RecordingEvent* out); /* false: there is none             */
 

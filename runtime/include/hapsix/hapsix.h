@@ -264,6 +264,10 @@ H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6
                            h6Error* error);
 /* Takes up to `capacity` records, oldest first; call from one reader thread. Never blocks the loop. */
 H6_API size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity);
+/* The same with the shapes of bodies that bend: row i of `bends` is q of all these bodies after frame i,
+ * one body after another, as in h6LoopView [m sqrt(kg)]; NaN where only the inputs were kept. `bends`
+ * has room for `capacity` rows, or is NULL. */
+H6_API size_t h6ReadRecordsWithBends(h6Loop* loop, h6FrameRecord* out, double* bends, size_t capacity);
 /* For one viewer on a thread of its own: bodies and contacts of the newest frame, about 125 times a
  * second. False when there is nothing newer than at the last call. The arrays stay valid until the next
  * call that gives true. The loop never waits: frames that were not fetched are lost. World frame. */

@@ -130,6 +130,12 @@ TEST_CASE(
     (rows++ ? last : first) = size;
   }
   CHECK(rows == 400);
+  std::istringstream frames(slurp(box.file("bend.csv")));
+  for (std::string row; std::getline(frames, row);) line = row;
+  double of_frames = 0;  // the last columns are those of body 0
+  const auto c = cells(line);
+  for (std::size_t j = c.size() - 4; j < c.size(); ++j) of_frames += std::fabs(std::stod(c[j]));
+  CHECK(of_frames == last);
   CHECK(first == 0);
   CHECK(last > 0);
   const Ended none = run(box, {"export", "bend.h5", "-o", "bend.csv", "--bends", "no/q.csv"});

@@ -37,7 +37,7 @@ struct Run {
       if (i == 800) row.late = H6_LATE_STOLEN;
       if (i == 900) watch.note("mark", "a note of the user");
       rows.push_back(row);
-      (void)watch.rows(&row, 1);
+      (void)watch.rows(&row, nullptr, 1);
     }
     watch.finish({});
     recording.head.rate = 1000;

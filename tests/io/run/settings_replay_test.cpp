@@ -72,10 +72,11 @@ Replayed replay(const fs::path& file, const std::string& method = "") {
   auto session = RecordedSession::open(file, *recording, {method, 0}, {}, remarks);
   if (!session) FAIL(session.error());
   Replayed out;
+  const io::RowComparison compared(recording->head, recording->columns);
   for (const h6FrameRecord& row : recording->frames) {
     const auto now = (*session)->step(row);
     if (!now) return out.stopped = now.error(), out;
-    if (method.empty() && io::first_difference(row, **now, 1, recording->columns)) return out;
+    if (method.empty() && compared.first(row, nullptr, **now, nullptr)) return out;
     ++out.frames;
   }
   return out;

@@ -85,6 +85,7 @@ TEST_CASE("a loop that is NULL gives defaults") {
   h6LoopView view;
   CHECK(h6StartLoop(nullptr, nullptr, nullptr, nullptr) == nullptr);
   CHECK(h6ReadRecords(nullptr, &row, 1) == 0);
+  CHECK(h6ReadRecordsWithBends(nullptr, &row, nullptr, 1) == 0);
   CHECK_FALSE(h6ReadView(nullptr, &view));
   CHECK(h6ChangeSession(nullptr, nullptr, nullptr) == nullptr);
   CHECK_FALSE(h6LoopRunning(nullptr));
