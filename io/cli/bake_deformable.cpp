@@ -5,9 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -18,6 +21,9 @@
 #include "io/deform/lattice.h"
 #include "io/deform/reduce.h"
 #include "io/deform/solid_file.h"
+#include "io/deform/solid_surface.h"
+#include "io/file/write_aside.h"
+#include "io/view/pick.h"
 
 namespace h6::cli {
 namespace {
@@ -31,6 +37,9 @@ struct DeformableOptions {
   io::ReduceOptions reduce;
   std::vector<std::string> boxes;  // "X,Y,Z,X,Y,Z"
   std::vector<std::uint32_t> fixed;
+  std::string fix_list, pick;  // text files of places
+  unsigned port = 0;
+  bool open = true;  // a browser
   std::vector<std::string> materials;
   double young = NAN, poisson = NAN, density = NAN, cell = 0;
 };
@@ -85,6 +94,30 @@ Outcome put_materials(const DeformableOptions& o, io::SolidMesh& mesh) {
   return Done{};
 }
 
+// Places from 1, one a line or with blanks and commas between them; a line's rest after # is a
+// remark.
+Outcome read_list(const std::string& file, std::vector<std::uint32_t>& numbers) {
+  std::ifstream in(file);
+  if (!in) return Failure{"cannot read " + file + ": " + std::strerror(errno)};
+  std::string line;
+  for (std::size_t row = 1; std::getline(in, line); ++row) {
+    line.resize(std::min(line.size(), line.find('#')));
+    std::replace_if(
+        line.begin(), line.end(), [](char c) { return c == ',' || c == '\r'; }, ' ');
+    std::istringstream words(line);
+    for (std::string word; words >> word;) {
+      double number = 0;
+      if (!parse(word, number) || !(number >= 1 && number <= 4e9) || number != std::floor(number))
+        return Failure{file + ", line " + std::to_string(row) +
+                       ": a place of a vertex is a whole number from 1, not '" + printable(word) +
+                       "'"};
+      numbers.push_back(static_cast<std::uint32_t>(number - 1));
+    }
+  }
+  if (in.bad()) return Failure{"cannot read " + file + ": " + std::strerror(errno)};
+  return Done{};
+}
+
 Outcome put_fixed(const DeformableOptions& o, double unit, io::SolidMesh& mesh) {
   for (const std::string& box : o.boxes) {
     double at[6];
@@ -105,7 +138,33 @@ Outcome put_fixed(const DeformableOptions& o, double unit, io::SolidMesh& mesh) 
   }
   std::vector<std::uint32_t> numbers;
   for (const std::uint32_t number : o.fixed) numbers.push_back(number - 1);
+  if (!o.fix_list.empty())
+    if (Outcome read = read_list(o.fix_list, numbers); !read) return read;
   return io::fix_vertices(mesh, numbers);
+}
+
+// Lets the user mark vertices on a page, beside those that are fixed already, and writes all of
+// them.
+Outcome pick_fixed(const Console& console, const DeformableOptions& o, io::SolidMesh& mesh) {
+  io::view::Pickable model;
+  model.name = std::filesystem::path(o.model).filename().string();
+  model.unit = o.units;
+  model.metres = io::metres(*io::unit_from_name(o.units));
+  model.vertices = mesh.vertices;
+  model.triangles = io::surface_of(mesh);
+  model.marked = mesh.fixed;
+  io::view::PickOptions options;
+  options.port = static_cast<std::uint16_t>(o.port);
+  options.open = o.open;
+  options.say = [&](const std::string& sentence) { console.log(sentence); };
+  options.stop = [] { return interrupted.load(); };
+  const Result<std::vector<std::uint32_t>> chosen = io::view::pick_vertices(model, options);
+  if (!chosen) return Failure{o.model + ": " + chosen.error()};
+  std::string list = "# fixed vertices of " + model.name + " by their place, from 1\n";
+  for (const std::uint32_t vertex : *chosen) list += std::to_string(vertex + 1) + '\n';
+  if (Outcome written = io::write_text_aside(o.pick, list); !written) return written;
+  mesh.fixed.clear();
+  return io::fix_vertices(mesh, *chosen);
 }
 
 Result<io::SolidMesh> read_model(const Console& console, DeformableOptions& o) {
@@ -113,7 +172,8 @@ Result<io::SolidMesh> read_model(const Console& console, DeformableOptions& o) {
   std::error_code error;
   if (std::filesystem::equivalent(o.model, o.out, error))
     return Failure{"cannot write " + o.out + ": this is the model itself, choose another name"};
-  if (Outcome there = check_output(o.out); !there) return there.failure();
+  for (const std::string& file : {o.out, o.pick})
+    if (Outcome there = check_output(file); !file.empty() && !there) return there.failure();
   if (io::is_solid_name(o.model)) {
     if (o.cell > 0)
       return Failure{o.model + ": it has its own elements; --cell is for surface meshes"};
@@ -170,6 +230,8 @@ int bake_deformable_command(const Console& console, DeformableOptions& o) {
   const double unit = io::metres(*io::unit_from_name(o.units));
   if (Outcome given = put_materials(o, *mesh); !given) return console.fail(given.error());
   if (Outcome held = put_fixed(o, unit, *mesh); !held) return console.fail(held.error());
+  if (!o.pick.empty())
+    if (Outcome held = pick_fixed(console, o, *mesh); !held) return console.fail(held.error());
   std::vector<std::string> warnings = mesh->remarks;
   io::ReduceReport report;
   Result<io::ReducedModel> model = io::reduce(*mesh, o.reduce, &report, console.progress());
@@ -223,6 +285,20 @@ void add_constraints(CLI::App* command, DeformableOptions& o) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(whole_within(1, 4000000000));
+  command->add_option("--fix-list", o.fix_list, "Fixes the vertices whose places a text file has")
+      ->option_text("FILE");
+  command
+      ->add_option(
+          "--pick", o.pick,
+          "Opens the model in a browser, where vertices to fix are marked by brush or box, "
+          "and writes their places to a text file for --fix-list")
+      ->option_text("FILE")
+      ->check(ends_with(".txt"));
+  command->add_option("--port", o.port, "Port of that page on 127.0.0.1; default: any free one")
+      ->option_text("NUMBER")
+      ->check(whole_within(0, 65535));
+  command->add_flag_callback(
+      "--no-browser", [&o] { o.open = false; }, "Only print the page's address");
   command->add_flag("--free", o.reduce.free,
                     "Nothing is fixed: the modes are those without rigid motion");
 }

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Builds live.html and report.html into OUT from the page's sources in SOURCE; without node and npm,
-# or without the network the first time, both are left empty and the program says so when it is
+# Builds live.html, pick.html and report.html into OUT from the page's sources in SOURCE; without node
+# and npm, or without the network the first time, they are left empty and the program says so when it is
 # asked for a view. Nothing else fails for it.
 file(MAKE_DIRECTORY ${OUT})
 file(COPY ${SOURCE}/ DESTINATION ${OUT}/build PATTERN node_modules EXCLUDE)
@@ -36,5 +36,6 @@ endif()
 if(problem)
   message("hapsix is built without its view: ${problem}")
   file(WRITE ${OUT}/live.html "")
+  file(WRITE ${OUT}/pick.html "")
   file(WRITE ${OUT}/report.html "")
 endif()

@@ -8,6 +8,7 @@
 namespace h6::io::view {
 
 std::string_view live_page();
+std::string_view pick_page();
 std::string_view report_page();  // "@data@" marks the place of the data
 // One sentence that tells why there are none.
 std::string no_page();

@@ -18,7 +18,7 @@ found=0
 most() {
   case $1 in
     hid|path|script|gz|device|bridge|plugin) echo 256 ;;
-    obj|request|contract|haply|http|study|udp_arm) echo 512 ;;
+    obj|request|pick|contract|haply|http|study|udp_arm) echo 512 ;;
     stl|ply|mesh_gz|scene|shell|dae|gltf|glb|run_text) echo 1500 ;;
     field) echo 25000 ;;
     vdb|log) echo 40000 ;;

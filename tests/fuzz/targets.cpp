@@ -33,6 +33,7 @@
 #include "io/record/recording.h"
 #include "io/scene/scene_file.h"
 #include "io/shell/shell_file.h"
+#include "io/view/pick_request.h"
 #include "io/view/view_request.h"
 
 namespace h6::fuzz {
@@ -226,12 +227,29 @@ void take_request(std::string_view bytes) {
   }
 }
 
+// One byte: how many vertices the model has. Then what the page for picking them says.
+void take_pick(std::string_view bytes) {
+  if (bytes.empty()) return;
+  const auto count = static_cast<std::uint8_t>(bytes[0]);
+  const auto picked = io::view::parse_picked(bytes.substr(1), count);
+  if (!picked) return check_sentence(picked.error());
+  promise(picked->use == !picked->vertices.empty(), "a choice has vertices");
+  for (std::size_t i = 0; i < picked->vertices.size(); ++i)
+    promise(
+        picked->vertices[i] < (i + 1 < picked->vertices.size() ? picked->vertices[i + 1] : count),
+        "vertices rise and are the model's");
+}
+
 void read_recording(const std::string& file) {
   const auto recording = io::read_recording(file, {0, 5000});
   if (!recording) return check_sentence(recording.error());
   promise(recording->frames.size() <= recording->frame_count, "no more frames than there are");
   promise(recording->seals.empty() || recording->seals.size() == recording->frames.size(),
           "a seal for each frame");
+  promise(recording->bends.size() == recording->frames.size() * io::modes_of(recording->head.bends),
+          "a shape for each frame");
+  for (const io::RecordedBend& bend : recording->head.bends)
+    promise(bend.modes >= 1 && bend.modes <= H6_MAX_MODES, "a body bends by its modes");
 }
 void take_recording(std::string_view bytes) { read_recording(as_file(bytes, "r.h5")); }
 std::string sealed_log(std::string_view bytes) {
@@ -246,10 +264,6 @@ std::string sealed_log(std::string_view bytes) {
         crc32_z(0, reinterpret_cast<const Bytef*>(&log[at + skip]), end - at - skip));
     std::memcpy(&log[at], &record, sizeof record);
     at = end;
-  promise(recording->bends.size() == recording->frames.size() * io::modes_of(recording->head.bends),
-          "a shape for each frame");
-  for (const io::RecordedBend& bend : recording->head.bends)
-    promise(bend.modes >= 1 && bend.modes <= H6_MAX_MODES, "a body bends by its modes");
   }
   return log;
 }
@@ -262,37 +276,22 @@ void take_log(std::string_view bytes) {
   fs::remove(file, ignored);
 }
 
-constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},
-                               {"obj", take_mesh<kObj>},
-                               {"ply", take_mesh<kPly>},
-                               {"gltf", take_mesh<kGltf>},
-                               {"glb", take_mesh<kGlb>},
-                               {"dae", take_mesh<kDae>},
-                               {"mesh_gz", take_mesh<kGz>},
-                               {"gz", take_gz},
-                               {"shell", take_shell},
-                               {"field", take_field},
-                               {"vdb", take_vdb},
-                               {"scene", take_scene},
-                               {"path", take_path},
-                               {"script", take_script},
-                               {"device", take_spec},
-                               {"hid", take_hid},
-                               {"bridge", take_bridge},
-                               {"haply", take_haply},
-                               {"plugin", take_plugin},
-                               {"request", take_request},
-                               {"recording", take_recording},
-                               {"log", take_log},
-                               {"contract", take_contract},
-                               {"veg", take_solid<kVeg>},
-                               {"msh", take_solid<kMsh>},
-                               {"vtk", take_solid<kVtk>},
-                               {"deformable", take_deformable},
-                               {"study", take_study},
-                               {"run_text", take_run_text},
-                               {"udp_arm", take_udp_arm},
-                               {"http", take_http}};
+constexpr Target kTargets[] = {{"stl", take_mesh<kStl>},    {"obj", take_mesh<kObj>},
+                               {"ply", take_mesh<kPly>},    {"gltf", take_mesh<kGltf>},
+                               {"glb", take_mesh<kGlb>},    {"dae", take_mesh<kDae>},
+                               {"mesh_gz", take_mesh<kGz>}, {"gz", take_gz},
+                               {"shell", take_shell},       {"field", take_field},
+                               {"vdb", take_vdb},           {"scene", take_scene},
+                               {"path", take_path},         {"script", take_script},
+                               {"device", take_spec},       {"hid", take_hid},
+                               {"bridge", take_bridge},     {"haply", take_haply},
+                               {"plugin", take_plugin},     {"request", take_request},
+                               {"pick", take_pick},         {"recording", take_recording},
+                               {"log", take_log},           {"contract", take_contract},
+                               {"veg", take_solid<kVeg>},   {"msh", take_solid<kMsh>},
+                               {"vtk", take_solid<kVtk>},   {"deformable", take_deformable},
+                               {"study", take_study},       {"run_text", take_run_text},
+                               {"udp_arm", take_udp_arm},   {"http", take_http}};
 
 }  // namespace
 

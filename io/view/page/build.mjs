@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// build.mjs OUT: live.html and report.html, each one file with everything in it.
+// build.mjs OUT: live.html, report.html and pick.html, each one file with everything in it.
 import { build } from 'esbuild';
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -22,7 +22,7 @@ const out = process.argv[2] ?? 'out';
 mkdirSync(out, { recursive: true });
 const style = readFileSync('node_modules/uplot/dist/uPlot.min.css', 'utf8') +
   readFileSync('src/style.css', 'utf8');
-for (const page of ['live', 'report']) {
+for (const page of ['live', 'report', 'pick']) {
   const bundle = await build({
     entryPoints: [`src/${page}.ts`], bundle: true, minify: true, write: false, format: 'iife',
     target: 'es2022', legalComments: 'none', metafile: true,
