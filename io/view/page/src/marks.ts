@@ -28,6 +28,11 @@ export class Marks {
     this.stroke = [];
     this.undone = [];
   }
+  // Takes back what the stroke has changed so far.
+  dropStroke() {
+    for (const v of this.stroke) this.flip(v);
+    this.stroke = [];
+  }
   undo() { this.back(this.done, this.undone); }
   redo() { this.back(this.undone, this.done); }
   get mayUndo() { return this.done.length > 0; }

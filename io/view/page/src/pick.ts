@@ -69,8 +69,9 @@ function down(event: PointerEvent) {
   if (act && event.pointerId !== act.id) return leave(false);
   const { x, y } = place(event);
   const box = input('tool-box').checked, on = box || solid.hit(x, y) !== null;
-  solid.orbit.enabled = event.button !== 0 || !on || ended !== '';
-  if (solid.orbit.enabled) return;
+  const turns = event.button !== 0 || !on || ended !== '';
+  solid.firstTurns(turns);
+  if (turns) return;
   act = { id: event.pointerId, kind: box ? 'box' : 'paint', x, y, marked: adds(event) };
   solid.renderer.domElement.setPointerCapture(event.pointerId);
   $('rubber').hidden = !box;
@@ -96,9 +97,7 @@ function up(event: PointerEvent) {
 function leave(whole: boolean) {
   act = null;
   $('rubber').hidden = true;
-  marks.endStroke();
-  if (!whole) marks.undo();
-  solid.orbit.enabled = true;
+  if (whole) marks.endStroke(); else marks.dropStroke();
   tell();
 }
 
@@ -107,6 +106,7 @@ function leave(whole: boolean) {
 function keyOnPart(event: KeyboardEvent) {
   const arrows: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
   const way = arrows[event.key], size = solid.size();
+  if (ended) return;
   if (way && event.altKey) solid.turn(0.1 * way[0], 0.1 * way[1]);
   else if (way) {
     cross.x = Math.min(size.w - 1, Math.max(0, cross.x + 12 * way[0]));

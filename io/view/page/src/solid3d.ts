@@ -68,9 +68,18 @@ export class Solid3D {
     sky.position.set(0, 0, 1);
     this.scene.add(sky, this.camera, this.surface, this.all, this.inside, this.outside, this.brush);
     this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
+    this.orbit.mouseButtons.RIGHT = THREE.MOUSE.ROTATE;
+    this.orbit.touches.TWO = THREE.TOUCH.DOLLY_ROTATE;
     this.orbit.addEventListener('change', () => this.changed());
     new ResizeObserver(() => this.resize()).observe(where);
     this.resize();
+  }
+
+  // Whether the left button or the first finger turns the camera. Controls that are switched off would
+  // not know of that finger when the second comes.
+  firstTurns(turns: boolean) {
+    this.orbit.mouseButtons.LEFT = turns ? THREE.MOUSE.ROTATE : null;
+    this.orbit.touches.ONE = turns ? THREE.TOUCH.ROTATE : null;
   }
 
   changed() { this.drawn = false; }

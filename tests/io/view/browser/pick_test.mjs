@@ -96,6 +96,26 @@ test('a drag beside the part turns it and fixes nothing', async () => {
   assert.equal(await count(), 6);
 }, { timeout: 60000 });
 
+test('one finger fixes vertices; a second takes that back, and both turn it and come nearer', async () => {
+  const touch = (type, points) => browser.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+  const camera = () => browser.value('window.hapsix.solid().camera.position.length()');
+  await press('clear');
+  await press('undo');
+  const [x, y] = await pixel(40, 10, 20), before = await marked(), far = await camera();
+  await touch('touchStart', [[x, y]]);
+  await touch('touchEnd', []);
+  assert.ok((await count()) > before.length);
+  await press('undo');
+  await touch('touchStart', [[x - 30, y]]);
+  await touch('touchStart', [[x - 30, y], [x + 30, y]]);
+  for (let i = 1; i <= 6; ++i) await touch('touchMove', [[x - 30 - 10 * i, y], [x + 30 + 10 * i, y]]);
+  await touch('touchEnd', []);
+  await wait(100);
+  assert.deepEqual(await marked(), before);
+  assert.ok((await camera()) < 0.8 * far, `${await camera()} of ${far}`);
+  await browser.value(`(() => { const s = window.hapsix.solid(); s.camera.position.setLength(${far}); s.orbit.update(); })()`);
+}, { timeout: 60000 });
+
 test('a rectangle takes all vertices behind it, or only those that are seen', async () => {
   await press('clear');
   await press('tool-box');
