@@ -29,10 +29,10 @@ export class Solid3D {
   }));
   private paint = new Float32Array(0);
   private inside = new THREE.Points(new THREE.BufferGeometry(),
-    new THREE.PointsMaterial({ color: fixed, size: 3, sizeAttenuation: false, transparent: true, opacity: 0.35, depthTest: false }));
+    new THREE.PointsMaterial({ color: '#ffe14d', size: 4, sizeAttenuation: false, transparent: true, opacity: 0.35, depthTest: false }));
   private outside = new THREE.Points(new THREE.BufferGeometry(),
-    new THREE.PointsMaterial({ color: fixed, size: 5, sizeAttenuation: false }));
-  private all = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 2.5, sizeAttenuation: false }));
+    new THREE.PointsMaterial({ color: '#ffe14d', size: 8, sizeAttenuation: false }));
+  private all = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: '#10141b', size: 3, sizeAttenuation: false }));
   private ray = new THREE.Raycaster();
   private drawn = true;  // since something changed
 
@@ -42,7 +42,6 @@ export class Solid3D {
     where.appendChild(this.renderer.domElement);
     const ground = () => {
       this.scene.background = new THREE.Color(css('ground'));
-      this.all.material.color.set(css('strong'));
       this.changed();
     };
     ground();
@@ -60,7 +59,7 @@ export class Solid3D {
     this.brush = new THREE.Mesh(new THREE.SphereGeometry(1, 18, 9),
       new THREE.MeshBasicMaterial({ color: '#e08a3c', wireframe: true, transparent: true, opacity: 0.35, depthTest: false }));
     this.brush.visible = false;
-    [this.all, this.outside, this.inside, this.brush].forEach((o, i) => { o.renderOrder = 1 + i; });
+    [this.outside, this.all, this.inside, this.brush].forEach((o, i) => { o.renderOrder = 1 + i; });
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(1.2, -1.9, 1.3).multiplyScalar(1.25 * Math.max(1, this.size().h / this.size().w));
     this.camera.add(new THREE.DirectionalLight('#ffffff', 0.9));
