@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "io/cli/commands.h"
+#include "io/cli/kept_map.h"
 #include "io/console/checks.h"
 #include "io/experiments/map/map_page.h"
 #include "io/file/write_aside.h"
@@ -16,7 +17,7 @@ namespace h6::cli {
 namespace {
 
 struct Options {
-  std::string methods, scenes, only, csv, report, scheduler;
+  std::string methods, scenes, only, csv, report, keep, scheduler;
   bool worker = false;
   MapOptions map;
 };
@@ -73,12 +74,12 @@ void serve_map(const MapOptions& options) {
   });
 }
 
-Result<std::vector<MapScene>> map_on_scheduler(const Options& o, const Console& console) {
-  MapPlan plan = plan_map(o.map);
+Outcome map_on_scheduler(const Options& o, const Console& console, MapPlan& plan, KeptMap& kept) {
   study::Work work;
   study::use_scheduler(o.scheduler, words_of(o), work);
-  std::size_t done = 0;
-  for (std::size_t job = 0; job < plan.jobs.size(); ++job) work.runs.push_back(job);
+  for (std::size_t job = 0; job < plan.jobs.size(); ++job)
+    if (is_open(plan, job)) work.runs.push_back(job);
+  std::size_t done = plan.jobs.size() - work.runs.size();
   const io::Progress progress = console.progress();
   work.go_on = [&] {
     return progress("variations",
@@ -91,15 +92,34 @@ Result<std::vector<MapScene>> map_on_scheduler(const Options& o, const Console& 
     if (!take_job_line(plan, job, line.substr(end)))
       return Failure{"a worker gave no runs: " + line.substr(0, 100)};
     ++done;
-    return Done{};
+    return kept.add(plan, job);
   };
   work.lost = [&](std::size_t job, const std::string& why) {
     MapPlan::Job& lost = plan.jobs[job];
     plan.scenes[lost.scene].variations[lost.variation].error = why;
     return std::to_string(job) + " " + job_line(plan, job);
   };
-  if (!work.runs.empty())
-    if (const Outcome shared = study::share_out(work); !shared) return Failure{shared.error()};
+  return work.runs.empty() ? Outcome(Done{}) : study::share_out(work);
+}
+
+Result<std::vector<MapScene>> map_scenes(const Options& o, const Console& console) {
+  MapPlan plan = plan_map(o.map);
+  KeptMap kept;
+  if (!o.keep.empty()) {
+    const Outcome opened = kept.open(o.keep, words_of(o), plan);
+    if (!opened) return opened.failure();
+    if (kept.done() > 0)
+      console.log("hapsix: " + std::to_string(kept.done()) + " of " +
+                  std::to_string(plan.jobs.size()) + " variations are done already");
+  }
+  const Outcome ran = o.scheduler.empty()
+                          ? run_open_jobs(o.map, plan, console,
+                                          [&](std::size_t job) { return kept.add(plan, job); })
+                          : map_on_scheduler(o, console, plan, kept);
+  if (!ran) return ran.failure();
+  if (interrupted.load())
+    return Failure{o.keep.empty() ? "interrupted" : "interrupted; the same command goes on"};
+  if (const Outcome finished = kept.finish(); !finished) return finished.failure();
   return finish_map(std::move(plan));
 }
 
@@ -109,11 +129,9 @@ int map_command(const Console& console, Options& o) {
   for (const std::string& file : {o.csv, o.report})
     if (Outcome good = file.empty() ? Outcome(Done{}) : check_output(file); !good)
       return console.fail(good.error());
-  const Result<std::vector<MapScene>> ran =
-      o.scheduler.empty() ? Result(run_map(o.map, console)) : map_on_scheduler(o, console);
+  const Result<std::vector<MapScene>> ran = map_scenes(o, console);
   if (!ran) return console.fail(ran.error());
   const std::vector<MapScene>& scenes = *ran;
-  if (interrupted.load()) return console.fail("interrupted");
   const MapReport report{o.map, scenes};
   if (!console.json) std::printf("%s", report.text(false).c_str());
   if (!o.csv.empty())
@@ -162,6 +180,11 @@ void add_map(CLI::App& app, Program& program) {
                   "figures, as far as they have this machine's SIMD target")
       ->option_text("ADDRESS")
       ->excludes("--jobs");
+  map->add_option(
+         "--keep", o->keep,
+         "Keep each variation here as it ends: a map that was killed goes on where it was, "
+         "and ends with the same figures")
+      ->option_text("FOLDER");
   map->add_flag("--worker", o->worker)->group("");
   map->add_option("--csv", o->csv, "A row for each run")
       ->check(ends_with(".csv"))

@@ -73,7 +73,7 @@ Result<Table> Table::open(const fs::path& folder, const std::string& identity,
   table.part_ = ::open(part.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (table.part_ < 0) return cannot("write", part);
   if (flock(table.part_, LOCK_EX | LOCK_NB) != 0)
-    return Failure{folder.string() + ": another hapsix study runs here, wait for its end"};
+    return Failure{folder.string() + ": another hapsix study or map runs here, wait for its end"};
   std::error_code error;
   if (!fs::exists(known, error)) {
     if (const Outcome written = io::write_text_aside(known, identity); !written)
@@ -81,8 +81,8 @@ Result<Table> Table::open(const fs::path& folder, const std::string& identity,
   } else if (whole_file(known) != identity) {
     return Failure{
         folder.string() +
-        ": this folder has the runs of another study, scene or version: choose another -o, "
-        "or remove it"};
+        ": this folder has the runs of another study, map, scene or version: choose another, or "
+        "remove it"};
   }
   if (const Outcome read = table.read_part(); !read) return read.failure();
   return table;
@@ -116,7 +116,7 @@ Outcome Table::read_part() {
 }
 
 Outcome Table::add(const std::string& row) {
-  if (!take(row)) return Failure{"a worker gave no row of this study: " + row.substr(0, 100)};
+  if (!take(row)) return Failure{"a worker gave no row of this table: " + row.substr(0, 100)};
   const std::string line = row + "\n";
   const fs::path part = folder_ / "runs.csv.part";
   for (std::size_t at = 0; at < line.size();) {

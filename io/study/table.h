@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// table.h - the rows of a study: appended to runs.csv.part as runs end, in order in runs.csv at the
-// end. A kill at any time costs the runs that were under way, and nothing else.
+// table.h - the rows of a study or a map: appended to runs.csv.part as runs end, in order in
+// runs.csv at the end. A kill at any time costs the runs that were under way, and nothing else.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -16,7 +16,7 @@ class Table {
   Table& operator=(const Table&) = delete;
   Table(Table&& other) noexcept;
   ~Table();
-  // Opens the table of a folder, or begins it. Fails when the folder holds another study (another
+  // Opens the table of a folder, or begins it. Fails when the folder holds other work (another
   // `identity`), or when another process writes to it.
   static Result<Table> open(const std::filesystem::path& folder, const std::string& identity,
                             const std::string& header, std::size_t runs);

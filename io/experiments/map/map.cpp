@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "io/experiments/probe.h"
@@ -182,12 +183,33 @@ std::vector<MapScene> finish_map(MapPlan&& plan) {
   return std::move(plan.scenes);
 }
 
+bool is_open(const MapPlan& plan, std::size_t job) {
+  const MapVariation& v = plan.scenes[plan.jobs[job].scene].variations[plan.jobs[job].variation];
+  return v.runs.empty() && v.error.empty();
+}
+
+Outcome run_open_jobs(const MapOptions& options, MapPlan& plan, const Console& console,
+                      const std::function<Outcome(std::size_t job)>& ended) {
+  std::mutex lock;
+  Outcome all = Done{};
+  std::vector<std::function<void()>> jobs;
+  for (std::size_t i = 0; i < plan.jobs.size(); ++i) {
+    if (!is_open(plan, i)) continue;
+    jobs.push_back([&, i] {
+      if (const std::lock_guard<std::mutex> hold(lock); !all) return;
+      run_job(options, plan, i);
+      if (interrupted.load()) return;  // it may have only some of its runs
+      const std::lock_guard<std::mutex> hold(lock);
+      if (Outcome kept = ended(i); !kept) all = kept;
+    });
+  }
+  run_jobs(jobs, console, "variations", options.jobs);
+  return all;
+}
+
 std::vector<MapScene> run_map(const MapOptions& options, const Console& console) {
   MapPlan plan = plan_map(options);
-  std::vector<std::function<void()>> jobs;
-  for (std::size_t i = 0; i < plan.jobs.size(); ++i)
-    jobs.push_back([&, i] { run_job(options, plan, i); });
-  run_jobs(jobs, console, "variations", options.jobs);
+  (void)run_open_jobs(options, plan, console, [](std::size_t) { return Outcome(Done{}); });
   return finish_map(std::move(plan));
 }
 

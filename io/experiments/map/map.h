@@ -6,6 +6,7 @@
 // Each variation runs under three forces, and twice: once with the scene's stiffness k for every
 // method, and once with a k for each method that makes a flat wall equally stiff.
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -73,6 +74,12 @@ void run_job(const MapOptions& options, MapPlan& plan, std::size_t job);
 // The runs of a job as one line of text, and back to the bit. False: this is no such line.
 std::string job_line(const MapPlan& plan, std::size_t job);
 bool take_job_line(MapPlan& plan, std::size_t job, const std::string& line);
+// Whether a job has neither runs nor an error yet.
+bool is_open(const MapPlan& plan, std::size_t job);
+// Runs the open jobs on threads of this process. `ended` gets each job that has ended, one at a
+// time; when it fails no further job begins, and its sentence is returned.
+Outcome run_open_jobs(const MapOptions& options, MapPlan& plan, const Console& console,
+                      const std::function<Outcome(std::size_t job)>& ended);
 std::vector<MapScene> finish_map(MapPlan&& plan);
 
 // The method's net stiffness on a flat wall, in k: the slope of the contact force of a box's bottom

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests `hapsix map` from outside: its files, one variation alone, and mistakes.
 #include <algorithm>
+#include <memory>
+#include <random>
 #include <string>
 
 #include "tests/io/cli/program.h"
@@ -35,6 +37,51 @@ TEST_CASE("map writes a row for each run, a report, and the same figures as JSON
   CHECK(alone.out.rfind("cone-in-gap:1: voxel ", 0) == 0);
   const Json again = result_of(box, {"map", "--methods", "gauss3", "--only", "cone-in-gap:1"});
   CHECK(again["scenes"]["cone-in-gap"]["runs"][0] == map["scenes"]["cone-in-gap"]["runs"][1]);
+}
+
+TEST_CASE("a map that is killed again and again ends with the same figures") {
+  Sandbox box;
+  const Args map = {"map", "--scenes", "cone-in-gap", "--methods", "global", "--variations", "4"};
+  const auto with = [&](const Args& more) {
+    Args all = map;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  const Json whole = result_of(box, with({"--csv", "whole.csv", "-o", "whole.md"}));
+  const Args kept = with({"--keep", "kept", "--csv", "kept.csv", "-o", "kept.md"});
+  const auto rows = [&](const char* name) {
+    const std::string text = slurp(box.file(name));
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  std::mt19937_64 random(7);
+  int kills = 0;
+  long most = 0, resumed = 0;
+  for (; !fs::exists(box.file("kept/runs.csv")) && kills < 40; ++kills) {
+    auto process = std::make_unique<Process>(box, kept);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50 + random() % 1500));
+    process.reset();  // SIGKILL
+    const long now = rows("kept/runs.csv.part");
+    CHECK((now >= most || fs::exists(box.file("kept/runs.csv"))));  // nothing is lost
+    resumed += most > 0;
+    most = now;
+  }
+  CHECK(kills > 1);
+  if (fs::exists(box.file("kept/runs.csv.part")))  // a torn row, as a loss of power leaves it
+    std::ofstream(box.file("kept/runs.csv.part"), std::ios::app) << "3,cone-in-gap,3,\"{";
+  CHECK(result_of(box, kept) == whole);
+  CHECK(slurp(box.file("kept.csv")) == slurp(box.file("whole.csv")));
+  CHECK(slurp(box.file("kept.md")) == slurp(box.file("whole.md")));
+  CHECK(rows("kept/runs.csv") == 1 + 4);
+  // A map that is done runs nothing again, also when only its files are gone.
+  fs::remove(box.file("kept.csv"));
+  const Ended again = run(box, kept);
+  CHECK(again.err.find("4 of 4 variations are done already") != std::string::npos);
+  CHECK(slurp(box.file("kept.csv")) == slurp(box.file("whole.csv")));
+  // Another map does not get into the folder.
+  const Ended other = run(box, {"map", "--scenes", "cone-in-gap", "--keep", "kept", "--seed", "2"});
+  CHECK(other.code == 1);
+  CHECK_MESSAGE(other.err.find("another study, map") != std::string::npos, other.err);
+  MESSAGE(kills << " kills, " << resumed << " of them of a map that had gone on");
 }
 
 TEST_CASE("map says what is wrong with its arguments before it runs") {
