@@ -14,6 +14,7 @@
 #include "io/cli/view_run.h"
 #include "io/console/checks.h"
 #include "io/file/write_aside.h"
+#include "io/propose/doubt.h"
 #include "io/propose/propose_scene.h"
 #include "io/run/try_run.h"
 #include "io/scene/scene_file.h"
@@ -133,25 +134,6 @@ std::string trial_sentence(const Trial& t) {
   return text;
 }
 
-// A sentence of advice after a trial that did not go well; null where it did.
-const char* doubt_of(io::Verdict verdict) {
-  switch (verdict) {
-    case io::Verdict::through:
-      return "in the trial the part went through a wall; a smaller \"voxel_size\" of the field or "
-             "a "
-             "smaller \"max_force\" of the coupling holds more, and 'hapsix check' says how much";
-    case io::Verdict::chatters:
-      return "in the trial the part trembled; a heavier part, more \"damping\" or a lower "
-             "\"stiffness\" of the contact calms it";
-    case io::Verdict::unstable:
-    case io::Verdict::sunk:
-      return "the trial failed; a smaller \"voxel_size\" of the field, a smaller \"max_force\" of "
-             "the coupling or a lower \"stiffness\" of the contact may help";
-    default:
-      return nullptr;
-  }
-}
-
 struct Made {
   std::unique_ptr<io::LoadedScene> loaded;
   Trial trial;
@@ -182,7 +164,7 @@ class NewScene {
     if (!start) return start.failure();
     Result<Trial> trial = attempt(*start, *files, **loaded);
     if (!trial) return trial.failure();
-    if (start->overlaps && doubt_of(trial->totals.verdict)) {
+    if (start->overlaps && io::doubt_of(trial->totals.verdict)) {
       // Where the overlap is no fit, the way out of it leads through a wall.
       Result<io::StartPlace> other = io::find_start(*plan, **loaded, true);
       if (other) {
@@ -238,7 +220,7 @@ class NewScene {
   void fill(Made& made, const io::StartPlace& start) const {
     const io::LoadedScene& l = *made.loaded;
     const double scale = 1 / io::metres(l.scene.unit);
-    const char* const doubt = doubt_of(made.trial.totals.verdict);
+    const char* const doubt = io::doubt_of(made.trial.totals.verdict);
     ordered_json choices = std::move(made.json["choices"]);
     made.json = {
         {"scene", o_.out},
@@ -286,10 +268,7 @@ int new_command(const Console& console, const NewOptions& o) {
   if (!made) return console.fail(made.error());
   const std::string file = printable(o.out);
   if (!console.json) std::printf("scene: %s\n", file.c_str());
-  if (!made->trial.first_contact)
-    console.warn({"the part touched nothing in the trial: move it by hand in the view"});
-  else if (const char* doubt = doubt_of(made->trial.totals.verdict))
-    console.warn({doubt});
+  if (const char* doubt = io::doubt_of(made->trial.totals.verdict)) console.warn({doubt});
   if (!wants_view(console, o)) {
     if (!console.json) std::printf("see it: hapsix run %s --view\n", file.c_str());
     console.result(made->json);
