@@ -53,9 +53,9 @@ Outcome KeptMap::open(const std::string& folder, const std::vector<std::string>&
   return Done{};
 }
 
-Outcome KeptMap::add(const MapPlan& plan, std::size_t job) {
+Outcome KeptMap::add(const MapPlan& plan, std::size_t job, double seconds) {
   if (!table_) return Done{};
-  return table_->add(row_begin(plan, job) + study::csv_field(job_line(plan, job)));
+  return table_->add(row_begin(plan, job) + study::csv_field(job_line(plan, job)), seconds);
 }
 
 Outcome KeptMap::finish() { return table_ ? table_->finish() : Outcome(Done{}); }

@@ -18,7 +18,7 @@ class KeptMap {
   // words of the command ask for, or when another process writes to it.
   Outcome open(const std::string& folder, const std::vector<std::string>& words, MapPlan& plan);
   std::size_t done() const { return table_ ? table_->done() : 0; }
-  Outcome add(const MapPlan& plan, std::size_t job);
+  Outcome add(const MapPlan& plan, std::size_t job, double seconds);
   // Writes runs.csv when every variation has its row.
   Outcome finish();
 

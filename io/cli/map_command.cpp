@@ -86,13 +86,13 @@ Outcome map_on_scheduler(const Options& o, const Console& console, MapPlan& plan
                     static_cast<double>(done) / static_cast<double>(plan.jobs.size())) &&
            !interrupted.load();
   };
-  work.done = [&](const std::string& line) -> Outcome {
+  work.done = [&](const std::string& line, double seconds) -> Outcome {
     std::size_t end = 0;
     const std::size_t job = std::stoul(line, &end);
     if (!take_job_line(plan, job, line.substr(end)))
       return Failure{"a worker gave no runs: " + line.substr(0, 100)};
     ++done;
-    return kept.add(plan, job);
+    return kept.add(plan, job, seconds);
   };
   work.lost = [&](std::size_t job, const std::string& why) {
     MapPlan::Job& lost = plan.jobs[job];
@@ -112,10 +112,11 @@ Result<std::vector<MapScene>> map_scenes(const Options& o, const Console& consol
       console.log("hapsix: " + std::to_string(kept.done()) + " of " +
                   std::to_string(plan.jobs.size()) + " variations are done already");
   }
-  const Outcome ran = o.scheduler.empty()
-                          ? run_open_jobs(o.map, plan, console,
-                                          [&](std::size_t job) { return kept.add(plan, job); })
-                          : map_on_scheduler(o, console, plan, kept);
+  const Outcome ran = o.scheduler.empty() ? run_open_jobs(o.map, plan, console,
+                                                          [&](std::size_t job, double seconds) {
+                                                            return kept.add(plan, job, seconds);
+                                                          })
+                                          : map_on_scheduler(o, console, plan, kept);
   if (!ran) return ran.failure();
   if (interrupted.load())
     return Failure{o.keep.empty() ? "interrupted" : "interrupted; the same command goes on"};

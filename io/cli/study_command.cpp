@@ -114,7 +114,7 @@ Outcome do_runs(const Program& program, const Options& o, const study::Plan& pla
                     static_cast<double>(table.done()) / static_cast<double>(plan.runs())) &&
            !interrupted.load();
   };
-  work.done = [&](const std::string& row) { return table.add(row); };
+  work.done = [&](const std::string& row, double seconds) { return table.add(row, seconds); };
   work.lost = [&](std::size_t run, const std::string& why) { return failed_row(plan, run, why); };
   return work.runs.empty() ? Outcome(Done{}) : study::share_out(work);
 }
@@ -193,8 +193,9 @@ void add_study(CLI::App& app, Program& program) {
   command->add_option("STUDY.json", o->file, "A scene and what varies; see below")->required();
   command
       ->add_option("-o,--output", o->folder,
-                   "Its folder: runs.csv and runs.svg in the end, and runs.parquet where Python "
-                   "has pyarrow. A study that was killed goes on where it was")
+                   "Its folder: runs.csv, times.csv (seconds of each run) and runs.svg in the end, "
+                   "and runs.parquet where Python has pyarrow. A study that was killed goes on "
+                   "where it was")
       ->required()
       ->option_text("FOLDER");
   command->add_option("--jobs", o->jobs, "Processes; default: one for each core")

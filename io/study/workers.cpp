@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -130,7 +132,11 @@ class Pool {
     const std::size_t run = std::strtoull(digits, &rest, 10);
     if (rest == digits || worker.runs.erase(run) == 0)
       return Failure{"a worker answers what nobody asked: " + line.substr(0, 100)};
-    return work_.done(lost ? work_.lost(run, *rest ? rest + 1 : rest) : line);
+    if (lost) return work_.done(work_.lost(run, *rest ? rest + 1 : rest), NAN);
+    const std::size_t tab = line.rfind('\t');
+    if (tab == std::string::npos)
+      return Failure{"a worker does not say how long it took: " + line.substr(0, 100)};
+    return work_.done(line.substr(0, tab), std::strtod(line.c_str() + tab, nullptr));
   }
   // Its runs go to another, unless they have brought several down.
   Outcome died(Worker& worker) {
@@ -142,7 +148,8 @@ class Pool {
       if (++tries_[run] < kTries) {
         queue_.push_front(run);
       } else if (const Outcome done = work_.done(
-                     work_.lost(run, "the process of this run ended three times before its end"));
+                     work_.lost(run, "the process of this run ended three times before its end"),
+                     NAN);
                  !done) {
         return done;
       }
@@ -170,7 +177,11 @@ Outcome share_out(const Work& work) {
 
 void serve(const std::function<std::string(std::size_t run)>& answer) {
   for (std::string line; std::getline(std::cin, line);) {
-    const std::string text = answer(std::stoul(line)) + "\n";
+    const auto start = std::chrono::steady_clock::now();
+    std::string text = answer(std::stoul(line));
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    if (text[0] != '!') text += "\t" + std::to_string(took.count());
+    text += "\n";
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
       return;
   }

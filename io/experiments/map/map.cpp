@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
@@ -189,7 +190,7 @@ bool is_open(const MapPlan& plan, std::size_t job) {
 }
 
 Outcome run_open_jobs(const MapOptions& options, MapPlan& plan, const Console& console,
-                      const std::function<Outcome(std::size_t job)>& ended) {
+                      const std::function<Outcome(std::size_t job, double seconds)>& ended) {
   std::mutex lock;
   Outcome all = Done{};
   std::vector<std::function<void()>> jobs;
@@ -197,10 +198,12 @@ Outcome run_open_jobs(const MapOptions& options, MapPlan& plan, const Console& c
     if (!is_open(plan, i)) continue;
     jobs.push_back([&, i] {
       if (const std::lock_guard<std::mutex> hold(lock); !all) return;
+      const auto start = std::chrono::steady_clock::now();
       run_job(options, plan, i);
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
       if (interrupted.load()) return;  // it may have only some of its runs
       const std::lock_guard<std::mutex> hold(lock);
-      if (Outcome kept = ended(i); !kept) all = kept;
+      if (Outcome kept = ended(i, took.count()); !kept) all = kept;
     });
   }
   run_jobs(jobs, console, "variations", options.jobs);
@@ -209,7 +212,7 @@ Outcome run_open_jobs(const MapOptions& options, MapPlan& plan, const Console& c
 
 std::vector<MapScene> run_map(const MapOptions& options, const Console& console) {
   MapPlan plan = plan_map(options);
-  (void)run_open_jobs(options, plan, console, [](std::size_t) { return Outcome(Done{}); });
+  (void)run_open_jobs(options, plan, console, [](std::size_t, double) { return Outcome(Done{}); });
   return finish_map(std::move(plan));
 }
 

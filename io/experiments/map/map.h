@@ -76,10 +76,10 @@ std::string job_line(const MapPlan& plan, std::size_t job);
 bool take_job_line(MapPlan& plan, std::size_t job, const std::string& line);
 // Whether a job has neither runs nor an error yet.
 bool is_open(const MapPlan& plan, std::size_t job);
-// Runs the open jobs on threads of this process. `ended` gets each job that has ended, one at a
-// time; when it fails no further job begins, and its sentence is returned.
+// Runs the open jobs on threads of this process. `ended` gets each job that has ended and how long
+// it took, one at a time; when it fails no further job begins, and its sentence is returned.
 Outcome run_open_jobs(const MapOptions& options, MapPlan& plan, const Console& console,
-                      const std::function<Outcome(std::size_t job)>& ended);
+                      const std::function<Outcome(std::size_t job, double seconds)>& ended);
 std::vector<MapScene> finish_map(MapPlan&& plan);
 
 // The method's net stiffness on a flat wall, in k: the slope of the contact force of a box's bottom

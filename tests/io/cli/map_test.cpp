@@ -55,23 +55,26 @@ TEST_CASE("a map that is killed again and again ends with the same figures") {
   };
   std::mt19937_64 random(7);
   int kills = 0;
+  unsigned longest = 1000;  // [ms]
   long most = 0, resumed = 0;
   for (; !fs::exists(box.file("kept/runs.csv")) && kills < 40; ++kills) {
     auto process = std::make_unique<Process>(box, kept);
-    std::this_thread::sleep_for(std::chrono::milliseconds(50 + random() % 1500));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50 + random() % longest));
     process.reset();  // SIGKILL
     const long now = rows("kept/runs.csv.part");
     CHECK((now >= most || fs::exists(box.file("kept/runs.csv"))));  // nothing is lost
     resumed += most > 0;
-    most = now;
+    if (now <= most) longest += 500;  // on a busy machine a variation takes seconds
+    most = std::max(most, now);
   }
-  CHECK(kills > 1);
+  CHECK(resumed > 0);
   if (fs::exists(box.file("kept/runs.csv.part")))  // a torn row, as a loss of power leaves it
     std::ofstream(box.file("kept/runs.csv.part"), std::ios::app) << "3,cone-in-gap,3,\"{";
   CHECK(result_of(box, kept) == whole);
   CHECK(slurp(box.file("kept.csv")) == slurp(box.file("whole.csv")));
   CHECK(slurp(box.file("kept.md")) == slurp(box.file("whole.md")));
   CHECK(rows("kept/runs.csv") == 1 + 4);
+  CHECK(rows("kept/times.csv") == 1 + 4);
   // A map that is done runs nothing again, also when only its files are gone.
   fs::remove(box.file("kept.csv"));
   const Ended again = run(box, kept);

@@ -46,6 +46,20 @@ std::string whole_table(Sandbox& box, const std::string& folder, const char* job
   return slurp(box.file(folder + "/runs.csv"));
 }
 
+// times.csv names each run once, in order, with a time that it can have taken.
+void check_times(Sandbox& box, const std::string& folder, std::size_t runs) {
+  const std::vector<std::string> times = lines(slurp(box.file(folder + "/times.csv")));
+  REQUIRE(times.size() == 1 + runs);
+  CHECK(times[0] == "run,seconds");
+  for (std::size_t run = 0; run < runs; ++run) {
+    CAPTURE(times[1 + run]);
+    const std::vector<std::string> row = fields(times[1 + run]);
+    REQUIRE(row.size() == 2);
+    CHECK(row[0] == std::to_string(run));
+    CHECK(std::stod(row[1]) > 0);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("a study has a row for each run, in order, whatever the number of processes") {
@@ -53,6 +67,7 @@ TEST_CASE("a study has a row for each run, in order, whatever the number of proc
   spill(box.file("study.json"), kStudy);
   const std::string table = whole_table(box, "two", "2");
   CHECK(table == whole_table(box, "one", "1"));
+  check_times(box, "two", 2 * 2 * 8);
   const std::vector<std::string> rows = lines(table);
   REQUIRE(rows.size() == 1 + 2 * 2 * 8);
   CHECK(
@@ -104,7 +119,9 @@ TEST_CASE(
   // A torn last row, as a loss of power leaves it.
   if (fs::exists(box.file("killed/runs.csv.part")))
     std::ofstream(box.file("killed/runs.csv.part"), std::ios::app) << "31,7,glob";
+  std::ofstream(box.file("killed/times.csv"), std::ios::app) << "31,0.";
   CHECK(whole_table(box, "killed", "2") == want);
+  check_times(box, "killed", 2 * 2 * 8);
   MESSAGE(kills << " kills");
 }
 
