@@ -475,6 +475,17 @@ void h6HaltLoop(h6Loop* loop) {
 }
 void h6HaltAll(void) { sched::halt_all(); }
 
+// What the hands come to once the haptic thread has ended. Later the session may be another loop's.
+static void report_hands(h6Loop& loop) {
+  loop.report.fault = H6_CAUSE_NONE;
+  for (std::size_t h = 0; h < loop.session->hands.size(); ++h) {
+    OutputGuard& guard = loop.session->devices[h].guard;
+    if (loop.gate.halted()) guard.fault(H6_CAUSE_STOPPED);
+    loop.report.hand[h] = guard.report();
+    if (loop.report.fault == H6_CAUSE_NONE) loop.report.fault = guard.fault();
+  }
+}
+
 void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
   if (out) *out = {};
   if (!loop || loop->thread->is_this()) return;
@@ -482,6 +493,7 @@ void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
   loop->gate.stop_all();
   if (!loop->joined) {
     take_asked(*loop->session);  // too late for a frame
+    report_hands(*loop);
     loop->session->team->set_realtime(0, -1);
     loop->session->owner = Owner::nobody;
     loop->joined = true;
@@ -492,13 +504,6 @@ void h6JoinLoop(h6Loop* loop, h6LoopReport* out) {
       h6Log(H6_LOG_WARNING, "records were lost to a slow reader: raise ring_frames");
   }
   h6LoopReport& report = loop->report;  // the haptic thread has ended
-  report.fault = H6_CAUSE_NONE;
-  for (std::size_t h = 0; h < loop->session->hands.size(); ++h) {
-    OutputGuard& guard = loop->session->devices[h].guard;
-    if (loop->gate.halted()) guard.fault(H6_CAUSE_STOPPED);
-    report.hand[h] = guard.report();
-    if (report.fault == H6_CAUSE_NONE) report.fault = guard.fault();
-  }
   report.ring_overruns = loop->ring ? loop->ring->lost() : 0;
   report.inputs_only = loop->ring ? loop->ring->inputs_only() : 0;
   report.watchdog_trips = loop->watchdog ? loop->watchdog->trips() : 0;

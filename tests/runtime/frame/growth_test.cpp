@@ -232,6 +232,15 @@ TEST_CASE("while a loop runs a session, others are refused and change nothing") 
   CHECK(error.code == H6_ERROR_BUSY);
   CHECK_FALSE(h6RestartFit(scene.session, &error));
   CHECK(error.code == H6_ERROR_BUSY);
+  // Neither does it take over, nor is it taken over.
+  h6Session* const idle = h6CreateSession(scene.model.handle, &scene.def, nullptr);
+  REQUIRE(idle);
+  for (const bool from : {false, true}) {
+    error = {};
+    CHECK_FALSE(h6TakeOver(from ? idle : scene.session, from ? scene.session : idle, &error));
+    CHECK(error.code == H6_ERROR_BUSY);
+    CHECK(error.message[0] != 0);
+  }
   const h6BodyState away{pose(1, 1, 1), {}};
   h6SetBody(scene.session, 1, &away);
   CHECK(h6ChangeSession(loop, scene.session, &error) == nullptr);
@@ -239,12 +248,19 @@ TEST_CASE("while a loop runs a session, others are refused and change nothing") 
   h6JoinLoop(loop, nullptr);
   CHECK(h6GetBody(scene.session, 1).pose.p.x == 0);
   CHECK(h6RestartFit(scene.session, &error));
+  CHECK(h6TakeOver(idle, scene.session, &error));
+  h6DestroySession(idle);
   CHECK(h6Step(scene.session, &sample, &command) != H6_OUTPUT_FAULT);
   // An old loop that is destroyed does not take the session from a new one.
   h6Loop* next = h6StartLoop(scene.session, &device, &def, &error);
   REQUIRE_MESSAGE(next, error.message);
+  h6HaltLoop(loop);
   h6DestroyLoop(loop);
   CHECK(h6Step(scene.session, &sample, &command) == H6_OUTPUT_FAULT);
+  h6LoopReport report;
+  h6RequestStop(next);
+  h6JoinLoop(next, &report);
+  CHECK(report.fault == H6_CAUSE_NONE);  // nor does it fault its outputs
   h6DestroyLoop(next);
 }
 
@@ -320,7 +336,7 @@ TEST_CASE("a device that ends its own loop asks for the end, and the program joi
   OnePart scene = box_on_floor();
   scene.open();
   struct Ends {
-    h6Loop* loop = nullptr;
+    std::atomic<h6Loop*> loop{nullptr};
     std::atomic<int> reads{0};
   } ends;
   h6Device device = simulated_device();
@@ -331,6 +347,7 @@ TEST_CASE("a device that ends its own loop asks for the end, and the program joi
     h6LoopReport report;
     std::memset(&report, 0xff, sizeof report);
     if (++e.reads != 50) return 0;
+    while (!e.loop) std::this_thread::yield();  // h6StartLoop has not returned yet
     h6JoinLoop(e.loop, &report);
     const int bad = report.frames != 0;
     h6DestroyLoop(e.loop);
