@@ -11,14 +11,15 @@
  * a -1 or an index past the end a function gives NULL, -1 or zeros, and changes nothing. A value that is
  * not finite is refused, by a create function or as a bad sample.
  *
- * Threads. Any thread, many at once: defaults, names, h6SampleField, h6StiffnessFor, h6WeighContacts,
- * and everything that only reads a model. A session belongs to one thread at a time: of two threads in
- * h6Step at once, the second gets H6_OUTPUT_FAULT, and nothing changes. While a loop runs a session it
- * belongs to the loop's thread: h6Step then gives H6_OUTPUT_FAULT, another h6StartLoop, h6TakeOver and
- * h6RestartFit fail with H6_ERROR_BUSY, the functions that set anything do nothing, but for h6Fault,
- * h6LoseDevice and h6Disarm, which only take force away, and what the h6Get functions give may change
- * under the reader's eyes: a loop has records and views instead. A session or model must not be
- * destroyed while another call uses it. Create functions and h6LoopRunning: any thread. */
+ * Threads. Any thread, many at once: defaults, names, h6Version, h6BuildInfo, h6SampleField,
+ * h6StiffnessFor, h6WeighContacts, and everything that only reads a model. A session belongs to one
+ * thread at a time: of two threads in h6Step at once, the second gets H6_OUTPUT_FAULT, and nothing
+ * changes. While a loop runs a session it belongs to the loop's thread: h6Step then gives
+ * H6_OUTPUT_FAULT, another h6StartLoop, h6TakeOver and h6RestartFit fail with H6_ERROR_BUSY, the
+ * functions that set anything do nothing, but for h6Fault, h6LoseDevice and h6Disarm, which only take
+ * force away, and what the h6Get functions give may change under the reader's eyes: a loop has
+ * records and views instead. A session or model must not be destroyed while another call uses it.
+ * Create functions and h6LoopRunning: any thread. */
 #ifndef HAPSIX_H
 #define HAPSIX_H
 

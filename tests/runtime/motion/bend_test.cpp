@@ -317,6 +317,37 @@ TEST_CASE("a definition of a deformable is checked, and its functions take wrong
   CHECK(scene.q() == std::vector<double>{1e-3, 2e-3, 3e-3});
 }
 
+TEST_CASE("while a loop runs a session, nothing puts its bodies into another shape") {
+  const auto open = [](BallOnBridge& scene) {
+    scene.def.hand_count = 0;
+    scene.bodies[1].pose = pose(0, 0, 0.5);  // far away
+    REQUIRE(scene.open());
+    const std::vector<double> q(8, 1e-3);
+    REQUIRE(h6SetDeformation(scene.session, 0, q.data(), nullptr, 8));
+  };
+  BallOnBridge scene(600, 8), again(600, 8);
+  open(scene), open(again);
+  h6LoopDef def = h6DefaultLoopDef();
+  def.duration = 0, def.realtime = false;
+  h6Loop* loop = h6StartLoop(scene.session, nullptr, &def, nullptr);
+  REQUIRE(loop);
+  const std::vector<double> other(8, -2e-3);
+  CHECK_FALSE(h6SetDeformation(scene.session, 0, other.data(), other.data(), 8));
+  std::thread([&] {
+    for (int i = 0; i < 20; ++i) {
+      CHECK_FALSE(h6SetDeformation(scene.session, 0, other.data(), nullptr, 8));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }).join();
+  h6RequestStop(loop);
+  h6LoopReport report;
+  h6JoinLoop(loop, &report);
+  for (std::uint64_t i = 0; i < report.frames; ++i) h6Step(again.session, nullptr, nullptr);
+  CHECK(scene.q() == again.q());
+  CHECK(h6SetDeformation(scene.session, 0, other.data(), nullptr, 8));  // it is ours again
+  h6DestroyLoop(loop);
+}
+
 TEST_CASE("a viewer of a loop gets the coordinates of the body that bends") {
   const auto vibrate = [](BallOnBridge& scene) {
     scene.def.hand_count = 0;
