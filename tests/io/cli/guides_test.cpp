@@ -120,3 +120,15 @@ TEST_CASE("links of the guides lead somewhere") {
   }
   CHECK(seen > 10);
 }
+
+// ./dev test-view draws them, and fails where one shows next to nothing.
+TEST_CASE("every picture of the gallery is drawn by its command") {
+  static const std::regex picture(R"(pictures/([a-z]+)\.png)");
+  const std::string text = slurp(guides / "gallery.md");
+  const fs::path drawn = fs::path(HAPSIX_SOURCE_DIR) / "tests/io/view/browser/gallery.mjs";
+  const std::string script = slurp(drawn);
+  int seen = 0;
+  for (std::sregex_iterator it(text.begin(), text.end(), picture), end; it != end; ++it, ++seen)
+    CHECK_MESSAGE(script.find("'" + (*it)[1].str()) != std::string::npos, (*it)[1].str());
+  CHECK(seen >= 5);
+}

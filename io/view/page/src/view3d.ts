@@ -61,6 +61,7 @@ export class View3D {
   ghost: THREE.Object3D | null = null;
   hand = -1;                                // the body that the first hand moves
   radius = 1;
+  private reach = 1;                        // how long marks are: the scene's radius, or the part's size
   private scene = new THREE.Scene();
   private sky = new THREE.HemisphereLight('#dfe8f5', '#3a3f4a', 1.6);
   private sun = new THREE.DirectionalLight('#ffffff', 1.8);
@@ -186,6 +187,7 @@ export class View3D {
     this.radius = 0.5 * box.getSize(new THREE.Vector3()).length();
     this.root.scale.setScalar(1 / this.radius);
     box.getCenter(this.centre);
+    this.reach = part.isEmpty() ? this.radius : Math.min(this.radius, 0.8 * part.getSize(new THREE.Vector3()).length());
     // Near enough to see the part, far enough to see its surroundings.
     const focus = (part.isEmpty() ? box : part).getCenter(new THREE.Vector3()).divideScalar(this.radius);
     const near = part.isEmpty() ? 1 : Math.max(0.3, 0.7 * part.getSize(new THREE.Vector3()).length() / this.radius);
@@ -249,7 +251,7 @@ export class View3D {
     for (let i = 0; i < n; ++i) {
       from.set(c.p[3 * i], c.p[3 * i + 1], c.p[3 * i + 2]);
       along.set(c.n[3 * i], c.n[3 * i + 1], c.n[3 * i + 2]);
-      const length = this.radius * (0.05 + 0.1 * Math.min(1, c.d[i] / voxel));
+      const length = this.reach * (0.05 + 0.1 * Math.min(1, c.d[i] / voxel));
       turn.setFromUnitVectors(z, along);
       size.setScalar(length);
       this.matrix.compose(from, turn, size);
@@ -263,7 +265,7 @@ export class View3D {
     this.deepest.visible = deepest >= 0;
     if (deepest >= 0) {
       this.deepest.position.set(c.p[3 * deepest], c.p[3 * deepest + 1], c.p[3 * deepest + 2]);
-      this.deepest.scale.setScalar(0.009 * this.radius);
+      this.deepest.scale.setScalar(0.012 * this.reach);
     }
   }
 
@@ -308,17 +310,17 @@ export class View3D {
     this.crossing.visible = place !== null;
     if (!place) return;
     this.crossing.position.set(place[0], place[1], place[2]);
-    this.crossing.scale.setScalar(0.03 * this.radius);
+    this.crossing.scale.setScalar(0.03 * this.reach);
   }
 
-  // Draws the net stiffness (xx yy zz xy xz yz). An axis is 0.12 of the scene's radius at `full`, at
-  // most three times that.
+  // Draws the net stiffness (xx yy zz xy xz yz). An axis is 0.12 of `reach` at `full`, at most
+  // three times that.
   stiffness(m: ArrayLike<number>, full: number, shown: boolean) {
     const body = this.bodies[this.hand];
     this.ellipsoid.visible = shown && !!body && m.length === 6 && m[0] + m[1] + m[2] > 0;
     if (!this.ellipsoid.visible || !body) return;
     const { values, axes } = principalAxes(m);
-    const size = values.map((v) => 0.12 * this.radius * Math.min(3, Math.max(0.01, v / full)));
+    const size = values.map((v) => 0.12 * this.reach * Math.min(3, Math.max(0.01, v / full)));
     const com = new THREE.Vector3(...(this.heads[this.hand].com as [number, number, number]));
     com.applyQuaternion(body.quaternion).add(body.position);
     this.ellipsoid.matrix.makeTranslation(com).multiply(axes)
@@ -420,7 +422,16 @@ export class View3D {
     this.root.updateMatrixWorld(true);
   }
 
+  // A ghost that coincides with the part would only flicker through its surface.
+  private showGhost() {
+    const body = this.bodies[this.hand];
+    if (!this.ghost || !body) return;
+    this.ghost.visible = this.ghost.position.distanceTo(body.position) > 0.004 * this.reach
+      || this.ghost.quaternion.angleTo(body.quaternion) > 0.01;
+  }
+
   render() {
+    this.showGhost();
     if (!this.renderer.xr.isPresenting) this.orbit.update();
     this.renderer.render(this.scene, this.camera);
   }

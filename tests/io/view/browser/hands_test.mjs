@@ -201,6 +201,8 @@ test('a finger leads the part into contact', () => {
 });
 
 test('a kept place is come back to, with the hand where it was; the stiffness of the hand is set', async () => {
+  await browser.go(address);  // a finger of a test that failed may still be down
+  await until(async () => await browser.value('Boolean(window.hapsix?.state())'), 'a state arrives');
   await browser.value('window.hapsix.ask({ do: "reset" })');
   await until(async () => (await state()).time < 2 && (await state()).time > 0.2, 'a new run');
   const at = await onPart();

@@ -132,6 +132,10 @@ test('what is drawn is explained: arrows, sphere, ellipsoid, units of the strips
   for (const words of ['contacts: share of stiffness 0', 'length by depth', 'where the hand is', 'deepest point', 'normals N',
     'torque directions T', 'along a long axis the part is stopped', 'force [N]', 'torque [mN·m]', 'depth [voxel]'])
     assert.ok(text.includes(words), words);
+  await browser.size(360, 740);  // what is drawn has its name at any width
+  await wait(300);
+  assert.match(await browser.value('document.getElementById("legend").innerText'), /net stiffness/);
+  await browser.size(1280, 860);
   assert.ok(await browser.value('document.querySelectorAll("#strips .u-title").length') >= 4, 'each strip has its title');
 });
 
