@@ -10,46 +10,11 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/bend/carried-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using DF = hn::CappedTag<float, kBendLanes>;
-using VF = hn::Vec<DF>;
-
-// The sums over the modes of lanes `lane` and on of one vector: three axes, and the spread where
-// there are four.
-template <int kAxes>
-struct Carried {
-  VF axis[kAxes];
-  HWY_INLINE Carried(const ModesView& m, const float* q, std::size_t v, std::size_t lane) {
-    const DF d;
-    HWY_UNROLL(4)
-    for (int a = 0; a < kAxes; ++a) axis[a] = hn::Zero(d);
-    const float* at = m.modes + v * m.count * kAxes * kBendLanes + lane;
-    for (std::size_t j = 0; j < m.count; ++j, at += kAxes * kBendLanes) {
-      const VF share = hn::Set(d, q[j]);
-      HWY_UNROLL(4)
-      for (int a = 0; a < 3; ++a)
-        axis[a] = hn::MulAdd(share, hn::LoadU(d, at + a * kBendLanes), axis[a]);
-      if constexpr (kAxes == 4)
-        axis[3] = hn::MulAdd(hn::Abs(share), hn::LoadU(d, at + 3 * kBendLanes), axis[3]);
-    }
-  }
-  HWY_INLINE VF length() const {
-    return hn::Sqrt(
-        hn::MulAdd(axis[0], axis[0], hn::MulAdd(axis[1], axis[1], hn::Mul(axis[2], axis[2]))));
-  }
-};
-
-// Calls f(vector, lane) for every register of the listed vectors.
-template <class F>
-HWY_INLINE void each_register(const std::uint32_t* vectors, std::size_t n, const F& f) {
-  for (std::size_t k = 0; k < n; ++k)
-    for (std::size_t lane = 0; lane < kBendLanes; lane += hn::Lanes(DF()))
-      f(vectors != nullptr ? vectors[k] : k, lane);
-}
 
 void points_simd(const ModesView& modes, const float* q, const float* const rest[3],
                  const std::uint32_t* vectors, std::size_t n, float* const to[3]) {
@@ -84,7 +49,7 @@ void spheres_simd(const ModesView& modes, const float* q, const float* const res
                   const std::uint32_t* vectors, std::size_t n, float* const to[4]) {
   const DF d;
   each_register(vectors, n, [&](std::size_t v, std::size_t lane) HWY_ATTR {
-    const Carried<4> way(modes, q, v, lane);
+    const Carried<3, 1> way(modes, q, v, lane);
     const std::size_t i = v * kBendLanes + lane;
     for (int a = 0; a < 3; ++a)
       hn::StoreU(hn::Add(hn::LoadU(d, rest[a] + i), way.axis[a]), d, to[a] + i);
@@ -97,7 +62,7 @@ float reach_simd(const ModesView& modes, const float* q, std::size_t n) {
   const DF d;
   VF most = hn::Zero(d);
   each_register(nullptr, n, [&](std::size_t v, std::size_t lane) HWY_ATTR {
-    const Carried<4> way(modes, q, v, lane);
+    const Carried<3, 1> way(modes, q, v, lane);
     most = hn::Max(most, hn::Mul(hn::Add(way.length(), way.axis[3]), hn::Set(d, kRoundUp)));
   });
   return hn::GetLane(hn::MaxOfLanes(d, most));
@@ -108,24 +73,8 @@ void rows_simd(const BentContacts& c, const ModesView& modes, const float turn[9
                std::size_t stride, float* out) {
   const DF d;
   HWY_ALIGN float local[3][kBendLanes], shares[kBendLanes];
-  for (std::size_t first = 0, end; first < c.count; first = end) {
-    const std::size_t v = c.row[first] / kBendLanes;
-    for (float(&axis)[kBendLanes] : local)
-      for (float& value : axis) value = 0;
-    for (end = first; end < c.count && c.row[end] / kBendLanes == v; ++end) {
-      const float direction[3] = {c.dx[end], c.dy[end], c.dz[end]};
-      const float r[3] = {c.rx[end], c.ry[end], c.rz[end]};
-      float* const row = out + end * stride;
-      for (int k = 0; k < 3; ++k) {
-        const int l = (k + 1) % 3, m = (k + 2) % 3;
-        row[k] = direction[k];
-        row[3 + k] = r[l] * direction[m] - r[m] * direction[l];
-        local[k][c.row[end] % kBendLanes] = turn[3 * k] * direction[0] +
-                                            turn[3 * k + 1] * direction[1] +
-                                            turn[3 * k + 2] * direction[2];
-      }
-      for (std::size_t j = 6 + modes.count; j < stride; ++j) row[j] = 0;
-    }
+  each_vector(c, [&](std::size_t v, std::size_t first, std::size_t end) HWY_ATTR {
+    rigid_rows(c, first, end, turn, stride, out, local);
     const float* at = modes.modes + v * modes.count * 3 * kBendLanes;
     for (std::size_t j = 0; j < modes.count; ++j, at += 3 * kBendLanes) {
       for (std::size_t lane = 0; lane < kBendLanes; lane += hn::Lanes(d)) {
@@ -138,7 +87,8 @@ void rows_simd(const BentContacts& c, const ModesView& modes, const float turn[9
       for (std::size_t i = first; i < end; ++i)
         out[i * stride + 6 + j] = shares[c.row[i] % kBendLanes];
     }
-  }
+    clear_ends(first, end, 6 + modes.count, stride, out);
+  });
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

@@ -51,6 +51,17 @@ struct BentContacts {
   const std::uint32_t* row;
   std::size_t count;
 };
+// The rigid part of contact i's row, and its direction in the axes of the modes.
+inline void rigid_row(const BentContacts& c, std::size_t i, const float turn[9], float* row,
+                      float local[3]) {
+  const float d[3] = {c.dx[i], c.dy[i], c.dz[i]}, r[3] = {c.rx[i], c.ry[i], c.rz[i]};
+  for (int k = 0; k < 3; ++k) {
+    const int l = (k + 1) % 3, m = (k + 2) % 3;
+    row[k] = d[k];
+    row[3 + k] = r[l] * d[m] - r[m] * d[l];
+    local[k] = turn[3 * k] * d[0] + turn[3 * k + 1] * d[1] + turn[3 * k + 2] * d[2];
+  }
+}
 void contact_rows(const BentContacts& contacts, const ModesView& modes, const float turn[9],
                   std::size_t stride, float* out);
 void contact_rows_ref(const BentContacts& contacts, const ModesView& modes, const float turn[9],

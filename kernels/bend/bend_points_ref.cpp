@@ -82,15 +82,9 @@ float bend_reach_ref(const ModesView& modes, const float* q, std::size_t n) {
 void contact_rows_ref(const BentContacts& c, const ModesView& modes, const float turn[9],
                       std::size_t stride, float* out) {
   for (std::size_t i = 0; i < c.count; ++i) {
-    const float d[3] = {c.dx[i], c.dy[i], c.dz[i]}, r[3] = {c.rx[i], c.ry[i], c.rz[i]};
     float* const row = out + i * stride;
     float local[3];
-    for (int k = 0; k < 3; ++k) {
-      const int l = (k + 1) % 3, m = (k + 2) % 3;
-      row[k] = d[k];
-      row[3 + k] = r[l] * d[m] - r[m] * d[l];
-      local[k] = turn[3 * k] * d[0] + turn[3 * k + 1] * d[1] + turn[3 * k + 2] * d[2];
-    }
+    rigid_row(c, i, turn, row, local);
     const std::size_t v = c.row[i] / kBendLanes, lane = c.row[i] % kBendLanes;
     for (std::size_t j = 0; j < modes.count; ++j) {
       const float* const mode = modes.modes + (v * modes.count + j) * 3 * kBendLanes + lane;

@@ -25,8 +25,8 @@ HWY_INLINE void add_to(double* at, VD value) {
 
 // The components in one register. A coefficient of degree 3 is read once: its product with q_l goes
 // to a sum over l, its product with q_j q_k to the column of l; the sum gives the rest.
-HWY_INLINE void force_lanes(const double* at, std::size_t r, std::size_t padded, const double* q,
-                            double* force, double* tangent) {
+HWY_INLINE void force_lanes(const double* at, bool linear, std::size_t r, std::size_t padded,
+                            const double* q, double* force, double* tangent) {
   const DD d;
   const auto next = [&at, d]() HWY_ATTR {
     const VD value = hn::LoadU(d, at);
@@ -39,6 +39,7 @@ HWY_INLINE void force_lanes(const double* at, std::size_t r, std::size_t padded,
     total = hn::MulAdd(c, hn::Set(d, q[j]), total);
     hn::StoreU(c, d, tangent + j * padded);
   }
+  if (linear) return hn::StoreU(total, d, force);
   for (std::size_t j = 0; j < r; ++j) {
     const VD qj = hn::Set(d, q[j]);
     VD sum = hn::Zero(d);
@@ -75,7 +76,7 @@ void force_simd(const ReducedForce& p, const double* q, double* force, double* t
   const std::size_t padded = p.padded();
   for (std::size_t first = 0; first < padded; first += kForceLanes)
     for (std::size_t lane = 0; lane < kForceLanes; lane += hn::Lanes(DD()))
-      force_lanes(p.coefficients + first * p.monomials() + lane, p.count, padded, q,
+      force_lanes(p.coefficients + first * p.monomials() + lane, p.linear, p.count, padded, q,
                   force + first + lane, tangent + first + lane);
 }
 

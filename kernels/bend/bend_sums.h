@@ -10,12 +10,15 @@ namespace h6::kernels {
 // coefficients of each monomial for components 8b .. 8b+7 stand together, monomials in
 // lexicographic order (j; j <= k; j <= k <= l). Components from count on are zeros.
 //     block b: [count][8], [count (count+1)/2][8], [count (count+1) (count+2)/6][8]
+// A linear force has the first of these only.
 inline constexpr std::size_t kForceLanes = 8;
 struct ReducedForce {
   const double* coefficients;
-  std::size_t count;  // r
+  std::size_t count;    // r
+  bool linear = false;  // there is nothing behind degree 1
   std::size_t padded() const { return (count + kForceLanes - 1) / kForceLanes * kForceLanes; }
   std::size_t monomials() const {
+    if (linear) return count;
     return count + count * (count + 1) / 2 + count * (count + 1) * (count + 2) / 6;
   }
 };

@@ -21,6 +21,7 @@ void reduced_force_ref(const ReducedForce& polynomial, const double* q, double* 
       add(force, q[j]);
       add(d(j), 1);
     }
+    if (polynomial.linear) continue;
     for (std::size_t j = 0; j < r; ++j)
       for (std::size_t k = j; k < r; ++k, at += kForceLanes) {
         add(force, q[j] * q[k]);

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "kernels/bend/bend_points.h"
+#include "kernels/bend/warp_points.h"
 
 namespace h6 {
 namespace {
@@ -18,17 +18,24 @@ void bend_tier(const Deformation& d, const Tier& rest, const Column<float>& mode
                const std::uint32_t* vectors, std::size_t count, Tier& to) {
   const float* const from[4] = {rest.x.data, rest.y.data, rest.z.data, rest.radius.data};
   float* const out[4] = {to.x.data, to.y.data, to.z.data, to.radius.data};
-  kernels::bend_spheres(view(d, modes), d.bent, from, vectors, count, out);
+  const auto bend = d.shell->bend.warps ? kernels::warp_spheres : kernels::bend_spheres;
+  bend(view(d, modes), d.bent, from, vectors, count, out);
 }
 
 }  // namespace
 
-double bend_reach(const Deformation& d, const double* q) {
+// A change of u and of the turn w moves a warped point by at most |du| + 1/2 |dw| |u|, since its
+// mean rotation changes by at most half as much as w.
+double bend_way(const Deformation& d, const double* change) {
   float values[H6_MAX_MODES];
-  for (int j = 0; j < d.modes; ++j) values[j] = static_cast<float>(q[j]);
+  for (int j = 0; j < d.modes; ++j) values[j] = static_cast<float>(change[j]);
   const Shell& shell = *d.shell;
-  return kernels::bend_reach(view(d, shell.bend.blocks), values,
-                             shell.blocks.x.count / kernels::kBendLanes);
+  const std::size_t vectors = shell.blocks.x.count / kernels::kBendLanes;
+  const kernels::ModesView modes = view(d, shell.bend.blocks);
+  if (!shell.bend.warps) return kernels::bend_reach(modes, values, vectors);
+  const kernels::WarpReach reach =
+      kernels::warp_reach(modes, values, shell.blocks.radius.data, vectors);
+  return double{reach.shift} + 0.5 * double{reach.turn} * double{d.reach};
 }
 
 void follow(Deformation& d, std::span<const Body> bodies) {
@@ -41,7 +48,8 @@ void follow(Deformation& d, std::span<const Body> bodies) {
   const Shell& shell = *d.shell;
   bend_tier(d, shell.blocks, shell.bend.blocks, nullptr, shell.blocks.x.count / kernels::kBendLanes,
             d.blocks);
-  d.reach = static_cast<float>(bend_reach(d, d.q));
+  d.reach = 0;
+  d.reach = static_cast<float>(bend_way(d, d.q));
 }
 
 void bend_groups(Deformation& d, const std::uint32_t* blocks, std::size_t count) {
@@ -53,14 +61,18 @@ void bend_points(Deformation& d, const std::uint32_t* groups, std::size_t count)
   static_assert(kGroupRows == kernels::kBendLanes, "a group's points are one vector");
   const Shell& s = *d.shell;
   const float* const rest[3] = {s.x.data, s.y.data, s.z.data};
-  float* const to[3] = {d.x.data, d.y.data, d.z.data};
-  kernels::bend_points(view(d, s.bend.points), d.bent, rest, groups, count, to);
+  float* const to[9] = {d.x.data,  d.y.data,  d.z.data,  d.ux.data, d.uy.data,
+                        d.uz.data, d.wx.data, d.wy.data, d.wz.data};
+  const auto bend = s.bend.warps ? kernels::warp_points : kernels::bend_points;
+  bend(view(d, s.bend.points), d.bent, rest, groups, count, to);
 }
 
 void bend_normals(Deformation& d, const std::uint32_t* groups, std::size_t count) {
   const Shell& s = *d.shell;
   const float* const rest[3] = {s.nx.data, s.ny.data, s.nz.data};
   float* const to[3] = {d.nx.data, d.ny.data, d.nz.data};
+  const float* const turn[3] = {d.wx.data, d.wy.data, d.wz.data};
+  if (s.bend.warps) return kernels::warp_normals(rest, turn, groups, count, to);
   kernels::bend_normals(view(d, s.bend.normals), d.bent, rest, groups, count, to);
 }
 

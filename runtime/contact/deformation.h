@@ -53,8 +53,9 @@ struct Deformation {
   // Where the search of the pair was: as PairSearch::last_place and anchor.
   float last_bent[H6_MAX_MODES] = {}, anchor_bent[H6_MAX_MODES] = {};
   // As in Shell, bent. Points of groups that are not open, and normals of points that are no
-  // candidates, are old.
+  // candidates, are old. Where displacements are warped: they and the turns, with the points.
   Column<float> x, y, z, nx, ny, nz;
+  Column<float> ux, uy, uz, wx, wy, wz;
   Tier groups, blocks;
   // Of contacts, by row: rows of the shell; forces along the direction of push and along the
   // field's gradient (`exact`) as rows of 6 + r; load and share of the stiffness in sums.
@@ -88,8 +89,9 @@ inline PointColumns points_of(const Body& a) {
   return {s.x.data, s.y.data, s.z.data, s.nx.data, s.ny.data, s.nz.data};
 }
 
-// How far coordinates q, or a change of them, carry any point, at most [m].
-double bend_reach(const Deformation& d, const double* q);
+// How far a change of the coordinates carries any point from the shape that d.reach belongs to, at
+// most [m].
+double bend_way(const Deformation& d, const double* change);
 // Takes over the coordinates and the place of the other body: what traversal starts from.
 void follow(Deformation& d, std::span<const Body> bodies);
 // Bends spheres of the groups of these blocks; points, or normals, of these groups.

@@ -204,7 +204,7 @@ double bending_bound(const Search& search, const float* from) {
   if (!search.bend) return 0;
   double change[H6_MAX_MODES];
   for (int j = 0; j < search.bend->modes; ++j) change[j] = double{search.bend->bent[j]} - from[j];
-  return double{search.scale} * bend_reach(*search.bend, change);
+  return double{search.scale} * bend_way(*search.bend, change);
 }
 
 // The distance that the shell has travelled through the field [voxel]. It does not grow while the

@@ -128,6 +128,8 @@ void lay_out_bend(const Settings& set, const Shell& shell, Deformation* to, Aren
   }
   for (Column<float>* column : {&d.x, &d.y, &d.z, &d.nx, &d.ny, &d.nz})
     column->take(arena, shell.x.count);
+  for (Column<float>* column : {&d.ux, &d.uy, &d.uz, &d.wx, &d.wy, &d.wz})
+    column->take(arena, shell.bend.warps ? shell.x.count : 0);
   const std::size_t r = shell.bend.modes, contacts = set.max_contacts;
   const bool exact = set.gradient == H6_EXACT;
   d.shell = &shell;

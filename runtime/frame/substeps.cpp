@@ -138,7 +138,7 @@ Substeps plan_explicit(const h6Session& s) {
 Substeps plan_substeps(h6Session& s) {
   if (s.settings.max_substeps == 1) return {};
   if (s.settings.integrator == H6_EXPLICIT) return plan_explicit(s);
-  for (Deformation& d : s.bends) d.pace = s.settings.dt * bend_reach(d, d.v);
+  for (Deformation& d : s.bends) d.pace = s.settings.dt * bend_way(d, d.v);
   note_reach(s, s.settings.dt, 1, true);
   find_near_pairs(s);
   double needed = 1;
@@ -166,7 +166,7 @@ double share_of_way(const Substeps& plan, bool held, std::uint32_t i) {
 
 bool slow_down(h6Session& s, double dt) {
   if (s.settings.max_substeps == 1 || s.settings.integrator == H6_EXPLICIT) return false;
-  for (Deformation& d : s.bends) d.pace = bend_reach(d, d.step);
+  for (Deformation& d : s.bends) d.pace = bend_way(d, d.step);
   note_reach(s, dt, 1 / s.substeps.needed, false);
   find_near_pairs(s);
   double share = 1;

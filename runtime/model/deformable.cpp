@@ -39,9 +39,17 @@ bool check(const h6DeformableDef& def, std::size_t points, h6Error* error) {
     return fail(error, H6_ERROR_RANGE,
                 "a deformable's alpha is 0 to 1e6 1/s and its beta 0 to 1e3 s, not %g and %g",
                 def.alpha, def.beta);
+  if (def.turn_modes && def.normal_modes)
+    return fail(error,
+                "a deformable has normal_modes or turn_modes, not both: the turn of a point turns "
+                "its normal");
+  if (def.turn_modes && (def.quadratic || def.cubic))
+    return fail(
+        error, "a deformable with turn_modes has a linear force: quadratic and cubic must be NULL");
   const Counts n(r);
   return check_finite(def.modes, points * r * 3, "modes", error) &&
          check_finite(def.normal_modes, points * r * 3, "normal_modes", error) &&
+         check_finite(def.turn_modes, points * r * 3, "turn_modes", error) &&
          check_finite(def.linear, r * n.linear, "linear", error) &&
          check_finite(def.quadratic, r * n.quadratic, "quadratic", error) &&
          check_finite(def.cubic, r * n.cubic, "cubic", error);
@@ -49,12 +57,13 @@ bool check(const h6DeformableDef& def, std::size_t points, h6Error* error) {
 
 void lay_out(Deformable& bend, const Shell& shell, Arena& arena) {
   const std::size_t r = bend.modes, row = r * kernels::kBendLanes;
-  bend.blocks.take(arena, 4 * row * (shell.blocks.x.count / kernels::kBendLanes));
-  bend.groups.take(arena, 4 * row * (shell.groups.x.count / kernels::kBendLanes));
+  const std::size_t vectors = shell.x.count / kernels::kBendLanes;
+  bend.blocks.take(arena, bend.sphere_axes() * row * (shell.blocks.x.count / kernels::kBendLanes));
+  bend.groups.take(arena, bend.sphere_axes() * row * (shell.groups.x.count / kernels::kBendLanes));
   bend.force.take(arena, (r + kernels::kForceLanes - 1) / kernels::kForceLanes *
-                             kernels::kForceLanes * Counts(r).all());
-  bend.points.take(arena, 3 * row * (shell.x.count / kernels::kBendLanes));
-  bend.normals.take(arena, 3 * row * (shell.x.count / kernels::kBendLanes));
+                             kernels::kForceLanes * (bend.linear ? r : Counts(r).all()));
+  bend.points.take(arena, bend.point_axes() * row * vectors);
+  bend.normals.take(arena, bend.warps ? 0 : 3 * row * vectors);
 }
 
 // The place of a row's value in columns of vectors.
@@ -63,39 +72,69 @@ float& at(Column<float>& column, std::size_t modes, std::size_t axes, std::size_
   constexpr std::size_t lanes = kernels::kBendLanes;
   return column[((row / lanes * modes + mode) * axes + axis) * lanes + row % lanes];
 }
-Vec3 mode_at(Deformable& bend, Column<float>& column, std::size_t row, std::size_t mode) {
-  return Vec3(at(column, bend.modes, 3, row, mode, 0), at(column, bend.modes, 3, row, mode, 1),
-              at(column, bend.modes, 3, row, mode, 2));
+Vec3 mode_at(Deformable& bend, std::size_t row, std::size_t mode, std::size_t axis = 0) {
+  Vec3 out;
+  for (std::size_t k = 0; k < 3; ++k)
+    out[static_cast<int>(k)] =
+        double{at(bend.points, bend.modes, bend.point_axes(), row, mode, axis + k)};
+  return out;
 }
 
-void take_rows(const Shell& shell, std::size_t r, const float* values, Column<float>& to) {
+// Writes axes `first` to `first` + 2.
+void take_rows(const Shell& shell, std::size_t r, const float* values, std::size_t axes,
+               std::size_t first, Column<float>& to) {
   for (std::size_t i = 0; i < shell.x.count; ++i)
     for (std::size_t j = 0; j < r; ++j)
       for (std::size_t k = 0; k < 3; ++k)
-        at(to, r, 3, i, j, k) = values[(std::size_t{shell.point[i]} * r + j) * 3 + k];
+        at(to, r, axes, i, j, first + k) = values[(std::size_t{shell.point[i]} * r + j) * 3 + k];
 }
 
-// A sphere's centre goes with the middle of what its points do; the fourth axis is how far any of
-// them goes from there. Columns repeat the last sphere up to a whole vector.
+// The middle of the box of f(i), i = first .. end-1, in float, and the largest distance from it.
+struct Middle {
+  Vec3 at;
+  float spread;
+};
+template <class F>
+Middle middle_of(std::size_t first, std::size_t end, const F& f) {
+  Vec3 low = Vec3::Constant(HUGE_VAL), high = -low;
+  for (std::size_t i = first; i < end; ++i) low = low.cwiseMin(f(i)), high = high.cwiseMax(f(i));
+  const Vec3 middle = (0.5 * (low + high)).cast<float>().cast<double>();
+  double spread = 0;
+  for (std::size_t i = first; i < end; ++i) spread = std::max(spread, (f(i) - middle).norm());
+  return {middle, static_cast<float>(spread * 1.000001)};
+}
+
+// A sphere's centre goes with the middle of what its points do; the next axis is how far any of
+// them goes from there. Of warped points that is the middle but for the turn of the sphere, and
+// there are those of the turns too: kernels/bend/warp_points.h. Columns repeat the last sphere up
+// to a whole vector.
 void take_spheres(Deformable& bend, const Shell& shell, const Tier& tier, std::size_t rows,
                   Column<float>& to) {
+  const std::size_t axes = bend.sphere_axes();
   for (std::size_t s = 0; s < tier.x.count; ++s) {
     const std::size_t first = std::min(s, tier.count - 1) * rows;
     const std::size_t end = std::min(first + rows, shell.points);
+    const Vec3 centre(tier.x[s], tier.y[s], tier.z[s]);
+    const auto put = [&](std::size_t j, std::size_t axis, const Middle& m,
+                         std::size_t spread_axis) {
+      for (std::size_t k = 0; k < 3; ++k)
+        at(to, bend.modes, axes, s, j, axis + k) = static_cast<float>(m.at[static_cast<int>(k)]);
+      at(to, bend.modes, axes, s, j, spread_axis) = m.spread;
+    };
     for (std::size_t j = 0; j < bend.modes; ++j) {
-      Vec3 low = Vec3::Constant(HUGE_VAL), high = -low;
-      for (std::size_t i = first; i < end; ++i) {
-        const Vec3 u = mode_at(bend, bend.points, i, j);
-        low = low.cwiseMin(u), high = high.cwiseMax(u);
+      Vec3 turn = Vec3::Zero();
+      if (bend.warps) {
+        const Middle turns = middle_of(first, end, [&](auto i) { return mode_at(bend, i, j, 3); });
+        put(j, 3, turns, 7);
+        turn = turns.at;
       }
-      const Eigen::Vector3f middle = (0.5 * (low + high)).cast<float>();
-      double spread = 0;
-      for (std::size_t i = first; i < end; ++i)
-        spread =
-            std::max(spread, (mode_at(bend, bend.points, i, j) - middle.cast<double>()).norm());
-      for (int k = 0; k < 3; ++k)
-        at(to, bend.modes, 4, s, j, static_cast<std::size_t>(k)) = middle[k];
-      at(to, bend.modes, 4, s, j, 3) = static_cast<float>(spread * 1.000001);
+      put(j, 0,
+          middle_of(first, end,
+                    [&](std::size_t i) -> Vec3 {
+                      const Vec3 arm = Vec3(shell.x[i], shell.y[i], shell.z[i]) - centre;
+                      return mode_at(bend, i, j) - turn.cross(arm);
+                    }),
+          bend.warps ? 6 : 3);
     }
   }
 }
@@ -148,10 +187,10 @@ void derive_normals(Deformable& bend, const Shell& shell) {
     A += 1e-6 * std::max(A.trace(), 1e-12) * Eigen::Matrix2d::Identity();
     const Eigen::Matrix2d inverse = A.inverse();
     for (std::size_t j = 0; j < bend.modes; ++j) {
-      const double u = n.dot(mode_at(bend, bend.points, from, j));
+      const double u = n.dot(mode_at(bend, from, j));
       Eigen::Vector2d slope = Eigen::Vector2d::Zero();
       for (std::size_t k = 0; k < count; ++k)
-        slope += (n.dot(mode_at(bend, bend.points, near[k], j)) - u) * share[k];
+        slope += (n.dot(mode_at(bend, near[k], j)) - u) * share[k];
       slope = inverse * slope;
       const Vec3 turn = -(slope[0] * t1 + slope[1] * t2);
       for (int k = 0; k < 3; ++k)
@@ -162,16 +201,21 @@ void derive_normals(Deformable& bend, const Shell& shell) {
 }
 
 // kernels/bend/bend_sums.h has the order.
-void take_force(const h6DeformableDef& def, Column<double>& to) {
+void take_force(const h6DeformableDef& def, bool linear, Column<double>& to) {
   const std::size_t r = def.mode_count;
   const Counts n(r);
   double* out = to.data;
-  for (std::size_t first = 0; first < r; first += kernels::kForceLanes)
-    for (const auto& [values, count] :
-         {std::pair(def.linear, n.linear), {def.quadratic, n.quadratic}, {def.cubic, n.cubic}})
-      for (std::size_t m = 0; m < count; ++m)
-        for (std::size_t i = first; i < first + kernels::kForceLanes; ++i)
-          *out++ = values && i < r ? values[i * count + m] : 0;
+  const auto put = [&](std::size_t first, const double* values, std::size_t count) {
+    for (std::size_t m = 0; m < count; ++m)
+      for (std::size_t i = first; i < first + kernels::kForceLanes; ++i)
+        *out++ = values && i < r ? values[i * count + m] : 0;
+  };
+  for (std::size_t first = 0; first < r; first += kernels::kForceLanes) {
+    put(first, def.linear, n.linear);
+    if (linear) continue;
+    put(first, def.quadratic, n.quadratic);
+    put(first, def.cubic, n.cubic);
+  }
 }
 
 // Bent points and spheres round in float: so much more room for each sphere [shell radius].
@@ -185,6 +229,8 @@ bool convert_deformable(const h6DeformableDef& def, const h6Allocator& allocator
   Deformable& bend = shell->bend;
   const std::size_t r = bend.modes = def.mode_count;
   bend.alpha = def.alpha, bend.beta = def.beta;
+  bend.warps = def.turn_modes != nullptr;
+  bend.linear = !def.quadratic && !def.cubic;
   Arena room;
   lay_out(bend, *shell, room);
   if (!bend.memory.reserve(allocator, room.used()))
@@ -192,14 +238,16 @@ bool convert_deformable(const h6DeformableDef& def, const h6Allocator& allocator
                 shell->points, room.used() / 1000000);
   Arena arena(bend.memory.data, bend.memory.count);
   lay_out(bend, *shell, arena);
-  take_rows(*shell, r, def.modes, bend.points);
-  if (def.normal_modes)
-    take_rows(*shell, r, def.normal_modes, bend.normals);
+  take_rows(*shell, r, def.modes, bend.point_axes(), 0, bend.points);
+  if (def.turn_modes)
+    take_rows(*shell, r, def.turn_modes, 6, 3, bend.points);
+  else if (def.normal_modes)
+    take_rows(*shell, r, def.normal_modes, 3, 0, bend.normals);
   else
     derive_normals(bend, *shell);
   take_spheres(bend, *shell, shell->groups, kGroupRows, bend.groups);
   take_spheres(bend, *shell, shell->blocks, kBlockRows, bend.blocks);
-  take_force(def, bend.force);
+  take_force(def, bend.linear, bend.force);
   for (Tier* tier : {&shell->groups, &shell->blocks})
     for (std::size_t i = 0; i < tier->x.count; ++i)
       tier->radius[i] += kBendRounding * static_cast<float>(shell->radius);

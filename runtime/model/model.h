@@ -70,11 +70,15 @@ struct Samples {
 // them, in the order of the shell's rows; the internal force as bend_sums.h has it.
 struct Deformable {
   std::size_t modes = 0;         // r; 0: the shell is rigid
+  bool warps = false;            // modes are those of kernels/bend/warp_points.h, without normals
+  bool linear = false;           // the internal force
   double alpha = 0, beta = 0;    // damping [1/s], [s]
   Column<float> groups, blocks;  // of their spheres
   Column<double> force;
   Column<float> points, normals;  // (rows)
   Buffer<char> memory;
+  std::size_t point_axes() const { return warps ? 6 : 3; }
+  std::size_t sphere_axes() const { return warps ? 8 : 4; }
 };
 
 // A shell's points in three flat tiers. Rows are sorted so that those next to each other are near

@@ -29,7 +29,7 @@ System system_of(const Settings& set, Deformation& d, const Vec6& u, bool rests)
   const double h = set.dt;
   const Eigen::Index r = d.modes, padded = (r + 7) / 8 * 8;
   const Deformable& bend = d.shell->bend;
-  kernels::reduced_force({bend.force.data, bend.modes}, d.q, d.internal, d.tangent);
+  kernels::reduced_force({bend.force.data, bend.modes, bend.linear}, d.q, d.internal, d.tangent);
   const Eigen::Map<const ModalVector> f(d.internal, r);
   const Eigen::Map<const ModalMatrix, 0, Eigen::OuterStride<>> K(d.tangent, r, r,
                                                                  Eigen::OuterStride<>(padded));

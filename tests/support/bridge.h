@@ -18,7 +18,7 @@ struct BridgeArrays {
   static constexpr double kLength = 0.3, kWidth = 0.06, kThick = 0.01;  // along x, y, z [m]
   std::size_t r = 0;
   ShellArrays shell;
-  std::vector<float> modes, normal_modes;
+  std::vector<float> modes, normal_modes, turn_modes;
   std::vector<double> linear, quadratic, cubic;
   h6DeformableDef bend = h6DefaultDeformableDef();
 
@@ -43,8 +43,9 @@ struct BridgeArrays {
   std::vector<double> frequency;  // w [rad/s]
   std::vector<Square> squares;
 
+  // `warped`: with turns in place of normals, and the linear part of the force only.
   BridgeArrays(std::size_t points, std::size_t mode_count, bool with_normals = true,
-               double alpha = 0, double beta = 0)
+               double alpha = 0, double beta = 0, bool warped = false)
       : r(mode_count) {
     std::mt19937_64 random(7);
     const auto uniform = [&](double low, double high) {
@@ -74,6 +75,9 @@ struct BridgeArrays {
     bend.normal_modes = with_normals ? normal_modes.data() : nullptr;
     bend.alpha = alpha, bend.beta = beta;
     bend.linear = linear.data(), bend.quadratic = quadratic.data(), bend.cubic = cubic.data();
+    if (!warped) return;
+    bend.turn_modes = turn_modes.data();
+    bend.normal_modes = nullptr, bend.quadratic = bend.cubic = nullptr;
   }
   BridgeArrays(const BridgeArrays&) = delete;
 
@@ -129,6 +133,7 @@ struct BridgeArrays {
         double turn[3] = {0, 0, 0}, along = 0;  // -(grad u)^T n, without its part along n
         for (int k = 0; k < 3; ++k) turn[0] -= dx[k] * n[k], turn[1] -= dy[k] * n[k];
         for (int k = 0; k < 3; ++k) along += turn[k] * n[k];
+        for (const double w : {dy[2], -dx[2], dx[1] - dy[0]}) turn_modes.push_back(float(0.5 * w));
         for (int k = 0; k < 3; ++k) {
           modes.push_back(float(u[k]));
           normal_modes.push_back(float(turn[k] - along * n[k]));
@@ -180,9 +185,10 @@ struct BallOnBridge {
         {low, low, low}, kVoxel, bricks, bricks, bricks);
   }
   explicit BallOnBridge(std::size_t points = 6000, std::size_t modes = 8, double ball_radius = 0.02,
-                        bool with_normals = true, double alpha = 0, double beta = 0)
+                        bool with_normals = true, double alpha = 0, double beta = 0,
+                        bool warped = false)
       : radius(ball_radius),
-        bridge(points, modes, with_normals, alpha, beta),
+        bridge(points, modes, with_normals, alpha, beta, warped),
         field(ball(ball_radius)),
         model({def_of(field)}, {bridge.def()}) {
     bodies[0].fixed = true, bodies[0].shell = 0;

@@ -77,7 +77,12 @@ typedef struct h6DeformableDef {
   const double* cubic;       /* P3 (r x r(r+1)(r+2)/6), or NULL: 0                                 */
   double        alpha;       /* mass damping, 0 .. 1e6                                       [1/s] */
   double        beta;        /* stiffness damping, 0 .. 1e3                                    [s] */
-  uint64_t reserved[8];
+  const float*  turn_modes;  /* (point_count x r x 3): turn of each point (half the curl of its
+                                displacement) for q_j = 1 [rad], or NULL. With them displacements are
+                                warped (Choi & Ko 2005): each is turned by the mean of the rotations
+                                up to its point's turn, and that turns the normal. normal_modes,
+                                quadratic and cubic must be NULL then                              */
+  uint64_t reserved[7];
 } h6DeformableDef;
 
 /* A shell: the points that may touch. Points stand level by level (coarse first); a point belongs

@@ -23,13 +23,59 @@ double uniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-Vec3 bent_point(const BridgeArrays& b, const std::vector<double>& q, std::size_t i) {
-  Vec3 p(b.shell.x[i], b.shell.y[i], b.shell.z[i]);
-  for (std::size_t j = 0; j < b.r; ++j) {
-    const float* u = b.modes.data() + (i * b.r + j) * 3;
-    p += q[j] * Vec3(u[0], u[1], u[2]);
+Vec3 sum_of(const std::vector<float>& modes, const std::vector<double>& q, std::size_t i) {
+  Vec3 out = Vec3::Zero();
+  for (std::size_t j = 0; j < q.size(); ++j) {
+    const float* u = modes.data() + (i * q.size() + j) * 3;
+    out += q[j] * Vec3(u[0], u[1], u[2]);
   }
-  return p;
+  return out;
+}
+
+// sum W^k u / (k + 1)!, the mean of the rotations exp(t W), t = 0 .. 1, and its derivative.
+struct Warped {
+  Vec3 value, slope;
+};
+Warped warp(const Vec3& w, const Vec3& u, const Vec3& dw, const Vec3& du) {
+  Warped sum{u, du};
+  Vec3 term = u, slope = du;
+  for (int k = 1; k < 40 && term.norm() + slope.norm() > 1e-18; ++k) {
+    slope = (dw.cross(term) + w.cross(slope)) / (k + 1);
+    term = w.cross(term) / (k + 1);
+    sum.value += term, sum.slope += slope;
+  }
+  return sum;
+}
+
+Vec3 bent_point(const BridgeArrays& b, const std::vector<double>& q, std::size_t i) {
+  const Vec3 rest(b.shell.x[i], b.shell.y[i], b.shell.z[i]), u = sum_of(b.modes, q, i);
+  if (!b.bend.turn_modes) return rest + u;
+  return rest + warp(sum_of(b.turn_modes, q, i), u, Vec3::Zero(), Vec3::Zero()).value;
+}
+// How the point moves by q_j.
+Vec3 bent_mode(const BridgeArrays& b, const std::vector<double>& q, std::size_t i, std::size_t j) {
+  std::vector<double> one(q.size());
+  one[j] = 1;
+  const Vec3 u = sum_of(b.modes, one, i);
+  if (!b.bend.turn_modes) return u;
+  return warp(sum_of(b.turn_modes, q, i), sum_of(b.modes, q, i), sum_of(b.turn_modes, one, i), u)
+      .slope;
+}
+Vec3 bent_normal(const BridgeArrays& b, const std::vector<double>& q, std::size_t i) {
+  const Vec3 rest(b.shell.nx[i], b.shell.ny[i], b.shell.nz[i]);
+  if (b.bend.turn_modes) return exp_rotation(sum_of(b.turn_modes, q, i)) * rest;
+  return (rest + sum_of(b.normal_modes, q, i)).normalized();
+}
+// A place over the plate's middle layer as it is bent now.
+Vec3 over_plate(const BridgeArrays& b, const std::vector<double>& q, const Vec3& at) {
+  std::size_t nearest = 0;
+  double least = HUGE_VAL;
+  for (std::size_t i = 0; i < b.shell.x.size(); ++i) {
+    const double d = std::hypot(double(b.shell.x[i]) - at[0], double(b.shell.y[i]) - at[1]);
+    if (d < least && b.shell.nz[i] < -0.9f) least = d, nearest = i;
+  }
+  const Vec3 rest(b.shell.x[nearest], b.shell.y[nearest], b.shell.z[nearest]);
+  return bent_point(b, q, nearest) + bent_normal(b, q, nearest) * (rest[2] - at[2]);
 }
 
 Quat any_turn(std::mt19937_64& random, double most) {
@@ -39,11 +85,15 @@ Quat any_turn(std::mt19937_64& random, double most) {
 
 }  // namespace
 
-TEST_CASE("contacts of a bent shell are those of all points, in 2,000 seeded poses and shapes") {
-  BallOnBridge scene(5000, 8);
+namespace {
+
+void compare_with_all_points(bool warped) {
+  BallOnBridge scene(5000, 8, 0.02, true, 0, 0, warped);
   scene.def.max_substeps = 1;
   scene.def.hand_count = 0;
   scene.def.contact.fit = H6_FIT_TIGHT;
+  // Warped shapes go farther.
+  const double most = warped ? 1.2e-2 : 6e-3;
   std::size_t touching = 0, steps_with_contacts = 0;
   int round = 0;
   for (const h6Method method : {H6_METHOD_NONE, H6_METHOD_FIRM}) {
@@ -59,7 +109,7 @@ TEST_CASE("contacts of a bent shell are those of all points, in 2,000 seeded pos
       // remember: by little, where single points are sampled, or by half a voxel.
       const double step = k % 3 ? 1e-5 : 5e-4;
       if (k % 8 == 0) {
-        for (double& v : q) v = uniform(random, -6e-3, 6e-3);
+        for (double& v : q) v = uniform(random, -most, most);
         turn_a = any_turn(random, 1), turn_b = any_turn(random, 3);
         centre = {uniform(random, -0.14, 0.14), uniform(random, -0.02, 0.02),
                   uniform(random, 0.015, 0.027)};
@@ -69,13 +119,7 @@ TEST_CASE("contacts of a bent shell are those of all points, in 2,000 seeded pos
       }
       const Vec3 origin(0.02, -0.01, 0.03);
       const h6BodyState a{{to(origin), to(turn_a)}, {}};
-      // The ball is over the bent plate's middle layer, in the plate's frame.
-      Vec3 at(centre[0], centre[1], centre[2]);
-      for (std::size_t j = 0; j < 8; ++j) {
-        double u[3], x[3], y[3];
-        scene.bridge.wave[j].at(at[0], at[1], u, x, y);
-        at += q[j] * Vec3(u[0], u[1], u[2]);
-      }
+      const Vec3 at = over_plate(scene.bridge, q, {centre[0], centre[1], centre[2]});
       const h6BodyState b{{to(Vec3(origin + turn_a * at)), to(turn_b)}, {}};
       h6SetBody(scene.session, 0, &a), h6SetBody(scene.session, 1, &b);
       REQUIRE(h6SetDeformation(scene.session, 0, q.data(), nullptr, q.size()));
@@ -113,6 +157,15 @@ TEST_CASE("contacts of a bent shell are those of all points, in 2,000 seeded pos
   CHECK(touching > 20000);
 }
 
+}  // namespace
+
+TEST_CASE("contacts of a bent shell are those of all points, in 2,000 seeded poses and shapes") {
+  compare_with_all_points(false);
+}
+TEST_CASE("contacts of a warped shell are those of all points, in 2,000 seeded poses and shapes") {
+  compare_with_all_points(true);
+}
+
 TEST_CASE("bent normals are the first derivative, given or from neighbours") {
   for (const bool given : {true, false}) {
     CAPTURE(given);
@@ -141,13 +194,9 @@ TEST_CASE("bent normals are the first derivative, given or from neighbours") {
       const h6Contacts c = h6GetContacts(scene.session, 0);
       for (std::size_t i = 0; i < c.count; ++i) {
         const std::uint32_t p = c.point[i];
-        Vec3 n(scene.bridge.shell.nx[p], scene.bridge.shell.ny[p], scene.bridge.shell.nz[p]);
-        const Vec3 rest = n;
-        for (std::size_t j = 0; j < 8; ++j) {
-          const float* m = scene.bridge.normal_modes.data() + (p * 8 + j) * 3;
-          n += q[j] * Vec3(m[0], m[1], m[2]);
-        }
-        n.normalize();
+        const BridgeArrays& plate = scene.bridge;
+        const Vec3 rest(plate.shell.nx[p], plate.shell.ny[p], plate.shell.nz[p]);
+        const Vec3 n = bent_normal(plate, q, p);
         const double off = (n - Vec3(c.nx[i], c.ny[i], c.nz[i])).norm();
         worst = std::max(worst, off);
         mean += off, turned += (n - rest).norm(), ++count;
@@ -184,15 +233,8 @@ struct Held {
   };
   State at;
 
-  Vec3 normal(const std::vector<double>& q, std::size_t i) const {
-    const std::uint32_t p = point[i];
-    const BridgeArrays& b = scene.bridge;
-    Vec3 n(b.shell.nx[p], b.shell.ny[p], b.shell.nz[p]);
-    for (std::size_t j = 0; j < b.r; ++j) {
-      const float* m = b.normal_modes.data() + (p * b.r + j) * 3;
-      n += q[j] * Vec3(m[0], m[1], m[2]);
-    }
-    return turn * n.normalized();
+  Vec3 mode(const std::vector<double>& q, std::size_t i, std::size_t j) const {
+    return turn * bent_mode(scene.bridge, q, point[i], j);
   }
   // On the ball: force and torque; then on the modes.
   Eigen::VectorXd forces(const State& s, bool damped) const {
@@ -202,30 +244,23 @@ struct Held {
       const Vec3 p = place + turn * bent_point(scene.bridge, s.modes, point[i]);
       const Vec3 local = s.q.conjugate() * (p - s.x);
       const double d = depth[i] - slope[i].dot(local - start[i]);
-      const Vec3 N = normal(s.modes, i), arm = p - s.x;
+      const Vec3 N = turn * bent_normal(scene.bridge, s.modes, point[i]), arm = p - s.x;
       Vec3 v = Vec3::Zero();
-      for (std::size_t j = 0; j < r; ++j) {
-        const float* u = scene.bridge.modes.data() + (point[i] * r + j) * 3;
-        v += s.rates[j] * (turn * Vec3(u[0], u[1], u[2]));
-      }
+      for (std::size_t j = 0; j < r; ++j) v += s.rates[j] * mode(s.modes, i, j);
       v -= s.u.head<3>() + s.u.tail<3>().cross(arm);
       const double e = d - (damped ? beta * N.dot(v) : 0);
       const Vec3 F = k * weight[i] * e * N;
       out.head<3>() -= F;
       out.segment<3>(3) -= arm.cross(F);
-      for (std::size_t j = 0; j < r; ++j) {
-        const float* u = scene.bridge.modes.data() + (point[i] * r + j) * 3;
-        out[static_cast<int>(6 + j)] += F.dot(turn * Vec3(u[0], u[1], u[2]));
-      }
+      for (std::size_t j = 0; j < r; ++j)
+        out[static_cast<int>(6 + j)] += F.dot(mode(s.modes, i, j));
     }
     return out;
   }
 };
 
-}  // namespace
-
-TEST_CASE("gradients of ball and modes together are derivatives of all forces, to 1e-6") {
-  BallOnBridge scene(20000, 8);
+void compare_with_differences(bool warped) {
+  BallOnBridge scene(20000, 8, 0.02, true, 0, 0, warped);
   scene.def.max_substeps = 1, scene.def.hand_count = 0;
   scene.def.contact.method = H6_METHOD_ROBUST;
   scene.def.contact.fit = H6_FIT_TIGHT;
@@ -237,14 +272,10 @@ TEST_CASE("gradients of ball and modes together are derivatives of all forces, t
   const Quat turn = from(scene.bodies[0].pose.q);
   std::mt19937_64 random(3);
   std::vector<double> q(8), v(8);
-  for (double& x : q) x = uniform(random, -2e-3, 2e-3);
+  const double most = warped ? 1e-2 : 2e-3;
+  for (double& x : q) x = uniform(random, -most, most);
   for (double& x : v) x = uniform(random, -2e-3, 2e-3);
-  Vec3 at(0.03, 0.01, scene.top() - 2e-3);
-  for (std::size_t j = 0; j < 8; ++j) {
-    double u[3], x[3], y[3];
-    scene.bridge.wave[j].at(0.03, 0.01, u, x, y);
-    at += q[j] * Vec3(u[0], u[1], u[2]);
-  }
+  const Vec3 at = over_plate(scene.bridge, q, {0.03, 0.01, scene.top() - 2e-3});
   const Quat ball_turn = exp_rotation({-0.4, 0.9, 0.2});
   const h6BodyState b{{to(Vec3(from(scene.bodies[0].pose.p) + turn * at)), to(ball_turn)},
                       {{2e-3, -1e-3, 3e-3}, {0.05, -0.02, 0.03}}};
@@ -336,4 +367,50 @@ TEST_CASE("gradients of ball and modes together are derivatives of all forces, t
       CHECK((block(my_K) - block(K)).norm() <= 1e-6 * block(K).norm());
       CHECK((block(my_D) - block(D)).norm() <= 1e-6 * block(D).norm());
     }
+}
+
+}  // namespace
+
+TEST_CASE("gradients of ball and modes together are derivatives of all forces, to 1e-6") {
+  compare_with_differences(false);
+}
+TEST_CASE("gradients on a warped shell are derivatives of all forces too, to 1e-6") {
+  compare_with_differences(true);
+}
+
+TEST_CASE("turns of zero leave points, depths and arms as they are without turns, to the bit") {
+  struct Seen {
+    std::vector<float> depth, rx, nx;
+    std::vector<std::uint32_t> point;
+  };
+  const auto look = [](bool warped) {
+    BallOnBridge scene(5000, 8, 0.02, true, 0, 0, warped);
+    BridgeArrays& plate = scene.bridge;
+    std::fill(plate.turn_modes.begin(), plate.turn_modes.end(), 0.0f);
+    std::fill(plate.normal_modes.begin(), plate.normal_modes.end(), 0.0f);
+    plate.bend.quadratic = plate.bend.cubic = nullptr;
+    const Model model({def_of(scene.field)}, {plate.def()});
+    scene.def.max_substeps = 1, scene.def.hand_count = 0;
+    scene.bodies[1].pose.p.z -= 1e-3;
+    h6Session* session = h6CreateSession(model.handle, &scene.def, nullptr);
+    REQUIRE(session);
+    const double q[8] = {1e-3, -2e-3, 1e-3, 5e-4, -1e-4, 3e-4, 1e-4, -2e-4};
+    h6SetDeformation(session, 0, q, nullptr, 8);
+    h6Step(session, nullptr, nullptr);
+    const h6Contacts c = h6GetContacts(session, 0);
+    Seen seen;
+    for (std::size_t i = 0; i < c.count; ++i)
+      if (c.depth[i] > 0) {
+        seen.depth.push_back(c.depth[i]), seen.rx.push_back(c.rx[i]);
+        seen.nx.push_back(c.nx[i]), seen.point.push_back(c.point[i]);
+      }
+    h6DestroySession(session);
+    return seen;
+  };
+  const Seen with = look(true), without = look(false);
+  CHECK(with.point.size() > 10);
+  CHECK(with.point == without.point);
+  CHECK(with.depth == without.depth);
+  CHECK(with.rx == without.rx);
+  CHECK(with.nx == without.nx);
 }

@@ -134,32 +134,55 @@ TEST_CASE("a pressed ball comes to rest on the bridge, which bends as far as its
 }
 
 TEST_CASE("a bridge under a moving ball has the same bits on any number of threads, and a hash") {
-  std::vector<std::uint64_t> want;
-  for (const unsigned threads : {1u, 2u, 4u}) {
-    BallOnBridge scene(20000, 12);
-    scene.def.threads = threads;
-    REQUIRE(scene.open());
-    std::vector<std::uint64_t> got;
-    std::uint32_t most = 0;
-    for (int i = 0; i < 500; ++i) {
-      const h6DeviceSample sample = scene.sample(i);
-      h6Step(scene.session, &sample, nullptr);
-      got.push_back(h6GetFrame(scene.session).state_hash);
-      most = std::max(most, h6GetFrame(scene.session).contacts);
+  for (const bool warped : {false, true}) {
+    std::vector<std::uint64_t> want;
+    for (const unsigned threads : {1u, 2u, 4u}) {
+      BallOnBridge scene(20000, 12, 0.02, true, 0, 0, warped);
+      scene.def.threads = threads;
+      REQUIRE(scene.open());
+      std::vector<std::uint64_t> got;
+      std::uint32_t most = 0;
+      for (int i = 0; i < 500; ++i) {
+        const h6DeviceSample sample = scene.sample(i);
+        h6Step(scene.session, &sample, nullptr);
+        got.push_back(h6GetFrame(scene.session).state_hash);
+        most = std::max(most, h6GetFrame(scene.session).contacts);
+      }
+      CHECK(most > 5);
+      if (threads == 1) want = got;
+      CHECK(got == want);
+      // The hash knows the modes.
+      BallOnBridge other(20000, 12, 0.02, true, 0, 0, warped);
+      REQUIRE(other.open());
+      std::vector<double> q(12);
+      q[3] = 1e-12;
+      const h6DeviceSample sample = other.sample(0);
+      REQUIRE(h6SetDeformation(other.session, 0, q.data(), nullptr, 12));
+      h6Step(other.session, &sample, nullptr);
+      CHECK(h6GetFrame(other.session).state_hash != want[0]);
     }
-    CHECK(most > 5);
-    if (threads == 1) want = got;
-    CHECK(got == want);
-    // The hash knows the modes.
-    BallOnBridge other(20000, 12);
-    REQUIRE(other.open());
-    std::vector<double> q(12);
-    q[3] = 1e-12;
-    const h6DeviceSample sample = other.sample(0);
-    REQUIRE(h6SetDeformation(other.session, 0, q.data(), nullptr, 12));
-    h6Step(other.session, &sample, nullptr);
-    CHECK(h6GetFrame(other.session).state_hash != want[0]);
   }
+}
+
+TEST_CASE("a pressed ball comes to rest on a warped bridge, which holds it") {
+  for (const h6Gradient gradient : {H6_SYMMETRIC, H6_EXACT})
+    for (const h6Method method : {H6_METHOD_FIRM, H6_METHOD_ROBUST, H6_METHOD_GLOBAL}) {
+      CAPTURE(std::string(h6MethodName(method)));
+      CAPTURE(int(gradient));
+      BallOnBridge scene(6000, 8, 0.02, true, 20, 1e-4, true);
+      scene.def.contact.method = method;
+      scene.def.gradient = gradient;
+      REQUIRE(scene.open());
+      const h6DeviceCommand command = press(scene, 3000, 2 * mm);
+      CHECK((h6GetFrame(scene.session).status & (H6_SOLVE_FAILED | H6_STATE_NOT_FINITE)) == 0);
+      for (const double v : scene.v()) CHECK(std::fabs(v) < 1e-4);
+      const h6Contacts c = h6GetContacts(scene.session, 0);
+      const double k = h6StiffnessFor(scene.model.handle, &scene.def);
+      double up = 0;
+      for (std::size_t i = 0; i < c.count; ++i) up -= k * double(c.load[i]) * double(c.nz[i]);
+      CHECK(up > 0.5);
+      CHECK(command.wrench.force.z == doctest::Approx(up).epsilon(0.02));
+    }
 }
 
 TEST_CASE("a session goes on with the deformation of the one before, to the bit") {
@@ -288,6 +311,19 @@ TEST_CASE("a definition of a deformable is checked, and its functions take wrong
   CHECK(has(model_error([](BridgeArrays& b) { b.modes[5] = NAN; }), "modes[5]"));
   CHECK(has(model_error([](BridgeArrays& b) { b.normal_modes[4] = NAN; }), "normal_modes[4]"));
   CHECK(has(model_error([](BridgeArrays& b) { b.cubic[3] = INFINITY; }), "cubic[3]"));
+  const auto warp = [](BridgeArrays& b) {
+    b.bend.turn_modes = b.turn_modes.data();
+    b.bend.normal_modes = nullptr, b.bend.quadratic = b.bend.cubic = nullptr;
+  };
+  CHECK(model_error(warp).empty());
+  const auto warp_error = [&](auto&& change) {
+    return model_error([&](BridgeArrays& b) { warp(b), change(b); });
+  };
+  CHECK(has(warp_error([](BridgeArrays& b) { b.turn_modes[7] = NAN; }), "turn_modes[7]"));
+  CHECK(has(warp_error([](BridgeArrays& b) { b.bend.normal_modes = b.normal_modes.data(); }),
+            "not both"));
+  CHECK(has(warp_error([](BridgeArrays& b) { b.bend.quadratic = b.quadratic.data(); }), "NULL"));
+  CHECK(has(warp_error([](BridgeArrays& b) { b.bend.cubic = b.cubic.data(); }), "NULL"));
   CHECK(has(model_error([](BridgeArrays& b) { b.bend.alpha = -1; }), "alpha"));
   CHECK(has(model_error([](BridgeArrays& b) { b.bend.beta = NAN; }), "beta"));
   CHECK(has(model_error([](BridgeArrays& b) { b.bend.reserved[0] = 1; }), "reserved"));
