@@ -95,9 +95,11 @@ const Rooms& below() {
                             "io/scenes/paper", "io/scenes/industrial", "io/record", "io/run"});
     std::set<std::string> map = r["io/experiments"];
     map.insert("io/experiments");
+    std::set<std::string> forced = map;
+    map.insert("io/study");
     room("io/experiments/map", map);
-    map.insert("kernels/weights");
-    room("io/experiments/forced", map);
+    forced.insert("kernels/weights");
+    room("io/experiments/forced", forced);
     // Programs and proof see everything.
     std::set<std::string> all;
     for (const auto& [name, sees] : r) all.insert(name);

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "io/cli/commands.h"
-#include "io/cli/kept_map.h"
 #include "io/console/checks.h"
+#include "io/experiments/map/kept_map.h"
 #include "io/experiments/map/map_page.h"
 #include "io/file/write_aside.h"
 #include "io/study/scheduler.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/cli/kept_map.h"
+#include "io/experiments/map/kept_map.h"
 
 #include <filesystem>
 
