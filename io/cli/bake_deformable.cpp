@@ -193,13 +193,11 @@ Result<io::SolidMesh> read_model(const Console& console, DeformableOptions& o) {
 }
 
 std::string made_with(const DeformableOptions& o) {
-  return ordered_json{{"program", "hapsix"},
-                      {"model", std::filesystem::path(o.model).filename().string()},
-                      {"modes", o.reduce.modes},
-                      {"linear_modes", o.reduce.linear_modes},
-                      {"damping", o.reduce.damping},
-                      {"cell", o.cell},
-                      {"units", o.units}}
+  return ordered_json{
+      {"program", "hapsix"},     {"model", std::filesystem::path(o.model).filename().string()},
+      {"modes", o.reduce.modes}, {"linear_modes", o.reduce.linear_modes},
+      {"warp", o.reduce.warp},   {"damping", o.reduce.damping},
+      {"cell", o.cell},          {"units", o.units}}
       .dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
@@ -211,6 +209,7 @@ ordered_json facts_of(const DeformableOptions& o, const io::ReducedModel& model,
           {"seconds", seconds},
           {"file_bytes", std::filesystem::file_size(o.out)},
           {"modes", model.modes},
+          {"warp", !model.turn.empty()},
           {"vertices", model.mesh.vertices.size()},
           {"elements", model.mesh.elements.size()},
           {"fixed", model.mesh.fixed.size()},
@@ -335,6 +334,11 @@ void add_bake_deformable(CLI::App* bake, Program& program) {
                    "default: as many as modes, at most 20")
       ->option_text("K")
       ->check(whole_within(1, 60));
+  command
+      ->add_flag("--warp", o->reduce.warp,
+                 "Linear modes alone, whose displacements are warped by the turns of their points, "
+                 "and a linear force: cheap at any count of modes")
+      ->excludes("--linear-modes");
   command
       ->add_option("--damping", o->reduce.damping,
                    "Share of the critical damping of the lowest mode, 0 to 1; default 0.05")

@@ -181,6 +181,7 @@ Result<ordered_json> deformable_info(const std::string& file) {
                          {"density", each.density}});
   return ordered_json{{"kind", "deformable"},
                       {"modes", m->modes},
+                      {"warp", !m->turn.empty()},
                       {"vertices", m->mesh.vertices.size()},
                       {"elements", m->mesh.elements.size()},
                       {"fixed", m->mesh.fixed.size()},

@@ -11,8 +11,10 @@ h6DeformableDef BentShell::def() const {
   out.mode_count = static_cast<std::uint32_t>(model->modes);
   out.modes = modes.data();
   out.linear = model->linear.data();
-  out.quadratic = model->quadratic.data();
-  out.cubic = model->cubic.data();
+  if (turns.empty())
+    out.quadratic = model->quadratic.data(), out.cubic = model->cubic.data();
+  else
+    out.turn_modes = turns.data();
   out.alpha = model->mass_damping;
   out.beta = model->stiffness_damping;
   return out;
@@ -37,6 +39,10 @@ Result<BentShell> bend_shell(ReducedModel model, const std::vector<h6Vec3>& poin
     return Failure{name + text + "; it must be in metres, in the frame of the shell's mesh"};
   if (outside > 0.02 * size) out.remark = name + text + ", where they follow the nearest element";
   out.modes.assign(modes.begin(), modes.end());
+  if (!model.turn.empty()) {
+    const std::vector<double> turns = turns_at(model, points);
+    out.turns.assign(turns.begin(), turns.end());
+  }
   out.model = std::make_unique<const ReducedModel>(std::move(model));
   return out;
 }

@@ -14,6 +14,7 @@ namespace h6::io {
 struct BentShell {
   std::unique_ptr<const ReducedModel> model;
   std::vector<float> modes;  // (points x r x 3) [1/sqrt(kg)]
+  std::vector<float> turns;  // (points x r x 3) [rad/(m sqrt(kg))], or empty
   std::string remark;        // a sentence where points lie outside the model's elements; or empty
 
   // Points at this object's arrays.

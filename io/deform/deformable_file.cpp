@@ -25,7 +25,7 @@ using recording::Stored;
 
 static_assert(std::endian::native == std::endian::little, "rows are read as they are on disk");
 
-constexpr int kVersion = 1;
+constexpr int kVersion = 1, kWarpedVersion = 2;
 constexpr const char* kKind = "hapsix reduced deformable";
 constexpr std::uint32_t kNoCorner = 0xffffffff;
 
@@ -44,14 +44,18 @@ struct Arrays {
   std::vector<Array<std::uint32_t>> wholes;
 };
 
-Arrays shapes(std::size_t n, std::size_t m, std::size_t fixed, std::size_t r) {
+Arrays shapes(std::size_t n, std::size_t m, std::size_t fixed, std::size_t r, bool warps) {
   Arrays a;
   a.reals = {{"/mesh", "vertices", {n, 3}, {}},
              {"/modes", "basis", {n, r, 3}, {}},
              {"/modes", "frequency", {r}, {}},
-             {"/force", "linear", {r, r}, {}},
-             {"/force", "quadratic", {r, pair_count(r)}, {}},
-             {"/force", "cubic", {r, triple_count(r)}, {}}};
+             {"/force", "linear", {r, r}, {}}};
+  if (warps) {
+    a.reals.push_back({"/modes", "turn", {n, r, 3}, {}});
+  } else {
+    a.reals.push_back({"/force", "quadratic", {r, pair_count(r)}, {}});
+    a.reals.push_back({"/force", "cubic", {r, triple_count(r)}, {}});
+  }
   a.wholes = {{"/mesh", "corners", {m, 8}, {}},
               {"/mesh", "material", {m}, {}},
               {"/mesh", "fixed", {fixed}, {}}};
@@ -60,14 +64,17 @@ Arrays shapes(std::size_t n, std::size_t m, std::size_t fixed, std::size_t r) {
 
 Arrays to_arrays(const ReducedModel& model) {
   const SolidMesh& mesh = model.mesh;
-  Arrays a = shapes(mesh.vertices.size(), mesh.elements.size(), mesh.fixed.size(), model.modes);
+  Arrays a = shapes(mesh.vertices.size(), mesh.elements.size(), mesh.fixed.size(), model.modes,
+                    !model.turn.empty());
   for (const h6Vec3& p : mesh.vertices)
     a.reals[0].values.insert(a.reals[0].values.end(), {p.x, p.y, p.z});
   a.reals[1].values = model.basis;
   a.reals[2].values = model.frequency;
   a.reals[3].values = model.linear;
-  a.reals[4].values = model.quadratic;
-  a.reals[5].values = model.cubic;
+  if (model.turn.empty())
+    a.reals[4].values = model.quadratic, a.reals[5].values = model.cubic;
+  else
+    a.reals[4].values = model.turn;
   for (const SolidElement& e : mesh.elements) {
     for (std::uint32_t c = 0; c < 8; ++c)
       a.wholes[0].values.push_back(c < e.corners ? e.corner[c] : kNoCorner);
@@ -85,8 +92,10 @@ void from_arrays(Arrays&& a, ReducedModel& model) {
   model.basis = std::move(a.reals[1].values);
   model.frequency = std::move(a.reals[2].values);
   model.linear = std::move(a.reals[3].values);
-  model.quadratic = std::move(a.reals[4].values);
-  model.cubic = std::move(a.reals[5].values);
+  if (a.reals.size() == 5)
+    model.turn = std::move(a.reals[4].values);
+  else
+    model.quadratic = std::move(a.reals[4].values), model.cubic = std::move(a.reals[5].values);
   const std::vector<std::uint32_t>&corners = a.wholes[0].values, &material = a.wholes[1].values;
   for (std::size_t i = 0; i < material.size(); ++i) {
     SolidElement e;
@@ -117,7 +126,7 @@ std::string config_text(const ReducedModel& model) {
   ordered_json made = ordered_json::parse(model.made_with, nullptr, false);
   if (made.is_discarded()) made = nullptr;
   return ordered_json{{"kind", kKind},
-                      {"version", kVersion},
+                      {"version", model.turn.empty() ? kVersion : kWarpedVersion},
                       {"vertices", model.mesh.vertices.size()},
                       {"elements", model.mesh.elements.size()},
                       {"fixed", model.mesh.fixed.size()},
@@ -247,7 +256,8 @@ Result<ordered_json> parse_config(const Source& source, const std::string& text)
   ordered_json json = ordered_json::parse(text, nullptr, false);
   if (!json.is_object() || json.value("kind", ordered_json()) != kKind)
     return source.wrong("/config does not say that it is one.");
-  if (json.value("version", ordered_json()) != kVersion)
+  const ordered_json version = json.value("version", ordered_json());
+  if (version != kVersion && version != kWarpedVersion)
     return source.wrong("it is of another version of the format; bake it again.");
   return json;
 }
@@ -268,7 +278,8 @@ Result<ReducedModel> read_here(const fs::path& file) {
   }
   if (model.modes < 1 || model.modes > kMostModes)
     return source->wrong("it claims " + std::to_string(model.modes) + " modes.");
-  Arrays arrays = shapes(config.vertices, config.elements, config.fixed, model.modes);
+  Arrays arrays = shapes(config.vertices, config.elements, config.fixed, model.modes,
+                         json->value("version", 0) == kWarpedVersion);
   for (auto& array : arrays.reals)
     if (Outcome read = read_array(*source, H5T_IEEE_F64LE, array); !read) return read.failure();
   for (auto& array : arrays.wholes)

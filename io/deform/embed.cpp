@@ -142,10 +142,9 @@ class ElementTree {
   std::vector<Node> nodes_;
 };
 
-}  // namespace
-
-std::vector<double> modes_at(const ReducedModel& model, const std::vector<h6Vec3>& points,
-                             double* farthest) {
+// Values at the vertices (vertices x r x 3), at points.
+std::vector<double> values_at(const ReducedModel& model, const std::vector<double>& values,
+                              const std::vector<h6Vec3>& points, double* farthest) {
   const SolidMesh& mesh = model.mesh;
   const ElementTree tree(mesh);
   const std::size_t width = model.modes * 3;
@@ -159,11 +158,56 @@ std::vector<double> modes_at(const ReducedModel& model, const std::vector<h6Vec3
     far = std::max(far, near.distance);
     for (std::uint32_t a = 0; a < e.corners; ++a) {
       const double share = near.at.value[a] + dot(near.at.gradient[a], rest);
-      const double* mode = model.basis.data() + e.corner[a] * width;
+      const double* mode = values.data() + e.corner[a] * width;
       for (std::size_t i = 0; i < width; ++i) out[n * width + i] += share * mode[i];
     }
   }
   if (farthest) *farthest = far;
+  return out;
+}
+
+// The local coordinates of a corner.
+h6Vec3 corner_place(const SolidElement& e, std::uint32_t corner) {
+  if (e.corners == 4) return {double(corner == 1), double(corner == 2), double(corner == 3)};
+  const std::uint32_t around = corner % 4;
+  return {double(around == 1 || around == 2), double(around >= 2), double(corner >= 4)};
+}
+
+}  // namespace
+
+std::vector<double> modes_at(const ReducedModel& model, const std::vector<h6Vec3>& points,
+                             double* farthest) {
+  return values_at(model, model.basis, points, farthest);
+}
+
+std::vector<double> turns_at(const ReducedModel& model, const std::vector<h6Vec3>& points) {
+  return values_at(model, model.turn, points, nullptr);
+}
+
+std::vector<double> vertex_turns(const SolidMesh& mesh, const std::vector<double>& basis,
+                                 std::size_t modes) {
+  const std::size_t width = modes * 3;
+  std::vector<double> out(basis.size(), 0), volume(mesh.vertices.size(), 0);
+  for (const SolidElement& e : mesh.elements) {
+    const deform::Quadrature points = deform::quadrature(mesh, e);
+    double size = 0;
+    for (std::size_t p = 0; p < points.count; ++p) size += points.point[p].weight;
+    for (std::uint32_t c = 0; c < e.corners; ++c) {
+      const QuadraturePoint at = deform::at_local(mesh, e, corner_place(e, c));
+      double* const turn = out.data() + e.corner[c] * width;
+      volume[e.corner[c]] += size;
+      for (std::uint32_t a = 0; a < e.corners; ++a)
+        for (std::size_t j = 0; j < modes; ++j) {
+          const double* u = basis.data() + e.corner[a] * width + 3 * j;
+          const h6Vec3 curl = cross(at.gradient[a], h6Vec3{u[0], u[1], u[2]});
+          turn[3 * j] += 0.5 * size * curl.x;
+          turn[3 * j + 1] += 0.5 * size * curl.y;
+          turn[3 * j + 2] += 0.5 * size * curl.z;
+        }
+    }
+  }
+  for (std::size_t v = 0; v < volume.size(); ++v)
+    for (std::size_t i = 0; volume[v] > 0 && i < width; ++i) out[v * width + i] /= volume[v];
   return out;
 }
 

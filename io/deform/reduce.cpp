@@ -27,6 +27,8 @@ Outcome check_options(const SolidMesh& mesh, const ReduceOptions& o) {
   if (o.linear_modes < 0 || o.linear_modes > static_cast<int>(kMostModes))
     return Failure{"The basis is made of 1 to " + std::to_string(kMostModes) +
                    " linear modes, not " + std::to_string(o.linear_modes) + "."};
+  if (o.warp && o.linear_modes > 0)
+    return Failure{"A warped model is made of linear modes alone: give their count by the modes."};
   if (!(o.damping >= 0 && o.damping <= 1))
     return Failure{"The damping is a share of the critical one, 0 to 1."};
   if (mesh.vertices.size() > kMostVertices)
@@ -47,18 +49,19 @@ double amplitude_of(const SolidMesh& mesh, const deform::Dofs& dofs, const Eigen
   return 0.2 * std::max({high.x - low.x, high.y - low.y, high.z - low.z}) / most;
 }
 
-void put_basis(const deform::Basis& basis, const deform::Dofs& dofs, ReducedModel& model) {
-  const auto r = static_cast<std::size_t>(basis.shape.cols());
+void put_basis(const Eigen::MatrixXd& shape, const Eigen::VectorXd& eigenvalue,
+               const deform::Dofs& dofs, ReducedModel& model) {
+  const auto r = static_cast<std::size_t>(shape.cols());
   model.basis.assign(model.mesh.vertices.size() * r * 3, 0);
   for (std::size_t v = 0; v < model.mesh.vertices.size(); ++v) {
     const std::int32_t first = dofs.first[v];
     if (first < 0) continue;
     for (std::size_t j = 0; j < r; ++j)
       for (int a = 0; a < 3; ++a)
-        model.basis[(v * r + j) * 3 + a] = basis.shape(first + a, static_cast<Index>(j));
+        model.basis[(v * r + j) * 3 + a] = shape(first + a, static_cast<Index>(j));
   }
   for (std::size_t j = 0; j < r; ++j)
-    model.frequency.push_back(std::sqrt(std::max(0.0, basis.eigenvalue[j])) /
+    model.frequency.push_back(std::sqrt(std::max(0.0, eigenvalue[static_cast<Index>(j)])) /
                               (2 * std::numbers::pi));
 }
 
@@ -83,6 +86,24 @@ class Stages {
   Clock::time_point last_ = Clock::now();
 };
 
+// Linear modes, whose turns warp them.
+ReducedModel warped_model(const SolidMesh& mesh, const deform::Dofs& dofs,
+                          const deform::LinearModes& modes, const ReduceOptions& options) {
+  ReducedModel model;
+  model.mesh = mesh;
+  const auto r = static_cast<std::size_t>(modes.shape.cols());
+  model.modes = r;
+  model.linear.assign(r * r, 0);
+  for (std::size_t j = 0; j < r; ++j)
+    model.linear[j * r + j] = modes.eigenvalue[static_cast<Index>(j)];
+  put_basis(modes.shape, modes.eigenvalue, dofs, model);
+  model.turn = vertex_turns(mesh, model.basis, r);
+  put_damping(options.damping, model);
+  model.free = options.free;
+  model.input_hash = reduction_key(mesh, options);
+  return model;
+}
+
 Result<ReducedModel> reduce_checked(const SolidMesh& mesh, const ReduceOptions& options,
                                     ReduceReport& report, Pulse& pulse) {
   const Failure cancelled{"cancelled"};
@@ -92,8 +113,9 @@ Result<ReducedModel> reduce_checked(const SolidMesh& mesh, const ReduceOptions& 
   if (rest < options.modes)
     return Failure{"The model has only " + std::to_string(std::max<Index>(0, rest)) +
                    " degrees of freedom; ask for fewer modes."};
-  const Index linear = std::min<Index>(
-      rest, options.linear_modes ? options.linear_modes : std::min(options.modes, 20));
+  const Index linear = std::min<Index>(rest, options.warp           ? options.modes
+                                             : options.linear_modes ? options.linear_modes
+                                                                    : std::min(options.modes, 20));
   Stages stages(report);
 
   if (!pulse.step("factoring the stiffness", 0, 0.2)) return cancelled;
@@ -105,6 +127,12 @@ Result<ReducedModel> reduce_checked(const SolidMesh& mesh, const ReduceOptions& 
   Result<deform::LinearModes> modes = deform::linear_modes(pencil, linear, options.free, pulse);
   if (!modes) return modes.failure();
   stages.done("modes");
+  if (options.warp) {
+    ReducedModel model = warped_model(mesh, dofs, *modes, options);
+    report.captured = 1;
+    stages.done("turns");
+    return model;
+  }
   if (!pulse.step("deriving the modes", 0.4, 0.6)) return cancelled;
   Eigen::MatrixXd derivatives = deform::modal_derivatives(mesh, dofs, pencil, *modes, pulse);
   stages.done("derivatives");
@@ -121,7 +149,7 @@ Result<ReducedModel> reduce_checked(const SolidMesh& mesh, const ReduceOptions& 
   model.mesh = mesh;
   if (!deform::make_polynomials(mesh, dofs, basis->shape, options.threads, model, pulse))
     return cancelled;
-  put_basis(*basis, dofs, model);
+  put_basis(basis->shape, basis->eigenvalue, dofs, model);
   put_damping(options.damping, model);
   model.free = options.free;
   model.input_hash = reduction_key(mesh, options);
@@ -138,6 +166,7 @@ std::string reduction_key(const SolidMesh& mesh, const ReduceOptions& o) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
   put(kReducer), put(o.modes), put(o.linear_modes), put(int{o.free}), put(o.damping);
+  if (o.warp) put('w');
   put(mesh.vertices.size()), put(mesh.elements.size()), put(mesh.materials.size());
   for (const h6Vec3& p : mesh.vertices) put(p);
   for (const SolidElement& e : mesh.elements) put(e);

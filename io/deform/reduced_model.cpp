@@ -30,6 +30,13 @@ bool consistent_mesh(const SolidMesh& mesh) {
 
 void reduced_force(const ReducedModel& model, const double* q, double* force) {
   const std::size_t r = model.modes;
+  if (!model.turn.empty()) {
+    for (std::size_t i = 0; i < r; ++i) {
+      force[i] = 0;
+      for (std::size_t j = 0; j < r; ++j) force[i] += model.linear[i * r + j] * q[j];
+    }
+    return;
+  }
   for (std::size_t i = 0; i < r; ++i) {
     const double* p1 = model.linear.data() + i * r;
     const double* p2 = model.quadratic.data() + i * pair_count(r);
@@ -50,6 +57,10 @@ void reduced_force(const ReducedModel& model, const double* q, double* force) {
 
 void reduced_stiffness(const ReducedModel& model, const double* q, double* stiffness) {
   const std::size_t r = model.modes;
+  if (!model.turn.empty()) {
+    std::copy(model.linear.begin(), model.linear.end(), stiffness);
+    return;
+  }
   for (std::size_t i = 0; i < r; ++i) {
     const double* p1 = model.linear.data() + i * r;
     const double* p2 = model.quadratic.data() + i * pair_count(r);
@@ -72,12 +83,14 @@ void reduced_stiffness(const ReducedModel& model, const double* q, double* stiff
 }
 
 bool consistent(const ReducedModel& model) {
-  const std::size_t r = model.modes;
+  const std::size_t r = model.modes, n = model.mesh.vertices.size();
+  const bool warps = !model.turn.empty();
   return r >= 1 && r <= kMostModes && consistent_mesh(model.mesh) &&
-         finite(model.basis, model.mesh.vertices.size() * r * 3) && finite(model.linear, r * r) &&
-         finite(model.quadratic, r * pair_count(r)) && finite(model.cubic, r * triple_count(r)) &&
-         finite(model.frequency, r) && std::isfinite(model.mass_damping) &&
-         std::isfinite(model.stiffness_damping);
+         finite(model.basis, n * r * 3) && finite(model.linear, r * r) &&
+         finite(model.turn, warps ? n * r * 3 : 0) &&
+         finite(model.quadratic, warps ? 0 : r * pair_count(r)) &&
+         finite(model.cubic, warps ? 0 : r * triple_count(r)) && finite(model.frequency, r) &&
+         std::isfinite(model.mass_damping) && std::isfinite(model.stiffness_damping);
 }
 
 }  // namespace h6::io

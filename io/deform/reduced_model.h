@@ -34,6 +34,10 @@ struct ReducedModel {
   std::size_t modes = 0;  // r, 1 .. kMostModes
   // (vertices x r x 3) displacement of a vertex per unit of q_j, in the mesh's frame [1/sqrt(kg)].
   std::vector<double> basis;
+  // (vertices x r x 3) turn of a vertex per unit of q_j, half the curl of the displacement in the
+  // elements around it [rad/(m sqrt(kg))]. With them displacements are warped (Choi & Ko 2005), and
+  // quadratic and cubic are empty; without them it is empty.
+  std::vector<double> turn;
   // Rows i = 0 .. r-1, each contiguous: r, pair_count(r) and triple_count(r) wide. SI units, with q
   // in m sqrt(kg).
   std::vector<double> linear, quadratic, cubic;
@@ -58,6 +62,13 @@ void reduced_stiffness(const ReducedModel& model, const double* q, double* stiff
 // outside a point lies [m].
 std::vector<double> modes_at(const ReducedModel& model, const std::vector<h6Vec3>& points,
                              double* farthest = nullptr);
+
+// The same for turns, of a model that has them.
+std::vector<double> turns_at(const ReducedModel& model, const std::vector<h6Vec3>& points);
+// ReducedModel::turn of a basis (vertices x r x 3): of the elements around a vertex the mean,
+// weighted by their volumes.
+std::vector<double> vertex_turns(const SolidMesh& mesh, const std::vector<double>& basis,
+                                 std::size_t modes);
 
 // Whether sizes and indices fit each other and every number is finite. Files hold such models only.
 bool consistent(const ReducedModel& model);

@@ -51,15 +51,16 @@ std::string asset_hash(const ShellData& s) {
 
 std::string asset_hash(const std::string& shell, const ReducedModel& m) {
   const double numbers[] = {m.mass_damping, m.stiffness_damping};
-  return Columns()
-      .add(shell)
+  Columns columns;
+  columns.add(shell)
       .add(numbers, sizeof numbers)
       .add(m.mesh.vertices)
       .add(m.basis)
       .add(m.linear)
       .add(m.quadratic)
-      .add(m.cubic)
-      .text();
+      .add(m.cubic);
+  if (!m.turn.empty()) columns.add(m.turn);  // other models keep the hash of older recordings
+  return columns.text();
 }
 
 }  // namespace h6::io

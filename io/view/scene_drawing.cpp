@@ -170,6 +170,9 @@ ordered_json draw_scene(const LoadedScene& loaded, const DrawLimits& limits, Env
       if (const auto& model = loaded.bends[i]) {
         double step = 0;
         envelope.add("modes" + number, modes_of(d, *model, step));
+        if (!model->turn.empty())
+          remarks.push_back("'" + body.name +
+                            "' is drawn by its linear modes, without the warp that contacts see");
         head["modes"] = model->modes;
         head["mode_step"] = step;
       }

@@ -76,3 +76,21 @@ TEST_CASE("inside a hexahedron the displacement is trilinear, and all points are
     CHECK(norm(h6Vec3{got[0], got[1], got[2]} - expected) < 1e-9);
   }
 }
+
+TEST_CASE("turns of modes that are small turns of the whole are those turns, at every point") {
+  for (const bool tets : {false, true}) {
+    SolidMesh mesh = solids::shaken(solids::block({0.3, 0.1, 0.1}, {4, 2, 2}), 0.004);
+    if (tets) mesh = solids::tetrahedra(mesh);
+    ReducedModel model;
+    model.mesh = mesh, model.modes = 3;
+    for (const h6Vec3& p : mesh.vertices)
+      for (const h6Vec3& axis : {h6Vec3{1, 0, 0}, h6Vec3{0, 1, 0}, h6Vec3{0, 0, 1}}) {
+        const h6Vec3 u = cross(axis, p);
+        model.basis.insert(model.basis.end(), {u.x, u.y, u.z});
+      }
+    model.turn = vertex_turns(mesh, model.basis, 3);
+    const std::vector<double> turns = turns_at(model, {{0.1, 0.05, 0.02}, {0.5, 0.2, -0.1}});
+    for (std::size_t i = 0; i < turns.size(); ++i)
+      CHECK(std::fabs(turns[i] - (i % 9 % 4 == 0 ? 1 : 0)) < 1e-9);
+  }
+}
