@@ -264,7 +264,7 @@ struct Plan::Parts {
     for (const io::SceneHand& hand : base.hands)
       out << io::hex(io::hash_bytes(hand.path.data(), hand.path.size() * sizeof(io::PathRow)))
           << '\n';
-    out << h6Version() << '\n';
+    out << h6BuildInfo() << '\n';  // another processor may give other bits
     identity = out.str();
   }
 };

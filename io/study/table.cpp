@@ -108,8 +108,8 @@ Result<Table> Table::open(const fs::path& folder, const std::string& identity,
   } else if (whole_file(known) != identity) {
     return Failure{
         folder.string() +
-        ": this folder has the runs of another study, map, scene or version: choose another, or "
-        "remove it"};
+        ": this folder has the runs of another study, map, scene, version or processor: choose "
+        "another, or remove it"};
   }
   if (const Outcome read = table.read_part(); !read) return read.failure();
   if (const Outcome read = table.read_times(); !read) return read.failure();
