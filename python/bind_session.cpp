@@ -99,8 +99,7 @@ h6Status step(PySession& s) {
 
 // Numbers of a sample that a call gives: (hands, n), or (n,) for one hand.
 template <class T>
-void put(PySession& s, T h6DeviceSample::*member, const std::optional<Rows<double>>& values,
-         const char* name) {
+void put(PySession& s, T h6DeviceSample::*member, const Rows<double>* values, const char* name) {
   if (!values) return;
   const auto n = static_cast<py::ssize_t>(kNumbers<T>);
   if (values->size() != n * static_cast<py::ssize_t>(s.hands) ||
@@ -115,10 +114,16 @@ h6Status step_with(PySession& s, const Rows<double>& pose,
                    const std::optional<Rows<double>>& velocity,
                    const std::optional<Rows<double>>& wrench,
                    std::optional<std::uint32_t> buttons) {
-  put(s, &h6DeviceSample::pose, std::optional(pose), "pose");
-  put(s, &h6DeviceSample::velocity, velocity, "velocity");
-  put(s, &h6DeviceSample::wrench, wrench, "wrench");
+  put(s, &h6DeviceSample::pose, &pose, "pose");
+  put(s, &h6DeviceSample::velocity, velocity ? &*velocity : nullptr, "velocity");
+  put(s, &h6DeviceSample::wrench, wrench ? &*wrench : nullptr, "wrench");
   for (std::size_t h = 0; h < s.hands && buttons; ++h) s.samples[h].buttons = *buttons;
+  return step(s);
+}
+
+// Most calls give a pose alone; three arguments less save 0.6 µs of the 2.1 beyond C.
+h6Status step_at(PySession& s, const Rows<double>& pose) {
+  put(s, &h6DeviceSample::pose, &pose, "pose");
   return step(s);
 }
 
@@ -196,6 +201,8 @@ void add_steps(py::class_<PySession, SessionPtr>& c) {
   c.def("step", &step,
         "One frame with what stands in `pose`, `velocity`, `wrench` and `buttons`; returns "
         "the status bits (status_names), 0: nothing was dropped or limited.")
+      .def("step", &step_at, py::arg("pose"),
+           "Puts this sample of each hand, (hands, 7), in place first.")
       .def("step", &step_with, py::arg("pose"), py::arg("velocity") = py::none(),
            py::arg("wrench") = py::none(), py::arg("buttons") = py::none(),
            "Puts these samples, (hands, 7) and (hands, 6), in place first.")

@@ -498,6 +498,9 @@ class Session:
         """One frame with what stands in `pose`, `velocity`, `wrench` and `buttons`;
         returns the status bits (status_names), 0: nothing was dropped or limited."""
     @overload
+    def step(self, pose: ArrayLike) -> int:
+        """Puts this sample of each hand, (hands, 7), in place first."""
+    @overload
     def step(self, pose: ArrayLike, velocity: Optional[ArrayLike] = None, wrench: Optional[ArrayLike] = None, buttons: Optional[int] = None) -> int:
         """Puts these samples, (hands, 7) and (hands, 6), in place first."""
     @property
