@@ -168,7 +168,7 @@ function freshness(time?: number) {
   if (stale) return chip('state', `no news for ${(age / 1000).toFixed(0)} s`, 'bad');
   if (time === undefined) return;
   if (paused) return chip('state', 'paused', 'warn');
-  chip('state', `${time.toFixed(1)} s${slow > 250 ? `, page draws ${(1000 / slow).toFixed(1)}/s` : ''}`, slow > 250 ? 'warn' : 'good');
+  chip('state', `${time.toFixed(1)} s${slow > 250 ? `, draws ${(1000 / slow).toFixed(1)}/s` : ''}`, slow > 250 ? 'warn' : 'good');
 }
 
 function showDeepest(h: any) {
