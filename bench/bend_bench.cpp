@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // bend_bench.cpp - times whole frames of a rigid ball on a plate that bends:
-// frame/bridge/METHOD/points:P/modes:R/contacts:C/threads:N. The plate has the size of the bridge
+// frame/bridge/METHOD/points:P/modes:R/contacts:C/threads:N, and frame/warped/... with turns and a
+// linear force in place of the cubic one. The plate has the size of the bridge
 // of Xu & Barbic 2016, Fig. 14, and modes that are made up.
 //
 // The hand presses until the ball has about the wanted contacts, then goes to and fro so slowly as
@@ -17,6 +18,7 @@
 
 namespace {
 
+using namespace h6;
 using namespace h6::test;
 
 constexpr double kX = 0.03, kY = 5e-3;
@@ -24,8 +26,8 @@ constexpr double kX = 0.03, kY = 5e-3;
 struct Held {
   BallOnBridge scene;
   double down = 0;
-  Held(h6Method method, std::size_t points, std::size_t modes, unsigned threads)
-      : scene(points, modes, 0.06, true, 20, 1e-4) {
+  Held(h6Method method, bool warped, std::size_t points, std::size_t modes, unsigned threads)
+      : scene(points, modes, 0.06, true, 20, 1e-4, warped) {
     scene.def.contact.method = method;
     scene.def.threads = threads;
     scene.hand.coupling.max_force = 20;
@@ -55,11 +57,21 @@ struct Held {
     std::vector<double> points, depth(shell.x.size());
     const h6Quat inverse{ball.pose.q.w, -ball.pose.q.x, -ball.pose.q.y, -ball.pose.q.z};
     for (std::size_t i = 0; i < shell.x.size(); ++i) {
-      double p[3] = {double(shell.x[i]), double(shell.y[i]), double(shell.z[i])};
-      for (std::size_t j = 0; j < q.size(); ++j)
-        for (std::size_t k = 0; k < 3; ++k)
-          p[k] += q[j] * double(scene.bridge.modes[(i * q.size() + j) * 3 + k]);
-      const h6Vec3 d{p[0] - ball.pose.p.x, p[1] - ball.pose.p.y, p[2] - ball.pose.p.z};
+      const auto sum = [&](const std::vector<float>& modes) {
+        double v[3] = {};
+        for (std::size_t j = 0; j < q.size(); ++j)
+          for (std::size_t k = 0; k < 3; ++k)
+            v[k] += q[j] * double(modes[(i * q.size() + j) * 3 + k]);
+        return h6Vec3{v[0], v[1], v[2]};
+      };
+      h6Vec3 moved = sum(scene.bridge.modes), term = moved;
+      const h6Vec3 turn = scene.bridge.bend.turn_modes ? sum(scene.bridge.turn_modes) : h6Vec3{};
+      for (int k = 1; k < 12; ++k) {  // the mean of the rotations up to the turn
+        term = (1.0 / (k + 1)) * h6::cross(turn, term);
+        moved = moved + term;
+      }
+      const h6Vec3 rest{double(shell.x[i]), double(shell.y[i]), double(shell.z[i])};
+      const h6Vec3 d = rest + moved - ball.pose.p;
       const h6Vec3 local = h6::place(h6Pose{{0, 0, 0}, inverse}, d);
       points.insert(points.end(), {local.x, local.y, local.z});
     }
@@ -78,9 +90,9 @@ struct Held {
   }
 };
 
-void frame(benchmark::State& state, h6Method method, std::size_t points, std::size_t modes,
-           std::uint32_t contacts, unsigned threads) {
-  Held held(method, points, modes, threads);
+void frame(benchmark::State& state, h6Method method, bool warped, std::size_t points,
+           std::size_t modes, std::uint32_t contacts, unsigned threads) {
+  Held held(method, warped, points, modes, threads);
   if (!held.scene.session) return state.SkipWithError("no session");
   held.press(contacts);
   if (!held.right()) return state.SkipWithError("contacts differ from brute force");
@@ -108,12 +120,13 @@ void frame(benchmark::State& state, h6Method method, std::size_t points, std::si
 }
 
 void add(h6Method method, std::size_t points, std::size_t modes, std::uint32_t contacts,
-         unsigned threads) {
-  const std::string name = std::string("frame/bridge/") + h6MethodName(method) +
-                           "/points:" + std::to_string(points) + "/modes:" + std::to_string(modes) +
-                           "/contacts:" + std::to_string(contacts) +
-                           "/threads:" + std::to_string(threads);
-  benchmark::RegisterBenchmark(name.c_str(), frame, method, points, modes, contacts, threads)
+         unsigned threads, bool warped = false) {
+  const std::string name =
+      (warped ? "frame/warped/" : "frame/bridge/") + std::string(h6MethodName(method)) +
+      "/points:" + std::to_string(points) + "/modes:" + std::to_string(modes) +
+      "/contacts:" + std::to_string(contacts) + "/threads:" + std::to_string(threads);
+  benchmark::RegisterBenchmark(name.c_str(), frame, method, warped, points, modes, contacts,
+                               threads)
       ->UseManualTime()
       ->Unit(benchmark::kMicrosecond)
       ->Iterations(3000);
@@ -123,6 +136,8 @@ void add(h6Method method, std::size_t points, std::size_t modes, std::uint32_t c
   for (const unsigned threads : {1u, 2u}) {
     for (const h6Method method : {H6_METHOD_FIRM, H6_METHOD_ROBUST})
       add(method, 85018, 20, 300, threads);
+    for (const std::size_t modes : {20u, 60u})
+      add(H6_METHOD_FIRM, 85018, modes, 300, threads, true);
     for (const std::size_t modes : {10u, 40u, 60u}) add(H6_METHOD_FIRM, 85018, modes, 300, threads);
     add(H6_METHOD_FIRM, 20000, 20, 300, threads);
     add(H6_METHOD_FIRM, 85018, 20, 30, threads);
