@@ -110,22 +110,37 @@ std::vector<float> points_of(const SceneBody& body, std::vector<std::string>& re
   return points;
 }
 
-// Displacements of the drawn vertices for each mode, 16 bits in steps of `step`: (vertices x r x
-// 3).
-std::vector<std::int16_t> modes_of(const Drawn& d, const ReducedModel& model, double& step) {
+std::vector<h6Vec3> vertices_of(const Drawn& d) {
   std::vector<h6Vec3> points;
   for (std::size_t v = 0; v < d.position.size(); v += 3)
     points.push_back({d.origin.x + d.step * (d.position[v] + 32768),
                       d.origin.y + d.step * (d.position[v + 1] + 32768),
                       d.origin.z + d.step * (d.position[v + 2] + 32768)});
-  const std::vector<double> modes = modes_at(model, points);
+  return points;
+}
+
+// 16 bits each, in steps of `step`.
+std::vector<std::int16_t> packed(const std::vector<double>& values, double& step) {
   double most = 1e-30;
-  for (const double m : modes) most = std::max(most, std::fabs(m));
+  for (const double v : values) most = std::max(most, std::fabs(v));
   step = most / 32767;
   std::vector<std::int16_t> out;
-  out.reserve(modes.size());
-  for (const double m : modes) out.push_back(static_cast<std::int16_t>(std::lround(m / step)));
+  out.reserve(values.size());
+  for (const double v : values) out.push_back(static_cast<std::int16_t>(std::lround(v / step)));
   return out;
+}
+
+// Displacements and turns of the drawn vertices for each mode: (vertices x r x 3).
+void add_modes(const Drawn& d, const ReducedModel& model, const std::string& number,
+               Envelope& envelope, ordered_json& head) {
+  const std::vector<h6Vec3> points = vertices_of(d);
+  double step = 0;
+  envelope.add("modes" + number, packed(modes_at(model, points), step));
+  head["modes"] = model.modes;
+  head["mode_step"] = step;
+  if (model.turn.empty()) return;
+  envelope.add("turns" + number, packed(turns_at(model, points), step));
+  head["turn_step"] = step;
 }
 
 ordered_json pose_json(const h6Pose& p) {
@@ -167,15 +182,7 @@ ordered_json draw_scene(const LoadedScene& loaded, const DrawLimits& limits, Env
       head["step"] = d.step;
       envelope.add("position" + number, d.position);
       envelope.add("index" + number, d.index);
-      if (const auto& model = loaded.bends[i]) {
-        double step = 0;
-        envelope.add("modes" + number, modes_of(d, *model, step));
-        if (!model->turn.empty())
-          remarks.push_back("'" + body.name +
-                            "' is drawn by its linear modes, without the warp that contacts see");
-        head["modes"] = model->modes;
-        head["mode_step"] = step;
-      }
+      if (const auto& model = loaded.bends[i]) add_modes(d, *model, number, envelope, head);
       d = {};
     } else if (const auto points = points_of(body, remarks); !points.empty()) {
       envelope.add("points" + number, points);

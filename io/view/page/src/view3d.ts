@@ -18,6 +18,7 @@ export interface BodyHead {
   step?: number;
   modes?: number;      // of a body that bends
   mode_step?: number;
+  turn_step?: number;  // where its displacements are warped
 }
 
 // The drawn vertices of a body that bends.
@@ -27,7 +28,32 @@ interface Bend {
   modes: Int16Array;    // (n r 3), in steps of `step`
   count: number;        // r
   step: number;
+  turns: Int16Array | null;  // likewise [rad], of a body whose displacements are warped
+  turnStep: number;
 }
+
+// One vertex: q, from `at` on, times its modes, from `first` on.
+function sumModes(modes: Int16Array, first: number, q: Float32Array, at: number, count: number, step: number,
+                  out: THREE.Vector3): THREE.Vector3 {
+  let x = 0, y = 0, z = 0;
+  for (let j = 0, m = first; j < count; ++j, m += 3) {
+    const s = q[at + j];
+    x += s * modes[m], y += s * modes[m + 1], z += s * modes[m + 2];
+  }
+  return out.set(step * x, step * y, step * z);
+}
+
+// Turns the displacement u by the mean of the rotations up to the turn w (Choi & Ko 2005, Eq. 11).
+function warp(u: THREE.Vector3, w: THREE.Vector3) {
+  const s = w.lengthSq(), angle = Math.sqrt(s), small = s < 1e-4;
+  const a = small ? 1 - s / 6 : Math.sin(angle) / angle;
+  const b = small ? 0.5 - s / 24 : (1 - Math.cos(angle)) / s;
+  const c = small ? 1 / 6 - s / 120 : (1 - a) / s;
+  const along = c * w.dot(u);
+  side.crossVectors(w, u);
+  u.multiplyScalar(a).addScaledVector(side, b).addScaledVector(w, along);
+}
+const side = new THREE.Vector3();
 
 export interface Contacts {
   p: Float32Array;  // (3 n) world [m]
@@ -207,26 +233,25 @@ export class View3D {
     shape.setAttribute('position', new THREE.BufferAttribute(position, 3));
     shape.setIndex(new THREE.BufferAttribute(index, 1));
     const modes = packet.arrays.get(`modes${i}`);
+    const turns = packet.arrays.get(`turns${i}`);
     if (modes instanceof Int16Array && head.modes && head.mode_step)
-      this.bending.push({ shape, rest: position.slice(), modes, count: head.modes, step: head.mode_step });
+      this.bending.push({
+        shape, rest: position.slice(), modes, count: head.modes, step: head.mode_step,
+        turns: turns instanceof Int16Array ? turns : null, turnStep: head.turn_step ?? 0 });
     return shape;
   }
 
   // Bends bodies: `q` has their coordinates from `at` on, one body after another.
   bends(q: Float32Array, at = 0) {
-    for (const { shape, rest, modes, count, step } of this.bending) {
+    const u = new THREE.Vector3(), w = new THREE.Vector3();
+    for (const { shape, rest, modes, count, step, turns, turnStep } of this.bending) {
       if (at + count > q.length) return;
       const place = shape.getAttribute('position') as THREE.BufferAttribute;
       const out = place.array as Float32Array;
-      for (let v = 0, m = 0; v < rest.length; v += 3) {
-        let x = 0, y = 0, z = 0;
-        for (let j = 0; j < count; ++j, m += 3) {
-          const s = q[at + j];
-          x += s * modes[m], y += s * modes[m + 1], z += s * modes[m + 2];
-        }
-        out[v] = rest[v] + step * x;
-        out[v + 1] = rest[v + 1] + step * y;
-        out[v + 2] = rest[v + 2] + step * z;
+      for (let v = 0; v < rest.length; v += 3) {
+        sumModes(modes, v * count, q, at, count, step, u);
+        if (turns) warp(u, sumModes(turns, v * count, q, at, count, turnStep, w));
+        out[v] = rest[v] + u.x, out[v + 1] = rest[v + 1] + u.y, out[v + 2] = rest[v + 2] + u.z;
       }
       place.needsUpdate = true;
       at += count;

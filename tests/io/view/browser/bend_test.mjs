@@ -64,3 +64,33 @@ test('in a report, the shape is that of the shown instant', async () => {
   await wait(300);
   await browser.picture(join(pictures, 'bridge-report.png'));
 }, { timeout: 120000 });
+
+test('with turns, a mode that turns a body as a whole keeps its shape', async () => {
+  // Mode 0 becomes the turn about z at a rate of 1: u = z x p. The drawn points must be the rest turned by q.
+  const off = (angle, warped) => browser.value(`(() => {
+    const view = window.hapsix.replay.view, bend = { ...view.bending[0] };
+    const r = bend.rest, n = bend.count, most = r.reduce((m, v) => Math.max(m, Math.abs(v)), 0);
+    bend.step = most / 32767, bend.turnStep = 1 / 32767;
+    bend.modes = new Int16Array(r.length * n), bend.turns = ${warped} ? new Int16Array(r.length * n) : null;
+    for (let v = 0; v < r.length; v += 3) {
+      bend.modes[v * n] = Math.round(-r[v + 1] / bend.step), bend.modes[v * n + 1] = Math.round(r[v] / bend.step);
+      if (bend.turns) bend.turns[v * n + 2] = 32767;
+    }
+    const kept = view.bending, place = bend.shape.getAttribute('position').array, before = place.slice();
+    view.bending = [bend];
+    view.bends(new Float32Array(n).fill(${angle}, 0, 1));
+    view.bending = kept;
+    const c = Math.cos(${angle}), s = Math.sin(${angle});
+    let worst = 0;
+    for (let v = 0; v < r.length; v += 3)
+      worst = Math.max(worst, Math.hypot(place[v] - c * r[v] + s * r[v + 1],
+        place[v + 1] - s * r[v] - c * r[v + 1], place[v + 2] - r[v + 2]));
+    place.set(before);
+    return worst / most;
+  })()`);
+  for (const angle of [0, 1e-3, 0.5, Math.PI, 6]) {
+    const worst = await off(angle, true);
+    assert.ok(worst < 1e-4 * (1 + angle), `${worst} of the size at ${angle} rad`);
+  }
+  assert.ok((await off(0.5, false)) > 0.05, 'without turns the body grows');
+});
