@@ -139,7 +139,7 @@ TEST_CASE("a check arms a device whose motors have no power before") {
     const Json json = result_of(
         box,
         {"devices",
-         "plugin:" + plugins + name + ".so?timeout=500&library=" + plugins + name + "_standin.so",
+         "plugin:" + plugins + name + ".so?timeout=1000&library=" + plugins + name + "_standin.so",
          "--test"});
     CHECK(json["passed"] == true);
     REQUIRE(json["pushes"].size() >= 6);
