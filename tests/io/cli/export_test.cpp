@@ -21,6 +21,31 @@ std::size_t column(const std::string& head, const std::string& name) {
   return static_cast<std::size_t>(found - all.begin());
 }
 
+// bend.h5: a tool pressed on a plate that bends. `more`: options of the bake.
+void record_bend(Sandbox& box, const Args& more) {
+  REQUIRE(run(box, {"scene", "export", "box-on-plates", "."}).code == 0);
+  Args bake{"bake", "deformable", "large.stl", "--units",
+            "mm",   "--cell",     "1",         "--young",
+            "1e5",  "--poisson",  "0.4",       "--density",
+            "1000", "--modes",    "4",         "--fix-box=-21,-12,-3,-7,-10.9,1",
+            "-o",   "plate.h5"};
+  bake.insert(bake.end(), more.begin(), more.end());
+  const Ended baked = run(box, bake);
+  REQUIRE_MESSAGE(baked.code == 0, baked.err);
+  spill(box.file("hand.csv"),
+        "t,x,y,z,qw,qx,qy,qz\n0,-31.75,8,2.2,1,0,0,0\n0.2,-31.75,8,1,1,0,0,0\n0.4,-31.75,8,1,1,0,0,"
+        "0\n");
+  spill(box.file("bend.json"), R"({"hapsix": 1, "units": "mm", "contact": {"stiffness": 1e4},
+    "bodies": [
+      {"name": "plate", "fixed": true,
+       "shell": {"mesh": "large.stl", "points": 2000, "bends": "plate.h5"}},
+      {"name": "tool", "mass": 0.05, "pose": {"p": [-31.75, 8, 2.2], "q": [1, 0, 0, 0]},
+       "field": {"mesh": "small.stl", "voxel_size": 0.15}}],
+    "hands": [{"body": "tool", "path": "hand.csv"}]})");
+  const Ended ran = run(box, {"run", "bend.json", "--virtual-time", "--record", "bend.h5"});
+  REQUIRE_MESSAGE(ran.code == 0, ran.err);
+}
+
 }  // namespace
 
 TEST_CASE("a recording as CSV: a row for each frame, and every contact of every frame") {
@@ -95,24 +120,7 @@ TEST_CASE("a field as a plain level set is read back, and by OpenVDB's Python wh
 TEST_CASE(
     "shapes of a body that bends as CSV: a row for each frame, bent while something presses") {
   Sandbox box;
-  REQUIRE(run(box, {"scene", "export", "box-on-plates", "."}).code == 0);
-  const Ended baked =
-      run(box, {"bake", "deformable", "large.stl", "--units", "mm", "--cell", "1", "--young", "1e5",
-                "--poisson", "0.4", "--density", "1000", "--modes", "4",
-                "--fix-box=-21,-12,-3,-7,-10.9,1", "-o", "plate.h5"});
-  REQUIRE_MESSAGE(baked.code == 0, baked.err);
-  spill(box.file("hand.csv"),
-        "t,x,y,z,qw,qx,qy,qz\n0,-31.75,8,2.2,1,0,0,0\n0.2,-31.75,8,1,1,0,0,0\n0.4,-31.75,8,1,1,0,0,"
-        "0\n");
-  spill(box.file("bend.json"), R"({"hapsix": 1, "units": "mm", "contact": {"stiffness": 1e4},
-    "bodies": [
-      {"name": "plate", "fixed": true,
-       "shell": {"mesh": "large.stl", "points": 2000, "bends": "plate.h5"}},
-      {"name": "tool", "mass": 0.05, "pose": {"p": [-31.75, 8, 2.2], "q": [1, 0, 0, 0]},
-       "field": {"mesh": "small.stl", "voxel_size": 0.15}}],
-    "hands": [{"body": "tool", "path": "hand.csv"}]})");
-  const Ended ran = run(box, {"run", "bend.json", "--virtual-time", "--record", "bend.h5"});
-  REQUIRE_MESSAGE(ran.code == 0, ran.err);
+  record_bend(box, {});
   const Ended done = run(box, {"export", "bend.h5", "-o", "bend.csv", "--bends", "q.csv"});
   REQUIRE_MESSAGE(done.code == 0, done.err);
   std::istringstream shapes(slurp(box.file("q.csv")));
@@ -140,6 +148,13 @@ TEST_CASE(
   CHECK(last > 0);
   const Ended none = run(box, {"export", "bend.h5", "-o", "bend.csv", "--bends", "no/q.csv"});
   CHECK(none.code != 0);
+}
+
+TEST_CASE("a warped model says so, and what it does is replayed to the bit") {
+  Sandbox box;
+  record_bend(box, {"--warp"});
+  CHECK(result_of(box, {"info", "plate.h5"})["warp"] == true);
+  CHECK(result_of(box, {"replay", "bend.h5", "--verify"})["same"] == true);
 }
 
 TEST_CASE("every contact as HDF5 columns: the same as in CSV") {
