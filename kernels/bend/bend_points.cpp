@@ -71,23 +71,10 @@ float reach_simd(const ModesView& modes, const float* q, std::size_t n) {
 // Contacts of one vector are put into the lanes of their rows, so that modes are read as they lie.
 void rows_simd(const BentContacts& c, const ModesView& modes, const float turn[9],
                std::size_t stride, float* out) {
-  const DF d;
-  HWY_ALIGN float local[3][kBendLanes], shares[kBendLanes];
+  HWY_ALIGN float local[3][kBendLanes];
   each_vector(c, [&](std::size_t v, std::size_t first, std::size_t end) HWY_ATTR {
     rigid_rows(c, first, end, turn, stride, out, local);
-    const float* at = modes.modes + v * modes.count * 3 * kBendLanes;
-    for (std::size_t j = 0; j < modes.count; ++j, at += 3 * kBendLanes) {
-      for (std::size_t lane = 0; lane < kBendLanes; lane += hn::Lanes(d)) {
-        VF share = hn::Zero(d);
-        for (int a = 0; a < 3; ++a)
-          share = hn::MulAdd(hn::Load(d, local[a] + lane), hn::LoadU(d, at + a * kBendLanes + lane),
-                             share);
-        hn::Store(share, d, shares + lane);
-      }
-      for (std::size_t i = first; i < end; ++i)
-        out[i * stride + 6 + j] = shares[c.row[i] % kBendLanes];
-    }
-    clear_ends(first, end, 6 + modes.count, stride, out);
+    modal_rows<3>(c, modes, v, first, end, local, stride, out);
   });
 }
 

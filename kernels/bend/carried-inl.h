@@ -85,10 +85,29 @@ HWY_INLINE void rigid_rows(const BentContacts& c, std::size_t first, std::size_t
     for (int k = 0; k < 3; ++k) local[k][c.row[i] % kBendLanes] = own[k];
   }
 }
-HWY_INLINE void clear_ends(std::size_t first, std::size_t end, std::size_t size, std::size_t stride,
-                           float* out) {
+// The modal parts of these rows: the products of each lane's `by` with its modes, which have kAxes
+// axes; zeros behind them.
+template <int kAxes>
+HWY_INLINE void modal_rows(const BentContacts& c, const ModesView& modes, std::size_t v,
+                           std::size_t first, std::size_t end, const float (&by)[kAxes][kBendLanes],
+                           std::size_t stride, float* out) {
+  const DF d;
+  HWY_ALIGN float shares[kBendLanes];
+  const float* at = modes.modes + v * modes.count * kAxes * kBendLanes;
+  for (std::size_t j = 0; j < modes.count; ++j, at += kAxes * kBendLanes) {
+    for (std::size_t lane = 0; lane < kBendLanes; lane += hn::Lanes(d)) {
+      VF share = hn::Zero(d);
+      HWY_UNROLL(6)
+      for (int a = 0; a < kAxes; ++a)
+        share =
+            hn::MulAdd(hn::Load(d, by[a] + lane), hn::LoadU(d, at + a * kBendLanes + lane), share);
+      hn::Store(share, d, shares + lane);
+    }
+    for (std::size_t i = first; i < end; ++i)
+      out[i * stride + 6 + j] = shares[c.row[i] % kBendLanes];
+  }
   for (std::size_t i = first; i < end; ++i)
-    for (std::size_t k = size; k < stride; ++k) out[i * stride + k] = 0;
+    for (std::size_t k = 6 + modes.count; k < stride; ++k) out[i * stride + k] = 0;
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE

@@ -155,7 +155,7 @@ HWY_INLINE void derivatives(const VF* n, const VF* u, const VF* w, VF* by_u, VF*
 void warp_rows_simd(const BentContacts& c, const ModesView& modes, const float* const at[6],
                     const float turn[9], std::size_t stride, float* out) {
   const DF d;
-  HWY_ALIGN float local[3][kBendLanes], by[6][kBendLanes], shares[kBendLanes];
+  HWY_ALIGN float local[3][kBendLanes], by[6][kBendLanes];
   each_vector(c, [&](std::size_t v, std::size_t first, std::size_t end) HWY_ATTR {
     rigid_rows(c, first, end, turn, stride, out, local);
     for (std::size_t lane = 0; lane < kBendLanes; lane += hn::Lanes(d)) {
@@ -168,20 +168,7 @@ void warp_rows_simd(const BentContacts& c, const ModesView& modes, const float* 
       derivatives(n, u, w, of, of + 3);
       for (int k = 0; k < 6; ++k) hn::Store(of[k], d, by[k] + lane);
     }
-    const float* mode = modes.modes + v * modes.count * 6 * kBendLanes;
-    for (std::size_t j = 0; j < modes.count; ++j, mode += 6 * kBendLanes) {
-      for (std::size_t lane = 0; lane < kBendLanes; lane += hn::Lanes(d)) {
-        VF share = hn::Zero(d);
-        HWY_UNROLL(6)
-        for (int k = 0; k < 6; ++k)
-          share = hn::MulAdd(hn::Load(d, by[k] + lane), hn::LoadU(d, mode + k * kBendLanes + lane),
-                             share);
-        hn::Store(share, d, shares + lane);
-      }
-      for (std::size_t i = first; i < end; ++i)
-        out[i * stride + 6 + j] = shares[c.row[i] % kBendLanes];
-    }
-    clear_ends(first, end, 6 + modes.count, stride, out);
+    modal_rows<6>(c, modes, v, first, end, by, stride, out);
   });
 }
 

@@ -5,17 +5,16 @@
 //
 // Modes have six axes for points, u and w, and eight for spheres:
 //     modes[((v count + j) axes + axis) 16 + lane]
-// Of a sphere about c, u_j and w_j are middles U_j, W_j of what its points at c + d do in mode j;
-// the seventh axis is the largest |u_ij - U_j - W_j x d_i|, and the eighth the largest |w_ij -
-// W_j|.
+// Axes of a sphere about c: U_j and W_j, the middles of what its points c + d_i do in mode j; the
+// largest |u_ij - U_j - W_j x d_i|; and the largest |w_ij - W_j|.
 #pragma once
 #include "kernels/bend/bend_points.h"
 
 namespace h6::kernels {
 
 // For the vectors v = vectors[0..n-1] (0..n-1 where null) and all 16 lanes i of each:
-//     u = sum_j q_j u_ij, w = sum_j q_j w_ij;   to[0..2] = rest + R~(w) u, to[3..5] = u, to[6..8] =
-//     w
+//     u = sum_j q_j u_ij, w = sum_j q_j w_ij
+//     to[0..2] = rest + R~(w) u, to[3..5] = u, to[6..8] = w
 void warp_points(const ModesView& modes, const float* q, const float* const rest[3],
                  const std::uint32_t* vectors, std::size_t n, float* const to[9]);
 void warp_points_ref(const ModesView& modes, const float* q, const float* const rest[3],
