@@ -207,13 +207,13 @@ class Replay {
       std::printf(
           "\nevery one of %" PRIu64
           " frames is the same to the bit: %s on %u thread%s\n%s"
-          "computed again: contacts, depths, stiffness, poses, velocities, shapes, commands, "
-          "causes, "
+          "computed again: contacts, depths, stiffness, poses, velocities, %scommands, causes, "
           "states, status, events, the summary's figures; attributes against what they repeat\n"
           "%s: scene, the hand's samples, "
           "deadlines, measured times, notes\n",
           replayed_->totals.frames, kernels::target_name(), session_->threads(),
           session_->threads() == 1 ? "" : "s", short_sentence().c_str(),
+          head_.bends.empty() ? "" : "shapes where they are known, ",
           sealed_ && recording_.sealed ? "sealed, and unchanged since"
                                        : "neither computed nor sealed (an older file)");
   }
