@@ -5,9 +5,8 @@
 //   hapsix export bay.vdb -o plain.vdb
 //
 // A recording holds no contacts; they are computed again to the bit, and a recording that cannot be
-// replayed has none to export. So are the shapes of bodies that bend where an older recording lacks
-// them. 3,000 contacts of 17
-// numbers at 1 kHz would be 0.4 GB for each second of a run.
+// replayed has none to export. Shapes of bodies that bend, which older recordings lack, are computed
+// again likewise. 3,000 contacts of 17 numbers at 1 kHz would be 0.4 GB for each second of a run.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>

@@ -5,9 +5,8 @@
 //            made_with); seal: a hash of all else
 //   /mesh    vertices (n, 3) [m]; corners (m, 8), a tetrahedron's last four are 4294967295;
 //            material (m), index into the materials; fixed (k)
-//   /modes   basis (n, r, 3) [1/sqrt(kg)]; frequency (r) [Hz]; of a warped model, whose version is
-//   2
-//            and which has no quadratic and cubic: turn (n, r, 3) [rad/(m sqrt(kg))]
+//   /modes   basis (n, r, 3) [1/sqrt(kg)]; frequency (r) [Hz]; a warped model has turn
+//            (n, r, 3) [rad/(m sqrt(kg))], no quadratic and cubic, and version 2
 //   /force   linear (r, r), quadratic (r, r(r+1)/2), cubic (r, r(r+1)(r+2)/6), in the order of
 //            reduced_model.h
 #pragma once

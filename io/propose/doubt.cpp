@@ -6,9 +6,9 @@ namespace h6::io {
 const char* doubt_of(Verdict verdict) {
   switch (verdict) {
     case Verdict::through:
-      return "in the trial the part went through a wall; a smaller \"voxel_size\" of the field or "
-             "a "
-             "smaller \"max_force\" of the coupling holds more, and 'hapsix check' says how much";
+      return "in the trial the part went through a wall; a smaller \"voxel_size\" of the field "
+             "or a smaller \"max_force\" of the coupling holds more, and 'hapsix check' says how "
+             "much";
     case Verdict::chatters:
       return "in the trial the part trembled; a heavier part, more \"damping\" or a lower "
              "\"stiffness\" of the contact calms it";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// doubt.h - what to change in a proposed scene whose trial did not go well.
+// doubt.h - advice on a proposed scene whose trial did not go well.
 #pragma once
 #include "io/scene/verdict.h"
 

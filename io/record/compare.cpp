@@ -19,7 +19,7 @@ bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// What a replay computes, in the order of a frame; bodies that bend come before the others.
+// The columns that a replay computes, in the order of a frame; bodies that bend come first.
 std::vector<Column> computed(const std::vector<RecordedBend>& bends) {
   std::vector<Column> found;
   const std::vector<Column> all = columns(bends);

@@ -180,7 +180,7 @@ void serve(const std::function<std::string(std::size_t run)>& answer) {
     const auto start = std::chrono::steady_clock::now();
     std::string text = answer(std::stoul(line));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    if (text[0] != '!') text += "\t" + std::to_string(took.count());
+    if (text[0] != '!' && text[0] != '?') text += "\t" + std::to_string(took.count());
     text += "\n";
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
       return;

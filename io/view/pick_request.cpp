@@ -11,7 +11,7 @@ using nlohmann::json;
 Result<Picked> parse_picked(std::string_view text, std::size_t count) {
   const json all = json::parse(text, nullptr, false);
   if (!all.is_object() || !all.contains("do") || !all["do"].is_string())
-    return Failure{"what the page sent is no request"};
+    return Failure{"the page sent something that is no request"};
   if (all["do"] == "cancel") return Picked{};
   if (all["do"] != "use" || !all.contains("vertices") || !all["vertices"].is_array())
     return Failure{"the page asks for something that is not known here"};

@@ -9,7 +9,7 @@
 
 namespace h6::io::view {
 
-// What the page says in the end. {"do": "use", "vertices": [4, 17, ...]} or {"do": "cancel"}.
+// The page's last message: {"do": "use", "vertices": [4, 17, ...]} or {"do": "cancel"}.
 struct Picked {
   bool use = false;
   std::vector<std::uint32_t> vertices;  // rising, each once, below `count`

@@ -18,9 +18,10 @@ struct DrawLimits {
   std::size_t triangles = 250000;  // of all bodies together: 60 Hz on a laptop's graphics
 };
 
-// Adds position<i>, index<i>, modes<i>, turns<i> or points<i> of body i to `envelope`, and returns the head's
-// part: {"bodies": [{"name", "fixed", "pose", "com", "origin", "step", "modes", "mode_step",
-// "turn_step"}], "hand_body", "voxel", "unit", "per_metre", "name"}. A file that cannot be read is a sentence in `remarks`, not a failure.
+// Adds position<i>, index<i>, modes<i>, turns<i> or points<i> of body i to `envelope`, and returns
+// the head's part: {"bodies": [{"name", "fixed", "pose", "com", "origin", "step", "modes",
+// "mode_step", "turn_step"}], "hand_body", "voxel", "unit", "per_metre", "name"}. A file that
+// cannot be read is a sentence in `remarks`, not a failure.
 nlohmann::ordered_json draw_scene(const LoadedScene& scene, const DrawLimits& limits,
                                   Envelope& envelope, std::vector<std::string>& remarks);
 

@@ -68,8 +68,8 @@ void fill_shares(const Settings& set, std::span<const Body> bodies, const ShellB
 
 using Modes = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, H6_MAX_MODES>;
 
-// Of a row of the shell, in the axes of the modes: how its point and its unit normal n move by q,
-// and what bends the way of the point itself, n.d2p/dq2 (0 where nothing is warped).
+// How a row of the shell moves by q, in the axes of the modes: its point p, its unit normal n, and
+// n.d2p/dq2, by which the way of the point is bent (empty where nothing is warped).
 struct RowMotion {
   Modes point, normal;
   ModalMatrix bow;

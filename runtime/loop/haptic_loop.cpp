@@ -475,7 +475,7 @@ void h6HaltLoop(h6Loop* loop) {
 }
 void h6HaltAll(void) { sched::halt_all(); }
 
-// What the hands come to once the haptic thread has ended. Later the session may be another loop's.
+// Reports the hands when the haptic thread has ended: later the session may be another loop's.
 static void report_hands(h6Loop& loop) {
   loop.report.fault = H6_CAUSE_NONE;
   for (std::size_t h = 0; h < loop.session->hands.size(); ++h) {

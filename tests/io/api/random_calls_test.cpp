@@ -18,7 +18,7 @@
 
 namespace {
 
-// What every sequence may read.
+// A scene and its session, which every sequence may read.
 struct Common {
   h6Scene* scene = h6ReadScene("box-on-wall", nullptr, nullptr);
   h6SessionDef def{};

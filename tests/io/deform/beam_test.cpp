@@ -142,7 +142,7 @@ VectorXd warped_balance(const ReducedModel& model, double force) {
   return q;
 }
 
-// Of the line through the middle.
+// The length of the line through the middle.
 template <class F>
 double length_of(const SolidMesh& mesh, const F& place) {
   std::vector<std::pair<double, h6Vec3>> line;
