@@ -121,9 +121,12 @@ h6Status step_with(PySession& s, const Rows<double>& pose,
   return step(s);
 }
 
-// Most calls give a pose alone; three arguments less save 0.6 µs of the 2.1 beyond C.
-h6Status step_at(PySession& s, const Rows<double>& pose) {
-  put(s, &h6DeviceSample::pose, &pose, "pose");
+// Most calls give a pose alone, as an array of doubles: three arguments less save 0.6 µs of the 2.1
+// beyond C, and an array that is not looked at for conversion 0.3 µs.
+h6Status step_at(PySession& s, const py::array& pose) {
+  const Rows<double> doubles =
+      Rows<double>::check_(pose) ? py::reinterpret_borrow<Rows<double>>(pose) : Rows<double>(pose);
+  put(s, &h6DeviceSample::pose, &doubles, "pose");
   return step(s);
 }
 

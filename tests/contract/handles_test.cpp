@@ -11,6 +11,7 @@
 #include <limits>
 #include <regex>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -114,6 +115,27 @@ TEST_CASE("records of a loop come as the part of the room that was filled") {
   REQUIRE(rows.size() == 50);
   CHECK(rows.back().report.frame == 49);
   CHECK(hapsix::read_records(loop, room).empty());
+}
+
+TEST_CASE(
+    "a span is of any array or container of its rows, not of others and no loose temporary one") {
+  using Numbers = std::vector<int>;
+  CHECK(std::is_convertible_v<Numbers&, hapsix::span<int>>);
+  CHECK(std::is_convertible_v<const Numbers&, hapsix::span<const int>>);
+  CHECK(std::is_convertible_v<Numbers, hapsix::span<const int>>);
+  CHECK(std::is_convertible_v<hapsix::span<int>, hapsix::span<const int>>);
+  CHECK_FALSE(std::is_convertible_v<Numbers, hapsix::span<int>>);
+  CHECK_FALSE(std::is_convertible_v<const Numbers&, hapsix::span<int>>);
+  CHECK_FALSE(std::is_convertible_v<int, hapsix::span<int>>);
+  CHECK_FALSE(std::is_convertible_v<std::vector<long>&, hapsix::span<int>>);
+  int rows[3] = {1, 2, 3};
+  const hapsix::span<int> all(rows);
+  all[2] = 7;
+  CHECK((all.size() == 3 && all.front() == 1 && all.back() == 7 && rows[2] == 7));
+  CHECK(std::vector<int>(all.begin(), all.end()) == std::vector<int>{1, 2, 7});
+  CHECK(all.first(2).size() == 2);
+  CHECK(all.subspan(1).data() == rows + 1);
+  CHECK(hapsix::span<int>().empty());
 }
 
 TEST_CASE("spans and rows of no object are empty, and a handle of nothing throws") {

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Every installed header compiles alone as C99, C11, C++17 and C++20, without a warning.
+# Every installed header compiles alone as C99, C11, C++17 and C++20, hapsix.hpp as C++17 and C++20,
+# without a warning.
 . "$(dirname "$0")/common.sh"
 stage
 count=0
@@ -9,7 +10,7 @@ for header in $(cd "$STAGE/include" && ls hapsix/*.h hapsix/*.hpp 2>/dev/null); 
   for compiler in gcc clang; do
     command -v $compiler >/dev/null || continue
     for language in c99 c11 c++17 c++20; do
-      case "$header:$language" in *.hpp:c99 | *.hpp:c11 | *.hpp:c++17) continue ;; esac
+      case "$header:$language" in *.hpp:c99 | *.hpp:c11) continue ;; esac
       echo "#include <$header>" >"$WORK/one.c"
       $compiler -x "${language%%[0-9]*}" -std=$language -fsyntax-only -I "$STAGE/include" \
         -Wall -Wextra -Wpedantic -Wconversion -Werror "$WORK/one.c" || fail "$header, $compiler -std=$language"

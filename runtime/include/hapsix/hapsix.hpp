@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// hapsix.hpp - the contract for C++20: handles that destroy themselves, and spans.
+// hapsix.hpp - the contract for C++17 and later: handles that destroy themselves, and spans.
 //
 // There is no second meaning of anything: a handle is a C pointer that is destroyed in its
 // destructor, and it converts to that pointer, so every function of hapsix.h (and of batch.h and io.h,
@@ -8,13 +8,53 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <stdexcept>
 #include <vector>
+#if __cplusplus >= 202002L
+#include <span>
+#else
+#include <iterator>
+#include <type_traits>
+#include <utility>
+#endif
 
 #include "hapsix.h"
 
 namespace hapsix {
+
+#if __cplusplus >= 202002L
+using std::span;
+#else
+// The part of std::span that C++17 lacks: rows of memory that something else keeps.
+template <class T>
+class span {
+  template <class Rows>
+  using RowOf = std::remove_pointer_t<decltype(std::data(std::declval<Rows&>()))>;
+
+ public:
+  constexpr span() = default;
+  constexpr span(T* first, std::size_t count) : first_(first), count_(count) {}
+  // Of an array or a container of T; of const T also of a temporary one.
+  template <class Rows, class = std::enable_if_t<
+                            std::is_convertible_v<RowOf<Rows> (*)[], T (*)[]> &&
+                            (std::is_const_v<T> || std::is_lvalue_reference_v<Rows>)>>
+  constexpr span(Rows&& rows) : first_(std::data(rows)), count_(std::size(rows)) {}  // NOLINT
+  constexpr T* data() const { return first_; }
+  constexpr std::size_t size() const { return count_; }
+  constexpr bool empty() const { return count_ == 0; }
+  constexpr T* begin() const { return first_; }
+  constexpr T* end() const { return first_ + count_; }
+  constexpr T& operator[](std::size_t i) const { return first_[i]; }
+  constexpr T& front() const { return *first_; }
+  constexpr T& back() const { return first_[count_ - 1]; }
+  constexpr span first(std::size_t count) const { return {first_, count}; }
+  constexpr span subspan(std::size_t from) const { return {first_ + from, count_ - from}; }
+
+ private:
+  T* first_ = nullptr;
+  std::size_t count_ = 0;
+};
+#endif
 
 class Error : public std::runtime_error {
  public:
@@ -51,17 +91,17 @@ using Model = Handle<h6Model, h6DestroyModel>;
 using Session = Handle<h6Session, h6DestroySession>;
 using Loop = Handle<h6Loop, h6DestroyLoop>;
 
-inline Model create_model(std::span<const h6FieldDef> fields, std::span<const h6ShellDef> shells,
+inline Model create_model(span<const h6FieldDef> fields, span<const h6ShellDef> shells,
                           h6ModelDef def = h6DefaultModelDef()) {
   def.fields = fields.data(), def.field_count = fields.size();
   def.shells = shells.data(), def.shell_count = shells.size();
   return Model::make([&](h6Error* error) { return h6CreateModel(&def, error); });
 }
 
-inline Session create_session(const h6Model* model, std::span<const h6BodyDef> bodies,
-                              std::span<const h6HandDef> hands,
+inline Session create_session(const h6Model* model, span<const h6BodyDef> bodies,
+                              span<const h6HandDef> hands,
                               h6SessionDef def = h6DefaultSessionDef(),
-                              std::span<const h6PairDef> pairs = {}) {
+                              span<const h6PairDef> pairs = {}) {
   def.bodies = bodies.data(), def.body_count = bodies.size();
   def.hands = hands.data(), def.hand_count = hands.size();
   def.pairs = pairs.data(), def.pair_count = pairs.size();
@@ -69,7 +109,7 @@ inline Session create_session(const h6Model* model, std::span<const h6BodyDef> b
 }
 
 // One device a hand; they and the session must outlive the loop.
-inline Loop start_loop(h6Session* session, std::span<const h6Device> devices,
+inline Loop start_loop(h6Session* session, span<const h6Device> devices,
                        const h6LoopDef& def = h6DefaultLoopDef()) {
   return Loop::make(
       [&](h6Error* error) { return h6StartLoop(session, devices.data(), &def, error); });
@@ -79,12 +119,12 @@ inline Loop start_loop(h6Session* session, std::span<const h6Device> devices,
 struct Contacts {
   explicit Contacts(const h6Contacts& c) : columns(c) {}
   std::size_t size() const { return columns.count; }
-  std::span<const float> column(const float* first) const { return {first, columns.count}; }
-  std::span<const float> depth() const { return column(columns.depth); }
-  std::span<const float> weight() const { return column(columns.weight); }
-  std::span<const float> load() const { return column(columns.load); }
-  std::span<const std::uint32_t> point() const { return {columns.point, columns.count}; }
-  std::span<const std::int32_t> field_body() const { return {columns.field_body, columns.count}; }
+  span<const float> column(const float* first) const { return {first, columns.count}; }
+  span<const float> depth() const { return column(columns.depth); }
+  span<const float> weight() const { return column(columns.weight); }
+  span<const float> load() const { return column(columns.load); }
+  span<const std::uint32_t> point() const { return {columns.point, columns.count}; }
+  span<const std::int32_t> field_body() const { return {columns.field_body, columns.count}; }
   h6Vec3 normal(std::size_t i) const { return {columns.nx[i], columns.ny[i], columns.nz[i]}; }
   h6Vec3 arm(std::size_t i) const { return {columns.rx[i], columns.ry[i], columns.rz[i]}; }
   h6Contacts columns;
@@ -100,7 +140,7 @@ inline std::vector<h6Overlap> overlaps(const h6Session* session) {
 }
 
 // Records of a loop, oldest first: the part of `room` that was filled.
-inline std::span<const h6FrameRecord> read_records(h6Loop* loop, std::span<h6FrameRecord> room) {
+inline span<const h6FrameRecord> read_records(h6Loop* loop, span<h6FrameRecord> room) {
   return room.first(h6ReadRecords(loop, room.data(), room.size()));
 }
 

@@ -190,7 +190,7 @@ TEST_CASE("progress rises on the caller's thread, and false cancels with a code"
   made.field = h6BakeField(made.mesh, &def, &error);
   REQUIRE_MESSAGE(made.field, error.message);
   REQUIRE(seen.calls > 0);
-  seen = {.last = 0, .calls = 0, .allowed = 0};
+  seen = Seen{0, 0, 0};
   CHECK(h6BakeField(made.mesh, &def, &error) == nullptr);
   CHECK(error.code == H6_ERROR_CANCELLED);
   h6SceneDef scene = h6DefaultSceneDef();
