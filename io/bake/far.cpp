@@ -201,7 +201,7 @@ class Nodes {
 
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
                       const Reached& reached, unsigned threads, const Steps& steps,
-                      std::vector<float>& far) {
+                      Samples& far) {
   const TriangleTree tree(surface, grid, threads);
   if (!steps.tell("far field", 0.88)) return Failure{"cancelled"};
   Nodes nodes(grid, tree);

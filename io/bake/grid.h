@@ -281,6 +281,6 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, c
 // far.cpp: signed lower bounds of the distance [m] at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
                       const Reached& reached, unsigned threads, const Steps& steps,
-                      std::vector<float>& far);
+                      Samples& far);
 
 }  // namespace h6::io::bake

@@ -20,14 +20,14 @@ inline constexpr std::int32_t kMaxBricksOnSide = 256;
 inline constexpr double kFinest = 1.5;
 
 struct FieldData {
-  Vec3 origin{};                          // node (0,0,0), mesh frame [m]
-  double voxel_size = 0;                  // [m]
-  std::array<std::int32_t, 3> bricks{};   // along x, y, z
-  std::vector<std::int32_t> brick_index;  // (bz x by x bx) row in samples, rising; -1: none
-  Samples samples;                        // (brick_count x 512) [m]
-  std::vector<float> far_grid;            // ((bz+1) x (by+1) x (bx+1)) signed [m]
-  double band = 0;                        // [m]
-  std::vector<std::int32_t> part;         // (brick_count) or empty
+  Vec3 origin{};                         // node (0,0,0), mesh frame [m]
+  double voxel_size = 0;                 // [m]
+  std::array<std::int32_t, 3> bricks{};  // along x, y, z
+  Large<std::int32_t> brick_index;       // (bz x by x bx) row in samples, rising; -1: none
+  Samples samples;                       // (brick_count x 512) [m]
+  Samples far_grid;                      // ((bz+1) x (by+1) x (bx+1)) signed [m]
+  double band = 0;                       // [m]
+  std::vector<std::int32_t> part;        // (brick_count) or empty
   std::vector<std::string> part_names;
   // (brick_count) or empty: the mesh's triangle nearest to the middle of the brick; -1 when a
   // sealed hole is nearer.

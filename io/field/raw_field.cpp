@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // raw_field.cpp - one page with the head, then the arrays one after the other: samples,
 // brick_index, far_grid, part, triangle, the finer samples, texts. Blocks of the arrays are hashed
-// while they are written or read, by all threads; the head comes last, with a hash of itself and of
-// the blocks' hashes.
+// by all threads; the head comes last, with a hash of itself and of the blocks' hashes.
+//
+// A field that is read keeps its floats in the mapped file. Copies of 2 GB would need 2 GB of fresh
+// memory, which the system clears, and which a virtual machine must first get from its host.
 #include "io/field/raw_field.h"
 
 #include <algorithm>
@@ -10,8 +12,8 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <new>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,12 +21,14 @@
 
 #include "io/file/content_hash.h"
 #include "io/file/direct_file.h"
+#include "io/file/mapped_file.h"
 #include "io/file/write_aside.h"
 
 namespace h6::io {
 namespace {
 
 constexpr std::size_t kHashed = std::size_t{4} << 20;
+constexpr std::size_t kAhead = 8 * kHashed;  // the disk is asked this much before a block is read
 constexpr std::string_view kFieldMagic = "hapsix cached field ", kVersion = "3\n";
 
 struct Head {
@@ -41,13 +45,12 @@ struct Head {
 };
 static_assert(sizeof(Head) == kDirectPage);
 
-// The arrays of a file in their order. Only a reader writes through them.
-using Pieces = std::array<std::span<char>, 10>;
+// The arrays of a file in their order.
+using Pieces = std::array<std::span<const char>, 10>;
 
 template <class T, class A>
-std::span<char> bytes_of(const std::vector<T, A>& values) {
-  return {const_cast<char*>(reinterpret_cast<const char*>(values.data())),
-          values.size() * sizeof(T)};
+std::span<const char> bytes_of(const std::vector<T, A>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
 }
 
 Pieces pieces_of(const FieldData& f, const std::vector<char>& text) {
@@ -76,12 +79,13 @@ void for_overlaps(const Pieces& pieces, std::uint64_t begin, std::size_t count, 
   }
 }
 
-// Where a block is read or written: in place for blocks of the first piece, the samples, whose
-// memory is aligned for direct access; else in the buffer.
-char* block_place(const Pieces& pieces, std::uint64_t begin, std::size_t count, char* buffer) {
+// Where a block is written from: the place of its samples, the first piece, if that is aligned for
+// direct access; else the buffer.
+const char* block_place(const Pieces& pieces, std::uint64_t begin, std::size_t count,
+                        const char* buffer) {
   const auto& samples = pieces.front();
   if (begin + count > samples.size() || count % kDirectPage != 0) return buffer;
-  char* place = samples.data() + begin;
+  const char* place = samples.data() + begin;
   return reinterpret_cast<std::uintptr_t>(place) % kDirectPage == 0 ? place : buffer;
 }
 
@@ -177,11 +181,11 @@ int write_all(DirectFile& file, const FieldData& field) {
 
 // ---- reading ------------------------------------------------------------------------------------
 
-// A field whose arrays have their sizes; no value when the head does not fit a file of this size.
-std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::vector<char>& text) {
+// Whether the arrays that a head announces fill a file with so many bytes behind the head.
+bool fits(const Head& head, std::uint64_t bytes) {
   std::uint64_t cells = 1, nodes = 1;
   for (const std::int32_t n : head.bricks) {
-    if (n < 1 || n > kMaxBricksOnSide) return std::nullopt;
+    if (n < 1 || n > kMaxBricksOnSide) return false;
     cells *= std::uint64_t(n);
     nodes *= std::uint64_t(n) + 1;
   }
@@ -189,14 +193,61 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
           cells ||
       std::max({head.text_bytes, head.fine_index_count, head.halves_count, head.quarters_count}) >
           bytes)
-    return std::nullopt;
+    return false;
   const std::uint64_t announced =
       head.brick_count * 512 * sizeof(float) + cells * sizeof(std::int32_t) +
       nodes * sizeof(float) +
       (head.part_count + head.triangle_count + head.refined_count + head.fine_index_count) *
           sizeof(std::int32_t) +
       (head.halves_count + head.quarters_count) * sizeof(float) + head.text_bytes;
-  if (announced != bytes) return std::nullopt;
+  return announced == bytes;
+}
+
+// The seal of the bytes in a file.
+int read_seal(const MappedFile& file, const Head& head, Hash128& found) {
+  const std::uint64_t size = file.size() - kDirectPage;
+  std::vector<Hash128> hashes(blocks_of(size));
+  const int error = for_blocks(hashes.size(), 0, [&](std::size_t i, char*) {
+    const std::uint64_t begin = kDirectPage + i * kHashed;
+    const std::size_t count = std::size_t(std::min<std::uint64_t>(kHashed, file.size() - begin));
+    file.expect(begin + kAhead, kHashed);
+    if (const int failed = file.fetch(begin, count)) return failed;
+    hashes[i] = hash_bytes(file.data() + begin, count);
+    return 0;
+  });
+  found = seal(head, hashes);
+  return error;
+}
+
+// Takes arrays from a file, one behind the other.
+class Arrays {
+ public:
+  explicit Arrays(std::shared_ptr<const MappedFile> file)
+      : file_(std::move(file)), at_(file_->data() + kDirectPage) {}
+
+  // Floats stay in the file.
+  void take(Samples& out, std::uint64_t count) {
+    float* const place = reinterpret_cast<float*>(at_);
+    out = Samples(SampleAllocator<float>(file_, place, std::size_t(count)));
+    out.resize(std::size_t(count));
+    at_ += count * sizeof(float);
+  }
+  // Indices are copied: they are checked next, and must not change after that if the file does.
+  template <class Indices>
+  void take(Indices& out, std::uint64_t count) {
+    const auto* const place = reinterpret_cast<const typename Indices::value_type*>(at_);
+    out.assign(place, place + count);
+    at_ += count * sizeof *place;
+  }
+
+ private:
+  std::shared_ptr<const MappedFile> file_;
+  char* at_;
+};
+
+// The field in a file that fits its head; its indices are not checked.
+FieldData field_in(const std::shared_ptr<const MappedFile>& file, const Head& head,
+                   std::vector<char>& text) {
   FieldData f;
   f.origin = {head.origin[0], head.origin[1], head.origin[2]};
   f.voxel_size = head.voxel_size;
@@ -204,39 +255,22 @@ std::optional<FieldData> room_for(const Head& head, std::uint64_t bytes, std::ve
   f.band = head.band;
   f.offset = head.offset;
   f.triangles = std::size_t(head.triangles);
-  f.samples.resize(std::size_t(head.brick_count) * 512);
-  f.brick_index.resize(std::size_t(cells));
-  f.far_grid.resize(std::size_t(nodes));
-  f.part.resize(std::size_t(head.part_count));
-  f.triangle.resize(std::size_t(head.triangle_count));
-  f.refined.resize(std::size_t(head.refined_count));
-  f.fine_index.resize(std::size_t(head.fine_index_count));
-  f.halves.resize(std::size_t(head.halves_count));
-  f.quarters.resize(std::size_t(head.quarters_count));
   f.tolerance = head.tolerance;
   f.grown = head.grown;
-  text.resize(std::size_t(head.text_bytes));
+  std::uint64_t cells = 1, nodes = 1;
+  for (const std::int32_t n : f.bricks) cells *= std::uint64_t(n), nodes *= std::uint64_t(n) + 1;
+  Arrays arrays(file);
+  arrays.take(f.samples, head.brick_count * 512);
+  arrays.take(f.brick_index, cells);
+  arrays.take(f.far_grid, nodes);
+  arrays.take(f.part, head.part_count);
+  arrays.take(f.triangle, head.triangle_count);
+  arrays.take(f.refined, head.refined_count);
+  arrays.take(f.fine_index, head.fine_index_count);
+  arrays.take(f.halves, head.halves_count);
+  arrays.take(f.quarters, head.quarters_count);
+  arrays.take(text, head.text_bytes);
   return f;
-}
-
-// Fills the pieces and returns the seal of the bytes that it read.
-int read_pieces(DirectFile& file, const Head& head, const Pieces& pieces, Hash128& found) {
-  const std::uint64_t size = total(pieces);
-  std::vector<Hash128> hashes(blocks_of(size));
-  const int error = for_blocks(hashes.size(), kHashed, [&](std::size_t i, char* buffer) {
-    const std::uint64_t begin = i * kHashed;
-    const std::size_t count = std::size_t(std::min<std::uint64_t>(kHashed, size - begin));
-    char* block = block_place(pieces, begin, count, buffer);
-    if (const int failed = file.read(kDirectPage + begin, block, count)) return failed;
-    hashes[i] = hash_bytes(block, count);
-    if (block == buffer)
-      for_overlaps(pieces, begin, count, [&](char* to, std::uint64_t from, std::size_t n) {
-        std::memcpy(to, buffer + from, n);
-      });
-    return 0;
-  });
-  found = seal(head, hashes);
-  return error;
 }
 
 }  // namespace
@@ -246,7 +280,7 @@ Outcome write_raw_field(const std::filesystem::path& file, const FieldData& fiel
     return Failure{"the field for " + file.string() + " is not consistent: nothing was written"};
   return write_aside(file, [&](const std::filesystem::path& path) -> Outcome {
     DirectFile out;
-    int error = out.open(path, DirectFile::For::writing);
+    int error = out.open(path);
     if (error == 0) error = write_all(out, field);
     if (error) return Failure{"Cannot write " + path.string() + ": " + std::strerror(error) + "."};
     return Done{};
@@ -258,29 +292,26 @@ Result<FieldData> read_raw_field(const std::filesystem::path& file) {
   const auto cannot_read = [&](int error) {
     return Failure{"Cannot read " + name + ": " + std::strerror(error) + "."};
   };
-  DirectFile in;
-  if (const int error = in.open(file, DirectFile::For::reading)) return cannot_read(error);
-  const DirectBuffer page = direct_buffer(kDirectPage);
-  if (!page) return cannot_read(ENOMEM);
-  std::memset(page.get(), 0, kDirectPage);
-  if (const int error = in.read(0, page.get(), kDirectPage)) return cannot_read(error);
-  const std::string_view start(page.get(), kDirectPage);
-  if (!start.starts_with(kFieldMagic)) return Failure{name + " is no field of the cache."};
-  if (!start.substr(kFieldMagic.size()).starts_with(kVersion))
-    return Failure{name + " was written by another version of hapsix."};
-  Head head;
-  std::memcpy(&head, page.get(), sizeof head);
   try {
-    std::vector<char> text;
-    std::optional<FieldData> field;
-    if (in.size() >= kDirectPage) field = room_for(head, in.size() - kDirectPage, text);
-    if (!field) return Failure{name + " is truncated or damaged."};
-    Hash128 found;
-    if (const int error = read_pieces(in, head, pieces_of(*field, text), found))
+    const auto in = std::make_shared<MappedFile>();
+    if (const int error = in->open(file)) return cannot_read(error);
+    if (const int error = in->fetch(0, std::min(in->size(), kDirectPage)))
       return cannot_read(error);
+    const std::string_view start(in->data(), std::min(in->size(), kDirectPage));
+    if (!start.starts_with(kFieldMagic)) return Failure{name + " is no field of the cache."};
+    if (!start.substr(kFieldMagic.size()).starts_with(kVersion))
+      return Failure{name + " was written by another version of hapsix."};
+    Head head;
+    start.copy(reinterpret_cast<char*>(&head), sizeof head);
+    if (in->size() < kDirectPage || !fits(head, in->size() - kDirectPage))
+      return Failure{name + " is truncated or damaged."};
+    Hash128 found;
+    if (const int error = read_seal(*in, head, found)) return cannot_read(error);
     if (found != head.hash) return Failure{name + " is damaged (its checksum differs)."};
-    if (!take_texts(text, *field) || !consistent(*field)) return Failure{name + " is damaged."};
-    return std::move(*field);
+    std::vector<char> text;
+    FieldData field = field_in(in, head, text);
+    if (!take_texts(text, field) || !consistent(field)) return Failure{name + " is damaged."};
+    return field;
   } catch (const std::bad_alloc&) {
     return Failure{"There is not enough memory to read " + name + "."};
   }

@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -47,14 +46,13 @@ DirectFile::~DirectFile() {
   if (direct_ >= 0) close(direct_);
 }
 
-int DirectFile::open(const std::filesystem::path& file, For purpose) {
-  const int flags = (purpose == For::reading ? O_RDONLY : O_WRONLY) | O_CLOEXEC;
+int DirectFile::open(const std::filesystem::path& file) {
+  const int flags = O_WRONLY | O_CLOEXEC;
   fd_ = ::open(file.c_str(), flags);
   if (fd_ < 0) return errno;
   struct stat there {};
   if (fstat(fd_, &there) != 0) return errno;
   if (!S_ISREG(there.st_mode)) return EINVAL;
-  size_ = std::uint64_t(there.st_size);
 #ifdef O_DIRECT
   direct_ = ::open(file.c_str(), flags | O_DIRECT);  // some file systems refuse
   struct stat same {};
@@ -98,37 +96,6 @@ int DirectFile::write(std::uint64_t at, const char* pages, std::size_t bytes) {
 }
 
 int DirectFile::cut(std::uint64_t bytes) { return ftruncate(fd_, off_t(bytes)) == 0 ? 0 : errno; }
-
-int DirectFile::read(std::uint64_t at, char* pages, std::size_t bytes) {
-  if (at >= size_) return 0;
-  bytes = std::size_t(std::min<std::uint64_t>(bytes, size_ - at));
-  std::size_t done = 0;
-  if (use_direct_.load(std::memory_order_relaxed)) {
-#ifdef RWF_NOWAIT
-    all_of(bytes, done, [&](std::size_t from) {
-      iovec to{pages + from, bytes - from};
-      return preadv2(fd_, &to, 1, off_t(at + from), RWF_NOWAIT);
-    });
-    if (done >= bytes) return 0;
-    done = done / kDirectPage * kDirectPage;
-#endif
-    std::size_t more = 0;
-    const std::size_t whole = whole_pages(bytes - done);
-    const int error = all_of(whole, more, [&](std::size_t from) {
-      if (from % kDirectPage != 0) return ssize_t{0};  // the file's end, or a short read
-      return pread(direct_, pages + done + from, whole - from, off_t(at + done + from));
-    });
-    if (error != 0 && error != EINVAL) return error;
-    if (error == EINVAL) use_direct_ = false;
-    done = std::min(bytes, done + more);
-  }
-  std::size_t more = 0;
-  const int error = all_of(bytes - done, more, [&](std::size_t from) {
-    return pread(fd_, pages + done + from, bytes - done - from, off_t(at + done + from));
-  });
-  if (error != 0) return error;
-  return more == bytes - done ? 0 : EIO;  // the file shrank meanwhile
-}
 
 int for_blocks(std::size_t count, std::size_t buffer_bytes,
                const std::function<int(std::size_t, char*)>& body) {

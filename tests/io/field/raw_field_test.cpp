@@ -48,6 +48,47 @@ TEST_CASE("raw_field: fields of one block, of many and of none come back to the 
   }
 }
 
+TEST_CASE("raw_field: a field that was read outlives its file, and changes to it stay its own") {
+  const Folder folder;
+  const fs::path file = folder.path / "a.field";
+  FieldData field = refined();
+  REQUIRE(write_raw_field(file, field));
+  const std::string bytes = bytes_of(file);
+  auto back = read_raw_field(file);
+  REQUIRE(back);
+  const FieldData copy = *back;
+  back->samples[5] = field.samples[5] = 3;
+  back->far_grid[1] = field.far_grid[1] = 4;
+  back->quarters.resize(field.quarters.size() + 125, 1);
+  field.quarters.resize(field.quarters.size() + 125, 1);
+  CHECK(bytes_of(file) == bytes);
+  REQUIRE(write_raw_field(file, scattered(1)));
+  const FieldData moved = std::move(*back);
+  check_same(moved, field);
+  CHECK(copy.samples[5] != 3);
+  fs::remove(file);
+  FieldData other = copy;
+  other = moved;
+  check_same(other, field);
+}
+
+#ifdef __linux__
+TEST_CASE("raw_field: reading a field copies no samples") {
+  const Folder folder;
+  const fs::path file = folder.path / "a.field";
+  REQUIRE(write_raw_field(file, baked(256)));
+  const auto own_kilobytes = [] {
+    const std::string status = bytes_of("/proc/self/status");
+    return std::stol(status.substr(status.find("RssAnon:") + 8));
+  };
+  const long before = own_kilobytes();
+  const auto back = read_raw_field(file);
+  REQUIRE(back);
+  const long samples = long(back->samples.size() * sizeof(float) / 1024);
+  CHECK(own_kilobytes() - before < samples / 2);
+}
+#endif
+
 TEST_CASE("raw_field: one flipped bit in the head or any block, and an end anywhere, are noticed") {
   const Folder folder;
   const fs::path file = folder.path / "a.field";
