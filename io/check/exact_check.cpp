@@ -54,13 +54,11 @@ struct Tally {
 class FarBounds {
  public:
   FarBounds(const FieldData& field, unsigned threads) : def_(field.def()) {
-    const std::size_t cells = field.brick_index.size();
-    table_.resize(cells);
+    table_.resize(field.brick_index.size());
     kernels::layout_table(def_, table_.data());
     far_.resize(8 * kernels::field_layout_size(def_).far_cells);
-    sched::parallel_for((cells + 4095) / 4096, threads, [&](std::size_t block) {
-      for (std::size_t c = 4096 * block; c < std::min(cells, 4096 * (block + 1)); ++c)
-        if (table_[c] < 0) kernels::layout_cell(def_, table_.data(), c, nullptr, far_.data());
+    sched::parallel_for(table_.size() / def_.bricks[0], threads, [&](std::size_t row) {
+      kernels::layout_row(def_, table_.data(), row, nullptr, far_.data());
     });
   }
   bool any() const { return !far_.empty(); }

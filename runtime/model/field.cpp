@@ -2,7 +2,9 @@
 // field.cpp - checks a field's definition and lays it out for the kernels, in parallel.
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <mutex>
 
 #include "kernels/field/field_layout.h"
 #include "runtime/model/model.h"
@@ -25,13 +27,36 @@ void for_each(const h6ModelDef& model, std::size_t count,
   }
 }
 
+// The first index from `begin` on that is bad; `count` if none is. Nearly always none is, so whole
+// slices are tested without branches.
+template <class Bad>
+std::size_t first_bad(std::size_t begin, std::size_t count, const Bad& bad) {
+  constexpr std::size_t kSlice = 4096;
+  for (; begin < count; begin += kSlice) {
+    const std::size_t end = std::min(count, begin + kSlice);
+    int any = 0;  // compilers make no vectors of bool
+    for (std::size_t i = begin; i < end; ++i) any |= bad(i);
+    for (std::size_t i = begin; any != 0 && i < end; ++i)
+      if (bad(i)) return i;
+  }
+  return count;
+}
+
+// The first sample from `begin` on that is not finite; `end` if all are.
+std::size_t first_wild(const float* samples, std::size_t begin, std::size_t end) {
+  return first_bad(begin, end, [&](std::size_t i) {
+    return (std::bit_cast<std::int32_t>(samples[i]) & INT32_MAX) >= 0x7f800000;
+  });
+}
+
 bool all_finite(const h6ModelDef& model, const float* samples, std::size_t count,
                 std::size_t* which) {
   constexpr std::size_t kSlice = 65536;
   std::atomic<std::size_t> bad{SIZE_MAX};
   for_each(model, (count + kSlice - 1) / kSlice, [&](std::size_t s) {
-    for (std::size_t i = s * kSlice; i < std::min(count, (s + 1) * kSlice); ++i)
-      if (!std::isfinite(samples[i])) bad.store(i, std::memory_order_relaxed);
+    const std::size_t end = std::min(count, (s + 1) * kSlice);
+    const std::size_t at = first_wild(samples, s * kSlice, end);
+    if (at < end) bad.store(at, std::memory_order_relaxed);
   });
   *which = bad.load();
   return *which == SIZE_MAX;
@@ -80,30 +105,24 @@ bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
   if (!def.brick_index || !def.far_grid || (def.brick_count && !def.samples))
     return fail(error, "brick_index, far_grid and samples must all be given");
   const std::size_t cells = std::size_t(def.bricks[0]) * def.bricks[1] * def.bricks[2];
-  for (std::size_t i = 0; i < cells; ++i)
-    if (def.brick_index[i] < -1 ||
-        (def.brick_index[i] >= 0 && std::size_t(def.brick_index[i]) >= def.brick_count))
-      return fail(error, "brick_index[%zu] is %d, but there are %zu bricks", i, def.brick_index[i],
-                  def.brick_count);
-  std::size_t bad = 0;
-  if (!all_finite(model, def.samples, def.brick_count * 512, &bad))
-    return fail(error, H6_ERROR_RANGE, "samples[%zu] is not finite", bad);
+  const auto bricks = static_cast<std::uint32_t>(std::min<std::size_t>(def.brick_count, INT32_MAX));
+  std::size_t bad = first_bad(0, cells, [&](std::size_t i) {
+    return static_cast<std::uint32_t>(def.brick_index[i]) + 1 > bricks;  // -1 is 0
+  });
+  if (bad < cells)
+    return fail(error, "brick_index[%zu] is %d, but there are %zu bricks", bad,
+                def.brick_index[bad], def.brick_count);
   const std::size_t nodes =
       std::size_t(def.bricks[0] + 1) * (def.bricks[1] + 1) * (def.bricks[2] + 1);
-  for (std::size_t i = 0; i < nodes; ++i)
-    if (!std::isfinite(def.far_grid[i])) return fail(error, H6_ERROR_RANGE, "far_grid[%zu] is not finite", i);
+  if (!all_finite(model, def.far_grid, nodes, &bad))
+    return fail(error, H6_ERROR_RANGE, "far_grid[%zu] is not finite", bad);
   return check_finer(def, model, error);
 }
 
-// Names by brick, in the order of the kernels' layout. Nothing is kept where there are none.
-bool convert_names(const h6FieldDef& def, const std::int32_t* names, std::size_t bricks,
-                   const Field& field, const h6Allocator& allocator, Buffer<std::int32_t>* out) {
-  if (!names || bricks == 0) return true;
-  if (!out->reserve(allocator, bricks)) return false;
-  for (std::size_t cell = 0; cell < field.table.count; ++cell)
-    if (field.table[cell] >= 0)
-      (*out)[kernels::row_of(field.table[cell])] = names[def.brick_index[cell]];
-  return true;
+// Room for the names of bricks. Nothing is kept where there are none.
+bool reserve_names(const std::int32_t* names, std::size_t bricks, const h6Allocator& allocator,
+                   Buffer<std::int32_t>* out) {
+  return !names || bricks == 0 || out->reserve(allocator, bricks);
 }
 
 // Into how many parts the finest cells cut a voxel.
@@ -155,20 +174,90 @@ bool may_be_near(const std::int16_t* corners, float band) {
   return squared < kBoxMargin * kBoxMargin;
 }
 
-Box box_of(const h6FieldDef& def, const Field& field) {
-  Box box;
-  for (std::int32_t c = 0, slot = 0; c < def.bricks[2]; ++c)
-    for (std::int32_t b = 0; b < def.bricks[1]; ++b)
-      for (std::int32_t a = 0; a < def.bricks[0]; ++a, ++slot) {
-        const std::int32_t entry = field.table[slot];
-        if (entry < 0 &&
-            !may_be_near(field.far.data + 8 * (std::ptrdiff_t{-1} - entry), field.view.band))
-          continue;
-        const Vec3 low = field.origin + 8 * field.voxel * Vec3(a, b, c);
-        box = united(box, {low, low + Vec3::Constant(8 * field.voxel)});
-      }
-  return box;
+// The first and the last cell along each axis that the field's box holds.
+struct Extent {
+  std::int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX}, high[3] = {-1, -1, -1};
+  void add(std::int32_t a, std::int32_t b, std::int32_t c) {
+    const std::int32_t cell[3] = {a, b, c};
+    for (int k = 0; k < 3; ++k)
+      low[k] = std::min(low[k], cell[k]), high[k] = std::max(high[k], cell[k]);
+  }
+};
+
+Box box_of(const Extent& cells, const Field& field) {
+  const auto [a, b, c] = cells.low;
+  const auto [d, e, f] = cells.high;
+  if (d < 0) return {};
+  const double edge = 8 * field.voxel;
+  return {field.origin + edge * Vec3(a, b, c),
+          field.origin + edge * Vec3(d, e, f) + Vec3::Constant(edge)};
 }
+
+// Fills the field in parallel, row of bricks by row of bricks.
+class Rows {
+ public:
+  Rows(const h6FieldDef& def, Field& field, std::int16_t* fine)
+      : def_(def), field_(field), fine_(fine) {}
+
+  void fill(std::size_t row) {
+    const std::int32_t* const table = field_.table.data;
+    const std::size_t first = row * def_.bricks[0], end = first + def_.bricks[0];
+    check(first, end);
+    kernels::layout_row(def_, table, row, field_.bricks.data, field_.far.data);
+    for (std::size_t cell = first; cell < end && field_.cuts.count > 0; ++cell)
+      kernels::layout_fine(def_, table, field_.cuts.data, cell, fine_);
+    take_names(first, end, def_.part, field_.part);
+    take_names(first, end, def_.triangle, field_.triangle);
+    extend(row, first);
+  }
+  const Extent& extent() const { return extent_; }
+  std::size_t wild() const { return wild_; }  // the first sample that is not finite, or SIZE_MAX
+
+ private:
+  // Done here, since what it reads is read next: a pass of its own would wait for memory once more.
+  void check(std::size_t first, std::size_t end) {
+    for (std::size_t cell = first; cell < end; ++cell) {
+      const std::int32_t brick = def_.brick_index[cell];
+      if (brick < 0) continue;
+      const std::size_t begin = std::size_t{512} * brick;
+      const std::size_t at = first_wild(def_.samples, begin, begin + 512);
+      if (at == begin + 512) continue;
+      const std::lock_guard guard(mutex_);
+      wild_ = std::min(wild_, at);
+    }
+  }
+
+  // Names by brick, in the order of the kernels' layout.
+  void take_names(std::size_t first, std::size_t end, const std::int32_t* names,
+                  Buffer<std::int32_t>& out) const {
+    for (std::size_t cell = first; cell < end && out.count > 0; ++cell)
+      if (field_.table[cell] >= 0)
+        out[kernels::row_of(field_.table[cell])] = names[def_.brick_index[cell]];
+  }
+
+  bool in_box(std::size_t cell) const {
+    const std::ptrdiff_t entry = field_.table[cell];
+    return entry >= 0 || may_be_near(field_.far.data + 8 * (-1 - entry), field_.view.band);
+  }
+
+  void extend(std::size_t row, std::size_t first) {
+    const auto b = static_cast<std::int32_t>(row % def_.bricks[1]);
+    const auto c = static_cast<std::int32_t>(row / def_.bricks[1]);
+    std::int32_t low = 0, high = def_.bricks[0] - 1;
+    while (low <= high && !in_box(first + low)) ++low;
+    while (low < high && !in_box(first + high)) --high;
+    if (low > high) return;
+    const std::lock_guard guard(mutex_);
+    extent_.add(low, b, c), extent_.add(high, b, c);
+  }
+
+  const h6FieldDef& def_;
+  Field& field_;
+  std::int16_t* const fine_;
+  Extent extent_;
+  std::size_t wild_ = SIZE_MAX;
+  std::mutex mutex_;
+};
 
 // Room for the bricks and the finer samples behind them, and for what a gather reads behind the
 // last of each. Kernels address both by 32-bit byte offsets.
@@ -221,14 +310,9 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
   kernels::layout_table(def, field->table.data);
   if (size.refined > 0) field->steepest = steepest(def);
   if (size.refined > 0) kernels::layout_cuts(def, field->table.data, field->cuts.data);
-  if (!convert_names(def, def.part, size.bricks, *field, model.allocator, &field->part) ||
-      !convert_names(def, def.triangle, size.bricks, *field, model.allocator, &field->triangle))
+  if (!reserve_names(def.part, size.bricks, model.allocator, &field->part) ||
+      !reserve_names(def.triangle, size.bricks, model.allocator, &field->triangle))
     return fail(error, H6_ERROR_MEMORY, "no memory for the names of %zu bricks", size.bricks);
-  for_each(model, cells, [&](std::size_t cell) {
-    kernels::layout_cell(def, field->table.data, cell, field->bricks.data, field->far.data);
-    if (size.refined > 0)
-      kernels::layout_fine(def, field->table.data, field->cuts.data, cell, fine);
-  });
   for (int k = 0; k < 3; ++k) field->view.size[k] = def.bricks[k];
   field->view.table = field->table.data;
   field->view.bricks = field->bricks.data;
@@ -236,7 +320,11 @@ bool convert_field(const h6FieldDef& def, const h6ModelDef& model, Field* field,
   field->view.cuts = field->cuts.data;
   field->view.fine = fine;
   field->view.band = kernels::layout_band(def);
-  field->box = box_of(def, *field);
+  Rows rows(def, *field, fine);
+  for_each(model, cells / def.bricks[0], [&](std::size_t row) { rows.fill(row); });
+  if (rows.wild() != SIZE_MAX)
+    return fail(error, H6_ERROR_RANGE, "samples[%zu] is not finite", rows.wild());
+  field->box = box_of(rows.extent(), *field);
   return true;
 }
 

@@ -153,10 +153,10 @@ class AnalyticField {
     layout_table(def_, table_.data());
     cuts_.assign(size.refined * kCutStride + 2, 0x7fff);
     layout_cuts(def_, table_.data(), cuts_.data());
-    for (std::size_t slot = 0; slot < index_.size(); ++slot) {
-      layout_cell(def_, table_.data(), slot, bricks_.data(), far_nodes_.data());
+    for (std::size_t row = 0; row < index_.size() / def_.bricks[0]; ++row)
+      layout_row(def_, table_.data(), row, bricks_.data(), far_nodes_.data());
+    for (std::size_t slot = 0; slot < index_.size(); ++slot)
       layout_fine(def_, table_.data(), cuts_.data(), slot, fine());
-    }
   }
 
   Distance distance_;

@@ -93,7 +93,7 @@ TEST_CASE("field_layout: a far cell whose corners disagree on the side is bounde
   std::int16_t corner[8];
   layout_table(def, &table);
   CHECK(table == -1);
-  layout_cell(def, &table, 0, nullptr, corner);
+  layout_row(def, &table, 0, nullptr, corner);
   for (std::int16_t v : corner) CHECK(v == 0);
 }
 
