@@ -3,12 +3,14 @@
 // bake/file/MESH/voxels:N/WHAT, where WHAT is
 //   write       writes a cache file to the disk (fsync) and renames it
 //   load/warm   reads it from the page cache
+//   model       makes the engine's model of what load/warm read
 //   load/cold   reads it after posix_fadvise dropped it from the page cache
 //   write/blosc, load/blosc   an exported .vdb, compressed by OpenVDB; warm
 //   write/none, load/none     an exported .vdb, uncompressed; warm
 // All use every thread of the machine. Each field that is read is compared, bit by bit, with the
 // field that was written. Files are in $HAPSIX_BENCH_FOLDER, or else in the folder of temporary
-// files, whose disk limits these times. The engine bay runs only with HAPSIX_BENCH_SOUPS=1.
+// files, whose disk limits these times. The engine bay and the landing gear run only
+// with HAPSIX_BENCH_SOUPS=1.
 #include <benchmark/benchmark.h>
 #include <fcntl.h>
 #include <unistd.h>
@@ -22,6 +24,7 @@
 #include <string>
 #include <vector>
 
+#include "hapsix/hapsix.h"
 #include "io/bake/bake_field.h"
 #include "io/field/field_file.h"
 #include "io/field/raw_field.h"
@@ -155,6 +158,28 @@ void load_file(benchmark::State& state, const BakedPtr& baked, const Format& for
   tell(state, *field, file.path);
 }
 
+void make_model(benchmark::State& state, const BakedPtr& baked) {
+  const io::FieldData* field = baked->get(state);
+  if (!field) return;
+  const TemporaryFile file;
+  if (const Outcome written = io::write_raw_field(file.path, *field); !written)
+    return state.SkipWithError(written.error().c_str());
+  for (auto _ : state) {
+    const Result<io::FieldData> back = io::read_raw_field(file.path);
+    if (!back) return state.SkipWithError(back.error().c_str());
+    const h6FieldDef part = back->def();
+    h6ModelDef def = h6DefaultModelDef();
+    def.fields = &part, def.field_count = 1;
+    h6Error error{};
+    h6Model* model = nullptr;
+    state.SetIterationTime(seconds([&] { model = h6CreateModel(&def, &error); }));
+    if (!model) return state.SkipWithError(error.message);
+    state.counters["model_MB"] = double(h6ModelBytes(model)) / 1e6;
+    h6DestroyModel(model);
+  }
+  tell(state, *field, file.path);
+}
+
 void add(const std::string& name, int voxels, std::function<io::Mesh()> mesh) {
   const auto baked = std::make_shared<Baked>(std::move(mesh), voxels);
   const auto row = [&](const char* what, auto run, auto... arguments) {
@@ -167,6 +192,7 @@ void add(const std::string& name, int voxels, std::function<io::Mesh()> mesh) {
   };
   row("write", write_file, cached);
   row("load/warm", load_file, cached, true);
+  row("model", make_model);
   row("load/cold", load_file, cached, false);
   row("write/blosc", write_file, exported(io::Compression::blosc));
   row("load/blosc", load_file, exported(io::Compression::blosc), true);
@@ -177,8 +203,10 @@ void add(const std::string& name, int voxels, std::function<io::Mesh()> mesh) {
 [[maybe_unused]] const bool registered = [] {
   add("alpha", 512, [] { return io::make_alpha().mesh; });
   const char* which = std::getenv("HAPSIX_BENCH_SOUPS");
-  if (which != nullptr && *which != '\0' && *which != '0')
+  if (which != nullptr && *which != '\0' && *which != '0') {
     add("soup500k", 1024, [] { return io::make_engine_bay().mesh; });
+    add("landing_gear", 2048, [] { return io::make_landing_gear().mesh; });
+  }
   return true;
 }();
 
