@@ -105,7 +105,7 @@ void weigh_shell(const Settings& set, std::span<const Body> bodies, ShellBody& s
   lane.weighing.took(watch.ns_since(since));
   watch.timed(H6_STAGE_WRENCH, [&] {
     sum_contacts(set, bodies, shell, lane);
-    if (set.contact.friction > 0) sum_friction(set, bodies, shell, lane);
+    if (contacts_rub(set.contact)) sum_friction(set, bodies, shell, lane);
   });
 }
 

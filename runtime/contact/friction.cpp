@@ -77,22 +77,33 @@ Vec6 follow(FrictionSpring& spring, const Body& a, const Body& b) {
   return moved;
 }
 
-// Fills the loads; those of `series` include damping already.
-double fill_loads(const Contacts& c, const h6ContactDef& def, const Pair& pair, const Vec6& u,
-                  double* load) {
-  const bool series = uses_series(def);
+// A contact's normal force over k; that of `series` includes damping already.
+double normal_load(const Contacts& c, const h6ContactDef& def, const Vec6& u, std::size_t i) {
+  if (uses_series(def)) return c.load[i];
+  const Vec3 n(c.nx[i], c.ny[i], c.nz[i]), r(c.rx[i], c.ry[i], c.rz[i]);
+  const double leaves = n.dot(u.head<3>() + u.tail<3>().cross(r));
+  return double{c.weight[i]} * std::max(0.0, double{c.depth[i]} - def.damping * leaves);
+}
+
+// Copies the contacts of a pair that rub to the scratch, and gives the rows there.
+FrictionRows<float> rows_that_rub(const Contacts& c, const h6ContactDef& def, const Pair& pair,
+                                  const Vec6& u, const FrictionScratch& s) {
+  const bool leans = pushes_lean(def);
+  if (leans) kernels::push_lean(kernel_columns(c, pair.begin, pair.end), s.lean);
+  const float* const from[6] = {c.nx, c.ny, c.nz, c.rx, c.ry, c.rz};
+  std::size_t count = 0;
   double total = 0;
   for (std::size_t i = pair.begin; i < pair.end; ++i) {
-    double l = series ? double{c.load[i]} : 0;
-    if (!series) {
-      const Vec3 n(c.nx[i], c.ny[i], c.nz[i]), r(c.rx[i], c.ry[i], c.rz[i]);
-      const double leaves = n.dot(u.head<3>() + u.tail<3>().cross(r));
-      l = double{c.weight[i]} * std::max(0.0, double{c.depth[i]} - def.damping * leaves);
-    }
-    load[i - pair.begin] = l;
-    total += l;
+    const double lean = leans ? double{s.lean[i - pair.begin]} : 0;
+    const double mu = std::max(def.friction, lean);
+    if (!(mu > 0)) continue;
+    const double load = mu * normal_load(c, def, u, i);
+    if (!(load > 0)) continue;
+    for (int k = 0; k < 6; ++k) s.row[k][count] = from[k][i];
+    s.load[count++] = load;
+    total += load;
   }
-  return total;
+  return {s.row[0], s.row[1], s.row[2], s.row[3], s.row[4], s.row[5], s.load, count, total};
 }
 
 // The energy of the spring when each row has `share` of its stretch [J], and whether a row slips.
@@ -115,8 +126,7 @@ Stored stored_in(const FrictionRows<float>& rows, const FrictionLaw& law, const 
 // Lets the spring slip, and keeps its energy within what was put in. `q`: in world axes.
 void slip(const FrictionRows<float>& rows, const FrictionLaw& law, FrictionSpring& spring, Vec6& q,
           double* stretch) {
-  for (std::size_t i = 0; i < rows.count; ++i)
-    stretch[i] = rows.load[i] > 0 ? tangential(row_at(rows, i), q).norm() : 0;
+  for (std::size_t i = 0; i < rows.count; ++i) stretch[i] = tangential(row_at(rows, i), q).norm();
   double share = friction_yield(rows, law, stretch);
   Stored stored = stored_in(rows, law, stretch, share);
   const double most = std::max(spring.energy, 0.0);
@@ -147,7 +157,7 @@ bool has_mass(const Body& body) { return !body.fixed && body.motion == Motion::d
 
 void sum_pair(const Settings& set, const Body& a, const Body& b, const Vec6& u,
               const FrictionRows<float>& rows, double* stretch, FrictionSpring& spring) {
-  const FrictionLaw law{set.contact.stiffness, set.contact.friction * rows.total};
+  const FrictionLaw law{set.contact.stiffness, rows.total};
   const Vec6 moved = follow(spring, a, b);
   Vec6 q = rotated(b.R, spring.q);
   slip(rows, law, spring, q, stretch);
@@ -212,7 +222,6 @@ Mat6 friction_stiffness(const FrictionRows<T>& rows, const FrictionLaw& law, con
   Mat3 squares = Mat3::Zero();
   Mat6 along = Mat6::Zero();
   for (std::size_t i = 0; i < rows.count; ++i) {
-    if (!(rows.load[i] > 0)) continue;
     const Row row = row_at(rows, i);
     const double s = secant(rows, law, i, row, q, ahead);
     Vec6 J;
@@ -236,7 +245,6 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
   const Mat3 turn = cross_matrix(q.tail<3>());
   Mat3 force = Mat3::Zero(), torque = Mat3::Zero();
   for (std::size_t i = 0; i < rows.count; ++i) {
-    if (!(rows.load[i] > 0)) continue;
     const Row row = row_at(rows, i);
     const Vec3 &n = row.n, &r = row.r;
     const double s = secant(rows, law, i, row, q, ahead);
@@ -285,23 +293,22 @@ template Mat6 friction_turning(const FrictionRows<double>&, const FrictionLaw&, 
 template double friction_yield(const FrictionRows<float>&, const FrictionLaw&, const double*);
 template double friction_yield(const FrictionRows<double>&, const FrictionLaw&, const double*);
 
+bool pushes_lean(const h6ContactDef& def) { return def.method == H6_METHOD_FIRM; }
+bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_lean(def); }
+
 void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
-  const Contacts& c = shell.contacts;
-  const FrictionScratch& scratch = lane.scratch->friction;
   const Body& a = bodies[shell.body];
   for (Pair& pair : shell.pairs) {
+    if (!pair.friction) continue;
     FrictionSpring& spring = *pair.friction;
     const Body& b = bodies[pair.b];
     const Vec6 u = pair_velocity(a, b);
-    const double total = fill_loads(c, set.contact, pair, u, scratch.load);
-    if (!(total > 0)) {
+    const FrictionScratch& scratch = lane.scratch->friction;
+    const FrictionRows<float> rows = rows_that_rub(shell.contacts, set.contact, pair, u, scratch);
+    if (rows.total > 0)
+      sum_pair(set, a, b, u, rows, scratch.stretch, spring);
+    else
       spring = {};
-      continue;
-    }
-    const std::size_t at = pair.begin;
-    const FrictionRows<float> rows{c.nx + at, c.ny + at,    c.nz + at,     c.rx + at, c.ry + at,
-                                   c.rz + at, scratch.load, pair.end - at, total};
-    sum_pair(set, a, b, u, rows, scratch.stretch, spring);
   }
 }
 
@@ -310,11 +317,14 @@ void add_friction(const Settings& set, const Sides& sides, Pair& pair,
   if (!spring.holds) return;
   const Mat6 S = arm_shift(sides.a, sides.b);
   const Mat6& K = spring.K;
-  const Mat6 KS = K * S.transpose(), SK = S * K, SKS = S * KS;
   const double beta = set.contact.damping;
   if (!sides.a.fixed) sides.on_a.f += spring.f, sides.on_a.K -= K, sides.on_a.D -= beta * K;
-  if (!sides.b.fixed) sides.on_b.f -= S * spring.f, sides.on_b.K -= SKS, sides.on_b.D -= beta * SKS;
+  if (!sides.b.fixed) {
+    const Mat6 SKS = S * (K * S.transpose());
+    sides.on_b.f -= S * spring.f, sides.on_b.K -= SKS, sides.on_b.D -= beta * SKS;
+  }
   if (pair.between) {
+    const Mat6 KS = K * S.transpose(), SK = S * K;
     pair.between->Kab += KS, pair.between->Dab += beta * KS;
     pair.between->Kba += SK, pair.between->Dba += beta * SK;
   }

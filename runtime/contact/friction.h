@@ -2,12 +2,13 @@
 // friction.h - Coulomb friction with stiction: one 6-D spring between a shell and a field, cut
 // contact by contact at mu times the normal load. METHOD.md, Sec. 9.
 //
-// With n the direction of a contact's push, P = I - n n^T, load l (force over k) and W the sum of
-// all loads of the pair, a displacement q = (d, theta) stretches the contact by z = P (d + theta x
-// r) and
+// With n the direction of a contact's push, P = I - n n^T, l its normal force over k times its mu,
+// and W the sum of all l of the pair, a displacement q = (d, theta) stretches the contact by
+// z = P (d + theta x r) and
 //     f = -K (q + beta u),   K = sum s J_t^T J_t,   J_t = P [I, -[r]x]
-//     s = k l / W  while the contact sticks;  k l / W * limit / |z|  beyond limit = mu W
-// so that no contact's friction exceeds mu k l.
+//     s = k l / W  while the contact sticks;  k l / |z|  beyond |z| = W
+// so that no contact's friction exceeds k l. mu is the setting; under `firm` it is at least the
+// sine between push and gradient: Sec. 3, "Energy of a push that leans".
 #pragma once
 #include <cstddef>
 
@@ -37,7 +38,7 @@ template <class T>
 struct FrictionRows {
   const T *nx, *ny, *nz;  // direction of the push, unit
   const T *rx, *ry, *rz;  // arm from a's centre of mass [m]
-  const double* load;     // normal force over k [m]
+  const double* load;     // most friction over k: mu times the normal force over k, > 0 [m]
   std::size_t count;
   double total;  // sum of the loads [m]
 };
@@ -45,7 +46,7 @@ struct FrictionRows {
 // Where contacts stick and where they slip.
 struct FrictionLaw {
   double stiffness;  // k, of the whole spring [N/m]
-  double limit;      // mu times the sum of all loads: the stretch at which a contact slips [m]
+  double limit;      // the sum of all loads: the stretch at which a contact slips [m]
 };
 
 // K for the stretch q, which is expected to become `ahead` by the end of the step.
@@ -61,8 +62,15 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
 template <class T>
 double friction_yield(const FrictionRows<T>& rows, const FrictionLaw& law, const double* stretch);
 
+// `firm` pushes along another direction than the gradient, so its contacts can make energy.
+bool pushes_lean(const h6ContactDef& def);
+// Whether any contact can rub: by the setting, or because its push leans.
+bool contacts_rub(const h6ContactDef& def);
+
+// (contacts), or null where no contact can rub.
 struct FrictionScratch {
-  double *load = nullptr, *stretch = nullptr;  // (contacts), or null without friction
+  double *load = nullptr, *stretch = nullptr;
+  float *lean = nullptr, *row[6] = {};  // of the rows that rub: n and r
 };
 
 }  // namespace h6

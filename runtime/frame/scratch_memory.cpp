@@ -34,7 +34,10 @@ void take_weighing(Scratch& scratch, Arena& arena, const ScratchRoom& room) {
                      arena.take<std::uint64_t>(room.merged)};
   scratch.weigh = room.weighing ? arena.take<char>(room.weighing) : nullptr;
   scratch.slice_sum = arena.take<kernels::WrenchSum>(room.contacts / kSumSlice + 1);
-  scratch.friction = {arena.take<double>(room.rubbing), arena.take<double>(room.rubbing)};
+  FrictionScratch& rub = scratch.friction;
+  for (double** column : {&rub.load, &rub.stretch}) *column = arena.take<double>(room.rubbing);
+  rub.lean = arena.take<float>(room.rubbing);
+  for (float*& column : rub.row) column = arena.take<float>(room.rubbing);
 }
 
 }  // namespace
@@ -45,7 +48,7 @@ ScratchRoom scratch_room(const Settings& set, std::size_t groups, std::size_t bl
   room.blocks = std::max(room.blocks, blocks);
   room.contacts = set.max_contacts;
   room.merged = uses_clusters(set.contact) ? set.max_contacts : 0;
-  room.rubbing = set.contact.friction > 0 ? set.max_contacts : 0;
+  room.rubbing = contacts_rub(set.contact) ? set.max_contacts : 0;
   room.weighing = weigh_scratch_bytes(set.contact, set.max_contacts);
   return room;
 }

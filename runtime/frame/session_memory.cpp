@@ -158,7 +158,7 @@ void lay_out(h6Session& s, const h6SessionDef& def, const Sizes& n, Arena& arena
   lay_out_near(s.near, n, arena);
   s.between = take<BetweenBodies>(arena, n.between ? n.pairs : 0);
   s.of_fields = take<BetweenFields>(arena, n.of_fields ? n.pairs : 0);
-  s.frictions = take<FrictionSpring>(arena, def.contact.friction > 0 ? n.pairs : 0);
+  s.frictions = take<FrictionSpring>(arena, contacts_rub(def.contact) ? n.pairs : 0);
   s.shells = take<ShellBody>(arena, n.shells.size());
   for (std::size_t i = 0; i < n.shells.size(); ++i) {
     const Shell& points = s.model->shells[def.bodies[n.shells[i].body].shell];

@@ -91,9 +91,9 @@ constexpr Setting kContactRows[] = {
     quiet(number<&h6ContactDef::fit_offset>(
         "fit_offset", "m", 0, not_negative(kNoLimit),
         "play: every depth counts less by this, at most 3 voxels of each field")),
-    quiet(number<&h6ContactDef::friction>(
-        "friction", "", 0, between(0, 10),
-        "mu, the coefficient of Coulomb friction with stiction; 0: no friction"))};
+    quiet(number<&h6ContactDef::friction>("friction", "", 0, between(0, 10),
+                                          "mu, the coefficient of Coulomb friction with stiction; "
+                                          "0: none, but where pushes of firm lean"))};
 constexpr SettingTable kContact = settings_of("h6ContactDef", kContactRows);
 
 constexpr Choice kCouplingModes[] = {{"dynamic", H6_COUPLING_DYNAMIC},

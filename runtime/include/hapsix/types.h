@@ -199,8 +199,9 @@ typedef struct h6ContactDef {
   h6Fit    fit;             /* of sessions; h6WeighContacts does not read it                       */
   double   fit_offset;      /* play: of sessions, every depth counts less by this, 0 .. 3 voxels of
                                each field                                                     [m]  */
-  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none; of
-                               sessions, h6WeighContacts does not read it. METHOD.md, Sec. 9       */
+  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none, but
+                               for `firm`, where pushes that lean always rub; of sessions,
+                               h6WeighContacts does not read it. METHOD.md, Sec. 3 and 9           */
   uint64_t reserved[8];
 } h6ContactDef;
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/frame/session.h"
@@ -462,4 +464,50 @@ TEST_CASE("a ball rolls down a slope without slipping") {
         doctest::Approx(now.velocity.linear.x).epsilon(0.01).scale(0));
   h6DestroySession(ball.session);
   ball.session = nullptr;
+}
+
+namespace {
+
+// A box under firm, without friction by the setting, on a level floor. Its normals lean by `angle`
+// off the vertical, all to the same side, so its pushes do.
+struct LeaningBox : BoxOnSlope {
+  std::optional<Model> leaning;
+  explicit LeaningBox(double angle) : BoxOnSlope(0, 0) {
+    for (std::size_t i = 0; i < shell.x.size(); ++i)
+      shell.nx[i] = float(std::sin(angle)), shell.nz[i] = float(std::cos(angle));
+    leaning.emplace(std::vector{def_of(field)}, std::vector{shell.def()});
+    std::swap(model.handle, leaning->handle);
+    def.contact.method = H6_METHOD_FIRM;
+    bodies[1].translation_only = true;
+    open();
+  }
+  const FrictionSpring& spring() const { return session->frictions[0]; }
+};
+
+}  // namespace
+
+TEST_CASE("firm: pushes that lean do not drive a box along a level floor") {
+  for (const double angle : {0.3, 0.6, 1.0}) {
+    CAPTURE(angle);
+    LeaningBox box(angle);
+    box.run(1);
+    // Along the push alone the floor would drive it by 0.07 to 0.2 g.
+    const h6Contacts c = h6GetContacts(box.session, 1);
+    CHECK(c.nx[0] > 0.07 * c.nz[0]);
+    CHECK(norm(box.body().velocity.linear) < 1e-3);
+    CHECK(box.spring().f.head<3>().norm() == doctest::Approx(0.1 * g * c.nx[0]).epsilon(0.05));
+  }
+}
+
+TEST_CASE("firm: where no push leans nothing rubs") {
+  LeaningBox box(0);
+  box.run(0.5);
+  CHECK(h6GetContacts(box.session, 1).count > 0);
+  CHECK_FALSE(box.spring().holds);
+  // A frictionless floor does not brake.
+  h6BodyState moving = box.body();
+  moving.velocity.linear.x = 0.02;
+  h6SetBody(box.session, 1, &moving);
+  box.run(0.5);
+  CHECK(box.body().velocity.linear.x == doctest::Approx(0.02));
 }
