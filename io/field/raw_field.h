@@ -14,7 +14,9 @@ namespace h6::io {
 // Written aside, then renamed.
 Outcome write_raw_field(const std::filesystem::path& file, const FieldData& field);
 // Reads a field back bit for bit. Fails, with a sentence, when the file is of another kind or
-// version, truncated or damaged. Never allocates more memory than the file's size.
+// version, truncated or damaged. Never allocates more memory than the file's size. The floats of
+// the field stay in the file: while it lives, the file may be renamed, replaced or removed, but
+// not cut (mapped_file.h).
 Result<FieldData> read_raw_field(const std::filesystem::path& file);
 
 }  // namespace h6::io
