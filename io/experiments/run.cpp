@@ -126,9 +126,14 @@ Result<std::vector<MethodColumn>> columns_named(const std::string& list) {
   for (std::string name; std::getline(in, name, ',');) {
     if (name.empty()) continue;
     const auto same = [&](const MethodColumn& column) { return column.name == name; };
+    if (std::any_of(out.begin(), out.end(), same)) continue;
     const auto found = std::find_if(known.begin(), known.end(), same);
-    if (found == known.end()) return Failure{no_such("method", name, names)};
-    if (std::none_of(out.begin(), out.end(), same)) out.push_back(*found);
+    if (found != known.end())
+      out.push_back(*found);
+    else if (h6MethodFromName(name.c_str(), nullptr, nullptr) == 0)
+      out.push_back({name, name, 0});  // with other pieces, such as firm+rub
+    else
+      return Failure{no_such("method", name, names)};
   }
   if (out.empty()) return Failure{"'" + list + "' names no method"};
   return out;

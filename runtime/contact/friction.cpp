@@ -88,7 +88,7 @@ double normal_load(const Contacts& c, const h6ContactDef& def, const Vec6& u, st
 // Copies the contacts of a pair that rub to the scratch, and gives the rows there.
 FrictionRows<float> rows_that_rub(const Contacts& c, const h6ContactDef& def, const Pair& pair,
                                   const Vec6& u, const FrictionScratch& s) {
-  const bool leans = pushes_lean(def);
+  const bool leans = pushes_rub(def);
   if (leans) kernels::push_lean(kernel_columns(c, pair.begin, pair.end), s.lean);
   const float* const from[6] = {c.nx, c.ny, c.nz, c.rx, c.ry, c.rz};
   std::size_t count = 0;
@@ -293,8 +293,10 @@ template Mat6 friction_turning(const FrictionRows<double>&, const FrictionLaw&, 
 template double friction_yield(const FrictionRows<float>&, const FrictionLaw&, const double*);
 template double friction_yield(const FrictionRows<double>&, const FrictionLaw&, const double*);
 
-bool pushes_lean(const h6ContactDef& def) { return def.method == H6_METHOD_FIRM; }
-bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_lean(def); }
+bool pushes_rub(const h6ContactDef& def) {
+  return def.method == H6_METHOD_FIRM && (def.pieces & H6_PIECE_RUB);
+}
+bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_rub(def); }
 
 void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const Body& a = bodies[shell.body];

@@ -7,8 +7,9 @@
 // z = P (d + theta x r) and
 //     f = -K (q + beta u),   K = sum s J_t^T J_t,   J_t = P [I, -[r]x]
 //     s = k l / W  while the contact sticks;  k l / |z|  beyond |z| = W
-// so that no contact's friction exceeds k l. mu is the setting; under `firm` it is at least the
-// sine between push and gradient: Sec. 3, "Energy of a push that leans".
+// so that no contact's friction exceeds k l. mu is the setting; under `firm+rub` it is at
+// least the tangent of the angle between push and gradient: Sec. 3, "Friction of a push that
+// leans".
 #pragma once
 #include <cstddef>
 
@@ -62,9 +63,9 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
 template <class T>
 double friction_yield(const FrictionRows<T>& rows, const FrictionLaw& law, const double* stretch);
 
-// `firm` pushes along another direction than the gradient, so its contacts can make energy.
-bool pushes_lean(const h6ContactDef& def);
-// Whether any contact can rub: by the setting, or because its push leans.
+// `firm+rub`: contacts whose push leans off the gradient, and so can make energy, have friction.
+bool pushes_rub(const h6ContactDef& def);
+// Whether any contact can rub: by the setting `friction`, or because its push leans.
 bool contacts_rub(const h6ContactDef& def);
 
 // (contacts), or null where no contact can rub.

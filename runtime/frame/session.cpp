@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runtime/contact/contact_stages.h"
+#include "runtime/contact/friction.h"
 #include "runtime/contact/weighing.h"
 #include "runtime/frame/session_checks.h"
 #include "runtime/frame/session_memory.h"
@@ -209,7 +210,7 @@ bool offsets_fit(const h6Model& model, const h6SessionDef& def, std::span<const 
 // Sec. 10 of METHOD.md says why these do not go with a body that bends.
 bool bends_fit(const h6Session& s, const h6SessionDef& def, h6Error* error) {
   const h6ContactDef& c = def.contact;
-  const char* const no = c.friction > 0                  ? "contact friction"
+  const char* const no = contacts_rub(c)                 ? "contact friction"
                          : c.passivity                   ? "contact passivity"
                          : uses_clusters(c)              ? "clusters of contacts"
                          : def.integrator == H6_EXPLICIT ? "the explicit integrator"

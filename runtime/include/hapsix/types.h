@@ -160,7 +160,8 @@ enum {
   H6_PIECE_CLUSTER = 1u << 3, /* weights on clusters: see H6_METHOD_CLUSTER                        */
   H6_PIECE_GEODESIC = 1u << 4, /* angles instead of chords: 2 asin(|dN|/2), the same for T         */
   H6_PIECE_HANDLES = 1u << 5, /* Eq. 13: T = r x F/|F|, in units of the body's radius              */
-  H6_PIECE_PRINTED = 1u << 6  /* Eq. 8 as printed: w = phi / largest phi                           */
+  H6_PIECE_PRINTED = 1u << 6, /* Eq. 8 as printed: w = phi / largest phi                           */
+  H6_PIECE_RUB     = 1u << 7  /* firm: pushes that lean off the field's gradient have friction     */
 };
 
 /* What becomes of an overlap at the start. Parts in their designed place overlap their neighbours:
@@ -199,9 +200,8 @@ typedef struct h6ContactDef {
   h6Fit    fit;             /* of sessions; h6WeighContacts does not read it                       */
   double   fit_offset;      /* play: of sessions, every depth counts less by this, 0 .. 3 voxels of
                                each field                                                     [m]  */
-  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none, but
-                               for `firm`, where pushes that lean always rub; of sessions,
-                               h6WeighContacts does not read it. METHOD.md, Sec. 3 and 9           */
+  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none; of
+                               sessions, h6WeighContacts does not read it. METHOD.md, Sec. 9       */
   uint64_t reserved[8];
 } h6ContactDef;
 

@@ -140,6 +140,14 @@ TEST_CASE("an experiment that does not exist is told, with the nearest name") {
   CHECK(blocked.err.find("taken") != std::string::npos);
 }
 
+TEST_CASE("a method may have any pieces, and one that is named twice is one column") {
+  Sandbox box;
+  const Json result = result_of(
+      box, {"experiments", "cone-in-gap", "--methods", "firm,firm+rub,gauss6+facing+depth,firm"});
+  is_a_scene(result["scenes"]["cone-in-gap"], {"firm", "firm+rub", "gauss6+facing+depth"});
+  CHECK(result["scenes"]["cone-in-gap"]["firm"] != result["scenes"]["cone-in-gap"]["firm+rub"]);
+}
+
 TEST_CASE("wrong methods are told before a folder is made") {
   Sandbox box;
   const auto told = [&](const char* methods, const std::string& words) {
@@ -150,5 +158,6 @@ TEST_CASE("wrong methods are told before a folder is made") {
   };
   told("robst", "did you mean 'robust'?");
   told(",", "',' names no method");
+  told("firm+rob", "no method 'firm+rob'");
   CHECK(box.files().empty());
 }
