@@ -176,6 +176,10 @@ class Sessions(unittest.TestCase):
         self.assertAlmostEqual(stiffness[2, 2], -1e4, places=1)
         self.assertEqual(damping.shape, (6, 6))
 
+    def test_a_method_keeps_its_pieces(self):
+        for name in ("firm", "firm+rub", "gauss6+facing+depth", "robust+cluster"):
+            self.assertEqual(hapsix.Contact(method=name).method, name)
+
 
 class Mistakes(unittest.TestCase):
     def sentence(self, kind, work):
