@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // bake_api.cpp - fields and shells from meshes and files, for C.
+#include <algorithm>
 #include <cmath>
 
 #include "io/api/guard.h"
@@ -8,6 +9,7 @@
 #include "io/scene/cache.h"
 #include "io/shell/bake_shell.h"
 #include "io/shell/shell_file.h"
+#include "runtime/base/foreign_enum.h"
 
 using namespace h6;
 using namespace h6::io;
@@ -27,7 +29,7 @@ Result<FieldBake> options_of(const h6FieldBakeDef& def) {
   if (!within(def.seal, 0, 1e6)) return bad("seal", "in 0..1e6 m");
   if (!within(def.weld, 0, 1)) return bad("weld", "in 0..1 voxel");
   if (!within(def.band_voxels, 1, kWidestBand)) return bad("band_voxels", "in 1..8");
-  if (def.sign < H6_SIGN_AUTO || def.sign > H6_SIGN_WINDING) return bad("sign", "one of h6Sign");
+  if (raw_number(def.sign) > H6_SIGN_WINDING) return bad("sign", "one of h6Sign");
   FieldBake bake;
   bake.voxels = def.voxels, bake.voxel_size = def.voxel_size, bake.tolerance = def.tolerance;
   bake.offset = def.offset < 0 ? -1 : def.offset;
@@ -45,9 +47,8 @@ Result<ShellBake> options_of(const h6ShellBakeDef& def) {
     return Failure{"points must be in 1..20000000"};
   if (!within(def.spacing, 0, 1e6)) return Failure{"spacing must be in 0..1e6 m"};
   if (!within(def.levels, 1, 16)) return Failure{"levels must be in 1..16"};
-  for (const h6ShellFrom from : {def.surface, def.normals})
-    if (from < H6_FROM_AUTO || from > H6_FROM_FIELD)
-      return Failure{"surface and normals must be one of h6ShellFrom"};
+  if (std::max(raw_number(def.surface), raw_number(def.normals)) > H6_FROM_FIELD)
+    return Failure{"surface and normals must be one of h6ShellFrom"};
   ShellBake bake;
   bake.points = def.points, bake.spacing = def.spacing, bake.levels = def.levels;
   bake.seed = def.seed;

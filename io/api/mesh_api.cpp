@@ -7,6 +7,7 @@
 #include "io/api/guard.h"
 #include "io/api/objects.h"
 #include "io/mesh/mesh_file.h"
+#include "runtime/base/foreign_enum.h"
 
 using namespace h6;
 using namespace h6::io;
@@ -15,7 +16,7 @@ namespace {
 
 constexpr double kFarthest = 1e6;  // [m]
 
-bool is_unit(h6Unit unit) { return unit >= H6_METRES && unit <= H6_INCHES; }
+bool is_unit(const h6Unit& unit) { return raw_number(unit) <= H6_INCHES; }
 
 Result<Mesh> take(const h6MeshDef& def) {
   if (!def.vertices || !def.triangles || def.triangle_count == 0)

@@ -6,6 +6,7 @@
 #include "io/api/scene_object.h"
 #include "io/record/recording.h"
 #include "io/scene/scene_file.h"
+#include "runtime/base/foreign_enum.h"
 
 using namespace h6;
 using namespace h6::io;
@@ -61,7 +62,7 @@ h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, h6Error
     if (!(session.rate > 0 && session.rate <= 1e6))
       return fill(error, H6_ERROR_RANGE, "the rate must be above 0 and at most 1000000 Hz"),
              nullptr;
-    if (!h6MethodName(session.contact.method))
+    if (raw_number(session.contact.method) >= H6_METHOD_COUNT)
       return fill(error, H6_ERROR_RANGE, "contact.method must be one of h6Method"), nullptr;
     const RecordingHead head = head_of(*def, session);
     if (def->scene) {  // or nobody could replay it
