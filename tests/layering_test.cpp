@@ -38,15 +38,15 @@ const Rooms& below() {
     room("sched", {"contract"});
 
     room("runtime/base", {"contract"});
-    room("runtime/model", {"contract", "kernels", "kernels/field", "kernels/bend", "sched",
-                           "runtime/base"});
+    room("runtime/model",
+         {"contract", "kernels", "kernels/field", "kernels/bend", "sched", "runtime/base"});
     room("runtime/settings", {"contract", "runtime/model"});
     room("runtime/hand", {"contract", "runtime/base"});
     room("runtime/contact",
          {"contract", "kernels", "kernels/field", "kernels/contact", "kernels/weights",
           "kernels/bend", "sched", "runtime/base", "runtime/model"});
-    room("runtime/motion",
-         {"contract", "kernels", "kernels/bend", "runtime/base", "runtime/hand", "runtime/contact"});
+    room("runtime/motion", {"contract", "kernels", "kernels/bend", "runtime/base", "runtime/hand",
+                            "runtime/contact"});
     room("runtime/frame", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/model",
                            "runtime/contact", "runtime/motion"});
     room("runtime/loop", {"contract", "sched", "runtime/base", "runtime/settings", "runtime/hand",
@@ -80,8 +80,8 @@ const Rooms& below() {
     room("io/scenes/machines",
          {"contract", "io/file", "io/mesh", "io/scene", "io/scenes", "io/scenes/industrial"});
     room("io/record", {"contract", "io/file"});
-    room("io/api", {"contract", "io/file", "io/mesh", "io/field", "io/shell", "io/check",
-                    "io/scene", "io/scenes", "io/record"});
+    room("io/api", {"contract", "runtime/base", "io/file", "io/mesh", "io/field", "io/shell",
+                    "io/check", "io/scene", "io/scenes", "io/record"});
     room("io/examples", {"contract", "io/api"});
     room("python", {"contract", "io/api"});
     room("io/view",
