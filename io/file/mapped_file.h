@@ -2,9 +2,9 @@
 // mapped_file.h - a file as memory: its pages are those of the page cache, so a file of gigabytes
 // that is read a second time is neither copied nor needs fresh memory.
 //
-// What is written to the memory stays in this process. Whoever cuts the file meanwhile takes the
-// pages away, and then a process that reads them gets SIGBUS: files that hapsix writes are renamed
-// to their name and never changed, so the old file stays whole.
+// The file itself never changes when a process writes to this memory. But the pages of a file that
+// someone cuts meanwhile are gone, and a process that reads them gets SIGBUS. hapsix never cuts or
+// changes a file that it has finished: it renames a new one over it, and the old one stays whole.
 #pragma once
 #include <cstddef>
 #include <filesystem>
@@ -18,7 +18,7 @@ class MappedFile {
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
 
-  // Returns 0 or errno; EINVAL for what is no regular file.
+  // Returns 0 or errno; EINVAL where `file` is no regular file.
   int open(const std::filesystem::path& file);
   char* data() const { return data_; }        // null when the file is empty
   std::size_t size() const { return size_; }  // when it was opened

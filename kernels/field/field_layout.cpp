@@ -46,7 +46,8 @@ std::size_t slot_count(const h6FieldDef& def) {
   return std::size_t(def.bricks[0]) * std::size_t(def.bricks[1]) * std::size_t(def.bricks[2]);
 }
 
-// What the far grid says at the four corners of a cell on one side, y fastest [voxel].
+// The bounds of the far grid at the four corners of one side of a cell, y fastest [voxel], and
+// which signs they have.
 struct FarSide {
   double least[4];
   bool inside = false, outside = false;
@@ -86,7 +87,7 @@ FarBound far_bound(const h6FieldDef& def, const Cell& c) {
   return far_bound(far_side(def, x, y, z), far_side(def, x + 1, y, z));
 }
 
-// Down.
+// Rounds down, since a far bound must not be too large.
 std::int16_t round_far(double voxels) {
   const double q = std::clamp((voxels - kFloatSlack) / kFarQuantum, 0.0, kInt16Max);
   return static_cast<std::int16_t>(static_cast<std::int32_t>(q));

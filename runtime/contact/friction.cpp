@@ -301,7 +301,6 @@ bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_r
 void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const Body& a = bodies[shell.body];
   for (Pair& pair : shell.pairs) {
-    if (!pair.friction) continue;
     FrictionSpring& spring = *pair.friction;
     const Body& b = bodies[pair.b];
     const Vec6 u = pair_velocity(a, b);

@@ -7,9 +7,9 @@
 // z = P (d + theta x r) and
 //     f = -K (q + beta u),   K = sum s J_t^T J_t,   J_t = P [I, -[r]x]
 //     s = k l / W  while the contact sticks;  k l / |z|  beyond |z| = W
-// so that no contact's friction exceeds k l. mu is the setting; under `firm+rub` it is at
-// least the tangent of the angle between push and gradient: Sec. 3, "Friction of a push that
-// leans".
+// so that no contact's friction exceeds k l. mu is the setting. Under `firm+rub` it
+// is at least the lean of the push (kernels/contact/contact_columns.h): Sec. 3, "Friction of a push
+// that leans".
 #pragma once
 #include <cstddef>
 

@@ -152,7 +152,8 @@ typedef enum h6Method {
 } h6Method;
 
 /* Pieces that can be added one by one. The first three turn the paper's methods into `robust`; the
- * others are options of the Gauss methods (gauss3, gauss6, robust). Other methods ignore them all. */
+ * next four are options of the Gauss methods (gauss3, gauss6, robust), the last is one of firm. Other
+ * methods ignore them. */
 enum {
   H6_PIECE_FACING = 1u << 0, /* contacts whose normal opposes the field's gradient fade out        */
   H6_PIECE_DEPTH  = 1u << 1, /* contacts enter the density in proportion to their depth            */
@@ -161,7 +162,8 @@ enum {
   H6_PIECE_GEODESIC = 1u << 4, /* angles instead of chords: 2 asin(|dN|/2), the same for T         */
   H6_PIECE_HANDLES = 1u << 5, /* Eq. 13: T = r x F/|F|, in units of the body's radius              */
   H6_PIECE_PRINTED = 1u << 6, /* Eq. 8 as printed: w = phi / largest phi                           */
-  H6_PIECE_RUB     = 1u << 7  /* firm: pushes that lean off the field's gradient have friction     */
+  H6_PIECE_RUB     = 1u << 7  /* firm: pushes that lean off the field's gradient have friction; of
+                                 sessions, h6WeighContacts does not read it                      */
 };
 
 /* What becomes of an overlap at the start. Parts in their designed place overlap their neighbours:
