@@ -210,7 +210,8 @@ bool offsets_fit(const h6Model& model, const h6SessionDef& def, std::span<const 
 // Sec. 10 of METHOD.md says why these do not go with a body that bends.
 bool bends_fit(const h6Session& s, const h6SessionDef& def, h6Error* error) {
   const h6ContactDef& c = def.contact;
-  const char* const no = contacts_rub(c)                 ? "contact friction"
+  const char* const no = c.friction > 0                  ? "contact friction"
+                         : pushes_rub(c)                 ? "the piece +rub"
                          : c.passivity                   ? "contact passivity"
                          : uses_clusters(c)              ? "clusters of contacts"
                          : def.integrator == H6_EXPLICIT ? "the explicit integrator"
