@@ -140,12 +140,14 @@ test('a headset shows the scene on a table; the grip of a controller takes the p
   await until(async () => apart(high, await hand(), 3, 7) < 1e-3, 'and back');
   // Down into the plates: the part follows, stays behind in contact, and the motor is asked to run.
   const plain = await browser.value('window.pulses.length');
+  let s;
   for (let i = 0; i <= 20; ++i) {
     await browser.value(`window.device.controllers.right.position.set(0.25, ${1.3 - 0.02 * i}, -0.5)`);
     await wait(100);
-    if (((await state()).contacts ?? 0) > 0 && (await state()).lag > 0 && await browser.value('window.pulses.length') > plain + 2) break;
+    s = await state();
+    if (s.contacts > 0 && s.lag > 0 && await browser.value('window.pulses.length') > plain + 2) break;
   }
-  const s = await state(), pulses = await browser.value('window.pulses');
+  const pulses = await browser.value('window.pulses');
   assert.ok(s.contacts > 0 && s.lag > 0, 'the part touches and stays behind the hand');
   assert.ok(pulses.length > plain, 'contact is felt');
   for (const [value, ms] of pulses) assert.ok(value >= 0 && value <= 1 && ms > 0 && ms <= 100, `${value} for ${ms} ms`);
