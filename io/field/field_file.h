@@ -19,8 +19,8 @@ Outcome write_field(const std::filesystem::path& file, const FieldData& field,
 // integers read it (pyopenvdb.readAll), and read_field reads it as that of another program.
 Outcome write_level_set(const std::filesystem::path& file, const FieldData& field);
 // Fields of this program are read back bit for bit; fields of another version are refused. A .vdb
-// of another program is read when it has one level set of floats: a far grid of safe bounds is
-// derived from its narrow band and background.
+// of another program is read when it has one level set of floats: from its narrow band and
+// background come safe distances beside the band and a far grid of safe bounds (foreign.cpp).
 Result<FieldData> read_field(const std::filesystem::path& file);
 
 }  // namespace h6::io

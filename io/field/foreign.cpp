@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // foreign.cpp - a field from a narrow-band level set of another program.
 //
-// Its values are distances where they are below the background, the half width of its band. A cell
-// nearer to the surface than background - sqrt(3) voxels has such values at all its nodes: this is
-// the band of our field.
+// Its values are distances where they are below the background, the half width of its band. In a
+// band of at least 3 voxels, values that rise faster than distances can are lowered, and the nodes
+// beyond get safe distances (extend_band.h): then the band of our field is as wide. Otherwise it is
+// sqrt(3) voxels narrower, since all cells there have the level set's own values at all nodes.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "io/field/extend_band.h"
 #include "io/field/grids.h"
+#include "io/field/lipschitz.h"
 #include "io/field/nearest_node.h"
 
 namespace h6::io {
@@ -74,6 +77,21 @@ void far_bounds(FloatGrid& grid, const Frame& frame, FieldData& f) {
     f.far_grid[i] =
         std::copysign(float(known < frame.background ? known : std::max(known, bound)), v);
   }
+}
+
+// The short form of culling wants 3 voxels, and neighbours that differ by at most one
+// (kernels/contact/cull_spheres.h).
+void widen(const FloatGrid& grid, const Frame& frame, FieldData& f) {
+  if (frame.background < 2.999 * frame.voxel) return;
+  lower_steep_samples(f);
+  const Place cells{f.bricks};
+  const auto inside = [&](std::size_t cell) {
+    const auto at = cells.at(cell);
+    return grid.tree().getValue(frame.low + Coord(8 * at[0], 8 * at[1], 8 * at[2])) < 0;
+  };
+  extend_band(f, frame.background, inside, 0);
+  // It is steep still where the level set was cut off.
+  if (steepest_edge(f, frame.background, 0) <= 1 + kSteepSlack) f.band = frame.background;
 }
 
 }  // namespace
@@ -141,6 +159,7 @@ Result<FieldData> foreign_field(const openvdb::GridPtrVec& grids, const std::str
   }
   if (steep > pairs / 50)
     return Failure{name + " is no distance field: its values rise faster than distances can"};
+  widen(*grid, frame, f);
   far_bounds(*grid, frame, f);
   return f;
 }
