@@ -20,7 +20,7 @@ constexpr float kBeyond = 2.0f;
 constexpr float kDetour = 0.25f;
 constexpr float kCellDiagonal = 1.7321f;
 constexpr int kSide = 8 + 2 * kAround;
-constexpr float kNone = std::numeric_limits<float>::infinity();
+constexpr float kNoNode = std::numeric_limits<float>::infinity();
 
 // The ways from a node to those of a row along x: their lengths at x - dx and x + dx.
 struct RowOfWays {
@@ -87,10 +87,10 @@ class Extension {
     Surroundings around;
     gather(cell, around);
     const auto beside = [](int at) { return std::max({kAround - at, at - kAround - 7, 0}); };
-    float least = kNone;
+    float least = kNoNode;
     for (int z = 0; z < kSide; ++z)
       for (int y = 0; y < kSide; ++y) {
-        if (around.least[z * kSide + y] == kNone) continue;
+        if (around.least[z * kSide + y] == kNoNode) continue;
         for (int x = 0; x < kSide; ++x) {
           const int dx = beside(x), dy = beside(y), dz = beside(z);
           const float way = std::sqrt(float(dx * dx + dy * dy + dz * dz));
@@ -124,8 +124,8 @@ class Extension {
   }
 
   void gather(std::size_t cell, Surroundings& around) const {
-    std::fill_n(around.d, kSide * kSide * kSide, kNone);
-    std::fill_n(around.least, kSide * kSide, kNone);
+    std::fill_n(around.d, kSide * kSide * kSide, kNoNode);
+    std::fill_n(around.least, kSide * kSide, kNoNode);
     const auto at = cells_.at(cell);
     for (int k = 0; k < 27; ++k) {
       const std::array<int, 3> step{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
