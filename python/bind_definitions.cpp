@@ -56,10 +56,9 @@ void choice(Class& c, const char* name, T Owner::*member, Names names, const cha
 
 std::string method_of(const h6ContactDef& contact) {
   static constexpr std::pair<std::uint32_t, const char*> pieces[] = {
-      {H6_PIECE_FACING, "facing"},     {H6_PIECE_DEPTH, "depth"},
-      {H6_PIECE_PRODUCT, "product"},   {H6_PIECE_CLUSTER, "cluster"},
-      {H6_PIECE_GEODESIC, "geodesic"}, {H6_PIECE_HANDLES, "handles"},
-      {H6_PIECE_PRINTED, "printed"},   {H6_PIECE_RUB, "rub"}};
+      {H6_PIECE_FACING, "facing"},   {H6_PIECE_DEPTH, "depth"},       {H6_PIECE_PRODUCT, "product"},
+      {H6_PIECE_CLUSTER, "cluster"}, {H6_PIECE_GEODESIC, "geodesic"}, {H6_PIECE_HANDLES, "handles"},
+      {H6_PIECE_PRINTED, "printed"}};
   const char* name = h6MethodName(contact.method);
   std::string text = name ? name : "";
   for (const auto& [bit, piece] : pieces)

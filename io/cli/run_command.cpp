@@ -169,7 +169,7 @@ void add_run(CLI::App& app, Program& program) {
   run->add_option(
          "--method", o->method,
          "none, global, cluster, gauss3, gauss6, robust, series or firm; the Gauss ones also with "
-         "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed; firm+rub")
+         "+facing, +depth, +product, +cluster, +geodesic, +handles, +printed")
       ->option_text("NAME");
   run->add_option("--threads", o->threads,
                   "1 (default): the haptic thread alone; N: with N - 1 helpers; same bits")

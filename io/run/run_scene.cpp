@@ -245,8 +245,7 @@ Outcome check_options(const RunOptions& options) {
     return Failure{
         "no method is called '" + options.method +
         "': none, global, cluster, gauss3, gauss6, robust, series or firm, the Gauss ones also "
-        "with +facing, +depth, +product, +cluster, +geodesic, +handles, +printed; firm also with "
-        "+rub"};
+        "with +facing, +depth, +product, +cluster, +geodesic, +handles, +printed"};
   return options.device.empty() ? Outcome(Done{}) : check_device(options.device);
 }
 

@@ -51,7 +51,7 @@ void push_directions_ref(const ContactColumns& c, const Around* around, float* n
 // slightly curved wall lean so little.
 //   t    = |n x g| / max(|n x g| / kMostRub, n.g)
 //   lean = t clamp(t / kNoLean - 1, 0, 1)
-inline constexpr float kNoLean = 0.02f, kMostRub = 0.5f;
+inline constexpr float kNoLean = 0.02f, kMostRub = 1.0f;
 void push_lean(const ContactColumns& c, float* lean);
 void push_lean_ref(const ContactColumns& c, float* lean);
 

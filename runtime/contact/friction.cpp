@@ -22,17 +22,21 @@ constexpr double kFade = 1e-12;
 
 struct Row {
   Vec3 n, r;
+  bool line;
 };
 template <class T>
 Row row_at(const FrictionRows<T>& c, std::size_t i) {
   const Vec3 n(c.nx[i], c.ny[i], c.nz[i]);
   // A step of Newton's method makes the unit vector of floats one of doubles.
-  return {(1.5 - 0.5 * n.squaredNorm()) * n, Vec3(c.rx[i], c.ry[i], c.rz[i])};
+  return {(1.5 - 0.5 * n.squaredNorm()) * n, Vec3(c.rx[i], c.ry[i], c.rz[i]), i >= c.planes};
 }
 
-Vec3 tangential(const Row& row, const Vec6& q) {
-  const Vec3 moved = q.head<3>() + q.tail<3>().cross(row.r);
-  return moved - row.n * row.n.dot(moved);
+Vec3 moved_at(const Row& row, const Vec6& q) { return q.head<3>() + q.tail<3>().cross(row.r); }
+double along(const Row& row, const Vec6& q) { return row.n.dot(moved_at(row, q)); }
+// How far the motion q stretches a row. Along a line the way back is free.
+Vec3 stretched(const Row& row, const Vec6& q) {
+  if (row.line) return std::max(along(row, q), 0.0) * row.n;
+  return moved_at(row, q) - along(row, q) * row.n;
 }
 
 // s: the secant of a contact's force over its stretch. It is the larger of the stretches now and at
@@ -41,7 +45,7 @@ template <class T>
 double secant(const FrictionRows<T>& rows, const FrictionLaw& law, std::size_t i, const Row& row,
               const Vec6& q, const Vec6& ahead) {
   const double squared =
-      std::max(tangential(row, q).squaredNorm(), tangential(row, ahead).squaredNorm());
+      std::max(stretched(row, q).squaredNorm(), stretched(row, ahead).squaredNorm());
   const double share = law.stiffness * rows.load[i] / rows.total;
   return squared > law.limit * law.limit ? share * law.limit / std::sqrt(squared) : share;
 }
@@ -85,25 +89,53 @@ double normal_load(const Contacts& c, const h6ContactDef& def, const Vec6& u, st
   return double{c.weight[i]} * std::max(0.0, double{c.depth[i]} - def.damping * leaves);
 }
 
-// Copies the contacts of a pair that rub to the scratch, and gives the rows there.
+// The rows of a pair, in the scratch.
+class RowWriter {
+ public:
+  RowWriter(const Contacts& c, const h6ContactDef& def, const Vec6& u, const FrictionScratch& s)
+      : c_(c), def_(def), u_(u), s_(s) {}
+
+  // A row of contact i along its plane (axis n) or a line (axis e).
+  void add(std::size_t i, double mu, const Vec3& axis) {
+    const double load = mu * normal_load(c_, def_, u_, i);
+    if (!(load > 0)) return;
+    for (int k = 0; k < 3; ++k) s_.row[k][count_] = static_cast<float>(axis[k]);
+    s_.row[3][count_] = c_.rx[i], s_.row[4][count_] = c_.ry[i], s_.row[5][count_] = c_.rz[i];
+    s_.load[count_++] = load;
+    total_ += load;
+  }
+  void end_planes() { planes_ = count_; }
+  FrictionRows<float> rows() const {
+    return {s_.row[0], s_.row[1], s_.row[2], s_.row[3], s_.row[4],
+            s_.row[5], s_.load,   count_,    total_,    planes_};
+  }
+
+ private:
+  const Contacts& c_;
+  const h6ContactDef& def_;
+  const Vec6& u_;
+  const FrictionScratch& s_;
+  std::size_t count_ = 0, planes_ = 0;
+  double total_ = 0;
+};
+
 FrictionRows<float> rows_that_rub(const Contacts& c, const h6ContactDef& def, const Pair& pair,
                                   const Vec6& u, const FrictionScratch& s) {
-  const bool leans = pushes_rub(def);
-  if (leans) kernels::push_lean(kernel_columns(c, pair.begin, pair.end), s.lean);
-  const float* const from[6] = {c.nx, c.ny, c.nz, c.rx, c.ry, c.rz};
-  std::size_t count = 0;
-  double total = 0;
+  RowWriter out(c, def, u, s);
+  if (def.friction > 0)
+    for (std::size_t i = pair.begin; i < pair.end; ++i)
+      out.add(i, def.friction, Vec3(c.nx[i], c.ny[i], c.nz[i]));
+  out.end_planes();
+  if (!pushes_rub(def)) return out.rows();
+  kernels::push_lean(kernel_columns(c, pair.begin, pair.end), s.lean);
   for (std::size_t i = pair.begin; i < pair.end; ++i) {
-    const double lean = leans ? double{s.lean[i - pair.begin]} : 0;
-    const double mu = std::max(def.friction, lean);
+    const double mu = s.lean[i - pair.begin];
     if (!(mu > 0)) continue;
-    const double load = mu * normal_load(c, def, u, i);
-    if (!(load > 0)) continue;
-    for (int k = 0; k < 6; ++k) s.row[k][count] = from[k][i];
-    s.load[count++] = load;
-    total += load;
+    // Along e the depth grows, while the push does no work.
+    const Vec3 n(c.nx[i], c.ny[i], c.nz[i]), g(c.gx[i], c.gy[i], c.gz[i]);
+    out.add(i, mu, (n * n.dot(g) - g).normalized());
   }
-  return {s.row[0], s.row[1], s.row[2], s.row[3], s.row[4], s.row[5], s.load, count, total};
+  return out.rows();
 }
 
 // The energy of the spring when each row has `share` of its stretch [J], and whether a row slips.
@@ -126,7 +158,7 @@ Stored stored_in(const FrictionRows<float>& rows, const FrictionLaw& law, const 
 // Lets the spring slip, and keeps its energy within what was put in. `q`: in world axes.
 void slip(const FrictionRows<float>& rows, const FrictionLaw& law, FrictionSpring& spring, Vec6& q,
           double* stretch) {
-  for (std::size_t i = 0; i < rows.count; ++i) stretch[i] = tangential(row_at(rows, i), q).norm();
+  for (std::size_t i = 0; i < rows.count; ++i) stretch[i] = stretched(row_at(rows, i), q).norm();
   double share = friction_yield(rows, law, stretch);
   Stored stored = stored_in(rows, law, stretch, share);
   const double most = std::max(spring.energy, 0.0);
@@ -216,22 +248,24 @@ void lead(const Settings& set, const Sides& sides, const Mat6& S, const Mat6& K)
 template <class T>
 Mat6 friction_stiffness(const FrictionRows<T>& rows, const FrictionLaw& law, const Vec6& q,
                         const Vec6& ahead) {
-  // J_t^T J_t is that of a spring in all directions less J J^T, J = [n; r x n].
+  // In the plane J_t^T J_t is that of a spring in all directions less J J^T, J = [n; r x n]; along
+  // a line it is J J^T.
   double sum = 0;
   Vec3 arms = Vec3::Zero();
   Mat3 squares = Mat3::Zero();
-  Mat6 along = Mat6::Zero();
+  Mat6 K = Mat6::Zero();
   for (std::size_t i = 0; i < rows.count; ++i) {
     const Row row = row_at(rows, i);
+    if (row.line && along(row, q) < 0) continue;
     const double s = secant(rows, law, i, row, q, ahead);
     Vec6 J;
     J << row.n, row.r.cross(row.n);
+    K.noalias() += (row.line ? s : -s) * J * J.transpose();
+    if (row.line) continue;
     sum += s;
     arms += s * row.r;
     squares.noalias() += s * row.r * row.r.transpose();
-    along.noalias() += s * J * J.transpose();
   }
-  Mat6 K = -along;
   K.topLeftCorner<3, 3>().diagonal().array() += sum;
   K.topRightCorner<3, 3>() -= cross_matrix(arms);
   K.bottomLeftCorner<3, 3>() += cross_matrix(arms);
@@ -246,14 +280,16 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
   Mat3 force = Mat3::Zero(), torque = Mat3::Zero();
   for (std::size_t i = 0; i < rows.count; ++i) {
     const Row row = row_at(rows, i);
+    if (row.line && along(row, q) < 0) continue;
     const Vec3 &n = row.n, &r = row.r;
     const double s = secant(rows, law, i, row, q, ahead);
-    const Vec3 moved = q.head<3>() + q.tail<3>().cross(r);
+    const Vec3 moved = moved_at(row, q);
     const Mat3 arm = cross_matrix(r), arms_turn = turn * arm;
-    const Mat3 by_turn = s * (arms_turn - n * (n.transpose() * arms_turn) -
-                              n.dot(moved) * cross_matrix(n) + n * n.cross(moved).transpose());
+    const Mat3 by_axis = n * (n.transpose() * arms_turn) + n.dot(moved) * cross_matrix(n) -
+                         n * n.cross(moved).transpose();
+    const Mat3 by_turn = s * (row.line ? by_axis : Mat3(arms_turn - by_axis));
     force += by_turn;
-    torque += arm * by_turn - s * cross_matrix(tangential(row, q)) * arm;
+    torque += arm * by_turn - s * cross_matrix(stretched(row, q)) * arm;
   }
   Mat6 out = Mat6::Zero();
   out.topRightCorner<3, 3>() = force;
@@ -263,16 +299,20 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
 
 template <class T>
 double friction_yield(const FrictionRows<T>& rows, const FrictionLaw& law, const double* stretch) {
-  double mean = 0;
-  for (std::size_t i = 0; i < rows.count; ++i) mean += rows.load[i] / rows.total * stretch[i];
-  if (!(mean > law.limit)) return 1;
+  // Rows along a line that are on their way back have no say.
+  double total = 0, sum = 0;
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    if (stretch[i] > 0) total += rows.load[i];
+    sum += rows.load[i] * stretch[i];
+  }
+  if (!(sum > law.limit * total)) return 1;
   // The share of the load that slips is concave in the share of the stretch, so Newton's method
   // comes from below.
-  double share = kSlipping * law.limit / mean;
+  double share = kSlipping * law.limit * total / sum;
   for (int step = 0; step < kYieldSteps; ++step) {
     double slips = 0, slope = 0;
     for (std::size_t i = 0; i < rows.count; ++i) {
-      const double part = rows.load[i] / rows.total, z = stretch[i] / law.limit;
+      const double part = rows.load[i] / total, z = stretch[i] / law.limit;
       slips += part * std::min(1.0, share * z);
       if (share * z < 1) slope += part * z;
     }
@@ -294,13 +334,17 @@ template double friction_yield(const FrictionRows<float>&, const FrictionLaw&, c
 template double friction_yield(const FrictionRows<double>&, const FrictionLaw&, const double*);
 
 bool pushes_rub(const h6ContactDef& def) {
-  return def.method == H6_METHOD_FIRM && (def.pieces & H6_PIECE_RUB);
+  return def.method == H6_METHOD_FIRM;
 }
 bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_rub(def); }
+std::size_t rows_of_contact(const h6ContactDef& def) {
+  return std::size_t{def.friction > 0} + std::size_t{pushes_rub(def)};
+}
 
 void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const Body& a = bodies[shell.body];
   for (Pair& pair : shell.pairs) {
+    if (!pair.friction) continue;
     FrictionSpring& spring = *pair.friction;
     const Body& b = bodies[pair.b];
     const Vec6 u = pair_velocity(a, b);

@@ -2,14 +2,15 @@
 // friction.h - Coulomb friction with stiction: one 6-D spring between a shell and a field, cut
 // contact by contact at mu times the normal load. METHOD.md, Sec. 9.
 //
-// With n the direction of a contact's push, P = I - n n^T, l its normal force over k times its mu,
-// and W the sum of all l of the pair, a displacement q = (d, theta) stretches the contact by
-// z = P (d + theta x r) and
+// With l a contact's normal force over k times its mu, and W the sum of all l of the pair, a
+// displacement q = (d, theta) stretches the contact by z = P (d + theta x r) and
 //     f = -K (q + beta u),   K = sum s J_t^T J_t,   J_t = P [I, -[r]x]
 //     s = k l / W  while the contact sticks;  k l / |z|  beyond |z| = W
-// so that no contact's friction exceeds k l. mu is the setting. Under `firm+rub` it
-// is at least the lean of the push (kernels/contact/contact_columns.h): Sec. 3, "Friction of a push
-// that leans".
+// so that no contact's friction exceeds k l. There are two kinds of rows:
+//     in the plane    P = I - n n^T, n the direction of the push; mu is the setting
+//     along a line    P = e e^T, only where e.(d + theta x r) > 0; mu is the lean of the push off
+//                     the field's gradient (kernels/contact/contact_columns.h). `firm` alone has
+//                     them: Sec. 3, "Friction of a push that leans".
 #pragma once
 #include <cstddef>
 
@@ -34,14 +35,16 @@ struct FrictionSpring {
   Mat6 turning = Mat6::Zero();  // H6_EXACT: how f changes as arms and normals turn with a
 };
 
-// A pair's contacts. T is float, or double in the test of the derivatives.
+// A pair's contacts, those in the plane first. T is float, or double in the test of the
+// derivatives.
 template <class T>
 struct FrictionRows {
-  const T *nx, *ny, *nz;  // direction of the push, unit
+  const T *nx, *ny, *nz;  // unit: direction n of the push, or the line e
   const T *rx, *ry, *rz;  // arm from a's centre of mass [m]
   const double* load;     // most friction over k: mu times the normal force over k, > 0 [m]
   std::size_t count;
-  double total;  // sum of the loads [m]
+  double total;        // sum of the loads [m]
+  std::size_t planes;  // rows in the plane; the others are along a line
 };
 
 // Where contacts stick and where they slip.
@@ -63,12 +66,14 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
 template <class T>
 double friction_yield(const FrictionRows<T>& rows, const FrictionLaw& law, const double* stretch);
 
-// `firm+rub`: contacts whose push leans off the gradient, and so can make energy, have friction.
+// `firm`: contacts whose push leans off the gradient, and so can make energy, have friction.
 bool pushes_rub(const h6ContactDef& def);
 // Whether any contact can rub: by the setting `friction`, or because its push leans.
 bool contacts_rub(const h6ContactDef& def);
+// How many rows each contact can have.
+std::size_t rows_of_contact(const h6ContactDef& def);
 
-// (contacts), or null where no contact can rub.
+// (max_contacts rows_of_contact), or null where no contact can rub.
 struct FrictionScratch {
   double *load = nullptr, *stretch = nullptr;
   float *lean = nullptr, *row[6] = {};  // of the rows that rub: n and r

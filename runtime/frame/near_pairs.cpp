@@ -117,7 +117,8 @@ bool add_row(h6Session& s, Near& near) {
   const Body &a = s.bodies[pair.a], &b = s.bodies[pair.b];
   if (moves(a) && moves(b)) pair.between = &s.between[slot];
   if (uses_series(s.settings.contact) && moves(b)) pair.of_fields = &s.of_fields[slot];
-  if (!s.frictions.empty()) pair.friction = &s.frictions[slot];
+  // A body that bends has no friction: METHOD.md, Sec. 10.
+  if (!s.frictions.empty() && !a.bend) pair.friction = &s.frictions[slot];
   if (pair.between) *pair.between = {};
   if (pair.of_fields) *pair.of_fields = {};
   if (pair.friction) *pair.friction = {};

@@ -48,7 +48,7 @@ ScratchRoom scratch_room(const Settings& set, std::size_t groups, std::size_t bl
   room.blocks = std::max(room.blocks, blocks);
   room.contacts = set.max_contacts;
   room.merged = uses_clusters(set.contact) ? set.max_contacts : 0;
-  room.rubbing = contacts_rub(set.contact) ? set.max_contacts : 0;
+  room.rubbing = set.max_contacts * rows_of_contact(set.contact);
   room.weighing = weigh_scratch_bytes(set.contact, set.max_contacts);
   return room;
 }

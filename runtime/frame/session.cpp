@@ -211,7 +211,6 @@ bool offsets_fit(const h6Model& model, const h6SessionDef& def, std::span<const 
 bool bends_fit(const h6Session& s, const h6SessionDef& def, h6Error* error) {
   const h6ContactDef& c = def.contact;
   const char* const no = c.friction > 0                  ? "contact friction"
-                         : pushes_rub(c)                 ? "the piece +rub"
                          : c.passivity                   ? "contact passivity"
                          : uses_clusters(c)              ? "clusters of contacts"
                          : def.integrator == H6_EXPLICIT ? "the explicit integrator"

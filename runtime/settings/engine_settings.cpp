@@ -35,7 +35,7 @@ constexpr Choice kMethods[] = {{"none", H6_METHOD_NONE},       {"global", H6_MET
 constexpr Choice kPieces[] = {{"facing", H6_PIECE_FACING},     {"depth", H6_PIECE_DEPTH},
                               {"product", H6_PIECE_PRODUCT},   {"cluster", H6_PIECE_CLUSTER},
                               {"geodesic", H6_PIECE_GEODESIC}, {"handles", H6_PIECE_HANDLES},
-                              {"printed", H6_PIECE_PRINTED},   {"rub", H6_PIECE_RUB}};
+                              {"printed", H6_PIECE_PRINTED}};
 
 constexpr Choice kFits[] = {{"relieve", H6_FIT_RELIEVE}, {"tight", H6_FIT_TIGHT}};
 
@@ -49,8 +49,7 @@ constexpr Setting kContactRows[] = {
         "method", kMethods, H6_METHOD_FIRM,
         "none, global, cluster, gauss3, gauss6, robust, series or firm; the Gauss methods and "
         "robust "
-        "also with pieces: +facing, +depth, +product, +cluster, +geodesic, +handles, +printed; "
-        "firm+rub: pushes that lean off the field's gradient have friction")),
+        "also with pieces: +facing, +depth, +product, +cluster, +geodesic, +handles, +printed")),
     number<&h6ContactDef::stiffness>(
         "stiffness", "N/m", 0, between(0, 1e9),
         "k, the stiffness of one contact alone; 0: from mass, weight and voxel, at least 1e4"),
@@ -92,9 +91,9 @@ constexpr Setting kContactRows[] = {
     quiet(number<&h6ContactDef::fit_offset>(
         "fit_offset", "m", 0, not_negative(kNoLimit),
         "play: every depth counts less by this, at most 3 voxels of each field")),
-    quiet(number<&h6ContactDef::friction>(
-        "friction", "", 0, between(0, 10),
-        "mu, the coefficient of Coulomb friction with stiction; 0: no friction"))};
+    quiet(number<&h6ContactDef::friction>("friction", "", 0, between(0, 10),
+                                          "mu, the coefficient of Coulomb friction with stiction; "
+                                          "0: none, but where pushes of firm lean"))};
 constexpr SettingTable kContact = settings_of("h6ContactDef", kContactRows);
 
 constexpr Choice kCouplingModes[] = {{"dynamic", H6_COUPLING_DYNAMIC},

@@ -177,7 +177,7 @@ class Sessions(unittest.TestCase):
         self.assertEqual(damping.shape, (6, 6))
 
     def test_a_method_keeps_its_pieces(self):
-        for name in ("firm", "firm+rub", "gauss6+facing+depth", "robust+cluster"):
+        for name in ("firm", "gauss6+facing+depth", "robust+cluster"):
             self.assertEqual(hapsix.Contact(method=name).method, name)
 
 

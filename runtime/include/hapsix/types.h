@@ -152,8 +152,7 @@ typedef enum h6Method {
 } h6Method;
 
 /* Pieces that can be added one by one. The first three turn the paper's methods into `robust`; the
- * next four are options of the Gauss methods (gauss3, gauss6, robust), the last is one of firm. Other
- * methods ignore them. */
+ * others are options of the Gauss methods (gauss3, gauss6, robust). Other methods ignore them all. */
 enum {
   H6_PIECE_FACING = 1u << 0, /* contacts whose normal opposes the field's gradient fade out        */
   H6_PIECE_DEPTH  = 1u << 1, /* contacts enter the density in proportion to their depth            */
@@ -161,9 +160,7 @@ enum {
   H6_PIECE_CLUSTER = 1u << 3, /* weights on clusters: see H6_METHOD_CLUSTER                        */
   H6_PIECE_GEODESIC = 1u << 4, /* angles instead of chords: 2 asin(|dN|/2), the same for T         */
   H6_PIECE_HANDLES = 1u << 5, /* Eq. 13: T = r x F/|F|, in units of the body's radius              */
-  H6_PIECE_PRINTED = 1u << 6, /* Eq. 8 as printed: w = phi / largest phi                           */
-  H6_PIECE_RUB     = 1u << 7  /* firm: pushes that lean off the field's gradient have friction; of
-                                 sessions, h6WeighContacts does not read it                      */
+  H6_PIECE_PRINTED = 1u << 6  /* Eq. 8 as printed: w = phi / largest phi                           */
 };
 
 /* What becomes of an overlap at the start. Parts in their designed place overlap their neighbours:
@@ -202,8 +199,9 @@ typedef struct h6ContactDef {
   h6Fit    fit;             /* of sessions; h6WeighContacts does not read it                       */
   double   fit_offset;      /* play: of sessions, every depth counts less by this, 0 .. 3 voxels of
                                each field                                                     [m]  */
-  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none; of
-                               sessions, h6WeighContacts does not read it. METHOD.md, Sec. 9       */
+  double   friction;        /* mu: Coulomb friction with stiction, 0 .. 10; default 0: none, but
+                               for `firm`, where pushes that lean always rub; of sessions,
+                               h6WeighContacts does not read it. METHOD.md, Sec. 3 and 9           */
   uint64_t reserved[8];
 } h6ContactDef;
 

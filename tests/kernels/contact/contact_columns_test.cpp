@@ -211,7 +211,7 @@ TEST_CASE(
     CHECK(std::fabs(lean_at(angle + 1e-3) - lean_at(angle)) < 4e-3);
   for (const double angle : {0.05, 0.2, 0.4})
     CHECK(lean_at(angle) == doctest::Approx(std::tan(angle)).epsilon(1e-5));
-  for (const double angle : {0.5, 1.5, 3.0}) CHECK(lean_at(angle) == doctest::Approx(0.5));
+  for (const double angle : {0.8, 1.5, 3.0}) CHECK(lean_at(angle) == doctest::Approx(1.0));
 }
 
 TEST_CASE(

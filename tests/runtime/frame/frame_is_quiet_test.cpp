@@ -101,8 +101,7 @@ constexpr Rule kRules[] = {{H6_METHOD_GLOBAL, 0},
                            {H6_METHOD_ROBUST, 0},
                            {H6_METHOD_ROBUST, H6_PIECE_CLUSTER},
                            {H6_METHOD_SERIES, 0},
-                           {H6_METHOD_FIRM, 0},
-                           {H6_METHOD_FIRM, H6_PIECE_RUB}};
+                           {H6_METHOD_FIRM, 0}};
 // Some rules are so soft here that the ball sinks in with a third of its points.
 int points_for(const Rule& rule) {
   const bool soft = rule.pieces || rule.method == H6_METHOD_CLUSTER;
