@@ -333,9 +333,7 @@ template Mat6 friction_turning(const FrictionRows<double>&, const FrictionLaw&, 
 template double friction_yield(const FrictionRows<float>&, const FrictionLaw&, const double*);
 template double friction_yield(const FrictionRows<double>&, const FrictionLaw&, const double*);
 
-bool pushes_rub(const h6ContactDef& def) {
-  return def.method == H6_METHOD_FIRM;
-}
+bool pushes_rub(const h6ContactDef& def) { return def.method == H6_METHOD_FIRM; }
 bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_rub(def); }
 std::size_t rows_of_contact(const h6ContactDef& def) {
   return std::size_t{def.friction > 0} + std::size_t{pushes_rub(def)};

@@ -101,9 +101,9 @@ TEST_CASE("exact derivatives of sticking friction agree with central differences
     const Vec3 n = scene.at[0].R * scene.normal[i], r = scene.at[0].R * scene.point[i];
     for (int k = 0; k < 3; ++k) columns[k].push_back(n[k]), columns[3 + k].push_back(r[k]);
   }
-  const FrictionRows<double> rows{columns[0].data(), columns[1].data(), columns[2].data(),
-                                  columns[3].data(), columns[4].data(), columns[5].data(),
-                                  scene.load.data(), scene.load.size(), scene.total, scene.planes};
+  const FrictionRows<double> rows{
+      columns[0].data(), columns[1].data(), columns[2].data(), columns[3].data(), columns[4].data(),
+      columns[5].data(), scene.load.data(), scene.load.size(), scene.total,       scene.planes};
   Vec6 q;
   q << scene.at[1].R * scene.q.head<3>(), scene.at[1].R * scene.q.tail<3>();
   FrictionSpring spring;
@@ -146,9 +146,9 @@ TEST_CASE("friction is at most mu times the load, in its plane, and only against
     for (int k = 0; k < 3; ++k)
       columns[k].push_back(scene.normal[i][k]), columns[3 + k].push_back(scene.point[i][k]);
   // Together they are no stiffer than k, and k r^2 in rotation.
-  const FrictionRows<double> all{columns[0].data(), columns[1].data(), columns[2].data(),
-                                 columns[3].data(), columns[4].data(), columns[5].data(),
-                                 scene.load.data(), scene.load.size(), scene.total, scene.planes};
+  const FrictionRows<double> all{
+      columns[0].data(), columns[1].data(), columns[2].data(), columns[3].data(), columns[4].data(),
+      columns[5].data(), scene.load.data(), scene.load.size(), scene.total,       scene.planes};
   double radius = 0;
   for (const Vec3& r : scene.point) radius = std::max(radius, r.norm());
   const Mat6 together = friction_stiffness(all, {1e4, 1.0}, scene.q, scene.q);
@@ -166,7 +166,7 @@ TEST_CASE("friction is at most mu times the load, in its plane, and only against
       const bool line = i >= scene.planes;
       const FrictionRows<double> row{&columns[0][i], &columns[1][i], &columns[2][i], &columns[3][i],
                                      &columns[4][i], &columns[5][i], alone,          1,
-                                     scene.total,   line ? 0u : 1u};
+                                     scene.total,    line ? 0u : 1u};
       const Mat6 K = friction_stiffness(row, {1e4, limit}, scene.q, scene.q);
       const Vec3 f = -(K * scene.q).head<3>();
       const double mu = limit / scene.total;
