@@ -41,18 +41,46 @@ class Loop {
   double factors_[6][kWaves][2];
 };
 
+// A body that a hand leads without a coupling: the hand feels the whole wrench, friction included.
+class Lead {
+ public:
+  Lead(const io::LoadedScene& loaded, const MethodColumn& method) {
+    h6SessionDef def = loaded.session_def();
+    method.apply(def.contact);
+    def.contact.damping = 0;
+    def.contact.fit = H6_FIT_TIGHT;
+    def.gravity = {};
+    h6HandDef hand = h6DefaultHandDef();
+    hand.body = 1;
+    hand.coupling.mode = H6_COUPLING_DIRECT;
+    def.hands = &hand, def.hand_count = 1;
+    session_.reset(h6CreateSession(loaded.model.get(), &def, nullptr));
+  }
+  explicit operator bool() const { return session_ != nullptr; }
+  h6Wrench at(const h6Pose& pose) {
+    h6DeviceSample sample{};
+    sample.pose = pose;
+    h6DeviceCommand command{};
+    h6Step(session_.get(), &sample, &command);
+    return command.wrench;
+  }
+
+ private:
+  SessionPtr session_;
+};
+
 // The contacts' net work over the loop, divided by the greatest work that they gave or took on the
 // way; 0 where nothing touches. The body's frame is at its centre of mass.
 double net_work(const io::LoadedScene& loaded, const MethodColumn& method, const Loop& loop,
                 const h6Vec3& centre) {
-  Probe probe(loaded, method);
-  if (!probe) return 0;
+  Lead lead(loaded, method);
+  if (!lead) return 0;
   double work = 0, least = 0, most = 0;
   h6Pose last = loop.at(centre, 0);
-  h6Wrench f0 = elastic_wrench(probe.at(last), kProbeStiffness);
+  h6Wrench f0 = lead.at(last);
   for (int i = 1; i <= kLoopSteps; ++i) {
     const h6Pose next = loop.at(centre, static_cast<double>(i) / kLoopSteps);
-    const h6Wrench f1 = elastic_wrench(probe.at(next), kProbeStiffness);
+    const h6Wrench f1 = lead.at(next);
     work += 0.5 * dot(f0.force + f1.force, next.p - last.p) +
             0.5 * dot(f0.torque + f1.torque, turn(last.q, next.q));
     least = std::min(least, work), most = std::max(most, work);
@@ -90,13 +118,13 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
   Study out;
   out.title = "Random closed loops";
   out.about =
-      "A body is led around " + std::to_string(loops) +
+      "A hand without a coupling leads a body around " + std::to_string(loops) +
       " random closed loops in six dimensions, at most some 0.6 voxels "
       "deep: a box of 20 mm (400 points) on a plane and on a ridge of 4 mm radius, and a peg of 6 "
       "mm (760 points) in a hole of 6.2. The fields' lattices are turned by 0.75 rad against the "
-      "surfaces. The table gives the contacts' net work over a loop, relative to the range of "
-      "work on the way: the root mean square over the loops, and the largest. A conservative "
-      "force gives 0.";
+      "surfaces. The table gives the contacts' net work over a loop, friction included, relative "
+      "to the range of work on the way: the root mean square over the loops of what they make, of "
+      "what they take, and the most that they make. A conservative force gives 0.";
   std::vector<Place> all = places();
   std::vector<std::vector<double>> found(all.size() * columns.size(), std::vector<double>(loops));
   std::vector<std::unique_ptr<io::LoadedScene>> scenes;
@@ -118,11 +146,15 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
   for (std::size_t at = 0; at < found.size(); ++at) {
     const std::string name = all[at / columns.size()].name;
     if (at % columns.size() == 0) out.table.push_back({name});
-    double sum = 0, most = 0;
-    for (const double w : found[at])
-      sum += w * w / static_cast<double>(loops), most = std::max(most, std::fabs(w));
-    out.table.back().push_back(number(std::sqrt(sum), 3) + ", " + number(most, 3));
-    out.json[name][columns[at % columns.size()].name] = {{"rms", std::sqrt(sum)}, {"most", most}};
+    double made = 0, taken = 0, most = 0;
+    for (const double w : found[at]) {
+      (w > 0 ? made : taken) += w * w / static_cast<double>(loops);
+      most = std::max(most, w);
+    }
+    made = std::sqrt(made), taken = std::sqrt(taken);
+    out.table.back().push_back(number(made, 3) + ", " + number(taken, 3) + ", " + number(most, 3));
+    out.json[name][columns[at % columns.size()].name] = {
+        {"made", made}, {"taken", taken}, {"most", most}};
   }
   return out;
 }
