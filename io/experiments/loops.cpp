@@ -146,15 +146,17 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
   for (std::size_t at = 0; at < found.size(); ++at) {
     const std::string name = all[at / columns.size()].name;
     if (at % columns.size() == 0) out.table.push_back({name});
-    double made = 0, taken = 0, most = 0;
+    double made = 0, taken = 0, most = 0, most_made = 0;
     for (const double w : found[at]) {
       (w > 0 ? made : taken) += w * w / static_cast<double>(loops);
-      most = std::max(most, w);
+      most = std::max(most, std::fabs(w)), most_made = std::max(most_made, w);
     }
+    const double rms = std::sqrt(made + taken);
     made = std::sqrt(made), taken = std::sqrt(taken);
-    out.table.back().push_back(number(made, 3) + ", " + number(taken, 3) + ", " + number(most, 3));
+    out.table.back().push_back(number(made, 3) + ", " + number(taken, 3) + ", " +
+                               number(most_made, 3));
     out.json[name][columns[at % columns.size()].name] = {
-        {"made", made}, {"taken", taken}, {"most", most}};
+        {"rms", rms}, {"most", most}, {"made", made}, {"taken", taken}};
   }
   return out;
 }

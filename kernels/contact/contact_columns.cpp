@@ -60,27 +60,6 @@ void facing_simd(const ContactColumns& c, float edge, float* facing) {
   }
 }
 
-void lean_simd(const ContactColumns& c, float* lean) {
-  const DF d;
-  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), per_lean = hn::Set(d, 1 / kNoLean);
-  const auto per_most = hn::Set(d, 1 / kMostRub);
-  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
-    const std::size_t live = c.count - i;
-    const auto nx = load_n(d, c.nx + i, live), gx = load_n(d, c.gx + i, live);
-    const auto ny = load_n(d, c.ny + i, live), gy = load_n(d, c.gy + i, live);
-    const auto nz = load_n(d, c.nz + i, live), gz = load_n(d, c.gz + i, live);
-    const auto x = hn::NegMulAdd(nz, gy, hn::Mul(ny, gz));
-    const auto y = hn::NegMulAdd(nx, gz, hn::Mul(nz, gx));
-    const auto z = hn::NegMulAdd(ny, gx, hn::Mul(nx, gy));
-    const auto sine = hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))));
-    const auto cosine = hn::MulAdd(nx, gx, hn::MulAdd(ny, gy, hn::Mul(nz, gz)));
-    const auto t = hn::IfThenElseZero(hn::Gt(sine, zero),
-                                      hn::Div(sine, hn::Max(hn::Mul(sine, per_most), cosine)));
-    const auto share = hn::Min(hn::Max(hn::MulSub(t, per_lean, one), zero), one);
-    store_n(hn::Mul(t, share), d, lean + i, live);
-  }
-}
-
 // G and the lean towards it, of contacts with distances around them.
 struct Slope {
   hn::Vec<DF> g[3], lean;
@@ -230,7 +209,6 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(facing_simd);
-HWY_EXPORT(lean_simd);
 HWY_EXPORT(directions_simd);
 HWY_EXPORT(firmness_simd);
 HWY_EXPORT(torque_simd);
@@ -241,7 +219,6 @@ HWY_EXPORT(loads_simd);
 void contact_facing(const ContactColumns& c, float edge, float* facing) {
   HWY_DYNAMIC_DISPATCH(facing_simd)(c, edge, facing);
 }
-void push_lean(const ContactColumns& c, float* lean) { HWY_DYNAMIC_DISPATCH(lean_simd)(c, lean); }
 void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
                      float* facing) {
   HWY_DYNAMIC_DISPATCH(directions_simd)(c, around, nx, ny, nz, facing);

@@ -46,15 +46,6 @@ void push_directions(const ContactColumns& c, const Around* around, float* nx, f
 void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
                          float* nz, float* facing);
 
-// How far the push n of each contact leans off the unit gradient g, as the tangent of the angle
-// between them: at most kMostRub, and 0 below kNoLean, since thousands of contacts on a flat or
-// slightly curved wall lean so little.
-//   t    = |n x g| / max(|n x g| / kMostRub, n.g)
-//   lean = t clamp(t / kNoLean - 1, 0, 1)
-inline constexpr float kNoLean = 0.02f, kMostRub = 1.0f;
-void push_lean(const ContactColumns& c, float* lean);
-void push_lean_ref(const ContactColumns& c, float* lean);
-
 // How much each contact counts in the density, and the stiffness rho of its direction. METHOD.md,
 // Sec. 3, "Firm".
 //   present   = clamp(max(depth, present), 0, full)                    [m]

@@ -26,18 +26,6 @@ void contact_facing_ref(const ContactColumns& c, float edge, float* facing) {
   }
 }
 
-void push_lean_ref(const ContactColumns& c, float* lean) {
-  for (std::size_t i = 0; i < c.count; ++i) {
-    const double n[3] = {c.nx[i], c.ny[i], c.nz[i]}, g[3] = {c.gx[i], c.gy[i], c.gz[i]};
-    const double x = n[1] * g[2] - n[2] * g[1], y = n[2] * g[0] - n[0] * g[2];
-    const double z = n[0] * g[1] - n[1] * g[0];
-    const double sine = std::sqrt(x * x + y * y + z * z);
-    const double cosine = n[0] * g[0] + n[1] * g[1] + n[2] * g[2];
-    const double t = sine > 0 ? sine / std::max(sine / kMostRub, cosine) : 0;
-    lean[i] = static_cast<float>(t * std::clamp(t / kNoLean - 1, 0.0, 1.0));
-  }
-}
-
 void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
                          float* nz, float* facing) {
   for (std::size_t i = 0; i < c.count; ++i) {

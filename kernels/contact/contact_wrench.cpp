@@ -17,6 +17,7 @@
 // After foreach_target.h.
 #include "hwy/highway.h"
 #include "kernels/tail-inl.h"
+#include "kernels/totals-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
@@ -125,30 +126,10 @@ HWY_INLINE void add_row(const double* factor, const double (*columns)[kStage], s
   for (int col = kFrom; col < 6; ++col) hn::Store(lanes[col], d, sum[col]);
 }
 
-#if HWY_TARGET != HWY_SCALAR
-// Adds the halves of a vector until two lanes are left.
-template <class D>
-HWY_INLINE void store_two(D d, hn::Vec<D> both, double* to) {
-  if constexpr (hn::MaxLanes(D()) > 2) {
-    const hn::Half<D> half;
-    store_two(half, hn::Add(hn::LowerHalf(half, both), hn::UpperHalf(half, both)), to);
-  } else {
-    hn::StoreU(both, d, to);
-  }
-}
-#endif
-
-// The sums of lanes, two at a time.
 HWY_INLINE void total(const Sums& sums, int count, double* to) {
   const DD d;
-  for (int k = 0; k < count; k += 2) {
-    const VD a = hn::Load(d, sums.lanes[k]), b = hn::Load(d, sums.lanes[k + 1]);
-#if HWY_TARGET == HWY_SCALAR
-    to[k] = hn::GetLane(a), to[k + 1] = hn::GetLane(b);
-#else
-    store_two(d, hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b)), to + k);
-#endif
-  }
+  for (int k = 0; k < count; k += 2)
+    total_two(hn::Load(d, sums.lanes[k]), hn::Load(d, sums.lanes[k + 1]), to + k);
 }
 
 void contact_wrench_simd(const WrenchColumns& contacts, const WrenchParameters& parameters,

@@ -2,10 +2,11 @@
 // friction.cpp - follows the friction spring of each pair, lets it slip, and sums its wrench.
 #include "runtime/contact/friction.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
+#include "runtime/base/solve_positive.h"
 #include "runtime/contact/contact_stages.h"
 #include "runtime/contact/weighing.h"
 
@@ -19,36 +20,6 @@ constexpr int kYieldSteps = 4;  // of Newton's method
 // Components of the stretch that no contact feels fade; the others keep all but this share in a
 // step.
 constexpr double kFade = 1e-12;
-
-struct Row {
-  Vec3 n, r;
-  bool line;
-};
-template <class T>
-Row row_at(const FrictionRows<T>& c, std::size_t i) {
-  const Vec3 n(c.nx[i], c.ny[i], c.nz[i]);
-  // A step of Newton's method makes the unit vector of floats one of doubles.
-  return {(1.5 - 0.5 * n.squaredNorm()) * n, Vec3(c.rx[i], c.ry[i], c.rz[i]), i >= c.planes};
-}
-
-Vec3 moved_at(const Row& row, const Vec6& q) { return q.head<3>() + q.tail<3>().cross(row.r); }
-double along(const Row& row, const Vec6& q) { return row.n.dot(moved_at(row, q)); }
-// How far the motion q stretches a row. Along a line the way back is free.
-Vec3 stretched(const Row& row, const Vec6& q) {
-  if (row.line) return std::max(along(row, q), 0.0) * row.n;
-  return moved_at(row, q) - along(row, q) * row.n;
-}
-
-// s: the secant of a contact's force over its stretch. It is the larger of the stretches now and at
-// the end of the step that counts: METHOD.md, Sec. 9, needs the first for passivity.
-template <class T>
-double secant(const FrictionRows<T>& rows, const FrictionLaw& law, std::size_t i, const Row& row,
-              const Vec6& q, const Vec6& ahead) {
-  const double squared =
-      std::max(stretched(row, q).squaredNorm(), stretched(row, ahead).squaredNorm());
-  const double share = law.stiffness * rows.load[i] / rows.total;
-  return squared > law.limit * law.limit ? share * law.limit / std::sqrt(squared) : share;
-}
 
 Vec6 rotated(const Mat3& R, const Vec6& q) {
   Vec6 out;
@@ -67,12 +38,11 @@ double put_in(const FrictionSpring& spring, const Vec6& q, const Vec6& moved) {
 // The relative motion since the last step, in the axes of b. The spring then stands at the present
 // poses.
 Vec6 follow(FrictionSpring& spring, const Body& a, const Body& b) {
-  const Mat3 turn = b.R.transpose();
-  const Vec3 X = turn * (a.x - b.x);
-  const Mat3 Q = turn * a.R;
+  const Vec3 X = b.R.transpose() * (a.x - b.x);
+  const Quat Q = b.q.conjugate() * a.q;
   Vec6 moved = Vec6::Zero();
   if (spring.holds) {
-    moved << X - spring.X, log_rotation(Quat(Mat3(Q * spring.Q.transpose())));
+    moved << X - spring.X, log_rotation(Q * spring.Q.conjugate());
     spring.energy += put_in(spring, rotated(spring.Rb, spring.q), rotated(spring.Rb, moved));
   }
   spring.holds = true;
@@ -89,89 +59,84 @@ double normal_load(const Contacts& c, const h6ContactDef& def, const Vec6& u, st
   return double{c.weight[i]} * std::max(0.0, double{c.depth[i]} - def.damping * leaves);
 }
 
-// The rows of a pair, in the scratch.
-class RowWriter {
- public:
-  RowWriter(const Contacts& c, const h6ContactDef& def, const Vec6& u, const FrictionScratch& s)
-      : c_(c), def_(def), u_(u), s_(s) {}
-
-  // A row of contact i along its plane (axis n) or a line (axis e).
-  void add(std::size_t i, double mu, const Vec3& axis) {
-    const double load = mu * normal_load(c_, def_, u_, i);
-    if (!(load > 0)) return;
-    for (int k = 0; k < 3; ++k) s_.row[k][count_] = static_cast<float>(axis[k]);
-    s_.row[3][count_] = c_.rx[i], s_.row[4][count_] = c_.ry[i], s_.row[5][count_] = c_.rz[i];
-    s_.load[count_++] = load;
-    total_ += load;
+FrictionRows<float> rows_that_rub(const Contacts& c, const h6ContactDef& def, const Pair& pair,
+                                  const Vec6& u, const FrictionScratch& s) {
+  const kernels::ContactColumns at = kernel_columns(c, pair.begin, pair.end);
+  FrictionRows<float> rows{};
+  float* load = s.load;
+  if (def.friction > 0) {
+    rows.planes = {at.nx, at.ny, at.nz, at.rx, at.ry, at.rz, load, at.count, false};
+    for (std::size_t i = 0; i < at.count; ++i) {
+      const double most = def.friction * normal_load(c, def, u, pair.begin + i);
+      load[i] = most > 0 ? static_cast<float>(most) : 0;
+      rows.total += load[i];
+    }
+    load += at.count;
   }
-  void end_planes() { planes_ = count_; }
-  FrictionRows<float> rows() const {
-    return {s_.row[0], s_.row[1], s_.row[2], s_.row[3], s_.row[4],
-            s_.row[5], s_.load,   count_,    total_,    planes_};
+  if (pushes_rub(def)) {
+    float* const* to = s.line;
+    const kernels::PushLineRows lines = kernels::push_lines(
+        at, c.load + pair.begin, {to[0], to[1], to[2], to[3], to[4], to[5], load});
+    rows.lines = {to[0], to[1], to[2], to[3], to[4], to[5], load, lines.count, true};
+    rows.total += lines.total;
+  }
+  return rows;
+}
+
+// How far the rows of a pair are stretched.
+class Stretches {
+ public:
+  Stretches(const FrictionRows<float>& rows, const FrictionScratch& s, const Vec6& q)
+      : s_(s), count_(rows.planes.count + rows.lines.count), limit_(rows.total) {
+    double* to = s.stretch;
+    for (const kernels::FrictionRows* some : {&rows.planes, &rows.lines}) {
+      if (some->count > 0) kernels::friction_stretch(*some, q.data(), to);
+      to += some->count;
+    }
+  }
+  // Sums over the rows when each has `share` of its stretch.
+  kernels::FrictionSums at(double share) const {
+    return kernels::friction_sums(s_.load, s_.stretch, count_, share, limit_);
+  }
+  // The share, 0 .. 1, of its stretch that the spring keeps. `whole`: at(1).
+  double yield(const kernels::FrictionSums& whole) const {
+    // Rows along a line that are on their way back have no say.
+    const double most = limit_ * whole.stretched;
+    if (!(whole.linear > most)) return 1;
+    // The share of the load that slips is concave in the share of the stretch, so Newton's method
+    // comes from below.
+    double share = kSlipping * most / whole.linear;
+    for (int step = 0; step < kYieldSteps; ++step) {
+      const kernels::FrictionSums now = at(share);
+      const double slips = now.capped / most, slope = now.sticking / (share * most);
+      if (!(slope > 0) || !(slips < kSlipping)) break;
+      share += (kSlipping - slips) / slope;
+    }
+    return std::min(1.0, share / kSlipping);
   }
 
  private:
-  const Contacts& c_;
-  const h6ContactDef& def_;
-  const Vec6& u_;
   const FrictionScratch& s_;
-  std::size_t count_ = 0, planes_ = 0;
-  double total_ = 0;
+  std::size_t count_;
+  double limit_;
 };
-
-FrictionRows<float> rows_that_rub(const Contacts& c, const h6ContactDef& def, const Pair& pair,
-                                  const Vec6& u, const FrictionScratch& s) {
-  RowWriter out(c, def, u, s);
-  if (def.friction > 0)
-    for (std::size_t i = pair.begin; i < pair.end; ++i)
-      out.add(i, def.friction, Vec3(c.nx[i], c.ny[i], c.nz[i]));
-  out.end_planes();
-  if (!pushes_rub(def)) return out.rows();
-  kernels::push_lean(kernel_columns(c, pair.begin, pair.end), s.lean);
-  for (std::size_t i = pair.begin; i < pair.end; ++i) {
-    const double mu = s.lean[i - pair.begin];
-    if (!(mu > 0)) continue;
-    // Along e the depth grows, while the push does no work.
-    const Vec3 n(c.nx[i], c.ny[i], c.nz[i]), g(c.gx[i], c.gy[i], c.gz[i]);
-    out.add(i, mu, (n * n.dot(g) - g).normalized());
-  }
-  return out.rows();
-}
-
-// The energy of the spring when each row has `share` of its stretch [J], and whether a row slips.
-struct Stored {
-  double energy = 0;
-  bool slips = false;
-};
-Stored stored_in(const FrictionRows<float>& rows, const FrictionLaw& law, const double* stretch,
-                 double share) {
-  Stored sum;
-  for (std::size_t i = 0; i < rows.count; ++i) {
-    const double z = share * stretch[i];
-    sum.slips = sum.slips || z > law.limit;
-    sum.energy += rows.load[i] * (z > law.limit ? law.limit * (z - 0.5 * law.limit) : 0.5 * z * z);
-  }
-  sum.energy *= law.stiffness / rows.total;
-  return sum;
-}
 
 // Lets the spring slip, and keeps its energy within what was put in. `q`: in world axes.
-void slip(const FrictionRows<float>& rows, const FrictionLaw& law, FrictionSpring& spring, Vec6& q,
-          double* stretch) {
-  for (std::size_t i = 0; i < rows.count; ++i) stretch[i] = stretched(row_at(rows, i), q).norm();
-  double share = friction_yield(rows, law, stretch);
-  Stored stored = stored_in(rows, law, stretch, share);
+void slip(const Stretches& rows, const FrictionLaw& law, FrictionSpring& spring, Vec6& q) {
+  kernels::FrictionSums sums = rows.at(1);
+  double share = rows.yield(sums);
+  if (share < 1) sums = rows.at(share);
   const double most = std::max(spring.energy, 0.0);
-  if (stored.energy > most) {
+  double stored = law.stiffness / law.limit * sums.energy;
+  if (stored > most) {
     // Where rows slip the energy grows less than with the square, but at least in proportion.
-    const double ratio = most / stored.energy;
-    share *= stored.slips ? ratio : std::sqrt(ratio);
-    stored.energy = most;
+    const double ratio = most / stored;
+    share *= sums.slips ? ratio : std::sqrt(ratio);
+    stored = most;
   }
   q *= share;
   // The account never holds more than the spring can at its limit.
-  spring.energy =
-      std::min(most, std::max(stored.energy, 0.5 * law.stiffness * law.limit * law.limit));
+  spring.energy = std::min(most, std::max(stored, 0.5 * law.stiffness * law.limit * law.limit));
 }
 
 // Removes from q what no contact feels, such as the turn of a wheel that rolls.
@@ -179,20 +144,23 @@ void forget_unfelt(const Mat6& K, double stiffness, double lever, Vec6& q) {
   Vec6 least;
   least.head<3>().setConstant(kFade * stiffness);
   least.tail<3>().setConstant(kFade * stiffness * lever * lever);
-  Mat6 A = K;
+  Mat6 A;
+  A.topRows<3>() = K.topRows<3>(), A.bottomRows<3>() = K.bottomRows<3>();
   A.diagonal() += least;
-  q -= A.llt().solve(Vec6(least.cwiseProduct(q)));
+  Vec6 unfelt;
+  if (solve_positive(A, Vec6(least.cwiseProduct(q)), unfelt)) q -= unfelt;
 }
 
 bool moves_in_step(const Body& body) { return !body.fixed && body.motion != Motion::held; }
 bool has_mass(const Body& body) { return !body.fixed && body.motion == Motion::dynamic; }
 
 void sum_pair(const Settings& set, const Body& a, const Body& b, const Vec6& u,
-              const FrictionRows<float>& rows, double* stretch, FrictionSpring& spring) {
+              const FrictionRows<float>& rows, const FrictionScratch& scratch,
+              FrictionSpring& spring) {
   const FrictionLaw law{set.contact.stiffness, rows.total};
   const Vec6 moved = follow(spring, a, b);
   Vec6 q = rotated(b.R, spring.q);
-  slip(rows, law, spring, q, stretch);
+  slip(Stretches(rows, scratch, q), law, spring, q);
   const Vec6 damped = q + set.contact.damping * u;
   const bool mass = has_mass(a) || has_mass(b);
   spring.implicit = set.integrator == H6_IMPLICIT && (moves_in_step(a) || moves_in_step(b));
@@ -200,13 +168,15 @@ void sum_pair(const Settings& set, const Body& a, const Body& b, const Vec6& u,
   // An implicit step goes on about as fast as the bodies are; those without mass, as the last one.
   Vec6 ahead = damped;
   if (spring.implicit) ahead += mass ? Vec6(set.dt * u) : rotated(b.R, moved);
-  spring.K = friction_stiffness(rows, law, q, ahead);
-  spring.elastic = -(spring.K * q);
+  friction_stiffness(rows, law, q, ahead, spring.K);
   spring.f = -(spring.K * damped);
-  if (set.gradient == H6_EXACT) spring.turning = friction_turning(rows, law, q, ahead);
+  if (set.gradient == H6_EXACT) {
+    spring.elastic = -(spring.K * q);
+    spring.turning = friction_turning(rows, law, q, ahead);
+  }
   forget_unfelt(spring.K, law.stiffness, series_lever(a.radius, a.voxel), q);
   spring.q = rotated(b.R.transpose(), q);
-  if (!spring.q.allFinite() || !spring.K.allFinite()) spring = {};
+  if (!spring.q.allFinite() || !spring.f.allFinite()) spring = {};
 }
 
 // How the wrenches change with the poses beyond K: the springs lie in the field's axes, so only a
@@ -236,60 +206,80 @@ Vec6 velocity_of(const Body& body) {
 // The solve takes a body that it does not move for standing still. The spring, which sticks, must
 // go along with an obstacle that a program or a hand moves, so its wrench gets that part
 // beforehand.
-void lead(const Settings& set, const Sides& sides, const Mat6& S, const Mat6& K) {
+void lead(const Settings& set, const Sides& sides, const Mat6& K) {
   const Body &a = sides.a, &b = sides.b;
   if (set.integrator != H6_IMPLICIT || has_mass(a) == has_mass(b)) return;
+  const Body& obstacle = has_mass(a) ? b : a;
+  if (obstacle.v.isZero(0) && obstacle.w.isZero(0)) return;
+  const Mat6 S = arm_shift(a, b);
   if (has_mass(a)) sides.on_a.f += set.dt * (K * (S.transpose() * velocity_of(b)));
   if (has_mass(b)) sides.on_b.f += set.dt * (S * (K * velocity_of(a)));
+}
+
+// ---- one row after the other, for the derivatives
+
+struct Row {
+  Vec3 n, r;
+  bool line;
+};
+template <class T>
+Row row_at(const kernels::FrictionRowsT<T>& c, std::size_t i) {
+  const Vec3 n(c.nx[i], c.ny[i], c.nz[i]);
+  // A step of Newton's method makes the unit vector of floats one of doubles.
+  return {(1.5 - 0.5 * n.squaredNorm()) * n, Vec3(c.rx[i], c.ry[i], c.rz[i]), c.lines};
+}
+Vec3 moved_at(const Row& row, const Vec6& q) { return q.head<3>() + q.tail<3>().cross(row.r); }
+// How far the motion q stretches a row. Along a line the way back is free.
+Vec3 stretched(const Row& row, const Vec6& q) {
+  const Vec3 moved = moved_at(row, q);
+  const double along = row.n.dot(moved);
+  return row.line ? Vec3(std::max(along, 0.0) * row.n) : Vec3(moved - along * row.n);
+}
+
+// A row's friction over its stretch is the load's share of the stiffness up to the limit, and falls
+// with the stretch beyond it. The larger of the stretches now and at the end of the step counts:
+// METHOD.md, Sec. 9, needs the first for passivity.
+template <class T>
+kernels::FrictionSecant secant_of(const FrictionRows<T>& rows, const FrictionLaw& law) {
+  return {law.stiffness * law.limit / rows.total, law.limit};
 }
 
 }  // namespace
 
 template <class T>
-Mat6 friction_stiffness(const FrictionRows<T>& rows, const FrictionLaw& law, const Vec6& q,
-                        const Vec6& ahead) {
-  // In the plane J_t^T J_t is that of a spring in all directions less J J^T, J = [n; r x n]; along
-  // a line it is J J^T.
-  double sum = 0;
-  Vec3 arms = Vec3::Zero();
-  Mat3 squares = Mat3::Zero();
-  Mat6 K = Mat6::Zero();
-  for (std::size_t i = 0; i < rows.count; ++i) {
-    const Row row = row_at(rows, i);
-    if (row.line && along(row, q) < 0) continue;
-    const double s = secant(rows, law, i, row, q, ahead);
-    Vec6 J;
-    J << row.n, row.r.cross(row.n);
-    K.noalias() += (row.line ? s : -s) * J * J.transpose();
-    if (row.line) continue;
-    sum += s;
-    arms += s * row.r;
-    squares.noalias() += s * row.r * row.r.transpose();
+void friction_stiffness(const FrictionRows<T>& rows, const FrictionLaw& law, const Vec6& q,
+                        const Vec6& ahead, Mat6& K) {
+  const kernels::FrictionSecant secant = secant_of(rows, law);
+  clear(K);
+  for (const kernels::FrictionRowsT<T>* some : {&rows.planes, &rows.lines}) {
+    if (some->count == 0) continue;
+    if constexpr (std::is_same_v<T, float>)
+      kernels::friction_stiffness(*some, secant, q.data(), ahead.data(), K.data());
+    else
+      kernels::friction_stiffness_ref(*some, secant, q.data(), ahead.data(), K.data());
   }
-  K.topLeftCorner<3, 3>().diagonal().array() += sum;
-  K.topRightCorner<3, 3>() -= cross_matrix(arms);
-  K.bottomLeftCorner<3, 3>() += cross_matrix(arms);
-  K.bottomRightCorner<3, 3>() += squares.trace() * Mat3::Identity() - squares;
-  return K;
 }
 
 template <class T>
 Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const Vec6& q,
                       const Vec6& ahead) {
+  const kernels::FrictionSecant secant = secant_of(rows, law);
   const Mat3 turn = cross_matrix(q.tail<3>());
   Mat3 force = Mat3::Zero(), torque = Mat3::Zero();
-  for (std::size_t i = 0; i < rows.count; ++i) {
-    const Row row = row_at(rows, i);
-    if (row.line && along(row, q) < 0) continue;
-    const Vec3 &n = row.n, &r = row.r;
-    const double s = secant(rows, law, i, row, q, ahead);
-    const Vec3 moved = moved_at(row, q);
-    const Mat3 arm = cross_matrix(r), arms_turn = turn * arm;
-    const Mat3 by_axis = n * (n.transpose() * arms_turn) + n.dot(moved) * cross_matrix(n) -
-                         n * n.cross(moved).transpose();
-    const Mat3 by_turn = s * (row.line ? by_axis : Mat3(arms_turn - by_axis));
-    force += by_turn;
-    torque += arm * by_turn - s * cross_matrix(stretched(row, q)) * arm;
+  for (const kernels::FrictionRowsT<T>* some : {&rows.planes, &rows.lines}) {
+    for (std::size_t i = 0; i < some->count; ++i) {
+      const Row row = row_at(*some, i);
+      const Vec3 &n = row.n, &r = row.r, moved = moved_at(row, q);
+      if (!(some->load[i] > 0) || (row.line && n.dot(moved) < 0)) continue;
+      const double z = std::max(stretched(row, q).norm(), stretched(row, ahead).norm());
+      const double s = secant.scale * some->load[i] / std::max(secant.limit, z);
+      const Mat3 arm = cross_matrix(r), arms_turn = turn * arm;
+      const Mat3 by_axis = n * (n.transpose() * arms_turn) + n.dot(moved) * cross_matrix(n) -
+                           n * n.cross(moved).transpose();
+      const Mat3 by_turn = s * (row.line ? by_axis : Mat3(arms_turn - by_axis));
+      force += by_turn;
+      torque += arm * by_turn - s * cross_matrix(stretched(row, q)) * arm;
+    }
   }
   Mat6 out = Mat6::Zero();
   out.topRightCorner<3, 3>() = force;
@@ -297,41 +287,14 @@ Mat6 friction_turning(const FrictionRows<T>& rows, const FrictionLaw& law, const
   return out;
 }
 
-template <class T>
-double friction_yield(const FrictionRows<T>& rows, const FrictionLaw& law, const double* stretch) {
-  // Rows along a line that are on their way back have no say.
-  double total = 0, sum = 0;
-  for (std::size_t i = 0; i < rows.count; ++i) {
-    if (stretch[i] > 0) total += rows.load[i];
-    sum += rows.load[i] * stretch[i];
-  }
-  if (!(sum > law.limit * total)) return 1;
-  // The share of the load that slips is concave in the share of the stretch, so Newton's method
-  // comes from below.
-  double share = kSlipping * law.limit * total / sum;
-  for (int step = 0; step < kYieldSteps; ++step) {
-    double slips = 0, slope = 0;
-    for (std::size_t i = 0; i < rows.count; ++i) {
-      const double part = rows.load[i] / total, z = stretch[i] / law.limit;
-      slips += part * std::min(1.0, share * z);
-      if (share * z < 1) slope += part * z;
-    }
-    if (!(slope > 0) || !(slips < kSlipping)) break;
-    share += (kSlipping - slips) / slope;
-  }
-  return std::min(1.0, share / kSlipping);
-}
-
-template Mat6 friction_stiffness(const FrictionRows<float>&, const FrictionLaw&, const Vec6&,
-                                 const Vec6&);
-template Mat6 friction_stiffness(const FrictionRows<double>&, const FrictionLaw&, const Vec6&,
-                                 const Vec6&);
+template void friction_stiffness(const FrictionRows<float>&, const FrictionLaw&, const Vec6&,
+                                 const Vec6&, Mat6&);
+template void friction_stiffness(const FrictionRows<double>&, const FrictionLaw&, const Vec6&,
+                                 const Vec6&, Mat6&);
 template Mat6 friction_turning(const FrictionRows<float>&, const FrictionLaw&, const Vec6&,
                                const Vec6&);
 template Mat6 friction_turning(const FrictionRows<double>&, const FrictionLaw&, const Vec6&,
                                const Vec6&);
-template double friction_yield(const FrictionRows<float>&, const FrictionLaw&, const double*);
-template double friction_yield(const FrictionRows<double>&, const FrictionLaw&, const double*);
 
 bool pushes_rub(const h6ContactDef& def) { return def.method == H6_METHOD_FIRM; }
 bool contacts_rub(const h6ContactDef& def) { return def.friction > 0 || pushes_rub(def); }
@@ -349,8 +312,8 @@ void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& 
     const FrictionScratch& scratch = lane.scratch->friction;
     const FrictionRows<float> rows = rows_that_rub(shell.contacts, set.contact, pair, u, scratch);
     if (rows.total > 0)
-      sum_pair(set, a, b, u, rows, scratch.stretch, spring);
-    else
+      sum_pair(set, a, b, u, rows, scratch, spring);
+    else if (spring.holds)
       spring = {};
   }
 }
@@ -358,21 +321,22 @@ void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& 
 void add_friction(const Settings& set, const Sides& sides, Pair& pair,
                   const FrictionSpring& spring) {
   if (!spring.holds) return;
-  const Mat6 S = arm_shift(sides.a, sides.b);
   const Mat6& K = spring.K;
   const double beta = set.contact.damping;
   if (!sides.a.fixed) sides.on_a.f += spring.f, sides.on_a.K -= K, sides.on_a.D -= beta * K;
+  lead(set, sides, K);
+  if (sides.b.fixed && !pair.between && set.gradient != H6_EXACT) return;
+  const Mat6 S = arm_shift(sides.a, sides.b), KS = K * S.transpose();
   if (!sides.b.fixed) {
-    const Mat6 SKS = S * (K * S.transpose());
+    const Mat6 SKS = S * KS;
     sides.on_b.f -= S * spring.f, sides.on_b.K -= SKS, sides.on_b.D -= beta * SKS;
   }
   if (pair.between) {
-    const Mat6 KS = K * S.transpose(), SK = S * K;
+    const Mat6 SK = S * K;
     pair.between->Kab += KS, pair.between->Dab += beta * KS;
     pair.between->Kba += SK, pair.between->Dba += beta * SK;
   }
   if (set.gradient == H6_EXACT) add_turning(sides, S, pair, spring);
-  lead(set, sides, S, K);
 }
 
 }  // namespace h6

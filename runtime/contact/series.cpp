@@ -8,9 +8,9 @@
 //     d f_p / d q = -k (delta_pq B_p - C_p A^-1 B_q),     summed over p: -k G A^-1 B_q
 // Each block of the system follows as in sum_wrench.cpp; S_p carries wrenches to b_p. In symmetric
 // form B_p = C_p.
-#include <Eigen/LU>
 #include <algorithm>
 
+#include "runtime/base/solve_positive.h"
 #include "runtime/contact/contact_stages.h"
 #include "runtime/contact/deformation.h"
 #include "runtime/contact/weighing.h"
@@ -114,15 +114,20 @@ void join_series(const Settings& set, std::span<const Body> bodies, ShellBody& s
     B += row_major(pair.sum.stiffness);
     C += row_major(pair.sum.damping);
   }
-  const Mat6 inverse = (G + C).inverse();
+  const Mat6 inverse = inverse_of_positive(G + C);  // C is semidefinite
+  const Mat6 IC = inverse * C;
   if (!a.fixed) {
-    acting[shell.body].K -= k * G * inverse * B;
-    acting[shell.body].D -= k * beta * G * inverse * C;
+    const Mat6 GIC = k * (G.diagonal().asDiagonal() * IC);
+    acting[shell.body].D -= beta * GIC;
+    if (set.gradient == H6_EXACT)
+      acting[shell.body].K -= k * G * inverse * B;
+    else
+      acting[shell.body].K -= GIC;
   }
   for (Pair& pair : shell.pairs) {
     if (pair.begin == pair.end) continue;
     const Mat6 Bp = row_major(pair.sum.stiffness), Cp = row_major(pair.sum.damping);
-    pair.B = k * (Cp - Cp * inverse * C);
+    pair.B = k * (Cp - Cp * IC);
     if (!pair.of_fields) continue;
     BetweenFields& to = *pair.of_fields;
     LinearWrench& on_b = acting[pair.b];

@@ -45,11 +45,11 @@ Mat6 arm_shift(const Body& a, const Body& b) {
 }
 
 Vec6 pair_velocity(const Body& a, const Body& b) {
-  Vec6 ua, ub;
-  ua << a.v, a.w;
-  if (a.bend) ua.head<3>() += a.w.cross(a.bend->about - a.x);
-  ub << b.v, b.w;
-  return ua - arm_shift(a, b).transpose() * ub;
+  // u_a - S^T u_b, S as in arm_shift.
+  Vec6 u;
+  u << a.v - b.v + (arm_origin(a) - b.x).cross(b.w), a.w - b.w;
+  if (a.bend) u.head<3>() += a.w.cross(a.bend->about - a.x);
+  return u;
 }
 
 void add_geometric_terms(const Sides& sides, Pair& pair, const Vec6& f) {

@@ -35,9 +35,9 @@ void take_weighing(Scratch& scratch, Arena& arena, const ScratchRoom& room) {
   scratch.weigh = room.weighing ? arena.take<char>(room.weighing) : nullptr;
   scratch.slice_sum = arena.take<kernels::WrenchSum>(room.contacts / kSumSlice + 1);
   FrictionScratch& rub = scratch.friction;
-  for (double** column : {&rub.load, &rub.stretch}) *column = arena.take<double>(room.rubbing);
-  rub.lean = arena.take<float>(room.rubbing);
-  for (float*& column : rub.row) column = arena.take<float>(room.rubbing);
+  rub.load = arena.take<float>(room.rubbing);
+  rub.stretch = arena.take<double>(room.rubbing);
+  for (float*& column : rub.line) column = arena.take<float>(room.rubbing);
 }
 
 }  // namespace

@@ -29,23 +29,20 @@ std::vector<MethodColumn> columns(const std::string& names) {
 
 }  // namespace
 
-// On curved surfaces, shares change along the loop under both methods: on four loops of the ridge
-// firm does more net work than robust (0.15 against 0.11), on thirty less.
-TEST_CASE("closed loops touch every surface; on a plane firm does less net work than robust") {
+TEST_CASE("closed loops touch every surface, and firm makes less work on them than robust") {
   const Study study = study_loops(columns("robust,firm"), quiet(), 4);
   REQUIRE(study.json.size() == 3);
   for (const auto& [surface, methods] : study.json.items()) {
     CAPTURE(surface);
-    const double firm = methods["firm"]["rms"];
-    CHECK(firm > 0);  // 0 would mean that nothing touched
-    CHECK(firm < 0.3);
+    const auto &firm = methods["firm"], &robust = methods["robust"];
+    CHECK(firm["rms"] > 0);  // 0 would mean that nothing touched
+    CHECK(firm["made"] < 0.15);
+    CHECK(firm["made"].get<double>() < 0.6 * robust["made"].get<double>());
     for (const auto& figures : methods) {
       CHECK(figures["most"] >= figures["rms"]);
       CHECK(figures["most"] < 1);
     }
   }
-  const auto& plane = study.json["box on a plane"];
-  CHECK(plane["firm"]["rms"] < plane["robust"]["rms"]);
 }
 
 TEST_CASE("the first loops stay the same when more are asked for") {

@@ -181,39 +181,6 @@ TEST_CASE("contact_columns: directions of push agree with the reference on every
   });
 }
 
-TEST_CASE("contact_columns: how far a push leans agrees with the reference on every target") {
-  on_every_target([](const std::string&) {
-    for (std::size_t n = 0; n <= 67; ++n) {
-      Contacts c(n, n % 4);
-      Random random(50 + n);
-      for (std::size_t i = 0; i < n; i += 2)  // half of them lean a little
-        for (std::size_t k = 0; k < 3; ++k)
-          c.column[3 + k][i] = c.column[k][i] + float(random.uniform(-0.05, 0.05));
-      Column got(n, 1), want(n, 0);
-      push_lean(c.view(), got.begin());
-      push_lean_ref(c.view(), want.begin());
-      CHECK(worst(got, want, n, 2e-5) <= 1);  // it comes in fifty times as fast as the tangent
-    }
-  });
-}
-
-TEST_CASE(
-    "contact_columns: a push leans by the tangent of its angle, neither little nor without end") {
-  const auto lean_at = [](double angle) {
-    const float n[3] = {float(std::sin(angle)), 0, float(std::cos(angle))}, g[3] = {0, 0, 1};
-    const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, nullptr, nullptr, nullptr, 1};
-    float lean;
-    push_lean_ref(one, &lean);
-    return double{lean};
-  };
-  for (const double angle : {0.0, 0.01, 0.0199}) CHECK(lean_at(angle) == 0);
-  for (double angle = 0; angle < 0.06; angle += 1e-3)  // it comes in without a jump
-    CHECK(std::fabs(lean_at(angle + 1e-3) - lean_at(angle)) < 4e-3);
-  for (const double angle : {0.05, 0.2, 0.4})
-    CHECK(lean_at(angle) == doctest::Approx(std::tan(angle)).epsilon(1e-5));
-  for (const double angle : {0.8, 1.5, 3.0}) CHECK(lean_at(angle) == doctest::Approx(1.0));
-}
-
 TEST_CASE(
     "contact_columns: a push follows a flat field and a flat part, whichever is the flatter") {
   const float n[3] = {1, 0, 0}, g[3] = {0, 0, 1}, zero[3] = {0, 0, 0};

@@ -92,6 +92,22 @@ struct Sticking {
   }
 };
 
+// Rows first..first+count-1 of columns n and r, `planes` of them in the plane.
+FrictionRows<double> rows_of(const std::vector<double>* c, const double* load, std::size_t first,
+                             std::size_t count, std::size_t planes, double total) {
+  const auto rows = [&](std::size_t skip, std::size_t some, bool lines) {
+    const auto at = [&](int k) { return c[k].data() + first + skip; };
+    return kernels::FrictionRowsT<double>{at(0), at(1),       at(2), at(3), at(4),
+                                          at(5), load + skip, some,  lines};
+  };
+  return {rows(0, planes, false), rows(planes, count - planes, true), total};
+}
+Mat6 stiffness_of(const FrictionRows<double>& rows, const FrictionLaw& law, const Vec6& q) {
+  Mat6 K;
+  friction_stiffness(rows, law, q, q, K);
+  return K;
+}
+
 }  // namespace
 
 TEST_CASE("exact derivatives of sticking friction agree with central differences") {
@@ -101,14 +117,13 @@ TEST_CASE("exact derivatives of sticking friction agree with central differences
     const Vec3 n = scene.at[0].R * scene.normal[i], r = scene.at[0].R * scene.point[i];
     for (int k = 0; k < 3; ++k) columns[k].push_back(n[k]), columns[3 + k].push_back(r[k]);
   }
-  const FrictionRows<double> rows{
-      columns[0].data(), columns[1].data(), columns[2].data(), columns[3].data(), columns[4].data(),
-      columns[5].data(), scene.load.data(), scene.load.size(), scene.total,       scene.planes};
+  const FrictionRows<double> rows =
+      rows_of(columns, scene.load.data(), 0, scene.load.size(), scene.planes, scene.total);
   Vec6 q;
   q << scene.at[1].R * scene.q.head<3>(), scene.at[1].R * scene.q.tail<3>();
   FrictionSpring spring;
   spring.holds = true;
-  spring.K = friction_stiffness(rows, scene.law, q, q);
+  spring.K = stiffness_of(rows, scene.law, q);
   spring.f = spring.elastic = -(spring.K * q);
   spring.turning = friction_turning(rows, scene.law, q, q);
   std::array<LinearWrench, 2> acting;
@@ -146,12 +161,11 @@ TEST_CASE("friction is at most mu times the load, in its plane, and only against
     for (int k = 0; k < 3; ++k)
       columns[k].push_back(scene.normal[i][k]), columns[3 + k].push_back(scene.point[i][k]);
   // Together they are no stiffer than k, and k r^2 in rotation.
-  const FrictionRows<double> all{
-      columns[0].data(), columns[1].data(), columns[2].data(), columns[3].data(), columns[4].data(),
-      columns[5].data(), scene.load.data(), scene.load.size(), scene.total,       scene.planes};
+  const FrictionRows<double> all =
+      rows_of(columns, scene.load.data(), 0, scene.load.size(), scene.planes, scene.total);
   double radius = 0;
   for (const Vec3& r : scene.point) radius = std::max(radius, r.norm());
-  const Mat6 together = friction_stiffness(all, {1e4, 1.0}, scene.q, scene.q);
+  const Mat6 together = stiffness_of(all, {1e4, 1.0}, scene.q);
   for (int i = 0; i < 1000; ++i) {
     const Vec3 to(std::sin(1.7 * i), std::cos(2.9 * i), std::sin(3.1 * i + 1));
     const Vec3 unit = to.normalized();
@@ -164,10 +178,8 @@ TEST_CASE("friction is at most mu times the load, in its plane, and only against
     for (std::size_t i = 0; i < scene.point.size(); ++i) {
       const double alone[1] = {scene.load[i]};
       const bool line = i >= scene.planes;
-      const FrictionRows<double> row{&columns[0][i], &columns[1][i], &columns[2][i], &columns[3][i],
-                                     &columns[4][i], &columns[5][i], alone,          1,
-                                     scene.total,    line ? 0u : 1u};
-      const Mat6 K = friction_stiffness(row, {1e4, limit}, scene.q, scene.q);
+      const FrictionRows<double> row = rows_of(columns, alone, i, 1, line ? 0 : 1, scene.total);
+      const Mat6 K = stiffness_of(row, {1e4, limit}, scene.q);
       const Vec3 f = -(K * scene.q).head<3>();
       const double mu = limit / scene.total;
       most = std::max(most, f.norm() / (mu * 1e4 * scene.load[i]));

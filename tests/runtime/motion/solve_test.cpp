@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "runtime/base/solve_positive.h"
 #include "runtime/motion/solve.h"
 
 using namespace h6;
@@ -52,4 +53,18 @@ TEST_CASE("systems of one body and of islands of two to four are solved; what is
   check_random_systems<Mat6, Vec6>(6);
   for (int bodies = 2; bodies <= kIslandBodies; ++bodies)
     check_random_systems<IslandMatrix, IslandVector>(6 * bodies);
+}
+
+TEST_CASE("the inverse of a positive matrix is its inverse to rounding, and symmetric to the bit") {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 2000; ++i) {
+    // A spring and a few contacts far stiffer than it, as the common spring of `firm` has.
+    Eigen::Matrix<double, 6, 3> J;
+    for (int k = 0; k < J.size(); ++k) J(k) = uniform(random);
+    Mat6 A = 30 * J * J.transpose();
+    A.diagonal().array() += 1;
+    const Mat6 inverse = inverse_of_positive(A);
+    CHECK((A * inverse - Mat6::Identity()).norm() < 1e-12 * A.norm());
+    CHECK(inverse == inverse.transpose());
+  }
 }
