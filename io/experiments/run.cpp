@@ -131,7 +131,7 @@ Result<std::vector<MethodColumn>> columns_named(const std::string& list) {
     if (found != known.end())
       out.push_back(*found);
     else if (h6MethodFromName(name.c_str(), nullptr, nullptr) == 0)
-      out.push_back({name, name, 0});  // with other pieces
+      out.push_back({name, name, 0});  // a method with other pieces
     else
       return Failure{no_such("method", name, names)};
   }

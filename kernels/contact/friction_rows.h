@@ -38,7 +38,7 @@ struct PushLineRows {
 PushLineRows push_lines(const ContactColumns& c, const float* pressed, const PushLines& out);
 PushLineRows push_lines_ref(const ContactColumns& c, const float* pressed, const PushLines& out);
 
-// |z| of each row for the displacement q [m]. That of a row without load may be anything from 0 on.
+// |z| of each row for the displacement q [m]. A row without load may get any value from 0 on.
 void friction_stretch(const FrictionRows& rows, const double q[6], double* stretch);
 template <class T>
 void friction_stretch_ref(const FrictionRowsT<T>& rows, const double q[6], double* stretch);
