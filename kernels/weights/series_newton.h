@@ -49,6 +49,17 @@ inline double norm2(const double v[6]) {
   return sum;
 }
 
+// When no gap changes by much more than this share of the largest e, few contacts change between
+// active and inactive: the step is likely the last.
+inline constexpr double kLastStep = 0.1;
+
+// Newton's step from y, where the sums are `now`.
+inline void newton_step(double c, const SeriesSums& now, const double y[6], double step[6]) {
+  double gradient[6];
+  for (int k = 0; k < 6; ++k) gradient[k] = now.pull[k] - c * y[k];
+  solve_spring_system(c, now.system, gradient, step);
+}
+
 // `now`: the sums at y, which is finite. sums(y, system) returns SeriesSums at y, with the system
 // only if `system` is set. max_e > 0 is the largest e. The number of passes over the contacts is
 // bounded, so that no frame can stall here.
@@ -56,9 +67,7 @@ template <class Sums>
 SeriesResult newton(const SeriesParameters& p, double max_e, double y[6], SeriesSums now,
                     const Sums& sums) {
   constexpr int kHalvings = 6;
-  // When no gap changes by much, few contacts change between active and inactive: the step is
-  // likely the last.
-  const double last = 0.1 * max_e;
+  const double last = kLastStep * max_e;
   const double scale = p.c * max_e;
   SeriesResult result{0, 0};
   bool system = true;
@@ -68,7 +77,7 @@ SeriesResult newton(const SeriesParameters& p, double max_e, double y[6], Series
     result.residual = std::sqrt(norm2(gradient)) / scale;
     if (!(result.residual > p.tolerance) || result.iterations >= p.iterations) return result;
     if (!system) now = sums(y, true);
-    solve_spring_system(p.c, now.system, gradient, step);
+    newton_step(p.c, now, y, step);
     system = norm2(step) > last * last;
     const double before = p.c * norm2(y) + now.energy;
     double trial[6], t = 1;

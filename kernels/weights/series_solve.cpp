@@ -5,9 +5,11 @@
 // The first pass divides kappa out. A pass reads eight columns and adds to 28 sums, or to 7 when
 // the solution is likely reached: then it also writes the slack and is the last. Most contacts
 // within the margin carry no load; a test in float, with room for rounding, skips them and changes
-// no bit. Without a start, a sample of the contacts is solved first when there are many.
+// no bit. When there are many contacts and the start is far off, a sample of them is solved first.
+// Passes run in slices of the contacts.
 #include "kernels/weights/series_solve.h"
 
+#include <algorithm>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
@@ -29,6 +31,11 @@ using VD = hn::Vec<DD>;
 
 constexpr float kDoubt = 1e-5f;  // a hundred times the rounding of a sum of some ten floats
 constexpr std::size_t kManyToStart = 256;  // fewest contacts for which a start is worth its time
+// Where the first step is longer than this share of the largest e, the start was far off.
+constexpr double kFar = 0.2;
+constexpr std::size_t kLeastSlice = 2048;  // contacts of a slice, which take 4 to 7 us
+constexpr std::size_t kMostSlices = 32;
+constexpr std::size_t kSliceStep = 128;  // 16 vectors: every slice begins with a sampled one
 
 HWY_INLINE VD load_column(const float* column, std::size_t first, std::size_t live) {
   return hn::PromoteTo(DD(), load_n(DF(), column + first, live));
@@ -107,10 +114,11 @@ enum Pass : int {
   kSlack = 4,  // fills slack
 };
 
-// One pass over one vector in `stride` of the contacts.
+// One pass over one vector in `stride` of the contacts. Returns the largest e.
 template <int kPass>
-HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const double* y,
-                       float* kappa, float* slack, SeriesSums& out, std::size_t stride = 1) {
+HWY_NOINLINE double pass_slice(const SeriesColumns& c, const SeriesParameters& p, const double* y,
+                               float* kappa, float* slack, SeriesSums& out,
+                               std::size_t stride = 1) {
   const DD d;
   const VD zero = hn::Zero(d), per_lever = hn::Set(d, 1 / p.lever), per_c = hn::Set(d, 1 / p.c);
   VD system[kUpper6], pull[6], energy = zero, max_e = zero;
@@ -161,45 +169,100 @@ HWY_INLINE double pass(const SeriesColumns& c, const SeriesParameters& p, const 
   return hn::GetLane(hn::MaxOfLanes(d, max_e));
 }
 
+// A solve: what its passes read, and what they write for each contact.
+struct Solve {
+  const SeriesColumns& contacts;
+  float *kappa, *slack;
+  const SliceRunner& run_slices;
+};
+
+SeriesColumns slice_of(const SeriesColumns& c, std::size_t begin, std::size_t count) {
+  return {
+      c.nx + begin, c.ny + begin, c.nz + begin, c.rx + begin,
+      c.ry + begin, c.rz + begin, c.e + begin,  c.facing == nullptr ? nullptr : c.facing + begin,
+      count};
+}
+
+void add_sums(const SeriesSums& some, SeriesSums& to) {
+  for (int k = 0; k < kUpper6; ++k) to.system[k] += some.system[k];
+  for (int k = 0; k < 6; ++k) to.pull[k] += some.pull[k];
+  to.energy += some.energy;
+}
+
+// pass_slice over all slices.
+template <int kPass>
+double pass(const Solve& solve, const SeriesParameters& p, const double* y, SeriesSums& out,
+            std::size_t stride = 1) {
+  const SeriesColumns& c = solve.contacts;
+  const std::size_t even = (c.count + kMostSlices - 1) / kMostSlices;
+  const std::size_t each = std::max(kLeastSlice, (even + kSliceStep - 1) / kSliceStep * kSliceStep);
+  if (c.count <= each) return pass_slice<kPass>(c, p, y, solve.kappa, solve.slack, out, stride);
+  SeriesSums sums[kMostSlices];
+  double max_e[kMostSlices];
+  auto work = [&](std::size_t i) {
+    const std::size_t begin = i * each;
+    max_e[i] = pass_slice<kPass>(slice_of(c, begin, std::min(each, c.count - begin)), p, y,
+                                 solve.kappa + begin, solve.slack + begin, sums[i], stride);
+  };
+  const std::size_t slices = (c.count + each - 1) / each;
+  solve.run_slices(slices, work);
+  double largest = 0;
+  for (std::size_t i = 0; i < slices; ++i) {
+    largest = std::max(largest, max_e[i]);
+    add_sums(sums[i], out);
+  }
+  return largest;
+}
+
 // Computes a start from a sample of the contacts. Each sampled contact represents several, so the
 // spring is made softer instead of the contacts stiffer.
-HWY_NOINLINE void start_from_some(const SeriesColumns& c, const SeriesParameters& p, double* y,
-                                  float* kappa, std::size_t stride) {
+void start_from_some(const Solve& solve, const SeriesParameters& p, double* y, std::size_t stride) {
   SeriesParameters softer = p;
   softer.c = p.c / static_cast<double>(stride);
   softer.tolerance = 1e-2;
   SeriesSums first;
-  const double max_e = pass<kStiffen | kSystem>(c, p, y, kappa, nullptr, first, stride);
+  const double max_e = pass<kStiffen | kSystem>(solve, p, y, first, stride);
   if (!(max_e > 0)) return;
-  newton(softer, max_e, y, first, [&](const double* at, bool) HWY_ATTR {
+  newton(softer, max_e, y, first, [&](const double* at, bool) {
     SeriesSums sums;
-    pass<kSystem>(c, p, at, kappa, nullptr, sums, stride);
+    pass<kSystem>(solve, p, at, sums, stride);
     return sums;
   });
   check_start(y);
 }
 
-void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double* y, float* kappa,
-                       float* slack, SeriesResult& result) {
+void series_solve_simd(const SeriesColumns& contacts, const SeriesParameters& p, double* y,
+                       float* kappa, float* slack, const SliceRunner& run_slices,
+                       SeriesResult& result) {
+  const Solve solve{contacts, kappa, slack, run_slices};
   result = {0, 0};
   check_start(y);
-  if (c.count >= kManyToStart && norm2(y) == 0) {
-    for (const std::size_t stride : {16, 4}) start_from_some(c, p, y, kappa, stride);
-  }
+  const bool many = contacts.count >= kManyToStart;
+  bool far = many && norm2(y) == 0;
   SeriesSums first;
-  const double max_e = pass<kStiffen | kSystem>(c, p, y, kappa, slack, first);
+  double max_e = far ? 0 : pass<kStiffen | kSystem>(solve, p, y, first);
+  if (many && max_e > 0) {
+    double step[6];
+    newton_step(p.c, first, y, step);
+    far = norm2(step) > kFar * kFar * max_e * max_e;
+  }
+  if (far) {
+    for (const std::size_t stride : {16, 4}) start_from_some(solve, p, y, stride);
+    first = {};
+    max_e = pass<kStiffen | kSystem>(solve, p, y, first);
+  }
   bool filled = false;  // slack is that of y
   if (max_e > 0) {
-    const bool apart = slack != c.e;
-    result = newton(p, max_e, y, first, [&](const double* at, bool system) HWY_ATTR {
+    const bool apart = slack != contacts.e;
+    result = newton(p, max_e, y, first, [&](const double* at, bool system) {
       SeriesSums sums;
       filled = !system && apart;
       if (system) {
-        pass<kSystem>(c, p, at, kappa, slack, sums);
+        pass<kSystem>(solve, p, at, sums);
       } else if (apart) {
-        pass<kSlack>(c, p, at, kappa, slack, sums);
+        pass<kSlack>(solve, p, at, sums);
       } else {
-        pass<0>(c, p, at, kappa, slack, sums);
+        pass<0>(solve, p, at, sums);
       }
       return sums;
     });
@@ -208,7 +271,7 @@ void series_solve_simd(const SeriesColumns& c, const SeriesParameters& p, double
   }
   if (filled) return;
   SeriesSums unused;
-  pass<kSlack>(c, p, y, kappa, slack, unused);
+  pass<kSlack>(solve, p, y, unused);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE
@@ -220,9 +283,10 @@ namespace h6::kernels {
 HWY_EXPORT(series_solve_simd);
 
 SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
-                          double y[6], float* kappa, float* slack) {
+                          double y[6], float* kappa, float* slack, const SliceRunner& run_slices) {
   SeriesResult result;
-  HWY_DYNAMIC_DISPATCH(series_solve_simd)(contacts, parameters, y, kappa, slack, result);
+  HWY_DYNAMIC_DISPATCH(series_solve_simd)
+  (contacts, parameters, y, kappa, slack, run_slices, result);
   return result;
 }
 

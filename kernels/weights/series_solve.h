@@ -13,6 +13,7 @@
 // Residual: |gradient| / (c max e), which bounds the error of y (and of the wrench c y) relative to
 // the largest e. METHOD.md, Sec. 3; ours.
 #pragma once
+#include "kernels/slices.h"
 #include "kernels/views.h"
 
 namespace h6::kernels {
@@ -40,9 +41,11 @@ struct SeriesResult {
 };
 
 // y: the start, and then the solution. kappa, slack (count): kappa_i and max(0, e_i - J_i.y); slack
-// may be the column e, at the cost of a pass. A start that is not finite counts as 0.
+// may be the column e, at the cost of a pass. A start that is not finite counts as 0. The sums over
+// slices of contacts are added in order, so any threads give the same bits.
 SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
-                          double y[6], float* kappa, float* slack);
+                          double y[6], float* kappa, float* slack,
+                          const SliceRunner& run_slices = {});
 // The specification, for float and (gradient tests) double columns.
 template <class T>
 SeriesResult series_solve_ref(const SeriesColumnsT<T>& contacts, const SeriesParameters& parameters,

@@ -20,6 +20,15 @@ namespace {
 
 // The spring's last extension, times this, must cover its next one.
 constexpr double kAhead = 2;
+constexpr std::size_t kGapSlice = 2048;  // contacts whose e is filled at a time, in 1 to 2 us
+
+kernels::SliceRunner slices_on(sched::FrameTeam* team) {
+  if (team == nullptr) return {};
+  return {[](void* self, std::size_t slices, kernels::SliceRunner::Work work, void* context) {
+            static_cast<sched::FrameTeam*>(self)->run(slices, work, context);
+          },
+          team};
+}
 
 }  // namespace
 
@@ -48,12 +57,12 @@ void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin,
                       c.load + begin);
 }
 
-kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever,
-                                   double y[6]) {
+kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6],
+                                   sched::FrameTeam* team) {
   const kernels::SeriesColumns columns{c.nx, c.ny,   c.nz,     c.rx,   c.ry,
                                        c.rz, c.load, c.weight, c.count};
-  const kernels::SeriesResult result =
-      kernels::series_solve(columns, {def.series_c, spring_lever(def, lever)}, y, c.kappa, c.slack);
+  const kernels::SeriesResult result = kernels::series_solve(
+      columns, {def.series_c, spring_lever(def, lever)}, y, c.kappa, c.slack, slices_on(team));
   kernels::series_loads(c.kappa, c.slack, c.depth, c.count, c.load, c.weight);
   return result;
 }
@@ -73,20 +82,24 @@ Mat6 series_spring(const h6ContactDef& def, double lever) {
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const Body& a = bodies[shell.body];
   Contacts& c = shell.contacts;
-  const bool firm = set.contact.method == H6_METHOD_FIRM;
-  if (firm) prepare_firm(set, bodies, shell, lane);
-  fill_inner_stiffness(c, set.contact, a.voxel, firm ? weighing_team(c.count, lane) : nullptr,
-                       firm ? lane.scratch->weigh : nullptr);
+  if (set.contact.method == H6_METHOD_FIRM) prepare_firm(set, bodies, shell, lane);
+  sched::FrameTeam* const team = weighing_team(c.count, lane);
+  fill_inner_stiffness(c, set.contact, a.voxel, team, lane.scratch->weigh);
   if (a.bend) {
     make_bent_rows(set, bodies, shell);
     fill_bent_gap(set, bodies, shell);
   }
-  for (const Pair& pair : shell.pairs)
-    if (!a.bend)
-      fill_series_gap(c, set.contact.damping, pair_velocity(a, bodies[pair.b]), pair.begin,
-                      pair.end);
+  for (const Pair& pair : shell.pairs) {
+    if (a.bend) break;
+    const Vec6 u = pair_velocity(a, bodies[pair.b]);
+    auto fill = [&](std::size_t i) {
+      const std::size_t begin = pair.begin + i * kGapSlice;
+      fill_series_gap(c, set.contact.damping, u, begin, std::min(begin + kGapSlice, pair.end));
+    };
+    slices_on(team)((pair.end - pair.begin + kGapSlice - 1) / kGapSlice, fill);
+  }
   const kernels::SeriesResult result =
-      solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y);
+      solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y, team);
   h6FrameReport& report = lane.report;
   report.series_iterations =
       std::max(report.series_iterations, static_cast<std::uint32_t>(result.iterations));

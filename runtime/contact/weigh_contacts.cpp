@@ -5,6 +5,7 @@
 // is our own. METHOD.md, Sec. 3, settles the paper's ambiguities: w_i = phi_self / phi_i.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "kernels/weights/cell_items.h"
 #include "kernels/weights/gauss_few.h"
@@ -155,32 +156,103 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
   if (rule.printed) weigh_as_printed(c, rule);
 }
 
-kernels::CellItems take_items(kernels::GaussColumns& columns, std::size_t contacts,
-                              float** weight) {
-  const std::size_t room = kernels::cell_items_room(contacts);
-  kernels::CellItems items{};
-  for (float*& column : items.direction) columns.take(column, room);
-  columns.take(items.share, room);
-  columns.take(*weight, room);
+struct Items {
+  kernels::CellItems column{};
+  float* weight = nullptr;
+  kernels::CellItems from(std::size_t row) const {
+    kernels::CellItems items = column;
+    for (float*& direction : items.direction) direction += row;
+    items.share += row;
+    return items;
+  }
+};
+
+constexpr std::size_t kLeastCells = 1024;  // contacts of a slice of cells, which take 2 to 8 us
+constexpr std::size_t kMostSlices = 32;
+
+std::size_t items_room(std::size_t contacts) {
+  return kernels::cell_items_room(contacts) + kMostSlices * kernels::kCellMost;
+}
+
+Items take_items(kernels::GaussColumns& columns, std::size_t contacts) {
+  const std::size_t room = items_room(contacts);
+  Items items;
+  for (float*& column : items.column.direction) columns.take(column, room);
+  columns.take(items.column.share, room);
+  columns.take(items.weight, room);
   return items;
 }
 
-// `firm`: c.slack holds how much each contact counts; c.load is not filled yet and serves as
-// scratch.
+kernels::CellContacts cells_between(const Contacts& c, std::size_t begin, std::size_t end) {
+  return {{c.nx + begin, c.ny + begin, c.nz + begin, c.tx + begin, c.ty + begin, c.tz + begin,
+           c.facing + begin, c.slack + begin, end - begin},
+          c.cell + begin,
+          c.field_body + begin};
+}
+
+// Slices of contacts that part no cell, and the items of each.
+struct CellSlices {
+  std::size_t count = 0;
+  std::size_t begin[kMostSlices + 1] = {};  // first contact; at `count` the number of contacts
+  std::size_t item[kMostSlices + 1] = {};   // first item, once items follow one another
+};
+
+CellSlices slice_cells(const Contacts& c) {
+  CellSlices slices;
+  const std::size_t each = std::max(kLeastCells, (c.count + kMostSlices - 1) / kMostSlices);
+  const auto in_a_cell = [&](std::size_t i) {
+    return c.cell[i] == c.cell[i - 1] && c.field_body[i] == c.field_body[i - 1];
+  };
+  for (std::size_t end = 0; end < c.count; slices.begin[slices.count] = end) {
+    end = std::min(end + each, c.count);
+    while (end < c.count && in_a_cell(end)) ++end;
+    ++slices.count;
+  }
+  return slices;
+}
+
+// Lists the items of all slices, one after the other. c.load serves as scratch.
+CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, const Items& items,
+                      sched::FrameTeam* team) {
+  CellSlices slices = slice_cells(c);
+  std::size_t found[kMostSlices];
+  // Slices that run in order can write each behind the last one's items; others need room.
+  const auto first = [&](std::size_t i) {
+    return team ? 2 * slices.begin[i] + i * kernels::kCellMost : slices.item[i];
+  };
+  for_slices(slices.count, team, [&](std::size_t i) {
+    const std::size_t begin = slices.begin[i];
+    found[i] = kernels::list_cell_items(cells_between(c, begin, slices.begin[i + 1]), widths,
+                                        items.from(first(i)), c.load + begin);
+    if (!team) slices.item[i + 1] = slices.item[i] + found[i];
+  });
+  for (std::size_t i = 0; team && i < slices.count; ++i) {
+    const kernels::CellItems from = items.from(first(i)), to = items.from(slices.item[i]);
+    for (int k = 0; k < 6; ++k)
+      std::memmove(to.direction[k], from.direction[k], found[i] * sizeof *from.share);
+    std::memmove(to.share, from.share, found[i] * sizeof *from.share);
+    slices.item[i + 1] = slices.item[i] + found[i];
+  }
+  return slices;
+}
+
+// `firm`: c.slack holds how much each contact counts; c.load is not filled yet.
 void weigh_cells(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
   if (!c.cell)
     return weigh_view({c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, rule, team,
                       scratch, c.weight);
   kernels::GaussColumns columns = kernels::GaussColumns::in(scratch);
-  float* item_weight = nullptr;
-  const kernels::CellItems items = take_items(columns, c.count, &item_weight);
-  const kernels::CellContacts contacts{
-      {c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, c.cell, c.field_body};
-  const auto& d = items.direction;
-  const std::size_t count = kernels::list_cell_items(contacts, rule.widths, items, c.load);
-  weigh_view({d[0], d[1], d[2], d[3], d[4], d[5], nullptr, items.share, count}, rule, team,
-             columns.at + columns.used, item_weight);
-  kernels::weigh_by_items(contacts, c.load, items.share, item_weight, c.weight);
+  const Items items = take_items(columns, c.count);
+  const CellSlices slices = list_items(c, rule.widths, items, team);
+  const auto& d = items.column.direction;
+  weigh_view(
+      {d[0], d[1], d[2], d[3], d[4], d[5], nullptr, items.column.share, slices.item[slices.count]},
+      rule, team, columns.at + columns.used, items.weight);
+  for_slices(slices.count, team, [&](std::size_t i) {
+    const std::size_t begin = slices.begin[i], item = slices.item[i];
+    kernels::weigh_by_items(cells_between(c, begin, slices.begin[i + 1]), c.load + begin,
+                            items.column.share + item, items.weight + item, c.weight + begin);
+  });
 }
 
 // Clusters never mix fields: a merged contact belongs to one pair.
@@ -203,10 +275,9 @@ std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
   const Rule rule = rule_of(def, 1.0);
   if (!rule.gauss) return 0;
   kernels::GaussColumns items{nullptr};
-  float* weight;
   const bool firm = def.method == H6_METHOD_FIRM;
-  if (firm) take_items(items, count, &weight);
-  const std::size_t rows = firm ? kernels::cell_items_room(count) : count;
+  if (firm) take_items(items, count);
+  const std::size_t rows = firm ? items_room(count) : count;
   return items.block_bytes() + std::max(kernels::gauss_tree_bytes(rows, rule.hat),
                                         kernels::gauss_sweep_bytes(rows, rule.hat));
 }

@@ -145,7 +145,11 @@ TEST_CASE("series: all gradients of a body between two moving fields are derivat
   REQUIRE(inside > 20);
   Pair &floor = touching.pairs[0], &wall = touching.pairs[1];
   floor.begin = 0, floor.end = wall.begin = 30, wall.end = 50;
+  sched::FrameTeam alone(1);
+  Scratch scratch;
   Lane lane;
+  lane.team = &alone;
+  lane.scratch = &scratch;
   weigh_series(s->settings, s->bodies, touching, lane);
   CHECK(lane.report.series_residual <= 1e-6);
   sum_contacts(s->settings, s->bodies, touching, lane);
