@@ -27,7 +27,7 @@ using FrictionRows = FrictionRowsT<float>;
 //   e    = (n (n.g) - g) / |n x g|, or 0 where the load is 0
 // pressed: the contacts' normal forces over k [m]. Every contact that has a load becomes a row, in
 // order; some without load may stand between them.
-inline constexpr float kNoLean = 0.02f, kMostRub = 1.0f;
+inline constexpr float kNoLean = 0.005f, kMostRub = 1.0f;
 struct PushLines {
   float *ex, *ey, *ez, *rx, *ry, *rz, *load;  // (c.count)
 };
