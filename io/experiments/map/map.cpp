@@ -30,12 +30,15 @@ constexpr Slow kSlow[] = {
      "each variation bakes 1,789,551 triangles anew; --scenes landing-gear runs it"}};
 
 MapRun run_once(const io::LoadedScene& loaded, const MethodColumn& method, double stiffness,
-                double newtons, double push) {
+                double newtons, MapForce force, const Variation& by) {
   RunChange change;
   change.method = method;
   change.stiffness = stiffness;
-  change.max_force = newtons / push;  // the push multiplies it, and the coupling's stiffness
-  change.force = push;
+  change.force = force == kPushForce ? by.push : 1;
+  change.max_force = newtons / change.force;  // which multiplies it, and the coupling's stiffness
+  // A scene's largest torque is for its own voxel, and half a voxel is less where voxels are finer.
+  if (force == kHalfVoxelForce)
+    change.also = [&](h6SessionDef&, h6HandDef& hand) { hand.coupling.max_torque *= by.voxel; };
   const RunFigures figures = run_experiment(loaded, change);
   return {
       figures.verdict,    figures.moved_on(),       figures.torque_noise, figures.max_depth_voxels,
@@ -61,7 +64,7 @@ void run_variation(const MapScene& scene, const std::vector<MethodColumn>& metho
           v.runs.push_back(v.run(kEqualStiffness, force, m));
         else
           v.runs.push_back(run_once(**loaded, methods[m], factor * stiffness, v.newtons[force],
-                                    force == kPushForce ? v.change.push : 1));
+                                    static_cast<MapForce>(force), v.change));
       }
     }
 }
