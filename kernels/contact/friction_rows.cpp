@@ -48,7 +48,7 @@ void lines_simd(const ContactColumns& c, const float* pressed, const PushLines& 
     const VF across[3] = {cross(n[1], g[2], n[2], g[1]), cross(n[2], g[0], n[0], g[2]),
                           cross(n[0], g[1], n[1], g[0])};
     const VF squared = dot(across, across), cosine = dot(n, g);
-    // Most contacts lean too little; they need no root and no quotient.
+    // Contacts on flat walls lean too little; they need no root and no quotient.
     const VF least = hn::Mul(no_lean, hn::Mul(cosine, hn::Max(cosine, zero)));
     const auto rubs = hn::And(hn::Gt(squared, least), hn::Gt(press, zero));
     if (hn::AllFalse(d, rubs)) continue;

@@ -21,7 +21,7 @@ using FrictionRows = FrictionRowsT<float>;
 
 // The lines along which pushes rub: depth grows along e, while the push n does no work. METHOD.md,
 // Sec. 3, "Friction of a push that leans". A push does not rub where it leans by less than kNoLean,
-// since thousands of contacts on a flat or slightly curved wall lean so little.
+// since thousands of contacts on a flat wall lean so little.
 //   t    = |n x g| / max(|n x g| / kMostRub, n.g)
 //   load = t clamp(t / kNoLean - 1, 0, 1) max(pressed, 0)
 //   e    = (n (n.g) - g) / |n x g|, or 0 where the load is 0

@@ -20,7 +20,7 @@ namespace {
 
 // The spring's last extension, times this, must cover its next one.
 constexpr double kAhead = 2;
-constexpr std::size_t kGapSlice = 2048;  // contacts whose e is filled at a time, in 1 to 2 us
+constexpr std::size_t kGapSlice = 2048;  // contacts whose e is filled at a time
 
 kernels::SliceRunner slices_on(sched::FrameTeam* team) {
   if (team == nullptr) return {};
@@ -92,11 +92,11 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
   for (const Pair& pair : shell.pairs) {
     if (a.bend) break;
     const Vec6 u = pair_velocity(a, bodies[pair.b]);
-    auto fill = [&](std::size_t i) {
+    const std::size_t slices = (pair.end - pair.begin + kGapSlice - 1) / kGapSlice;
+    for_slices(slices, team, [&](std::size_t i) {
       const std::size_t begin = pair.begin + i * kGapSlice;
       fill_series_gap(c, set.contact.damping, u, begin, std::min(begin + kGapSlice, pair.end));
-    };
-    slices_on(team)((pair.end - pair.begin + kGapSlice - 1) / kGapSlice, fill);
+    });
   }
   const kernels::SeriesResult result =
       solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y, team);

@@ -87,12 +87,6 @@ void fill_facing(const Contacts& c, bool filter, std::size_t begin, std::size_t 
   std::fill(facing + begin, facing + end, 1.0f);
 }
 
-template <class Run>
-void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
-  if (team) return team->for_slices(slices, run);
-  for (std::size_t i = 0; i < slices; ++i) run(i);
-}
-
 // Calls run(begin, end) for slices of all rows.
 template <class Run>
 void for_rows(const Contacts& c, sched::FrameTeam* team, const Run& run) {
@@ -167,11 +161,13 @@ struct Items {
   }
 };
 
-constexpr std::size_t kLeastCells = 1024;  // contacts of a slice of cells, which take 2 to 8 us
+constexpr std::size_t kLeastCells = 1024;  // contacts of a slice of cells, listed in 8 us
 constexpr std::size_t kMostSlices = 32;
 
+// Between the items of two slices there is room for the whole vectors that the first one stores.
 std::size_t items_room(std::size_t contacts) {
-  return kernels::cell_items_room(contacts) + kMostSlices * kernels::kCellMost;
+  return kernels::cell_items_room(contacts) +
+         std::min(kMostSlices, contacts / kLeastCells) * kernels::kCellMost;
 }
 
 Items take_items(kernels::GaussColumns& columns, std::size_t contacts) {
@@ -190,7 +186,7 @@ kernels::CellContacts cells_between(const Contacts& c, std::size_t begin, std::s
           c.field_body + begin};
 }
 
-// Slices of contacts that part no cell, and the items of each.
+// Slices of contacts, none of which ends within a cell, and the items of each.
 struct CellSlices {
   std::size_t count = 0;
   std::size_t begin[kMostSlices + 1] = {};  // first contact; at `count` the number of contacts
@@ -277,7 +273,7 @@ std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count) {
   kernels::GaussColumns items{nullptr};
   const bool firm = def.method == H6_METHOD_FIRM;
   if (firm) take_items(items, count);
-  const std::size_t rows = firm ? items_room(count) : count;
+  const std::size_t rows = firm ? kernels::cell_items_room(count) : count;
   return items.block_bytes() + std::max(kernels::gauss_tree_bytes(rows, rule.hat),
                                         kernels::gauss_sweep_bytes(rows, rule.hat));
 }

@@ -19,6 +19,13 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
 // The scratch that weigh_columns needs for up to `count` contacts, in bytes; 0 when it needs none.
 std::size_t weigh_scratch_bytes(const h6ContactDef& def, std::size_t count);
 
+// Calls run(i) for every slice, on the threads of `team`; null: on this one, in order.
+template <class Run>
+void for_slices(std::size_t slices, sched::FrameTeam* team, const Run& run) {
+  if (team) return team->for_slices(slices, run);
+  for (std::size_t i = 0; i < slices; ++i) run(i);
+}
+
 // Rows begin..end-1.
 inline kernels::ContactColumns kernel_columns(const Contacts& c, std::size_t begin,
                                               std::size_t end) {
