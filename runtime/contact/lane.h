@@ -28,7 +28,8 @@ struct TraverseScratch {
   float* key = nullptr;                                     // (capacity) decides which to drop
   float *gradient_x = nullptr, *gradient_y = nullptr, *gradient_z = nullptr;  // (capacity)
   std::size_t used = 0, capacity = 0;                                         // candidates
-  SearchColumns lent;  // for pairs without columns
+  kernels::Touching apart{};  // (points) candidates before slices are joined, or null
+  SearchColumns lent;         // for pairs without columns
 };
 
 struct Scratch {

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "kernels/contact/cull_spheres.h"
 #include "kernels/contact/expiry.h"
@@ -24,15 +25,26 @@ kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at) {
           t.gradient_z + at};
 }
 
-void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
-                     std::size_t from_row, std::size_t count) {
-  const kernels::Touching a = candidates_from(to, to_row), b = candidates_from(from, from_row);
+namespace {
+
+void move_rows(const kernels::Touching& a, const kernels::Touching& b, std::size_t count) {
   if (a.row == b.row || count == 0) return;
   std::memmove(a.row, b.row, count * sizeof *a.row);
   std::memmove(a.distance, b.distance, count * sizeof *a.distance);
   std::memmove(a.gx, b.gx, count * sizeof *a.gx);
   std::memmove(a.gy, b.gy, count * sizeof *a.gy);
   std::memmove(a.gz, b.gz, count * sizeof *a.gz);
+}
+
+kernels::Touching rows_from(const kernels::Touching& rows, std::size_t at) {
+  return {rows.row + at, rows.distance + at, rows.gx + at, rows.gy + at, rows.gz + at};
+}
+
+}  // namespace
+
+void move_candidates(const TraverseScratch& to, std::size_t to_row, const TraverseScratch& from,
+                     std::size_t from_row, std::size_t count) {
+  move_rows(candidates_from(to, to_row), candidates_from(from, from_row), count);
 }
 
 namespace {
@@ -68,6 +80,10 @@ constexpr double kSlowStep = 1 / kStepsNear;  // [voxel]
 // one of them comes near.
 constexpr float kFarGroup = 1;
 
+struct Screw {
+  float m[6];
+};
+
 // The constants of one traversal.
 struct Search {
   const kernels::FieldView& field;
@@ -78,8 +94,10 @@ struct Search {
   float margin;          // [voxel]
   bool cold;             // the caches hold little of what is sampled
   float near = 0;        // points are sampled up to this distance; 0: all points of a group [voxel]
-  bool reaches = false;  // TraverseScratch::reach says how far each group's points may be
   Deformation* bend = nullptr;  // where the shell bends: spheres and points as they are now
+  bool reaches = false;         // TraverseScratch::reach says how far each group's points may be
+  bool keeps = false;           // only points that can carry load are kept
+  Screw ahead{};                // of `reaches` and `keeps`: see keep_loadable.h
 
   const Tier& blocks() const { return bend ? bend->blocks : shell.blocks; }
   const Tier& groups() const { return bend ? bend->groups : shell.groups; }
@@ -92,13 +110,13 @@ struct Search {
   }
   // Writes to t.frontier the groups of t.open_blocks of which a point may touch after the way
   // `now`, or may carry load.
-  std::size_t loadable(const float* expiry, float now, const float ahead[6], std::size_t blocks,
+  std::size_t loadable(const float* expiry, float now, std::size_t blocks,
                        const TraverseScratch& t) const {
     const Tier& tier = shell.groups;
     const Bundles& normals = shell.normals;
     return kernels::loadable_groups(
         {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count},
-        {normals.nx.data, normals.ny.data, normals.nz.data, normals.spread.data}, ahead, margin,
+        {normals.nx.data, normals.ny.data, normals.nz.data, normals.spread.data}, ahead.m, margin,
         expiry, now, t.open_blocks, blocks, t.reach, t.frontier);
   }
   // Evaluates the samples in `vectors`. Rows in `out` are rows of the shell.
@@ -120,18 +138,24 @@ struct Search {
     }
     return kept;
   }
+  std::size_t keep_loadable(const kernels::Touching& rows, std::size_t count) const {
+    return kernels::keep_loadable({shell.x.data, shell.y.data, shell.z.data, shell.nx.data,
+                                   shell.ny.data, shell.nz.data, shell.point.data},
+                                  rows, count, ahead.m);
+  }
   // Samples `count` groups of t.survivors from `first` on.
   std::size_t touch(const TraverseScratch& t, std::size_t first, std::size_t count,
                     const kernels::Touching& out) const {
     if (bend) bend_points(*bend, t.survivors + first, count);
     const Column<float>&x = bend ? bend->x : shell.x, &y = bend ? bend->y : shell.y,
           &z = bend ? bend->z : shell.z;
-    return kernels::touch_groups(
+    const std::size_t found = kernels::touch_groups(
         field, place, {x.data, y.data, z.data, shell.points}, t.survivors + first, count, margin,
         cold,
         {near > 0 ? t.rows + first : nullptr, t.clearance + first, t.near_rows + first,
          t.rest + first, near, reaches ? t.reach : nullptr},
         out);
+    return keeps ? keep_loadable(out, found) : found;
   }
 };
 
@@ -154,8 +178,25 @@ Search search_of(const Settings& set, const Body& a, const Body& b, float margin
           margin,
           cold,
           0,
-          false,
           a.bend};
+}
+
+constexpr std::size_t kMoved = 8;  // slices whose candidates are moved at a time, in about 2 us
+
+// Moves the candidates of all slices from t.apart, where each slice has its own rows, behind row
+// `used`. Returns their number.
+std::size_t join_slices(const TraverseScratch& t, std::size_t used, Lane& lane,
+                        std::size_t slices) {
+  std::size_t* const found = lane.scratch->slice_count;
+  std::size_t end = used;
+  for (std::size_t i = 0; i < slices; ++i) end += std::exchange(found[i], end);
+  found[slices] = end;
+  lane.team->for_slices((slices + kMoved - 1) / kMoved, [&](std::size_t some) {
+    for (std::size_t i = some * kMoved; i < std::min((some + 1) * kMoved, slices); ++i)
+      move_rows(candidates_from(t, found[i]), rows_from(t.apart, i * kTouchSlice * kGroupRows),
+                found[i + 1] - found[i]);
+  });
+  return end - used;
 }
 
 // Samples `count` groups and writes the points that touch behind row `used`. Their order does not
@@ -163,25 +204,22 @@ Search search_of(const Settings& set, const Body& a, const Body& b, float margin
 std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::size_t count,
                   std::size_t used, bool shared) {
   const auto by_myself = [&] { return search.touch(t, 0, count, candidates_from(t, used)); };
-  if (shared || count <= kTouchSlice || lane.team->threads() == 1) return by_myself();
-  const std::int64_t since = sched::now_ns();
-  const auto timed = [&](std::size_t found) {
-    lane.touching.took(static_cast<double>(sched::now_ns() - since));
-    return found;
-  };
-  if (!lane.touching.share(count)) return timed(by_myself());
   const std::size_t slices = (count + kTouchSlice - 1) / kTouchSlice;
-  std::size_t* const found = lane.scratch->slice_count;
-  lane.team->for_slices(slices, [&](std::size_t i) {
-    const std::size_t at = i * kTouchSlice, n = std::min(kTouchSlice, count - at);
-    found[i] = search.touch(t, at, n, candidates_from(t, used + at * kGroupRows));
-  });
-  std::size_t kept = found[0];
-  for (std::size_t i = 1; i < slices; ++i) {
-    move_candidates(t, used + kept, t, used + i * kTouchSlice * kGroupRows, found[i]);
-    kept += found[i];
+  if (shared || slices < 2 || t.apart.row == nullptr || lane.team->threads() == 1)
+    return by_myself();
+  const std::int64_t since = sched::now_ns();
+  std::size_t found = 0;
+  if (lane.touching.share(count)) {
+    lane.team->for_slices(slices, [&](std::size_t i) {
+      const std::size_t at = i * kTouchSlice, n = std::min(kTouchSlice, count - at);
+      lane.scratch->slice_count[i] = search.touch(t, at, n, rows_from(t.apart, at * kGroupRows));
+    });
+    found = join_slices(t, used, lane, slices);
+  } else {
+    found = by_myself();
   }
-  return timed(kept);
+  lane.touching.took(static_cast<double>(sched::now_ns() - since));
+  return found;
 }
 
 // An upper bound on how far a point within `radius` of the shell's centre moved between two places
@@ -373,10 +411,6 @@ void prefetch_normals(const Shell& shell, const TraverseScratch& t, std::size_t 
   }
 }
 
-struct Screw {
-  float m[6];
-};
-
 // Bends the normals of the groups that hold these rows.
 void bend_candidates(Deformation& d, const TraverseScratch& t, const std::uint32_t* rows,
                      std::size_t count) {
@@ -410,10 +444,14 @@ void note_quiet(const Settings& set, const Body& a, const Body& b, PairSearch& p
   pair.quiet.begin(b.field->voxel * (*least - pair.now - margin - 2 * kSlack), a, b);
 }
 
-// `complete` becomes false where the traversal is coarse.
-std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
-                        TraverseScratch& t, Lane& lane, std::size_t used, bool shared,
-                        bool& complete) {
+struct Found {
+  std::size_t count = 0;  // candidates
+  bool complete = true;   // the traversal was not coarse
+  bool loadable = false;  // all of them can carry load
+};
+
+Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                  TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
   const Shell& shell = *a.shell;
   Anytime& anytime = *lane.anytime;
   Search search = search_of(set, a, b, pair.margin, lane.cold);
@@ -424,7 +462,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
 
   std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16,
                                         way.far, t.open_blocks);
-  if (blocks == 0) return 0;
+  if (blocks == 0) return {};
   const auto expired_groups = [&] {
     return kernels::expired(pair.group_expiry, t.open_blocks, blocks, way.far, t.frontier);
   };
@@ -437,23 +475,25 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
       pair.block_expiry[t.open_blocks[k]] = expiry_of(way, t.clearance[k]);
     std::copy_n(t.survivors, left, t.open_blocks);
     blocks = left;
-    if (blocks == 0) return 0;
+    if (blocks == 0) return {};
     count = expired_groups();
   }
   const auto note_blocks = [&] {
     kernels::least_of_blocks(pair.group_expiry, t.open_blocks, blocks, pair.block_expiry);
   };
   const auto coarsely = [&] {
-    complete = false;
-    return touch_coarsely(search, pair, t, anytime, blocks, used);
+    return Found{touch_coarsely(search, pair, t, anytime, blocks, used), false};
   };
   // Samples and bundles of normals do not bend: such a shell is never coarse.
   const bool bends = search.bend != nullptr;
   if (bends) bend_groups(*search.bend, t.open_blocks, blocks);
   if (!bends && is_coarse_anyway(anytime, pair, used, blocks)) return coarsely();
   search.reaches = search.margin > 0 && pair.fit.count == 0 && !bends;
-  if (search.reaches)
-    count = search.loadable(pair.group_expiry, way.now, ahead_of_shell(a, b, pair).m, blocks, t);
+  search.keeps = search.reaches && !(set.contact.fit_offset > 0);
+  if (search.reaches) {
+    search.ahead = ahead_of_shell(a, b, pair);
+    count = search.loadable(pair.group_expiry, way.now, blocks, t);
+  }
   const std::size_t groups = find_near_groups(pair, t, search, count, way);
   if (lane.cold) prefetch_normals(shell, t, groups);
   if (!bends && must_be_coarse(anytime, pair, used, blocks, groups)) {
@@ -474,7 +514,7 @@ std::size_t search_pair(const Settings& set, const Body& a, const Body& b, PairS
   pair.sampled = groups;
   note_groups(pair, t, search, groups, way);
   note_blocks();
-  return found;
+  return {found, true, search.keeps};
 }
 
 }  // namespace
@@ -516,13 +556,13 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
 
 std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
                           TraverseScratch& t, Lane& lane, std::size_t used, bool shared) {
-  bool complete = true;
   const bool borrows = !pair.group_expiry;
   if (borrows) {
     static_cast<SearchColumns&>(pair) = t.lent;
     pair.travelled = -1;
   }
-  std::size_t found = search_pair(set, a, b, pair, t, lane, used, shared, complete);
+  const Found all = search_pair(set, a, b, pair, t, lane, used, shared);
+  std::size_t found = all.count;
   pair.quiet.way = 0;
   if (found == 0 && pair.fit.count == 0 && !a.bend) note_quiet(set, a, b, pair);
   if (borrows) static_cast<SearchColumns&>(pair) = {};
@@ -530,10 +570,10 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
   pair.fit.deepest = 0;
   if (pair.fit.count > 0 || set.contact.fit_offset > 0) {
     const FitRule rule{static_cast<float>(set.contact.fit_offset / b.field->voxel), pair.margin};
-    found = relieve(pair.fit, candidates, found, rule, complete);
+    found = relieve(pair.fit, candidates, found, rule, all.complete);
   }
   if (a.bend) bend_candidates(*a.bend, t, candidates.row, found);
-  if (!(pair.margin > 0)) return found;
+  if (!(pair.margin > 0) || all.loadable) return found;
   const PointColumns s = points_of(a);
   return kernels::keep_loadable({s.x, s.y, s.z, s.nx, s.ny, s.nz, a.shell->point.data}, candidates,
                                 found, ahead_of_shell(a, b, pair).m);

@@ -10,6 +10,13 @@
 namespace h6 {
 namespace {
 
+kernels::Touching take_touching(Arena& arena, std::size_t rows) {
+  kernels::Touching t{};
+  t.row = arena.take<std::uint32_t>(rows);
+  for (float** column : {&t.distance, &t.gx, &t.gy, &t.gz}) *column = arena.take<float>(rows);
+  return t;
+}
+
 void take_traversal(TraverseScratch& t, Arena& arena, const ScratchRoom& room) {
   t.capacity = room.contacts + kGroupRows * room.groups;
   t.frontier = arena.take<std::uint32_t>(room.groups);
@@ -26,6 +33,7 @@ void take_traversal(TraverseScratch& t, Arena& arena, const ScratchRoom& room) {
   for (float** column :
        {&t.candidate_distance, &t.key, &t.gradient_x, &t.gradient_y, &t.gradient_z})
     *column = arena.take<float>(t.capacity);
+  if (room.slices) t.apart = take_touching(arena, kGroupRows * room.groups);
   t.lent = take_search(arena, room.groups, room.blocks);
 }
 
@@ -59,11 +67,12 @@ ScratchRoom either(const ScratchRoom& a, const ScratchRoom& b) {
   room.contacts = std::max(a.contacts, b.contacts);
   room.merged = std::max(a.merged, b.merged), room.rubbing = std::max(a.rubbing, b.rubbing);
   room.weighing = std::max(a.weighing, b.weighing);
+  room.slices = a.slices || b.slices;
   return room;
 }
 
 void lay_out_scratch(Scratch& scratch, Arena& arena, const ScratchRoom& room, bool weighs) {
-  scratch.slice_count = arena.take<std::size_t>(room.groups / kTouchSlice + 1);
+  scratch.slice_count = arena.take<std::size_t>(room.groups / kTouchSlice + 2);
   // A shell body's candidates have become contacts before these are weighed, so both lie in one
   // place.
   const std::size_t begin = arena.used();

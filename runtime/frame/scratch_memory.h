@@ -14,6 +14,7 @@ struct ScratchRoom {
   std::size_t contacts = 0;              // of a shell body
   std::size_t merged = 0, rubbing = 0;   // contacts that clusters and friction look at
   std::size_t weighing = 0;              // [B]
+  bool slices = false;                   // several threads may search one pair
   bool operator==(const ScratchRoom&) const = default;
 };
 // Room for shell bodies with these settings, of up to so many groups and blocks.

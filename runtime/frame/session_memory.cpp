@@ -68,6 +68,7 @@ Sizes sizes_of(const h6Model& model, const Settings& set, const h6SessionDef& de
     shares = shares || size.fields > 1;
   }
   n.scratch = scratch_room(set, groups, blocks);
+  n.scratch.slices = def.threads > 1 && !def.workers;
   n.pairs = std::min(all, def.max_pairs ? def.max_pairs : default_pairs(n.shells.size()));
   if (shares) n.traversals = def.threads;
   if (n.shells.size() > 1 && def.threads > 1) n.lanes = def.threads;
