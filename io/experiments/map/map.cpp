@@ -31,14 +31,9 @@ constexpr Slow kSlow[] = {
 
 MapRun run_once(const io::LoadedScene& loaded, const MethodColumn& method, double stiffness,
                 double newtons, MapForce force, const Variation& by) {
-  RunChange change;
+  RunChange change = map_change(newtons, force, by);
   change.method = method;
   change.stiffness = stiffness;
-  change.force = force == kPushForce ? by.push : 1;
-  change.max_force = newtons / change.force;  // which multiplies it, and the coupling's stiffness
-  // A scene's largest torque is for its own voxel, and half a voxel is less where voxels are finer.
-  if (force == kHalfVoxelForce)
-    change.also = [&](h6SessionDef&, h6HandDef& hand) { hand.coupling.max_torque *= by.voxel; };
   const RunFigures figures = run_experiment(loaded, change);
   return {
       figures.verdict,    figures.moved_on(),       figures.torque_noise, figures.max_depth_voxels,
@@ -99,6 +94,18 @@ MapScene planned(const std::string& name, const MapOptions& options) {
 }
 
 }  // namespace
+
+RunChange map_change(double newtons, MapForce force, const Variation& by) {
+  RunChange change;
+  change.force = force == kPushForce ? by.push : 1;
+  change.max_force = newtons / change.force;  // which multiplies it, and the coupling's stiffness
+  // A scene's largest torque is for its own voxel, and half a voxel is less where voxels are finer.
+  if (force == kHalfVoxelForce)
+    change.also = [voxel = by.voxel](h6SessionDef&, h6HandDef& hand) {
+      hand.coupling.max_torque *= voxel;
+    };
+  return change;
+}
 
 double wall_stiffness(const h6ContactDef& contact, const MethodColumn& method) {
   io::Scene scene = posed_scene("wall", plate(-40 * kMm, 40 * kMm), bottom(40, 40));

@@ -59,6 +59,10 @@ struct MapScene {
   std::vector<MapVariation> variations;
 };
 
+// How the hand of a run pushes: with up to `newtons` [N], the force that the variation has under
+// `force`, and for half a voxel also with the torque of half a voxel.
+RunChange map_change(double newtons, MapForce force, const Variation& by);
+
 std::vector<MapScene> run_map(const MapOptions& options, const Console& console);
 
 // The map in parts, for runs on other machines. A job is one variation of one scene.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/experiments/map/map_page.h"
@@ -129,6 +130,23 @@ TEST_CASE("pushes are counted by how hard they are, and every run once") {
     CHECK(v.newtons[kPushForce] == v.change.push * v.newtons[kSceneForce]);
     CHECK(v.newtons[kHalfVoxelForce] == doctest::Approx(5 * v.change.voxel));
   }
+}
+
+TEST_CASE("a hand that pushes half a voxel deep also turns no farther than half a voxel") {
+  Variation finer;
+  finer.voxel = 0.5, finer.push = 4;
+  // The largest force and torque of a hand that has 2 N and 4 Nm in its scene.
+  const auto most = [&](MapForce force) {
+    const RunChange change = map_change(2, force, finer);
+    h6SessionDef def = h6DefaultSessionDef();
+    h6HandDef hand = h6DefaultHandDef();
+    hand.coupling.max_torque = 4;
+    if (change.also) change.also(def, hand);
+    return std::pair(change.force * change.max_force, change.force * hand.coupling.max_torque);
+  };
+  CHECK(most(kHalfVoxelForce) == std::pair(2.0, 2.0));
+  CHECK(most(kSceneForce) == std::pair(2.0, 4.0));
+  CHECK(most(kPushForce) == std::pair(2.0, 16.0));
 }
 
 TEST_CASE("scaled stiffness makes a box rest equally deep on a wall under every rule" *
