@@ -74,12 +74,14 @@ void begin_step(h6Session& s, std::uint32_t step, bool cold) {
 }
 
 // Reports the depths of points, so it runs before points are merged into clusters.
-void note_depths(std::span<const Body> bodies, const ShellBody& shell, h6FrameReport& report) {
-  for (const Pair& pair : shell.pairs) {
+void note_depths(std::span<const Body> bodies, ShellBody& shell, h6FrameReport& report) {
+  for (Pair& pair : shell.pairs) {
+    pair.touches = false;
     if (pair.begin == pair.end) continue;
     const kernels::Depths depths =
         kernels::look_at_depths(shell.contacts.depth + pair.begin, pair.end - pair.begin);
     // Not all rows count: `series` also has points that are about to touch.
+    pair.touches = depths.inside > 0;
     report.contacts += static_cast<std::uint32_t>(depths.inside);
     report.max_depth = std::max<double>(report.max_depth, depths.deepest);
     report.max_depth_voxels =

@@ -64,6 +64,7 @@ struct alignas(64) PairSearch : SearchColumns {
   std::size_t open_blocks = 0, open_groups = 0;  // how many were near when last tested
   CullBypass cull_blocks, cull_groups;
   CullBypass pick_rows;          // decides whether to test single points of groups
+  std::uint32_t touched = 0;     // a block that touched in the last traversal that found any
   kernels::Affine last_place{};  // from the shell to the field, in the last traversal
   kernels::Affine anchor{};      // a place that the shell has stayed near to since
   PairFit fit;
@@ -86,6 +87,7 @@ struct BetweenFields {
 struct alignas(64) Pair {
   std::int32_t a = -1, b = -1;
   bool awake = false;                  // it was traversed in the last step
+  bool touches = false;                // and found a point inside
   std::size_t begin = 0, end = 0;      // rows among the shell body's contacts
   BetweenBodies* between = nullptr;    // where both bodies move
   BetweenFields* of_fields = nullptr;  // `series`, where b moves

@@ -520,11 +520,10 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
 }  // namespace
 
 double clearance(const Settings& set, const Body& a, const Body& b, double enough, double little,
-                 TraverseScratch& t) {
+                 std::uint32_t hint, TraverseScratch& t) {
   const Shell& shell = *a.shell;
   const Search search = search_of(set, a, b, 0, false);
   const float far = static_cast<float>(enough) + kSlack;
-  search.cull(search.blocks(), nullptr, shell.blocks.count, t.survivors, t.clearance);
   const auto add_groups = [&](std::size_t block, std::size_t groups) {
     const auto vector = static_cast<std::uint32_t>(block);
     if (search.bend) bend_groups(*search.bend, &vector, 1);
@@ -533,12 +532,22 @@ double clearance(const Settings& set, const Body& a, const Body& b, double enoug
       t.frontier[groups++] = static_cast<std::uint32_t>(g);
     return groups;
   };
-  // A part that touches is soon found: its nearest block holds a group that is near.
+  const auto least_of_groups = [&](std::size_t block) {
+    const std::size_t groups = add_groups(block, 0);
+    search.cull(search.groups(), t.frontier, groups, t.survivors, t.rest);
+    return *std::min_element(t.rest, t.rest + groups) - kSlack;
+  };
+  // A part that touches is soon found: the block that touched last holds a group that is near, or
+  // the block that is nearest does. The first saves the test of all blocks.
+  if (hint < shell.blocks.count) {
+    search.cull(search.blocks(), &hint, 1, t.survivors, t.clearance);
+    if (t.clearance[0] < far)
+      if (const float found = least_of_groups(hint); found <= little) return found;
+  }
+  search.cull(search.blocks(), nullptr, shell.blocks.count, t.survivors, t.clearance);
   const float* const nearest = std::min_element(t.clearance, t.clearance + shell.blocks.count);
   if (*nearest < far) {
-    const std::size_t groups = add_groups(static_cast<std::size_t>(nearest - t.clearance), 0);
-    search.cull(search.groups(), t.frontier, groups, t.survivors, t.rest);
-    const float found = *std::min_element(t.rest, t.rest + groups) - kSlack;
+    const float found = least_of_groups(static_cast<std::size_t>(nearest - t.clearance));
     if (found <= little) return found;
   }
   float least = HUGE_VALF;
@@ -573,6 +582,7 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
     found = relieve(pair.fit, candidates, found, rule, all.complete);
   }
   if (a.bend) bend_candidates(*a.bend, t, candidates.row, found);
+  if (found > 0) pair.touched = static_cast<std::uint32_t>(candidates.row[0] / kBlockRows);
   if (!(pair.margin > 0) || all.loadable) return found;
   const PointColumns s = points_of(a);
   return kernels::keep_loadable({s.x, s.y, s.z, s.nx, s.ny, s.nz, a.shell->point.data}, candidates,

@@ -22,9 +22,10 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
 // The way that no point of shell body a can touch field body b [voxel], from the spheres of blocks;
 // where that is under `enough`, from the spheres of groups. Where it is no more than `little`, any
 // number up to `little` may be returned. It follows from the poses alone: what the traversal
-// remembers can depend on threads and on the clock.
+// remembers can depend on threads and on the clock. `hint`: the block to look at first; any number
+// will do.
 double clearance(const Settings& set, const Body& a, const Body& b, double enough, double little,
-                 TraverseScratch& t);
+                 std::uint32_t hint, TraverseScratch& t);
 
 kernels::Touching candidates_from(const TraverseScratch& t, std::size_t at);
 // Copies candidates from one scratch to another, or within one. The two ranges may overlap.

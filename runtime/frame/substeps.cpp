@@ -59,7 +59,7 @@ double allowed(h6Session& s, const Pair& pair, double way) {
   const double longest = longest_step(*s.bodies[pair.b].field);
   if (way <= longest) return way;
   const double clear = clearance(s.settings, s.bodies[pair.a], s.bodies[pair.b], way, longest,
-                                 s.lanes.scratch[0].traverse);
+                                 pair.search.touched, s.lanes.scratch[0].traverse);
   return std::min(way, std::max(clear, longest));
 }
 
@@ -176,8 +176,11 @@ bool slow_down(h6Session& s, double dt) {
     const double held = held_motion(s, pair) / s.substeps.needed;
     const double moved = free_motion(a, b, dt) / b.field->voxel;
     const double way = moved + held / b.field->voxel;
-    if (way > longest_step(*b.field) && moved > 0 && within_reach(s, pair))
-      share = std::min(share, std::max(0.0, 1 - (way - allowed(s, pair, way)) / moved));
+    const double longest = longest_step(*b.field);
+    if (!(way > longest && moved > 0 && within_reach(s, pair))) continue;
+    // This step found the contacts at the present poses: a pair that touches need not be searched.
+    const double may = pair.awake && pair.touches ? longest : allowed(s, pair, way);
+    share = std::min(share, std::max(0.0, 1 - (way - may) / moved));
   }
   forget_reach(s);
   if (!(share < 1)) return false;

@@ -6,6 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "runtime/contact/traverse_pair.h"
+#include "runtime/frame/session.h"
 #include "tests/support/ball_in_bowl.h"
 #include "tests/support/box_on_floor.h"
 #include "tests/support/one_part.h"
@@ -212,6 +214,34 @@ TEST_CASE("free flight close to a wall ends where it ends without substeps") {
   CHECK(norm(a.velocity.linear - b.velocity.linear) < 1e-12);
   CHECK(norm(a.velocity.angular - b.velocity.angular) < 1e-9);
   CHECK(angle_between(a.pose.q, b.pose.q) < 1e-9);
+}
+
+TEST_CASE("where a search begins does not change how far a body may go") {
+  OnePart ball(sample_analytic([](double, double, double z) { return z; },
+                               {-32 * mm, -32 * mm, -32 * mm}, mm, 8, 8, 8),
+               sphere_points(5 * mm, 8000));
+  ball.open();
+  h6Session& s = *ball.session;
+  constexpr double kEnough = 2, kLittle = 0.2;  // [voxel], and a voxel is 1 mm
+  int touched = 0, close = 0, far = 0;
+  for (double above = -0.5; above < 9; above += 0.11) {
+    const h6BodyState at{pose(0.3 * mm, 0.2 * mm, (5 + above) * mm), {}};
+    h6SetBody(ball.session, 1, &at);
+    const auto may = [&](std::uint32_t hint) {
+      const double clear = h6::clearance(s.settings, s.bodies[1], s.bodies[0], kEnough, kLittle,
+                                         hint, s.lanes.scratch[0].traverse);
+      return std::min(kEnough, std::max(clear, kLittle));
+    };
+    const double anywhere = may(UINT32_MAX);
+    CAPTURE(above);
+    for (std::uint32_t block = 0; block <= s.bodies[1].shell->blocks.count; ++block)
+      REQUIRE(may(block) == anywhere);
+    CHECK(anywhere <= std::max(above, kLittle) + 0.01);
+    touched += above <= 0, close += above > 0 && anywhere == kLittle, far += anywhere == kEnough;
+  }
+  CHECK(touched > 0);
+  CHECK(close > 0);
+  CHECK(far > 0);
 }
 
 TEST_CASE("near a field a body moves at most a fifth of a voxel a step, whatever the budget") {
