@@ -59,49 +59,56 @@ double normal_load(const Contacts& c, const h6ContactDef& def, const Vec6& u, st
   return double{c.weight[i]} * std::max(0.0, double{c.depth[i]} - def.damping * leaves);
 }
 
-FrictionRows<float> rows_that_rub(const Contacts& c, const h6ContactDef& def, const Pair& pair,
-                                  const Vec6& u, const FrictionScratch& s) {
-  const kernels::ContactColumns at = kernel_columns(c, pair.begin, pair.end);
-  FrictionRows<float> rows{};
-  float* load = s.load;
-  if (def.friction > 0) {
-    rows.planes = {at.nx, at.ny, at.nz, at.rx, at.ry, at.rz, load, at.count, false};
-    for (std::size_t i = 0; i < at.count; ++i) {
-      const double most = def.friction * normal_load(c, def, u, pair.begin + i);
-      load[i] = most > 0 ? static_cast<float>(most) : 0;
-      rows.total += load[i];
-    }
-    load += at.count;
-  }
-  if (pushes_rub(def)) {
-    float* const* to = s.line;
-    const kernels::PushLineRows lines = kernels::push_lines(
-        at, c.load + pair.begin, {to[0], to[1], to[2], to[3], to[4], to[5], load});
-    rows.lines = {to[0], to[1], to[2], to[3], to[4], to[5], load, lines.count, true};
-    rows.total += lines.total;
-  }
-  return rows;
+void add(kernels::FrictionSums& to, const kernels::FrictionSums& more) {
+  to.stretched += more.stretched, to.linear += more.linear, to.capped += more.capped;
+  to.sticking += more.sticking, to.energy += more.energy;
+  to.slips = to.slips || more.slips;
 }
 
-// How far the rows of a pair are stretched.
-class Stretches {
+// The rows of a pair, slice by slice of its contacts. Each slice has its own part of the scratch,
+// and results of slices are joined in order.
+class SlicedRows {
  public:
-  Stretches(const FrictionRows<float>& rows, const FrictionScratch& s, const Vec6& q)
-      : s_(s), count_(rows.planes.count + rows.lines.count), limit_(rows.total) {
-    double* to = s.stretch;
-    for (const kernels::FrictionRows* some : {&rows.planes, &rows.lines}) {
-      if (some->count > 0) kernels::friction_stretch(*some, q.data(), to);
-      to += some->count;
-    }
+  SlicedRows(const Contacts& c, const h6ContactDef& def, const Pair& pair, const Vec6& u,
+             Lane& lane)
+      : lane_(lane), count_(pair.end - pair.begin) {
+    each([&](std::size_t i) {
+      const std::size_t begin = pair.begin + i * kRubSlice;
+      rows_that_rub(c, def, u, begin, std::min(begin + kRubSlice, pair.end), i);
+    });
+    for (std::size_t i = 0; i < slices(); ++i) total_ += scratch().slice[i].total;
+  }
+  double total() const { return total_; }
+  FrictionRows<float> of(std::size_t i) const {
+    FrictionRows<float> rows = scratch().slice[i];
+    rows.total = total_;
+    return rows;
+  }
+  std::size_t slices() const { return (count_ + kRubSlice - 1) / kRubSlice; }
+  const FrictionScratch& scratch() const { return lane_.scratch->friction; }
+  // Calls run(i) for every slice, on any thread.
+  template <class F>
+  void each(F&& run) const {
+    share_slices(lane_, lane_.rubbing, count_, slices(), run);
+  }
+
+  // How far the rows are stretched by q; the sums as of at(1).
+  kernels::FrictionSums stretch(const Vec6& q) const {
+    const FrictionScratch& s = scratch();
+    return sums_of([&](std::size_t i) {
+      for (const kernels::FrictionRows* some : {&s.slice[i].planes, &s.slice[i].lines})
+        if (some->count > 0) kernels::friction_stretch(*some, q.data(), stretch_of(*some));
+      return sums(i, 1);
+    });
   }
   // Sums over the rows when each has `share` of its stretch.
   kernels::FrictionSums at(double share) const {
-    return kernels::friction_sums(s_.load, s_.stretch, count_, share, limit_);
+    return sums_of([&](std::size_t i) { return sums(i, share); });
   }
   // The share, 0 .. 1, of its stretch that the spring keeps. `whole`: at(1).
   double yield(const kernels::FrictionSums& whole) const {
     // Rows along a line that are on their way back have no say.
-    const double most = limit_ * whole.stretched;
+    const double most = total_ * whole.stretched;
     if (!(whole.linear > most)) return 1;
     // The share of the load that slips is concave in the share of the stretch, so Newton's method
     // comes from below.
@@ -116,14 +123,68 @@ class Stretches {
   }
 
  private:
-  const FrictionScratch& s_;
+  void rows_that_rub(const Contacts& c, const h6ContactDef& def, const Vec6& u, std::size_t begin,
+                     std::size_t end, std::size_t i) const {
+    const FrictionScratch& s = scratch();
+    const kernels::ContactColumns at = kernel_columns(c, begin, end);
+    const std::size_t first = i * kRubSlice;
+    FrictionRows<float>& rows = s.slice[i];
+    rows = {};
+    float* load = s.load + first;
+    if (def.friction > 0) {
+      rows.planes = {at.nx, at.ny, at.nz, at.rx, at.ry, at.rz, load, at.count, false};
+      for (std::size_t k = 0; k < at.count; ++k) {
+        const double most = def.friction * normal_load(c, def, u, begin + k);
+        load[k] = most > 0 ? static_cast<float>(most) : 0;
+        rows.total += load[k];
+      }
+      load += count_;
+    }
+    if (pushes_rub(def)) {
+      float* to[6];
+      for (int k = 0; k < 6; ++k) to[k] = s.line[k] + first;
+      const kernels::PushLineRows lines =
+          kernels::push_lines(at, c.load + begin, {to[0], to[1], to[2], to[3], to[4], to[5], load});
+      rows.lines = {to[0], to[1], to[2], to[3], to[4], to[5], load, lines.count, true};
+      rows.total += lines.total;
+    }
+  }
+  double* stretch_of(const kernels::FrictionRows& some) const {
+    return scratch().stretch + (some.load - scratch().load);
+  }
+  kernels::FrictionSums sums(std::size_t i, double share) const {
+    kernels::FrictionSums out{};
+    for (const kernels::FrictionRows* some :
+         {&scratch().slice[i].planes, &scratch().slice[i].lines})
+      if (some->count > 0)
+        add(out, kernels::friction_sums(some->load, stretch_of(*some), some->count, share, total_));
+    return out;
+  }
+  template <class F>
+  kernels::FrictionSums sums_of(const F& sums_of_slice) const {
+    each([&](std::size_t i) { scratch().sums[i] = sums_of_slice(i); });
+    kernels::FrictionSums out{};
+    for (std::size_t i = 0; i < slices(); ++i) add(out, scratch().sums[i]);
+    return out;
+  }
+
+  Lane& lane_;
   std::size_t count_;
-  double limit_;
+  double total_ = 0;
 };
 
+// K of all rows, as friction_stiffness has it of some.
+void stiffness_of(const SlicedRows& rows, const FrictionLaw& law, const Vec6& q, const Vec6& ahead,
+                  Mat6& K) {
+  Mat6* const of = rows.scratch().K;
+  rows.each([&](std::size_t i) { friction_stiffness(rows.of(i), law, q, ahead, of[i]); });
+  clear(K);
+  for (std::size_t i = 0; i < rows.slices(); ++i) K += of[i];
+}
+
 // Lets the spring slip, and keeps its energy within what was put in. `q`: in world axes.
-void slip(const Stretches& rows, const FrictionLaw& law, FrictionSpring& spring, Vec6& q) {
-  kernels::FrictionSums sums = rows.at(1);
+void slip(const SlicedRows& rows, const FrictionLaw& law, FrictionSpring& spring, Vec6& q) {
+  kernels::FrictionSums sums = rows.stretch(q);
   double share = rows.yield(sums);
   if (share < 1) sums = rows.at(share);
   const double most = std::max(spring.energy, 0.0);
@@ -155,12 +216,11 @@ bool moves_in_step(const Body& body) { return !body.fixed && body.motion != Moti
 bool has_mass(const Body& body) { return !body.fixed && body.motion == Motion::dynamic; }
 
 void sum_pair(const Settings& set, const Body& a, const Body& b, const Vec6& u,
-              const FrictionRows<float>& rows, const FrictionScratch& scratch,
-              FrictionSpring& spring) {
-  const FrictionLaw law{set.contact.stiffness, rows.total};
+              const SlicedRows& rows, FrictionSpring& spring) {
+  const FrictionLaw law{set.contact.stiffness, rows.total()};
   const Vec6 moved = follow(spring, a, b);
   Vec6 q = rotated(b.R, spring.q);
-  slip(Stretches(rows, scratch, q), law, spring, q);
+  slip(rows, law, spring, q);
   const Vec6 damped = q + set.contact.damping * u;
   const bool mass = has_mass(a) || has_mass(b);
   spring.implicit = set.integrator == H6_IMPLICIT && (moves_in_step(a) || moves_in_step(b));
@@ -168,11 +228,13 @@ void sum_pair(const Settings& set, const Body& a, const Body& b, const Vec6& u,
   // An implicit step goes on about as fast as the bodies are; those without mass, as the last one.
   Vec6 ahead = damped;
   if (spring.implicit) ahead += mass ? Vec6(set.dt * u) : rotated(b.R, moved);
-  friction_stiffness(rows, law, q, ahead, spring.K);
+  stiffness_of(rows, law, q, ahead, spring.K);
   spring.f = -(spring.K * damped);
   if (set.gradient == H6_EXACT) {
     spring.elastic = -(spring.K * q);
-    spring.turning = friction_turning(rows, law, q, ahead);
+    spring.turning.setZero();
+    for (std::size_t i = 0; i < rows.slices(); ++i)
+      spring.turning += friction_turning(rows.of(i), law, q, ahead);
   }
   forget_unfelt(spring.K, law.stiffness, series_lever(a.radius, a.voxel), q);
   spring.q = rotated(b.R.transpose(), q);
@@ -309,10 +371,9 @@ void sum_friction(const Settings& set, std::span<const Body> bodies, ShellBody& 
     FrictionSpring& spring = *pair.friction;
     const Body& b = bodies[pair.b];
     const Vec6 u = pair_velocity(a, b);
-    const FrictionScratch& scratch = lane.scratch->friction;
-    const FrictionRows<float> rows = rows_that_rub(shell.contacts, set.contact, pair, u, scratch);
-    if (rows.total > 0)
-      sum_pair(set, a, b, u, rows, scratch, spring);
+    const SlicedRows rows(shell.contacts, set.contact, pair, u, lane);
+    if (rows.total() > 0)
+      sum_pair(set, a, b, u, rows, spring);
     else if (spring.holds)
       spring = {};
   }

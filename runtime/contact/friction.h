@@ -68,11 +68,17 @@ bool contacts_rub(const h6ContactDef& def);
 // How many rows each contact can have.
 std::size_t rows_of_contact(const h6ContactDef& def);
 
+inline constexpr std::size_t kRubSlice = 2048;  // contacts whose friction is summed at a time
+
 // (max_contacts rows_of_contact), or null where no contact can rub.
 struct FrictionScratch {
   float* load = nullptr;      // of each row, those in the plane first
   double* stretch = nullptr;  // likewise
   float* line[6] = {};        // of rows along a line: e and r
+  // (slices of contacts)
+  FrictionRows<float>* slice = nullptr;  // its rows, with the total of its own loads
+  kernels::FrictionSums* sums = nullptr;
+  Mat6* K = nullptr;
 };
 
 }  // namespace h6

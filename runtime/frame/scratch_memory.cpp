@@ -46,6 +46,10 @@ void take_weighing(Scratch& scratch, Arena& arena, const ScratchRoom& room) {
   rub.load = arena.take<float>(room.rubbing);
   rub.stretch = arena.take<double>(room.rubbing);
   for (float*& column : rub.line) column = arena.take<float>(room.rubbing);
+  const std::size_t slices = room.rubbing > 0 ? room.contacts / kRubSlice + 1 : 0;
+  rub.slice = arena.take<FrictionRows<float>>(slices);
+  rub.sums = arena.take<kernels::FrictionSums>(slices);
+  rub.K = arena.take<Mat6>(slices);
 }
 
 }  // namespace
