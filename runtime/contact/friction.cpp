@@ -92,7 +92,7 @@ class SlicedRows {
     share_slices(lane_, lane_.rubbing, count_, slices(), run);
   }
 
-  // How far the rows are stretched by q; the sums as of at(1).
+  // Stretches the rows by q. Returns at(1).
   kernels::FrictionSums stretch(const Vec6& q) const {
     const FrictionScratch& s = scratch();
     return sums_of([&](std::size_t i) {

@@ -181,7 +181,7 @@ Search search_of(const Settings& set, const Body& a, const Body& b, float margin
           a.bend};
 }
 
-constexpr std::size_t kMoved = 8;  // slices whose candidates are moved at a time, in about 2 us
+constexpr std::size_t kMoved = 8;  // slices whose candidates are moved at a time
 
 // Moves the candidates of all slices from t.apart, where each slice has its own rows, behind row
 // `used`. Returns their number.
