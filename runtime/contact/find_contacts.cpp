@@ -220,7 +220,10 @@ void traverse(const Settings& set, std::span<const Body> bodies, ShellBody& shel
 
 void gather_contacts(std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   Contacts& c = shell.contacts;
+  std::size_t rows = 0;
+  for (const Pair& pair : shell.pairs) rows += pair.search.candidates;
   c.count = 0;
+  place_columns(c, rows);
   const Body& a = bodies[shell.body];
   const Shell& points = *a.shell;
   const PointColumns now = points_of(a);
