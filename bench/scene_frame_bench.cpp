@@ -7,6 +7,7 @@
 //     rest       not at all
 //     tremble    0.01 voxel a frame, to and fro, as a hand that holds something
 //     slide:S    S voxels a frame, to and fro, across the direction in which it moved in
+//     dwell:S    at the places of slide:S, at each of them trembling: as many contacts, slowly
 //     turn       about its centre, its farthest point by 0.5 voxel a frame, to and fro
 //     path       along a closed curve of 300 poses, by about 0.3 voxel a frame
 //     random     the same poses in random order
@@ -92,15 +93,22 @@ h6Pose moved(double in, double across, const h6Vec3& turn = {}) {
   return {kVoxel * (in * kIn + across * kAcross), h6::turn_by(turn)};
 }
 
-enum class Motion { rest, tremble, slide, turn, path, random, anew };
+h6Pose beside(h6Pose pose, double in) {
+  using namespace h6;
+  pose.p = pose.p + kVoxel * in * kIn;
+  return pose;
+}
+
+enum class Motion { rest, tremble, slide, dwell, turn, path, random, anew };
 struct Moving {
   Motion motion;
-  double step = 0;  // of `slide` [voxel]
+  double step = 0;  // of `slide` and `dwell` [voxel]
 };
 std::string name_of(const Moving& m) {
-  static const char* const names[] = {"rest", "tremble", "slide", "turn", "path", "random", "anew"};
+  static const char* const names[] = {"rest", "tremble", "slide",  "dwell",
+                                      "turn", "path",    "random", "anew"};
   const std::string name = names[static_cast<int>(m.motion)];
-  if (m.motion != Motion::slide) return name;
+  if (m.step == 0) return name;
   char step[32];
   std::snprintf(step, sizeof step, ":%g", m.step);
   return name + step;
@@ -123,7 +131,8 @@ std::vector<h6Pose> poses_of(const Moving& moving, bool socket, double push) {
     case Motion::tremble:
       for (std::size_t i = 0; i < 4; ++i) poses.push_back(moved(push + 0.01 * to_and_fro(i, 1), 0));
       return poses;
-    case Motion::slide: {
+    case Motion::slide:
+    case Motion::dwell: {
       // In the socket the walls are near: a quarter of a voxel, or a step, to each side.
       const double way = std::max((socket ? 1 : 2) * moving.step, 0.25);
       const auto n = static_cast<std::size_t>(std::lround(way / moving.step));
@@ -304,7 +313,11 @@ void frame(benchmark::State& state, bool socket, h6Method method, std::size_t wa
   std::size_t i = 0;
   const auto next = [&]() -> const h6Pose& {
     if (anew) step(session.get(), outside);
-    return poses[i++ % poses.size()];
+    const h6Pose& pose = poses[i++ % poses.size()];
+    // It trembles until the engine knows the place. The frame back to the pose is timed.
+    for (int k = 0; moving.motion == Motion::dwell && k < 9; ++k)
+      step(session.get(), beside(pose, k % 2 == 0 ? 0.01 : 0));
+    return pose;
   };
   for (int checked = 0; checked < 45; ++checked) {
     const h6Pose& pose = next();
@@ -402,8 +415,9 @@ void add(bool socket, h6Method method, std::size_t contacts, unsigned threads, b
 
 [[maybe_unused]] const bool registered = [] {
   const Moving all[] = {{Motion::rest},       {Motion::tremble},  {Motion::slide, 0.05},
-                        {Motion::slide, 0.5}, {Motion::slide, 2}, {Motion::turn},
-                        {Motion::path},       {Motion::random},   {Motion::anew}};
+                        {Motion::slide, 0.5}, {Motion::slide, 2}, {Motion::dwell, 2},
+                        {Motion::turn},       {Motion::path},     {Motion::random},
+                        {Motion::anew}};
   for (const bool socket : {false, true})
     for (const h6Method method :
          {H6_METHOD_GAUSS6, H6_METHOD_ROBUST, H6_METHOD_SERIES, H6_METHOD_FIRM})
