@@ -6,6 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "io/field/grids.h"
 #include "sched/parallel_for.h"
@@ -22,34 +25,38 @@ constexpr float kCellDiagonal = 1.7321f;
 constexpr int kSide = 8 + 2 * kAround;
 constexpr float kNoNode = std::numeric_limits<float>::infinity();
 
-// The ways from a node to those of a row along x: their lengths at x - dx and x + dx.
-struct RowOfWays {
-  int dy, dz, most_dx;
-  float length[kAround + 1];
+// The ways from a node to those of all rows along x that are as far from its own row: their lengths
+// at x - dx and x + dx.
+struct RingOfWays {
+  int most_dx = -1;
+  float length[kAround + 1] = {};
+  std::vector<int> rows;  // kSide dz + dy
 };
 
 // The shortest first: they soon give sums that no longer ones can beat.
-std::vector<RowOfWays> ways_around() {
-  std::vector<RowOfWays> rows;
+std::vector<RingOfWays> ways_around() {
+  std::map<int, RingOfWays> rings;  // by dy^2 + dz^2
   for (int dz = -kAround; dz <= kAround; ++dz)
     for (int dy = -kAround; dy <= kAround; ++dy) {
-      RowOfWays row{dy, dz, -1, {}};
+      const int aside = dy * dy + dz * dz;
+      if (aside > kLongestWay * kLongestWay) continue;
+      RingOfWays& ring = rings[aside];
+      ring.rows.push_back(kSide * dz + dy);
       for (int dx = 0; dx <= kAround; ++dx) {
-        const double length = std::sqrt(double(dx * dx + dy * dy + dz * dz));
-        if (length <= kLongestWay) row.most_dx = dx, row.length[dx] = float(length);
+        const double length = std::sqrt(double(dx * dx + aside));
+        if (length <= kLongestWay) ring.most_dx = dx, ring.length[dx] = float(length);
       }
-      if (row.most_dx >= 0) rows.push_back(row);
     }
-  std::sort(rows.begin(), rows.end(), [](const RowOfWays& a, const RowOfWays& b) {
-    return a.dy * a.dy + a.dz * a.dz < b.dy * b.dy + b.dz * b.dz;
-  });
-  return rows;
+  std::vector<RingOfWays> out;
+  for (auto& [aside, ring] : rings) out.push_back(std::move(ring));
+  return out;
 }
 
 // |d| of the nodes of K in and around a brick, infinity at all others.
 struct Surroundings {
   float d[kSide * kSide * kSide];
   float least[kSide * kSide];  // of each row along x
+  float least_of_all;
 };
 
 // Sums over the nodes x - dx and x + dx of a row, dx < count, for eight nodes x. The loop over x
@@ -112,14 +119,16 @@ class Extension {
   bool in_band(float sample) const { return std::fabs(sample) < known_; }
 
   void measure_row(const Surroundings& around, int y, int z, float* v) const {
-    float worst = *std::max_element(v, v + 8);
-    for (const RowOfWays& row : ways_) {
-      const int at = (z + kAround + row.dz) * kSide + y + kAround + row.dy;
-      int count = 0;
-      while (count <= row.most_dx && around.least[at] + row.length[count] < worst) ++count;
-      if (count == 0) continue;
-      lower_row(around.d + at * kSide + kAround, row.length, count, v);
-      worst = *std::max_element(v, v + 8);
+    const int own = (z + kAround) * kSide + y + kAround;
+    for (const RingOfWays& ring : ways_) {
+      const float worst = *std::max_element(v, v + 8);
+      if (worst <= ring.length[0] + around.least_of_all) return;
+      for (const int row : ring.rows) {
+        const float least = around.least[own + row];
+        int count = 0;
+        while (count <= ring.most_dx && least + ring.length[count] < worst) ++count;
+        if (count > 0) lower_row(around.d + (own + row) * kSide + kAround, ring.length, count, v);
+      }
     }
   }
 
@@ -132,6 +141,7 @@ class Extension {
       const float* samples = brick({at[0] + step[0], at[1] + step[1], at[2] + step[2]});
       if (samples != nullptr) gather_brick(samples, step, around);
     }
+    around.least_of_all = *std::min_element(around.least, around.least + kSide * kSide);
   }
 
   // The nodes of the brick that stands `step` bricks away.
@@ -166,7 +176,7 @@ class Extension {
   const Place cells_;
   const float known_, voxel_;  // [m]
   const float band_;
-  const std::vector<RowOfWays> ways_;
+  const std::vector<RingOfWays> ways_;
 };
 
 // The cells without a brick next to bricks.
