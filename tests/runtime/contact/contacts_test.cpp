@@ -345,3 +345,31 @@ TEST_CASE("points clear of a field are not sampled again while the shell tremble
   CHECK(looked == 0);
   h6DestroySession(s);
 }
+
+TEST_CASE("the columns of few contacts lie close together, apart, and within their memory") {
+  constexpr std::size_t kCapacity = 1000;
+  h6::Contacts c{};
+  h6::Arena count;
+  h6::take_columns(c, count, kCapacity);
+  const std::size_t lines = (count.used() + 63) / 64;
+  std::vector<std::uint32_t> memory(16 * (lines + 1));
+  std::uint32_t* const base =
+      memory.data() + (64 - reinterpret_cast<std::uintptr_t>(memory.data()) % 64) % 64 / 4;
+  for (const std::size_t rows : {kCapacity, std::size_t{0}, std::size_t{1}, std::size_t{94},
+                                 std::size_t{16}, std::size_t{17}, kCapacity - 1, kCapacity}) {
+    h6::Arena arena(base, 64 * lines);
+    h6::take_columns(c, arena, kCapacity);
+    h6::place_columns(c, rows);
+    std::vector<std::uintptr_t> begins;
+    h6::each_column(
+        c, [&](auto*& column) { begins.push_back(reinterpret_cast<std::uintptr_t>(column)); });
+    std::sort(begins.begin(), begins.end());
+    const std::size_t room = 64 * ((rows + 15) / 16);
+    for (std::size_t k = 1; k < begins.size(); ++k) CHECK(begins[k] - begins[k - 1] == room);
+    CHECK(begins.front() == reinterpret_cast<std::uintptr_t>(base));
+    CHECK(begins.back() + room <= reinterpret_cast<std::uintptr_t>(base) + 64 * lines);
+  }
+  c.cell = nullptr;  // a rule that has no such column keeps none
+  h6::place_columns(c, 20);
+  CHECK(c.cell == nullptr);
+}
