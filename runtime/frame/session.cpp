@@ -370,7 +370,7 @@ void h6DestroySession(h6Session* s) {
   delete s->team;
   delete s->alone;
   forget_overlap(*s);
-  release(s->allocator, s->memory, s->memory_bytes);
+  release_memory(*s);
   const h6Allocator allocator = s->allocator;
   destroy(allocator, s);
 }

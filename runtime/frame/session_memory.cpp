@@ -192,6 +192,8 @@ void list_pairs(std::span<const h6PairDef> listed, NearPairs& near) {
             });
 }
 
+bool in_slabs(const h6Session& s) { return s.workers && !s.allocator.allocate; }
+
 }  // namespace
 
 bool reserve_memory(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef> listed,
@@ -201,7 +203,8 @@ bool reserve_memory(h6Session& s, const h6SessionDef& def, std::span<const h6Pai
   Arena count;
   lay_out(s, def, n, count);
   s.memory_bytes = count.used();
-  s.memory = allocate(def.allocator, s.memory_bytes);
+  s.memory =
+      in_slabs(s) ? s.workers->slabs.take(s.memory_bytes) : allocate(s.allocator, s.memory_bytes);
   if (!s.memory)
     return fail(error, H6_ERROR_MEMORY,
                 "no memory for the session (%zu MB): lower max_contacts or max_pairs",
@@ -225,6 +228,14 @@ bool reserve_memory(h6Session& s, const h6SessionDef& def, std::span<const h6Pai
     s.bodies[n.shells[i].body].meets = static_cast<std::int32_t>(i);
   for (Deformation& d : s.bends) s.bodies[d.body].bend = &d;
   return true;
+}
+
+void release_memory(h6Session& s) {
+  if (!s.memory) return;
+  if (in_slabs(s))
+    s.workers->slabs.give_back(s.memory, s.memory_bytes);
+  else
+    release(s.allocator, s.memory, s.memory_bytes);
 }
 
 }  // namespace h6

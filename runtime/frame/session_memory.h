@@ -11,5 +11,7 @@ namespace h6 {
 // fields. `listed`: sorted_pairs of the definition. False: `error` says that there is no memory.
 bool reserve_memory(h6Session& s, const h6SessionDef& def, std::span<const h6PairDef> listed,
                     h6Error* error);
+// Gives it back. What lies in it has no destructors.
+void release_memory(h6Session& s);
 
 }  // namespace h6

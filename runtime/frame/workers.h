@@ -9,6 +9,7 @@
 
 #include "hapsix/batch.h"
 #include "runtime/frame/scratch_memory.h"
+#include "runtime/frame/session_slabs.h"
 #include "sched/frame_team.h"
 
 struct h6Workers {
@@ -25,6 +26,7 @@ struct h6Workers {
   h6::ScratchRoom room;              // of each
   void* memory = nullptr;
   std::size_t memory_bytes = 0;
+  h6::SessionSlabs slabs;  // of sessions without an allocator of their own
 };
 
 namespace h6 {
