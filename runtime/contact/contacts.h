@@ -42,9 +42,9 @@ inline void take_columns(Contacts& c, Arena& arena, std::size_t capacity) {
   c.capacity = capacity;
 }
 
-// Lays the columns close together for up to `rows` <= capacity contacts. Their rows are lost. Few
-// contacts then lie on a few pages, where each column had a page of its own: 4,096 sessions of 94
-// contacts, which no cache holds, make 1.13 to 1.2 times as many steps a second.
+// Lays the columns side by side for up to `rows` <= capacity contacts. What they held is lost. With
+// few contacts, columns then share pages of memory. So 1,024 sessions of 94 contacts make 1.16 to
+// 1.20 times as many steps a second (h6StepMany, AVX-512).
 inline void place_columns(Contacts& c, std::size_t rows) {
   H6_ASSERT(rows <= c.capacity);
   Arena arena(c.depth, SIZE_MAX);  // the first column

@@ -8,9 +8,10 @@
  * throws; it waits only for the sessions that other workers are stepping. Make the workers first and
  * the sessions with h6SessionDef.workers: they then share one scratch a thread, which stays in its
  * cache, and take a third of the memory. Those without an allocator of their own lie side by side in
- * pages of 2 MB, where the system gives such pages. Other sessions can be stepped here, too, as long as nobody
- * else steps them. Use `threads` 1, since here a session stays on one thread, and max_contacts as small
- * as your parts allow: that is most of a session's memory. */
+ * pages of 2 MB, where the system gives such pages; that memory is free again when all sessions in a
+ * piece of 16 MB have ended. Other sessions can be stepped here, too, as long as nobody else steps
+ * them. Use `threads` 1, since here a session stays on one thread, and max_contacts as small as your
+ * parts allow: that is most of a session's memory. */
 #ifndef HAPSIX_BATCH_H
 #define HAPSIX_BATCH_H
 
