@@ -40,20 +40,26 @@ Columns directions(std::size_t vectors, std::size_t rows) {
 
 // Points about a ball: half of them touch.
 struct Touch {
+  const test::AnalyticField& field;
   ShellPoints points;
   std::vector<std::uint32_t> groups, row;
   Columns out, want;  // distance and gradient
   std::vector<float> least;
   std::size_t count = 0, want_count = 0;
 
-  explicit Touch(std::size_t n)
-      : points(n, 2), row(n), out(columns(4, n)), want(columns(4, n)), least(n / kGroup) {
+  Touch(std::size_t n, const test::AnalyticField& in)
+      : field(in),
+        points(n, 2),
+        row(n),
+        out(columns(4, n)),
+        want(columns(4, n)),
+        least(n / kGroup) {
     for (std::uint32_t g = 0; g < n / kGroup; ++g) groups.push_back(g);
     want_count = run(touch_groups_ref, want);
   }
   template <class Kernel>
   std::size_t run(const Kernel& kernel, Columns& to) {
-    return kernel(ball_field().view(), test::kIdentity,
+    return kernel(field.view(), test::kIdentity,
                   PointsView{points.x.data(), points.y.data(), points.z.data(), points.x.size()},
                   groups.data(), groups.size(), 0.0f, false,
                   GroupLook{nullptr, least.data(), nullptr, nullptr, 0},
@@ -61,8 +67,8 @@ struct Touch {
   }
 };
 
-Case touch(std::size_t n) {
-  auto t = std::make_shared<Touch>(n);
+Case touch(std::size_t n, const test::AnalyticField& field) {
+  auto t = std::make_shared<Touch>(n, field);
   return {[=] { t->count = t->run(touch_groups, t->out); },
           [=] { t->count = t->run(touch_groups_ref, t->out); },
           [=] { return t->count == t->want_count && near(t->out, t->want, t->count, 1e-3f); }};
@@ -123,7 +129,10 @@ Case torque(std::size_t n) {
 const bool registered = [] {
   for (std::size_t n : {1024, 10000}) {
     const std::string size = "/n:" + std::to_string(n);
-    add("kernels/touch_groups" + size, n, [=] { return touch(n / kGroup * kGroup); });
+    const std::size_t whole = n / kGroup * kGroup;
+    add("kernels/touch_groups" + size, n, [=] { return touch(whole, ball_field()); });
+    add("kernels/touch_groups/creased" + size, n, [=] { return touch(whole, cut_field(10)); });
+    add("kernels/touch_groups/refined" + size, n, [=] { return touch(whole, cut_field(1)); });
     add("kernels/make_contacts" + size, n, [=] { return make(n); });
     add("kernels/torque_directions" + size, n, [=] { return torque(n); });
   }

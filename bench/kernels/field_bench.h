@@ -2,7 +2,9 @@
 // field_bench.h - a field and points for the sampling and culling benchmarks.
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numeric>
 #include <vector>
 
@@ -18,6 +20,23 @@ inline const test::AnalyticField& ball_field() {
     return test::sphere(p, {191.5, 191.5, 191.5}, kBall);
   });
   return field;
+}
+
+// The ball with cells within 2 voxels of its surface cut into quarters: one in `every` of them.
+inline const test::AnalyticField& cut_field(int every) {
+  const auto make = [](int n) {
+    const auto distance = [](const test::Point& p) {
+      return test::sphere(p, {191.5, 191.5, 191.5}, kBall);
+    };
+    return std::make_unique<test::AnalyticField>(
+        48, 48, 48, distance, 3.0, 0.001, 1.0, [=](int x, int y, int z) {
+          if (std::fabs(distance({x + 0.5, y + 0.5, z + 0.5})) > 2) return 1;
+          return (x / 8 + y / 8 + z / 8) % n == 0 ? 4
+                                                  : 1;  // all cells of some bricks, as at an edge
+        });
+  };
+  static const auto all = make(1), some = make(10);
+  return every == 1 ? *all : *some;
 }
 
 struct ShellPoints {

@@ -20,11 +20,12 @@ HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
 // The points to sample are staged, those of one group behind those of another, some groups at a
-// time. Sixteen points, a batch, then go through three steps: find their entry in the table, their
-// cell in the bricks, their samples. The steps run some batches apart, so that none waits for the
-// memory of the one before. When the field is cold, each step also prefetches for the next.
+// time. Sixteen points, a batch, then go through four steps: find their entry in the table, their
+// cell in the bricks, its finer samples where it is cut, their samples. The steps run some batches
+// apart, so that none waits for the memory of the one before. When the field is cold, each step
+// also prefetches for the next.
 //
-//     batch  k + ahead: locate   k + ahead / 2: look_up   k: sample
+//     batch  k + ahead: locate   k + ahead / 2: look_up   k + ahead / 4: find_finer   k: sample
 constexpr std::size_t kStaged = 32;  // groups
 constexpr std::size_t kRing = 16;
 constexpr std::size_t kAhead = 4;  // batches, when the field is in the caches; else kRing
@@ -37,10 +38,14 @@ struct Stage {
 };
 
 struct Ring {
-  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // index in the table, then byte offset in bricks
-  HWY_ALIGN std::int32_t node[kRing][kGroup];
+  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // index in the table, then its entry
+  HWY_ALIGN std::int32_t node[kRing][kGroup];  // then byte offset in bricks
   HWY_ALIGN float fraction[3][kRing][kGroup];
-  bool plain[kRing];  // all points lie in plain bricks; other batches take the general path
+  bool plain[kRing];  // all points lie in bricks
+  // All lie in bricks, some of them refined; then: in cut cells. Only then are the rest filled.
+  bool cut[kRing];
+  HWY_ALIGN std::int32_t line[kRing][kGroup], plane[kRing][kGroup];
+  HWY_ALIGN float quantum[kRing][kGroup];
 };
 
 // The last batch is filled up with the first point.
@@ -158,33 +163,89 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
     for (const std::int32_t slot : ring.slot[k]) hwy::Prefetch(field.table + slot);
 }
 
-HWY_INLINE void prefetch_far(const FieldView& field, const std::int32_t* slot) {
+HWY_INLINE void prefetch_far(const FieldView& field, const std::int32_t* entry) {
+  for (std::size_t i = 0; i < kGroup; ++i)
+    if (entry[i] < 0) hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry[i]}));
+}
+
+// Of a batch with refined bricks: what find_finer reads.
+HWY_NOINLINE void prefetch_cuts(const FieldView& field, const Ring& ring, std::size_t k) {
+  const DI di;
+  HWY_ALIGN std::int32_t cell[kGroup];
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di))
+    hn::Store(cell_at(hn::Load(di, ring.node[k] + i)), di, cell + i);
   for (std::size_t i = 0; i < kGroup; ++i) {
-    const std::int32_t entry = field.table[slot[i]];
-    if (entry < 0) hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry}));
+    if (ring.slot[k][i] < kRefined) continue;
+    const std::uint16_t* const cuts =
+        field.cuts + std::ptrdiff_t{row_of(ring.slot[k][i])} * kCutStride;
+    hwy::Prefetch(cuts);
+    hwy::Prefetch(cuts + kCutHead + cell[i]);
   }
+}
+
+// Finds the finer samples of a batch of points that all lie in bricks. Returns whether there are
+// any.
+HWY_NOINLINE bool find_finer(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
+  const DF d;
+  const DI di;
+  bool any = false;
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
+    const VI entry = hn::Load(di, ring.slot[k] + i);
+    const VI row = hn::And(entry, hn::Set(di, ~kRefined)), node = hn::Load(di, ring.node[k] + i);
+    const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
+    const VI code = codes_of(field, row, refined, cell_at(node));
+    any = any || !hn::AllTrue(di, hn::Eq(code, hn::Zero(di)));
+    Fractions at{hn::Load(d, ring.fraction[0][k] + i), hn::Load(d, ring.fraction[1][k] + i),
+                 hn::Load(d, ring.fraction[2][k] + i)};
+    Place place{near_offset(row, node), hn::Set(di, kNearCorners[1]), hn::Set(di, kNearCorners[2])};
+    VF quantum = hn::Set(d, kNearQuantum);
+    take_finer(field, row, code, at, place, quantum);
+    hn::Store(at.x, d, ring.fraction[0][k] + i);
+    hn::Store(at.y, d, ring.fraction[1][k] + i);
+    hn::Store(at.z, d, ring.fraction[2][k] + i);
+    hn::Store(place.first, di, ring.node[k] + i);
+    hn::Store(place.line, di, ring.line[k] + i);
+    hn::Store(place.plane, di, ring.plane[k] + i);
+    hn::Store(quantum, d, ring.quantum[k] + i);
+  }
+  const char* const bytes = reinterpret_cast<const char*>(field.bricks);
+  for (std::size_t i = 0; cold && i < kGroup; ++i) {
+    const char* const first = bytes + ring.node[k][i];
+    hwy::Prefetch(first);
+    hwy::Prefetch(first + ring.line[k][i] + ring.plane[k][i]);
+  }
+  return any;
 }
 
 HWY_INLINE void look_up(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
   const DI di;
-  HWY_ALIGN std::int32_t slot[kGroup];
-  if (cold) std::copy_n(ring.slot[k], kGroup, slot);
-  bool any_far = false;
+  auto far = hn::FirstN(di, 0), refined = far;
+  VI entry[kGroup / hn::MaxLanes(DI())];
   for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di)) {
-    const VI entry = gather_entries(field.table, ring.slot[k] + i);
-    const auto far = hn::Lt(entry, hn::Zero(di));
-    any_far = any_far || !hn::AllFalse(di, far);
-    ring.plain[k] = ring.plain[k] && hn::AllTrue(di, is_plain(entry));
-    const VI row = hn::IfThenZeroElse(far, hn::And(entry, hn::Set(di, ~kRefined)));
-    hn::Store(near_offset(row, hn::Load(di, ring.node[k] + i)), di, ring.slot[k] + i);
+    VI& e = entry[i / hn::Lanes(di)];
+    e = gather_entries(field.table, ring.slot[k] + i);
+    far = hn::Or(far, hn::Lt(e, hn::Zero(di)));
+    refined = hn::Or(refined, hn::Gt(e, hn::Set(di, kRefined - 1)));
+    hn::Store(e, di, ring.slot[k] + i);
+  }
+  const bool any_far = !hn::AllFalse(di, far);
+  ring.plain[k] = ring.plain[k] && !any_far;
+  ring.cut[k] = ring.plain[k] && !hn::AllFalse(di, refined);
+  if (HWY_UNLIKELY(ring.cut[k])) {
+    if (cold) prefetch_cuts(field, ring, k);
+    return;
+  }
+  for (std::size_t i = 0; i < kGroup; i += hn::Lanes(di)) {
+    const VI e = entry[i / hn::Lanes(di)], row = hn::IfThenZeroElse(hn::Lt(e, hn::Zero(di)), e);
+    hn::Store(near_offset(row, hn::Load(di, ring.node[k] + i)), di, ring.node[k] + i);
   }
   if (!cold) return;
   const char* const bytes = reinterpret_cast<const char*>(field.bricks);
-  for (const std::int32_t offset : ring.slot[k]) {
+  for (const std::int32_t offset : ring.node[k]) {
     hwy::Prefetch(bytes + offset + 2 * 5);
     hwy::Prefetch(bytes + offset + 2 * 86);
   }
-  if (any_far) prefetch_far(field, slot);
+  if (any_far) prefetch_far(field, ring.slot[k]);
 }
 
 struct Samples {
@@ -196,11 +257,29 @@ HWY_INLINE Samples sample_plain(const FieldView& field, const Ring& ring, std::s
   const DF d;
   const VF quantum = hn::Set(d, kNearQuantum);
   VI pair[4];
-  gather_pairs(field.bricks, ring.slot[k] + i, kNearCorners, pair);
+  gather_pairs(field.bricks, ring.node[k] + i, kNearCorners, pair);
   Samples s;
   interpolate<true>(corners_of(pair), hn::Load(d, ring.fraction[0][k] + i),
                     hn::Load(d, ring.fraction[1][k] + i), hn::Load(d, ring.fraction[2][k] + i),
                     quantum, quantum, s.distance, s.gx, s.gy, s.gz);
+  return s;
+}
+
+// Of these lanes some lie in cut cells.
+HWY_NOINLINE Samples sample_cut(const FieldView& field, const Ring& ring, std::size_t k,
+                                std::size_t i) {
+  const DF d;
+  const DI di;
+  VI pair[4];
+  gather_places(field.bricks,
+                {hn::Load(di, ring.node[k] + i), hn::Load(di, ring.line[k] + i),
+                 hn::Load(di, ring.plane[k] + i)},
+                pair);
+  Samples s;
+  interpolate<true>(corners_of(pair), hn::Load(d, ring.fraction[0][k] + i),
+                    hn::Load(d, ring.fraction[1][k] + i), hn::Load(d, ring.fraction[2][k] + i),
+                    hn::Load(d, ring.quantum[k] + i), hn::Set(d, kNearQuantum), s.distance, s.gx,
+                    s.gy, s.gz);
   return s;
 }
 
@@ -247,7 +326,7 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
   const DI di;
   static_assert(hn::MaxLanes(DF()) <= kGroup, "a vector is part of a batch");
   const VF none = hn::Set(d, __builtin_huge_valf());
-  const std::size_t ahead = cold ? kRing : kAhead, half = ahead / 2;
+  const std::size_t ahead = cold ? kRing : kAhead, half = ahead / 2, quarter = ahead / 4;
   Ring ring;
   const auto locate_at = [&](std::size_t k) HWY_ATTR {
     if (k < batches) locate(field, to_field, points, k, k % kRing, cold, ring);
@@ -255,23 +334,31 @@ HWY_INLINE std::size_t sample_batches(const FieldView& field, const Affine& to_f
   const auto look_up_at = [&](std::size_t k) HWY_ATTR {
     if (k < batches) look_up(field, k % kRing, cold, ring);
   };
+  const auto find_finer_at = [&](std::size_t k) HWY_ATTR {
+    if (k < batches && HWY_UNLIKELY(ring.cut[k % kRing]))
+      ring.cut[k % kRing] = find_finer(field, k % kRing, cold, ring);
+  };
   for (std::size_t k = 0; k < HWY_MIN(2 * ahead, batches); ++k) points.prefetch(k);
   for (std::size_t k = 0; k < ahead; ++k) locate_at(k);
   for (std::size_t k = 0; k < half; ++k) look_up_at(k);
+  for (std::size_t k = 0; k < quarter; ++k) find_finer_at(k);
   for (std::size_t k = 0; k < batches; ++k) {
     look_up_at(k + half);
+    find_finer_at(k + quarter);
     VF smallest = none;
     for (std::size_t i = 0; i < kGroup; i += hn::Lanes(d)) {
       const std::size_t at = points.first(k) + i;
-      Samples s = HWY_LIKELY(ring.plain[k % kRing]) ? sample_plain(field, ring, k % kRing, i)
-                                                    : sample_anew(field, to_field, points, at);
+      const std::size_t r = k % kRing;
+      Samples s = HWY_UNLIKELY(!ring.plain[r]) ? sample_anew(field, to_field, points, at)
+                  : HWY_UNLIKELY(ring.cut[r])  ? sample_cut(field, ring, r, i)
+                                               : sample_plain(field, ring, r, i);
       const auto real = hn::FirstN(d, at < points.count() ? points.count() - at : 0);
       s.distance = hn::IfThenElse(real, s.distance, none);
       points.keep(at, s.distance);
       smallest = hn::Min(smallest, s.distance);
       // A whole vector is written in any case: a branch would be mispredicted too often.
       auto touching = hn::Lt(s.distance, points.limit_of(k, at));
-      if (HWY_UNLIKELY(!ring.plain[k % kRing]) && limit > 0 && !hn::AllFalse(d, touching))
+      if (HWY_UNLIKELY(!ring.plain[r]) && limit > 0 && !hn::AllFalse(d, touching))
         touching = hn::Or(hn::Lt(s.distance, hn::Zero(d)),
                           hn::And(touching, in_bricks(field, to_field, points, at)));
       hn::StoreU(compress(di, points.row(at), hn::RebindMask(di, touching)), di,

@@ -13,6 +13,7 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
+#include "kernels/compress-inl.h"
 #include "kernels/field/sample_field-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -24,13 +25,18 @@ constexpr int side(int corner, int axis) { return kCornerSign[corner][axis] > 0;
 
 struct Batch {
   HWY_ALIGN float fraction[3][2][kBatch];  // axis, below or above the point
-  HWY_ALIGN std::int32_t slot[4][kBatch];  // index in the table
+  HWY_ALIGN std::int32_t slot[4][kBatch];  // index in the table, then its entry
   HWY_ALIGN std::int32_t node[4][kBatch];  // then byte offset in the bricks
   bool plain[kBatch];                      // of a vector's first point: all corners lie in bricks
-  // Points with a corner in a cut cell, by their number in the batch.
-  HWY_ALIGN std::int32_t cut[kBatch];
-  std::size_t cut_count = 0;
-  std::uint32_t cut_point[kBatch];
+};
+
+// Corners in cut cells. They are sampled together, after the others.
+struct CutCorners {
+  static constexpr std::size_t kRoom = 4 * kBatch + hn::MaxLanes(DF());
+  std::size_t count = 0;
+  std::int32_t row[kRoom], code[kRoom];  // of their bricks, of their cells
+  float fraction[3][kRoom];
+  std::int32_t corner[kRoom], point[kRoom];
 };
 
 // The two places of an axis for a vector of points.
@@ -77,43 +83,60 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
   }
 }
 
-// The codes of the cells of refined bricks, from their first nodes.
-HWY_INLINE VI codes_at(const FieldView& field, VI row, hn::Mask<DI> refined, VI node) {
+// Lists the lanes whose corner has a code.
+HWY_INLINE void list_cut(const Batch& batch, int corner, std::size_t i, VI row, VI code,
+                         CutCorners& cut) {
   const DF d;
   const DI di;
-  // node = x + 9 y + 81 z, each below 8: exact in float, and no multiple of a ninth is near.
-  const auto over = [&](VI n, float share) HWY_ATTR {
-    return hn::ConvertTo(
-        di, hn::Mul(hn::Add(hn::ConvertTo(d, n), hn::Set(d, 0.5f)), hn::Set(d, share)));
-  };
-  const VI z = over(node, 1.0f / 81), rest = hn::Sub(node, hn::Mul(z, hn::Set(di, 81)));
-  const VI y = over(rest, 1.0f / 9), x = hn::Sub(rest, hn::Mul(y, hn::Set(di, 9)));
-  return codes_of(field, row, refined, {z, x, hn::Zero(d)}, {z, y, hn::Zero(d)},
-                  {z, z, hn::Zero(d)});
+  const auto some = hn::Ne(code, hn::Zero(di));
+  const std::size_t n = cut.count;
+  const auto put = [&](VI from, std::int32_t* to)
+                       HWY_ATTR { hn::StoreU(compress(di, from, some), di, to + n); };
+  put(row, cut.row), put(code, cut.code);
+  put(hn::Set(di, corner), cut.corner);
+  put(hn::Add(hn::Iota(di, 0), hn::Set(di, static_cast<std::int32_t>(i))), cut.point);
+  HWY_UNROLL(3)
+  for (int a = 0; a < 3; ++a)
+    hn::StoreU(
+        compress(d, hn::Load(d, batch.fraction[a][side(corner, a)] + i), hn::RebindMask(d, some)),
+        d, cut.fraction[a] + n);
+  cut.count += hn::CountTrue(di, some);
 }
 
-HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i, Batch& batch) {
+// Lists the corners in cut cells of a vector of points.
+HWY_NOINLINE void list_cut_cells(const FieldView& field, const Batch& batch, std::size_t live,
+                                 std::size_t i, CutCorners& cut) {
   const DI di;
-  auto other = hn::FirstN(di, 0);
-  VI codes = hn::Zero(di);
+  for (int c = 0; c < 4; ++c) {
+    const VI entry = hn::Load(di, batch.slot[c] + i);
+    const auto refined = hn::And(hn::FirstN(di, live), hn::Gt(entry, hn::Set(di, kRefined - 1)));
+    if (hn::AllFalse(di, refined)) continue;
+    const VI row = hn::And(entry, hn::Set(di, ~kRefined));
+    const VI node =
+        hn::ShiftRight<1>(hn::Sub(hn::Load(di, batch.node[c] + i), near_offset(row, hn::Zero(di))));
+    const VI code = codes_of(field, row, refined, cell_at(node));
+    if (!hn::AllTrue(di, hn::Eq(code, hn::Zero(di)))) list_cut(batch, c, i, row, code, cut);
+  }
+}
+
+HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i, Batch& batch,
+                        CutCorners& cut) {
+  const DI di;
+  auto beyond_any = hn::FirstN(di, 0), refined = beyond_any;
   HWY_UNROLL(4)
   for (int c = 0; c < 4; ++c) {
     const VI entry = gather_entries(field.table, batch.slot[c] + i);
+    hn::Store(entry, di, batch.slot[c] + i);
     const auto beyond = hn::Lt(entry, hn::Zero(di));
-    other = hn::Or(other, beyond);
-    const VI row = hn::And(entry, hn::Set(di, ~kRefined));
-    const VI node = hn::Load(di, batch.node[c] + i);
-    const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
-    if (!hn::AllFalse(di, refined)) codes = hn::Or(codes, codes_at(field, row, refined, node));
-    hn::Store(hn::IfThenZeroElse(beyond, near_offset(row, node)), di, batch.node[c] + i);
+    beyond_any = hn::Or(beyond_any, beyond);
+    refined = hn::Or(refined, hn::Gt(entry, hn::Set(di, kRefined - 1)));
+    const VI first =
+        near_offset(hn::And(entry, hn::Set(di, ~kRefined)), hn::Load(di, batch.node[c] + i));
+    hn::Store(hn::IfThenZeroElse(beyond, first), di, batch.node[c] + i);
   }
-  batch.plain[i] = batch.plain[i] && hn::AllFalse(di, hn::And(other, hn::FirstN(di, live)));
-  if (!batch.plain[i] || hn::AllTrue(di, hn::Eq(codes, hn::Zero(di)))) return;
-  hn::Store(codes, di, batch.cut + i);
-  for (std::size_t k = i; k < i + HWY_MIN(live, hn::Lanes(di)); ++k) {
-    batch.cut_point[batch.cut_count] = static_cast<std::uint32_t>(k);
-    batch.cut_count += batch.cut[k] != 0;
-  }
+  batch.plain[i] = batch.plain[i] && hn::AllFalse(di, hn::And(beyond_any, hn::FirstN(di, live)));
+  if (HWY_UNLIKELY(!hn::AllFalse(di, refined)) && batch.plain[i])
+    list_cut_cells(field, batch, live, i, cut);
 }
 
 HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::size_t live,
@@ -133,27 +156,28 @@ HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::si
   }
 }
 
-// Points whose corners lie in bricks, some in cut cells; a vector of them at most.
-HWY_NOINLINE void sample_cut(const FieldView& field, const Affine& to_field,
-                             const PointsView& points, float step, std::size_t first,
-                             const std::uint32_t* which, std::size_t count, float* const at[4]) {
+// Samples a vector of corners in cut cells, from the k-th on.
+HWY_INLINE void sample_cut(const FieldView& field, const CutCorners& cut, std::size_t k,
+                           std::size_t first, float* const at[4]) {
   const DF d;
-  HWY_ALIGN float column[3][hn::MaxLanes(d)] = {};
+  const DI di;
+  const VF unit = hn::Set(d, kNearQuantum);
+  const std::size_t live = HWY_MIN(hn::Lanes(d), cut.count - k);
+  const auto alive = hn::FirstN(di, live);
+  const auto read = [&](const std::int32_t* from)
+                        HWY_ATTR { return hn::IfThenElseZero(alive, hn::LoadU(di, from + k)); };
+  Fractions in{hn::LoadU(d, cut.fraction[0] + k), hn::LoadU(d, cut.fraction[1] + k),
+               hn::LoadU(d, cut.fraction[2] + k)};
+  Place place{hn::Zero(di), hn::Zero(di), hn::Zero(di)};
+  VF quantum = unit, value, none;
+  take_finer(field, read(cut.row), read(cut.code), in, place, quantum);
+  VI pair[4];
+  gather_places(field.bricks, place, pair);
+  interpolate<false>(corners_of(pair), in.x, in.y, in.z, quantum, unit, value, none, none, none);
   HWY_ALIGN float out[hn::MaxLanes(d)];
-  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    const std::size_t row = first + which[HWY_MIN(i, count - 1)];
-    column[0][i] = points.x[row], column[1][i] = points.y[row], column[2][i] = points.z[row];
-  }
-  const VF x = hn::Load(d, column[0]), y = hn::Load(d, column[1]), z = hn::Load(d, column[2]);
-  Sides q[3];
-  for (int a = 0; a < 3; ++a) q[a] = sides_of(to_field.m[a], x, y, z, step);
-  for (int c = 0; c < 4; ++c) {
-    VF value, none;
-    sample_inside<false, false>(field, q[0].at[side(c, 0)], q[1].at[side(c, 1)],
-                                q[2].at[side(c, 2)], value, none, none, none);
-    hn::Store(value, d, out);
-    for (std::size_t i = 0; i < count; ++i) at[c][first + which[i]] = out[i];
-  }
+  hn::Store(value, d, out);
+  for (std::size_t i = 0; i < live; ++i)
+    at[cut.corner[k + i]][first + static_cast<std::size_t>(cut.point[k + i])] = out[i];
 }
 
 // Points with a corner in a far cell or outside the grid.
@@ -178,21 +202,20 @@ void sample_corners_simd(const FieldView& field, const Affine& to_field, const P
                          float step, float* const at[4]) {
   const std::size_t width = hn::Lanes(DF());
   Batch batch;
+  CutCorners cut;
   for (std::size_t first = 0; first < points.count; first += kBatch) {
     const std::size_t some = HWY_MIN(kBatch, points.count - first);
     for (std::size_t i = 0; i < some; i += width)
       locate(field, to_field, points, step, first, i, batch);
-    batch.cut_count = 0;
-    for (std::size_t i = 0; i < some; i += width) look_up(field, some - i, i, batch);
+    cut.count = 0;
+    for (std::size_t i = 0; i < some; i += width) look_up(field, some - i, i, batch, cut);
     for (std::size_t i = 0; i < some; i += width) {
       if (HWY_LIKELY(batch.plain[i]))
         sample_plain(field, batch, some - i, i, at, first + i);
       else
         sample_anew(field, to_field, points, step, first + i, at);
     }
-    for (std::size_t i = 0; i < batch.cut_count; i += width)
-      sample_cut(field, to_field, points, step, first, batch.cut_point + i,
-                 HWY_MIN(width, batch.cut_count - i), at);
+    for (std::size_t k = 0; k < cut.count; k += width) sample_cut(field, cut, k, first, at);
   }
 }
 

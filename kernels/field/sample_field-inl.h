@@ -277,12 +277,6 @@ HWY_INLINE VI near_offset(VI row, VI node) {
   return hn::Add(hn::Mul(row, hn::Set(di, 2 * kBrickStride)), hn::ShiftLeft<1>(node));
 }
 
-// Entries of bricks without finer samples.
-HWY_INLINE hn::Mask<DI> is_plain(VI entry) {
-  const DI di;
-  return hn::And(hn::Gt(entry, hn::Set(di, -1)), hn::Lt(entry, hn::Set(di, kRefined)));
-}
-
 // The place of a point along one axis of a cell that is cut into `factor`.
 struct FineAxis {
   VI low;
@@ -302,21 +296,38 @@ struct Place {
   VI first, line, plane;
 };
 
-// Finds the lanes of refined bricks whose cell is cut. Returns their codes, 0 in other lanes.
-HWY_INLINE VI codes_of(const FieldView& field, VI row, hn::Mask<DI> refined, const Axis& x,
-                       const Axis& y, const Axis& z) {
+// Finds the lanes of refined bricks whose cell, x fastest of 8 x 8 x 8, is cut. Returns their
+// codes, 0 in other lanes.
+HWY_INLINE VI codes_of(const FieldView& field, VI row, hn::Mask<DI> refined, VI cell) {
   const DI di;
   HWY_ALIGN std::int32_t at[hn::MaxLanes(di)];
-  const VI cell = hn::Add(x.cell, hn::Add(hn::ShiftLeft<3>(y.cell), hn::ShiftLeft<6>(z.cell)));
   const VI code = hn::Add(hn::Mul(row, hn::Set(di, 2 * kCutStride)),
                           hn::Add(hn::Set(di, 2 * kCutHead), hn::ShiftLeft<1>(cell)));
   hn::Store(hn::IfThenElseZero(refined, code), di, at);
   return hn::IfThenElseZero(refined, hn::And(gather_at(field.cuts, at), hn::Set(di, 0xffff)));
 }
 
+// The cell of 8 x 8 x 8 whose first node has this number of 9 x 9 x 9.
+HWY_INLINE VI cell_at(VI node) {
+  const DF d;
+  const DI di;
+  // node = x + 9 y + 81 z, each below 8: exact in float, and no multiple of a ninth is near.
+  const auto over = [&](VI n, float share) HWY_ATTR {
+    return hn::ConvertTo(
+        di, hn::Mul(hn::Add(hn::ConvertTo(d, n), hn::Set(d, 0.5f)), hn::Set(d, share)));
+  };
+  // x + 8 y + 64 z = node - y' - 8 z, y' = y + 9 z being the number of whole rows before it.
+  return hn::Sub(node, hn::Add(over(node, 1.0f / 9), hn::ShiftLeft<3>(over(node, 1.0f / 81))));
+}
+
+// Where a point lies in its cell, along each axis.
+struct Fractions {
+  VF x, y, z;
+};
+
 // Puts the finer samples of cut cells in the place of the brick's: place, fractions and quantum.
 // The slope per voxel needs no change, since finer samples have a finer quantum.
-HWY_INLINE void take_finer(const FieldView& field, VI row, VI code, Axis& x, Axis& y, Axis& z,
+HWY_INLINE void take_finer(const FieldView& field, VI row, VI code, Fractions& at_cell,
                            Place& place, VF& quantum) {
   const DF d;
   const DI di;
@@ -326,8 +337,8 @@ HWY_INLINE void take_finer(const FieldView& field, VI row, VI code, Axis& x, Axi
   const VI unit = hn::Add(gather_at(field.cuts, at), hn::ShiftRight<1>(code));
   const auto quarter = hn::Ne(hn::And(code, hn::Set(di, 1)), hn::Zero(di));
   const VF factor = hn::IfThenElse(hn::RebindMask(d, quarter), hn::Set(d, 4.0f), hn::Set(d, 2.0f));
-  const FineAxis fx = split_cell(x.fraction, factor), fy = split_cell(y.fraction, factor),
-                 fz = split_cell(z.fraction, factor);
+  const FineAxis fx = split_cell(at_cell.x, factor), fy = split_cell(at_cell.y, factor),
+                 fz = split_cell(at_cell.z, factor);
   const VI line = hn::IfThenElse(quarter, hn::Set(di, 2 * 5), hn::Set(di, 2 * 3));
   const VI plane = hn::IfThenElse(quarter, hn::Set(di, 2 * 25), hn::Set(di, 2 * 9));
   const std::ptrdiff_t behind =
@@ -340,9 +351,9 @@ HWY_INLINE void take_finer(const FieldView& field, VI row, VI code, Axis& x, Axi
   place.line = hn::IfThenElse(cut, line, place.line);
   place.plane = hn::IfThenElse(cut, plane, place.plane);
   const auto cut_f = hn::RebindMask(d, cut);
-  x.fraction = hn::IfThenElse(cut_f, fx.fraction, x.fraction);
-  y.fraction = hn::IfThenElse(cut_f, fy.fraction, y.fraction);
-  z.fraction = hn::IfThenElse(cut_f, fz.fraction, z.fraction);
+  at_cell.x = hn::IfThenElse(cut_f, fx.fraction, at_cell.x);
+  at_cell.y = hn::IfThenElse(cut_f, fy.fraction, at_cell.y);
+  at_cell.z = hn::IfThenElse(cut_f, fz.fraction, at_cell.z);
   quantum = hn::IfThenElse(cut_f,
                            hn::Mul(quantum, hn::IfThenElse(hn::RebindMask(d, quarter),
                                                            hn::Set(d, 0.25f), hn::Set(d, 0.5f))),
@@ -418,7 +429,7 @@ HWY_INLINE hn::Mask<DI> sample_inside(const FieldView& field, VF qx, VF qy, VF q
     const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
     VI code = hn::Zero(di);
     if (!hn::AllFalse(di, refined)) {
-      code = codes_of(field, row, refined, x, y, z);
+      code = codes_of(field, row, refined, cell_at(cell.node));
       if (kDefer) {
         const auto cut = hn::Ne(code, hn::Zero(di));
         if (2 * hn::CountTrue(di, cut) < hn::Lanes(di)) left_out = cut, code = hn::Zero(di);
@@ -429,7 +440,9 @@ HWY_INLINE hn::Mask<DI> sample_inside(const FieldView& field, VF qx, VF qy, VF q
       gather_pairs(field.bricks, at, kNearCorners, pair);
     } else {
       Place place{first, hn::Set(di, kNearCorners[1]), hn::Set(di, kNearCorners[2])};
-      take_finer(field, row, code, x, y, z, place, quantum);
+      Fractions at_cell{x.fraction, y.fraction, z.fraction};
+      take_finer(field, row, code, at_cell, place, quantum);
+      x.fraction = at_cell.x, y.fraction = at_cell.y, z.fraction = at_cell.z;
       gather_places(field.bricks, place, pair);
     }
   } else {
