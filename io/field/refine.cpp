@@ -195,7 +195,7 @@ class Chooser {
     if (!misses(exact, flat)) return;
     // A node that the fine bake does not know lies beyond the band.
     for (int n = 0; n < 125; ++n)
-      if (std::isnan(exact[n])) exact[n] = flat[n];
+      if (!nodes_.exact(exact[n])) exact[n] = flat[n];
     if (!finer) finer = std::make_unique<Finer>();
     std::int32_t& index =
         finer->index[std::size_t(((cell[2] & 7) * 8 + (cell[1] & 7)) * 8 + (cell[0] & 7))];
@@ -211,17 +211,23 @@ class Chooser {
     }
   }
 
-  // The fine nodes of a cell; kUnknown where they are not exact.
-  void gather(const GridNode& cell, const float* const (&source)[8], float (&exact)[125]) const {
+  // The fine nodes of a cell; kUnknown where they lie in no brick.
+  static void gather(const GridNode& cell, const float* const (&source)[8], float (&out)[125]) {
     const int x0 = 4 * (cell[0] & 1), y0 = 4 * (cell[1] & 1), z0 = 4 * (cell[2] & 1);
-    for (int n = 0; n < 125; ++n) {
-      const int x = x0 + n % 5, y = y0 + n / 5 % 5, z = z0 + n / 25;
-      const float* s = source[(x >> 3) | (y >> 3) << 1 | (z >> 3) << 2];
-      const float v = s == nullptr ? kUnknown : s[((z & 7) * 8 + (y & 7)) * 8 + (x & 7)];
-      exact[n] = nodes_.exact(v) ? v : kUnknown;
+    for (int row = 0; row < 25; ++row) {
+      const int y = y0 + row % 5, z = z0 + row / 5, from = (y >> 3) << 1 | (z >> 3) << 2;
+      const int at = ((z & 7) * 8 + (y & 7)) * 8;
+      const float *const four = source[from], *const last = source[from | (x0 + 4) >> 3];
+      float* const to = out + 5 * row;
+      if (four != nullptr)
+        std::copy_n(four + at + x0, 4, to);
+      else
+        std::fill_n(to, 4, kUnknown);
+      to[4] = last == nullptr ? kUnknown : last[at + ((x0 + 4) & 7)];
     }
   }
 
+  // Nodes that are not exact are not tested: tested_ is less than what is exact.
   bool misses(const float (&exact)[125], const float (&found)[125]) const {
     int wrong = 0;
     for (int n = 0; n < 125; ++n)  // false for kUnknown
