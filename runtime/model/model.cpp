@@ -2,6 +2,7 @@
 // model.cpp - makes and destroys a model, and answers questions about it.
 #include "runtime/model/model.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/field/sample_field.h"
@@ -84,42 +85,57 @@ size_t h6ModelBytes(const h6Model* model) {
   return bytes;
 }
 
+namespace {
+
+constexpr std::size_t kSampled = 64;  // points at a time; a multiple of every vector length
+
+// Whether a brick holds the place.
+bool in_brick(const Field& field, const Vec3& p) {
+  const Vec3 cell = ((p - field.origin) / (8 * field.voxel)).array().floor();
+  const auto* n = field.view.size;
+  for (int k = 0; k < 3; ++k)
+    if (!(cell[k] >= 0 && cell[k] < n[k])) return false;
+  const std::size_t at =
+      (static_cast<std::size_t>(cell[2]) * n[1] + static_cast<std::size_t>(cell[1])) * n[0] +
+      static_cast<std::size_t>(cell[0]);
+  return field.view.table[at] >= 0;
+}
+
+// Samples up to kSampled points.
+void sample_some(const Field& field, const double* points, std::size_t count, double* distance,
+                 double* gradient) {
+  const float scale = static_cast<float>(1.0 / field.voxel);
+  // Points relative to the field's first node, in double: float then loses nothing that matters.
+  const kernels::Affine to_field{{{scale, 0, 0, 0}, {0, scale, 0, 0}, {0, 0, scale, 0}}};
+  alignas(64) float q[3][kSampled], d[kSampled], g[3][kSampled];
+  for (std::size_t i = 0; i < count; ++i)
+    for (int k = 0; k < 3; ++k)
+      q[k][i] = static_cast<float>(points[3 * i + static_cast<std::size_t>(k)] - field.origin[k]);
+  kernels::sample_field(field.view, to_field, {q[0], q[1], q[2], count}, nullptr, count, d,
+                        gradient ? g[0] : nullptr, gradient ? g[1] : nullptr,
+                        gradient ? g[2] : nullptr);
+  for (std::size_t i = 0; i < count; ++i) distance[i] = d[i] * field.voxel;
+  for (std::size_t i = 0; gradient && i < count; ++i) {
+    Vec3 v(g[0][i], g[1][i], g[2][i]);
+    const double n = v.norm();
+    if (n > 0) v /= n;
+    for (int k = 0; k < 3; ++k) gradient[3 * i + static_cast<std::size_t>(k)] = v[k];
+  }
+}
+
+}  // namespace
+
 int h6SampleField(const h6Model* model, int32_t index, const double* points, size_t count,
                   double* distance, double* gradient, uint8_t* exact) {
   if (!model || index < 0 || static_cast<std::size_t>(index) >= model->field_count ||
       (count && (!points || !distance)))
     return -1;
   const Field& field = model->fields[index];
-  const float scale = static_cast<float>(1.0 / field.voxel);
-  // Points relative to the field's first node, in double: float then loses nothing that matters.
-  const kernels::Affine to_field{{{scale, 0, 0, 0}, {0, scale, 0, 0}, {0, 0, scale, 0}}};
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3 p(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
-    const Eigen::Vector3f q = (p - field.origin).cast<float>();
-    float d, gx, gy, gz;
-    kernels::sample_field(field.view, to_field, {&q[0], &q[1], &q[2], 1}, nullptr, 1, &d, &gx, &gy,
-                          &gz);
-    distance[i] = d * field.voxel;
-    if (gradient) {
-      Vec3 g(gx, gy, gz);
-      const double n = g.norm();
-      if (n > 0) g /= n;
-      for (int k = 0; k < 3; ++k) gradient[3 * i + k] = g[k];
-    }
-    if (exact) {
-      const Vec3 cell = ((p - field.origin) / (8 * field.voxel)).array().floor();
-      bool inside = cell.allFinite();
-      for (int k = 0; k < 3; ++k) inside = inside && cell[k] >= 0 && cell[k] < field.view.size[k];
-      exact[i] = 0;
-      if (inside) {
-        const auto* n = field.view.size;
-        const std::size_t at =
-            (static_cast<std::size_t>(cell[2]) * n[1] + static_cast<std::size_t>(cell[1])) * n[0] +
-            static_cast<std::size_t>(cell[0]);
-        exact[i] = field.view.table[at] >= 0;
-      }
-    }
-  }
+  for (std::size_t i = 0; exact && i < count; ++i)
+    exact[i] = in_brick(field, Vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]));
+  for (std::size_t i = 0; i < count; i += kSampled)
+    sample_some(field, points + 3 * i, std::min(kSampled, count - i), distance + i,
+                gradient ? gradient + 3 * i : nullptr);
   return 0;
 }
 

@@ -67,6 +67,30 @@ TEST_CASE("sampling a field gives back its samples") {
   CHECK(worst_gradient < 0.5 * std::sqrt(3.0) / 7.5);
 }
 
+TEST_CASE("many points sampled at once give the bits of each one alone") {
+  FieldArrays field = ball_field();
+  Model model({def_of(field)}, {});
+  for (const std::size_t count : {1, 2, 63, 64, 65, 200}) {
+    std::vector<double> points, distance(count), gradient(3 * count);
+    for (std::size_t i = 0; i < count; ++i) {  // near, far, and outside the grid
+      const double a = 0.7 * double(i), r = 0.3 * double(i % 150) * mm;
+      points.insert(points.end(), {r * std::cos(a), r * std::sin(a), 0.1 * r});
+    }
+    points[3 * (count / 2)] = std::numeric_limits<double>::quiet_NaN();
+    std::vector<std::uint8_t> exact(count);
+    REQUIRE(h6SampleField(model.handle, 0, points.data(), count, distance.data(), gradient.data(),
+                          exact.data()) == 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      double d = 0, g[3];
+      std::uint8_t e = 2;
+      REQUIRE(h6SampleField(model.handle, 0, &points[3 * i], 1, &d, g, &e) == 0);
+      CHECK(d == distance[i]);
+      for (std::size_t k = 0; k < 3; ++k) CHECK(g[k] == gradient[3 * i + k]);
+      CHECK(e == exact[i]);
+    }
+  }
+}
+
 TEST_CASE("far from the surface the answer is a bound with the right sign") {
   FieldArrays field = sample_analytic(
       [](double x, double y, double z) { return std::sqrt(x * x + y * y + z * z) - 22 * mm; },
