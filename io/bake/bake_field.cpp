@@ -363,12 +363,14 @@ class NearNodes {
  private:
   static bool any_within(const bake::NodeMask& nodes, const int (&corner)[3], const int (&first)[3],
                          const int (&last)[3]) {
-    for (int n = 0; n < 512; ++n) {
-      const int p[3] = {corner[0] + n % 8, corner[1] + n / 8 % 8, corner[2] + n / 64};
-      bool in = true;
-      for (int k = 0; k < 3; ++k) in = in && p[k] >= first[k] && p[k] <= last[k];
-      if (in && nodes.get(std::size_t(n))) return true;
-    }
+    int low[3], high[3];  // in the brick
+    for (int k = 0; k < 3; ++k)
+      low[k] = std::max(first[k] - corner[k], 0), high[k] = std::min(last[k] - corner[k], 7);
+    std::uint64_t line = 0, layer = 0;
+    for (int x = low[0]; x <= high[0]; ++x) line |= std::uint64_t{1} << x;
+    for (int y = low[1]; y <= high[1]; ++y) layer |= line << (8 * y);
+    for (int z = low[2]; z <= high[2]; ++z)
+      if ((nodes.z[std::size_t(z)] & layer) != 0) return true;
     return false;
   }
 

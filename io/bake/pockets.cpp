@@ -17,7 +17,8 @@
 namespace h6::io::bake {
 
 struct Facet {
-  Vec3 a, e, f;  // corner and two edges
+  Vec3 a, e, f;    // corner and two edges
+  Vec3 low, high;  // its box, a little larger than it
   std::uint32_t component;
 };
 
@@ -29,17 +30,10 @@ constexpr int kFine = 8;                      // steps a voxel
 constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
 constexpr int kLooks = 5;                     // lines that vote; one may graze an edge
 
-// The place in [0, 1] where p + t d meets the triangle (T. Moeller, B. Trumbore, 1997), or a
-// negative number. Touching counts.
-double meets(const Vec3& p, const Vec3& d, const Facet& t) {
-  constexpr double kTouch = 1e-7;
-  const Vec3 h = cross(d, t.f);
-  const double det = dot(t.e, h);
-  if (det == 0) return -1;
-  const Vec3 s = p - t.a, q = cross(s, t.e);
-  const double u = dot(s, h) / det, v = dot(d, q) / det, w = dot(t.f, q) / det;
-  return u >= -kTouch && v >= -kTouch && u + v <= 1 + kTouch && w >= 0 && w <= 1 ? w : -1;
-}
+// The line p + t d meets a triangle where these are at least 0, and u + v and t at most 1 (T.
+// Moeller, B. Trumbore, 1997); with s = p - a:
+//     det = e . (d x f)   u = s . (d x f) / det   v = d . (s x e) / det   t = f . (s x e) / det
+constexpr double kTouch = 1e-7;  // touching an edge counts
 
 // Numbers the triangles by the pieces of the mesh that share no vertex.
 std::vector<std::uint32_t> components(const Surface& surface) {
@@ -87,8 +81,10 @@ class Lattice {
  public:
   Lattice(const std::vector<Facet>& facets, const Vec3& eye)
       : low_(eye - Vec3{kView, kView, kView}) {
-    for (const Facet& t : facets)
-      for (int axis = 0; axis < 3; ++axis) cut(t, axis);
+    for (const Facet& t : facets) {
+      const Box box = lines_of(t);
+      for (int axis = 0; axis < 3 && !box.empty; ++axis) cut(t, box, axis);
+    }
   }
 
   // The grid nodes that fine steps from the middle reach, by View's numbers.
@@ -129,56 +125,78 @@ class Lattice {
   static constexpr std::uint64_t kRow = (std::uint64_t{1} << kSide) - 1;
   static std::size_t row_of(int y, int z) { return std::size_t(z * kSide + y); }
 
-  // Cuts the steps along an axis that a facet crosses.
-  void cut(const Facet& t, int axis) {
-    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+  // The lattice points in the box of a facet.
+  struct Box {
     int first[3], last[3];
-    for (const int k : {i, j}) {
-      const double a = component(t.a, k) - component(low_, k), e = component(t.e, k),
-                   f = component(t.f, k), slack = 1e-6;
-      first[k] = int(std::max(0.0, std::ceil(kFine * (a + std::min({0.0, e, f}) - slack))));
-      last[k] = int(std::min(kSide - 1.0, std::floor(kFine * (a + std::max({0.0, e, f}) + slack))));
+    bool empty = false;
+  };
+  Box lines_of(const Facet& t) const {
+    Box box;
+    for (int k = 0; k < 3; ++k) {
+      const double low = component(t.low, k) - component(low_, k),
+                   high = component(t.high, k) - component(low_, k);
+      box.empty = box.empty || low > 2 * kView || high < 0;
+      box.first[k] = int(std::max(0.0, std::ceil(kFine * low)));
+      box.last[k] = int(std::min(kSide - 1.0, std::floor(kFine * high)));
     }
+    return box;
+  }
+
+  // Cuts the steps along an axis that a facet crosses. On lines along one axis, u, v and t are
+  // affine in the line's numbers p and q, so each row of lines has one interval of q.
+  void cut(const Facet& t, const Box& box, int axis) {
+    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
     double along[3] = {0, 0, 0};
     along[axis] = 2 * kView;
-    for (int p = first[i]; p <= last[i]; ++p)
-      for (int q = first[j]; q <= last[j]; ++q) {
-        double from[3] = {0, 0, 0};
-        from[i] = double(p) / kFine;
-        from[j] = double(q) / kFine;
-        const double at =
-            meets(low_ + Vec3{from[0], from[1], from[2]}, {along[0], along[1], along[2]}, t);
-        if (at < 0) continue;
-        int point[3];
-        point[i] = p, point[j] = q;
-        // A hit at a point cuts the steps on both sides of it.
-        const double step = at * (kSide - 1), touch = 1e-9;
-        for (int k = std::max(0, int(std::ceil(step - 1 - touch)));
-             k <= std::min(kSide - 2, int(std::floor(step + touch))); ++k) {
-          point[axis] = k;
-          cut_[axis][row_of(point[1], point[2])] |= std::uint64_t{1} << point[0];
-        }
-      }
+    const Vec3 d{along[0], along[1], along[2]}, h = cross(d, t.f);
+    const double det = dot(t.e, h);
+    if (det == 0) return;
+    const Affine u(*this, t, i, j, (1 / det) * h), v(*this, t, i, j, (1 / det) * cross(t.e, d)),
+        at(*this, t, i, j, (1 / det) * cross(t.e, t.f));
+    const double inverse[3] = {1 / u.by_q, 1 / v.by_q, -1 / (u.by_q + v.by_q)};
+    for (int p = box.first[i]; p <= box.last[i]; ++p) {
+      double from = box.first[j], to = box.last[j];
+      const auto at_least_0 = [&](double value, double slope, double inverse) {
+        if (slope > 0) from = std::max(from, -value * inverse);
+        if (slope < 0) to = std::min(to, -value * inverse);
+        if (slope == 0 && value < 0) to = -1;
+      };
+      at_least_0(u.at(p, 0) + kTouch, u.by_q, inverse[0]);
+      at_least_0(v.at(p, 0) + kTouch, v.by_q, inverse[1]);
+      at_least_0(1 + kTouch - u.at(p, 0) - v.at(p, 0), -u.by_q - v.by_q, inverse[2]);
+      for (int q = int(std::ceil(from)); q <= to; ++q) cut_at(axis, i, j, p, q, at.at(p, q));
+    }
   }
+
+  // Where a line meets a facet's plane at `at`. A hit at a point cuts the steps on both sides of
+  // it.
+  void cut_at(int axis, int i, int j, int p, int q, double at) {
+    if (!(at >= 0 && at <= 1)) return;
+    int point[3];
+    point[i] = p, point[j] = q;
+    const double step = at * (kSide - 1), touch = 1e-9;
+    for (int k = std::max(0, int(std::ceil(step - 1 - touch)));
+         k <= std::min(kSide - 2, int(std::floor(step + touch))); ++k) {
+      point[axis] = k;
+      cut_[axis][row_of(point[1], point[2])] |= std::uint64_t{1} << point[0];
+    }
+  }
+
+  // dot(c, place of lattice line (p, q) - t.a)
+  struct Affine {
+    double value, by_p, by_q;
+    Affine(const Lattice& l, const Facet& t, int i, int j, const Vec3& c)
+        : value(dot(c, l.low_ - t.a)),
+          by_p(component(c, i) / kFine),
+          by_q(component(c, j) / kFine) {}
+    double at(int p, int q) const { return value + by_p * p + by_q * q; }
+  };
 
   Vec3 low_;
   // Bit x of row (y, z): the step from the point along each axis is cut; the point is reached.
   std::array<std::array<std::uint64_t, kSide * kSide>, 3> cut_{};
   std::array<std::uint64_t, kSide * kSide> reached_{};
 };
-
-// The facets within the view of a node.
-std::vector<Facet> facets_near(const std::vector<Facet>& facets, const Vec3& eye) {
-  std::vector<Facet> near;
-  const auto apart = [](double p, double e, double f, double at) {
-    return p + std::min({0.0, e, f}) > at + kView || p + std::max({0.0, e, f}) < at - kView;
-  };
-  for (const Facet& t : facets)
-    if (!apart(t.a.x, t.e.x, t.f.x, eye.x) && !apart(t.a.y, t.e.y, t.f.y, eye.y) &&
-        !apart(t.a.z, t.e.z, t.f.z, eye.z))
-      near.push_back(t);
-  return near;
-}
 
 // The step from the middle of a view to its i-th node.
 std::array<int, 3> step_to(std::size_t i) {
@@ -197,6 +215,74 @@ std::array<std::size_t, kInView> nearest_first() {
     return squared(step_to(a)) < squared(step_to(b));
   });
   return order;
+}
+
+// A facet as one eye sees it: det, u det, v det and t det of the line from the eye to d are
+// dot(n, d), dot(m, d), dot(q, d) and w.
+struct Seen {
+  Vec3 n, m, q;
+  double w;
+  std::uint32_t component;
+  InView may_meet;  // lines that its box does not rule out
+
+  bool meets(const Vec3& d) const {
+    const double det = dot(n, d), sign = det < 0 ? -1 : 1, size = sign * det;
+    const double u = sign * dot(m, d), v = sign * dot(q, d), at = sign * w, touch = kTouch * size;
+    return size > 0 && u >= -touch && v >= -touch && u + v <= size + touch && at >= 0 && at <= size;
+  }
+};
+
+// The lines of a view whose end is at least k along an axis, or at most -k: k 0 to kView.
+struct Ends {
+  InView at_least[3][kView + 1], at_most[3][kView + 1];
+  Ends() {
+    for (std::size_t i = 0; i < kInView; ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (int k = 0; k <= kView; ++k) {
+          const int d = step_to(i)[axis];
+          at_least[axis][k][i] = k == 0 || d >= k;
+          at_most[axis][k][i] = k == 0 || d <= -k;
+        }
+  }
+};
+
+// The facets within the view of a node.
+std::vector<Seen> facets_near(const std::vector<Facet>& facets, const Vec3& eye) {
+  static const Ends ends;
+  std::vector<Seen> near;
+  for (const Facet& t : facets) {
+    int beyond[3], before[3];  // a line must end at least so far up, or down
+    bool apart = false;
+    for (int k = 0; k < 3; ++k) {
+      const double low = component(t.low, k) - component(eye, k),
+                   high = component(t.high, k) - component(eye, k);
+      apart = apart || low > kView || high < -kView;
+      beyond[k] = low > 0 ? int(std::ceil(std::min(low, double(kView)))) : 0;
+      before[k] = high < 0 ? int(std::ceil(std::min(-high, double(kView)))) : 0;
+    }
+    if (apart) continue;
+    InView may_meet;
+    may_meet.set();
+    for (std::size_t k = 0; k < 3; ++k)
+      may_meet &= ends.at_least[k][beyond[k]] & ends.at_most[k][before[k]];
+    const Vec3 s = eye - t.a, q = cross(s, t.e);
+    near.push_back({cross(t.f, t.e), cross(t.f, s), q, dot(t.f, q), t.component, may_meet});
+  }
+  return near;
+}
+
+// Of these lines from the eye, those that meet no facet.
+InView clear_lines(const std::vector<Seen>& near, InView lines) {
+  for (const Seen& t : near) {
+    const InView tried = lines & t.may_meet;
+    if (tried.none()) continue;
+    for (std::size_t i = tried._Find_first(); i < kInView; i = tried._Find_next(i)) {
+      const std::array<int, 3> d = step_to(i);
+      if (t.meets({double(d[0]), double(d[1]), double(d[2])})) lines.reset(i);
+    }
+    if (lines.none()) break;
+  }
+  return lines;
 }
 
 }  // namespace
@@ -261,7 +347,9 @@ std::vector<Facet> Pockets::facets_of(std::size_t row) const {
     const auto& t = surface_.triangles[triangle];
     const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
                &c = surface_.vertices[t[2]];
-    facets.push_back({a, b - a, c - a, component_[triangle]});
+    const Vec3 slack{1e-6, 1e-6, 1e-6};
+    facets.push_back({a, b - a, c - a, min(min(a, b), c) - slack, max(max(a, b), c) + slack,
+                      component_[triangle]});
   }
   return facets;
 }
@@ -290,32 +378,29 @@ Pockets::Side Pockets::look(const std::vector<Facet>& facets, const std::array<i
                             const InView& view, Node& node) const {
   static const std::array<std::size_t, kInView> order = nearest_first();
   const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
-  const std::vector<Facet> near = facets_near(facets, eye);
+  const std::vector<Seen> near = facets_near(facets, eye);
   Crossed crossed;
+  InView left = view;  // lines that do not vote
   int odd = 0, looks = 0;
   for (const std::size_t i : order) {
     if (!view[i]) continue;
+    if (looks == kLooks) break;
+    ++looks;
+    left.reset(i);
     const std::array<int, 3> d = step_to(i);
     crossed.clear();
-    for (const Facet& t : near)
-      if (meets(eye, {double(d[0]), double(d[1]), double(d[2])}, t) >= 0) crossed.add(t.component);
+    for (const Seen& t : near)
+      if (t.may_meet[i] && t.meets({double(d[0]), double(d[1]), double(d[2])}))
+        crossed.add(t.component);
     if (crossed.none()) return Side::outside;
-    if (looks < kLooks) {
-      ++looks;
-      odd += crossed.some_odd();
-      if (2 * odd > kLooks) return Side::inside;
-    }
+    odd += crossed.some_odd();
+    if (2 * odd > kLooks) return Side::inside;
   }
+  if (clear_lines(near, left).any()) return Side::outside;
   if (2 * odd > looks) return Side::unknown;
   node.walked = true;
-  node.linked = Lattice(near, eye).walk();
-  for (std::size_t i = 0; i < kInView; ++i) {
-    const std::array<int, 3> d = step_to(i);
-    const Vec3 way{double(d[0]), double(d[1]), double(d[2])};
-    if (!node.linked[i] && !view[i])
-      node.linked[i] = std::none_of(near.begin(), near.end(),
-                                    [&](const Facet& t) { return meets(eye, way, t) >= 0; });
-  }
+  node.linked = Lattice(facets, eye).walk();
+  node.linked |= clear_lines(near, ~(node.linked | view));
   return Side::unknown;
 }
 
