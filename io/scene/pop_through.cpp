@@ -52,20 +52,25 @@ double PopThroughSearch::motion(const h6Pose& from, const h6Pose& to) const {
 
 // The points whose sleep is over, with their samples.
 void PopThroughSearch::sample(const h6Pose& pose) {
-  due_.clear(), at_.clear();
+  due_.clear();
   for (std::size_t b = 0; b < block_wake_.size(); ++b) {
     if (block_wake_[b] > moved_) continue;
     block_wake_[b] = std::numeric_limits<double>::infinity();
     const std::size_t end = std::min(points_.size(), (b + 1) * kBlock);
     for (std::size_t i = b * kBlock; i < end; ++i) {
-      if (wake_[i] > moved_) {
+      if (wake_[i] > moved_)
         block_wake_[b] = std::min(block_wake_[b], wake_[i]);
-        continue;
-      }
-      const h6Vec3 x = place(pose, points_[i]);
-      due_.push_back(static_cast<std::uint32_t>(i));
-      at_.insert(at_.end(), {x.x, x.y, x.z});
+      else
+        due_.push_back(static_cast<std::uint32_t>(i));
     }
+  }
+  const h6Vec3 x = rotate(pose.q, {1, 0, 0}), y = rotate(pose.q, {0, 1, 0}),
+               z = rotate(pose.q, {0, 0, 1});
+  at_.resize(3 * due_.size());
+  for (std::size_t k = 0; k < due_.size(); ++k) {
+    const h6Vec3& p = points_[due_[k]];
+    const h6Vec3 at = pose.p + p.x * x + p.y * y + p.z * z;
+    at_[3 * k] = at.x, at_[3 * k + 1] = at.y, at_[3 * k + 2] = at.z;
   }
   distance_.resize(due_.size()), gradient_.resize(at_.size());
   h6SampleField(model_, field_, at_.data(), due_.size(), distance_.data(), gradient_.data(),
