@@ -184,7 +184,7 @@ HWY_NOINLINE void prefetch_cuts(const FieldView& field, const Ring& ring, std::s
 }
 
 // Finds the finer samples of a batch of points that all lie in bricks. Returns whether there are
-// any.
+// any. Where a tenth of the cells is cut, the general path took 1.2 times as long, with AVX2 1.4.
 HWY_NOINLINE bool find_finer(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
   const DF d;
   const DI di;

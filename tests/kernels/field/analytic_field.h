@@ -172,7 +172,7 @@ class AnalyticField {
 inline int scattered_cut(int x, int y, int z) {
   if (std::fabs(clutter({x + 0.5, y + 0.5, z + 0.5})) > 2.5) return 1;
   const std::uint32_t mixed =
-      std::uint32_t(x * 73856093) ^ std::uint32_t(y * 19349663) ^ std::uint32_t(z * 83492791);
+      std::uint32_t(x) * 73856093 ^ std::uint32_t(y) * 19349663 ^ std::uint32_t(z) * 83492791;
   return 1 << (mixed >> 9) % 3;
 }
 
