@@ -164,6 +164,7 @@ class Lattice {
       at_least_0(u.at(p, 0) + kTouch, u.by_q, inverse[0]);
       at_least_0(v.at(p, 0) + kTouch, v.by_q, inverse[1]);
       at_least_0(1 + kTouch - u.at(p, 0) - v.at(p, 0), -u.by_q - v.by_q, inverse[2]);
+      if (from > to) continue;  // from may be too large for an int
       for (int q = int(std::ceil(from)); q <= to; ++q) cut_at(axis, i, j, p, q, at.at(p, q));
     }
   }
