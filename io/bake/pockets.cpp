@@ -30,8 +30,8 @@ constexpr int kFine = 8;                      // steps a voxel
 constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
 constexpr int kLooks = 5;                     // lines that vote; one may graze an edge
 
-// The line p + t d meets a triangle where these are at least 0, and u + v and t at most 1 (T.
-// Moeller, B. Trumbore, 1997); with s = p - a:
+// The line p + t d meets a triangle with corner a and edges e, f where u, v and t are at least 0
+// and u + v and t at most 1 (T. Moeller, B. Trumbore, 1997). With s = p - a:
 //     det = e . (d x f)   u = s . (d x f) / det   v = d . (s x e) / det   t = f . (s x e) / det
 constexpr double kTouch = 1e-7;  // touching an edge counts
 
@@ -156,9 +156,9 @@ class Lattice {
     const double inverse[3] = {1 / u.by_q, 1 / v.by_q, -1 / (u.by_q + v.by_q)};
     for (int p = box.first[i]; p <= box.last[i]; ++p) {
       double from = box.first[j], to = box.last[j];
-      const auto at_least_0 = [&](double value, double slope, double inverse) {
-        if (slope > 0) from = std::max(from, -value * inverse);
-        if (slope < 0) to = std::min(to, -value * inverse);
+      const auto at_least_0 = [&](double value, double slope, double one_over) {
+        if (slope > 0) from = std::max(from, -value * one_over);
+        if (slope < 0) to = std::min(to, -value * one_over);
         if (slope == 0 && value < 0) to = -1;
       };
       at_least_0(u.at(p, 0) + kTouch, u.by_q, inverse[0]);
@@ -272,7 +272,7 @@ std::vector<Seen> facets_near(const std::vector<Facet>& facets, const Vec3& eye)
   return near;
 }
 
-// Of these lines from the eye, those that meet no facet.
+// Returns those of the lines from the eye that meet no facet.
 InView clear_lines(const std::vector<Seen>& near, InView lines) {
   for (const Seen& t : near) {
     const InView tried = lines & t.may_meet;

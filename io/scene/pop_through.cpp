@@ -64,6 +64,7 @@ void PopThroughSearch::sample(const h6Pose& pose) {
         due_.push_back(static_cast<std::uint32_t>(i));
     }
   }
+  // place(pose, p), with the turn as a matrix: a map of nut-on-bolt takes 0.85 to 0.98 of its time.
   const h6Vec3 x = rotate(pose.q, {1, 0, 0}), y = rotate(pose.q, {0, 1, 0}),
                z = rotate(pose.q, {0, 0, 1});
   at_.resize(3 * due_.size());

@@ -38,12 +38,13 @@ struct Stage {
 };
 
 struct Ring {
-  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // index in the table, then its entry
-  HWY_ALIGN std::int32_t node[kRing][kGroup];  // then byte offset in bricks
+  HWY_ALIGN std::int32_t slot[kRing][kGroup];  // index in the table; after look_up the entry there
+  HWY_ALIGN std::int32_t node[kRing][kGroup];  // first node of the cell; then its byte offset
   HWY_ALIGN float fraction[3][kRing][kGroup];
   bool plain[kRing];  // all points lie in bricks
-  // All lie in bricks, some of them refined; then: in cut cells. Only then are the rest filled.
+  // All points lie in bricks, and some of these are refined; after find_finer, some cells are cut.
   bool cut[kRing];
+  // Filled for such batches only: bytes to the next row and plane, and the unit of the samples.
   HWY_ALIGN std::int32_t line[kRing][kGroup], plane[kRing][kGroup];
   HWY_ALIGN float quantum[kRing][kGroup];
 };
@@ -168,7 +169,7 @@ HWY_INLINE void prefetch_far(const FieldView& field, const std::int32_t* entry) 
     if (entry[i] < 0) hwy::Prefetch(field.far + 8 * (-1 - std::ptrdiff_t{entry[i]}));
 }
 
-// Of a batch with refined bricks: what find_finer reads.
+// Prefetches what find_finer reads for a batch with refined bricks.
 HWY_NOINLINE void prefetch_cuts(const FieldView& field, const Ring& ring, std::size_t k) {
   const DI di;
   HWY_ALIGN std::int32_t cell[kGroup];
@@ -184,7 +185,7 @@ HWY_NOINLINE void prefetch_cuts(const FieldView& field, const Ring& ring, std::s
 }
 
 // Finds the finer samples of a batch of points that all lie in bricks. Returns whether there are
-// any. Where a tenth of the cells is cut, the general path took 1.2 times as long, with AVX2 1.4.
+// any. Where a tenth of the cells is cut, the general path took 1.4 times as long.
 HWY_NOINLINE bool find_finer(const FieldView& field, std::size_t k, bool cold, Ring& ring) {
   const DF d;
   const DI di;
@@ -265,7 +266,7 @@ HWY_INLINE Samples sample_plain(const FieldView& field, const Ring& ring, std::s
   return s;
 }
 
-// Of these lanes some lie in cut cells.
+// Samples a vector of points of which some lie in cut cells.
 HWY_NOINLINE Samples sample_cut(const FieldView& field, const Ring& ring, std::size_t k,
                                 std::size_t i) {
   const DF d;

@@ -429,7 +429,8 @@ HWY_INLINE hn::Mask<DI> sample_inside(const FieldView& field, VF qx, VF qy, VF q
     const auto refined = hn::Gt(entry, hn::Set(di, kRefined - 1));
     VI code = hn::Zero(di);
     if (!hn::AllFalse(di, refined)) {
-      code = codes_of(field, row, refined, cell_at(cell.node));
+      code = codes_of(field, row, refined,
+                      hn::Add(x.cell, hn::Add(hn::ShiftLeft<3>(y.cell), hn::ShiftLeft<6>(z.cell))));
       if (kDefer) {
         const auto cut = hn::Ne(code, hn::Zero(di));
         if (2 * hn::CountTrue(di, cut) < hn::Lanes(di)) left_out = cut, code = hn::Zero(di);
