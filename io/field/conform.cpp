@@ -1,30 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
+// conform.cpp - a cell knows what the cells around it have at the nodes that it shares with them:
+// an uncut one interpolates corners that are its own as well, one with halves every second of its
+// own nodes. So it has to know no more than how finely they are sampled.
 #include "io/field/conform.h"
 
-#include <algorithm>
-#include <bit>
+#include <array>
 #include <vector>
 
+#include "io/field/box.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
 namespace {
 
-// A cell and how finely it is sampled: samples a voxel, 0 where it has none.
-struct Sampled {
-  int factor = 0;
-  const float* halves = nullptr;  // factor 2
-  float corners[8] = {};          // factor 1
-};
-
-// The 3 x 3 x 3 cells around one, x fastest.
-struct Around {
-  Sampled cell[27];
-  // Bit i: cell i has one sample a voxel; two, and the one in the middle has four.
-  std::uint32_t ones = 0, twos = 0;
-};
-
-// Bit i: the node touches cell i of the 3 x 3 x 3; for all nodes of a cell cut into `factor`.
+// Bit i: the node touches cell i of the 3 x 3 x 3 around; for all nodes of a cell cut into
+// `factor`.
 template <int factor>
 constexpr std::array<std::uint32_t, (factor + 1) * (factor + 1) * (factor + 1)> touched() {
   constexpr int side = factor + 1;
@@ -43,140 +33,111 @@ constexpr std::array<std::uint32_t, (factor + 1) * (factor + 1) * (factor + 1)> 
 constexpr auto kOfHalves = touched<2>();
 constexpr auto kOfQuarters = touched<4>();
 
-// The value at a fine node, 0 to 4 along each axis, of a cell with `factor` samples a voxel.
-template <int factor>
-float interpolated(const float* samples, const GridNode& at) {
-  constexpr int step = 4 / factor, side = factor + 1;
-  int low[3];
-  float t[3];
-  for (std::size_t k = 0; k < 3; ++k) {
-    low[k] = std::min(at[k] / step, factor - 1);
-    t[k] = float(at[k] - step * low[k]) / float(step);
-  }
-  float sum = 0;
-  for (int c = 0; c < 8; ++c) {
-    float weight = 1;
-    for (int k = 0; k < 3; ++k) weight *= (c >> k & 1) != 0 ? t[k] : 1 - t[k];
-    const int x = low[0] + (c & 1), y = low[1] + (c >> 1 & 1), z = low[2] + (c >> 2);
-    sum += weight * samples[(z * side + y) * side + x];
-  }
-  return sum;
-}
-
-// Reads the field at fine nodes, by the cells around them.
-class Cells {
+// Samples a voxel in the cells of a brick and in one layer around it; 0 where a cell has none.
+class Sampled {
  public:
-  explicit Cells(const FieldData& field) : field_(field) {}
+  Sampled(const FieldData& field, const GridNode& brick) {
+    for (int i = 0; i < 27; ++i)
+      row_[i] =
+          row_of(field, {brick[0] + i % 3 - 1, brick[1] + i / 3 % 3 - 1, brick[2] + i / 9 - 1});
+    for (int z = -1; z <= 8; ++z)
+      for (int y = -1; y <= 8; ++y)
+        for (int x = -1; x <= 8; ++x) factor_[place(x, y, z)] = look_up(field, x, y, z);
+  }
 
-  Around around(const GridNode& middle, int own) const {
-    Around out;
-    for (int i = 0; i < 27; ++i) {
-      if (i == 13) continue;
-      Sampled& cell = out.cell[i];
-      look_up({middle[0] + i % 3 - 1, middle[1] + i / 3 % 3 - 1, middle[2] + i / 9 - 1}, cell);
-      out.ones |= std::uint32_t(cell.factor == 1) << i;
-      out.twos |= std::uint32_t(cell.factor == 2 && own == 4) << i;
-    }
-    return out;
+  // Bit i: cell i of the 3 x 3 x 3 around a cell of the brick has `factor`.
+  std::uint32_t around(int x, int y, int z, int factor) const {
+    std::uint32_t bits = 0;
+    for (int i = 0; i < 27; ++i)
+      bits |=
+          std::uint32_t(factor_[place(x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1)] == factor)
+          << i;
+    return bits;
   }
 
  private:
-  // Without samples where there is no brick, or no whole cell at the band's end.
-  void look_up(const GridNode& cell, Sampled& out) const {
-    std::size_t brick = 0, local = 0;
-    for (std::size_t k = 3; k-- > 0;) {
-      if (cell[k] < 0 || cell[k] >= 8 * field_.bricks[k]) return;
-      brick = brick * std::size_t(field_.bricks[k]) + std::size_t(cell[k] >> 3);
-      local = local * 8 + std::size_t(cell[k] & 7);
-    }
-    const std::int32_t row = field_.brick_index[brick];
-    if (row < 0) return;
-    const std::int32_t refined = field_.refined[std::size_t(row)];
-    const std::int32_t i = refined < 0 ? 0 : field_.fine_index[512 * std::size_t(refined) + local];
-    if (i > 0) out.halves = &field_.halves[27 * std::size_t(i - 1)];
-    if (i == 0 && !read_corners(cell, &field_.samples[512 * std::size_t(row) + local], out.corners))
-      return;
-    out.factor = i < 0 ? 4 : i > 0 ? 2 : 1;
+  static std::size_t place(int x, int y, int z) {
+    return std::size_t(100 * (z + 1) + 10 * (y + 1) + x + 1);
+  }
+  std::int32_t row(int x, int y, int z) const {
+    return row_[9 * (1 + (z >> 3)) + 3 * (1 + (y >> 3)) + 1 + (x >> 3)];
+  }
+  std::uint8_t look_up(const FieldData& field, int x, int y, int z) const {
+    const std::int32_t own = row(x, y, z);
+    if (own < 0) return 0;
+    const std::int32_t refined = field.refined[std::size_t(own)];
+    const std::size_t local = std::size_t(64 * (z & 7) + 8 * (y & 7) + (x & 7));
+    const std::int32_t i = refined < 0 ? 0 : field.fine_index[512 * std::size_t(refined) + local];
+    if (i != 0) return i < 0 ? 4 : 2;
+    bool whole = true;  // at the band's end a corner may be missing
+    for (int c = 1; c < 8; ++c)
+      whole = whole && row(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) >= 0;
+    return whole ? 1 : 0;
   }
 
-  // `first`: the sample at the cell's first node. Returns whether all eight are there.
-  bool read_corners(const GridNode& cell, const float* first, float (&out)[8]) const {
-    for (int c = 0; c < 8; ++c) {
-      const GridNode at{cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2)};
-      bool beside = false;  // it lies in another brick
-      for (std::size_t k = 0; k < 3; ++k) beside = beside || (at[k] >> 3) != (cell[k] >> 3);
-      const float* const v = beside ? coarse_node(field_, {4 * at[0], 4 * at[1], 4 * at[2]})
-                                    : first + (c & 1) + 8 * (c >> 1 & 1) + 64 * (c >> 2);
-      if (v == nullptr) return false;
-      out[c] = *v;
-    }
-    return true;
-  }
-
-  const FieldData& field_;
+  std::int32_t row_[27];
+  std::uint8_t factor_[1000];
 };
 
-// All cells of `factor` in one refined brick, whose first node is `from`. A node takes the value
-// that the coarsest cell that touches it has there.
-void conform_brick(const Cells& cells, const GridNode& from, const std::int32_t* index, int factor,
-                   FieldData& field) {
-  const int side = factor + 1, step = 4 / factor;
+// Nodes that touch one of `cells`, and none of `others`, take the values of `from`.
+template <std::size_t count>
+void take(const std::array<std::uint32_t, count>& touches, std::uint32_t cells,
+          std::uint32_t others, const float (&from)[count], float* values) {
+  for (std::size_t n = 0; n < count; ++n)
+    if ((touches[n] & cells) != 0 && (touches[n] & others) == 0) values[n] = from[n];
+}
+
+void conform_halves(const float (&corners)[8], std::uint32_t ones, float* values) {
+  float flat[27];
+  interpolate<2, 2>(corners, flat);
+  take(kOfHalves, ones, 0, flat, values);
+}
+
+void conform_quarters(const float (&corners)[8], std::uint32_t ones, std::uint32_t twos,
+                      float* values) {
+  float flat[125], half[27];
+  interpolate<2, 4>(corners, flat);
+  take(kOfQuarters, ones, 0, flat, values);
+  if (twos == 0) return;
+  for (int n = 0; n < 27; ++n) half[n] = values[50 * (n / 9) + 10 * (n / 3 % 3) + 2 * (n % 3)];
+  interpolate<3, 2>(half, flat);
+  take(kOfQuarters, twos, ones, flat, values);
+}
+
+// All cut cells of one refined brick.
+void conform_brick(const GridNode& brick, const std::int32_t* index, FieldData& field) {
+  const Sampled sampled(field, brick);
+  float box[kBox];
+  read_box(field, brick, box);
   for (int c = 0; c < 512; ++c) {
-    if (factor == 2 ? index[c] <= 0 : index[c] >= 0) continue;
-    const GridNode cell{(from[0] >> 2) + c % 8, (from[1] >> 2) + c / 8 % 8,
-                        (from[2] >> 2) + c / 64};
-    const Around around = cells.around(cell, factor);
-    if ((around.ones | around.twos) == 0) continue;
-    float* values = factor == 2 ? &field.halves[27 * std::size_t(index[c] - 1)]
-                                : &field.quarters[125 * std::size_t(-1 - index[c])];
-    const std::uint32_t* const touches = factor == 2 ? kOfHalves.data() : kOfQuarters.data();
-    for (int n = 0; n < side * side * side; ++n) {
-      const std::uint32_t ones = touches[n] & around.ones, twos = touches[n] & around.twos;
-      if ((ones | twos) == 0) continue;
-      const int i = std::bit_width(ones != 0 ? ones : twos) - 1;
-      const GridNode at{step * (n % side) - 4 * (i % 3 - 1),
-                        step * (n / side % side) - 4 * (i / 3 % 3 - 1),
-                        step * (n / side / side) - 4 * (i / 9 - 1)};
-      values[n] = ones != 0 ? interpolated<1>(around.cell[i].corners, at)
-                            : interpolated<2>(around.cell[i].halves, at);
-    }
+    if (index[c] == 0) continue;
+    const int x = c % 8, y = c / 8 % 8, z = c / 64;
+    const std::uint32_t ones = sampled.around(x, y, z, 1);
+    const std::uint32_t twos = index[c] > 0 ? 0 : sampled.around(x, y, z, 2);
+    if ((ones | twos) == 0) continue;
+    float corners[8];
+    for (int k = 0; k < 8; ++k)
+      corners[k] = box[81 * (z + (k >> 2)) + 9 * (y + (k >> 1 & 1)) + x + (k & 1)];
+    if (index[c] > 0)
+      conform_halves(corners, ones, &field.halves[27 * std::size_t(index[c] - 1)]);
+    else
+      conform_quarters(corners, ones, twos, &field.quarters[125 * std::size_t(-1 - index[c])]);
   }
 }
 
 }  // namespace
 
-const float* coarse_node(const FieldData& field, const GridNode& node) {
-  std::size_t cell = 0, local = 0;
-  for (std::size_t k = 3; k-- > 0;) {
-    const int n = node[k] >> 2;
-    if (n < 0 || n >= 8 * field.bricks[k]) return nullptr;
-    cell = cell * std::size_t(field.bricks[k]) + std::size_t(n >> 3);
-    local = local * 8 + std::size_t(n & 7);
-  }
-  const std::int32_t row = field.brick_index[cell];
-  return row < 0 ? nullptr : &field.samples[std::size_t(row) * 512 + local];
-}
-
 void conform(unsigned threads, FieldData& field) {
-  struct Brick {
-    GridNode from;
-    const std::int32_t* index;
-  };
-  std::vector<Brick> bricks;
-  for (std::size_t c = 0; c < field.brick_index.size() && !field.refined.empty(); ++c) {
-    const std::int32_t row = field.brick_index[c];
-    const std::int32_t refined = row < 0 ? -1 : field.refined[std::size_t(row)];
-    if (refined < 0) continue;
-    const GridNode at = place_of(c, field.bricks);
-    bricks.push_back(
-        {{32 * at[0], 32 * at[1], 32 * at[2]}, &field.fine_index[512 * std::size_t(refined)]});
-  }
-  const Cells cells(field);
-  // Quarters read halves, so halves come first. Cells of one kind do not read each other.
-  for (const int factor : {2, 4})
-    sched::parallel_for(bricks.size(), threads, [&](std::size_t b) {
-      conform_brick(cells, bricks[b].from, bricks[b].index, factor, field);
-    });
+  if (field.refined.empty()) return;
+  std::vector<std::size_t> bricks;
+  for (std::size_t c = 0; c < field.brick_index.size(); ++c)
+    if (field.brick_index[c] >= 0 && field.refined[std::size_t(field.brick_index[c])] >= 0)
+      bricks.push_back(c);
+  sched::parallel_for(bricks.size(), threads, [&](std::size_t b) {
+    const std::size_t row = std::size_t(field.brick_index[bricks[b]]);
+    conform_brick(place_of(bricks[b], field.bricks),
+                  &field.fine_index[512 * std::size_t(field.refined[row])], field);
+  });
 }
 
 }  // namespace h6::io

@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 
+#include "io/field/box.h"
 #include "io/field/conform.h"
 #include "sched/parallel_for.h"
 
@@ -24,8 +25,6 @@ constexpr double kExactBeyondBand = 1.9;  // [fine voxel]
 // A place in the band has a node within half a fine cell's diagonal, which may lie beyond the band.
 constexpr double kTestedBeyondBand = 0.867;  // [fine voxel]
 
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-
 // The nodes of the fine bake.
 class FineNodes {
  public:
@@ -34,29 +33,26 @@ class FineNodes {
     for (std::size_t k = 0; k < 3; ++k) far_size_[k] = fine.bricks[k] + 1;
   }
 
-  // The samples of fine brick `at`; null where there are none.
-  const float* brick(const GridNode& at) const {
-    for (std::size_t k = 0; k < 3; ++k)
-      if (at[k] >= fine_.bricks[k]) return nullptr;
-    const std::int32_t row = fine_.brick_index[place_in(at, fine_.bricks)];
-    return row < 0 ? nullptr : &fine_.samples[std::size_t(row) * 512];
-  }
+  const FieldData& field() const { return fine_; }
   bool exact(float sample) const { return std::fabs(sample) < exact_below_; }
 
-  // The value at a coarse node, from whichever bake is exact there. `coarse`: the coarse bake's, or
-  // null.
-  float at_coarse_node(const GridNode& node, const float* coarse) const {
-    const GridNode at{node[0] >> 3, node[1] >> 3, node[2] >> 3};
-    const float* s = brick(at);
-    const float fine =
-        s == nullptr ? 0 : s[((node[2] & 7) * 8 + (node[1] & 7)) * 8 + (node[0] & 7)];
-    if (s != nullptr && (coarse == nullptr || exact(fine))) return fine;
-    const bool inside =
-        s != nullptr ? fine < 0 : std::signbit(fine_.far_grid[place_in(at, far_size_)]);
-    if (coarse == nullptr) return inside ? -exact_below_ : exact_below_;
-    if ((*coarse < 0) == inside) return *coarse;
-    // The fine bake saw a gap open, or closed, where the coarse one did not.
-    return -*coarse - 2 * float(fine_.offset);
+  // The values at the coarse nodes in fine brick `at`, 2 x 2 x 2, from whichever bake is exact
+  // there. `coarse`: the first of the coarse bake's, in its brick, or null. `out`: likewise.
+  void at_coarse_nodes(const GridNode& at, const float* coarse, float* out) const {
+    const std::int32_t row = row_of(fine_, at);
+    const float* const fine = row < 0 ? nullptr : &fine_.samples[std::size_t(row) * 512];
+    const bool far_inside =
+        fine == nullptr && std::signbit(fine_.far_grid[place_in(at, far_size_)]);
+    for (int k = 0; k < 8; ++k) {
+      const int x = k & 1, y = k >> 1 & 1, z = k >> 2, to = (z * 8 + y) * 8 + x;
+      const float* const known = coarse == nullptr ? nullptr : coarse + to;
+      if (fine == nullptr) {
+        out[to] = at_coarse_node(far_inside, known);
+        continue;
+      }
+      const float value = fine[4 * to];
+      out[to] = known == nullptr || exact(value) ? value : at_coarse_node(value < 0, known);
+    }
   }
 
   // The least |distance| that the far grid knows at its nodes in a coarse brick.
@@ -72,6 +68,14 @@ class FineNodes {
   float far(const GridNode& node) const { return fine_.far_grid[place_in(node, far_size_)]; }
 
  private:
+  // Where the fine bake knows no more than the side.
+  float at_coarse_node(bool inside, const float* coarse) const {
+    if (coarse == nullptr) return inside ? -exact_below_ : exact_below_;
+    if ((*coarse < 0) == inside) return *coarse;
+    // The fine bake saw a gap open, or closed, where the coarse one did not.
+    return -*coarse - 2 * float(fine_.offset);
+  }
+
   const FieldData& fine_;
   float exact_below_;
   std::array<std::int32_t, 3> far_size_{};
@@ -103,11 +107,11 @@ void take_bricks(const FieldData& coarse, const FieldData& fine, const FineNodes
     const std::int32_t from = coarse.brick_index[c];
     const float* samples = from < 0 ? nullptr : &coarse.samples[std::size_t(from) * 512];
     const GridNode at = place_of(c, coarse.bricks);
-    for (int n = 0; n < 512; ++n) {
-      const GridNode node{32 * at[0] + 4 * (n % 8), 32 * at[1] + 4 * (n / 8 % 8),
-                          32 * at[2] + 4 * (n / 64)};
-      out.samples[row * 512 + std::size_t(n)] =
-          nodes.at_coarse_node(node, samples == nullptr ? nullptr : samples + n);
+    for (int box = 0; box < 64; ++box) {
+      const int x = box % 4, y = box / 4 % 4, z = box / 16, first = 2 * ((z * 8 + y) * 8 + x);
+      nodes.at_coarse_nodes({kCut * at[0] + x, kCut * at[1] + y, kCut * at[2] + z},
+                            samples == nullptr ? nullptr : samples + first,
+                            &out.samples[row * 512 + std::size_t(first)]);
     }
   });
 }
@@ -131,33 +135,13 @@ void take_names(const FieldData& coarse, const FieldData& fine, FieldData& out) 
   }
 }
 
-// Trilinear values at 5 x 5 x 5 places in a cell of `kCount` nodes a side.
-template <int kCount>
-void interpolate(const float* nodes, float (&out)[125]) {
-  constexpr int kStep = 4 / (kCount - 1);
-  float lines[5 * kCount * kCount], planes[25 * kCount];
-  const auto along = [](const float* from, int stride, int i) {
-    const int low = std::min(i / kStep, kCount - 2);
-    const float t = float(i - low * kStep) / kStep;
-    return from[low * stride] + t * (from[(low + 1) * stride] - from[low * stride]);
-  };
-  for (int row = 0; row < kCount * kCount; ++row)
-    for (int i = 0; i < 5; ++i) lines[5 * row + i] = along(nodes + kCount * row, 1, i);
-  for (int z = 0; z < kCount; ++z)
-    for (int i = 0; i < 5; ++i)
-      for (int x = 0; x < 5; ++x)
-        planes[25 * z + 5 * i + x] = along(lines + 5 * kCount * z + x, 5, i);
-  for (int i = 0; i < 5; ++i)
-    for (int n = 0; n < 25; ++n) out[25 * i + n] = along(planes + n, 25, i);
-}
-
 // The finer samples of one brick.
 struct Finer {
   std::array<std::int32_t, 512> index{};  // as in FieldData, for these halves and quarters
   std::vector<float> halves, quarters;
 };
 
-// Decides for the cells of one coarse brick, one after the other.
+// Decides for the cells of one coarse brick, by boxes of 2 x 2 x 2 cells, which are a fine brick.
 class Chooser {
  public:
   Chooser(const FieldData& out, const FineNodes& nodes, double tolerance, double tested)
@@ -166,73 +150,89 @@ class Chooser {
   // Returns null where the coarse samples are good enough.
   std::unique_ptr<Finer> choose(const GridNode& brick) const {
     std::unique_ptr<Finer> finer;
-    for (int box = 0; box < 64; ++box) {  // of 2 x 2 x 2 cells, one fine brick
-      const GridNode fine{kCut * brick[0] + box % 4, kCut * brick[1] + box / 4 % 4,
-                          kCut * brick[2] + box / 16};
-      const float* source[8];
-      for (int k = 0; k < 8; ++k)
-        source[k] = nodes_.brick({fine[0] + (k & 1), fine[1] + (k >> 1 & 1), fine[2] + (k >> 2)});
-      if (source[0] == nullptr) continue;
-      for (int i = 0; i < 8; ++i)
-        try_cell({2 * fine[0] + (i & 1), 2 * fine[1] + (i >> 1 & 1), 2 * fine[2] + (i >> 2)},
-                 source, finer);
+    float coarse[kBox], exact[kBox], flat[kBox];
+    read_box(out_, brick, coarse);
+    for (int box = 0; box < 64; ++box) {
+      const int x = box % 4, y = box / 4 % 4, z = box / 16;
+      if (!read_box(nodes_.field(), {kCut * brick[0] + x, kCut * brick[1] + y, kCut * brick[2] + z},
+                    exact))
+        continue;
+      float corner[27];
+      for (int n = 0; n < 27; ++n)
+        corner[n] = coarse[81 * (2 * z + n / 9) + 9 * (2 * y + n / 3 % 3) + 2 * x + n % 3];
+      interpolate<3, 4>(corner, flat);
+      const unsigned missing = cells_that_miss(exact, flat) & whole_cells(corner);
+      for (int i = 0; i < 8; ++i) {
+        if ((missing >> i & 1) == 0) continue;
+        if (!finer) finer = std::make_unique<Finer>();
+        const int cell[3] = {i & 1, i >> 1 & 1, i >> 2};
+        finer
+            ->index[std::size_t(64 * (2 * z + cell[2]) + 8 * (2 * y + cell[1]) + 2 * x + cell[0])] =
+            cut(exact, flat, 4 * (81 * cell[2] + 9 * cell[1] + cell[0]), *finer);
+      }
     }
     return finer;
   }
 
  private:
-  void try_cell(const GridNode& cell, const float* const (&source)[8],
-                std::unique_ptr<Finer>& finer) const {
-    float corner[8], exact[125], flat[125];
+  // Nodes that are not exact are not tested: tested_ is less than what is exact. An unknown value
+  // misses nothing.
+  bool misses(float exact, float found) const {
+    return (std::fabs(exact - found) > allowed_) & (std::fabs(exact) < tested_);
+  }
+
+  // Bit i: cell i of a box has a node whose value misses the tolerance.
+  unsigned cells_that_miss(const float (&exact)[kBox], const float (&found)[kBox]) const {
+    unsigned cells = 0;
+    for (int z = 0; z < 2; ++z) {
+      int wrong[81] = {}, any = 0;  // over the five nodes along z
+      for (int layer = 4 * z; layer <= 4 * z + 4; ++layer)
+        for (int n = 0; n < 81; ++n)
+          wrong[n] |= int(misses(exact[81 * layer + n], found[81 * layer + n]));
+      for (const int w : wrong) any |= w;
+      for (int n = 0; n < 81 && any != 0; ++n) {
+        if (wrong[n] == 0) continue;
+        const unsigned x = (n % 9 <= 4 ? 5u : 0u) | (n % 9 >= 4 ? 10u : 0u);
+        const unsigned y = (n / 9 <= 4 ? 3u : 0u) | (n / 9 >= 4 ? 12u : 0u);
+        cells |= (x & y) << 4 * z;
+      }
+    }
+    return cells;
+  }
+
+  // Bit i: all corners of cell i are known. Else it lies outside the band.
+  static unsigned whole_cells(const float (&corner)[27]) {
+    unsigned cells = 0;
     for (int i = 0; i < 8; ++i) {
-      const float* v = coarse_node(
-          out_, {4 * (cell[0] + (i & 1)), 4 * (cell[1] + (i >> 1 & 1)), 4 * (cell[2] + (i >> 2))});
-      if (v == nullptr) return;  // outside the band
-      corner[i] = *v;
+      bool known = true;
+      for (int k = 0; k < 8; ++k) {
+        const int x = (i & 1) + (k & 1), y = (i >> 1 & 1) + (k >> 1 & 1), z = (i >> 2) + (k >> 2);
+        known = known && !std::isnan(corner[9 * z + 3 * y + x]);
+      }
+      cells |= unsigned(known) << i;
     }
-    gather(cell, source, exact);
-    interpolate<2>(corner, flat);
-    if (!misses(exact, flat)) return;
-    // A node that the fine bake does not know lies beyond the band.
-    for (int n = 0; n < 125; ++n)
-      if (!nodes_.exact(exact[n])) exact[n] = flat[n];
-    if (!finer) finer = std::make_unique<Finer>();
-    std::int32_t& index =
-        finer->index[std::size_t(((cell[2] & 7) * 8 + (cell[1] & 7)) * 8 + (cell[0] & 7))];
-    float half[27];
-    for (int n = 0; n < 27; ++n) half[n] = exact[50 * (n / 9) + 10 * (n / 3 % 3) + 2 * (n % 3)];
-    interpolate<3>(half, flat);
-    if (!misses(exact, flat)) {
-      finer->halves.insert(finer->halves.end(), half, half + 27);
-      index = std::int32_t(finer->halves.size() / 27);
-    } else {
-      finer->quarters.insert(finer->quarters.end(), exact, exact + 125);
-      index = -std::int32_t(finer->quarters.size() / 125);
-    }
+    return cells;
   }
 
-  // The fine nodes of a cell; kUnknown where they lie in no brick.
-  static void gather(const GridNode& cell, const float* const (&source)[8], float (&out)[125]) {
-    const int x0 = 4 * (cell[0] & 1), y0 = 4 * (cell[1] & 1), z0 = 4 * (cell[2] & 1);
-    for (int row = 0; row < 25; ++row) {
-      const int y = y0 + row % 5, z = z0 + row / 5, from = (y >> 3) << 1 | (z >> 3) << 2;
-      const int at = ((z & 7) * 8 + (y & 7)) * 8;
-      const float *const four = source[from], *const last = source[from | (x0 + 4) >> 3];
-      float* const to = out + 5 * row;
-      if (four != nullptr)
-        std::copy_n(four + at + x0, 4, to);
-      else
-        std::fill_n(to, 4, kUnknown);
-      to[4] = last == nullptr ? kUnknown : last[at + ((x0 + 4) & 7)];
+  // Adds the finer samples of a cell, whose first node in the box is `first`. Returns their index.
+  std::int32_t cut(const float (&exact)[kBox], const float (&flat)[kBox], int first,
+                   Finer& finer) const {
+    float quarter[125], half[27], found[125];
+    for (int n = 0; n < 125; ++n) {
+      // A node that the fine bake does not know lies beyond the band.
+      const int at = first + 81 * (n / 25) + 9 * (n / 5 % 5) + n % 5;
+      quarter[n] = nodes_.exact(exact[at]) ? exact[at] : flat[at];
     }
-  }
-
-  // Nodes that are not exact are not tested: tested_ is less than what is exact.
-  bool misses(const float (&exact)[125], const float (&found)[125]) const {
+    for (int n = 0; n < 27; ++n) half[n] = quarter[50 * (n / 9) + 10 * (n / 3 % 3) + 2 * (n % 3)];
+    interpolate<3, 2>(half, found);
     int wrong = 0;
-    for (int n = 0; n < 125; ++n)  // false for kUnknown
-      wrong |= int(std::fabs(exact[n] - found[n]) > allowed_) & int(std::fabs(exact[n]) < tested_);
-    return wrong != 0;
+    for (int n = 0; n < 125; ++n) wrong |= int(misses(quarter[n], found[n]));
+    if (wrong == 0) {
+      finer.halves.insert(finer.halves.end(), half, half + 27);
+      return std::int32_t(finer.halves.size() / 27);
+    }
+    finer.quarters.insert(finer.quarters.end(), quarter, quarter + 125);
+    return -std::int32_t(finer.quarters.size() / 125);
   }
 
   const FieldData& out_;

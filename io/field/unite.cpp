@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/field/conform.h"
+#include "io/field/box.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
