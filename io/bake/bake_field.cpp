@@ -289,7 +289,7 @@ struct Baked {
 };
 
 // The surface is in grid coordinates and gains the facets that seal it. Without `far` the far grid
-// stays empty.
+// holds the sides alone, unless thin walls may have to be added.
 Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldBake& options,
                            bool far, const bake::Steps& steps, FieldBakeReport* report) {
   using namespace bake;
@@ -324,11 +324,12 @@ Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldB
   if (!steps.tell("samples", 0.8)) return cancelled;
   write_samples(grid, band, reached, inside, threads, field);
   inside.chains.reset();
-  if (far)
-    if (const Outcome done =
-            far_distances(surface, grid, band, reached, threads, steps, field.far_grid);
-        !done)
-      return done.failure();
+  if (!far && (out.thin.empty() || !options.grow_thin))
+    far_sides(grid, band, reached, threads, field.far_grid);
+  else if (const Outcome done =
+               far_distances(surface, grid, band, reached, threads, steps, field.far_grid);
+           !done)
+    return done.failure();
   if (report) {
     report->sealed_area = double(openings.plugs) * grid.voxel * grid.voxel;
     warn_of_holes(grid, openings, options, *report);
@@ -453,7 +454,7 @@ Result<FieldData> bake_to_tolerance(bake::Surface& surface, const FieldBake& opt
   if (!grids) return grids.failure();
   to_grid(surface, grids->fine, options.threads);
   Result<Baked> fine =
-      bake_on_grid(surface, grids->fine, options, true, steps.part(0, 0.5), report);
+      bake_on_grid(surface, grids->fine, options, false, steps.part(0, 0.5), report);
   if (!fine) return fine.failure();
   const Result<ThinPieces> thin = find_thin(surface, grids->fine, *fine, options, report);
   if (!thin) return thin.failure();
@@ -467,8 +468,8 @@ Result<FieldData> bake_to_tolerance(bake::Surface& surface, const FieldBake& opt
   for (Vec3& v : coarse_surface.vertices) v = (1.0 / kCut) * v;
   FieldBake magnitudes = options;  // the sides are those of the fine bake
   if (!sealed) magnitudes.sign = SignMode::flood;
-  Result<Baked> coarse = bake_on_grid(coarse_surface, grids->coarse, magnitudes, grown,
-                                      steps.part(0.6, 0.75), nullptr);
+  Result<Baked> coarse =
+      bake_on_grid(coarse_surface, grids->coarse, magnitudes, true, steps.part(0.6, 0.75), nullptr);
   if (!coarse) return coarse.failure();
   if (grown)
     if (const Outcome done = add_thin(*thin, surface, grids->coarse, kCut, options,

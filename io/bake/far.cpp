@@ -200,8 +200,7 @@ class Nodes {
 }  // namespace
 
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                      const Reached& reached, unsigned threads, const Steps& steps,
-                      Samples& far) {
+                      const Reached& reached, unsigned threads, const Steps& steps, Samples& far) {
   const TriangleTree tree(surface, grid, threads);
   if (!steps.tell("far field", 0.88)) return Failure{"cancelled"};
   Nodes nodes(grid, tree);
@@ -240,6 +239,18 @@ Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand
                  [&](std::size_t layer) { others(int(2 * layer)); }))
     return Failure{"cancelled"};
   return Done{};
+}
+
+void far_sides(const Grid& grid, const NarrowBand& band, const Reached& reached, unsigned threads,
+               Samples& far) {
+  const int nx = grid.bricks[0] + 1, ny = grid.bricks[1] + 1, nz = grid.bricks[2] + 1;
+  far.resize(std::size_t(nx) * std::size_t(ny) * std::size_t(nz));
+  sched::parallel_for(std::size_t(nz), threads, [&](std::size_t c) {
+    float* at = far.data() + c * std::size_t(nx) * std::size_t(ny);
+    for (int b = 0; b < ny; ++b)
+      for (int a = 0; a < nx; ++a)
+        *at++ = look_up(grid, band, reached, a, b, int(c)).inside ? -1.0f : 1.0f;
+  });
 }
 
 }  // namespace h6::io::bake

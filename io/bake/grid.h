@@ -280,7 +280,9 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, c
 
 // far.cpp: signed lower bounds of the distance [m] at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                      const Reached& reached, unsigned threads, const Steps& steps,
-                      Samples& far);
+                      const Reached& reached, unsigned threads, const Steps& steps, Samples& far);
+// The sides alone: -1 inside and 1 outside.
+void far_sides(const Grid& grid, const NarrowBand& band, const Reached& reached, unsigned threads,
+               Samples& far);
 
 }  // namespace h6::io::bake

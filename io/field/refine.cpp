@@ -29,25 +29,28 @@ constexpr double kTestedBeyondBand = 0.867;  // [fine voxel]
 class FineNodes {
  public:
   explicit FineNodes(const FieldData& fine)
-      : fine_(fine), exact_below_(float(fine.band + kExactBeyondBand * fine.voxel_size)) {
+      : fine_(fine),
+        exact_below_(float(fine.band + kExactBeyondBand * fine.voxel_size)),
+        tested_(float(fine.band + kTestedBeyondBand * fine.voxel_size)) {
     for (std::size_t k = 0; k < 3; ++k) far_size_[k] = fine.bricks[k] + 1;
   }
 
   const FieldData& field() const { return fine_; }
   bool exact(float sample) const { return std::fabs(sample) < exact_below_; }
+  // Of nodes that are not exact none is tested.
+  bool tested(float sample) const { return std::fabs(sample) < tested_; }
 
   // The values at the coarse nodes in fine brick `at`, 2 x 2 x 2, from whichever bake is exact
   // there. `coarse`: the first of the coarse bake's, in its brick, or null. `out`: likewise.
   void at_coarse_nodes(const GridNode& at, const float* coarse, float* out) const {
     const std::int32_t row = row_of(fine_, at);
     const float* const fine = row < 0 ? nullptr : &fine_.samples[std::size_t(row) * 512];
-    const bool far_inside =
-        fine == nullptr && std::signbit(fine_.far_grid[place_in(at, far_size_)]);
+    const bool side = fine == nullptr && far_inside(at);
     for (int k = 0; k < 8; ++k) {
       const int x = k & 1, y = k >> 1 & 1, z = k >> 2, to = (z * 8 + y) * 8 + x;
       const float* const known = coarse == nullptr ? nullptr : coarse + to;
       if (fine == nullptr) {
-        out[to] = at_coarse_node(far_inside, known);
+        out[to] = at_coarse_node(side, known);
         continue;
       }
       const float value = fine[4 * to];
@@ -55,17 +58,29 @@ class FineNodes {
     }
   }
 
-  // The least |distance| that the far grid knows at its nodes in a coarse brick.
-  double least_far(const GridNode& brick) const {
-    double least = 1e30;
-    for (int i = 0; i < 125; ++i) {
-      const GridNode n{kCut * brick[0] + i % 5, kCut * brick[1] + i / 5 % 5,
-                       kCut * brick[2] + i / 25};
-      least = std::min(least, std::fabs(double(fine_.far_grid[place_in(n, far_size_)])));
+  // Whether a cell that has a corner in a coarse brick reaches into the fine band: one in the
+  // brick, or one below it along some axis.
+  bool reach(const GridNode& brick) const {
+    for (int b = 124; b >= 0; --b) {
+      const int x = b % 5 - 1, y = b / 5 % 5 - 1, z = b / 25 - 1;
+      const std::int32_t row =
+          row_of(fine_, {kCut * brick[0] + x, kCut * brick[1] + y, kCut * brick[2] + z});
+      if (row < 0) continue;
+      if (x >= 0 && y >= 0 && z >= 0) return true;
+      const float* const samples = &fine_.samples[std::size_t(row) * 512];
+      float least = exact_below_;
+      for (int k = z < 0 ? kCut : 0; k < 8; ++k)
+        for (int j = y < 0 ? kCut : 0; j < 8; ++j)
+          for (int i = x < 0 ? kCut : 0; i < 8; ++i)
+            least = std::min(least, std::fabs(samples[64 * k + 8 * j + i]));
+      if (tested(least)) return true;
     }
-    return least;
+    return false;
   }
-  float far(const GridNode& node) const { return fine_.far_grid[place_in(node, far_size_)]; }
+  // The side of a node of the far grid.
+  bool far_inside(const GridNode& node) const {
+    return std::signbit(fine_.far_grid[place_in(node, far_size_)]);
+  }
 
  private:
   // Where the fine bake knows no more than the side.
@@ -77,7 +92,7 @@ class FineNodes {
   }
 
   const FieldData& fine_;
-  float exact_below_;
+  float exact_below_, tested_;  // [m]
   std::array<std::int32_t, 3> far_size_{};
 };
 
@@ -87,12 +102,8 @@ void take_bricks(const FieldData& coarse, const FieldData& fine, const FineNodes
                  unsigned threads, FieldData& out) {
   const std::size_t cells = coarse.brick_index.size();
   out.brick_index.assign(cells, -1);
-  // Nodes of the far grid are 2 voxels apart. A surface at the band's end beside a brick lies at
-  // most sqrt(band^2 + 2) voxels from one of them.
-  const double band = coarse.band / coarse.voxel_size;
-  const double near = std::sqrt(band * band + 2) * coarse.voxel_size + fine.voxel_size;
   sched::parallel_for(cells, threads, [&](std::size_t c) {
-    if (coarse.brick_index[c] >= 0 || nodes.least_far(place_of(c, coarse.bricks)) < near)
+    if (coarse.brick_index[c] >= 0 || nodes.reach(place_of(c, coarse.bricks)))
       out.brick_index[c] = 0;
   });
   std::int32_t rows = 0;
@@ -144,8 +155,8 @@ struct Finer {
 // Decides for the cells of one coarse brick, by boxes of 2 x 2 x 2 cells, which are a fine brick.
 class Chooser {
  public:
-  Chooser(const FieldData& out, const FineNodes& nodes, double tolerance, double tested)
-      : out_(out), nodes_(nodes), allowed_(float(kMeasured * tolerance)), tested_(float(tested)) {}
+  Chooser(const FieldData& out, const FineNodes& nodes, double tolerance)
+      : out_(out), nodes_(nodes), allowed_(float(kMeasured * tolerance)) {}
 
   // Returns null where the coarse samples are good enough.
   std::unique_ptr<Finer> choose(const GridNode& brick) const {
@@ -175,10 +186,9 @@ class Chooser {
   }
 
  private:
-  // Nodes that are not exact are not tested: tested_ is less than what is exact. An unknown value
-  // misses nothing.
+  // An unknown value misses nothing.
   bool misses(float exact, float found) const {
-    return (std::fabs(exact - found) > allowed_) & (std::fabs(exact) < tested_);
+    return (std::fabs(exact - found) > allowed_) & nodes_.tested(exact);
   }
 
   // Bit i: cell i of a box has a node whose value misses the tolerance.
@@ -237,7 +247,7 @@ class Chooser {
 
   const FieldData& out_;
   const FineNodes& nodes_;
-  float allowed_, tested_;
+  float allowed_;
 };
 
 void take_finer(std::vector<std::unique_ptr<Finer>>& chosen, FieldData& out) {
@@ -273,6 +283,22 @@ void take_finer(std::vector<std::unique_ptr<Finer>>& chosen, FieldData& out) {
   }
 }
 
+// The far bounds of the coarse bake, on the sides of the fine one. Inside, a bound m comes from the
+// sqrt(m^2 + offset^2) to the mesh, or from less than the offset (io/bake/far.cpp); outside, the
+// zero set may be nearer to it by the offset.
+void take_far(const FieldData& coarse, const FineNodes& nodes, FieldData& out) {
+  const std::array<std::int32_t, 3> size{out.bricks[0] + 1, out.bricks[1] + 1, out.bricks[2] + 1};
+  out.far_grid.resize(coarse.far_grid.size());
+  for (std::size_t i = 0; i < out.far_grid.size(); ++i) {
+    const GridNode n = place_of(i, size);
+    const float known = coarse.far_grid[i], o = float(out.offset);
+    float bound = std::fabs(known);
+    const bool inside = nodes.far_inside({kCut * n[0], kCut * n[1], kCut * n[2]});
+    if (known < 0 && !inside) bound = bound <= o ? 0 : std::sqrt(bound * bound + o * o) - o;
+    out.far_grid[i] = inside ? -bound : bound;
+  }
+}
+
 }  // namespace
 
 FieldData refine(const FieldData& coarse, const FieldData& fine, double tolerance,
@@ -290,19 +316,14 @@ FieldData refine(const FieldData& coarse, const FieldData& fine, double toleranc
   std::vector<std::size_t> cell_of(out.brick_count());
   for (std::size_t c = 0; c < out.brick_index.size(); ++c)
     if (out.brick_index[c] >= 0) cell_of[std::size_t(out.brick_index[c])] = c;
-  const Chooser chooser(out, nodes, tolerance, fine.band + kTestedBeyondBand * fine.voxel_size);
+  const Chooser chooser(out, nodes, tolerance);
   std::vector<std::unique_ptr<Finer>> chosen(cell_of.size());
   sched::parallel_for(cell_of.size(), threads, [&](std::size_t row) {
     chosen[row] = chooser.choose(place_of(cell_of[row], out.bricks));
   });
   take_finer(chosen, out);
   conform(threads, out);
-  out.far_grid.resize(std::size_t(out.bricks[0] + 1) * std::size_t(out.bricks[1] + 1) *
-                      std::size_t(out.bricks[2] + 1));
-  for (std::size_t i = 0; i < out.far_grid.size(); ++i) {
-    const GridNode n = place_of(i, {out.bricks[0] + 1, out.bricks[1] + 1, out.bricks[2] + 1});
-    out.far_grid[i] = nodes.far({kCut * n[0], kCut * n[1], kCut * n[2]});
-  }
+  take_far(coarse, nodes, out);
   return out;
 }
 

@@ -8,11 +8,11 @@ namespace h6::io {
 
 inline constexpr int kCut = 4;  // fine voxels along a coarse one
 
-// Both fields begin at the same node, cover the same box and have the same offset. The signs and
-// the far grid are those of the fine one; the coarse one needs no far grid. Within the fine band,
-// cells keep the coarse samples where these are right to the tolerance [m] at the fine nodes; else
-// they get two or four samples a voxel. Beyond, they keep the coarse samples. The result is
-// continuous.
+// Both fields begin at the same node, cover the same box and have the same offset. The signs are
+// those of the fine one, whose far grid need hold no more; the far bounds are the coarse one's.
+// Within the fine band, cells keep the coarse samples where these are right to the tolerance [m] at
+// the fine nodes; else they get two or four samples a voxel. Beyond, they keep the coarse samples.
+// The result is continuous.
 FieldData refine(const FieldData& coarse, const FieldData& fine, double tolerance,
                  unsigned threads);
 
