@@ -82,11 +82,18 @@ Masks in_solid(const Winding& winding, const Grid& grid, const NarrowBand& band,
     solid = last < 0 ? NodeMask{} : known.solid[std::size_t(last)];
     asked = last < 0 ? NodeMask{} : known.asked[std::size_t(last)];
     const NodeMask ask = nodes[r] & ~asked;
-    for (std::size_t z = 0; z < 8; ++z)
-      for (std::uint64_t bits = ask.z[z]; bits != 0; bits &= bits - 1) {
-        const std::size_t n = 64 * z + std::size_t(std::countr_zero(bits));
-        if (winding.inside(place_of(grid, band, r, n))) solid.set(n);
+    const std::array<int, 3> at = grid.place(band.cell[r]);
+    for (int box = 0; box < 32; ++box) {
+      const int x = box % 2 * 4, y = box / 2 % 4 * 2, z = box / 8 * 2, first = 8 * y + x;
+      const std::uint64_t nodes_of = std::uint64_t{0xf0f} << first;
+      const std::size_t low = std::size_t(z);
+      if (((ask.z[low] | ask.z[low + 1]) & nodes_of) == 0) continue;
+      const std::uint32_t in_box = winding.inside({8 * at[0] + x, 8 * at[1] + y, 8 * at[2] + z});
+      for (std::size_t k = 0; k < 2; ++k) {
+        const std::uint64_t four = in_box >> 8 * k & 0xf, next = in_box >> (8 * k + 4) & 0xf;
+        solid.z[low + k] |= (four | next << 8) << first & ask.z[low + k];
       }
+    }
     asked = asked | nodes[r];
     in[r] = solid & nodes[r];
   });

@@ -11,11 +11,21 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr std::size_t kFan = 8;
-constexpr double kFar = 2;  // radii from which a cluster is a dipole
+constexpr std::uint32_t kFan = 8;
 
-std::array<float, 3> floats(const Vec3& v) { return {float(v.x), float(v.y), float(v.z)}; }
-Vec3 doubles(const std::array<float, 3>& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
+Vec3 doubles(const float (&v)[3]) { return {double(v[0]), double(v[1]), double(v[2])}; }
+
+// The error of a dipole grows with its area and falls with the fourth power of the distance. So
+// slivers and scattered triangles, of little area for their radius, are far sooner than a disc.
+kernels::WindingCluster cluster_of(const Vec3& middle, double radius, double area,
+                                   const Vec3& dipole) {
+  constexpr double kDisc = 2.4, kLeast = 1.3;  // radii
+  const double share = area / (std::numbers::pi * radius * radius);
+  const double reach = radius * std::clamp(kDisc * std::sqrt(std::sqrt(share)), kLeast, kDisc);
+  return {{float(middle.x), float(middle.y), float(middle.z)},
+          float(reach),
+          {float(dipole.x), float(dipole.y), float(dipole.z)}};
+}
 
 }  // namespace
 
@@ -23,8 +33,10 @@ Winding::Winding(const Surface& surface, unsigned threads)
     : surface_(surface),
       count_(surface.triangles.size()),
       triangle_(order_for_leaves(surface, threads)) {
-  level_.emplace_back((count_ + kFan - 1) / kFan);
-  sched::parallel_for(level_[0].size(), threads, [&](std::size_t i) {
+  cluster_.resize((count_ + kFan - 1) / kFan);
+  level_ = {0, std::uint32_t(cluster_.size())};
+  std::vector<double> radius_of(cluster_.size()), area_of(cluster_.size());
+  sched::parallel_for(cluster_.size(), threads, [&](std::size_t i) {
     const std::size_t first = kFan * i, end = std::min(count_, first + kFan);
     Vec3 middle{}, normal{};
     double area = 0;
@@ -42,29 +54,28 @@ Winding::Winding(const Surface& surface, unsigned threads)
     for (std::size_t k = first; k < end; ++k)
       for (const std::uint32_t v : surface_.triangles[triangle_[k]])
         radius = std::max(radius, norm(surface_.vertices[v] - middle));
-    level_[0][i] = {floats(middle), float(radius), floats((0.25 / std::numbers::pi) * normal)};
+    cluster_[i] = cluster_of(middle, radius, area, (0.25 / std::numbers::pi) * normal);
+    radius_of[i] = radius, area_of[i] = area;
   });
-  while (level_.back().size() > 1) {
-    const std::vector<Cluster>& below = level_.back();
-    std::vector<Cluster> above((below.size() + kFan - 1) / kFan);
-    for (std::size_t i = 0; i < above.size(); ++i) {
-      const std::size_t first = kFan * i, end = std::min(below.size(), first + kFan);
+  while (level_.back() - level_[level_.size() - 2] > 1) {
+    const std::size_t begin = level_[level_.size() - 2], stop = level_.back();
+    for (std::size_t first = begin; first < stop; first += kFan) {
+      const std::size_t end = std::min(stop, first + kFan);
       Vec3 middle{}, dipole{};
-      double weight = 0;
+      double area = 0;
       for (std::size_t k = first; k < end; ++k) {
-        const double w = double(below[k].radius) * double(below[k].radius) + 1e-12;
-        middle = middle + w * doubles(below[k].middle);
-        dipole = dipole + doubles(below[k].dipole);
-        weight += w;
+        middle = middle + area_of[k] * doubles(cluster_[k].middle);
+        dipole = dipole + doubles(cluster_[k].dipole);
+        area += area_of[k];
       }
-      middle = (1 / weight) * middle;
+      middle = (1 / area) * middle;
       double radius = 0;
       for (std::size_t k = first; k < end; ++k)
-        radius =
-            std::max(radius, norm(doubles(below[k].middle) - middle) + double(below[k].radius));
-      above[i] = {floats(middle), float(radius), floats(dipole)};
+        radius = std::max(radius, norm(doubles(cluster_[k].middle) - middle) + radius_of[k]);
+      cluster_.push_back(cluster_of(middle, radius, area, dipole));
+      radius_of.push_back(radius), area_of.push_back(area);
     }
-    level_.push_back(std::move(above));
+    level_.push_back(std::uint32_t(cluster_.size()));
   }
   make_leaves();
   look_at_surface();
@@ -74,8 +85,9 @@ void Winding::make_leaves() {
   leaf_.resize((count_ + kFan - 1) / kFan);
   for (std::size_t i = 0; i < leaf_.size(); ++i) {
     Leaf& leaf = leaf_[i];
-    leaf.first = std::uint32_t(leaf_vertex_.size());
     const std::size_t end = std::min(count_, kFan * (i + 1));
+    const Vec3 origin = surface_.vertices[surface_.triangles[triangle_[kFan * i]][0]];
+    for (int k = 0; k < 3; ++k) leaf.origin[k] = std::floor(component(origin, k));
     std::uint32_t known[3 * kFan];
     std::size_t corners = 0;
     for (std::size_t k = kFan * i; k < end; ++k)
@@ -83,74 +95,72 @@ void Winding::make_leaves() {
         const std::uint32_t* at = std::find(known, known + leaf.vertices, v);
         leaf.corner[corners++] = std::uint8_t(at - known);
         if (at != known + leaf.vertices) continue;
+        const Vec3& p = surface_.vertices[v];
+        leaf.x[leaf.vertices] = float(p.x - leaf.origin[0]);
+        leaf.y[leaf.vertices] = float(p.y - leaf.origin[1]);
+        leaf.z[leaf.vertices] = float(p.z - leaf.origin[2]);
         known[leaf.vertices++] = v;
-        leaf_vertex_.push_back(surface_.vertices[v]);
       }
     leaf.triangles = std::uint32_t(end - kFan * i);
   }
 }
 
-// Half the solid angle of each triangle turns the sum (A. van Oosterom, J. Strackee, "The solid
-// angle of a plane triangle", 1983). It is less than half a turn, so the side of the real axis
-// before and after tells a full turn, and one arc tangent serves all triangles.
-void Winding::turn(const Leaf& leaf, const Vec3& p, Turns& sum) const {
-  Vec3 to[3 * kFan];
-  double length[3 * kFan];
-  for (std::uint32_t v = 0; v < leaf.vertices; ++v) {
-    to[v] = leaf_vertex_[leaf.first + v] - p;
-    length[v] = norm(to[v]);
+Winding::Places Winding::box() {
+  Places places{{}, {1.5, 0.5, 0.5}, std::sqrt(1.5 * 1.5 + 0.5)};
+  for (std::size_t i = 0; i < kernels::kWindingPlaces; ++i) {
+    places.offsets.x[i] = float(i % 4);
+    places.offsets.y[i] = float(i / 4 % 2);
+    places.offsets.z[i] = float(i / 8);
   }
-  for (std::uint32_t t = 0; t < leaf.triangles; ++t) {
-    const std::uint8_t* corner = &leaf.corner[3 * t];
-    const Vec3 &a = to[corner[0]], &b = to[corner[1]], &c = to[corner[2]];
-    const double la = length[corner[0]], lb = length[corner[1]], lc = length[corner[2]];
-    double y = dot(a, cross(b, c)),
-           x = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-    const double length2 = x * x + y * y;
-    if (!(length2 > 1e-200)) continue;  // p is on the triangle's rim
-    if (length2 < 1e-12) {              // eight such factors would leave the range of doubles
-      const double scale = 1 / std::sqrt(length2);
-      x *= scale, y *= scale;
-    }
-    const double before = sum.y;
-    sum.y = sum.x * y + before * x;
-    sum.x = sum.x * x - before * y;
-    if (y >= 0)
-      sum.full += before >= 0 && sum.y < 0;
-    else
-      sum.full -= before < 0 && sum.y >= 0;
-  }
-  const double scale = 1 / std::sqrt(sum.x * sum.x + sum.y * sum.y);
-  sum.x *= scale, sum.y *= scale;
+  return places;
+}
+
+std::uint32_t Winding::inside(const std::array<int, 3>& first) const {
+  float number[kernels::kWindingPlaces];
+  numbers({double(first[0]), double(first[1]), double(first[2])}, box_, number);
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < kernels::kWindingPlaces; ++i)
+    bits |= std::uint32_t(turn_ * double(number[i]) > 0.5) << i;
+  return bits;
 }
 
 double Winding::at(const Vec3& p) const {
+  float number[kernels::kWindingPlaces];
+  numbers(p, {{}, {}, 0}, number);
+  return double(number[0]);
+}
+
+// A cluster that is far from the ball is far from each place in it.
+void Winding::numbers(const Vec3& base, const Places& places,
+                      float (&number)[kernels::kWindingPlaces]) const {
   struct Entry {
     std::uint32_t level, cluster;
   };
   Entry stack[128];  // seven of each level wait at most
   int depth = 0;
-  stack[depth++] = {std::uint32_t(level_.size()) - 1, 0};
-  double sum = 0;
-  Turns turns;
+  thread_local std::vector<std::uint32_t> far, near;
+  far.clear(), near.clear();
+  const Vec3 middle = base + places.middle;
+  stack[depth++] = {std::uint32_t(level_.size()) - 2, std::uint32_t(cluster_.size()) - 1};
   while (depth > 0) {
     const Entry e = stack[--depth];
-    const Cluster& cluster = level_[e.level][e.cluster];
-    const Vec3 to = doubles(cluster.middle) - p;
-    const double far2 = dot(to, to), near = kFar * double(cluster.radius);
-    if (far2 > near * near) {
-      sum += dot(to, doubles(cluster.dipole)) / (far2 * std::sqrt(far2));
-      continue;
+    const Cluster& cluster = cluster_[e.cluster];
+    const Vec3 to = doubles(cluster.middle) - middle;
+    const double reach = double(cluster.reach) + places.radius;
+    if (dot(to, to) > reach * reach) {
+      far.push_back(e.cluster);
+    } else if (e.level == 0) {
+      near.push_back(e.cluster);
+    } else {
+      const std::uint32_t below = level_[e.level - 1];
+      const std::uint32_t first = below + kFan * (e.cluster - level_[e.level]);
+      const std::uint32_t end = std::min(level_[e.level], first + kFan);
+      for (std::uint32_t k = first; k < end; ++k) stack[depth++] = {e.level - 1, k};
     }
-    if (e.level == 0) {
-      turn(leaf_[e.cluster], p, turns);
-      continue;
-    }
-    const std::size_t first = kFan * e.cluster;
-    const std::size_t end = std::min(level_[e.level - 1].size(), first + kFan);
-    for (std::size_t k = first; k < end; ++k) stack[depth++] = {e.level - 1, std::uint32_t(k)};
   }
-  return sum + turns.full + std::atan2(turns.y, turns.x) / (2 * std::numbers::pi);
+  const double at[3] = {base.x, base.y, base.z};
+  kernels::winding_numbers(cluster_.data(), far.data(), far.size(), leaf_.data(), near.data(),
+                           near.size(), at, places.offsets, number);
 }
 
 Winding::Look Winding::look(std::uint32_t triangle) const {

@@ -124,6 +124,34 @@ TEST_CASE("winding: the tree has the exact winding number, near and far") {
   }
 }
 
+TEST_CASE("winding: sixteen nodes at once are on the sides that the exact winding number says") {
+  Random random(3);
+  std::size_t seen = 0, in = 0;
+  for (const Mesh& solid : solids()) {
+    Mesh mesh = holed(cracked(solid, 0.05, random), 0.3, random);
+    for (Vec3& v : mesh.vertices) v = Vec3{100, 200, 300} + 15 * v;  // in voxels
+    auto surface = h6::io::bake::prepare_surface(mesh, 2);
+    REQUIRE(surface);
+    const h6::io::bake::Winding winding(*surface, 2);
+    const Judge judge(mesh);
+    for (int box = 0; box < 100; ++box) {
+      const std::array<int, 3> first{int(100 + random(-20, 16)), int(200 + random(-20, 18)),
+                                     int(300 + random(-20, 18))};
+      const std::uint32_t inside = winding.inside(first);
+      for (int i = 0; i < 16; ++i) {
+        const double w = judge.winding(
+            Vec3{double(first[0] + i % 4), double(first[1] + i / 4 % 2), double(first[2] + i / 8)});
+        if (std::fabs(w - 0.5) < 0.05) continue;
+        ++seen;
+        in += w > 0.5;
+        CHECK((inside >> i & 1) == (w > 0.5 ? 1u : 0u));
+      }
+    }
+  }
+  CHECK(in > seen / 20);
+  CHECK(in < seen / 2);
+}
+
 TEST_CASE("winding: sheets and mixed windings are not trusted, and 'winding' says so") {
   Random random(4);
   Mesh mixed = sphere({0, 0, 0}, 0.7, 16);
