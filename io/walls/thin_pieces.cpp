@@ -16,10 +16,20 @@ namespace {
 
 constexpr double kOpposite = 0.70710678;  // cosine of 45 degrees
 
+using Corners = std::array<Vec3, 3>;
 struct Piece {
-  std::array<Vec3, 3> corner;
-  std::uint32_t triangle;
+  Vec3 middle;
   double thickness, area;
+};
+struct Facet {
+  Corners corner;
+  std::uint32_t triangle;
+};
+// The pieces of some triangles, and as few facets as they fill: halves that are thin altogether are
+// one again, so a plate of two triangles does not become a million.
+struct Found {
+  std::vector<Piece> pieces;
+  std::vector<Facet> facets;
 };
 
 class Cutter {
@@ -28,15 +38,16 @@ class Cutter {
          const FaceTable& faces)
       : mesh_(mesh), options_(options), rays_(rays), faces_(faces) {}
 
-  void cut(std::uint32_t triangle, std::vector<Piece>& out) const {
+  void cut(std::uint32_t triangle, Found& out) const {
     if (!(faces_.area[triangle] > 0) || flat(triangle)) return;
     const auto& t = mesh_.triangles[triangle];
     cut(triangle, {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]}, out);
   }
 
  private:
-  void cut(std::uint32_t triangle, const std::array<Vec3, 3>& c, std::vector<Piece>& out) const {
-    if (!asked(c)) return;
+  // Whether all of it is thin. Then it has added one facet.
+  bool cut(std::uint32_t triangle, const Corners& c, Found& out) const {
+    if (!asked(c)) return false;
     std::size_t from = 0;
     double longest2 = -1;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -46,16 +57,22 @@ class Cutter {
     const Vec3 &p = c[from], &q = c[(from + 1) % 3], &r = c[(from + 2) % 3];
     if (longest2 > options_.piece * options_.piece) {
       const Vec3 middle = 0.5 * (p + q);
-      cut(triangle, {p, middle, r}, out);
-      cut(triangle, {middle, q, r}, out);
-      return;
+      const bool one = cut(triangle, {p, middle, r}, out);
+      const bool other = cut(triangle, {middle, q, r}, out);
+      if (!one || !other) return false;
+      out.facets.resize(out.facets.size() - 2);
+      out.facets.push_back({c, triangle});
+      return true;
     }
-    const double thickness = thickness_at(triangle, (1.0 / 3) * (p + q + r));
-    if (thickness < options_.thinner_than)
-      out.push_back({c, triangle, thickness, 0.5 * norm(cross(q - p, r - p))});
+    const Vec3 place = (1.0 / 3) * (p + q + r);
+    const double thickness = thickness_at(triangle, place);
+    if (!(thickness < options_.thinner_than)) return false;
+    out.pieces.push_back({place, thickness, 0.5 * norm(cross(q - p, r - p))});
+    out.facets.push_back({c, triangle});
+    return true;
   }
 
-  bool asked(const std::array<Vec3, 3>& c) const {
+  bool asked(const Corners& c) const {
     if (!options_.asked) return true;
     Vec3 low = c[0], high = c[0];
     for (const Vec3& v : c) {
@@ -92,13 +109,12 @@ class Cutter {
   const FaceTable& faces_;
 };
 
-void take(const Mesh& whole, const Piece& piece, ThinPieces& out) {
+void take(const Mesh& whole, const Facet& facet, ThinPieces& out) {
   const auto first = std::uint32_t(out.mesh.vertices.size());
-  for (const Vec3& v : piece.corner) out.mesh.vertices.push_back(v);
+  for (const Vec3& v : facet.corner) out.mesh.vertices.push_back(v);
   out.mesh.triangles.push_back({first, first + 1, first + 2});
-  if (!whole.part.empty()) out.mesh.part.push_back(whole.part[piece.triangle]);
-  out.source.push_back(std::int32_t(piece.triangle));
-  out.area += piece.area;
+  if (!whole.part.empty()) out.mesh.part.push_back(whole.part[facet.triangle]);
+  out.source.push_back(std::int32_t(facet.triangle));
 }
 
 // Sharp edges taper to nothing, so the thinnest place of all says little about the walls.
@@ -110,7 +126,7 @@ void find_typical(std::vector<Piece> pieces, ThinPieces& out) {
     area += piece.area;
     if (area < 0.1 * out.area) continue;
     out.thickness = piece.thickness;
-    out.place = (1.0 / 3) * (piece.corner[0] + piece.corner[1] + piece.corner[2]);
+    out.place = piece.middle;
     return;
   }
 }
@@ -123,7 +139,7 @@ Result<ThinPieces> thin_pieces(const Mesh& mesh, const ThinPieceOptions& options
   const FaceTable faces = face_table(mesh);
   const Cutter cutter(mesh, options, **rays, faces);
   constexpr std::size_t kBlock = 256;  // triangles; blocks are joined in order
-  std::vector<std::vector<Piece>> found((mesh.triangles.size() + kBlock - 1) / kBlock);
+  std::vector<Found> found((mesh.triangles.size() + kBlock - 1) / kBlock);
   sched::parallel_for(found.size(), options.threads, [&](std::size_t b) {
     const std::size_t end = std::min(mesh.triangles.size(), kBlock * (b + 1));
     for (std::size_t t = kBlock * b; t < end; ++t) cutter.cut(std::uint32_t(t), found[b]);
@@ -131,9 +147,11 @@ Result<ThinPieces> thin_pieces(const Mesh& mesh, const ThinPieceOptions& options
   ThinPieces out;
   out.mesh.part_names = mesh.part_names;
   std::vector<Piece> all;
-  for (const std::vector<Piece>& pieces : found)
-    all.insert(all.end(), pieces.begin(), pieces.end());
-  for (const Piece& piece : all) take(mesh, piece, out);
+  for (const Found& some : found) {
+    for (const Facet& facet : some.facets) take(mesh, facet, out);
+    for (const Piece& piece : some.pieces) out.area += piece.area;
+    all.insert(all.end(), some.pieces.begin(), some.pieces.end());
+  }
   find_typical(std::move(all), out);
   return out;
 }

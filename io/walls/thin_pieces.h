@@ -19,7 +19,7 @@ struct ThinPieceOptions {
 };
 
 struct ThinPieces {
-  Mesh mesh;                         // the pieces, with the parts of the whole
+  Mesh mesh;                         // all pieces, as few triangles; with the parts of the whole
   std::vector<std::int32_t> source;  // (triangles) in the whole mesh
   double area = 0;                   // [m^2]
   double thickness = 0;              // a tenth of the area bounds thinner walls [m]
