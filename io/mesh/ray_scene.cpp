@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "kernels/bake/triangle_distance.h"
 
@@ -68,29 +69,37 @@ Vec3 point_nearest(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   return best;
 }
 
-// The triangles with area; only the first of those with the same three corners.
+bool has_area(const Mesh& mesh, std::size_t t) {
+  const auto& f = mesh.triangles[t];
+  const Vec3& a = mesh.vertices[f[0]];
+  const Vec3 u = mesh.vertices[f[1]] - a, v = mesh.vertices[f[2]] - a, n = cross(u, v);
+  const double longest2 = std::max({dot(u, u), dot(v, v), dot(v - u, v - u)});
+  return dot(n, n) > 1e-24 * longest2 * longest2;
+}
+
+// The triangles with area; only the first of those with the same three corners. They are counted
+// into the order of their sorted corners, the last corner first; that keeps the order of equals.
 std::vector<std::uint32_t> that_count(const Mesh& mesh) {
-  // Three sorted corners and the triangle. Pairs of numbers sort twice as fast as arrays.
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> keys;
-  keys.reserve(mesh.triangles.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    std::array<std::uint32_t, 3> f = mesh.triangles[t];
-    const Vec3& a = mesh.vertices[f[0]];
-    const Vec3 u = mesh.vertices[f[1]] - a, v = mesh.vertices[f[2]] - a;
-    const Vec3 n = cross(u, v);
-    const double longest2 = std::max({dot(u, u), dot(v, v), dot(v - u, v - u)});
-    if (!(dot(n, n) > 1e-24 * longest2 * longest2)) continue;  // a line
-    std::sort(f.begin(), f.end());
-    keys.emplace_back(std::uint64_t{f[0]} << 32 | f[1], std::uint64_t{f[2]} << 32 | t);
+  std::vector<std::array<std::uint32_t, 3>> corner(mesh.triangles.begin(), mesh.triangles.end());
+  std::vector<std::uint32_t> order, next, end(mesh.vertices.size() + 1);
+  for (std::uint32_t t = 0; t < corner.size(); ++t) {
+    std::sort(corner[t].begin(), corner[t].end());
+    if (has_area(mesh, t)) order.push_back(t);
   }
-  std::sort(keys.begin(), keys.end());
+  next.resize(order.size());
+  for (const std::size_t k : {2, 1, 0}) {
+    std::fill(end.begin(), end.end(), 0);
+    for (const std::uint32_t t : order) ++end[corner[t][k] + 1];
+    std::partial_sum(end.begin(), end.end(), end.begin());
+    for (const std::uint32_t t : order) next[end[corner[t][k]]++] = t;
+    order.swap(next);
+  }
+  std::vector<bool> counts(corner.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    counts[order[i]] = i == 0 || corner[order[i]] != corner[order[i - 1]];
   std::vector<std::uint32_t> kept;
-  kept.reserve(keys.size());
-  for (std::size_t i = 0; i < keys.size(); ++i)
-    if (i == 0 || keys[i].first != keys[i - 1].first ||
-        keys[i].second >> 32 != keys[i - 1].second >> 32)
-      kept.push_back(static_cast<std::uint32_t>(keys[i].second));
-  std::sort(kept.begin(), kept.end());
+  for (std::uint32_t t = 0; t < corner.size(); ++t)
+    if (counts[t]) kept.push_back(t);
   return kept;
 }
 

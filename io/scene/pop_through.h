@@ -69,6 +69,7 @@ class PopThroughSearch {
   void sample(const h6Pose& pose);
   double distance_at(const h6Vec3& x) const;
   bool touches(const h6Vec3& x) const;
+  const RayScene* rays() const;
   std::optional<Wall> between(const h6Vec3& from, const h6Vec3& to) const;
   bool passes(const h6Vec3& from, const h6Vec3& to, std::optional<Wall>& wall) const;
   void lift(Track& t, const h6Vec3& x, double d, const h6Vec3& out);
@@ -79,7 +80,8 @@ class PopThroughSearch {
   int field_;
   double voxel_;
   const FieldMesh& mesh_;
-  const RayScene* rays_ = nullptr;
+  mutable const RayScene* rays_ = nullptr;  // made once something is near
+  mutable std::optional<Failure> no_rays_;
   const std::vector<h6Vec3>& points_;
   h6Vec3 centre_{};
   double radius_ = 0;
