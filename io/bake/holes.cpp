@@ -6,6 +6,7 @@
 // all the same, a hole is wider, and the nodes behind it are opened again: half a plug is none.
 #include "io/bake/holes.h"
 
+#include <atomic>
 #include <numeric>
 
 #include "io/bake/flood.h"
@@ -187,11 +188,38 @@ void remove(const Masks& some, unsigned threads, Masks& from) {
   sched::parallel_for(from.size(), threads, [&](std::size_t r) { from[r] = from[r] & ~some[r]; });
 }
 
+namespace {
+
+// Whether one of the nodes that have three even or three odd numbers lies in the solid. They are a
+// quarter of all, and each layer of nodes along an axis has some.
+bool some_in_solid(const Winding& winding, const Grid& grid, const NarrowBand& band,
+                   const Masks& nodes, unsigned threads) {
+  std::atomic<bool> found = false;
+  sched::parallel_for(nodes.size(), threads, [&](std::size_t r) {
+    const std::array<int, 3> at = grid.place(band.cell[r]);
+    for (int box = 0; box < 8 && !found.load(std::memory_order_relaxed); ++box) {
+      const int odd = box % 2, y = box / 2 % 2 * 4 + odd, z = box / 4 * 4 + odd;
+      std::uint32_t ask = 0;  // in the order of the box
+      for (int i = 0; i < 16; ++i) {
+        const int row = 8 * (y + i / 4 % 2 * 2), layer = z + i / 8 * 2;
+        ask |= std::uint32_t(nodes[r].z[std::size_t(layer)] >> (row + i % 4 * 2 + odd) & 1) << i;
+      }
+      if (ask != 0 &&
+          (winding.inside({8 * at[0] + odd, 8 * at[1] + y, 8 * at[2] + z}, 2) & ask) != 0)
+        found.store(true, std::memory_order_relaxed);
+    }
+  });
+  return found;
+}
+
+}  // namespace
+
 std::optional<Hole> find_leak(const Surface& surface, const Winding& winding, const Grid& grid,
                               const NarrowBand& band, const Reached& reached, unsigned threads) {
   Masks near = near_rims(surface, grid, band, grid.offset + 2, threads);
   sched::parallel_for(near.size(), threads,
                       [&](std::size_t r) { near[r] = near[r] & reached.node[r]; });
+  if (!some_in_solid(winding, grid, band, near, threads)) return std::nullopt;
   Sides known;
   const Masks solid = in_solid(winding, grid, band, near, threads, known);
   remove(solid, threads, near);

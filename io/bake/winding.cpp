@@ -105,19 +105,20 @@ void Winding::make_leaves() {
   }
 }
 
-Winding::Places Winding::box() {
-  Places places{{}, {1.5, 0.5, 0.5}, std::sqrt(1.5 * 1.5 + 0.5)};
+Winding::Places Winding::box(int stride) {
+  const double s = stride;
+  Places places{{}, {1.5 * s, 0.5 * s, 0.5 * s}, s * std::sqrt(1.5 * 1.5 + 0.5)};
   for (std::size_t i = 0; i < kernels::kWindingPlaces; ++i) {
-    places.offsets.x[i] = float(i % 4);
-    places.offsets.y[i] = float(i / 4 % 2);
-    places.offsets.z[i] = float(i / 8);
+    places.offsets.x[i] = float(s * double(i % 4));
+    places.offsets.y[i] = float(s * double(i / 4 % 2));
+    places.offsets.z[i] = float(s * double(i / 8));
   }
   return places;
 }
 
-std::uint32_t Winding::inside(const std::array<int, 3>& first) const {
+std::uint32_t Winding::inside(const std::array<int, 3>& first, int stride) const {
   float number[kernels::kWindingPlaces];
-  numbers({double(first[0]), double(first[1]), double(first[2])}, box_, number);
+  numbers({double(first[0]), double(first[1]), double(first[2])}, box_[stride - 1], number);
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < kernels::kWindingPlaces; ++i)
     bits |= std::uint32_t(turn_ * double(number[i]) > 0.5) << i;

@@ -17,9 +17,10 @@ class Winding {
   // The solid angle of all triangles around p over 4 pi: 1 inside a closed mesh that is wound
   // outwards, 0 outside, and in between near holes. Off by 0.05 at most.
   double at(const Vec3& p) const;
-  // Bit i: node i of the 4 x 2 x 2, x fastest, that begin at `first` is more inside than outside.
-  // Meshes wound inwards are as good. One query of all costs little more than one of a single node.
-  std::uint32_t inside(const std::array<int, 3>& first) const;
+  // Bit i: node i of the 4 x 2 x 2, x fastest, that begin at `first`, `stride` apart (1 or 2), is
+  // more inside than outside. Meshes wound inwards are as good. One query of all costs little more
+  // than one of a single node.
+  std::uint32_t inside(const std::array<int, 3>& first, int stride = 1) const;
   // Whether the winding tells a solid: half a voxel before and behind most of the surface it is
   // nearly a whole number, which no sheet and no mix of windings has.
   bool trusted() const { return trusted_; }
@@ -33,7 +34,7 @@ class Winding {
     Vec3 middle;
     double radius;
   };
-  static Places box();
+  static Places box(int stride);
   void numbers(const Vec3& base, const Places& places,
                float (&number)[kernels::kWindingPlaces]) const;
   void make_leaves();
@@ -49,7 +50,7 @@ class Winding {
   std::vector<Leaf> leaf_;
   std::vector<Cluster> cluster_;      // of eight triangles, then of eight of these, ...
   std::vector<std::uint32_t> level_;  // the first cluster of each level, and their number
-  Places box_ = box();
+  Places box_[2] = {box(1), box(2)};
   double turn_ = 1;
   bool trusted_ = false;
 };
