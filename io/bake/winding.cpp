@@ -15,8 +15,8 @@ constexpr std::uint32_t kFan = 8;
 
 Vec3 doubles(const float (&v)[3]) { return {double(v[0]), double(v[1]), double(v[2])}; }
 
-// The error of a dipole grows with its area and falls with the fourth power of the distance. So
-// slivers and scattered triangles, of little area for their radius, are far sooner than a disc.
+// The error of a dipole grows with its area and falls with the fourth power of the distance. So a
+// cluster of little area for its radius, such as slivers, counts as far from nearer by than a disc.
 kernels::WindingCluster cluster_of(const Vec3& middle, double radius, double area,
                                    const Vec3& dipole) {
   constexpr double kDisc = 2.4, kLeast = 1.3;  // radii

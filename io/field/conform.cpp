@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// conform.cpp - a cell knows what the cells around it have at the nodes that it shares with them:
-// an uncut one interpolates corners that are its own as well, one with halves every second of its
-// own nodes. So it has to know no more than how finely they are sampled.
+// conform.cpp - a cell can work out what the cells around it have at shared nodes. An uncut cell
+// interpolates its corners there, and the shared ones are the cell's own, too. A cell with halves
+// interpolates nodes that are every second one of the cell's own. So the cell only has to know how
+// finely the others are sampled.
 #include "io/field/conform.h"
 
 #include <array>

@@ -37,7 +37,7 @@ class FineNodes {
 
   const FieldData& field() const { return fine_; }
   bool exact(float sample) const { return std::fabs(sample) < exact_below_; }
-  // Of nodes that are not exact none is tested.
+  // Only exact nodes are tested.
   bool tested(float sample) const { return std::fabs(sample) < tested_; }
 
   // The values at the coarse nodes in fine brick `at`, 2 x 2 x 2, from whichever bake is exact
@@ -58,8 +58,8 @@ class FineNodes {
     }
   }
 
-  // Whether a cell that has a corner in a coarse brick reaches into the fine band: one in the
-  // brick, or one below it along some axis.
+  // Whether a coarse cell reaches into the fine band and has a corner in this coarse brick. Such a
+  // cell lies in the brick, or one cell below it along some axes.
   bool reach(const GridNode& brick) const {
     for (int b = 124; b >= 0; --b) {
       const int x = b % 5 - 1, y = b / 5 % 5 - 1, z = b / 25 - 1;
@@ -83,7 +83,7 @@ class FineNodes {
   }
 
  private:
-  // Where the fine bake knows no more than the side.
+  // Gives the value where the fine bake knows no more than the side.
   float at_coarse_node(bool inside, const float* coarse) const {
     if (coarse == nullptr) return inside ? -exact_below_ : exact_below_;
     if ((*coarse < 0) == inside) return *coarse;
@@ -152,7 +152,7 @@ struct Finer {
   std::vector<float> halves, quarters;
 };
 
-// Decides for the cells of one coarse brick, by boxes of 2 x 2 x 2 cells, which are a fine brick.
+// Decides for the cells of one coarse brick, box by box. A box is 2 x 2 x 2 cells: one fine brick.
 class Chooser {
  public:
   Chooser(const FieldData& out, const FineNodes& nodes, double tolerance)

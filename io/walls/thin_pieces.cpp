@@ -25,8 +25,8 @@ struct Facet {
   Corners corner;
   std::uint32_t triangle;
 };
-// The pieces of some triangles, and as few facets as they fill: halves that are thin altogether are
-// one again, so a plate of two triangles does not become a million.
+// The pieces of some triangles, and as few facets as fill them. Two halves that are thin altogether
+// become one again, so a plate of two triangles does not become a million.
 struct Found {
   std::vector<Piece> pieces;
   std::vector<Facet> facets;

@@ -19,7 +19,7 @@ struct ThinPieceOptions {
 };
 
 struct ThinPieces {
-  Mesh mesh;                         // all pieces, as few triangles; with the parts of the whole
+  Mesh mesh;                         // as few triangles as fill all pieces, with their parts
   std::vector<std::int32_t> source;  // (triangles) in the whole mesh
   double area = 0;                   // [m^2]
   double thickness = 0;              // a tenth of the area bounds thinner walls [m]
@@ -28,8 +28,9 @@ struct ThinPieces {
 
 // Triangles are halved until they are pieces. A piece bounds a thin wall if a ray from its middle
 // straight into the solid leaves the solid this soon, through a face that is within 45 degrees of
-// parallel: sharp edges are no walls. Open sheets are not judged. Indices must be in range,
-// vertices finite and welded as read_mesh does.
+// parallel: sharp edges are no walls. Two halves that are thin altogether become one triangle
+// again. Open sheets are not judged. Indices must be in range, vertices finite and welded as
+// read_mesh does.
 Result<ThinPieces> thin_pieces(const Mesh& mesh, const ThinPieceOptions& options);
 
 }  // namespace h6::io

@@ -17,8 +17,8 @@ struct WindingCluster {
   float dipole[3];  // sum of area normals over 4 pi
 };
 
-// At most eight triangles. Each vertex is there once: most are shared, and their distances cost
-// more than all else.
+// At most eight triangles. Each vertex is there once: triangles share most of them, so fewer
+// distances have to be taken.
 struct WindingLeaf {
   double origin[3];                   // that the vertices are relative to
   float x[24], y[24], z[24];          // of the vertices
@@ -26,8 +26,7 @@ struct WindingLeaf {
   std::uint8_t corner[24];            // (3 x triangles) vertices
 };
 
-// Offsets from a place that they share. They should be short: the result is off by about 1e-6 of
-// the coordinates over the distance to a triangle.
+// Offsets from a place that they share [voxel], a few voxels long: they are in float.
 struct WindingPlaces {
   alignas(64) float x[kWindingPlaces], y[kWindingPlaces], z[kWindingPlaces];
 };

@@ -137,7 +137,7 @@ TEST_CASE("winding_numbers: an open cube lacks the solid angle of its open side"
     for (std::size_t i = 0; i < kWindingPlaces; ++i) places.z[i] = float(-1.9 + 0.2 * double(i));
     const auto number = around(leaves, middle, places);
     for (std::size_t i = 0; i < kWindingPlaces; ++i) {
-      // Of a square seen from the height h over its middle: 4 asin(a^2 / (a^2 + h^2)).
+      // A square seen from the height h over its middle fills 4 asin(a^2 / (a^2 + h^2)).
       const double h = 2 - double(places.z[i]), a2 = 4;
       const double missing = 4 * std::asin(a2 / (a2 + h * h)) / (4 * std::numbers::pi);
       CHECK(number[i] == doctest::Approx(1 - missing).epsilon(1e-5));
