@@ -5,11 +5,14 @@
 // candidate is judged alone, by lines to the reached nodes in view. A line that crosses a closed
 // component of the mesh an odd number of times rejects the node: that component holds it in.
 // Nearly all candidates are tips of solids, and this is true of them even where solids overlap. A
-// line that crosses nothing accepts the node. Else a walk of a few voxels on a lattice eight times
-// finer decides. Its reach does not depend on the other nodes, so each node walks once.
+// line that crosses nothing accepts the node. Else a walk of a few voxels decides, on lattices that
+// are two, four and eight times finer. A finer walk reaches all that a coarser one reaches, and
+// costs more. The reach of the finest does not depend on the other nodes, so each node walks once.
 #include "io/bake/pockets.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "sched/parallel_for.h"
@@ -22,13 +25,42 @@ struct Facet {
   std::uint32_t component;
 };
 
+// Facets with their boxes in columns, so that the search for those in a box runs in SIMD.
+class Facets {
+ public:
+  bool empty() const { return facets_.empty(); }
+  void add(const Facet& t) {
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    for (int k = 0; k < 3; ++k) {
+      low_[k].push_back(std::nextafter(float(component(t.low, k)), -kFar));
+      high_[k].push_back(std::nextafter(float(component(t.high, k)), kFar));
+    }
+    facets_.push_back(t);
+  }
+  // Those whose boxes meet a box, with few others.
+  std::vector<const Facet*> in(const Vec3& low, const Vec3& high) const {
+    std::vector<std::int32_t> apart(facets_.size(), 0);
+    for (int k = 0; k < 3; ++k) {
+      const float from = float(component(low, k)), to = float(component(high, k));
+      for (std::size_t i = 0; i < apart.size(); ++i)
+        apart[i] |= (low_[k][i] > to) | (high_[k][i] < from);
+    }
+    std::vector<const Facet*> in;
+    for (std::size_t i = 0; i < apart.size(); ++i)
+      if (!apart[i]) in.push_back(&facets_[i]);
+    return in;
+  }
+
+ private:
+  std::vector<Facet> facets_;
+  std::array<std::vector<float>, 3> low_, high_;
+};
+
 namespace {
 
 constexpr int kView = 2;  // nodes along each axis; a row knows all triangles so far
 constexpr int kAcross = 2 * kView + 1;
-constexpr int kFine = 8;                      // steps a voxel
-constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
-constexpr int kLooks = 5;                     // lines that vote; one may graze an edge
+constexpr std::size_t kLooks = 5;  // lines that vote; one may graze an edge
 
 // The line p + t d meets a triangle with corner a and edges e, f where u, v and t are at least 0
 // and u + v and t at most 1 (T. Moeller, B. Trumbore, 1997). With s = p - a:
@@ -76,14 +108,15 @@ class Crossed {
   std::vector<std::pair<std::uint32_t, int>> counts_;
 };
 
-// Fine steps in the view of a node. A row of lattice points along x is a word.
+// Fine steps in the view of a node, kFine a voxel. A row of lattice points along x is a word.
+template <int kFine>
 class Lattice {
  public:
-  Lattice(const std::vector<Facet>& facets, const Vec3& eye)
+  Lattice(const std::vector<const Facet*>& facets, const Vec3& eye)
       : low_(eye - Vec3{kView, kView, kView}) {
-    for (const Facet& t : facets) {
-      const Box box = lines_of(t);
-      for (int axis = 0; axis < 3 && !box.empty; ++axis) cut(t, box, axis);
+    for (const Facet* t : facets) {
+      const Box box = lines_of(*t);
+      for (int axis = 0; axis < 3 && !box.empty; ++axis) cut(*t, box, axis);
     }
   }
 
@@ -122,6 +155,7 @@ class Lattice {
   }
 
  private:
+  static constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
   static constexpr std::uint64_t kRow = (std::uint64_t{1} << kSide) - 1;
   static std::size_t row_of(int y, int z) { return std::size_t(z * kSide + y); }
 
@@ -205,6 +239,11 @@ std::array<int, 3> step_to(std::size_t i) {
           int(i) / kAcross / kAcross - kView};
 }
 
+Vec3 along(std::size_t i) {
+  const std::array<int, 3> d = step_to(i);
+  return {double(d[0]), double(d[1]), double(d[2])};
+}
+
 // The nodes of a view, nearest first: short lines cross little.
 std::array<std::size_t, kInView> nearest_first() {
   std::array<std::size_t, kInView> order;
@@ -247,43 +286,72 @@ struct Ends {
   }
 };
 
-// The facets within the view of a node.
-std::vector<Seen> facets_near(const std::vector<Facet>& facets, const Vec3& eye) {
+// Facets as the eye sees them.
+std::vector<Seen> seen_from(const Vec3& eye, const std::vector<const Facet*>& facets) {
   static const Ends ends;
-  std::vector<Seen> near;
-  for (const Facet& t : facets) {
-    int beyond[3], before[3];  // a line must end at least so far up, or down
-    bool apart = false;
-    for (int k = 0; k < 3; ++k) {
-      const double low = component(t.low, k) - component(eye, k),
-                   high = component(t.high, k) - component(eye, k);
-      apart = apart || low > kView || high < -kView;
-      beyond[k] = low > 0 ? int(std::ceil(std::min(low, double(kView)))) : 0;
-      before[k] = high < 0 ? int(std::ceil(std::min(-high, double(kView)))) : 0;
-    }
-    if (apart) continue;
+  std::vector<Seen> seen;
+  seen.reserve(facets.size());
+  for (const Facet* t : facets) {
     InView may_meet;
     may_meet.set();
-    for (std::size_t k = 0; k < 3; ++k)
-      may_meet &= ends.at_least[k][beyond[k]] & ends.at_most[k][before[k]];
-    const Vec3 s = eye - t.a, q = cross(s, t.e);
-    near.push_back({cross(t.f, t.e), cross(t.f, s), q, dot(t.f, q), t.component, may_meet});
+    for (int k = 0; k < 3; ++k) {
+      const double low = component(t->low, k) - component(eye, k),
+                   high = component(t->high, k) - component(eye, k);
+      // A line must end at least so far up, or down.
+      const int beyond = low > 0 ? int(std::ceil(std::min(low, double(kView)))) : 0,
+                before = high < 0 ? int(std::ceil(std::min(-high, double(kView)))) : 0;
+      may_meet &= ends.at_least[k][beyond] & ends.at_most[k][before];
+    }
+    const Vec3 s = eye - t->a, q = cross(s, t->e);
+    seen.push_back({cross(t->f, t->e), cross(t->f, s), q, dot(t->f, q), t->component, may_meet});
   }
-  return near;
+  return seen;
 }
 
 // Returns those of the lines from the eye that meet no facet.
-InView clear_lines(const std::vector<Seen>& near, InView lines) {
-  for (const Seen& t : near) {
+InView clear_lines(const std::vector<Seen>& seen, InView lines) {
+  for (const Seen& t : seen) {
     const InView tried = lines & t.may_meet;
     if (tried.none()) continue;
-    for (std::size_t i = tried._Find_first(); i < kInView; i = tried._Find_next(i)) {
-      const std::array<int, 3> d = step_to(i);
-      if (t.meets({double(d[0]), double(d[1]), double(d[2])})) lines.reset(i);
-    }
+    for (std::size_t i = tried._Find_first(); i < kInView; i = tried._Find_next(i))
+      if (t.meets(along(i))) lines.reset(i);
     if (lines.none()) break;
   }
   return lines;
+}
+
+// What the lines from a node to the nearest reached nodes cross.
+struct Votes {
+  InView lines;     // up to kLooks
+  bool clear;       // the last of them crosses nothing
+  std::size_t odd;  // lines that cross a component an odd number of times
+};
+Votes vote(const Facets& facets, const Vec3& eye, const InView& view) {
+  static const std::array<std::size_t, kInView> order = nearest_first();
+  std::array<std::size_t, kLooks> lines;
+  std::size_t count = 0;
+  Vec3 low = eye, high = eye;
+  for (const std::size_t i : order) {
+    if (!view[i]) continue;
+    if (count == kLooks) break;
+    lines[count++] = i;
+    const Vec3 end = eye + along(i);
+    low = min(low, end), high = max(high, end);
+  }
+  const std::vector<Seen> seen = seen_from(eye, facets.in(low, high));
+  Votes votes{{}, false, 0};
+  Crossed crossed;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = lines[k];
+    votes.lines.set(i);
+    crossed.clear();
+    for (const Seen& t : seen)
+      if (t.may_meet[i] && t.meets(along(i))) crossed.add(t.component);
+    votes.clear = crossed.none();
+    votes.odd += crossed.some_odd();
+    if (votes.clear || 2 * votes.odd > kLooks) break;
+  }
+  return votes;
 }
 
 }  // namespace
@@ -314,7 +382,7 @@ std::vector<RowNodes> Pockets::reached(const Masks& wet) {
 RowNodes Pockets::judge(Row& row, const Masks& wet) const {
   RowNodes found{row.row, {}};
   const std::array<int, 3> brick = grid_.place(band_.cell[row.row]);
-  std::vector<Facet> facets;  // near the nodes of the row
+  Facets facets;  // near the nodes of the row
   std::erase_if(row.nodes, [&](Node& node) {
     if (wet[row.row].get(node.place)) return true;
     const std::array<int, 3> p = {8 * brick[0] + node.place % 8, 8 * brick[1] + node.place / 8 % 8,
@@ -337,11 +405,11 @@ RowNodes Pockets::judge(Row& row, const Masks& wet) const {
 }
 
 // The facets near the nodes of a row.
-std::vector<Facet> Pockets::facets_of(std::size_t row) const {
+Facets Pockets::facets_of(std::size_t row) const {
   const Tiles& tiles = band_.tiles;
   const std::array<int, 3> brick = grid_.place(band_.cell[row]);
   const std::size_t tile = tiles.of(brick);
-  std::vector<Facet> facets;
+  Facets facets;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
     if (!(tiles.near[i] >> Tiles::bit(brick) & 1)) continue;
     const std::uint32_t triangle = tiles.triangle[i];
@@ -349,8 +417,8 @@ std::vector<Facet> Pockets::facets_of(std::size_t row) const {
     const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
                &c = surface_.vertices[t[2]];
     const Vec3 slack{1e-6, 1e-6, 1e-6};
-    facets.push_back({a, b - a, c - a, min(min(a, b), c) - slack, max(max(a, b), c) + slack,
-                      component_[triangle]});
+    facets.add({a, b - a, c - a, min(min(a, b), c) - slack, max(max(a, b), c) + slack,
+                component_[triangle]});
   }
   return facets;
 }
@@ -375,33 +443,22 @@ InView Pockets::wet_about(const std::array<int, 3>& p, const Masks& wet) const {
 }
 
 // Looks along lines to the reached nodes in view; where they do not decide, lets the node walk.
-Pockets::Side Pockets::look(const std::vector<Facet>& facets, const std::array<int, 3>& p,
-                            const InView& view, Node& node) const {
-  static const std::array<std::size_t, kInView> order = nearest_first();
+Pockets::Side Pockets::look(const Facets& facets, const std::array<int, 3>& p, const InView& view,
+                            Node& node) const {
   const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
-  const std::vector<Seen> near = facets_near(facets, eye);
-  Crossed crossed;
-  InView left = view;  // lines that do not vote
-  int odd = 0, looks = 0;
-  for (const std::size_t i : order) {
-    if (!view[i]) continue;
-    if (looks == kLooks) break;
-    ++looks;
-    left.reset(i);
-    const std::array<int, 3> d = step_to(i);
-    crossed.clear();
-    for (const Seen& t : near)
-      if (t.may_meet[i] && t.meets({double(d[0]), double(d[1]), double(d[2])}))
-        crossed.add(t.component);
-    if (crossed.none()) return Side::outside;
-    odd += crossed.some_odd();
-    if (2 * odd > kLooks) return Side::inside;
-  }
-  if (clear_lines(near, left).any()) return Side::outside;
-  if (2 * odd > looks) return Side::unknown;
+  const Votes votes = vote(facets, eye, view);
+  if (votes.clear) return Side::outside;
+  if (2 * votes.odd > kLooks) return Side::inside;
+  const Vec3 sight{kView, kView, kView};
+  const std::vector<const Facet*> near = facets.in(eye - sight, eye + sight);
+  const std::vector<Seen> seen = seen_from(eye, near);
+  if (clear_lines(seen, view & ~votes.lines).any()) return Side::outside;
+  if (2 * votes.odd > votes.lines.count()) return Side::unknown;
+  if ((Lattice<2>(near, eye).walk() & view).any()) return Side::outside;
+  if ((Lattice<4>(near, eye).walk() & view).any()) return Side::outside;
   node.walked = true;
-  node.linked = Lattice(facets, eye).walk();
-  node.linked |= clear_lines(near, ~(node.linked | view));
+  node.linked = Lattice<8>(near, eye).walk();
+  node.linked |= clear_lines(seen, ~(node.linked | view));
   return Side::unknown;
 }
 

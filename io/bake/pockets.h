@@ -12,7 +12,7 @@ namespace h6::io::bake {
 inline constexpr std::size_t kInView = 125;
 using InView = std::bitset<kInView>;
 
-struct Facet;
+class Facets;
 
 // Judges the candidates again and again, as more of the outside is known. Needs a closed surface
 // that outlives it, as do the grid and the band.
@@ -37,9 +37,9 @@ class Pockets {
   enum class Side { outside, inside, unknown };
 
   RowNodes judge(Row& row, const Masks& wet) const;
-  std::vector<Facet> facets_of(std::size_t row) const;
+  Facets facets_of(std::size_t row) const;
   InView wet_about(const std::array<int, 3>& p, const Masks& wet) const;
-  Side look(const std::vector<Facet>& facets, const std::array<int, 3>& p, const InView& view,
+  Side look(const Facets& facets, const std::array<int, 3>& p, const InView& view,
             Node& node) const;
 
   const Surface& surface_;
