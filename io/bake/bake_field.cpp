@@ -420,7 +420,7 @@ Outcome add_thin(const ThinPieces& thin, const bake::Surface& whole, bake::Grid 
   options.sign = SignMode::flood;
   const Result<Baked> walls = bake_on_grid(*surface, grid, options, true, steps, nullptr);
   if (!walls) return walls.failure();
-  field = unite(field, walls->field, options.threads);
+  field = unite(std::move(field), walls->field, options.threads);
   field.grown = kGrow / cut * grid.voxel;
   return Done{};
 }

@@ -18,35 +18,44 @@ class Half {
       : field_(field), corners_{field.bricks[0] + 1, field.bricks[1] + 1, field.bricks[2] + 1} {}
 
   std::int32_t row(std::size_t cell) const { return field_.brick_index[cell]; }
+  const float* samples(std::size_t cell) const {
+    return &field_.samples[512 * std::size_t(row(cell))];
+  }
   // Whether the whole brick lies deeper inside than the band.
   bool deep(std::size_t cell) const {
     return row(cell) < 0 && far(place_of(cell, field_.bricks), 0) < 0;
   }
 
-  // The samples of a brick. Without a brick, a bound: no surface is nearer than the band, nor than
-  // the far grid says at one of the corners.
-  void samples(std::size_t cell, float (&out)[512]) const {
-    if (const std::int32_t r = row(cell); r >= 0) {
-      std::copy_n(&field_.samples[512 * std::size_t(r)], 512, out);
+  // Lowers samples of a brick that is not deep to those of this field, or to a bound where it has
+  // none: no surface is nearer than the band, nor than the far grid says at one of the corners.
+  void lower(std::size_t cell, float* samples) const {
+    if (row(cell) >= 0) {
+      const float* own = this->samples(cell);
+      for (int n = 0; n < 512; ++n) samples[n] = std::min(samples[n], own[n]);
       return;
     }
     const GridNode at = place_of(cell, field_.bricks);
-    double corner[8];
-    for (int k = 0; k < 8; ++k) corner[k] = std::fabs(far(at, k));
-    const double voxel = field_.voxel_size;
+    double corner[8], everywhere = field_.band;
+    for (int k = 0; k < 8; ++k) {
+      corner[k] = std::fabs(far(at, k));
+      everywhere = std::max(everywhere, corner[k] - away(8, 8, 8));
+    }
+    if (*std::max_element(samples, samples + 512) <= everywhere) return;
     for (int n = 0; n < 512; ++n) {
-      const int p[3] = {n % 8, n / 8 % 8, n / 64};
+      if (samples[n] <= everywhere) continue;  // eight roots are dear
+      const int x = n % 8, y = n / 8 % 8, z = n / 64;
       double bound = field_.band;
-      for (int k = 0; k < 8; ++k) {
-        const int d[3] = {8 * (k & 1) - p[0], 8 * (k >> 1 & 1) - p[1], 8 * (k >> 2) - p[2]};
-        const double away = std::sqrt(double(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
-        bound = std::max(bound, corner[k] - voxel * away);
-      }
-      out[n] = float(far(at, 0) < 0 ? -bound : bound);
+      for (int k = 0; k < 8; ++k)
+        bound = std::max(bound,
+                         corner[k] - away(8 * (k & 1) - x, 8 * (k >> 1 & 1) - y, 8 * (k >> 2) - z));
+      samples[n] = std::min(samples[n], float(bound));
     }
   }
 
  private:
+  double away(int x, int y, int z) const {
+    return field_.voxel_size * std::sqrt(double(x * x + y * y + z * z));
+  }
   float far(const GridNode& brick, int corner) const {
     return field_.far_grid[place_in(
         {brick[0] + (corner & 1), brick[1] + (corner >> 1 & 1), brick[2] + (corner >> 2)},
@@ -59,36 +68,38 @@ class Half {
 
 }  // namespace
 
-FieldData unite(const FieldData& a, const FieldData& b, unsigned threads) {
+FieldData unite(FieldData a, const FieldData& b, unsigned threads) {
   const Half first(a), second(b);
-  const std::size_t cells = a.brick_index.size();
-  FieldData out = a;
+  Large<std::int32_t> brick_index(a.brick_index.size());
   std::int32_t rows = 0;
-  for (std::size_t c = 0; c < cells; ++c) {
+  for (std::size_t c = 0; c < brick_index.size(); ++c) {
     const bool any = first.row(c) >= 0 || second.row(c) >= 0;
-    out.brick_index[c] = any && !first.deep(c) && !second.deep(c) ? rows++ : -1;
+    brick_index[c] = any && !first.deep(c) && !second.deep(c) ? rows++ : -1;
   }
-  out.samples.resize(512 * std::size_t(rows));
-  out.triangle.assign(std::size_t(rows), -1);
-  out.part.assign(a.part.empty() ? 0 : std::size_t(rows), 0);
-  sched::parallel_for(cells, threads, [&](std::size_t c) {
-    if (out.brick_index[c] < 0) return;
-    const std::size_t to = std::size_t(out.brick_index[c]);
-    float left[512], right[512];
-    first.samples(c, left);
-    second.samples(c, right);
-    for (std::size_t n = 0; n < 512; ++n) out.samples[512 * to + n] = std::min(left[n], right[n]);
+  Samples samples(512 * std::size_t(rows));
+  std::vector<std::int32_t> triangle(std::size_t(rows), -1),
+      part(a.part.empty() ? 0 : std::size_t(rows), 0);
+  sched::parallel_for(brick_index.size(), threads, [&](std::size_t c) {
+    if (brick_index[c] < 0) return;
+    const std::size_t to = std::size_t(brick_index[c]);
     constexpr std::size_t kMiddle = (4 * 8 + 4) * 8 + 4;
     const bool of_first =
-        second.row(c) < 0 || (first.row(c) >= 0 && left[kMiddle] < right[kMiddle]);
+        second.row(c) < 0 ||
+        (first.row(c) >= 0 && first.samples(c)[kMiddle] < second.samples(c)[kMiddle]);
+    std::copy_n((of_first ? first : second).samples(c), 512, &samples[512 * to]);
+    (of_first ? second : first).lower(c, &samples[512 * to]);
     const FieldData& nearer = of_first ? a : b;
     const std::size_t from = std::size_t(nearer.brick_index[c]);
-    out.triangle[to] = nearer.triangle[from];
-    if (!out.part.empty()) out.part[to] = nearer.part[from];
+    triangle[to] = nearer.triangle[from];
+    if (!part.empty()) part[to] = nearer.part[from];
   });
-  for (std::size_t i = 0; i < out.far_grid.size(); ++i)
-    out.far_grid[i] = std::min(a.far_grid[i], b.far_grid[i]);
-  return out;
+  for (std::size_t i = 0; i < a.far_grid.size(); ++i)
+    a.far_grid[i] = std::min(a.far_grid[i], b.far_grid[i]);
+  a.brick_index = std::move(brick_index);
+  a.samples = std::move(samples);
+  a.triangle = std::move(triangle);
+  a.part = std::move(part);
+  return a;
 }
 
 }  // namespace h6::io
