@@ -5,9 +5,9 @@
 // candidate is judged alone, by lines to the reached nodes in view. A line that crosses a closed
 // component of the mesh an odd number of times rejects the node: that component holds it in.
 // Nearly all candidates are tips of solids, and this is true of them even where solids overlap. A
-// line that crosses nothing accepts the node. Else a walk of a few voxels decides, on lattices that
-// are two, four and eight times finer. A finer walk reaches all that a coarser one reaches, and
-// costs more. The reach of the finest does not depend on the other nodes, so each node walks once.
+// line that crosses nothing accepts the node. Where no line accepts any more, a walk of a few
+// voxels on a lattice eight times finer decides; it costs as much as fifty looks, and few nodes
+// need one. Its reach does not depend on the other nodes, so each node walks once.
 #include "io/bake/pockets.h"
 
 #include <algorithm>
@@ -60,7 +60,9 @@ namespace {
 
 constexpr int kView = 2;  // nodes along each axis; a row knows all triangles so far
 constexpr int kAcross = 2 * kView + 1;
-constexpr std::size_t kLooks = 5;  // lines that vote; one may graze an edge
+constexpr int kFine = 8;                      // steps a voxel
+constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
+constexpr std::size_t kLooks = 5;             // lines that vote; one may graze an edge
 
 // The line p + t d meets a triangle with corner a and edges e, f where u, v and t are at least 0
 // and u + v and t at most 1 (T. Moeller, B. Trumbore, 1997). With s = p - a:
@@ -108,8 +110,7 @@ class Crossed {
   std::vector<std::pair<std::uint32_t, int>> counts_;
 };
 
-// Fine steps in the view of a node, kFine a voxel. A row of lattice points along x is a word.
-template <int kFine>
+// Fine steps in the view of a node. A row of lattice points along x is a word.
 class Lattice {
  public:
   Lattice(const std::vector<const Facet*>& facets, const Vec3& eye)
@@ -155,7 +156,6 @@ class Lattice {
   }
 
  private:
-  static constexpr int kSide = 2 * kView * kFine + 1;  // lattice points along each axis
   static constexpr std::uint64_t kRow = (std::uint64_t{1} << kSide) - 1;
   static std::size_t row_of(int y, int z) { return std::size_t(z * kSide + y); }
 
@@ -365,21 +365,21 @@ Pockets::Pockets(const Surface& surface, const Grid& grid, const NarrowBand& ban
   for (const RowNodes& row : candidates) {
     rows_.push_back({row.row, {}});
     for (std::size_t n = 0; n < kBrickSamples; ++n)
-      if (row.nodes.get(n)) rows_.back().nodes.push_back({std::uint16_t(n), false, {}});
+      if (row.nodes.get(n)) rows_.back().nodes.push_back({std::uint16_t(n), false, {}, {}});
   }
 }
 
-std::vector<RowNodes> Pockets::reached(const Masks& wet) {
+std::vector<RowNodes> Pockets::reached(const Masks& wet, By by) {
   std::vector<RowNodes> out(rows_.size());
   sched::parallel_for(rows_.size(), threads_,
-                      [&](std::size_t i) { out[i] = judge(rows_[i], wet); });
+                      [&](std::size_t i) { out[i] = judge(rows_[i], wet, by); });
   std::erase_if(out, [](const RowNodes& row) { return !row.nodes.any(); });
   std::erase_if(rows_, [](const Row& row) { return row.nodes.empty(); });
   return out;
 }
 
 // Finds the nodes that are reached, and drops those and the nodes that are inside.
-RowNodes Pockets::judge(Row& row, const Masks& wet) const {
+RowNodes Pockets::judge(Row& row, const Masks& wet, By by) const {
   RowNodes found{row.row, {}};
   const std::array<int, 3> brick = grid_.place(band_.cell[row.row]);
   Facets facets;  // near the nodes of the row
@@ -388,23 +388,19 @@ RowNodes Pockets::judge(Row& row, const Masks& wet) const {
     const std::array<int, 3> p = {8 * brick[0] + node.place % 8, 8 * brick[1] + node.place / 8 % 8,
                                   8 * brick[2] + node.place / 64};
     const InView view = wet_about(p, wet);
-    if (view.none()) return false;
-    if (!node.walked) {
+    if (by == By::lines && view == node.view) return false;
+    node.view = view;
+    Side side = (node.linked & view).any() ? Side::outside : Side::unknown;
+    if (!node.walked && view.any()) {
       if (facets.empty()) facets = facets_of(row.row);
-      const Side side = look(facets, p, view, node);
-      if (side != Side::unknown) {
-        if (side == Side::outside) found.nodes.set(node.place);
-        return true;
-      }
+      side = look(facets, p, by, node);
     }
-    if ((node.linked & view).none()) return false;
-    found.nodes.set(node.place);
-    return true;
+    if (side == Side::outside) found.nodes.set(node.place);
+    return side != Side::unknown;
   });
   return found;
 }
 
-// The facets near the nodes of a row.
 Facets Pockets::facets_of(std::size_t row) const {
   const Tiles& tiles = band_.tiles;
   const std::array<int, 3> brick = grid_.place(band_.cell[row]);
@@ -442,23 +438,22 @@ InView Pockets::wet_about(const std::array<int, 3>& p, const Masks& wet) const {
   return view;
 }
 
-// Looks along lines to the reached nodes in view; where they do not decide, lets the node walk.
-Pockets::Side Pockets::look(const Facets& facets, const std::array<int, 3>& p, const InView& view,
+// Looks along lines to the reached nodes in view; where they do not decide, may let the node walk.
+Pockets::Side Pockets::look(const Facets& facets, const std::array<int, 3>& p, By by,
                             Node& node) const {
   const Vec3 eye{double(p[0]), double(p[1]), double(p[2])};
-  const Votes votes = vote(facets, eye, view);
+  const Votes votes = vote(facets, eye, node.view);
   if (votes.clear) return Side::outside;
   if (2 * votes.odd > kLooks) return Side::inside;
   const Vec3 sight{kView, kView, kView};
   const std::vector<const Facet*> near = facets.in(eye - sight, eye + sight);
   const std::vector<Seen> seen = seen_from(eye, near);
-  if (clear_lines(seen, view & ~votes.lines).any()) return Side::outside;
-  if (2 * votes.odd > votes.lines.count()) return Side::unknown;
-  if ((Lattice<2>(near, eye).walk() & view).any()) return Side::outside;
-  if ((Lattice<4>(near, eye).walk() & view).any()) return Side::outside;
+  if (clear_lines(seen, node.view & ~votes.lines).any()) return Side::outside;
+  if (by == By::lines || 2 * votes.odd > votes.lines.count()) return Side::unknown;
   node.walked = true;
-  node.linked = Lattice<8>(near, eye).walk();
-  node.linked |= clear_lines(seen, ~(node.linked | view));
+  node.linked = Lattice(near, eye).walk();
+  if ((node.linked & node.view).any()) return Side::outside;
+  node.linked |= clear_lines(seen, ~(node.linked | node.view));
   return Side::unknown;
 }
 

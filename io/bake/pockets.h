@@ -21,13 +21,16 @@ class Pockets {
   Pockets(const Surface& surface, const Grid& grid, const NarrowBand& band,
           const std::vector<RowNodes>& candidates, unsigned threads);
 
-  // The candidates that `wet` (rows), nodes of the outside, reaches. Each is returned once.
-  std::vector<RowNodes> reached(const Masks& wet);
+  // The candidates that `wet` (rows), nodes of the outside, reaches. Each is returned once. Lines
+  // come first, until they reach no more: walks are dear.
+  enum class By { lines, walks };
+  std::vector<RowNodes> reached(const Masks& wet, By by);
 
  private:
   struct Node {
     std::uint16_t place;  // in the brick
     bool walked;
+    InView view;    // the nodes of the outside when it was judged last
     InView linked;  // if walked: the nodes that no triangle parts from this one
   };
   struct Row {
@@ -36,11 +39,10 @@ class Pockets {
   };
   enum class Side { outside, inside, unknown };
 
-  RowNodes judge(Row& row, const Masks& wet) const;
+  RowNodes judge(Row& row, const Masks& wet, By by) const;
   Facets facets_of(std::size_t row) const;
   InView wet_about(const std::array<int, 3>& p, const Masks& wet) const;
-  Side look(const Facets& facets, const std::array<int, 3>& p, const InView& view,
-            Node& node) const;
+  Side look(const Facets& facets, const std::array<int, 3>& p, By by, Node& node) const;
 
   const Surface& surface_;
   const Grid& grid_;

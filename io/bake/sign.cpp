@@ -83,8 +83,14 @@ void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& b
                       [&](std::size_t r) { dry[r] = free[r] & ~outside.wet()[r]; });
   Pockets pockets(surface, grid, band, cramped_nodes(grid, band, dry, threads), threads);
   constexpr int kRounds = 8;  // down a groove, a few voxels at a time
-  for (int i = 0; i < kRounds; ++i)
-    if (!outside.from_nodes(pockets.reached(outside.wet()), 1)) return;
+  const auto reach = [&](Pockets::By by) {
+    return outside.from_nodes(pockets.reached(outside.wet(), by), 1);
+  };
+  for (int i = 0; i < kRounds; ++i) {
+    for (int k = 0; k < kRounds && reach(Pockets::By::lines); ++k) {
+    }
+    if (!reach(Pockets::By::walks)) return;
+  }
 }
 
 }  // namespace

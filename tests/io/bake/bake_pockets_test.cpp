@@ -104,3 +104,57 @@ TEST_CASE(
     CHECK(shut == 0);
   }
 }
+
+namespace {
+
+// A block with a slot that goes straight down from its top and then bends along +x, in voxels: all
+// its gaps are narrower than one. Nodes lie at whole numbers, moved by `node`. With a lid the slot
+// is a closed hollow.
+Mesh bent_slot(const Vec3& node, bool lid) {
+  constexpr double kTop = 0.5;
+  const auto part = [&](double x0, double x1, double y0, double y1, double z0, double z1) {
+    const auto within = [](double v) { return std::clamp(v, -6.0, 6.0); };
+    return box({within(x0 + node.x), within(y0), within(z0 + node.z)},
+               {within(x1 + node.x), within(y1), within(z1 + node.z)});
+  };
+  constexpr double kEnd = 20;
+  Mesh block = part(-kEnd, 0.3, -kEnd, kEnd, -kEnd, kTop);  // before the slot
+  add(block, part(-kEnd, kEnd, -kEnd, kEnd, -kEnd, -0.2));  // below it
+  add(block, part(3.4, kEnd, -kEnd, kEnd, -kEnd, kTop));    // where it ends
+  add(block, part(0.7, kEnd, -kEnd, kEnd, 0.2, kTop));      // above its bend
+  add(block, part(-kEnd, kEnd, -kEnd, -3, -kEnd, kTop));    // at both its sides
+  add(block, part(-kEnd, kEnd, 3, kEnd, -kEnd, kTop));
+  add(block, part(-kEnd, -5, -kEnd, -5, -kEnd, kEnd));  // a mast, for the bounds
+  if (lid) add(block, part(-kEnd, kEnd, -kEnd, kEnd, 0.3, kTop));
+  return block;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "pockets: a slot narrower than a voxel is outside beyond its bend, where no straight line "
+    "leads; a closed one is inside") {
+  FieldBake options;
+  options.voxel_size = 1;
+  options.grow_thin = false;
+  options.threads = 2;
+  const auto plain = bake_field(box({-6, -6, -6}, {6, 6, 6}), options, nullptr);
+  REQUIRE(plain);
+  const auto off = [](double v) { return v - std::floor(v); };
+  const Vec3 node{off(plain->origin.x), off(plain->origin.y), off(plain->origin.z)};
+  for (const bool lid : {false, true}) {
+    CAPTURE(lid);
+    const auto field = bake_field(bent_slot(node, lid), options, nullptr);
+    REQUIRE(field);
+    REQUIRE(field->sign_mode == "closed");
+    int nodes = 0, outside = 0;
+    for_nodes(*field, [&](std::array<int, 3> n, double d) {
+      const Vec3 p = node_position(*field, n) - node;
+      if (std::fabs(p.z) > 0.1 || p.x < 0.9 || p.x > 3.1 || std::fabs(p.y) > 1.5) return;
+      ++nodes;
+      outside += d > 0;
+    });
+    CHECK(nodes >= 9);
+    CHECK(outside == (lid ? 0 : nodes));
+  }
+}
