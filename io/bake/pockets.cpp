@@ -6,8 +6,8 @@
 // component of the mesh an odd number of times rejects the node: that component holds it in.
 // Nearly all candidates are tips of solids, and this is true of them even where solids overlap. A
 // line that crosses nothing accepts the node. Where no line accepts any more, a walk of a few
-// voxels on a lattice eight times finer decides; it costs as much as fifty looks, and few nodes
-// need one. Its reach does not depend on the other nodes, so each node walks once.
+// voxels on a lattice eight times finer decides; it costs as much as some forty looks, and few
+// nodes need one. Its reach does not depend on the other nodes, so each node walks once.
 #include "io/bake/pockets.h"
 
 #include <algorithm>
