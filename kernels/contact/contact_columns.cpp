@@ -60,7 +60,7 @@ void facing_simd(const ContactColumns& c, float edge, float* facing) {
   }
 }
 
-// G and the lean towards it, of contacts with distances around them.
+// G and the share of kMostLean towards it, of contacts with distances around them.
 struct Slope {
   hn::Vec<DF> g[3], lean;
 };
@@ -68,7 +68,7 @@ HWY_INLINE Slope slope_at(const ContactColumns& c, const Around* around, std::si
                           std::size_t live) {
   const DF d;
   Slope s{{load_n(d, c.gx + i, live), load_n(d, c.gy + i, live), load_n(d, c.gz + i, live)},
-          hn::Set(d, kMostLean)};
+          hn::Set(d, 1.0f)};
   if (!around) return s;
   const Around& a = *around;
   hn::Vec<DF> at[5];
@@ -110,9 +110,16 @@ void directions_simd(const ContactColumns& c, const Around* around, float* nx, f
     auto dot = hn::Mul(N[0], s.g[0]);
     dot = hn::MulAdd(N[1], s.g[1], dot);
     dot = hn::MulAdd(N[2], s.g[2], dot);
-    auto share = hn::MulAdd(dot, hn::Set(d, -1 / kStillFacing), one);
+    const auto still = hn::MulAdd(hn::Set(d, kStillFacingLeaning - kStillFacing), s.lean,
+                                  hn::Set(d, kStillFacing));
+    auto share = hn::Sub(one, hn::Div(dot, still));
     share = hn::Min(hn::Max(share, zero), one);
-    const auto lean = hn::IfThenElseZero(hn::Gt(share, zero), s.lean);
+    // Down to N.G = -most / kMostLean the lean is below its limit anyway.
+    constexpr float most = 1 - kLeastAlong;
+    const auto limit =
+        hn::Div(hn::Set(d, most), hn::Max(hn::Neg(dot), hn::Set(d, most / kMostLean)));
+    const auto lean = hn::IfThenElseZero(hn::Gt(share, zero),
+                                         hn::Min(hn::Mul(hn::Set(d, kMostLean), s.lean), limit));
     hn::Vec<DF> to[3];
     auto length2 = zero;
     for (int k = 0; k < 3; ++k) {

@@ -31,15 +31,21 @@ inline constexpr float kSharp = 0.5f;  // curvature of the field that halves it 
 // Half a voxel deep a contact leans in full, however sharp the field is: a lone point at an edge
 // must get out along the slope. Depths in the field's finest spacing.
 inline constexpr float kLeanFrom = 0.25f, kLeanFull = 0.5f;
-inline constexpr float kStillFacing = -0.25f;  // N.G at which a contact stops pushing
+// N.G at which a contact stops pushing, without a lean and with the most. A point at an edge of the
+// part has the normal of one face only, and an obstacle can touch a sharp edge from behind it. On a
+// sharp field the limit is narrow, so that a wire lets go of a point that has passed it.
+inline constexpr float kStillFacing = -0.25f, kStillFacingLeaning = -0.75f;
+inline constexpr float kLeastAlong = 0.1f;  // of the direction along N, before it is made unit
 
 // The direction in which a contact pushes, and its facing factor. METHOD.md, Sec. 3, "Firm".
 //   G   the slope over the tetrahedron, which does not jump between cells; g where `around` is null
 //       or distances may be bounds
 //   q   the curvature of the field, div G, over kSharp; 0 where `around` is null
 //   s   clamp((depth - kLeanFrom) / (kLeanFull - kLeanFrom), 0, 1)
-//   facing    = clamp(1 - N.G / kStillFacing, 0, 1)
-//   direction = N + kMostLean (s + (1 - s) / (1 + q^2)) G made unit; N where facing is 0
+//   lean      = s + (1 - s) / (1 + q^2)
+//   facing    = clamp(1 - N.G / (kStillFacing + lean (kStillFacingLeaning - kStillFacing)), 0, 1)
+//   direction = N + min(kMostLean lean, (1 - kLeastAlong) / max(0, -N.G)) G made unit; N where
+//               facing is 0
 // The direction may be written over N.
 void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
                      float* facing);

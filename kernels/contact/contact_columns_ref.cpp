@@ -30,7 +30,7 @@ void push_directions_ref(const ContactColumns& c, const Around* around, float* n
                          float* nz, float* facing) {
   for (std::size_t i = 0; i < c.count; ++i) {
     const double N[3] = {c.nx[i], c.ny[i], c.nz[i]};
-    double G[3] = {c.gx[i], c.gy[i], c.gz[i]}, lean = kMostLean;
+    double G[3] = {c.gx[i], c.gy[i], c.gz[i]}, lean = 1;
     if (around) {
       const Around& a = *around;
       double d[5];
@@ -55,7 +55,10 @@ void push_directions_ref(const ContactColumns& c, const Around* around, float* n
       lean += (1 - deep) * (lean / (1 + q * q) - lean);
     }
     const double dot = N[0] * G[0] + N[1] * G[1] + N[2] * G[2];
-    const double share = std::clamp(1 - dot / kStillFacing, 0.0, 1.0);
+    const double still = kStillFacing + lean * (kStillFacingLeaning - double{kStillFacing});
+    const double share = std::clamp(1 - dot / still, 0.0, 1.0);
+    lean *= kMostLean;
+    if (dot < 0) lean = std::min(lean, (1 - double{kLeastAlong}) / -dot);
     if (share == 0) lean = 0;
     const double to[3] = {N[0] + lean * G[0], N[1] + lean * G[1], N[2] + lean * G[2]};
     const double length = std::sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);

@@ -268,22 +268,25 @@ h6::test::ShellArrays knife_edge(double angle) {
   return s;
 }
 
-// The side of a needle along z, with no point at its tip.
-h6::test::ShellArrays needle(double radius) {
+// The side of a needle along z, with no point at its tip. Its normals may lean back from the tip by
+// an angle, as those behind a barb do.
+h6::test::ShellArrays needle(double radius, double back = 0) {
   h6::test::ShellArrays s;
   for (int ring = 0; ring <= 20; ++ring)
     for (int i = 0; i < 8; ++i) {
       const double a = 0.785398163 * i, x = std::cos(a), y = std::sin(a);
-      s.add(radius * x, radius * y, 0.5 * mm * ring, -x, -y, 0);
+      s.add(radius * x, radius * y, 0.5 * mm * ring, -x * std::cos(back), -y * std::cos(back),
+            -std::sin(back));
     }
   return s;
 }
 
 }  // namespace
 
-TEST_CASE("a knife edge and a needle, which have no normal along a push, are held") {
+TEST_CASE("a knife edge, a needle and a barb, which have no normal along a push, are held") {
   CHECK(pushed_depth(knife_edge(0.1), H6_METHOD_FIRM, 1.25) < 0.5 * mm);
   CHECK(pushed_depth(needle(0.15 * mm), H6_METHOD_FIRM, 1.25) < 0.5 * mm);
+  CHECK(pushed_depth(needle(2 * mm, 0.35), H6_METHOD_FIRM, 1.25) < 0.5 * mm);
   CHECK(pushed_depth(needle(0.15 * mm), H6_METHOD_ROBUST, 1.25) > 2 * mm);
   // Along N an edge gives way by the angle of its faces.
   CHECK(pushed_depth(knife_edge(0.1), H6_METHOD_ROBUST, 1.25) >
