@@ -31,10 +31,12 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "hapsix/vector.h"
 #include "io/bake/bake_field.h"
 #include "io/mesh/mesh_file.h"
 #include "io/scenes/industrial/industrial.h"
@@ -68,6 +70,38 @@ io::Mesh gear(int around, int across) {
       mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
     }
   return mesh;
+}
+
+// Makes closed tubes of 1,888 triangles each that cross a ball in all directions and overlap.
+io::Mesh tubes(int count) {
+  constexpr std::uint32_t kAround = 16, kAlong = 60;
+  std::mt19937_64 engine(7);
+  const auto random = [&](double low, double high) {
+    return low + (high - low) * 0x1p-53 * double(engine() >> 11);
+  };
+  io::Mesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const double z = random(-1, 1), turn = random(0, 2 * M_PI), r = std::sqrt(1 - z * z);
+    const h6Vec3 way{r * std::cos(turn), r * std::sin(turn), z};
+    const h6Vec3 u = unit(cross(way, {-way.z, way.x, way.y})), v = cross(way, u);
+    const h6Vec3 start = random(-0.07, 0.07) * u + random(-0.07, 0.07) * v;
+    const double radius = random(0.0015, 0.0035);
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (std::uint32_t k = 0; k < kAlong; ++k)
+      for (std::uint32_t j = 0; j < kAround; ++j) {
+        const double a = 2 * M_PI * j / kAround, end = k == 0 || k + 1 == kAlong ? 0 : radius;
+        mesh.vertices.push_back(start + (0.004 * k - 0.12) * way + end * std::cos(a) * u +
+                                end * std::sin(a) * v);
+      }
+    for (std::uint32_t k = 0; k + 1 < kAlong; ++k)
+      for (std::uint32_t j = 0; j < kAround; ++j) {
+        const std::uint32_t a = first + k * kAround + j,
+                            b = first + k * kAround + (j + 1) % kAround;
+        mesh.triangles.push_back({a, b, b + kAround});
+        mesh.triangles.push_back({a, b + kAround, a + kAround});
+      }
+  }
+  return io::weld(mesh);
 }
 
 // On Linux these reset the peak, free memory that earlier benchmarks left, and read the peak [MB].
@@ -356,6 +390,16 @@ InputPtr industrial(io::IndustrialInput&& made) {
   add_fields("gear100k", ring, {256, 512}, true);
   add_shells("gear100k", ring);
   add_scaling("gear100k", ring, 512);
+  // Closed solids that overlap, and the soup that they are without one triangle.
+  const auto opened = [](io::Mesh mesh) {
+    mesh.triangles.erase(mesh.triangles.begin() + 100);
+    return plain(std::move(mesh));
+  };
+  const auto loom = [] { return *io::make_scene("wire-bundle")->bodies[0].field->mesh_data; };
+  add_fields("loom", once([=] { return plain(loom()); }), {256, 512}, false);
+  add_fields("loom/soup", once([=] { return opened(loom()); }), {256, 512}, false);
+  add_fields("tubes", once([] { return plain(tubes(300)); }), {256, 512}, false);
+  add_fields("tubes/soup", once([=] { return opened(tubes(300)); }), {256, 512}, false);
   // Large inputs take seconds to bake and OpenVDB takes minutes, so they are optional.
   const char* which = std::getenv("HAPSIX_BENCH_SOUPS");
   if (which != nullptr && *which != '\0' && *which != '0') {
