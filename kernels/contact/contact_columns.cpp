@@ -110,16 +110,17 @@ void directions_simd(const ContactColumns& c, const Around* around, float* nx, f
     auto dot = hn::Mul(N[0], s.g[0]);
     dot = hn::MulAdd(N[1], s.g[1], dot);
     dot = hn::MulAdd(N[2], s.g[2], dot);
-    const auto still = hn::MulAdd(hn::Set(d, kStillFacingLeaning - kStillFacing), s.lean,
-                                  hn::Set(d, kStillFacing));
-    auto share = hn::Sub(one, hn::Div(dot, still));
-    share = hn::Min(hn::Max(share, zero), one);
-    // Down to N.G = -most / kMostLean the lean is below its limit anyway.
-    constexpr float most = 1 - kLeastAlong;
-    const auto limit =
-        hn::Div(hn::Set(d, most), hn::Max(hn::Neg(dot), hn::Set(d, most / kMostLean)));
-    const auto lean = hn::IfThenElseZero(hn::Gt(share, zero),
-                                         hn::Min(hn::Mul(hn::Set(d, kMostLean), s.lean), limit));
+    auto share = one, lean = hn::Mul(hn::Set(d, kMostLean), s.lean);
+    if (!hn::AllFalse(d, hn::Lt(dot, zero))) {  // else there is nothing to divide
+      const auto still = hn::MulAdd(hn::Set(d, kStillFacingLeaning - kStillFacing), s.lean,
+                                    hn::Set(d, kStillFacing));
+      share = hn::Min(hn::Max(hn::Sub(one, hn::Div(dot, still)), zero), one);
+      // Down to N.G = -most / kMostLean the lean is below its limit anyway.
+      constexpr float most = 1 - kLeastAlong;
+      const auto limit =
+          hn::Div(hn::Set(d, most), hn::Max(hn::Neg(dot), hn::Set(d, most / kMostLean)));
+      lean = hn::IfThenElseZero(hn::Gt(share, zero), hn::Min(lean, limit));
+    }
     hn::Vec<DF> to[3];
     auto length2 = zero;
     for (int k = 0; k < 3; ++k) {
