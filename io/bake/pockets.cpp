@@ -25,7 +25,7 @@ struct Facet {
   std::uint32_t component;
 };
 
-// Facets with their boxes in columns, so that the search for those in a box runs in SIMD.
+// Facets keep their boxes in columns, so that a search for the facets in a box runs in SIMD.
 class Facets {
  public:
   bool empty() const { return facets_.empty(); }
@@ -37,7 +37,7 @@ class Facets {
     }
     facets_.push_back(t);
   }
-  // Those whose boxes meet a box, with few others.
+  // Returns the facets whose boxes meet a box, and few others.
   std::vector<const Facet*> in(const Vec3& low, const Vec3& high) const {
     std::vector<std::int32_t> apart(facets_.size(), 0);
     for (int k = 0; k < 3; ++k) {
@@ -286,7 +286,7 @@ struct Ends {
   }
 };
 
-// Facets as the eye sees them.
+// Returns facets as the eye sees them.
 std::vector<Seen> seen_from(const Vec3& eye, const std::vector<const Facet*>& facets) {
   static const Ends ends;
   std::vector<Seen> seen;
@@ -320,7 +320,7 @@ InView clear_lines(const std::vector<Seen>& seen, InView lines) {
   return lines;
 }
 
-// What the lines from a node to the nearest reached nodes cross.
+// The lines from a node to the nearest reached nodes vote on its side.
 struct Votes {
   InView lines;     // up to kLooks
   bool clear;       // the last of them crosses nothing
@@ -401,6 +401,7 @@ RowNodes Pockets::judge(Row& row, const Masks& wet, By by) const {
   return found;
 }
 
+// Returns the facets near the nodes of a row.
 Facets Pockets::facets_of(std::size_t row) const {
   const Tiles& tiles = band_.tiles;
   const std::array<int, 3> brick = grid_.place(band_.cell[row]);

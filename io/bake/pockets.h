@@ -21,8 +21,8 @@ class Pockets {
   Pockets(const Surface& surface, const Grid& grid, const NarrowBand& band,
           const std::vector<RowNodes>& candidates, unsigned threads);
 
-  // The candidates that `wet` (rows), nodes of the outside, reaches. Each is returned once. Lines
-  // come first, until they reach no more: walks are dear.
+  // The candidates that `wet` (rows), nodes of the outside, reaches. Each is returned once. A
+  // caller asks by lines until they reach no more, since walks are dear.
   enum class By { lines, walks };
   std::vector<RowNodes> reached(const Masks& wet, By by);
 

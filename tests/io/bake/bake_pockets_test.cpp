@@ -129,7 +129,49 @@ Mesh bent_slot(const Vec3& node, bool lid) {
   return block;
 }
 
+// A convex prism along z.
+Mesh prism(const std::vector<std::array<double, 2>>& outline, double low, double high) {
+  Mesh mesh;
+  const auto n = std::uint32_t(outline.size());
+  for (const auto& [x, y] : outline)
+    for (const double z : {low, high}) mesh.vertices.push_back({x, y, z});
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t a = 2 * i, b = 2 * ((i + 1) % n);
+    mesh.triangles.push_back({a, b, b + 1});
+    mesh.triangles.push_back({a, b + 1, a + 1});
+    if (i == 0 || i + 1 == n) continue;
+    mesh.triangles.push_back({0, b, a});
+    mesh.triangles.push_back({1, a + 1, b + 1});
+  }
+  return mesh;
+}
+
 }  // namespace
+
+TEST_CASE("pockets: a slanted slot narrower than a voxel is outside 60 voxels deep") {
+  constexpr double kHalf = 40, kWide = 0.35;  // along x and y
+  Mesh block = prism({{-kHalf, kWide - kHalf}, {kHalf - kWide, kHalf}, {-kHalf, kHalf}}, -6, 6);
+  add(block, prism({{kWide - kHalf, -kHalf}, {kHalf, -kHalf}, {kHalf, kHalf - kWide}}, -6, 6));
+  add(block, box({-kHalf, -kHalf, -6}, {kHalf - 60, kHalf - 60, 6}));  // the slot's end
+  add(block, box({-kHalf, -kHalf, -6}, {kHalf, kHalf, -3}));
+  add(block, box({-kHalf, -kHalf, 3}, {kHalf, kHalf, 6}));
+  FieldBake options;
+  options.voxel_size = 1;
+  options.grow_thin = false;
+  options.threads = 2;
+  const auto field = bake_field(block, options, nullptr);
+  REQUIRE(field);
+  REQUIRE(field->sign_mode == "closed");
+  int nodes = 0, outside = 0;
+  for_nodes(*field, [&](std::array<int, 3> n, double d) {
+    const Vec3 p = node_position(*field, n);
+    if (std::fabs(p.x - p.y) > 0.1 || std::fabs(p.z) > 2 || p.x < kHalf - 59 || p.x > kHalf) return;
+    ++nodes;
+    outside += d > 0;
+  });
+  CHECK(nodes >= 200);
+  CHECK(outside == nodes);
+}
 
 TEST_CASE(
     "pockets: a slot narrower than a voxel is outside beyond its bend, where no straight line "
