@@ -23,11 +23,13 @@ namespace {
 
 // Reads a scene file, or makes the generated scene of that name. Sets the exit code of a failure.
 Result<io::Scene> find_scene(const std::string& name, bool outside, int* code) {
-  const bool is_file = std::filesystem::exists(name);
   std::vector<std::string> known;
   for (const io::SceneName& scene : io::scene_names()) known.push_back(scene.name);
-  if (!is_file && std::find(known.begin(), known.end(), name) != known.end())
-    return io::make_scene(name);
+  const bool is_name = std::find(known.begin(), known.end(), name) != known.end();
+  // 'hapsix scene export NAME NAME' leaves a folder of that name, which is no scene file.
+  const bool is_file =
+      std::filesystem::exists(name) && !(is_name && std::filesystem::is_directory(name));
+  if (!is_file && is_name) return io::make_scene(name);
   if (!is_file && std::filesystem::path(name).extension() != ".json") {  // the user meant a name
     const std::string like = nearest(name, known);
     *code = kUsage;

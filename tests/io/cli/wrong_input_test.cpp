@@ -293,6 +293,14 @@ TEST_CASE("a mistake in a scene names file and place") {
   mistake(box, {"run", "."}, 1, {"folder"});
 }
 
+TEST_CASE("a folder that has the name of a generated scene does not hide the scene") {
+  Sandbox box;
+  fs::create_directories(box.file("box-on-wall"));
+  const Ended ended = run(box, {"run", "box-on-wall", "--virtual-time", "--duration", "0.01"});
+  CAPTURE(ended.err);
+  CHECK(ended.code == 0);
+}
+
 TEST_CASE("a result that cannot be written is a failure") {
   Sandbox box;
   if (!fs::exists("/dev/full")) {
