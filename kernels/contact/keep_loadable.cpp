@@ -73,8 +73,9 @@ std::size_t keep_simd(const ShellColumns& shell, const Touching& rows, std::size
 }
 
 std::size_t groups_simd(const SpheresView& groups, const BundlesView& normals, const float ahead[6],
-                        float most, const float* expiry, float now, const std::uint32_t* blocks,
-                        std::size_t count, float* reach, std::uint32_t* survivors) {
+                        float most, const float* expiry, const float* now,
+                        const std::uint32_t* blocks, std::size_t count, float* reach,
+                        std::uint32_t* survivors) {
   const DF d;
   const DI di;
   const std::size_t lanes = hn::Lanes(d);
@@ -90,7 +91,7 @@ std::size_t groups_simd(const SpheresView& groups, const BundlesView& normals, c
                                  hn::Mul(turn, at(groups.radius)));
     const VF here = hn::Min(hn::Set(d, most), hn::Max(hn::Zero(d), most_here));
     hn::StoreU(here, d, reach + g);
-    const auto keep = hn::Le(at(expiry), hn::Add(hn::Set(d, now), here));
+    const auto keep = hn::Le(at(expiry), hn::Add(hn::Set(d, now[g / kBlock]), here));
     const auto index = hn::Add(hn::Iota(di, 0), hn::Set(di, static_cast<std::int32_t>(g)));
     hn::StoreU(compress(di, index, hn::RebindMask(di, keep)), di,
                reinterpret_cast<std::int32_t*>(survivors) + kept);
@@ -113,7 +114,7 @@ std::size_t keep_loadable(const ShellColumns& shell, const Touching& rows, std::
   return HWY_DYNAMIC_DISPATCH(keep_simd)(shell, rows, count, ahead);
 }
 std::size_t loadable_groups(const SpheresView& groups, const BundlesView& normals,
-                            const float ahead[6], float most, const float* expiry, float now,
+                            const float ahead[6], float most, const float* expiry, const float* now,
                             const std::uint32_t* blocks, std::size_t count, float* reach,
                             std::uint32_t* survivors) {
   return HWY_DYNAMIC_DISPATCH(groups_simd)(groups, normals, ahead, most, expiry, now, blocks, count,

@@ -24,18 +24,18 @@ struct BundlesView {
   const float *nx, *ny, *nz, *spread;
 };
 // Writes to `survivors`, in order, the groups 16 b + i of the blocks b = blocks[0..count-1] of
-// which a point can carry load after the way `now` [voxel]:
-//     expiry <= now + reach,   reach = min(most, max(0, -n.q + spread |q| + |w| radius))
+// which a point can carry load after the way now[b] [voxel]:
+//     expiry <= now[b] + reach,   reach = min(most, max(0, -n.q + spread |q| + |w| radius))
 // where q is taken at the centre of the group's sphere. No point of a group farther than its reach
 // can carry load; reach[g] is written for all groups of the blocks. Columns are readable to whole
 // blocks, `survivors` has room for 16 count. Returns the number of survivors.
 std::size_t loadable_groups(const SpheresView& groups, const BundlesView& normals,
-                            const float ahead[6], float most, const float* expiry, float now,
+                            const float ahead[6], float most, const float* expiry, const float* now,
                             const std::uint32_t* blocks, std::size_t count, float* reach,
                             std::uint32_t* survivors);
 std::size_t loadable_groups_ref(const SpheresView& groups, const BundlesView& normals,
-                                const float ahead[6], float most, const float* expiry, float now,
-                                const std::uint32_t* blocks, std::size_t count, float* reach,
-                                std::uint32_t* survivors);
+                                const float ahead[6], float most, const float* expiry,
+                                const float* now, const std::uint32_t* blocks, std::size_t count,
+                                float* reach, std::uint32_t* survivors);
 
 }  // namespace h6::kernels

@@ -32,9 +32,9 @@ std::size_t keep_loadable_ref(const ShellColumns& s, const Touching& rows, std::
 }
 
 std::size_t loadable_groups_ref(const SpheresView& groups, const BundlesView& normals,
-                                const float ahead[6], float most, const float* expiry, float now,
-                                const std::uint32_t* blocks, std::size_t count, float* reach,
-                                std::uint32_t* survivors) {
+                                const float ahead[6], float most, const float* expiry,
+                                const float* now, const std::uint32_t* blocks, std::size_t count,
+                                float* reach, std::uint32_t* survivors) {
   const float turn = std::hypot(ahead[3], ahead[4], ahead[5]);
   std::size_t kept = 0;
   for (std::size_t k = 0; k < kBlock * count; ++k) {
@@ -44,7 +44,7 @@ std::size_t loadable_groups_ref(const SpheresView& groups, const BundlesView& no
     const float size = std::sqrt(way.along(way.q[0], way.q[1], way.q[2]));
     const float most_here = towards + normals.spread[g] * size + turn * groups.radius[g];
     reach[g] = std::min(most, std::max(0.0f, most_here));
-    if (expiry[g] <= now + reach[g]) survivors[kept++] = g;
+    if (expiry[g] <= now[g / kBlock] + reach[g]) survivors[kept++] = g;
   }
   return kept;
 }

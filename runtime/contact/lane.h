@@ -19,6 +19,7 @@ struct TraverseScratch {
   std::uint32_t *frontier = nullptr, *survivors = nullptr;  // (groups)
   std::uint32_t *far = nullptr, *far_survivors = nullptr;   // (groups)
   std::uint32_t* open_blocks = nullptr;                     // (blocks)
+  float *way_now = nullptr, *way_from = nullptr;            // (blocks) [voxel]
   float* clearance = nullptr;                               // (groups) [voxel]
   std::uint16_t *rows = nullptr, *near_rows = nullptr;      // (groups)
   float* rest = nullptr;                                    // (groups) [voxel]

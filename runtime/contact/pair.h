@@ -39,8 +39,9 @@ struct CullBypass {
 // One row for each group or block of a shell: what a search remembers of a pair. Distances
 // travelled are in voxels of the field.
 struct SearchColumns {
-  // No point of a group can touch before the distance travelled exceeds the group's expiry. A
-  // block's expiry is the least of its groups' expiries.
+  float* block_way = nullptr;  // no point of a block travelled farther, up to the anchor
+  // No point of a group can touch before its block's way exceeds the group's expiry. A block's
+  // expiry is the least of its groups' expiries.
   float *group_expiry = nullptr, *block_expiry = nullptr;
   // Bit i: the group's point i was near when all of its points were last sampled. No other point of
   // the group can touch before rest_expiry.
@@ -58,9 +59,8 @@ struct alignas(64) PairSearch : SearchColumns {
   // `series`, `firm`: the common spring and damping may carry points towards the field by this
   // screw (v [m], w) about a's centre of mass, world frame; none comes farther than margin [voxel].
   float ahead[6] = {}, margin = 0;
-  double travelled = -1;    // the distance travelled up to the anchor; < 0: nothing is known
-  double now = 0;           // and from there to the place of the last traversal
-  std::size_t sampled = 0;  // groups that the last traversal sampled
+  double travelled = -1;                         // no block's way is longer; < 0: nothing is known
+  std::size_t sampled = 0;                       // groups that the last traversal sampled
   std::size_t open_blocks = 0, open_groups = 0;  // how many were near when last tested
   CullBypass cull_blocks, cull_groups;
   CullBypass pick_rows;          // decides whether to test single points of groups

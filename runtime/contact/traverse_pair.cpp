@@ -70,6 +70,7 @@ constexpr std::size_t kFewGroups =
     4;  // testing so few groups of a block is cheaper than testing its sphere
 constexpr std::size_t kCached = 256;  // groups whose samples lie in the caches while a shell stays
 constexpr double kLongestWay = 256;   // float resolves 3e-5 there [voxel]
+constexpr double kRounding = 4e-6;    // error of a motion in float, as a share of the longest one
 constexpr double kStays = 0.04;  // a shell nearer than this to its anchor counts as staying [voxel]
 // When the shell is slow, only single points of a group are sampled: those nearer than kNearest
 // plus the distance of kStepsNear steps like the last one.
@@ -108,16 +109,14 @@ struct Search {
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
         reach, margin, rows, 0, count, survivors, clearance);
   }
-  // Writes to t.frontier the groups of t.open_blocks of which a point may touch after the way
-  // `now`, or may carry load.
-  std::size_t loadable(const float* expiry, float now, std::size_t blocks,
-                       const TraverseScratch& t) const {
+  // Writes to t.frontier the groups of t.open_blocks of which a point may touch, or may carry load.
+  std::size_t loadable(const float* expiry, std::size_t blocks, const TraverseScratch& t) const {
     const Tier& tier = shell.groups;
     const Bundles& normals = shell.normals;
     return kernels::loadable_groups(
         {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count},
         {normals.nx.data, normals.ny.data, normals.nz.data, normals.spread.data}, ahead.m, margin,
-        expiry, now, t.open_blocks, blocks, t.reach, t.frontier);
+        expiry, t.way_now, t.open_blocks, blocks, t.reach, t.frontier);
   }
   // Evaluates the samples in `vectors`. Rows in `out` are rows of the shell.
   std::size_t touch_samples(const std::uint32_t* vectors, std::size_t count,
@@ -222,22 +221,25 @@ std::size_t touch(const Search& search, TraverseScratch& t, Lane& lane, std::siz
   return found;
 }
 
-// An upper bound on how far a point within `radius` of the shell's centre moved between two places
-// [voxel].
-double motion_bound(const kernels::Affine& from, const kernels::Affine& to, double radius) {
-  double turn = 0, shift = 0;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      const double d = double(to.m[r][c]) - from.m[r][c];
-      turn += d * d;
-    }
-    const double d = double(to.m[r][3]) - from.m[r][3];
-    shift += d * d;
-  }
-  return (std::sqrt(turn) * radius + std::sqrt(shift)) * (1 + 1e-9);
-}
+// The change between two places of a shell in a field.
+struct Change {
+  kernels::Affine map{};
+  double turn = 0, shift = 0;  // bounds on its matrix [voxel/m] and its translation [voxel]
 
-// And by bending between two shapes.
+  Change(const kernels::Affine& from, const kernels::Affine& to) {
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 4; ++c) {
+        const double d = double(to.m[r][c]) - from.m[r][c];
+        map.m[r][c] = static_cast<float>(d);
+        (c < 3 ? turn : shift) += d * d;
+      }
+    turn = std::sqrt(turn) * (1 + 1e-6), shift = std::sqrt(shift) * (1 + 1e-6);
+  }
+  // An upper bound on how far a point within `radius` of the shell's centre moved [voxel].
+  double most(double radius) const { return turn * radius + shift; }
+};
+
+// An upper bound on how far a point moved by bending between two shapes [voxel].
 double bending_bound(const Search& search, const float* from) {
   if (!search.bend) return 0;
   double change[H6_MAX_MODES];
@@ -245,49 +247,45 @@ double bending_bound(const Search& search, const float* from) {
   return double{search.scale} * bend_way(*search.bend, change);
 }
 
-// The distance that the shell has travelled through the field [voxel]. It does not grow while the
-// shell moves to and fro around its anchor.
-struct Way {
-  float now;   // travelled up to the anchor, plus the distance from there
-  float far;   // that, and the margin of this frame
-  float from;  // travelled up to the anchor, less that distance; clearances found here add to it
-};
-
-// The distance travelled at which a sphere or point with this clearance may touch. kSlack covers
-// the rounding to float. Half of x + |x| is max(x, 0) without a branch, which no processor could
-// foretell here.
-float expiry_of(const Way& way, float clearance) {
+// The way that a sphere's block must have travelled before the sphere may touch, if it has this
+// clearance now. kSlack covers the rounding to float. Half of x + |x| is max(x, 0) without a
+// branch, which no processor could foretell here.
+float expiry_of(float from, float clearance) {
   const float left = clearance - kSlack;
-  return way.from + 0.5f * (left + std::fabs(left));
+  return from + 0.5f * (left + std::fabs(left));
 }
 
-// Updates the distance travelled. It starts again from zero when it is too long for float, or when
-// nothing is known.
-Way travel(PairSearch& pair, Search& search) {
+// Updates the ways of the blocks: t.way_now is the distance that a block has travelled through the
+// field up to the anchor and from there, t.way_from the distance up to the anchor less that from
+// there. They do not grow while the shell moves to and fro around its anchor. They start again from
+// zero when they are too long for float, or when nothing is known. Lists in t.open_blocks the
+// blocks that may touch, and returns their number.
+std::size_t travel(PairSearch& pair, TraverseScratch& t, Search& search) {
   const Shell& shell = search.shell;
   Deformation* const bend = search.bend;
-  const auto anchor = [&] {
-    pair.anchor = search.place;
-    if (bend) std::copy_n(bend->bent, bend->modes, bend->anchor_bent);
-  };
-  double away = 0;
+  const double bends = bend ? bend->reach : 0, radius = (shell.radius + bends) * (1 + 1e-6);
+  kernels::Motion motion{};
   if (pair.travelled >= 0) {
-    const double radius = (shell.radius + (bend ? bend->reach : 0)) * (1 + 1e-6);
-    const double step = motion_bound(pair.last_place, search.place, radius) +
+    const double step = Change(pair.last_place, search.place).most(radius) +
                         (bend ? bending_bound(search, bend->last_bent) : 0);
     if (step < kSlowStep)
       search.near = search.margin + kNearest + static_cast<float>(kStepsNear * step);
-    away = motion_bound(pair.anchor, search.place, radius) +
-           (bend ? bending_bound(search, bend->anchor_bent) : 0);
-    if (!(away < kStays)) {
-      pair.travelled += away;
-      anchor();
-      away = 0;
-    }
+    const Change change(pair.anchor, search.place);
+    const double bent = bend ? bending_bound(search, bend->anchor_bent) : 0;
+    const double most = change.most(radius) + bent;
+    motion.settles = !(most < kStays);
+    if (motion.settles) pair.travelled += most;
+    motion.change = change.map;
+    motion.turn = static_cast<float>(change.turn);
+    motion.most = static_cast<float>(most);
+    // The motion of a block's centre is a sum of products, which may cancel.
+    motion.more = static_cast<float>(change.turn * bends + bent + kRounding * most);
   }
   if (!(pair.travelled >= 0 && pair.travelled < kLongestWay)) {
-    pair.travelled = away = 0;
-    anchor();
+    pair.travelled = 0;
+    motion = {};
+    motion.settles = true;
+    std::fill_n(pair.block_way, shell.blocks.x.count, 0.0f);
     std::fill_n(pair.group_expiry, shell.groups.count, 0.0f);
     std::fill_n(pair.near_rows, shell.groups.count, std::uint16_t{0});
     std::fill(pair.group_expiry + shell.groups.count, pair.group_expiry + 16 * shell.blocks.count,
@@ -298,9 +296,14 @@ Way travel(PairSearch& pair, Search& search) {
   }
   pair.last_place = search.place;
   if (bend) std::copy_n(bend->bent, bend->modes, bend->last_bent);
-  pair.now = pair.travelled + away;
-  const float now = static_cast<float>(pair.now);
-  return {now, now + search.margin, static_cast<float>(pair.travelled - away)};
+  if (motion.settles) {
+    pair.anchor = search.place;
+    if (bend) std::copy_n(bend->bent, bend->modes, bend->anchor_bent);
+  }
+  const Tier& blocks = shell.blocks;  // at rest; motion.more has what bending adds
+  return kernels::travel_blocks(
+      {blocks.x.data, blocks.y.data, blocks.z.data, blocks.radius.data, blocks.x.count}, motion,
+      pair.block_expiry, search.margin, pair.block_way, t.way_now, t.way_from, t.open_blocks);
 }
 
 // Samples some points of each group of `blocks` blocks, and bounds how deep the others may be.
@@ -334,7 +337,7 @@ std::size_t touch_coarsely(const Search& search, PairSearch& pair, TraverseScrat
 // Of the `count` groups in t.frontier, writes those that must be sampled to t.survivors. Groups
 // that were near when last sampled are always among them; for the others their spheres decide.
 std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search& search,
-                             std::size_t count, const Way& way) {
+                             std::size_t count) {
   std::size_t near = 0, far = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t g = t.frontier[k];
@@ -347,7 +350,8 @@ std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search&
   if (far > 0 && pair.cull_groups.worth(far)) {
     left = search.cull(search.groups(), t.far, far, t.far_survivors, t.clearance);
     for (std::size_t k = 0; k < far; ++k)
-      pair.group_expiry[t.far[k]] = expiry_of(way, t.clearance[k]);
+      pair.group_expiry[t.far[k]] =
+          expiry_of(t.way_from[t.far[k] / kernels::kBlock], t.clearance[k]);
     pair.cull_groups.learn(far, left);
     others = t.far_survivors;
   }
@@ -355,12 +359,13 @@ std::size_t find_near_groups(PairSearch& pair, TraverseScratch& t, const Search&
   return near + left;
 }
 
-// Chooses the points of each group that may touch after the distance `now`.
+// Chooses the points of each group that may touch.
 void choose_rows(const PairSearch& pair, TraverseScratch& t, const Search& search,
-                 std::size_t groups, float now) {
+                 std::size_t groups) {
   if (!(search.near > 0)) return;
   for (std::size_t k = 0; k < groups; ++k) {
     const std::uint32_t g = t.survivors[k];
+    const float now = t.way_now[g / kernels::kBlock] + search.margin;
     const bool some = pair.near_rows[g] != 0 && pair.rest_expiry[g] > now;
     t.rows[k] = some ? pair.near_rows[g] : kernels::kAllRows;
   }
@@ -376,14 +381,15 @@ std::size_t bits_of(unsigned rows) {
 
 // Notes when the sampled groups may touch again, and which of their points are near.
 void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& search,
-                 std::size_t groups, const Way& way) {
-  const auto until = [&](float distance) {
-    return expiry_of(way, kernels::cull_clearance(distance, search.reach));
+                 std::size_t groups) {
+  const auto until = [&](std::uint32_t g, float distance) {
+    return expiry_of(t.way_from[g / kernels::kBlock],
+                     kernels::cull_clearance(distance, search.reach));
   };
   if (!(search.near > 0)) {
     for (std::size_t k = 0; k < groups; ++k) {
       const std::uint32_t g = t.survivors[k];
-      pair.group_expiry[g] = until(t.clearance[k]);
+      pair.group_expiry[g] = until(g, t.clearance[k]);
       if (!(t.clearance[k] < kFarGroup))
         pair.near_rows[g] = 0;
       else if (pair.near_rows[g] == 0)
@@ -396,10 +402,10 @@ void note_groups(PairSearch& pair, const TraverseScratch& t, const Search& searc
     const std::uint32_t g = t.survivors[k];
     if (t.rows[k] == kernels::kAllRows) {
       pair.near_rows[g] = t.clearance[k] < kFarGroup ? t.near_rows[k] : 0;
-      pair.rest_expiry[g] = until(t.rest[k]);
+      pair.rest_expiry[g] = until(g, t.rest[k]);
     }
     near += bits_of(pair.near_rows[g]);
-    pair.group_expiry[g] = std::min(until(t.clearance[k]), pair.rest_expiry[g]);
+    pair.group_expiry[g] = std::min(until(g, t.clearance[k]), pair.rest_expiry[g]);
   }
   pair.pick_rows.learn(kGroupRows * groups, near);
 }
@@ -439,11 +445,13 @@ Screw ahead_of_shell(const Body& a, const Body& b, const PairSearch& pair) {
 }
 
 // After a traversal that found nothing: for how long the pair can be left out.
-void note_quiet(const Settings& set, const Body& a, const Body& b, PairSearch& pair) {
-  const float* const least =
-      std::min_element(pair.block_expiry, pair.block_expiry + a.shell->blocks.count);
+void note_quiet(const Settings& set, const Body& a, const Body& b, PairSearch& pair,
+                const TraverseScratch& t) {
+  float least = HUGE_VALF;
+  for (std::size_t k = 0; k < a.shell->blocks.count; ++k)
+    least = std::min(least, pair.block_expiry[k] - t.way_now[k]);
   const double margin = uses_series(set.contact) ? set.contact.margin_voxels : 0.0;
-  pair.quiet.begin(b.field->voxel * (*least - pair.now - margin - 2 * kSlack), a, b);
+  pair.quiet.begin(b.field->voxel * (least - margin - 2 * kSlack), a, b);
 }
 
 struct Found {
@@ -457,16 +465,15 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
   const Shell& shell = *a.shell;
   Anytime& anytime = *lane.anytime;
   Search search = search_of(set, a, b, pair.margin, lane.cold);
-  const Way way = travel(pair, search);
+  std::size_t blocks = travel(pair, t, search);
   const bool fast = !(search.near > 0);
   pair.sampled = 0;
   pair.missed = 0;
 
-  std::size_t blocks = kernels::expired(pair.block_expiry, nullptr, shell.blocks.x.count / 16,
-                                        way.far, t.open_blocks);
   if (blocks == 0) return {};
   const auto expired_groups = [&] {
-    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, way.far, t.frontier);
+    return kernels::expired(pair.group_expiry, t.open_blocks, blocks, t.way_now, search.margin,
+                            t.frontier);
   };
   std::size_t count = expired_groups();
   if (count > kFewGroups * blocks && pair.cull_blocks.worth(blocks)) {
@@ -474,7 +481,7 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
         search.cull(search.blocks(), t.open_blocks, blocks, t.survivors, t.clearance);
     pair.cull_blocks.learn(blocks, left);
     for (std::size_t k = 0; k < blocks; ++k)
-      pair.block_expiry[t.open_blocks[k]] = expiry_of(way, t.clearance[k]);
+      pair.block_expiry[t.open_blocks[k]] = expiry_of(t.way_from[t.open_blocks[k]], t.clearance[k]);
     std::copy_n(t.survivors, left, t.open_blocks);
     blocks = left;
     if (blocks == 0) return {};
@@ -494,9 +501,9 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
   search.keeps = search.reaches && !(set.contact.fit_offset > 0);
   if (search.reaches) {
     search.ahead = ahead_of_shell(a, b, pair);
-    count = search.loadable(pair.group_expiry, way.now, blocks, t);
+    count = search.loadable(pair.group_expiry, blocks, t);
   }
-  const std::size_t groups = find_near_groups(pair, t, search, count, way);
+  const std::size_t groups = find_near_groups(pair, t, search, count);
   if (lane.cold) prefetch_normals(shell, t, groups);
   if (!bends && must_be_coarse(anytime, pair, used, blocks, groups)) {
     pair.cull_groups.left_out = 0;
@@ -504,7 +511,7 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
     return coarsely();
   }
   if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
-  choose_rows(pair, t, search, groups, way.far);
+  choose_rows(pair, t, search, groups);
   search.cold = lane.cold || fast || groups > kCached;
   const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(search, t, lane, groups, used, shared);
@@ -514,7 +521,7 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
     return coarsely();
   }
   pair.sampled = groups;
-  note_groups(pair, t, search, groups, way);
+  note_groups(pair, t, search, groups);
   note_blocks();
   return {found, true, search.keeps};
 }
@@ -575,7 +582,7 @@ std::size_t traverse_pair(const Settings& set, const Body& a, const Body& b, Pai
   const Found all = search_pair(set, a, b, pair, t, lane, used, shared);
   std::size_t found = all.count;
   pair.quiet.way = 0;
-  if (found == 0 && pair.fit.count == 0 && !a.bend) note_quiet(set, a, b, pair);
+  if (found == 0 && pair.fit.count == 0 && !a.bend) note_quiet(set, a, b, pair, t);
   if (borrows) static_cast<SearchColumns&>(pair) = {};
   const kernels::Touching candidates = candidates_from(t, used);
   pair.fit.deepest = 0;

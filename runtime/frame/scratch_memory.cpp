@@ -24,6 +24,8 @@ void take_traversal(TraverseScratch& t, Arena& arena, const ScratchRoom& room) {
   t.far = arena.take<std::uint32_t>(room.groups);
   t.far_survivors = arena.take<std::uint32_t>(room.groups);
   t.open_blocks = arena.take<std::uint32_t>(room.blocks);
+  t.way_now = arena.take<float>(room.blocks);
+  t.way_from = arena.take<float>(room.blocks);
   t.clearance = arena.take<float>(room.groups);
   t.rest = arena.take<float>(room.groups);
   t.reach = arena.take<float>(room.groups);
@@ -90,6 +92,7 @@ void lay_out_scratch(Scratch& scratch, Arena& arena, const ScratchRoom& room, bo
 
 SearchColumns take_search(Arena& arena, std::size_t groups, std::size_t blocks) {
   SearchColumns columns;
+  columns.block_way = arena.take<float>(blocks);
   columns.group_expiry = arena.take<float>(groups);
   columns.block_expiry = arena.take<float>(blocks);
   columns.near_rows = arena.take<std::uint16_t>(groups);

@@ -81,7 +81,8 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
   Random random(3);
   constexpr std::size_t kGroups = 400;
   std::vector<std::vector<float>> tier(4, std::vector<float>(kGroups)), bundle = tier;
-  std::vector<float> expiry(kGroups);
+  std::vector<float> expiry(kGroups), now(kGroups / 16);
+  for (float& w : now) w = float(random.uniform(8, 12));
   std::vector<std::uint32_t> blocks, rows;
   std::vector<bool> needed(kGroups);
   constexpr float kMost = 0.25f;
@@ -96,7 +97,7 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
     for (int k = 0; k < 3; ++k) bundle[k][g] = float(axis[k]);
     tier[3][g] = float(random.uniform(0, 0.004));
     bundle[3][g] = float(random.uniform(0, 0.3));
-    expiry[g] = float(random.uniform(9.7, 10.3));
+    expiry[g] = now[g / 16] + float(random.uniform(-0.3, 0.3));
     // Points anywhere in the sphere, with any normal of the bundle.
     for (int i = 0; i < 16; ++i) {
       float p[3], normal[3];
@@ -112,7 +113,7 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
                           way[1] + way[5] * p[0] - way[3] * p[2],
                           way[2] + way[3] * p[1] - way[4] * p[0]};
       const float back = normal[0] * q[0] + normal[1] * q[1] + normal[2] * q[2];
-      if (expiry[g] <= 10 + std::min(kMost, -back) - 1e-5f) needed[g] = true;
+      if (expiry[g] <= now[g / 16] + std::min(kMost, -back) - 1e-5f) needed[g] = true;
     }
   }
   const SpheresView spheres{tier[0].data(), tier[1].data(), tier[2].data(), tier[3].data(),
@@ -120,10 +121,11 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
   const BundlesView normals{bundle[0].data(), bundle[1].data(), bundle[2].data(), bundle[3].data()};
   std::vector<float> farthest(kGroups, -1);
   std::vector<std::uint32_t> want(rows.size());
-  want.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), 10, blocks.data(),
-                                  blocks.size(), farthest.data(), want.data()));
+  want.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), now.data(),
+                                  blocks.data(), blocks.size(), farthest.data(), want.data()));
   for (const std::uint32_t g : rows) {
-    if (needed[g] || expiry[g] <= 10) CHECK(std::find(want.begin(), want.end(), g) != want.end());
+    if (needed[g] || expiry[g] <= now[g / 16])
+      CHECK(std::find(want.begin(), want.end(), g) != want.end());
     CHECK(farthest[g] >= 0);
     CHECK(farthest[g] <= kMost);
   }
@@ -133,10 +135,10 @@ TEST_CASE("loadable_groups: a group is dropped only if each of its points can be
     for (std::size_t n = 0; n <= blocks.size(); ++n) {
       std::vector<std::uint32_t> got(16 * n), exact(16 * n);
       std::vector<float> reach(kGroups, -1), reach_ref = reach;
-      exact.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), 10,
+      exact.resize(loadable_groups_ref(spheres, normals, way, kMost, expiry.data(), now.data(),
                                        blocks.data(), n, reach_ref.data(), exact.data()));
-      got.resize(loadable_groups(spheres, normals, way, kMost, expiry.data(), 10, blocks.data(), n,
-                                 reach.data(), got.data()));
+      got.resize(loadable_groups(spheres, normals, way, kMost, expiry.data(), now.data(),
+                                 blocks.data(), n, reach.data(), got.data()));
       CHECK(got == exact);
       CHECK(reach == reach_ref);
     }

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "kernels/contact/expiry.h"
 #include "kernels/contact/touch_groups.h"
 #include "tests/kernels/field/analytic_field.h"
 #include "tests/kernels/kernel_test.h"
@@ -34,37 +33,6 @@ struct Learnt {
 };
 
 bool near(float a, float b) { return a == b || std::fabs(a - b) < 1e-3f; }
-
-}  // namespace
-
-TEST_CASE("expiry: SIMD finds the same indices and the same least values on every target") {
-  on_every_target([](const std::string&) {
-    Random random(1);
-    for (std::size_t blocks = 0; blocks <= 20; ++blocks) {
-      std::vector<float> values(16 * blocks + 1);  // + 1: data() of an empty vector may be null
-      for (float& v : values) v = float(random.uniform(0, 4));
-      for (std::size_t i = 0; i < values.size(); i += 5) values[i] = 2;  // exactly now: expired
-      std::vector<std::uint32_t> some;
-      for (std::uint32_t b = 0; b < blocks; b += 1 + random.below(3)) some.push_back(b);
-      for (const float now : {-1.0f, 2.0f, 5.0f}) {
-        std::vector<std::uint32_t> got(16 * blocks + 1), want(16 * blocks + 1);
-        CHECK(expired(values.data(), nullptr, blocks, now, got.data()) ==
-              expired_ref(values.data(), nullptr, blocks, now, want.data()));
-        std::size_t n = expired_ref(values.data(), nullptr, blocks, now, want.data());
-        CHECK(std::equal(want.begin(), want.begin() + n, got.begin()));
-        n = expired_ref(values.data(), some.data(), some.size(), now, want.data());
-        CHECK(expired(values.data(), some.data(), some.size(), now, got.data()) == n);
-        CHECK(std::equal(want.begin(), want.begin() + n, got.begin()));
-      }
-      std::vector<float> got(blocks + 1, -7), want(blocks + 1, -7);
-      least_of_blocks(values.data(), some.data(), some.size(), got.data());
-      least_of_blocks_ref(values.data(), some.data(), some.size(), want.data());
-      CHECK(got == want);
-    }
-  });
-}
-
-namespace {
 
 // Points in `field`, by the kernel and by its reference.
 void touch_alike(const AnalyticField& field) {
