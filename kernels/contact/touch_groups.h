@@ -25,6 +25,9 @@ struct GroupLook {
   float near;  // [voxel]
   // reach[g]: the limit of the points of group g, at most `limit`; null: `limit` for all.
   const float* reach = nullptr;
+  // Without `rows`: where points of bricks and of far cells are mixed, `least` may be less than the
+  // smallest distance, but not less than the field's band. It is a bound that is found sooner.
+  bool roughly = false;
 };
 inline constexpr std::uint16_t kAllRows = 0xffff;
 inline constexpr float kNearLeast = 3;

@@ -152,7 +152,7 @@ struct Search {
         field, place, {x.data, y.data, z.data, shell.points}, t.survivors + first, count, margin,
         cold,
         {near > 0 ? t.rows + first : nullptr, t.clearance + first, t.near_rows + first,
-         t.rest + first, near, reaches ? t.reach : nullptr},
+         t.rest + first, near, reaches ? t.reach : nullptr, true},
         out);
     return keeps ? keep_loadable(out, found) : found;
   }

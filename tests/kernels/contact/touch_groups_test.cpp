@@ -100,6 +100,48 @@ TEST_CASE("touch_groups: SIMD finds the same points where cells have finer sampl
   touch_alike(AnalyticField(16, 17, 18, clutter, 3.0, 0.001, 1.0, scattered_cut));
 }
 
+TEST_CASE("touch_groups: a rough least distance is a bound, and the same points touch") {
+  const AnalyticField field(16, 17, 18, clutter);
+  constexpr std::size_t kGroups = 600;
+  Random random(4);
+  std::vector<float> column[3];
+  std::vector<std::uint32_t> list;
+  for (std::uint32_t g = 0; g < kGroups; ++g) {
+    const double centre[3] = {random.uniform(0, 127), random.uniform(0, 135),
+                              random.uniform(0, 143)};
+    list.push_back(g);
+    for (int i = 0; i < 16; ++i)
+      for (int k = 0; k < 3; ++k) column[k].push_back(float(centre[k] + random.uniform(-3, 3)));
+  }
+  const PointsView points{column[0].data(), column[1].data(), column[2].data(), 16 * kGroups};
+  on_every_target([&](const std::string& target) {
+    for (const float limit : {0.0f, 0.5f, 8.0f}) {  // 8: beyond the band
+      Hits got(16 * kGroups), want(16 * kGroups);
+      std::vector<float> least(kGroups), exact(kGroups);
+      const std::size_t n =
+          touch_groups_ref(field.view(), kIdentity, points, list.data(), kGroups, limit, false,
+                           {nullptr, exact.data(), nullptr, nullptr, 0}, want.columns());
+      REQUIRE(touch_groups(field.view(), kIdentity, points, list.data(), kGroups, limit, true,
+                           {nullptr, least.data(), nullptr, nullptr, 0, nullptr, true},
+                           got.columns()) == n);
+      CHECK(n > kGroups / 2);
+      for (std::size_t i = 0; i < n; ++i) {
+        CHECK(got.row[i] == want.row[i]);
+        CHECK(std::fabs(got.d[i] - want.d[i]) < 1e-3f);
+      }
+      std::size_t rough = 0;
+      for (std::size_t k = 0; k < kGroups; ++k) {
+        if (near(least[k], exact[k])) continue;
+        ++rough;
+        CHECK(least[k] < exact[k]);
+        CHECK(least[k] >= field.view().band);
+      }
+      if (target != "SCALAR") CHECK(rough > 10);  // a vector of one point is never mixed
+      CHECK(rough < kGroups / 2);
+    }
+  });
+}
+
 TEST_CASE("make_contacts: SIMD agrees with the reference on every target and count") {
   on_every_target([](const std::string&) {
     Random random(8);
