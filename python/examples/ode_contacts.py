@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ode_contacts.py - another simulator's penalty contacts: a plate of 0.1 kg falls onto tiles in the
-Open Dynamics Engine. Each contact with the full stiffness throws it; weighed, it stays. The C example
-of this name has triangles, for which Debian's python3-pyode is not built."""
+"""ode_contacts.py - another simulator's penalty contacts: a plate of 0.1 kg falls onto boxes in the Open Dynamics
+Engine. Unlike here, it falls onto triangles in the C example of this name: Debian's python3-pyode is built without
+them. Each contact with the full stiffness throws it; weighed, it stays."""
 import numpy as np
 import ode
 
