@@ -17,9 +17,9 @@ fi
 cd "$WORK"
 # used FOLDER: the package in it, and no other hapsix, drives the engine.
 used() {
-  PYTHONPATH=$1 $python "$SOURCE/python/examples/hello.py" >"$WORK/said" || fail "hello.py"
+  PYTHONPATH=$1 $python "$SOURCE/python/examples/run_scene.py" >"$WORK/said" || fail "run_scene.py"
   PYTHONPATH=$1 $python -c "import hapsix; assert hapsix.__file__.startswith('$1')" || fail "another hapsix"
-  grep -E '^[0-9]+ frames, at most 0\.[0-9]+ voxels deep' "$WORK/said" >/dev/null || fail "hello.py says: $(cat "$WORK/said")"
+  grep -E '^[0-9]+ frames, at most 0\.[0-9]+ voxels deep' "$WORK/said" >/dev/null || fail "run_scene.py says: $(cat "$WORK/said")"
 }
 used "$WORK/site"
 

@@ -559,6 +559,30 @@ class Imports(unittest.TestCase):
         self.assertIn("another version of Python", said.stderr.splitlines()[-1])
 
 
+class Examples(unittest.TestCase):
+    @staticmethod
+    def names(folder, ending):
+        found = os.listdir(os.path.join(SOURCE, folder))
+        return {name[:-len(ending)] for name in found if name.endswith(ending)}
+
+    def test_each_example_in_c_has_a_twin_of_its_name_that_ctest_runs(self):
+        in_c = self.names("runtime/examples", ".c") | self.names("io/examples", ".c")
+        self.assertGreater(len(in_c), 7)
+        twins = self.names("python/examples", ".py")
+        self.assertEqual(in_c - twins, set())
+        with open(os.path.join(SOURCE, "tests/CMakeLists.txt")) as file:
+            run = file.read()
+        for name in twins:
+            self.assertIn(f"h6_python_test(python.examples.{name} python/examples/{name}.py ", run)
+
+    def test_an_example_has_at_most_60_lines_and_begins_with_what_it_shows(self):
+        for name in self.names("python/examples", ".py"):
+            with open(os.path.join(SOURCE, f"python/examples/{name}.py")) as file:
+                lines = file.read().splitlines()
+            self.assertLessEqual(len(lines), 60, name)
+            self.assertTrue(lines[1].startswith(f'"""{name}.py - '), name)
+
+
 class Stubs(unittest.TestCase):
     def test_the_stubs_say_what_the_module_has(self):
         made = subprocess.run([sys.executable, os.path.join(SOURCE, "python/stubs.py")], capture_output=True,
