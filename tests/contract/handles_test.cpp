@@ -16,9 +16,8 @@
 #include <vector>
 
 #include "hapsix/batch.h"
-#include "hapsix/io.h"
-// After batch.h and io.h, for their handles.
 #include "hapsix/hapsix.hpp"
+#include "hapsix/io.h"
 #include "runtime/examples/floor.h"
 
 namespace {

@@ -2,8 +2,12 @@
 // hapsix.hpp - the contract for C++17 and later: handles that destroy themselves, and spans.
 //
 // There is no second meaning of anything: a handle is a C pointer that is destroyed in its
-// destructor, and it converts to that pointer, so every function of hapsix.h (and of batch.h and io.h,
-// where they are included first) takes it. A handle that cannot be made throws hapsix::Error.
+// destructor, and it converts to that pointer, so every function of hapsix.h, batch.h and io.h takes it.
+// A handle that cannot be made throws hapsix::Error.
+//
+// All handles are here, in whatever order headers are included, since formatters sort them. The handles
+// of io.h need no io.h: it is another library's, and a program that does not link that one leaves them
+// alone.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +22,24 @@
 #include <utility>
 #endif
 
+#include "batch.h"
 #include "hapsix.h"
+
+extern "C" {
+// What io.h declares, too.
+typedef struct h6Mesh h6Mesh;
+typedef struct h6Field h6Field;
+typedef struct h6Shell h6Shell;
+typedef struct h6Scene h6Scene;
+typedef struct h6Recorder h6Recorder;
+typedef struct h6Recording h6Recording;
+H6_API void h6DestroyMesh(h6Mesh* mesh);
+H6_API void h6DestroyField(h6Field* field);
+H6_API void h6DestroyShell(h6Shell* shell);
+H6_API void h6DestroyScene(h6Scene* scene);
+H6_API void h6DestroyRecorder(h6Recorder* recorder);
+H6_API void h6DestroyRecording(h6Recording* recording);
+}
 
 namespace hapsix {
 
@@ -144,17 +165,14 @@ inline span<const h6FrameRecord> read_records(h6Loop* loop, span<h6FrameRecord> 
   return room.first(h6ReadRecords(loop, room.data(), room.size()));
 }
 
-#ifdef HAPSIX_BATCH_H
 using Workers = Handle<h6Workers, h6DestroyWorkers>;
-#endif
 
-#ifdef HAPSIX_IO_H
+// Of the library hapsix::io.
 using Mesh = Handle<h6Mesh, h6DestroyMesh>;
 using Field = Handle<h6Field, h6DestroyField>;
 using Shell = Handle<h6Shell, h6DestroyShell>;
 using Scene = Handle<h6Scene, h6DestroyScene>;
 using Recorder = Handle<h6Recorder, h6DestroyRecorder>;
 using Recording = Handle<h6Recording, h6DestroyRecording>;
-#endif
 
 }  // namespace hapsix
