@@ -13,7 +13,9 @@ headers() { mkdir -p "$1/hapsix"; cp "$SOURCE"/runtime/include/hapsix/{base,batc
 # library DIR: a library that has every function of the headers in DIR, with debug information. The real
 # one has none, and its types are those of the headers.
 library() {
-  { printf '#include <hapsix/%s.h>\n' batch io
+  { for header in "$1"/hapsix/*.h; do echo "#include <hapsix/$(basename "$header")>"; done
+    # A plug-in has this one, not the library: with it, the structs of plug-ins are compared, too.
+    printf 'const h6DevicePluginV1 h6_device_plugin_v1;\n'
     cat "$1"/hapsix/*.h | tr '\n' ' ' | grep -oE 'H6_API [^;{}]*\([^;{}]*\);' | sed 's/;$/ { __builtin_trap(); }/'; } >"$1/all.c"
   gcc -g -std=c99 -shared -fPIC -w -I "$1" -o "$1/all.so" "$1/all.c"
 }
@@ -37,11 +39,13 @@ headers "$WORK/removed"; changed "$WORK/removed" types.h '/bool       translatio
 same "$WORK/removed" && fail "a removed member passes"
 headers "$WORK/moved"; changed "$WORK/moved" types.h 's/^  double     mass;  /  float      mass;  /'
 same "$WORK/moved" && fail "a member of another type passes"
+headers "$WORK/unplugged"; changed "$WORK/unplugged" device_plugin.h '/  uint32_t cause;/d'
+same "$WORK/unplugged" && fail "a removed member of a plug-in's struct passes"
 headers "$WORK/gone"; changed "$WORK/gone" hapsix.h '/H6_API double          h6GetVoxel/d; /H6_API double *h6GetVoxel/d'
 same "$WORK/gone" && fail "a removed function passes"
 headers "$WORK/longer"; changed "$WORK/longer" hapsix.h 's/^} h6LoopDef;/  double more; } h6LoopDef;/'
 same "$WORK/longer" && fail "a larger definition passes"
-for broken in removed moved gone longer; do safe "$WORK/$broken" && fail "--update takes $broken"; done
+for broken in removed moved unplugged gone longer; do safe "$WORK/$broken" && fail "--update takes $broken"; done
 headers "$WORK/added"; changed "$WORK/added" hapsix.h 's/^H6_API h6LoopDef h6DefaultLoopDef/H6_API int h6NewFunction(int a);\n&/'
 same "$WORK/added" || { cat "$WORK/said" >&2; fail "an added function does not pass"; }
 headers "$WORK/used"; changed "$WORK/used" hapsix.h '/size_t   view_contacts;/,/} h6LoopDef;/ s/^  uint64_t reserved\[8\];/  double more; uint64_t reserved[7];/'
