@@ -106,6 +106,7 @@ h6HandDef h6DefaultHandDef(void) {
   def.coupling = h6DefaultCouplingDef();
   return def;
 }
+h6HandFilterDef h6DefaultHandFilterDef(void) { return h6DefaultHandDef().filter; }
 h6SessionDef h6DefaultSessionDef(void) {
   h6SessionDef def = h6::default_def<h6SessionDef>(h6::session_settings());
   def.contact = h6DefaultContactDef();

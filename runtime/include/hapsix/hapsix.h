@@ -48,7 +48,8 @@ H6_API h6BodyDef     h6DefaultBodyDef(void);    /* at the origin, at rest, 0.1 k
 H6_API h6ContactDef  h6DefaultContactDef(void); /* firm, k derived from the part, beta 1e-3 s        */
 H6_API h6CouplingDef h6DefaultCouplingDef(void);/* 1e3 N/m, critically damped, half a voxel          */
 H6_API h6SafetyDef   h6DefaultSafetyDef(void);  /* the device's ratings, soft start of 0.1 s         */
-H6_API h6HandDef     h6DefaultHandDef(void);
+H6_API h6HandFilterDef h6DefaultHandFilterDef(void); /* passes everything: scales 1, no clutch       */
+H6_API h6HandDef     h6DefaultHandDef(void);    /* body 0, impedance, that filter and that coupling   */
 H6_API h6SessionDef  h6DefaultSessionDef(void); /* implicit, 1000 Hz, 16384 contacts, 1 thread       */
 
 /* The weights as a function, without scene or session, for any penalty simulator. With w from
