@@ -65,12 +65,40 @@ TEST_CASE("handles let go of what they hold, also after a move") {
     REQUIRE(touching.size() == 1);
     CHECK(touching.depth()[0] > 0);
     CHECK(touching.normal(0).z == doctest::Approx(1));
+    CHECK(touching.gradient(0).z == doctest::Approx(1));
+    CHECK(touching.torque_direction(0).z == 0);  // the push turns nothing about its own axis
     CHECK(touching.point()[0] == 0);
     CHECK(touching.field_body()[0] == 0);
     CHECK(hapsix::overlaps(moved).empty());
     CHECK(hapsix::contacts(moved, 7).size() == 0);
   }
   CHECK(heap.bytes == 0);
+}
+
+TEST_CASE("each accessor of contacts shows a column of its own, in every row") {
+  h6Contacts c{};
+  const float** const to[15] = {&c.depth, &c.nx, &c.ny, &c.nz, &c.gx, &c.gy,     &c.gz,  &c.rx,
+                                &c.ry,    &c.rz, &c.tx, &c.ty, &c.tz, &c.weight, &c.load};
+  float r[15][2];
+  for (int column = 0; column < 15; ++column) {
+    for (int i = 0; i < 2; ++i) r[column][i] = static_cast<float>(10 * column + i);
+    *to[column] = r[column];
+  }
+  const std::uint32_t point[2] = {7, 8};
+  const std::int32_t field_body[2] = {5, 6};
+  c.count = 2, c.point = point, c.field_body = field_body;
+  const hapsix::Contacts all(c);
+  REQUIRE(all.size() == 2);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto shows = [&](h6Vec3 row, int first) {
+      return row.x == r[first][i] && row.y == r[first + 1][i] && row.z == r[first + 2][i];
+    };
+    CHECK((all.depth()[i] == r[0][i] && all.weight()[i] == r[13][i] && all.load()[i] == r[14][i]));
+    CHECK((shows(all.normal(i), 1) && shows(all.gradient(i), 4)));
+    CHECK((shows(all.arm(i), 7) && shows(all.torque_direction(i), 10)));
+    CHECK((all.point()[i] == point[i] && all.field_body()[i] == field_body[i]));
+  }
+  CHECK(all.column(all.columns.tz)[1] == r[12][1]);
 }
 
 TEST_CASE("a handle that cannot be made throws the sentence and the code") {

@@ -146,8 +146,12 @@ struct Contacts {
   span<const float> load() const { return column(columns.load); }
   span<const std::uint32_t> point() const { return {columns.point, columns.count}; }
   span<const std::int32_t> field_body() const { return {columns.field_body, columns.count}; }
+  // Of row i: the inward unit normal, the field's unit gradient outward, the arm from the centre of mass
+  // [m] and the torque direction. World frame. The columns themselves: column(columns.gx), ...
   h6Vec3 normal(std::size_t i) const { return {columns.nx[i], columns.ny[i], columns.nz[i]}; }
+  h6Vec3 gradient(std::size_t i) const { return {columns.gx[i], columns.gy[i], columns.gz[i]}; }
   h6Vec3 arm(std::size_t i) const { return {columns.rx[i], columns.ry[i], columns.rz[i]}; }
+  h6Vec3 torque_direction(std::size_t i) const { return {columns.tx[i], columns.ty[i], columns.tz[i]}; }
   h6Contacts columns;
 };
 inline Contacts contacts(const h6Session* session, std::int32_t shell_body) {
