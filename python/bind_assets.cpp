@@ -406,8 +406,10 @@ void add_models(py::module_& m) {
       .def(
           "stiffness_for",
           [](const PyModel& model, const Definition& definition) {
-            return definition.with(
-                [&](const h6SessionDef& def) { return h6StiffnessFor(model.get(), &def); });
+            return definition.with([&](const h6SessionDef& def) {  // a copy, which no one changes
+              py::gil_scoped_release release;
+              return h6StiffnessFor(model.get(), &def);
+            });
           },
           py::arg("definition"),
           "The contact stiffness that such a session has [N/m]; 0: not valid.");

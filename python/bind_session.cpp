@@ -68,8 +68,11 @@ void add_contacts(py::module_& m) {
           "names",
           [](const P& p) {
             py::array_t<std::int32_t> part(p.c.count), triangle(p.c.count);
-            h6NameContacts(p.session->session, p.body, part.mutable_data(),
-                           triangle.mutable_data());
+            std::int32_t *parts = part.mutable_data(), *triangles = triangle.mutable_data();
+            {
+              py::gil_scoped_release release;
+              h6NameContacts(p.session->session, p.body, parts, triangles);
+            }
             return py::make_tuple(part, triangle);
           },
           "part (n,), triangle (n,) int32 of the field's mesh that each touches; -1: not known. "

@@ -338,6 +338,13 @@ class Many(unittest.TestCase):
         poses = np.tile(session.pose, (30000, 1, 1))
         self.assert_others_run(lambda: poses, session.follow)
 
+    def test_other_python_threads_run_while_contacts_are_named_and_a_stiffness_is_derived(self):
+        contacts, definition = pressed().contacts(1), SCENE.definition()
+        self.assertGreater(len(contacts), 100)
+        # One call takes microseconds, too few for another thread to wake: many calls, none of which waits.
+        self.assert_others_run(lambda: range(3000), lambda times: [contacts.names() for _ in times])
+        self.assert_others_run(lambda: range(3000), lambda times: [SCENE.model.stiffness_for(definition) for _ in times])
+
     def test_other_python_threads_run_while_a_batch_or_recording_is_destroyed(self):
         definition = SCENE.definition()
         definition.max_contacts = 1000
