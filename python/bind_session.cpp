@@ -97,7 +97,9 @@ auto rows(T Row::*member, std::array<Row, H6_MAX_HANDS> PySession::*of, bool wri
 
 h6Status step(PySession& s) {
   py::gil_scoped_release release;
-  return h6Step(s.session, s.samples.data(), s.commands.data());
+  const h6Status status = h6Step(s.session, s.samples.data(), s.commands.data());
+  s.show();
+  return status;
 }
 
 // Numbers of a sample that a call gives: (hands, n), or (n,) for one hand.
@@ -149,6 +151,7 @@ py::array follow(PySession& s, const Rows<double>& poses) {
     h6Step(s.session, s.samples.data(), s.commands.data());
     h6GetRecord(s.session, s.samples.data(), s.commands.data(), &to[i]);
   }
+  s.show();
   return out;
 }
 
@@ -195,6 +198,20 @@ py::array frame_of(const PySession& s) {
   return row.attr("reshape")(py::tuple(0));
 }
 
+py::array report_of(const SessionPtr& s) {
+  s->shows_report = true;
+  s->show();
+  return view(&s->report, {}, {}, py::cast(s));
+}
+
+py::array states_of(const SessionPtr& s) {
+  s->shows_states = true;
+  s->show();
+  return view(reinterpret_cast<const double*>(s->states.data()),
+              {static_cast<py::ssize_t>(s->bodies), 13}, {sizeof(h6BodyState), sizeof(double)},
+              py::cast(s));
+}
+
 py::array overlaps_of(const PySession& s) {
   const auto made = overlaps(s.session);
   py::array_t<h6Overlap> out(made.size());
@@ -233,15 +250,26 @@ void add_steps(py::class_<PySession, SessionPtr>& c) {
 
 void add_state(py::class_<PySession, SessionPtr>& c) {
   using S = PySession;
-  c.def("body", &body_of, py::arg("body"), "(13,) pose (7) and velocity (6) of a body; a copy")
+  c.def("body", &body_of, py::arg("body"),
+        "(13,) pose (7) and velocity (6) of a body; a copy, to be kept. `states` is a view.")
       .def("deformation", &deformation_of, py::arg("body"),
-           "(r,) coordinates q of a body whose shell bends [m sqrt(kg)], a copy; (0,) of others")
+           "(r,) coordinates q of a body whose shell bends [m sqrt(kg)], (0,) of others; a copy, "
+           "since it is small")
+      .def_property_readonly(
+          "states", &states_of,
+          "(bodies, 13) pose (7) and velocity (6) of each body after the last step: a view, which "
+          "shows the next step, too. Once it was taken, each step takes the time to fill it.")
+      .def_property_readonly(
+          "report", &report_of,
+          "The last frame's report, a structured scalar with the members of `frame`: a view, which "
+          "shows the next step, too. Take it once, before the loop.")
       .def(
           "set_body",
           [](S& s, std::int32_t body, const Numbers<h6Pose>& pose,
              const Numbers<h6Velocity>& velocity) {
             const h6BodyState state{struct_of<h6Pose>(pose), struct_of<h6Velocity>(velocity)};
             h6SetBody(s.session, body_at(s, body), &state);
+            s.show();
           },
           py::arg("body"), py::arg("pose"), py::arg("velocity") = Numbers<h6Velocity>{},
           "Teleports a body; an overlap that it makes pushes in full.")
@@ -253,14 +281,18 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
           py::arg("body"), "Contacts of a shell body in the last frame, as views.")
       .def_property_readonly("frame", &frame_of,
                              "The last frame's report, a structured scalar: frame['contacts'], "
-                             "['max_depth'] [m], ['frame_us'], ['state_hash'], ...; a copy")
-      .def_property_readonly("overlaps", &overlaps_of, "Overlaps at the start, a structured array")
+                             "['max_depth'] [m], ['frame_us'], ['state_hash'], ...; a copy, to be "
+                             "kept. `report` is a view.")
+      .def_property_readonly("overlaps", &overlaps_of,
+                             "Overlaps at the start, a structured array; a copy, since there are "
+                             "few and a step changes none")
       .def(
           "restart_fit",
           [](S& s) {
             py::gil_scoped_release release;
             h6Error error{};
             if (!h6RestartFit(s.session, &error)) throw Error(error);
+            s.show();
           },
           "Makes the present poses a new start.")
       .def(
@@ -294,6 +326,7 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
 SessionPtr make_session(std::shared_ptr<PyModel> model, const Definition& of) {
   auto made = std::make_shared<PySession>();
   made->hands = of.hands.size(), made->bodies = of.bodies.size(), made->rate = of.def.rate;
+  made->states.resize(made->bodies);
   for (h6DeviceSample& sample : made->samples) sample = h6DefaultDeviceSample();
   for (std::size_t h = 0; h < made->hands && h < H6_MAX_HANDS; ++h)
     if (const auto body = static_cast<std::size_t>(of.hands[h]->body); body < of.bodies.size())

@@ -162,6 +162,15 @@ struct PySession {
   double rate = 0;
   std::array<h6DeviceSample, H6_MAX_HANDS> samples;
   std::array<h6DeviceCommand, H6_MAX_HANDS> commands{};
+  // What views show, from the first time that one is taken.
+  h6FrameReport report{};
+  std::vector<h6BodyState> states;
+  bool shows_report = false, shows_states = false;
+  void show() {
+    if (shows_report) report = h6GetFrame(session);
+    for (std::size_t b = 0; shows_states && b < bodies; ++b)
+      states[b] = h6GetBody(session, static_cast<std::int32_t>(b));
+  }
 };
 std::shared_ptr<PySession> make_session(std::shared_ptr<PyModel> model, const Definition& of);
 

@@ -441,7 +441,8 @@ class Session:
     def bodies(self) -> int:
         """how many there are"""
     def body(self, body: int) -> NDArray[Any]:
-        """(13,) pose (7) and velocity (6) of a body; a copy"""
+        """(13,) pose (7) and velocity (6) of a body; a copy, to be kept. `states` is a
+        view."""
     @property
     def buttons(self) -> NDArray[Any]:
         """(hands,)"""
@@ -459,8 +460,8 @@ class Session:
     def coupling(self, hand: int) -> Coupling:
         """The Coupling in use, with derived values."""
     def deformation(self, body: int) -> NDArray[Any]:
-        """(r,) coordinates q of a body whose shell bends [m sqrt(kg)], a copy; (0,) of
-        others"""
+        """(r,) coordinates q of a body whose shell bends [m sqrt(kg)], (0,) of others; a
+        copy, since it is small"""
     def disarm(self) -> None:
         """Lets every output decay to zero."""
     def follow(self, poses: ArrayLike) -> NDArray[Any]:
@@ -469,7 +470,7 @@ class Session:
     @property
     def frame(self) -> NDArray[Any]:
         """The last frame's report, a structured scalar: frame['contacts'], ['max_depth']
-        [m], ['frame_us'], ['state_hash'], ...; a copy"""
+        [m], ['frame_us'], ['state_hash'], ...; a copy, to be kept. `report` is a view."""
     @property
     def hands(self) -> int:
         """how many there are"""
@@ -480,19 +481,29 @@ class Session:
         """From the last commands to the next [s], for a loop in real time."""
     @property
     def overlaps(self) -> NDArray[Any]:
-        """Overlaps at the start, a structured array"""
+        """Overlaps at the start, a structured array; a copy, since there are few and a
+        step changes none"""
     @property
     def pose(self) -> NDArray[Any]:
         """(hands, 7) sample of each hand, to be written [m]"""
     @property
     def rate(self) -> float:
         """[Hz]"""
+    @property
+    def report(self) -> NDArray[Any]:
+        """The last frame's report, a structured scalar with the members of `frame`: a
+        view, which shows the next step, too. Take it once, before the loop."""
     def restart_fit(self) -> None:
         """Makes the present poses a new start."""
     def safety(self, hand: int) -> dict:
         """dict: state, fault, frames with each cause"""
     def set_body(self, body: int, pose: Sequence[float], velocity: Sequence[float] = ...) -> None:
         """Teleports a body; an overlap that it makes pushes in full."""
+    @property
+    def states(self) -> NDArray[Any]:
+        """(bodies, 13) pose (7) and velocity (6) of each body after the last step: a
+        view, which shows the next step, too. Once it was taken, each step takes the time
+        to fill it."""
     @overload
     def step(self) -> int:
         """One frame with what stands in `pose`, `velocity`, `wrench` and `buttons`;

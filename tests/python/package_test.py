@@ -78,6 +78,28 @@ class Sessions(unittest.TestCase):
         self.assertEqual(normal.shape, (len(contacts), 3))
         np.testing.assert_allclose(np.linalg.norm(session.contacts(1).normal, axis=1), 1, atol=1e-5)
 
+    def test_views_of_bodies_and_of_the_frame_show_each_step_and_copies_keep_theirs(self):
+        session = pressed()
+        report, states, frame, body = session.report, session.states, session.frame, session.body(1)
+        for array in (report, states):
+            self.assertIsNotNone(array.base)
+            self.assertFalse(array.flags.writeable)
+        self.assertEqual((states.shape, report.shape), ((session.bodies, 13), ()))
+        poses = np.array([[SCENE.path(0, 1e-3 * i)[0]] for i in range(670, 680)])
+        for work in (lambda: session.step(*SCENE.path(0, 0.67)), lambda: session.follow(poses),
+                     lambda: session.set_body(1, (1e-3, 0, 5e-3, 1, 0, 0, 0))):
+            before = states.copy()
+            work()
+            self.assertFalse(np.array_equal(states[1], before[1]))
+            for i in range(session.bodies):
+                np.testing.assert_array_equal(states[i], session.body(i))
+            self.assertEqual(report, session.frame)
+        self.assertTrue(np.shares_memory(states, session.states) and np.shares_memory(report, session.report))
+        self.assertEqual(int(report["frame"]), int(frame["frame"]) + 11)
+        self.assertFalse(np.array_equal(states[1], body))
+        del session
+        self.assertGreater(report["frame"], 0)
+
     def test_a_view_outlives_its_session(self):
         session = pressed(frames=200)
         depth, expected = session.contacts(1).depth, session.contacts(1).depth.copy()
