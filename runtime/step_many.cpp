@@ -6,7 +6,6 @@
 #include <atomic>
 #include <exception>
 #include <iterator>
-#include <vector>
 
 #include "hapsix/batch.h"
 #include "runtime/frame/session.h"
@@ -21,8 +20,8 @@ namespace {
 bool whole(const h6StepArrays& a) {
   const auto unknown = [](std::uint64_t word) { return word != 0; };
   constexpr std::size_t most = SIZE_MAX / sizeof(h6Session*);  // that an array can hold
-  return (a.sessions || a.count == 0) && a.count <= most && a.hands <= H6_MAX_HANDS && a.steps > 0 &&
-         (a.pose || a.hands == 0 || a.count == 0) &&
+  return (a.sessions || a.count == 0) && a.count <= most && a.hands <= H6_MAX_HANDS &&
+         a.steps > 0 && (a.pose || a.hands == 0 || a.count == 0) &&
          std::none_of(std::begin(a.reserved), std::end(a.reserved), unknown);
 }
 
@@ -118,7 +117,7 @@ h6Status step_all(h6Workers& workers, const h6StepArrays& a) {
 
 bool make_room(h6Workers& workers, const ScratchRoom& room, h6Error* error) {
   const ScratchRoom next = either(workers.room, room);
-  std::vector<Scratch> scratch(workers.scratch.size());
+  sched::HostVector<Scratch> scratch(workers.scratch.size());
   const auto lay_out = [&](Arena& arena) {
     for (Scratch& one : scratch) lay_out_scratch(one, arena, next, true);
     return arena.used();
@@ -161,15 +160,24 @@ h6Workers* h6CreateWorkers(const h6WorkersDef* def, h6Error* error) {
     return fail(error, H6_ERROR_RANGE, "workers threads is %u: 1 to %u, or 0 for one a core",
                 used.threads, sched::FrameTeam::kMostThreads),
            nullptr;
-  const unsigned cores = std::min(sched::machine_threads(), sched::FrameTeam::kMostThreads);
+  const unsigned threads = used.threads
+                               ? used.threads
+                               : std::min(sched::machine_threads(), sched::FrameTeam::kMostThreads);
+  const sched::HostScope scope(used.allocator);
   try {
-    return new h6Workers(used.threads ? used.threads : cores, used);
+    h6Workers* const workers = create<h6Workers>(used.allocator, threads, used);
+    if (!workers) fail(error, H6_ERROR_MEMORY, "no memory for workers");
+    return workers;
+  } catch (const std::bad_alloc&) {
+    return fail(error, H6_ERROR_MEMORY, "no memory for workers"), nullptr;
   } catch (const std::exception& e) {  // from threads
     return fail(error, H6_ERROR_SYSTEM, "the workers could not be made: %s", e.what()), nullptr;
   }
 }
 
-void h6DestroyWorkers(h6Workers* workers) { delete workers; }
+void h6DestroyWorkers(h6Workers* workers) {
+  if (workers) destroy(h6Allocator(workers->allocator), workers);
+}
 
 uint32_t h6WorkerThreads(const h6Workers* workers) { return workers ? workers->team.threads() : 0; }
 

@@ -75,8 +75,9 @@ struct FrameTeam::Job {
   std::uint32_t number = 0;
   // A helper writes its own before it counts a slice as done; read and cleared between jobs.
   struct alignas(64) Helped : HelperWork {};
-  std::unique_ptr<Helped[]> helped;  // (threads)
+  HostVector<Helped> helped;  // (threads)
 
+  explicit Job(unsigned threads) : helped(threads) {}
   static std::uint64_t ticket_of(std::uint32_t number, std::size_t slices) {
     return std::uint64_t{number} << 32 | std::uint64_t{slices} << 16;
   }
@@ -203,14 +204,16 @@ struct FrameTeam::Lent {
 FrameTeam::FrameTeam(unsigned threads, const h6Tasks& tasks)
     : threads_(std::clamp(threads, 1u, kMostThreads)) {
   if (threads_ < 2) return;
-  job_ = std::make_shared<Job>();
-  job_->helped = std::make_unique<Job::Helped[]>(threads_);
   const unsigned helpers = threads_ - 1;
   if (tasks.enqueue && tasks.finish) {
-    lent_ = std::make_unique<Lent[]>(helpers);
+    job_ = std::allocate_shared<Job>(HostMemory<Job>(), threads_);
+    lent_.resize(helpers);
     for (unsigned i = 0; i < helpers; ++i) lent_[i] = {job_.get(), tasks, i + 1, nullptr, {}};
     return;
   }
+  // A thread of TBB may hold the job when the team has ended, so it takes the heap.
+  const HostScope heap({});
+  job_ = std::make_shared<Job>(threads_);
   // TBB makes no more workers than the machine has cores, unless it is told.
   using Control = oneapi::tbb::global_control;
   if (threads_ > machine_threads())
@@ -256,7 +259,7 @@ void FrameTeam::begin_frame(std::int64_t now) {
   for (unsigned i = 0; i < threads_; ++i) job_->helped[i] = {};
   for (unsigned i = 0; resident_ && i + 1 < threads_; ++i) resident_[i]->begin_frame(now);
   job_->polling.store(true, std::memory_order_release);
-  for (unsigned i = 0; lent_ && i + 1 < threads_; ++i) lent_[i].begin_frame();
+  for (Lent& lent : lent_) lent.begin_frame();
 }
 
 FrameTeam::HelperWork FrameTeam::helper_work() const {
@@ -275,7 +278,7 @@ void FrameTeam::end_frame(std::int64_t next_frame_ns) {
   if (!job_) return;
   for (unsigned i = 0; resident_ && i + 1 < threads_; ++i) resident_[i]->end_frame(next_frame_ns);
   job_->polling.store(false, std::memory_order_release);
-  for (unsigned i = 0; lent_ && i + 1 < threads_; ++i) lent_[i].end_frame();
+  for (Lent& lent : lent_) lent.end_frame();
 }
 
 void FrameTeam::run(std::size_t slices, Slice work, void* context) {

@@ -14,6 +14,7 @@
 #include <type_traits>
 
 #include "hapsix/base.h"
+#include "sched/host_memory.h"
 
 namespace h6::sched {
 
@@ -22,6 +23,7 @@ class FrameTeam {
   // `threads` 1: no helper, everything runs on the caller. Else threads - 1 helpers, up to
   // kMostThreads in all: tasks of the program where `tasks` has callbacks.
   static constexpr unsigned kMostThreads = 64;
+  // With those, all memory of the team is of the caller's HostScope.
   explicit FrameTeam(unsigned threads, const h6Tasks& tasks = {});
   ~FrameTeam();
   FrameTeam(const FrameTeam&) = delete;
@@ -82,7 +84,7 @@ class FrameTeam {
   struct Lent;
   std::shared_ptr<Job> job_;  // shared with the helpers
   std::unique_ptr<std::shared_ptr<Resident>[]> resident_;
-  std::unique_ptr<Lent[]> lent_;
+  HostVector<Lent> lent_;
   std::shared_ptr<void> allowance_;
   unsigned threads_ = 1;
   Runner runner_ = nullptr;

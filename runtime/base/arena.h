@@ -44,7 +44,13 @@ inline void release(const h6Allocator& a, void* memory, std::size_t bytes) {
 template <class T, class... A>
 T* create(const h6Allocator& a, A&&... arguments) {
   void* memory = allocate(a, sizeof(T));
-  return memory ? new (memory) T(std::forward<A>(arguments)...) : nullptr;
+  if (!memory) return nullptr;
+  try {
+    return new (memory) T(std::forward<A>(arguments)...);
+  } catch (...) {
+    release(a, memory, sizeof(T));
+    throw;
+  }
 }
 template <class T>
 void destroy(const h6Allocator& a, T* object) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // body_boxes.cpp - the order of bodies, and upper boxes that follow the lower ones.
 #include "runtime/frame/body_boxes.h"
+#include "sched/host_memory.h"
 
 #include <algorithm>
 #include <new>
-#include <vector>
 
 namespace h6 {
 namespace {
@@ -48,12 +48,12 @@ void BodyBoxes::lay_out(Arena& arena, std::size_t bodies) {
 void BodyBoxes::fill(std::span<const Box> boxes, std::span<const bool> moves) {
   for (const std::span<Box> tier : {box_, middle_, upper_})
     for (Box& box : tier) new (&box) Box();
-  std::vector<Vec3> centre;
+  sched::HostVector<Vec3> centre;
   for (const Box& box : boxes)
     centre.push_back(box.empty() ? Vec3(Vec3::Zero()) : Vec3(0.5 * (box.low + box.high)));
   std::size_t row = 0;
   for (const bool moving : {false, true}) {
-    std::vector<std::uint32_t> bodies;
+    sched::HostVector<std::uint32_t> bodies;
     for (std::size_t i = 0; i < boxes.size(); ++i)
       if (moves[i] == moving) bodies.push_back(static_cast<std::uint32_t>(i));
     split_bodies(centre, bodies, kFan * kFan);

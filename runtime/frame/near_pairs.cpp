@@ -3,7 +3,7 @@
 #include "runtime/frame/near_pairs.h"
 
 #include <algorithm>
-#include <memory>
+#include <new>
 
 #include "runtime/contact/contact_stages.h"
 #include "runtime/frame/session.h"
@@ -204,19 +204,24 @@ void update_list(h6Session& s, std::span<const std::uint32_t> bodies) {
 
 }  // namespace
 
-std::vector<h6PairDef> sorted_pairs(const h6SessionDef& def) {
-  std::vector<h6PairDef> pairs(def.pairs, def.pairs + def.pair_count);
-  std::stable_sort(pairs.begin(), pairs.end(), [](const h6PairDef& l, const h6PairDef& r) {
-    return l.shell_body < r.shell_body;
+sched::HostVector<h6PairDef> sorted_pairs(const h6SessionDef& def) {
+  // A stable sort of the library would take its room from the heap.
+  sched::HostVector<const h6PairDef*> order(def.pair_count);
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = def.pairs + i;
+  std::sort(order.begin(), order.end(), [](const h6PairDef* l, const h6PairDef* r) {
+    return l->shell_body != r->shell_body ? l->shell_body < r->shell_body : l < r;
   });
+  sched::HostVector<h6PairDef> pairs;
+  for (const h6PairDef* pair : order) pairs.push_back(*pair);
   return pairs;
 }
 
 void open_near_pairs(h6Session& s) {
   NearPairs& n = s.near;
-  std::vector<Box> boxes(s.bodies.size());
-  const auto moving = std::make_unique<bool[]>(s.bodies.size());
-  std::vector<std::uint32_t> all;
+  sched::HostVector<Box> boxes(s.bodies.size());
+  Buffer<bool> moving;
+  if (!moving.reserve(s.allocator, s.bodies.size() + 1)) throw std::bad_alloc();
+  sched::HostVector<std::uint32_t> all;
   n.lively_count = 0;
   for (std::size_t i = 0; i < s.bodies.size(); ++i) {
     const Body& body = s.bodies[i];
@@ -231,7 +236,7 @@ void open_near_pairs(h6Session& s) {
     if (moving[i]) n.lively[n.lively_count++] = static_cast<std::uint32_t>(i);
     all.push_back(static_cast<std::uint32_t>(i));
   }
-  n.boxes.fill(boxes, {moving.get(), s.bodies.size()});
+  n.boxes.fill(boxes, {moving.data, s.bodies.size()});
   for (const Near& near : n.all_near()) remove_row(s, near);
   n.near_count = n.awake_count = n.active_count = 0;
   update_list(s, all);

@@ -10,11 +10,11 @@
 #pragma once
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "runtime/contact/pair.h"
 #include "runtime/contact/settings.h"
 #include "runtime/frame/body_boxes.h"
+#include "sched/host_memory.h"
 
 struct h6Session;
 
@@ -62,7 +62,7 @@ struct NearPairs {
 };
 
 // The listed pairs in the order of traversal: those of one shell body are neighbours.
-std::vector<h6PairDef> sorted_pairs(const h6SessionDef& def);
+sched::HostVector<h6PairDef> sorted_pairs(const h6SessionDef& def);
 
 // Calls f(shell body, field body) for every pair of a definition, in the order of traversal.
 // `sorted`: its sorted_pairs. If none are listed: every moving shell against every other field. Two
@@ -70,7 +70,8 @@ std::vector<h6PairDef> sorted_pairs(const h6SessionDef& def);
 //
 // A shell that bends counts as one that moves.
 template <class F>
-void each_pair(const h6Model& model, const h6SessionDef& def, std::span<const h6PairDef> sorted, F&& f) {
+void each_pair(const h6Model& model, const h6SessionDef& def, std::span<const h6PairDef> sorted,
+               F&& f) {
   for (const h6PairDef& p : sorted) f(p.shell_body, p.field_body);
   if (!sorted.empty()) return;
   const auto count = static_cast<std::int32_t>(def.body_count);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <new>
-#include <vector>
 
 #include "runtime/contact/contact_stages.h"
 #include "runtime/contact/friction.h"
@@ -15,6 +14,7 @@
 #include "runtime/frame/session_checks.h"
 #include "runtime/frame/session_memory.h"
 #include "runtime/frame/workers.h"
+#include "sched/host_memory.h"
 
 namespace h6 {
 namespace {
@@ -36,9 +36,9 @@ Mat3 inertia_of(const Shell& shell, const Vec3& com, double mass, double voxel) 
 
 // The smallest voxel of the fields that each body can touch, and of its own field if others touch
 // it [m].
-std::vector<double> voxels_of(const h6Model& model, const h6SessionDef& def,
-                              std::span<const h6PairDef> listed) {
-  std::vector<double> voxel(def.body_count, HUGE_VAL);
+sched::HostVector<double> voxels_of(const h6Model& model, const h6SessionDef& def,
+                                    std::span<const h6PairDef> listed) {
+  sched::HostVector<double> voxel(def.body_count, HUGE_VAL);
   each_pair(model, def, listed, [&](std::int32_t a, std::int32_t b) {
     const double finest = model.fields[def.bodies[b].field].finest;
     for (const std::int32_t i : {a, b})
@@ -160,12 +160,12 @@ void set_hand(const Settings& set, double force_stiffness, Hand& hand, HandDevic
 // Moving bodies that pairs connect, in groups of at most four. A larger group is split into single
 // bodies; within a step each treats its neighbours as fixed. Quasi-static and held bodies have no
 // mass of their own and are in no island.
-std::vector<Island> islands_of(const h6Model& model, std::span<const Body> bodies,
-                               const h6SessionDef& def, std::span<const h6PairDef> listed) {
+sched::HostVector<Island> islands_of(const h6Model& model, std::span<const Body> bodies,
+                                     const h6SessionDef& def, std::span<const h6PairDef> listed) {
   const auto dynamic = [&](std::int32_t i) {
     return !bodies[i].fixed && bodies[i].motion == Motion::dynamic;
   };
-  std::vector<std::int32_t> root(bodies.size());
+  sched::HostVector<std::int32_t> root(bodies.size());
   for (std::size_t i = 0; i < root.size(); ++i) root[i] = static_cast<std::int32_t>(i);
   const auto find = [&](std::int32_t i) {
     while (root[i] != i) i = root[i] = root[root[i]];
@@ -174,11 +174,11 @@ std::vector<Island> islands_of(const h6Model& model, std::span<const Body> bodie
   each_pair(model, def, listed, [&](std::int32_t a, std::int32_t b) {
     if (dynamic(a) && dynamic(b)) root[find(b)] = find(a);
   });
-  std::vector<std::vector<std::int32_t>> members(bodies.size());
+  sched::HostVector<sched::HostVector<std::int32_t>> members(bodies.size());
   for (std::int32_t i = 0; i < static_cast<std::int32_t>(root.size()); ++i)
     if (dynamic(i)) members[find(i)].push_back(i);
-  std::vector<Island> islands;
-  for (const std::vector<std::int32_t>& group : members) {
+  sched::HostVector<Island> islands;
+  for (const sched::HostVector<std::int32_t>& group : members) {
     if (group.size() <= kIslandBodies && !group.empty()) {
       Island island{{}, static_cast<int>(group.size())};
       std::copy(group.begin(), group.end(), island.body);
@@ -258,10 +258,10 @@ bool join_partners(h6Session& s, const h6SessionDef& def, std::span<const h6Pair
 bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   const Turn turn(def.workers);
   if (!turn) return fail(error, H6_ERROR_BUSY, "the session's workers are stepping others");
-  const std::vector<h6PairDef> listed = sorted_pairs(def);
+  const sched::HostVector<h6PairDef> listed = sorted_pairs(def);
   if (!offsets_fit(*s.model, def, listed, error) || !reserve_memory(s, def, listed, error))
     return false;
-  const std::vector<double> voxels = voxels_of(*s.model, def, listed);
+  const sched::HostVector<double> voxels = voxels_of(*s.model, def, listed);
   for (std::size_t i = 0; i < s.bodies.size(); ++i)
     set_body(s.bodies[i], def.bodies[i], voxels[i] < HUGE_VAL ? voxels[i] : 1e-3);
   if (!bends_fit(s, def, error) || !join_partners(s, def, listed, error)) return false;
@@ -270,11 +270,12 @@ bool fill(h6Session& s, const h6SessionDef& def, h6Error* error) {
   for (std::size_t i = 0; i < s.hands.size(); ++i)
     set_hand(s.settings, k.force, s.hands[i], s.devices[i], s.bodies[def.hands[i].body],
              def.hands[i]);
-  const std::vector<Island> islands = islands_of(*s.model, s.bodies, def, listed);
+  const sched::HostVector<Island> islands = islands_of(*s.model, s.bodies, def, listed);
   s.islands = s.islands.first(islands.size());
   std::copy(islands.begin(), islands.end(), s.islands.begin());
-  s.team = new sched::FrameTeam(def.threads, def.tasks);
-  s.alone = new sched::FrameTeam(1);
+  s.team = create<sched::FrameTeam>(s.allocator, def.threads, def.tasks);
+  s.alone = create<sched::FrameTeam>(s.allocator, 1);
+  if (!s.team || !s.alone) throw std::bad_alloc();
   open_lanes(s.lanes, s.team, s.alone, &s.anytime);
   open_near_pairs(s);
   return measure_overlap(s, error);
@@ -332,10 +333,11 @@ double h6StiffnessFor(const h6Model* model, const h6SessionDef* def) {
 
 h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Error* error) {
   if (!model || !def) return fail(error, "a session needs a model and a definition"), nullptr;
+  const sched::HostScope scope(def->allocator);
   try {
     if (!check_session(*model, *def, error)) return nullptr;
-  } catch (const std::exception& e) {  // no memory to compare the pairs
-    return fail(error, H6_ERROR_SYSTEM, "the session could not be checked: %s", e.what()), nullptr;
+  } catch (const std::exception&) {  // to compare the pairs
+    return fail(error, H6_ERROR_MEMORY, "no memory for a session"), nullptr;
   }
   h6Session* s = create<h6Session>(def->allocator);
   if (!s) return fail(error, H6_ERROR_MEMORY, "no memory for a session"), nullptr;
@@ -356,7 +358,9 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
   bool ready = false;
   try {
     ready = fill(*s, *def, error);
-  } catch (const std::exception& e) {  // from threads and small tables
+  } catch (const std::bad_alloc&) {  // from small tables
+    fail(error, H6_ERROR_MEMORY, "no memory for a session");
+  } catch (const std::exception& e) {  // from threads
     fail(error, H6_ERROR_SYSTEM, "the session could not be made: %s", e.what());
   }
   s->tick_length.see(sched::now_ns(), sched::ticks());
@@ -367,8 +371,8 @@ h6Session* h6CreateSession(const h6Model* model, const h6SessionDef* def, h6Erro
 
 void h6DestroySession(h6Session* s) {
   if (!s) return;
-  delete s->team;
-  delete s->alone;
+  destroy(s->allocator, s->team);
+  destroy(s->allocator, s->alone);
   forget_overlap(*s);
   release_memory(*s);
   const h6Allocator allocator = s->allocator;

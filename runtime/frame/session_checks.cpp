@@ -9,9 +9,9 @@
 #include <cmath>
 #include <numeric>
 #include <tuple>
-#include <vector>
 
 #include "runtime/settings/engine_settings.h"
+#include "sched/host_memory.h"
 
 namespace h6 {
 
@@ -95,7 +95,7 @@ bool check_pairs(const h6SessionDef& def, h6Error* error) {
                 def.body_count, most);
   for (std::size_t i = 0; i < def.pair_count; ++i)
     if (!check_pair(def, i, error)) return false;
-  std::vector<std::size_t> order(def.pair_count);
+  sched::HostVector<std::size_t> order(def.pair_count);
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto key = [&](std::size_t i) {
     return std::tuple(def.pairs[i].shell_body, def.pairs[i].field_body, i);

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <new>
-#include <vector>
 
 #include "runtime/contact/weighing.h"
 #include "runtime/frame/scratch_memory.h"
 #include "runtime/frame/session.h"
 #include "runtime/frame/workers.h"
+#include "sched/host_memory.h"
 
 namespace h6 {
 namespace {
@@ -34,8 +34,8 @@ struct Sizes {
   std::size_t bodies = 0, hands = 0, listed = 0;
   std::size_t pairs = 0;  // near at a time
   ScratchRoom scratch;
-  std::vector<ShellSize> shells;
-  std::vector<std::int32_t> bends;        // bodies whose shells bend
+  sched::HostVector<ShellSize> shells;
+  sched::HostVector<std::int32_t> bends;  // bodies whose shells bend
   bool between = false;                   // the bodies of a pair may both move
   bool of_fields = false;                 // `series` couples fields that move
   std::size_t traversals = 1, lanes = 0;  // one for each thread that may need one; of workers: 0

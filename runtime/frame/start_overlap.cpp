@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "runtime/contact/traverse_pair.h"
 #include "runtime/frame/name_contacts.h"
 #include "runtime/frame/session.h"
 #include "runtime/frame/workers.h"
+#include "sched/host_memory.h"
 #include "sched/realtime.h"
 
 namespace h6 {
@@ -20,9 +20,9 @@ namespace {
 struct Measured {
   Pair* pair;
   const Body &a, &b;
-  std::vector<h6OverlapPoint> points;
-  std::vector<std::uint32_t> rows;
-  std::vector<float> depths;  // [voxel]
+  sched::HostVector<h6OverlapPoint> points;
+  sched::HostVector<std::uint32_t> rows;
+  sched::HostVector<float> depths;  // [voxel]
 };
 
 h6OverlapPoint point_at(const Body& a, const Pair& pair, const Field& field,
@@ -72,7 +72,7 @@ Measured measure_pair(h6Session& s, const Settings& set, Pair& pair) {
   return found;
 }
 
-std::vector<Measured> measure(h6Session& s) {
+sched::HostVector<Measured> measure(h6Session& s) {
   const sched::FlushDenormals flush;
   Settings set = s.settings;
   set.contact.method = H6_METHOD_NONE;  // without a margin
@@ -81,7 +81,7 @@ std::vector<Measured> measure(h6Session& s) {
   s.anytime.coarse_pairs = 0;
   find_near_pairs(s);
   begin_traversal(s.anytime, {}, s.near.near_count, true);
-  std::vector<Measured> all;
+  sched::HostVector<Measured> all;
   for (const NearPairs::Near& near : s.near.all_near()) {
     Pair& pair = s.near.pairs[near.slot];
     if (!overlap(s.near.places[pair.a].shell, s.near.places[pair.b].field)) continue;
@@ -124,7 +124,8 @@ void set_relief(PairFit& fit, const Measured& found, const h6ContactDef& set, st
   }
 }
 
-void store(h6Session& s, const std::vector<Measured>& all, std::uint32_t* rows, float* relief) {
+void store(h6Session& s, const sched::HostVector<Measured>& all, std::uint32_t* rows,
+           float* relief) {
   StartOverlap& to = s.overlap;
   std::size_t pair = 0, row = 0;
   for (const NearPairs::Near& near : s.near.all_near()) s.near.pairs[near.slot].search.fit = {};
@@ -159,7 +160,7 @@ void keep_common(PairFit& fit, const PairFit& had) {
 }  // namespace
 
 bool measure_overlap(h6Session& s, h6Error* error) {
-  const std::vector<Measured> all = measure(s);
+  const sched::HostVector<Measured> all = measure(s);
   StartOverlap next;
   next.pair_count = all.size();
   for (const Measured& found : all) next.point_count += found.points.size();
@@ -245,6 +246,7 @@ bool h6RestartFit(h6Session* session, h6Error* error) {
   if (run_by_loop(*session)) return fail(error, H6_ERROR_BUSY, "a loop runs this session");
   const Turn turn(session->workers);
   if (!turn) return fail(error, H6_ERROR_BUSY, "the session's workers are stepping others");
+  const sched::HostScope scope(session->allocator);
   try {
     return measure_overlap(*session, error);
   } catch (const std::exception& e) {

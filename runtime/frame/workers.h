@@ -5,12 +5,12 @@
 // have one for each thread. A thread's scratch then stays in its cache from session to session.
 #pragma once
 #include <atomic>
-#include <vector>
 
 #include "hapsix/batch.h"
 #include "runtime/frame/scratch_memory.h"
 #include "runtime/frame/session_slabs.h"
 #include "sched/frame_team.h"
+#include "sched/host_memory.h"
 
 struct h6Workers {
   h6Workers(unsigned threads, const h6WorkersDef& def)
@@ -22,8 +22,8 @@ struct h6Workers {
   h6::sched::FrameTeam team;
   std::atomic<bool> busy{false};  // a call steps sessions, or uses a scratch
   h6Allocator allocator;
-  std::vector<h6::Scratch> scratch;  // (threads) columns in `memory`
-  h6::ScratchRoom room;              // of each
+  h6::sched::HostVector<h6::Scratch> scratch;  // (threads) columns in `memory`
+  h6::ScratchRoom room;                        // of each
   void* memory = nullptr;
   std::size_t memory_bytes = 0;
   h6::SessionSlabs slabs;  // of sessions without an allocator of their own

@@ -11,7 +11,8 @@
 #include <cstdio>
 #include <exception>
 #include <memory>
-#include <vector>
+#include <new>
+#include <optional>
 
 #include "runtime/frame/session.h"
 #include "runtime/loop/device_gate.h"
@@ -20,6 +21,7 @@
 #include "runtime/settings/engine_settings.h"
 #include "sched/clock.h"
 #include "sched/halt_list.h"
+#include "sched/host_memory.h"
 #include "sched/periodic_thread.h"
 #include "sched/watchdog.h"
 
@@ -29,6 +31,7 @@ enum Request { kNothing, kArm, kDisarm };
 
 struct h6Loop {
   h6Session* session = nullptr;
+  h6Allocator allocator{};  // of the session that the loop began with
   h6LoopDef def{};
   h6Device devices[H6_MAX_HANDS] = {};
   h6DeviceSample samples[H6_MAX_HANDS] = {};
@@ -36,27 +39,27 @@ struct h6Loop {
   std::uint64_t frames = 0;  // how many to run; 0: no end
   std::uint64_t begun = 0;   // frames so far
   double due = 1;            // the next frame runs when this reaches 1
-  std::unique_ptr<h6::RecordRing> ring;
+  std::optional<h6::RecordRing> ring;
   h6FrameRecord record{};
-  std::vector<double> bends;  // q of the bodies that bend, after the frame
-  h6LoopReport report{};      // belongs to the haptic thread until that has ended
+  h6::sched::HostVector<double> bends;  // q of the bodies that bend, after the frame
+  h6LoopReport report{};                // belongs to the haptic thread until that has ended
   std::atomic<bool> stop{false};
   std::atomic<int> request{kNothing};
   h6::DeviceGate gate;
-  std::int64_t sent_at = 0;                       // time of the last commands, 0: none yet [ns]
-  std::int64_t read_at = 0;                       // ... and samples
-  std::uint64_t trips = 0;                        // trips of the watchdog that were handled
-  bool stepped = false;                           // this tick was a frame
-  bool joined = false;                            // the session may be another loop's now
-  std::unique_ptr<h6::sched::Watchdog> watchdog;  // uses the gate, so it is destroyed before it
+  std::int64_t sent_at = 0;                     // time of the last commands, 0: none yet [ns]
+  std::int64_t read_at = 0;                     // ... and samples
+  std::uint64_t trips = 0;                      // trips of the watchdog that were handled
+  bool stepped = false;                         // this tick was a frame
+  bool joined = false;                          // the session may be another loop's now
+  std::optional<h6::sched::Watchdog> watchdog;  // uses the gate, so it is destroyed before it
   std::atomic<double> pace{1};
-  std::unique_ptr<h6::LoopView> view;
+  std::optional<h6::LoopView> view;
   std::uint64_t view_step = 1;  // the viewer gets one of so many frames
   // The next session, and the previous one on its way back.
   std::atomic<h6Session*> offered{nullptr}, given_back{nullptr};
   // The haptic thread's core, which the helper avoids, and the helper's priority (0: none).
   std::atomic<int> core{-1}, helper_priority{0};
-  std::unique_ptr<h6::sched::PeriodicThread> thread;
+  std::optional<h6::sched::PeriodicThread> thread;
 };
 
 namespace h6 {
@@ -337,10 +340,16 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
   Owner none = Owner::nobody;
   if (!session->owner.compare_exchange_strong(none, Owner::loop))
     return fail(error, H6_ERROR_BUSY, "another loop or step runs this session"), nullptr;
+  const sched::HostScope scope(session->allocator);
   try {
-    const auto let_go = [](h6Loop* l) { l->session->owner = Owner::nobody, delete l; };
-    std::unique_ptr<h6Loop, decltype(let_go)> loop(new h6Loop, let_go);
+    const auto let_go = [](h6Loop* l) {
+      l->session->owner = Owner::nobody;
+      destroy(h6Allocator(l->allocator), l);
+    };
+    std::unique_ptr<h6Loop, decltype(let_go)> loop(create<h6Loop>(session->allocator), let_go);
+    if (!loop) throw std::bad_alloc();
     loop->session = session;
+    loop->allocator = session->allocator;
     loop->def = used;
     for (std::size_t h = 0; h < session->hands.size(); ++h) {
       loop->devices[h] = devices[h];
@@ -355,8 +364,8 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
       std::size_t modes = 0;
       for (const Deformation& d : session->bends) modes += static_cast<std::size_t>(d.modes);
       loop->bends.resize(modes);
-      loop->ring = std::make_unique<RecordRing>(used.ring_frames, used.ring_inputs,
-                                                session->hands.size(), modes, session->allocator);
+      loop->ring.emplace(used.ring_frames, used.ring_inputs, session->hands.size(), modes,
+                         session->allocator);
       if (!loop->ring->ready()) {
         fail(error, H6_ERROR_MEMORY, "no memory for %zu records: lower ring_frames",
              used.ring_frames);
@@ -364,7 +373,7 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
       }
     }
     if (used.view_contacts) {
-      loop->view = std::make_unique<LoopView>(*session, used.view_contacts);
+      loop->view.emplace(*session, used.view_contacts);
       loop->view_step =
           static_cast<std::uint64_t>(std::max(1.0, 1 / (kViewRate * session->settings.dt)));
     }
@@ -383,10 +392,10 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     }
     h6Loop* raw = loop.get();
     if (real && !used.virtual_time)
-      loop->watchdog = std::make_unique<sched::Watchdog>(
+      loop->watchdog.emplace(
           static_cast<std::int64_t>(1e9 * (session->settings.dt + shortest_decay(*session))),
           used.realtime ? options.request.priority + 1 : 0, [raw] { raw->gate.stop_real(); });
-    loop->thread = std::make_unique<sched::PeriodicThread>(
+    loop->thread.emplace(
         options,
         sched::PeriodicThread::Work{
             [raw](const sched::RealtimeGrant& grant) {
@@ -405,6 +414,9 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
             },
             [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
     return loop.release();
+  } catch (const std::bad_alloc&) {
+    session->owner = Owner::nobody;
+    return fail(error, H6_ERROR_MEMORY, "no memory for a loop"), nullptr;
   } catch (const std::exception& e) {
     session->owner = Owner::nobody;
     fail(error, H6_ERROR_SYSTEM, "the haptic thread could not be started: %s", e.what());
@@ -515,7 +527,7 @@ void h6DestroyLoop(h6Loop* loop) {
   h6RequestStop(loop);
   if (loop->thread->is_this()) return;  // the thread still uses the loop
   h6JoinLoop(loop, nullptr);
-  delete loop;
+  destroy(h6Allocator(loop->allocator), loop);
 }
 
 }  // extern "C"

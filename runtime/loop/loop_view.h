@@ -2,9 +2,9 @@
 // loop_view.h - hands the newest poses and contacts of a running loop to a viewer, in place.
 // Neither side ever waits; a value that the viewer does not fetch in time is replaced.
 #pragma once
-#include <vector>
 
 #include "hapsix/hapsix.h"
+#include "sched/host_memory.h"
 #include "sched/latest_value.h"
 
 namespace h6 {
@@ -24,9 +24,9 @@ class LoopView {
     std::uint64_t frame = 0;
     double time = 0;
     std::size_t contacts = 0, rows = 0;
-    std::vector<h6Pose> body;
-    std::vector<h6ViewContact> contact;
-    std::vector<double> bend;
+    sched::HostVector<h6Pose> body;
+    sched::HostVector<h6ViewContact> contact;
+    sched::HostVector<double> bend;
   };
   sched::LatestValue<Slot> slots_;
 };

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <mutex>
 
 #include "kernels/field/field_layout.h"
@@ -13,18 +14,15 @@
 namespace h6 {
 namespace {
 
-void for_each(const h6ModelDef& model, std::size_t count,
-              const std::function<void(std::size_t)>& body) {
-  if (model.parallel_for) {
+template <class Body>
+void for_each(const h6ModelDef& model, std::size_t count, const Body& body) {
+  if (model.parallel_for)
     model.parallel_for(
         model.parallel_user, count,
-        [](void* context, std::size_t i) {
-          (*static_cast<const std::function<void(std::size_t)>*>(context))(i);
-        },
+        [](void* context, std::size_t i) { (*static_cast<const Body*>(context))(i); },
         const_cast<void*>(static_cast<const void*>(&body)));
-  } else {
-    sched::parallel_for(count, 0, body);
-  }
+  else
+    sched::parallel_for(count, 0, std::ref(body));
 }
 
 // The first index from `begin` on that is bad; `count` if none is. Nearly always none is, so whole
@@ -95,7 +93,8 @@ bool check_finer(const h6FieldDef& def, const h6ModelDef& model, h6Error* error)
 bool check(const h6FieldDef& def, const h6ModelDef& model, h6Error* error) {
   if (!check_reserved(def, "", error)) return false;
   if (!(def.voxel_size > 0) || !std::isfinite(def.voxel_size))
-    return fail(error, H6_ERROR_RANGE, "voxel_size must be a positive number of metres, it is %g", def.voxel_size);
+    return fail(error, H6_ERROR_RANGE, "voxel_size must be a positive number of metres, it is %g",
+                def.voxel_size);
   if (!from(def.origin).allFinite()) return fail(error, H6_ERROR_RANGE, "origin is not finite");
   if (!(def.band >= 0) || !std::isfinite(def.band))
     return fail(error, H6_ERROR_RANGE, "band must be >= 0, it is %g", def.band);

@@ -65,11 +65,12 @@ bool check_tree(const h6ShellDef& def, h6Error* error) {
 }
 
 // A sphere that does not enclose its descendants would silently lose contacts.
-bool check_spheres(const h6ShellDef& def, h6Error* error) {
+bool check_spheres(const h6ShellDef& def, const h6Allocator& allocator, h6Error* error) {
   // Parents are found in one sweep; then each node of the last level walks up.
   const std::uint32_t nodes = def.level_first[def.level_count];
   Buffer<std::uint32_t> parent;
-  if (!parent.reserve({}, nodes)) return fail(error, H6_ERROR_MEMORY, "no memory to check %u nodes", nodes);
+  if (!parent.reserve(allocator, nodes))
+    return fail(error, H6_ERROR_MEMORY, "no memory to check %u nodes", nodes);
   for (std::uint32_t r = 0; r < def.level_first[def.level_count - 1]; ++r)
     for (std::uint32_t c = 0; c < def.node_child_count[r]; ++c)
       parent[def.node_first_child[r] + c] = r;
@@ -247,7 +248,8 @@ void lay_out(Shell& shell, Arena& arena) {
 
 bool convert_shell(const h6ShellDef& def, const h6Allocator& allocator, Shell* shell,
                    h6Error* error) {
-  if (!check_reserved(def, "", error) || !check_tree(def, error) || !check_points(def, error) || !check_spheres(def, error))
+  if (!check_reserved(def, "", error) || !check_tree(def, error) || !check_points(def, error) ||
+      !check_spheres(def, allocator, error))
     return false;
   const std::size_t n = shell->points = def.point_count;
   const std::size_t padded = (n + kBlockRows - 1) / kBlockRows * kBlockRows;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/* quiet_host.c - a program with an allocator, a pool and a log of its own: the engine allocates
- * nothing after creation, starts no thread and writes nothing to stdout and stderr. */
+/* quiet_host.c - a program with an allocator, a pool and a log of its own: the engine takes all of its
+ * memory from that allocator and nothing after creation, starts no thread and writes nothing to stdout
+ * and stderr. */
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <fcntl.h>
@@ -11,21 +12,29 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "hapsix/batch.h"
 #include "runtime/examples/floor.h"
 
 void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
 void* __libc_memalign(size_t, size_t);
-static long of_heap, of_ours, lines, tasks;
+static long of_heap, of_ours, held, lines, tasks;
 /* All that asks the C library for memory comes through here, the engine and its packages too. */
 void* malloc(size_t n) { return ++of_heap, __libc_malloc(n); }
+void* calloc(size_t n, size_t each) { return ++of_heap, __libc_calloc(n, each); }
+void* realloc(void* p, size_t n) { return ++of_heap, __libc_realloc(p, n); }
 void* aligned_alloc(size_t a, size_t n) { return ++of_heap, __libc_memalign(a, n); }
+int posix_memalign(void** p, size_t a, size_t n) {
+  return ++of_heap, (*p = __libc_memalign(a, n)) == NULL;
+}
 
 static void* allocate(void* user, size_t bytes, size_t alignment) {
-  (void)user, ++of_ours;
+  (void)user, ++of_ours, held += (long)bytes;
   return __libc_memalign(alignment, bytes);
 }
 static void release(void* user, void* memory, size_t bytes) {
-  (void)user, (void)bytes, free(memory);
+  (void)user, held -= (long)bytes, free(memory);
 }
 
 /* The pool: one thread, which takes one task at a time. */
@@ -100,8 +109,13 @@ int main(int argc, char** argv) {
   def.allocator = parts.allocator;
   def.threads = 2, def.tasks.enqueue = enqueue, def.tasks.finish = finish;
   h6Error error;
+  h6WorkersDef crew = h6DefaultWorkersDef();
+  crew.allocator = parts.allocator, crew.threads = 2, crew.tasks = def.tasks;
+  const long heap_at_first = of_heap;
   h6Model* model = floor_and_tip(parts, &error);
   h6Session* session = model ? hold_tip(model, def, &error) : NULL;
+  h6Workers* workers = h6CreateWorkers(&crew, &error);
+  const long to_create = of_heap - heap_at_first;
   h6DeviceSample in = h6DefaultDeviceSample();
   h6DeviceCommand felt;
   in.pose.p.x = in.pose.p.y = 4e-3;
@@ -124,7 +138,7 @@ int main(int argc, char** argv) {
   /* Refusals are sentences for the caller, and no text for the terminal. */
   def.rate = -1;
   const bool refused = h6CreateSession(model, &def, &error) == NULL && error.code != H6_NO_ERROR;
-  h6DestroySession(session), h6DestroyModel(model);
+  h6DestroyWorkers(workers), h6DestroySession(session), h6DestroyModel(model);
   pthread_mutex_lock(&pool.lock);
   pool.state = ENDS;
   pthread_cond_broadcast(&pool.changed);
@@ -133,8 +147,9 @@ int main(int argc, char** argv) {
   struct stat written;
   fstat(out, &written);
   dup2(terminal, 1);
-  dprintf(1, "%ld allocations in 2000 steps, %d threads, %ld bytes said, %ld tasks, %s, %ld line, %s\n",
-          allocated, running, (long)written.st_size, tasks,
+  dprintf(1, "%ld of the heap, %ld bytes kept, %ld allocations in 2000 steps, %d threads, "
+          "%ld bytes said, %ld tasks, %s, %ld line, %s\n",
+          to_create, held, allocated, running, (long)written.st_size, tasks,
           refused && ours_before > 0 ? "refused" : "not refused", lines,
           pool.ran > 0 ? "helped by the pool" : "never helped");
   return 0;

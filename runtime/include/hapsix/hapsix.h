@@ -9,7 +9,8 @@
  * Nothing here opens a file or names a device. A step never allocates, locks, prints, throws or
  * waits. Create functions return NULL and fill `error` (which may be NULL) when they fail. For a NULL,
  * a -1 or an index past the end a function gives NULL, -1 or zeros, and changes nothing. A value that is
- * not finite is refused, by a create function or as a bad sample.
+ * not finite is refused, by a create function or as a bad sample; what it does elsewhere stands at the
+ * function.
  *
  * Threads. Any thread, many at once: defaults, names, h6Version, h6BuildInfo, h6SampleField,
  * h6StiffnessFor, h6WeighContacts, and everything that only reads a model. A session belongs to one
@@ -79,7 +80,9 @@ H6_API size_t   h6ModelBytes(const h6Model* model);
 
 /* A signed distance query for tools and tests: points (count x 3) in the field's mesh frame [m].
  * distance (count) [m]; gradient (count x 3), unit length where it is defined, or NULL; exact (count)
- * or NULL: 1 where the distance is a sample, 0 where it is a bound. Returns 0; -1: no such field. */
+ * or NULL: 1 where the distance is a sample, 0 where it is a bound. A point that is not finite, or
+ * beyond the range of a float, has distance INFINITY, gradient 0 and exact 0. Returns 0; -1: no such
+ * field. */
 H6_API int h6SampleField(const h6Model* model, int32_t field, const double* points, size_t count,
                          double* distance, double* gradient, uint8_t* exact);
 
@@ -110,7 +113,8 @@ H6_API size_t h6GetOverlapPoints(const h6Session* session, h6OverlapPoint* out, 
  * while a loop runs. */
 H6_API bool   h6RestartFit(h6Session* session, h6Error* error);
 
-/* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. An
+/* State after the last step. h6SetBody teleports: velocity as given, coupling history forgotten. A state
+ * is ignored where a number is not finite or beyond 1e6, or the quaternion's length not in 0.5 .. 2. An
  * overlap that it makes pushes in full, since programs move obstacles with it. A point that has relief
  * keeps it unless it is free now; before the first step all points of the body lose it. To make the new
  * place a start, call h6RestartFit. Friction springs of a free body begin anew, unstretched; a fixed
@@ -145,7 +149,9 @@ H6_API h6CouplingDef h6GetCoupling(const h6Session* session, int32_t hand);
 H6_API double        h6GetVoxel(const h6Session* session, int32_t body);
 
 /* Ratings that the safety chain keeps a hand's output inside; a loop sets them from its devices.
- * Without them: 100 N and 10 N m. Values above those are cut down to them. */
+ * Without them: 100 N and 10 N m. Values above those, INFINITY too, are cut down to them. A force or
+ * torque that is below 0 or NaN counts as 0, and nothing is rendered; another number that is NaN is not
+ * known, and an axis of the workspace with NaN is not limited. */
 H6_API void h6SetRating(h6Session* session, int32_t hand, const h6DeviceCapabilities* capabilities);
 /* A session begins armed. h6Disarm lets every output decay to zero. h6Fault latches every output at
  * zero at once, for this cause. h6Arm clears faults and starts again softly; it does nothing for a hand
@@ -157,7 +163,8 @@ H6_API void h6Disarm(h6Session* session);
 H6_API void h6Fault(h6Session* session, h6Cause cause);
 H6_API void h6Rearm(h6Session* session);
 /* For the next step only, in a program that steps by itself. h6LoseDevice: this hand's device failed
- * to read or write; all outputs latch. h6NoteInterval: seconds from the last commands to the next. */
+ * to read or write; all outputs latch. h6NoteInterval: seconds from the last commands to the next; up
+ * to two frames, below 0 or NaN: in time; above 1e6: 1e6. */
 H6_API void h6LoseDevice(h6Session* session, int32_t hand);
 H6_API void h6NoteInterval(h6Session* session, double seconds);
 /* The input of a hand's safety chain from outside before a step: requests, faults, deadlines.
@@ -166,7 +173,8 @@ H6_API void h6NoteInterval(h6Session* session, double seconds);
 typedef struct h6SafetyInput {
   uint32_t asked;         /* H6_ASKED_*; a fault's h6Cause in the byte from bit 8 on               */
   double   overdue;       /* how late the command of this step comes; with H6_ASKED_SLOW: how much
-                             longer than a step the last one lasted                           [s]  */
+                             longer than a step the last one lasted; below 0 or NaN: 0; above
+                             1e6: 1e6                                                         [s]  */
 } h6SafetyInput;
 enum {
   H6_ASKED_ARM          = 1u << 0,
@@ -258,13 +266,14 @@ typedef struct h6LoopReport {
   uint64_t reserved[16];
 } h6LoopReport;
 
-/* Starts the haptic thread. `devices` has one entry per hand and must outlive the loop. Records come
+/* Starts the haptic thread. `devices` has one entry per hand and must outlive the loop. Memory comes
  * from the session's allocator. A watchdog
  * thread stops the devices when no command has been sent for a frame and a decay_time, and latches the
  * outputs at zero; there is none when every device lives on the frames' own time (frame_time). */
 H6_API h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef* def,
                            h6Error* error);
-/* Takes up to `capacity` records, oldest first; call from one reader thread. Never blocks the loop. */
+/* Takes up to `capacity` records, oldest first. Never blocks the loop. One thread at a time reads: two
+ * readers need a lock of their own, and each record then goes to one of them. */
 H6_API size_t h6ReadRecords(h6Loop* loop, h6FrameRecord* out, size_t capacity);
 /* The same with the shapes of bodies that bend: row i of `bends` is q of all these bodies after frame i,
  * one body after another, as in h6LoopView [m sqrt(kg)]; NaN where only the inputs were kept. `bends`
@@ -291,8 +300,9 @@ typedef struct h6LoopView {
   uint64_t reserved[2];
 } h6LoopView;
 H6_API bool   h6ReadView(h6Loop* loop, h6LoopView* out);
-/* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused). Devices get the time of the frames,
- * so this is for simulated hands (frame_time), not for a real arm. Any thread. */
+/* Slow motion: `pace` frames a period, 1 (real time) .. 0 (paused); another number, NaN too, means 1.
+ * Devices get the time of the frames, so this is for simulated hands (frame_time), not for a real arm.
+ * Any thread. */
 H6_API void   h6SetPace(h6Loop* loop, double pace);
 /* Changes settings while the loop runs: `next` has the same model, bodies, hands and rate. Between two
  * frames it takes over poses, velocities, hands and the state of their safety chains; other history is
@@ -301,7 +311,8 @@ H6_API void   h6SetPace(h6Loop* loop, double pace);
  * and safety limits of the hands stay as they were.
  * Returns the previous session, which the caller destroys; or NULL with `error` filled, and nothing
  * has changed. Waits for the frame in progress, 2 s at most (H6_ERROR_BUSY: a driver hangs). One thread
- * at a time may call it, not the haptic thread. */
+ * at a time may call it, not the haptic thread: two callers need a lock of their own, or one may be
+ * given the session that the other replaced, and the other waits for ever. */
 H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);
 /* The same between two steps of a program that steps by itself. False: `error` is filled, no change. */
 H6_API bool   h6TakeOver(h6Session* next, const h6Session* before, h6Error* error);

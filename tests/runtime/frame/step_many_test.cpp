@@ -257,12 +257,23 @@ TEST_CASE("while workers step, no session is made for them, and without memory n
   CHECK(inner.error.code == H6_ERROR_BUSY);
   CHECK_FALSE(inner.refit);
 
+  // Workers whose memory is at its end, once before and once after they were made.
+  bool some = false;
   h6WorkersDef def = h6DefaultWorkersDef();
-  def.allocator = {[](void*, std::size_t, std::size_t) -> void* { return nullptr; },
-                   [](void*, void*, std::size_t) {}, nullptr};
-  const Workers poor(h6CreateWorkers(&def, nullptr));
-  scene.def.workers = poor.get();
+  def.allocator = {[](void* user, std::size_t bytes, std::size_t alignment) {
+                     return *static_cast<bool*>(user) ? std::aligned_alloc(alignment, bytes)
+                                                      : nullptr;
+                   },
+                   [](void*, void* memory, std::size_t) { std::free(memory); }, &some};
   h6Error error{};
+  CHECK(h6CreateWorkers(&def, &error) == nullptr);
+  CHECK(error.code == H6_ERROR_MEMORY);
+  some = true;
+  const Workers poor(h6CreateWorkers(&def, nullptr));
+  REQUIRE(poor);
+  some = false;
+  scene.def.workers = poor.get();
+  error = {};
   CHECK(h6CreateSession(scene.model.handle, &scene.def, &error) == nullptr);
   CHECK(error.code == H6_ERROR_MEMORY);
 }

@@ -362,17 +362,69 @@ TEST_CASE("all memory of a model and a session comes from the given allocator an
   CHECK(counter.calls > 5);
 }
 
-TEST_CASE("a machine without memory is an error, not a crash") {
-  const h6Allocator none{[](void*, std::size_t, std::size_t) -> void* { return nullptr; },
-                         [](void*, void*, std::size_t) {}, nullptr};
+TEST_CASE("wherever memory ends, model, session and loop say so and give back what they had") {
+  struct Purse {
+    int calls = 0, most = 0;
+    std::size_t bytes = 0;
+  } purse;
+  const h6Allocator allocator{[](void* user, std::size_t n, std::size_t alignment) -> void* {
+                                auto& p = *static_cast<Purse*>(user);
+                                if (p.calls++ == p.most) return nullptr;
+                                p.bytes += n;
+                                return std::aligned_alloc(alignment, n);
+                              },
+                              [](void* user, void* memory, std::size_t n) {
+                                static_cast<Purse*>(user)->bytes -= n;
+                                std::free(memory);
+                              },
+                              &purse};
   FieldArrays field = ball_field();
+  ShellArrays shell = sphere_points(5 * mm, 100);
   const h6FieldDef f = def_of(field);
+  const h6ShellDef sh = shell.def();
   h6ModelDef def = h6DefaultModelDef();
-  def.fields = &f, def.field_count = 1;
-  def.allocator = none;
-  h6Error error{};
-  CHECK(h6CreateModel(&def, &error) == nullptr);
-  CHECK(says(error.message, "memory"));
+  def.fields = &f, def.field_count = 1, def.shells = &sh, def.shell_count = 1;
+  h6BodyDef bodies[2] = {h6DefaultBodyDef(), h6DefaultBodyDef()};
+  bodies[0].fixed = true, bodies[0].field = 0, bodies[1].shell = 0;
+  const h6PairDef pair{1, 0, {}};
+  h6SessionDef sdef = h6DefaultSessionDef();
+  sdef.bodies = bodies, sdef.body_count = 2, sdef.allocator = allocator;
+  sdef.pairs = &pair, sdef.pair_count = 1;
+  h6LoopDef ldef = h6DefaultLoopDef();
+  ldef.virtual_time = true, ldef.duration = 0.002, ldef.ring_frames = 8, ldef.view_contacts = 8;
+
+  // Makes one of them with room for 0, 1, 2 ... calls until it succeeds.
+  const auto count_failures = [&](const auto& make, const auto& end) {
+    for (int most = 0; most < 1000; ++most) {
+      purse = {0, most, purse.bytes};
+      const std::size_t before = purse.bytes;
+      h6Error error{};
+      if (auto* const made = make(&error)) {
+        end(made);
+        CHECK(purse.bytes == before);
+        return most;
+      }
+      CHECK_MESSAGE(error.code == H6_ERROR_MEMORY, error.message);
+      CHECK(says(error.message, "memory"));
+      CHECK(purse.bytes == before);
+    }
+    return 0;
+  };
+  h6ModelDef poor = def;
+  poor.allocator = allocator;
+  CHECK(count_failures([&](h6Error* e) { return h6CreateModel(&poor, e); }, h6DestroyModel) > 3);
+  h6Model* const model = h6CreateModel(&def, nullptr);
+  REQUIRE(model);
+  CHECK(count_failures([&](h6Error* e) { return h6CreateSession(model, &sdef, e); },
+                       h6DestroySession) > 6);
+  purse = {0, 1000};
+  h6Session* const session = h6CreateSession(model, &sdef, nullptr);
+  REQUIRE(session);
+  CHECK(count_failures([&](h6Error* e) { return h6StartLoop(session, nullptr, &ldef, e); },
+                       h6DestroyLoop) > 4);
+  h6DestroySession(session);
+  CHECK(purse.bytes == 0);
+  h6DestroyModel(model);
 }
 
 TEST_CASE("every name has its value and back") {
