@@ -356,7 +356,9 @@ void add_shells(py::module_& m) {
             if (!h6WriteShell(s.shell, file.c_str(), &error)) throw Error(error);
           },
           py::arg("file"), "A .ply.")
-      .def("__len__", [](const PyShell& s) { return s.def().point_count; });
+      .def(
+          "__len__", [](const PyShell& s) { return s.def().point_count; },
+          "How many points there are.");
   for (const char* name : {"x", "y", "z"})
     shell.def_property_readonly(name, points(name), "(points,) float32, mesh frame [m]");
   for (const char* name : {"nx", "ny", "nz"})
@@ -395,7 +397,9 @@ py::tuple sample_field(const PyModel& model, std::int32_t field, const Rows<doub
 void add_models(py::module_& m) {
   py::class_<PyModel, std::shared_ptr<PyModel>>(m, "Model",
                                                 "Fields and shells, immutable, shared by sessions.")
-      .def(py::init(&make_model), py::arg("fields"), py::arg("shells"))
+      .def(py::init(&make_model), py::arg("fields"), py::arg("shells"),
+           "Copies fields and shells, whose places here are the indices that bodies name. An Error "
+           "says which of them is damaged.")
       .def_property_readonly("bytes",
                              [](const PyModel& model) { return h6ModelBytes(model.get()); },
                              "memory that the model holds")

@@ -193,7 +193,7 @@ void add_batch(py::module_& m) {
            "Begins sessions anew (None: all), the bodies of their hands at poses (which, hands, "
            "7), or "
            "where the definition puts them. Samples start there, at rest.")
-      .def("__len__", &Batch::count)
+      .def("__len__", &Batch::count, "How many sessions there are.")
       .def_property_readonly("hands", &Batch::hands, "how many each session has")
       .def_property_readonly("threads", &Batch::threads, "that step the sessions")
       .def_property_readonly("model", &Batch::model, "that all sessions share")

@@ -100,8 +100,12 @@ py::list events_of(const PyRecording& r) {
 void add_reader(py::module_& m) {
   py::class_<PyRecording, std::shared_ptr<PyRecording>>(
       m, "Recording", "A recorded run, or what a killed run left of one.")
-      .def(py::init(&read_recording), py::arg("file"))
-      .def("__len__", [](const PyRecording& r) { return r.info.frames; })
+      .def(
+          py::init(&read_recording), py::arg("file"),
+          "An .h5 file. Frames are read when they are asked for; an Error says why a file is none.")
+      .def(
+          "__len__", [](const PyRecording& r) { return r.info.frames; },
+          "How many frames there are.")
       .def("frames", &frames_of, py::arg("first") = 0, py::arg("count") = py::none(),
            "Rows first .. first + count as a structured array: ['time'] [s], "
            "['report']['contacts'], "

@@ -37,7 +37,8 @@ void add_contacts(py::module_& m) {
       m, "Contacts",
       "Contacts of a shell body in the last frame: views, valid until the next step (later "
       "they show whatever is there then). World frame. Rows with depth <= 0 are about to touch.")
-      .def("__len__", [](const P& p) { return p.c.count; })
+      .def(
+          "__len__", [](const P& p) { return p.c.count; }, "How many rows there are.")
       .def_property_readonly("depth", in([](const h6Contacts& c) { return c.depth; }),
                              "(n,) float32 [m]")
       .def_property_readonly("weight", in([](const h6Contacts& c) { return c.weight; }),

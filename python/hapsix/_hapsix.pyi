@@ -16,7 +16,7 @@ class Batch:
         """count sessions of this definition; threads: 1 .. 64, 0: one for each core. Keep
         definition.max_contacts small: that is most of a session's memory."""
     def __len__(self) -> int:
-        ...
+        """How many sessions there are."""
     @property
     def body(self) -> NDArray[Any]:
         """(count, hands, 13) pose and velocity of each hand's body"""
@@ -138,7 +138,7 @@ class Contacts:
     """Contacts of a shell body in the last frame: views, valid until the next step (later
     they show whatever is there then). World frame. Rows with depth <= 0 are about to touch."""
     def __len__(self) -> int:
-        ...
+        """How many rows there are."""
     @property
     def arm(self) -> object:
         """(n, 3) float32, from the centre of mass [m]"""
@@ -320,7 +320,8 @@ class Mesh:
 class Model:
     """Fields and shells, immutable, shared by sessions."""
     def __init__(self, fields: List[Field], shells: List[Shell]) -> None:
-        ...
+        """Copies fields and shells, whose places here are the indices that bodies name.
+        An Error says which of them is damaged."""
     @property
     def bytes(self) -> int:
         """memory that the model holds"""
@@ -348,9 +349,10 @@ class Recorder:
 class Recording:
     """A recorded run, or what a killed run left of one."""
     def __init__(self, file: str) -> None:
-        ...
+        """An .h5 file. Frames are read when they are asked for; an Error says why a file
+        is none."""
     def __len__(self) -> int:
-        ...
+        """How many frames there are."""
     def bends(self, first: int = 0, count: Optional[int] = None) -> dict:
         """The same frames of the bodies that bend: {index of the body: (n, r) coordinates
         q [m sqrt(kg)]}, NaN where they are not known; {} where nothing bends, and of
@@ -530,7 +532,7 @@ class Shell:
         copied, in one level: each is looked at in every frame near the field. For more
         than some thousand points bake_shell is faster."""
     def __len__(self) -> int:
-        ...
+        """How many points there are."""
     @property
     def nx(self) -> NDArray[Any]:
         """(points,) float32, inward unit normal"""

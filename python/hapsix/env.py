@@ -145,6 +145,7 @@ class AssemblyVectorEnv(_VectorBase):
     closed = False
 
     def __init__(self, num_envs=1, task=PEG_IN_HOLE, threads=0, autoreset=True):
+        """The arguments are told above. Loads the task's scene, which takes seconds the first time."""
         task = _task_of(task)
         self.metadata = dict(self.metadata, **_autoreset_mode(autoreset))
         self.task, self.num_envs, self.autoreset = task, num_envs, autoreset
@@ -256,6 +257,7 @@ class AssemblyEnv(_Base):
     spec = None
 
     def __init__(self, task=PEG_IN_HOLE):
+        """task: one of TASKS, by name, or a Task of your own."""
         self._many = AssemblyVectorEnv(1, task, threads=1, autoreset=False)
         self.observation_space = self._many.single_observation_space
         self.action_space = self._many.single_action_space
