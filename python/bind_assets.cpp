@@ -130,7 +130,7 @@ std::shared_ptr<PyMesh> make_mesh(const Rows<double>& vertices,
       PyMesh{Mesh::make([&](h6Error* error) { return h6CreateMesh(&def, error); })});
 }
 
-py::dict info_of(const PyMesh& mesh) {
+Typed<py::dict, "_MeshInfo"> info_of(const PyMesh& mesh) {
   h6MeshInfo i{};
   {
     py::gil_scoped_release release;
@@ -140,15 +140,16 @@ py::dict info_of(const PyMesh& mesh) {
   for (std::int32_t part = 0; const char* name = h6GetPartName(mesh.mesh, part); ++part)
     names.append(name);
   using namespace py::literals;
-  return py::dict("triangles"_a = i.triangles, "vertices"_a = i.vertices, "parts"_a = i.parts,
-                  "duplicates"_a = i.duplicates, "degenerate"_a = i.degenerate,
-                  "open_edges"_a = i.open_edges, "odd_edges"_a = i.odd_edges,
-                  "components"_a = i.components, "closed"_a = i.closed, "low"_a = tuple_of(i.low),
-                  "high"_a = tuple_of(i.high), "volume"_a = i.volume, "names"_a = names);
+  return {py::dict("triangles"_a = i.triangles, "vertices"_a = i.vertices, "parts"_a = i.parts,
+                   "duplicates"_a = i.duplicates, "degenerate"_a = i.degenerate,
+                   "open_edges"_a = i.open_edges, "odd_edges"_a = i.odd_edges,
+                   "components"_a = i.components, "closed"_a = i.closed, "low"_a = tuple_of(i.low),
+                   "high"_a = tuple_of(i.high), "volume"_a = i.volume, "names"_a = names)};
 }
 
-py::dict check_field(const PyMesh& mesh, const PyField& field, double stiffness, std::size_t points,
-                     bool push, std::uint32_t threads, py::object progress) {
+Typed<py::dict, "_FieldCheck"> check_field(const PyMesh& mesh, const PyField& field,
+                                           double stiffness, std::size_t points, bool push,
+                                           std::uint32_t threads, py::object progress) {
   h6CheckDef def = h6DefaultCheckDef();
   def.stiffness = stiffness, def.points = points, def.push = push, def.threads = threads;
   h6CheckReport r{};
@@ -157,12 +158,12 @@ py::dict check_field(const PyMesh& mesh, const PyField& field, double stiffness,
   watched.run(
       [&](h6Error* error) { return h6CheckField(mesh.mesh, field.field, &def, &r, error); });
   using namespace py::literals;
-  return py::dict("agrees"_a = r.agrees, "drains"_a = r.drains, "leak"_a = tuple_of(r.leak),
-                  "worst_node"_a = r.worst_node, "worst_between"_a = r.worst_between,
-                  "wall_hundredth"_a = r.wall_hundredth, "wall_median"_a = r.wall_median,
-                  "gap_hundredth"_a = r.gap_hundredth, "gap_median"_a = r.gap_median,
-                  "pushed"_a = r.pushed, "holding_force"_a = r.holding_force,
-                  "weakest"_a = tuple_of(r.weakest));
+  return {py::dict("agrees"_a = r.agrees, "drains"_a = r.drains, "leak"_a = tuple_of(r.leak),
+                   "worst_node"_a = r.worst_node, "worst_between"_a = r.worst_between,
+                   "wall_hundredth"_a = r.wall_hundredth, "wall_median"_a = r.wall_median,
+                   "gap_hundredth"_a = r.gap_hundredth, "gap_median"_a = r.gap_median,
+                   "pushed"_a = r.pushed, "holding_force"_a = r.holding_force,
+                   "weakest"_a = tuple_of(r.weakest))};
 }
 
 void add_meshes(py::module_& m) {
@@ -377,7 +378,10 @@ std::shared_ptr<PyModel> make_model(const std::vector<std::shared_ptr<PyField>>&
   return model;
 }
 
-py::tuple sample_field(const PyModel& model, std::int32_t field, const Rows<double>& points) {
+using Samples = Typed<py::tuple,
+                      "Tuple[numpy.ndarray[numpy.float64], "
+                      "numpy.ndarray[numpy.float64], numpy.ndarray[bool]]">;
+Samples sample_field(const PyModel& model, std::int32_t field, const Rows<double>& points) {
   const std::size_t count = rows_of(points, 3, "points");
   py::array_t<double> distance(count), gradient({count, std::size_t{3}});
   py::array_t<bool> exact(count);
@@ -400,9 +404,9 @@ void add_models(py::module_& m) {
       .def(py::init(&make_model), py::arg("fields"), py::arg("shells"),
            "Copies fields and shells, whose places here are the indices that bodies name. An Error "
            "says which of them is damaged.")
-      .def_property_readonly("bytes",
-                             [](const PyModel& model) { return h6ModelBytes(model.get()); },
-                             "memory that the model holds")
+      .def_property_readonly(
+          "bytes", [](const PyModel& model) { return h6ModelBytes(model.get()); },
+          "memory that the model holds")
       .def("sample_field", &sample_field, py::arg("field"), py::arg("points"),
            "points (n, 3) in the field's mesh frame [m] -> distance (n,) [m], gradient (n, 3), "
            "exact "
@@ -436,13 +440,14 @@ void add_scenes(py::module_& m) {
            "A scene file (.json) or a generated scene ('peg-in-hole'). Assets are baked, or come "
            "from "
            "the cache. outside: files outside the scene's folder may be read.")
-      .def_property_readonly("model",
-                             [](const std::shared_ptr<PyScene>& scene) {
-                               auto model = std::make_shared<PyModel>();
-                               model->scene = scene;
-                               return model;
-                             },
-                             "made of the scene's parts; it lives as long as the scene")
+      .def_property_readonly(
+          "model",
+          [](const std::shared_ptr<PyScene>& scene) {
+            auto model = std::make_shared<PyModel>();
+            model->scene = scene;
+            return model;
+          },
+          "made of the scene's parts; it lives as long as the scene")
       .def(
           "definition",
           [](const PyScene& scene) {
@@ -455,7 +460,7 @@ void add_scenes(py::module_& m) {
           "duration", [](const PyScene& s) { return h6GetSceneDuration(s.scene); }, "[s]")
       .def_property_readonly(
           "bodies",
-          [](const PyScene& scene) {
+          [](const PyScene& scene) -> NameTuple {
             py::list names;
             for (std::int32_t i = 0; const char* name = h6GetBodyName(scene.scene, i); ++i)
               names.append(name);
@@ -464,7 +469,8 @@ void add_scenes(py::module_& m) {
           "names of bodies, in the order of their indices")
       .def(
           "path",
-          [](const PyScene& scene, std::int32_t hand, double time) {
+          [](const PyScene& scene, std::int32_t hand,
+             double time) -> Typed<py::tuple, "Tuple[Tuple[float, ...], Tuple[float, ...]]"> {
             h6DeviceSample sample;
             if (!h6SampleScenePath(scene.scene, hand, time, &sample))
               throw py::index_error("hand " + std::to_string(hand) + " has no path");

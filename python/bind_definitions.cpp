@@ -112,7 +112,7 @@ void add_body(py::module_& m) {
   numbers(c, "com", &T::com, "(3,) centre of mass, mesh frame [m]");
   c.def_property(
       "inertia",
-      [](const T& b) {
+      [](const T& b) -> NumberTuple {
         return py::make_tuple(b.inertia[0], b.inertia[1], b.inertia[2], b.inertia[3], b.inertia[4],
                               b.inertia[5]);
       },
@@ -211,16 +211,19 @@ void add_definition(py::module_& m) {
   auto c = definition<D>(m, "Definition", "A session's bodies, hands, pairs and settings.",
                          [] { return D(); });
   c.def_property(
-      "bodies", [](const D& d) { return py::tuple(py::cast(d.bodies)); },
+      "bodies", [](const D& d) -> Typed<py::tuple, "Tuple[Body, ...]"> {
+        return py::tuple(py::cast(d.bodies));
+      },
       [](D& d, std::vector<std::shared_ptr<h6BodyDef>> v) { d.bodies = std::move(v); },
       "tuple of Body, which may be changed; assign a new sequence for others");
   c.def_property(
-      "hands", [](const D& d) { return py::tuple(py::cast(d.hands)); },
+      "hands", [](const D& d) -> Typed<py::tuple, "Tuple[Hand, ...]"> {
+        return py::tuple(py::cast(d.hands));
+      },
       [](D& d, std::vector<std::shared_ptr<h6HandDef>> v) { d.hands = std::move(v); },
       "tuple of Hand, at most 8");
   c.def_property(
-      "pairs",
-      [](const D& d) {
+      "pairs", [](const D& d) -> Typed<py::tuple, "Tuple[Tuple[int, int], ...]"> {
         py::tuple out(d.pairs.size());
         for (std::size_t i = 0; i < d.pairs.size(); ++i)
           out[i] = py::make_tuple(d.pairs[i][0], d.pairs[i][1]);

@@ -41,7 +41,8 @@ std::shared_ptr<PyRecording> read_recording(const std::string& file) {
   return made;
 }
 
-py::array frames_of(PyRecording& r, std::uint64_t first, std::optional<std::uint64_t> count) {
+py::array_t<h6FrameRecord> frames_of(PyRecording& r, std::uint64_t first,
+                                     std::optional<std::uint64_t> count) {
   const std::uint64_t left = r.info.frames - std::min(first, r.info.frames);
   const std::uint64_t rows = std::min(left, count.value_or(left));
   py::array_t<h6FrameRecord> out(rows);
@@ -53,8 +54,8 @@ py::array frames_of(PyRecording& r, std::uint64_t first, std::optional<std::uint
     got = h6GetRecordingFrames(r.recording, first, to, rows, &error);
   }
   if (got < 0) throw Error(error);
-  return static_cast<std::uint64_t>(got) == rows ? py::array(out)
-                                                 : py::array(out[py::slice(0, got, 1)]);
+  if (static_cast<std::uint64_t>(got) == rows) return out;
+  return out[py::slice(0, got, 1)].cast<py::array_t<h6FrameRecord>>();
 }
 
 std::size_t modes_of(const PyRecording& r) {
@@ -64,7 +65,8 @@ std::size_t modes_of(const PyRecording& r) {
   return modes;
 }
 
-py::dict bends_of(PyRecording& r, std::uint64_t first, std::optional<std::uint64_t> count) {
+Typed<py::dict, "Dict[int, numpy.ndarray[numpy.float64]]"> bends_of(
+    PyRecording& r, std::uint64_t first, std::optional<std::uint64_t> count) {
   const std::uint64_t left = r.info.frames - std::min(first, r.info.frames);
   const std::uint64_t rows = std::min(left, count.value_or(left));
   const std::size_t modes = modes_of(r);
@@ -89,7 +91,7 @@ py::dict bends_of(PyRecording& r, std::uint64_t first, std::optional<std::uint64
   return out;
 }
 
-py::list events_of(const PyRecording& r) {
+Typed<py::list, "List[Tuple[float, str, str]]"> events_of(const PyRecording& r) {
   py::list out;
   for (std::size_t i = 0; i < r.info.events; ++i)
     if (h6RecordingEvent event; h6GetRecordingEvent(r.recording, i, &event))
@@ -212,10 +214,13 @@ void add_recorder(py::module_& m) {
           py::arg("summary") = py::none(), "Makes the file. summary: one JSON object, or None.");
 }
 
-py::tuple weigh(const Rows<float>& normals, const Rows<float>& arms, const Rows<float>& depths,
-                double voxel, double lever, const std::optional<Rows<float>>& gradients,
-                const std::optional<Numbers<h6Velocity>>& velocity, const h6ContactDef* contact,
-                bool exact) {
+using Weighed = Typed<py::tuple,
+                      "Tuple[numpy.ndarray[numpy.float32], numpy.ndarray[numpy.float64], "
+                      "numpy.ndarray[numpy.float64], numpy.ndarray[numpy.float64]]">;
+Weighed weigh(const Rows<float>& normals, const Rows<float>& arms, const Rows<float>& depths,
+              double voxel, double lever, const std::optional<Rows<float>>& gradients,
+              const std::optional<Numbers<h6Velocity>>& velocity, const h6ContactDef* contact,
+              bool exact) {
   h6ContactArrays a = h6DefaultContactArrays();
   a.count = rows_of(normals, 3, "normals");
   const auto same = [&](bool fits, const char* name, const char* shape) {

@@ -10,8 +10,8 @@ using SessionPtr = std::shared_ptr<PySession>;
 
 // Rows of a column, three next to each other: (count, 3). The engine's columns of x, y and z have
 // equal distances, so this is a view; else it is a copy.
-py::object three(const float* x, const float* y, const float* z, std::size_t count,
-                 py::handle owner) {
+py::array_t<float> three(const float* x, const float* y, const float* z, std::size_t count,
+                         py::handle owner) {
   const auto gap = reinterpret_cast<const char*>(y) - reinterpret_cast<const char*>(x);
   const auto n = static_cast<py::ssize_t>(count);
   if (reinterpret_cast<const char*>(z) - reinterpret_cast<const char*>(y) == gap)
@@ -67,7 +67,9 @@ void add_contacts(py::module_& m) {
           "(n, 3) float32")
       .def(
           "names",
-          [](const P& p) {
+          [](const P& p) -> Typed<py::tuple,
+                                  "Tuple[numpy.ndarray[numpy.int32], "
+                                  "numpy.ndarray[numpy.int32]]"> {
             py::array_t<std::int32_t> part(p.c.count), triangle(p.c.count);
             std::int32_t *parts = part.mutable_data(), *triangles = triangle.mutable_data();
             {
@@ -137,7 +139,7 @@ h6Status step_at(PySession& s, const py::array& pose) {
 }
 
 // One frame for each row of poses (n, hands, 7), without the interpreter: the frames as rows.
-py::array follow(PySession& s, const Rows<double>& poses) {
+py::array_t<h6FrameRecord> follow(PySession& s, const Rows<double>& poses) {
   const auto hands = static_cast<py::ssize_t>(s.hands);
   if (poses.ndim() != 3 || poses.shape(1) != hands || poses.shape(2) != 7)
     throw py::value_error("poses must have the shape (frames, " + std::to_string(hands) + ", 7)");
@@ -182,30 +184,30 @@ py::array_t<double> deformation_of(const PySession& s, std::int32_t body) {
   return py::array_t<double>(static_cast<py::ssize_t>(modes), q);
 }
 
-py::dict safety_of(const PySession& s, std::int32_t hand) {
+Typed<py::dict, "_Safety"> safety_of(const PySession& s, std::int32_t hand) {
   h6HandSafety safety;
   h6GetSafety(s.session, hand_at(s, hand), &safety);
   py::dict frames;
   for (int i = 1; i < H6_CAUSE_COUNT; ++i)
     if (safety.frames[i]) frames[h6CauseName(static_cast<h6Cause>(i))] = safety.frames[i];
   using namespace py::literals;
-  return py::dict("state"_a = h6DeviceStateName(safety.state),
-                  "fault"_a = h6CauseName(safety.fault), "frames"_a = frames);
+  return {py::dict("state"_a = h6DeviceStateName(safety.state),
+                   "fault"_a = h6CauseName(safety.fault), "frames"_a = frames)};
 }
 
-py::array frame_of(const PySession& s) {
+py::array_t<h6FrameReport> frame_of(const PySession& s) {
   py::array_t<h6FrameReport> row(1);
   *row.mutable_data() = h6GetFrame(s.session);
   return row.attr("reshape")(py::tuple(0));
 }
 
-py::array report_of(const SessionPtr& s) {
+py::array_t<h6FrameReport> report_of(const SessionPtr& s) {
   s->shows_report = true;
   s->show();
   return view(&s->report, {}, {}, py::cast(s));
 }
 
-py::array states_of(const SessionPtr& s) {
+py::array_t<double> states_of(const SessionPtr& s) {
   s->shows_states = true;
   s->show();
   return view(reinterpret_cast<const double*>(s->states.data()),
@@ -213,7 +215,7 @@ py::array states_of(const SessionPtr& s) {
               py::cast(s));
 }
 
-py::array overlaps_of(const PySession& s) {
+py::array_t<h6Overlap> overlaps_of(const PySession& s) {
   const auto made = overlaps(s.session);
   py::array_t<h6Overlap> out(made.size());
   std::copy(made.begin(), made.end(), out.mutable_data());

@@ -23,13 +23,29 @@ namespace hapsix::python {
 
 namespace py = pybind11;
 
+// A tuple, dict or list with the type that its signature, and so the stub, has. NumPy's arrays in
+// it are called as pybind11 calls them.
+template <std::size_t N>
+struct Text {
+  char text[N];
+  constexpr Text(const char (&from)[N]) {  // NOLINT: it is that text
+    for (std::size_t i = 0; i < N; ++i) text[i] = from[i];
+  }
+};
+template <class Object, Text type>
+struct Typed : Object {
+  Typed(Object object) : Object(std::move(object)) {}  // NOLINT: it is that object
+};
+using NumberTuple = Typed<py::tuple, "Tuple[float, ...]">;
+using NameTuple = Typed<py::tuple, "Tuple[str, ...]">;
+
 // A struct of doubles, as a tuple that nobody can change in vain, and back.
 template <class T>
 inline constexpr std::size_t kNumbers = sizeof(T) / sizeof(double);
 template <class T>
 using Numbers = std::array<double, kNumbers<T>>;
 template <class T>
-py::tuple tuple_of(const T& value) {
+NumberTuple tuple_of(const T& value) {
   Numbers<T> numbers;
   std::memcpy(&numbers, &value, sizeof value);
   py::tuple out(kNumbers<T>);
@@ -59,15 +75,15 @@ struct Unlocked : Handle {
 
 // An array over memory that `owner` keeps. Strides in bytes.
 template <class T>
-py::array view(const T* data, std::vector<py::ssize_t> shape, std::vector<py::ssize_t> strides,
-               py::handle owner, bool writable = false) {
-  py::array array(py::dtype::of<T>(), std::move(shape), std::move(strides), data, owner);
+py::array_t<T> view(const T* data, std::vector<py::ssize_t> shape, std::vector<py::ssize_t> strides,
+                    py::handle owner, bool writable = false) {
+  py::array_t<T> array(std::move(shape), std::move(strides), data, owner);
   if (!writable)
     py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
   return array;
 }
 template <class T>
-py::array column(const T* data, std::size_t count, py::handle owner, bool writable = false) {
+py::array_t<T> column(const T* data, std::size_t count, py::handle owner, bool writable = false) {
   return view(data, {static_cast<py::ssize_t>(count)}, {sizeof(T)}, owner, writable);
 }
 
@@ -181,3 +197,8 @@ void add_batch(py::module_& m);
 void add_recordings(py::module_& m);
 
 }  // namespace hapsix::python
+
+template <class Object, hapsix::python::Text type>
+struct pybind11::detail::handle_type_name<hapsix::python::Typed<Object, type>> {
+  static constexpr auto name = const_name(type.text);
+};

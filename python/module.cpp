@@ -29,14 +29,14 @@ void pass_on(void*, h6LogLevel level, const char* sentence) {
   }
 }
 
-py::tuple status_names(std::uint32_t status) {
+hapsix::python::NameTuple status_names(std::uint32_t status) {
   py::list names;
   for (unsigned bit = 0; bit < 32; ++bit)
     if (status & 1u << bit)
       if (const char* name = h6StatusName(1u << bit)) names.append(name);
   return py::tuple(names);
 }
-py::tuple cause_names(std::uint32_t causes) {
+hapsix::python::NameTuple cause_names(std::uint32_t causes) {
   py::list names;
   for (unsigned i = 0; i < 32; ++i)
     if (causes & 1u << i)

@@ -12,9 +12,11 @@ Units are SI. A pose is (x, y, z, qw, qx, qy, qz) of a body's mesh frame, a velo
 linear part before the angular one. An array that is called a view shares memory with what it came from.
 """
 import sys as _sys
+import typing as _typing
 
 try:
     import numpy as _np
+    from numpy import typing as _npt
 except ImportError:
     raise ImportError(f"hapsix needs NumPy, which {_sys.executable} does not have: install it there, or use "
                       "the Python that has it (Debian: /usr/bin/python3 and python3-numpy)") from None
@@ -25,7 +27,7 @@ except ModuleNotFoundError:
                       f"{_sys.version_info.major}.{_sys.version_info.minor}") from None
 
 
-def columns(frames, hands=1):
+def columns(frames: "_npt.NDArray[_np.void]", hands: int = 1) -> "_typing.Dict[str, _npt.NDArray[_typing.Any]]":
     """Frames (Recording.frames, Session.follow) as a dict of columns (n,), most of them views:
     pandas.DataFrame(hapsix.columns(recording.frames(), recording.hands)). Names end in x, y, z, w;
     hand_1_… is the second hand's."""
@@ -49,7 +51,7 @@ def _flatten(out, name, rows):
         _flatten(out, f"{name}_{member}", rows[member])
 
 
-def quaternion(axis, angle):
+def quaternion(axis: "_npt.ArrayLike", angle: float) -> "_npt.NDArray[_np.float64]":
     """(4,) of a turn about an axis (3,) by an angle [rad]."""
     axis = _np.asarray(axis, float)
     return _np.concatenate(([_np.cos(angle / 2)], _np.sin(angle / 2) * axis / _np.linalg.norm(axis)))

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import typing
 import unittest
 
 try:
@@ -362,11 +363,11 @@ class Many(unittest.TestCase):
         self.assert_others_run(lambda: poses, session.follow)
 
     def test_other_python_threads_run_while_contacts_are_named_and_a_stiffness_is_derived(self):
-        contacts, definition = pressed().contacts(1), SCENE.definition()
+        contacts, model, definition = pressed().contacts(1), SCENE.model, SCENE.definition()
         self.assertGreater(len(contacts), 100)
         # One call takes microseconds, too few for another thread to wake: many calls, none of which waits.
         self.assert_others_run(lambda: range(3000), lambda times: [contacts.names() for _ in times])
-        self.assert_others_run(lambda: range(3000), lambda times: [SCENE.model.stiffness_for(definition) for _ in times])
+        self.assert_others_run(lambda: range(3000), lambda times: [model.stiffness_for(definition) for _ in times])
 
     def test_other_python_threads_run_while_a_batch_or_recording_is_destroyed(self):
         definition = SCENE.definition()
@@ -614,11 +615,120 @@ class Examples(unittest.TestCase):
 
 
 class Stubs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        with open(os.path.join(SOURCE, "python/hapsix/_hapsix.pyi")) as file:
+            cls.text = file.read()
+        cls.names = {"__name__": "stub"}
+        exec("from __future__ import annotations\n" + cls.text, cls.names)
+        cls.classes = {name: kind for name, kind in cls.names.items() if isinstance(kind, type)
+                       and kind.__module__ == "stub" and name in vars(hapsix) and name != "Error"}
+
+    def fits(self, value, kind, where):
+        """A value has exactly the type that a stub names."""
+        origin, args = typing.get_origin(kind), typing.get_args(kind)
+        if origin is np.ndarray:
+            self.assertIsInstance(value, np.ndarray, where)
+            self.assertIs(value.dtype.type, typing.get_args(args[1])[0], where)
+        elif origin is dict:
+            self.assertIs(type(value), dict, where)
+            for key, of in value.items():
+                self.fits(key, args[0], where), self.fits(of, args[1], where)
+        elif origin in (tuple, list):
+            self.assertIs(type(value), origin, where)
+            kinds = args if origin is tuple and args[-1] is not ... else args[:1] * len(value)
+            self.assertEqual(len(value), len(kinds), where)
+            for of, each in zip(value, kinds):
+                self.fits(of, each, where)
+        elif hasattr(kind, "__total__"):  # a TypedDict
+            hints = typing.get_type_hints(kind, self.names)
+            self.assertEqual(set(value), set(hints), where)
+            for key, of in value.items():
+                self.fits(of, hints[key], f"{where}[{key!r}]")
+        else:
+            self.assertIs(type(value), getattr(hapsix, kind.__name__, kind), where)
+
+    @staticmethod
+    def things():
+        """One object of each class, and what each call gives that returns more than one number or object."""
+        mesh = hapsix.Mesh(*cube(10e-3))
+        field, shell = hapsix.bake_field(mesh, voxels=32), hapsix.bake_shell(mesh, points=50)
+        session, scene = pressed(), hapsix.Scene("clip-and-rod")
+        bends = hapsix.Session(scene.model, scene.definition())
+        bends.step(scene.path(0, 0)[0])
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "run.h5")
+            recorder = hapsix.Recorder(file, scene)
+            recorder.record(bends)
+            recorder.finish()
+            recording = hapsix.Recording(file)
+            frames, shapes = recording.frames(), recording.bends()
+        of = [hapsix.Body(), hapsix.Contact(), hapsix.Coupling(), hapsix.Filter(), hapsix.Hand(), hapsix.Safety(),
+              mesh, field, shell, hapsix.Model([field], [shell]), SCENE, hapsix.Definition(pairs=[(1, 0)]), session,
+              session.contacts(1), hapsix.Batch(SCENE.model, SCENE.definition(), 2, 1), recording, recorder]
+        calls = {
+            "Session.body": session.body(1), "Session.deformation": bends.deformation(0),
+            "Session.follow": session.follow(session.pose[None]), "Session.safety": session.safety(0),
+            "Contacts.names": session.contacts(1).names(), "Scene.path": SCENE.path(0, 0.1),
+            "Model.sample_field": SCENE.model.sample_field(0, np.zeros((2, 3))), "Recording.frames": frames,
+            "Recording.bends": shapes, "check_field": hapsix.check_field(mesh, field, points=100),
+            "weigh": hapsix.weigh([[0, 0, 1]], [[0, 0, 0]], [1e-4], voxel=1e-3, lever=0.1),
+            "status_names": hapsix.status_names(1), "cause_names": hapsix.cause_names(2)}
+        return {type(thing).__name__: thing for thing in of}, calls
+
+    def test_the_stubs_give_attributes_and_results_the_types_that_they_have(self):
+        things, calls = self.things()
+        self.assertEqual(set(self.classes), set(things))
+        seen = 0
+        for name, kind in self.classes.items():
+            hints = dict(typing.get_type_hints(kind, self.names))
+            for member, about in vars(kind).items():
+                if isinstance(about, property):
+                    hints[member] = typing.get_type_hints(about.fget, self.names)["return"]
+                elif callable(about) and not member.startswith("_"):
+                    returned = typing.get_type_hints(about, self.names).get("return")  # none of overloads
+                    self.assertEqual(f"{name}.{member}" in calls, self.holds_more(returned), f"{name}.{member}")
+            for member, hint in hints.items():
+                self.fits(getattr(things[name], member), hint, f"{name}.{member}")
+                seen += 1
+        self.assertGreater(seen, 130)
+        for where, value in calls.items():
+            owner, _, member = where.rpartition(".")
+            about = getattr(self.names[owner], member) if owner else self.names[member]
+            self.fits(value, typing.get_type_hints(about, self.names)["return"], where)
+
+    @staticmethod
+    def holds_more(kind):
+        """It is an array, or holds other things."""
+        return typing.get_origin(kind) is not None or hasattr(kind, "__total__")
+
+    def test_the_check_of_a_type_fails_for_another_type(self):
+        self.fits(np.zeros(2, np.float32), self.names["NDArray"][np.float32], "")
+        for value, kind in ((np.zeros(2), self.names["NDArray"][np.float32]), ((1.0, 2), typing.Tuple[float, ...]),
+                            (True, int), ([1.0], typing.Tuple[float, ...]), ({"state": ""}, self.names["_Safety"])):
+            with self.assertRaises(AssertionError):
+                self.fits(value, kind, "")
+
+    def test_the_stubs_leave_no_array_or_argument_without_a_type(self):
+        body = self.text[self.text.index("class Error"):]
+        self.assertNotRegex(body, r"\bAny\b|\*\*kwargs|: object|-> (object|tuple|dict|list)\b")
+
+    def test_the_stubs_name_the_options_that_bakes_take(self):
+        with open(os.path.join(SOURCE, "python/bind_assets.cpp")) as file:
+            taken = set(re.findall(r'\btake(?:_choice)?\(options, "(\w+)"', file.read()))
+        mesh = hapsix.Mesh(*cube(10e-3))
+        for bake in ("bake_field", "bake_shell"):
+            options = set(typing.get_type_hints(self.names[bake], self.names)) - {"mesh", "progress", "return"}
+            self.assertEqual(options & taken, options)
+            for option in taken:  # an object is no value of any option
+                with self.assertRaises((TypeError, RuntimeError)) as raised:
+                    getattr(hapsix, bake)(mesh, **{option: object()})
+                self.assertEqual("has no option" in str(raised.exception), option not in options, option)
+
     def test_the_stubs_say_what_the_module_has(self):
         made = subprocess.run([sys.executable, os.path.join(SOURCE, "python/stubs.py")], capture_output=True,
                               text=True, check=True).stdout
-        with open(os.path.join(SOURCE, "python/hapsix/_hapsix.pyi")) as file:
-            self.assertEqual(file.read(), made, "run python/stubs.py")
+        self.assertEqual(self.text, made, "run python/stubs.py")
 
     @staticmethod
     def told(doc):
