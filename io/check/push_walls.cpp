@@ -24,6 +24,7 @@ constexpr int kRest = 2000;            // most frames after the hand has stopped
 constexpr double kLookVoxels = 0.1;    // that the point moves between searches for its nearest face
 constexpr int kStill = 60;             // frames
 constexpr double kStillVoxels = 1e-4;  // a frame
+constexpr int kWindow = 128;           // frames: a mean over so many tells whether it drifts
 constexpr double kGuide = 20;          // stiffness of the guide over that of the contact
 constexpr double kMass = 0.02;         // [kg]
 
@@ -108,6 +109,36 @@ class Trail {
   std::vector<Crossing> crossings_;
 };
 
+// Tells when the point has come to rest under the coupling's whole force: it moves no more, or it
+// trembles about a place. Beyond the band a point trembles by tenths of a voxel for ever, and most
+// frames of a search were spent on that.
+class Rest {
+ public:
+  explicit Rest(double voxel) : step_(kStillVoxels * voxel) {}
+
+  // `full`: the coupling pulls with all of its force. Call it once a frame.
+  bool reached(const Vec3& now, bool full) {
+    const bool moved = norm(now - last_) >= step_;
+    last_ = now;
+    if (!full) {
+      still_ = frames_ = 0, sum_ = {};
+      return false;
+    }
+    still_ = moved ? 0 : still_ + 1;
+    sum_ = sum_ + now;
+    if (++frames_ % kWindow != 0) return still_ >= kStill;
+    const Vec3 mean = (1.0 / kWindow) * sum_;
+    const bool stays = frames_ > kWindow && norm(mean - mean_) < kWindow * step_;
+    mean_ = mean, sum_ = {};
+    return stays || still_ >= kStill;
+  }
+
+ private:
+  double step_;
+  Vec3 last_{}, sum_{}, mean_{};
+  int still_ = 0, frames_ = 0;
+};
+
 }  // namespace
 
 struct WallPusher::Push {
@@ -177,7 +208,8 @@ WallPusher::Ended WallPusher::end_of(const Push& push) const {
   h6DeviceSample &sample = samples[0], &guide = samples[1];
   sample.pose = guide.pose = pose;
   Vec3 last = from;
-  for (int i = 1, still = 0; i <= moving + kRest && still < kStill; ++i) {
+  Rest rest(voxel);
+  for (int i = 1; i <= moving + kRest; ++i) {
     sample.pose.p = from + std::min(1.0, double(i) / moving) * way * push.along;
     sample.velocity.linear = (i < moving ? speed : 0) * push.along;
     h6Step(session.get(), samples, nullptr);
@@ -191,8 +223,7 @@ WallPusher::Ended WallPusher::end_of(const Push& push) const {
       if (depth > 2 * stretch + voxel && dot(now - push.face, push.along) > push.thickness)
         return Ended::through;
     }
-    const bool full = norm(sample.pose.p - now) > 1.5 * stretch;  // the coupling's force
-    still = full && norm(now - last) < kStillVoxels * voxel ? still + 1 : 0;
+    if (rest.reached(now, norm(sample.pose.p - now) > 1.5 * stretch)) break;
     guide.pose.p = from + dot(now - from, push.along) * push.along;
     guide.velocity.linear = rate * dot(now - last, push.along) * push.along;
     last = now;
@@ -242,7 +273,8 @@ std::vector<WallPlace> sample_of(std::span<const WallPlace> places) {
 // Narrows a bracket of forces at a sample of the places, and then pushes at all with what is found.
 // Places that let this through are the next sample. In the end all are pushed at with a spare less.
 // A place that holds a force holds less too, so while a bracket closes only places are pushed at
-// that let its upper end through. On a cube, pushing at all places in every step took twice as long.
+// that let its upper end through. On a cube, pushing at all places in every step took twice as
+// long.
 class Search {
  public:
   Search(const WallPusher& pusher, std::span<const WallPlace> places, unsigned threads,
