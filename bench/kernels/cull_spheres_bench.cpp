@@ -25,7 +25,7 @@ std::size_t call(const Kernel& kernel, Data& d, std::vector<std::uint32_t>& out)
   const ShellPoints& s = d.spheres;
   return kernel(ball_field().view(), test::kIdentity,
                 SpheresView{s.x.data(), s.y.data(), s.z.data(), s.radius.data(), s.x.size()}, 1.0f,
-                Reach{}, 0.0f, d.rows.data(), 0u, d.rows.size(), out.data(), nullptr);
+                Reach{}, 0.0f, d.rows.data(), 0u, d.rows.size(), out.data(), nullptr, true);
 }
 
 Case make(std::size_t n) {

@@ -8,7 +8,7 @@ namespace h6::kernels {
 std::size_t cull_spheres_ref(const FieldView& field, const Affine& to_field,
                              const SpheresView& spheres, float radius_scale, const Reach& reach,
                              float margin, const std::uint32_t* rows, std::uint32_t first,
-                             std::size_t count, std::uint32_t* survivors, float* clearance) {
+                             std::size_t count, std::uint32_t* survivors, float* clearance, bool) {
   const PointsView centres{spheres.x, spheres.y, spheres.z, spheres.count};
   std::size_t written = 0;
   for (std::size_t k = 0; k < count; ++k) {

@@ -107,7 +107,7 @@ struct Search {
                    std::uint32_t* survivors, float* clearance) const {
     return kernels::cull_spheres(
         field, place, {tier.x.data, tier.y.data, tier.z.data, tier.radius.data, tier.count}, scale,
-        reach, margin, rows, 0, count, survivors, clearance);
+        reach, margin, rows, 0, count, survivors, clearance, cold);
   }
   // Writes to t.frontier the groups of t.open_blocks of which a point may touch, or may carry load.
   std::size_t loadable(const float* expiry, std::size_t blocks, const TraverseScratch& t) const {
@@ -466,7 +466,6 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
   Anytime& anytime = *lane.anytime;
   Search search = search_of(set, a, b, pair.margin, lane.cold);
   std::size_t blocks = travel(pair, t, search);
-  const bool fast = !(search.near > 0);
   pair.sampled = 0;
   pair.missed = 0;
 
@@ -512,7 +511,7 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
   }
   if (search.near > 0 && !pair.pick_rows.worth(kGroupRows * groups)) search.near = 0;
   choose_rows(pair, t, search, groups);
-  search.cold = lane.cold || fast || groups > kCached;
+  search.cold = lane.cold || groups > kCached;
   const std::int64_t since = anytime.by_clock ? sched::now_ns() : 0;
   const std::size_t found = touch(search, t, lane, groups, used, shared);
   learn_sampling(anytime, groups, groups, found, since);
@@ -531,7 +530,7 @@ Found search_pair(const Settings& set, const Body& a, const Body& b, PairSearch&
 double clearance(const Settings& set, const Body& a, const Body& b, double enough, double little,
                  std::uint32_t hint, TraverseScratch& t) {
   const Shell& shell = *a.shell;
-  const Search search = search_of(set, a, b, 0, false);
+  const Search search = search_of(set, a, b, 0, true);
   const float far = static_cast<float>(enough) + kSlack;
   const auto add_groups = [&](std::size_t block, std::size_t groups) {
     const auto vector = static_cast<std::uint32_t>(block);
