@@ -22,42 +22,65 @@ using DF = hn::CappedTag<float, kCellMost>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 
-// The length of a cell is random, so a loop over its rows is mispredicted; masks are not.
-HWY_INLINE std::size_t end_of(const CellContacts& c, std::size_t begin) {
-  const hn::RebindToUnsigned<DF> du;
-  const hn::RebindToSigned<DF> di;
-  std::size_t i = begin + 1;
-  if (HWY_LIKELY(i + kCellMost <= c.contacts.count)) {
-    const auto cell = hn::Set(du, c.cell[begin]);
-    const auto field = hn::Set(di, c.field[begin]);
-    for (std::size_t rows = 0; rows < kCellMost; rows += kLanes, i += kLanes) {
-      const auto other_cell = hn::Ne(hn::LoadU(du, c.cell + i), cell);
-      const auto other_field = hn::Ne(hn::LoadU(di, c.field + i), field);
-      const auto others =
-          hn::Or(hn::RebindMask(DF(), other_cell), hn::RebindMask(DF(), other_field));
-      const std::intptr_t first = hn::FindFirstTrue(DF(), others);
-      if (first >= 0) return i + static_cast<std::size_t>(first);
-    }
-  }
-  while (i < c.contacts.count && c.cell[i] == c.cell[begin] && c.field[i] == c.field[begin]) ++i;
-  return i;
-}
+// Finds where cells end, 64 rows at a time. The lengths of cells are random, so a loop over the
+// rows of a cell is mispredicted, and a search that begins where the last one ended waits for it:
+// with such a search a frame of 1,000 to 10,000 contacts took 1.02 to 1.07 times as long.
+class Cells {
+ public:
+  HWY_INLINE explicit Cells(const CellContacts& c) : c_(c), here_(lasts(0)), next_(lasts(64)) {}
 
-// The number of contacts from `begin` on, the first of its cell, that are alone in their cells; up
-// to a vector.
-HWY_INLINE std::size_t lone_from(const CellContacts& c, std::size_t begin) {
-  const hn::RebindToUnsigned<DF> du;
-  const hn::RebindToSigned<DF> di;
-  const std::size_t count = c.contacts.count;
-  if (HWY_UNLIKELY(begin + kLanes + 1 > count))
-    return begin + 1 == count || c.cell[begin] != c.cell[begin + 1] ||
-           c.field[begin] != c.field[begin + 1];
-  const auto cells = hn::Eq(hn::LoadU(du, c.cell + begin), hn::LoadU(du, c.cell + begin + 1));
-  const auto fields = hn::Eq(hn::LoadU(di, c.field + begin), hn::LoadU(di, c.field + begin + 1));
-  const auto more = hn::And(hn::RebindMask(DF(), cells), hn::RebindMask(DF(), fields));
-  const std::intptr_t first = hn::FindFirstTrue(DF(), more);
-  return first < 0 ? kLanes : static_cast<std::size_t>(first);
-}
+  // `begin` is the first row of a cell, and never less than in the last call. Returns how many rows
+  // from there on are alone in their cells, up to a vector.
+  HWY_INLINE std::size_t lone_from(std::size_t begin) {
+    const auto ones = static_cast<std::size_t>(hwy::Num0BitsBelowLS1Bit_Nonzero64(~from(begin)));
+    return HWY_MIN(ones, HWY_MIN(kLanes, c_.contacts.count - begin));
+  }
+  // The row behind the cell that begins there.
+  HWY_INLINE std::size_t end_of(std::size_t begin) {
+    return begin + 1 + hwy::Num0BitsBelowLS1Bit_Nonzero64(from(begin));
+  }
+
+ private:
+  // Bit i < 63: row begin + i is the last of its cell. A cell has at most kCellMost rows, so some
+  // of them are set. Bit 63 is 0.
+  HWY_INLINE std::uint64_t from(std::size_t begin) {
+    while (begin >= at_ + 64) at_ += 64, here_ = next_, next_ = lasts(at_ + 64);
+    const std::size_t skip = begin - at_;
+    return (here_ >> skip | next_ << 1 << (63 - skip)) & ~(std::uint64_t{1} << 63);
+  }
+  // Bit i: row `begin` + i is the last of its cell, or there is no such row.
+  HWY_INLINE std::uint64_t lasts(std::size_t begin) const {
+    const DF d;
+    const hn::RebindToUnsigned<DF> du;
+    const hn::RebindToSigned<DF> di;
+    if (begin >= c_.contacts.count) return ~std::uint64_t{0};
+    std::uint64_t all = 0;
+    for (std::size_t i = 0; i < 64; i += kLanes) {
+      const std::size_t row = begin + i, behind = row + 1, count = c_.contacts.count;
+      const std::size_t live = behind < count ? HWY_MIN(count - behind, kLanes) : 0;
+      auto last = hn::Not(hn::FirstN(d, live));
+      if (HWY_LIKELY(live == kLanes)) {
+        const auto cell = hn::Ne(hn::LoadU(du, c_.cell + row), hn::LoadU(du, c_.cell + behind));
+        const auto field = hn::Ne(hn::LoadU(di, c_.field + row), hn::LoadU(di, c_.field + behind));
+        last = hn::Or(hn::RebindMask(d, cell), hn::RebindMask(d, field));
+      } else if (live > 0) {
+        const auto cell =
+            hn::Ne(load_n(du, c_.cell + row, live), load_n(du, c_.cell + behind, live));
+        const auto field =
+            hn::Ne(load_n(di, c_.field + row, live), load_n(di, c_.field + behind, live));
+        last = hn::Or(last, hn::Or(hn::RebindMask(d, cell), hn::RebindMask(d, field)));
+      }
+      std::uint8_t bytes[8] = {};
+      hn::StoreMaskBits(d, last, bytes);
+      all |= std::uint64_t(bytes[0] | bytes[1] << 8) << i;
+    }
+    return all;
+  }
+
+  const CellContacts& c_;
+  std::size_t at_ = 0;  // row of the first bit of here_
+  std::uint64_t here_, next_;
+};
 
 struct Columns {
   const float* k[6];
@@ -157,15 +180,16 @@ std::size_t list_simd(const CellContacts& c, const GaussWidths& widths, const Ce
   const Columns column(c.contacts);
   const float per_square[2] = {1 / (widths.normal * widths.normal),
                                1 / (widths.torque * widths.torque)};
+  Cells cells(c);
   std::size_t count = 0;
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
-    if (const std::size_t lone = lone_from(c, begin)) {
+    if (const std::size_t lone = cells.lone_from(begin)) {
       end = begin + lone;
       store_n(hn::Set(DF(), 1.0f), DF(), part + begin, lone);
       count = list_some(c, column, begin, share_of(c, begin, lone), items, count);
       continue;
     }
-    end = end_of(c, begin);
+    end = cells.end_of(begin);
     float mean[6];
     float share = mean_of(c, column, nullptr, begin, end, mean);
     if (!(share > 0)) {
@@ -224,14 +248,15 @@ void weigh_simd(const CellContacts& c, const float* part, const float* item_shar
                 const float* item_weight, float* weight) {
   const DF d;
   const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  Cells cells(c);
   std::size_t at = 0;
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
-    if (const std::size_t lone = lone_from(c, begin)) {
+    if (const std::size_t lone = cells.lone_from(begin)) {
       end = begin + lone;
       at = weigh_lone(c, begin, end, item_share, item_weight, at, weight);
       continue;
     }
-    end = end_of(c, begin);
+    end = cells.end_of(begin);
     auto joined = hn::FirstN(d, 0), parted = joined;
     for (std::size_t i = begin; i < end; i += kLanes) {
       const std::size_t live = end - i;
