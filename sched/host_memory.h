@@ -17,12 +17,12 @@ namespace h6::sched {
 
 class HostScope {
  public:
-  explicit HostScope(const h6Allocator& a) : before_(current) { current = a; }
-  ~HostScope() { current = before_; }
+  explicit HostScope(const h6Allocator& a);
+  ~HostScope();
   HostScope(const HostScope&) = delete;
   HostScope& operator=(const HostScope&) = delete;
 
-  static thread_local constinit inline h6Allocator current{};
+  static const h6Allocator& current();
 
  private:
   h6Allocator before_;
@@ -32,7 +32,7 @@ template <class T>
 class HostMemory {
  public:
   using value_type = T;
-  HostMemory() : from_(HostScope::current) {}
+  HostMemory() : from_(HostScope::current()) {}
   template <class U>
   HostMemory(const HostMemory<U>& other) : from_(other.from()) {}
 
