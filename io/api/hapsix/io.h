@@ -184,7 +184,7 @@ H6_API int32_t        h6FindBody(const h6Scene* scene, const char* name); /* -1:
 H6_API const char*    h6GetBodyName(const h6Scene* scene, int32_t body);  /* NULL: there is none    */
 H6_API double         h6GetSceneDuration(const h6Scene* scene);                           /* [s]    */
 /* Pose and velocity that a hand of the scene wants at `time` [s], on its path. False: no such hand, or
- * it has no path. */
+ * it has no path, or a time that is not a number; infinite times give the ends of the path. */
 H6_API bool           h6SampleScenePath(const h6Scene* scene, int32_t hand, double time,
                                         h6DeviceSample* out);
 
@@ -205,7 +205,8 @@ H6_API h6RecorderDef h6DefaultRecorderDef(void);
 /* Records to `file` (.h5) by way of file.part, so a killed run loses at most half a second. Refuses a
  * file that is something else, and one that another run records to. */
 H6_API h6Recorder* h6CreateRecorder(const char* file, const h6RecorderDef* def, h6Error* error);
-/* Rows as h6ReadRecords gives them, or h6GetRecord. Call it at least every 50 ms, also with count 0. */
+/* Rows as h6ReadRecords gives them, or h6GetRecord. Call it at least every 50 ms, also with count 0.
+ * Numbers that are not finite are recorded as they are. */
 H6_API bool        h6RecordFrames(h6Recorder* recorder, const h6FrameRecord* rows, size_t count,
                                   h6Error* error);
 /* The same with the shapes of bodies that bend: row i of `bends`, `modes` numbers, is q of all these
