@@ -63,7 +63,7 @@ inline constexpr float cull_clearance(float distance, const Reach& r) {
 // unspecified. When `clearance` (room for `count`) is not null, entry k is how far the shell may
 // move in the field's frame before a point of sphere rows[k] may touch:
 // cull_clearance(distance) - radius, but at most 0 for survivors. `cold`: the field is not in the
-// caches, so memory is prefetched; the result is the same.
+// caches, so memory is prefetched for few spheres, too; the result is the same.
 std::size_t cull_spheres(const FieldView& field, const Affine& to_field, const SpheresView& spheres,
                          float radius_scale, const Reach& reach, float margin,
                          const std::uint32_t* rows, std::uint32_t first, std::size_t count,

@@ -25,8 +25,8 @@ struct GroupLook {
   float near;  // [voxel]
   // reach[g]: the limit of the points of group g, at most `limit`; null: `limit` for all.
   const float* reach = nullptr;
-  // Without `rows`: where points of bricks and of far cells are mixed, `least` may be less than the
-  // smallest distance, but not less than the field's band. It is a bound that is found sooner.
+  // Without `rows`: where points of bricks and of far cells are mixed, a `least` above the field's
+  // band may be less than the smallest distance, down to the band. Such a bound is found sooner.
   bool roughly = false;
 };
 inline constexpr std::uint16_t kAllRows = 0xffff;

@@ -37,7 +37,9 @@ class Cells {
   }
   // The row behind the cell that begins there.
   HWY_INLINE std::size_t end_of(std::size_t begin) {
-    return begin + 1 + hwy::Num0BitsBelowLS1Bit_Nonzero64(from(begin));
+    const std::uint64_t ends = from(begin);
+    HWY_DASSERT(ends != 0);  // else the cell has more than kCellMost rows
+    return begin + 1 + hwy::Num0BitsBelowLS1Bit_Nonzero64(ends);
   }
 
  private:

@@ -59,8 +59,8 @@ struct alignas(64) PairSearch : SearchColumns {
   // `series`, `firm`: the common spring and damping may carry points towards the field by this
   // screw (v [m], w) about a's centre of mass, world frame; none comes farther than margin [voxel].
   float ahead[6] = {}, margin = 0;
-  double travelled = -1;                         // no block's way is longer; < 0: nothing is known
-  std::size_t sampled = 0;                       // groups that the last traversal sampled
+  double travelled = -1;    // no way is longer but for rounding; < 0: nothing is known
+  std::size_t sampled = 0;  // groups that the last traversal sampled
   std::size_t open_blocks = 0, open_groups = 0;  // how many were near when last tested
   CullBypass cull_blocks, cull_groups;
   CullBypass pick_rows;          // decides whether to test single points of groups

@@ -3,8 +3,8 @@
 //
 // Xu & Barbic 2016, Sec. 3 after McNeely 1999: a sphere whose signed distance exceeds its radius is
 // dropped with all its points. Here the spheres form flat tiers, and a dropped sphere is not tested
-// again until the shell has moved as far as the sphere was clear. The same holds for single points.
-// METHOD.md, Sec. 6.
+// again until its part of the shell may have moved as far as it was clear. The same holds for
+// single points. METHOD.md, Sec. 6.
 #include "runtime/contact/traverse_pair.h"
 
 #include <algorithm>
@@ -68,7 +68,7 @@ kernels::Affine shell_to_field(const Body& a, const Body& b) {
 constexpr float kSlack = 1e-3f;  // [voxel]
 constexpr std::size_t kFewGroups =
     4;  // testing so few groups of a block is cheaper than testing its sphere
-constexpr std::size_t kCached = 256;  // groups whose samples lie in the caches while a shell stays
+constexpr std::size_t kCached = 256;  // groups whose samples the last frame left in the caches
 constexpr double kLongestWay = 256;   // float resolves 3e-5 there [voxel]
 constexpr double kRounding = 4e-6;    // error of a motion in float, as a share of the longest one
 constexpr double kStays = 0.04;  // a shell nearer than this to its anchor counts as staying [voxel]

@@ -341,11 +341,11 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
   if (!session->owner.compare_exchange_strong(none, Owner::loop))
     return fail(error, H6_ERROR_BUSY, "another loop or step runs this session"), nullptr;
   const sched::HostScope scope(session->allocator);
+  // Whatever ends this call without a loop gives the session back, last of all.
+  const auto give_back = [](h6Session* s) { s->owner = Owner::nobody; };
+  std::unique_ptr<h6Session, decltype(give_back)> held(session, give_back);
   try {
-    const auto let_go = [](h6Loop* l) {
-      l->session->owner = Owner::nobody;
-      destroy(h6Allocator(l->allocator), l);
-    };
+    const auto let_go = [](h6Loop* l) { destroy(h6Allocator(l->allocator), l); };
     std::unique_ptr<h6Loop, decltype(let_go)> loop(create<h6Loop>(session->allocator), let_go);
     if (!loop) throw std::bad_alloc();
     loop->session = session;
@@ -413,12 +413,11 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
               return more;
             },
             [raw](std::uint64_t, const sched::TickTiming& timing) { keep_record(*raw, timing); }});
+    held.release();
     return loop.release();
   } catch (const std::bad_alloc&) {
-    session->owner = Owner::nobody;
     return fail(error, H6_ERROR_MEMORY, "no memory for a loop"), nullptr;
   } catch (const std::exception& e) {
-    session->owner = Owner::nobody;
     fail(error, H6_ERROR_SYSTEM, "the haptic thread could not be started: %s", e.what());
     return nullptr;
   }

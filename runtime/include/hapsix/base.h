@@ -101,9 +101,9 @@ typedef struct h6Error {
 
 /* All memory of a model, session, loop or workers comes from these two when both are set, else from the
  * C library. They are called only while one of them is created or destroyed and in h6RestartFit, never
- * inside a step, and with an alignment of at least 64. The engine's own threads, and what the system and
- * TBB keep for them, are not of this memory: with one thread, or with h6Tasks and parallel_for of the
- * program, there are none. */
+ * inside a step, and with an alignment of at least 64. What the system and TBB keep for threads of the
+ * engine is not of this memory: for helpers, and for the haptic thread and the watchdog of a loop. A model
+ * and a session have no such threads with h6Tasks and parallel_for of the program. */
 typedef struct h6Allocator {
   void* (*allocate)(void* user, size_t bytes, size_t alignment);
   void (*release)(void* user, void* memory, size_t bytes);

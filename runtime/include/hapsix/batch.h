@@ -26,7 +26,7 @@ typedef struct h6Workers h6Workers;
 typedef struct h6WorkersDef {
   uint32_t threads;     /* 1 .. 64, the calling one included; 0, the default: one for each core    */
   h6Tasks  tasks;       /* the program's own workers in place of the engine's; zero: the engine's   */
-  h6Allocator allocator;/* of the scratch of sessions that name these workers; zero: the heap        */
+  h6Allocator allocator;/* of the workers, and of the scratch of sessions that name them; zero: heap */
   uint64_t reserved[5];
 } h6WorkersDef;
 H6_API h6WorkersDef h6DefaultWorkersDef(void);
