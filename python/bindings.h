@@ -178,7 +178,7 @@ struct PySession {
   double rate = 0;
   std::array<h6DeviceSample, H6_MAX_HANDS> samples;
   std::array<h6DeviceCommand, H6_MAX_HANDS> commands{};
-  // What views show, from the first time that one is taken.
+  // The views show these. Steps fill them from the first view on.
   h6FrameReport report{};
   std::vector<h6BodyState> states;
   bool shows_report = false, shows_states = false;

@@ -290,8 +290,8 @@ HWY_NOINLINE Samples sample_cut(const FieldView& field, const Ring& ring, std::s
 
 // Samples a vector of a mixed batch, where points of far cells count as `band` away. Returns
 // whether it could: some points must lie in bricks, and the others outside the obstacle. Without it
-// the search at random poses of the alpha takes 1.26 times as long, of the starter 1.12 times,
-// along their paths 1.00 times (`./dev bench peers`).
+// the search at random poses of the refined alpha takes 1.35 times as long, of the starter 1.24
+// times, along their paths 0.99 and 1.06 times (`./dev bench peers`).
 HWY_INLINE bool sample_roughly(const FieldView& field, const Ring& ring, std::size_t k,
                                std::size_t i, Samples& s) {
   const DF d;

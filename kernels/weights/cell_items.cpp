@@ -24,7 +24,8 @@ constexpr std::size_t kLanes = hn::MaxLanes(DF());
 
 // Finds where cells end, 64 rows at a time. The lengths of cells are random, so a loop over the
 // rows of a cell is mispredicted, and a search that begins where the last one ended waits for it:
-// with such a search a frame of 1,000 to 10,000 contacts took 1.02 to 1.07 times as long.
+// with such a search frames of 1,000 to 16,000 contacts took 1.01 to 1.10 times as long
+// (frame/clutter, frame/conforming and frame/loaded, AVX-512).
 class Cells {
  public:
   HWY_INLINE explicit Cells(const CellContacts& c) : c_(c), here_(lasts(0)), next_(lasts(64)) {}

@@ -341,7 +341,7 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
   if (!session->owner.compare_exchange_strong(none, Owner::loop))
     return fail(error, H6_ERROR_BUSY, "another loop or step runs this session"), nullptr;
   const sched::HostScope scope(session->allocator);
-  // Whatever ends this call without a loop gives the session back, last of all.
+  // If this call ends without a loop, the session is given back, last of all.
   const auto give_back = [](h6Session* s) { s->owner = Owner::nobody; };
   std::unique_ptr<h6Session, decltype(give_back)> held(session, give_back);
   try {

@@ -7,7 +7,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
 #include <map>
 #include <random>
@@ -16,6 +15,7 @@
 
 #include "hapsix/hapsix.hpp"
 #include "tests/support/bridge.h"
+#include "tests/support/random_sequences.h"
 #include "tests/support/sanitized.h"
 
 using namespace h6::test;
@@ -76,7 +76,7 @@ class Sequence {
   h6Session* any() {
     return sessions_.empty() || rarely() ? nullptr : sessions_[random_() % sessions_.size()].get();
   }
-  // What a loop runs changes under the eyes of another thread.
+  // A loop changes its session while this thread reads it.
   bool watched(const h6Session* s) const { return kThreadSanitized && loop_ && s == running_; }
   bool judged(const char* function, bool done, const h6Error& error) {
     CAPTURE(function);
@@ -294,18 +294,5 @@ class Sequence {
 
 TEST_CASE("any sequence of models, loops and changed sessions has a defined result") {
   Common common;
-  const char* const asked = std::getenv("HAPSIX_SEQUENCES");
-  const long count = asked ? std::atol(asked) : kSanitized ? 500 : 10000;
-  for (long i = 0; i < count; ++i) {
-    CAPTURE(i);
-    Sequence sequence(static_cast<std::uint64_t>(i), common);
-    for (int k = 0; k < 40; ++k) sequence.call();
-  }
-  MESSAGE(count << " sequences of 40 calls");
-  if (count < 500) return;  // too few for what is called seldom
-  CHECK(common.tally.size() == 9);
-  for (const auto& [function, tally] : common.tally) {
-    CAPTURE(function);
-    CHECK((tally.done > 0 && tally.failed > 0));
-  }
+  h6::test::run_sequences<Sequence>(common, kSanitized ? 500 : 10000, 500, 9);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the headers promise to two threads: callers of one loop take turns, and objects of io.h work
+// The headers promise this to two threads: callers of one loop take turns, and objects of io.h work
 // at once where they differ, or where they are only read.
 #include <doctest/doctest.h>
 

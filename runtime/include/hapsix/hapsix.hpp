@@ -26,7 +26,7 @@
 #include "hapsix.h"
 
 extern "C" {
-// What io.h declares, too.
+// io.h declares these, too. This header may not include it: the engine does not know its library.
 typedef struct h6Mesh h6Mesh;
 typedef struct h6Field h6Field;
 typedef struct h6Shell h6Shell;

@@ -4,13 +4,12 @@
 // its sentence, and numbers are finite. HAPSIX_SEQUENCES sets how many there are; 100000 take some
 // five minutes.
 //
-// What is cheap is called often, what writes or reads files seldom. Every sequence may use a mesh,
-// its field and its shell, scenes and a recording that are made once.
+// Cheap functions are called often, those that write or read files seldom. Every sequence may use a
+// mesh, its field and its shell, scenes and a recording that are made once.
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <random>
@@ -20,6 +19,7 @@
 #include "hapsix/hapsix.hpp"
 #include "hapsix/io.h"
 #include "tests/io/private_cache.h"
+#include "tests/support/random_sequences.h"
 #include "tests/support/sanitized.h"
 
 namespace {
@@ -30,7 +30,7 @@ std::string place(const char* name) { return (h6::test::private_cache.folder / n
 constexpr double kCorners[12] = {0, 0, 0, 0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01};
 constexpr std::uint32_t kFaces[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
 
-// What every sequence may read, and how often each function succeeded and failed.
+// The objects that every sequence may read, and how often each function succeeded and failed.
 struct Common {
   hapsix::Mesh mesh;
   hapsix::Field field;
@@ -405,18 +405,5 @@ class Sequence {
 TEST_CASE("any sequence of calls of io.h with any arguments has a defined result") {
   Common common;
   std::ofstream(place("any.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-  const char* const asked = std::getenv("HAPSIX_SEQUENCES");
-  const long count = asked ? std::atol(asked) : h6::test::kSanitized ? 100 : 2000;
-  for (long i = 0; i < count; ++i) {
-    CAPTURE(i);
-    Sequence sequence(static_cast<std::uint64_t>(i), common);
-    for (int k = 0; k < 40; ++k) sequence.call();
-  }
-  MESSAGE(count << " sequences of 40 calls");
-  if (count < 1000) return;  // too few for what is called seldom
-  CHECK(common.tally.size() == 18);
-  for (const auto& [function, tally] : common.tally) {
-    CAPTURE(function);
-    CHECK((tally.done > 0 && tally.failed > 0));
-  }
+  h6::test::run_sequences<Sequence>(common, h6::test::kSanitized ? 100 : 2000, 1000, 18);
 }

@@ -59,8 +59,8 @@ TEST_CASE("a map that is killed again and again ends with the same figures") {
   long most = 0, resumed = 0;
   for (; !fs::exists(box.file("kept/runs.csv")) && kills < 40; ++kills) {
     auto process = std::make_unique<Process>(box, kept);
-    // The first kill comes with the first row, so that something is there to go on with: on a quick
-    // machine a few random ones may find nothing or the end, on a busy one a row takes seconds.
+    // The first kill comes with the first row, so that the next run has something to go on with.
+    // On a quick machine the map may end before a random kill, on a busy one a row takes seconds.
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(120);
     while (kills == 0 && rows("kept/runs.csv.part") < 2 && !fs::exists(box.file("kept/runs.csv")) &&
            std::chrono::steady_clock::now() < give_up)
