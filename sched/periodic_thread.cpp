@@ -41,6 +41,7 @@ void PeriodicThread::join() {
 }
 
 void PeriodicThread::run() {
+  id_ = std::this_thread::get_id();
   RealtimeGrant grant;
   if (options_.realtime && !options_.virtual_time) grant = request_realtime(options_.request);
   if (work_.begin) work_.begin(grant);
@@ -74,6 +75,7 @@ void PeriodicThread::run() {
     if (!more) break;
   }
   release_realtime(grant);
+  id_ = std::thread::id{};
   running_.store(false, std::memory_order_release);
 }
 

@@ -55,7 +55,7 @@ class PeriodicThread {
   ~PeriodicThread();  // asks it to stop, and joins
   void request_stop() { stop_.store(true, std::memory_order_relaxed); }
   void join();
-  bool is_this() const { return thread_.get_id() == std::this_thread::get_id(); }
+  bool is_this() const { return id_.load() == std::this_thread::get_id(); }
   bool running() const { return running_.load(std::memory_order_acquire); }
 
  private:
@@ -64,6 +64,7 @@ class PeriodicThread {
   Work work_;
   std::atomic<bool> stop_{false};
   std::atomic<bool> running_{true};
+  std::atomic<std::thread::id> id_{};  // while it runs; any thread may ask while another one joins
   std::thread thread_;
 };
 

@@ -57,6 +57,7 @@ struct h6Loop {
   std::uint64_t view_step = 1;  // the viewer gets one of so many frames
   // The next session, and the previous one on its way back.
   std::atomic<h6Session*> offered{nullptr}, given_back{nullptr};
+  std::atomic<bool> changing{false};  // by one caller of h6ChangeSession; the frame never looks
   // The haptic thread's core, which the helper avoids, and the helper's priority (0: none).
   std::atomic<int> core{-1}, helper_priority{0};
   std::optional<h6::sched::PeriodicThread> thread;
@@ -168,9 +169,11 @@ void change_session(h6Loop& loop) {
   if (!next) return;  // the offer was withdrawn
   take_over(*next, *loop.session);
   next->asked.fetch_or(loop.session->asked.exchange(0));
-  loop.given_back.store(loop.session, std::memory_order_release);
+  h6Session* const before = loop.session;
   loop.session = next;
   ++loop.record.settings;
+  // The last word: from here on the caller may look at the loop's session.
+  loop.given_back.store(before, std::memory_order_release);
 }
 
 // Slow motion: a frame only every few periods. In the time of frames nothing changes.
@@ -263,7 +266,9 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
 }
 
 constexpr std::int64_t kTakeOverTime = 2'000'000'000;  // longest wait of h6ChangeSession [ns]
-constexpr int kHelperPriority = 79;                    // below the haptic thread's
+constexpr std::int64_t kPoll = 100'000;                // between two looks of its wait [ns]
+constexpr const char* kLoopEnded = "the loop has ended";
+constexpr int kHelperPriority = 79;  // below the haptic thread's
 
 void note_grant(h6LoopReport& report, const sched::RealtimeGrant& grant) {
   std::snprintf(report.granted, sizeof report.granted, "%s", grant.text);
@@ -324,6 +329,49 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
                   "it out or choose less",
                   h, above.key, above.asked, above.unit, h, above.rating, above.unit);
   return check_reserved(def, "loop: ", error) && check_settings(loop_settings(), &def, "", error);
+}
+
+// The turn of one caller of h6ChangeSession. Only callers wait here, and no longer than `give_up`,
+// which std::mutex could not promise.
+class Turn {
+ public:
+  Turn(std::atomic<bool>& taken, std::int64_t give_up) : taken_(taken) {
+    while (taken_.exchange(true, std::memory_order_acquire)) {
+      if (sched::now_ns() > give_up) return;
+      sched::sleep_until_ns(sched::now_ns() + kPoll);
+    }
+    mine_ = true;
+  }
+  ~Turn() {
+    if (mine_) taken_.store(false, std::memory_order_release);
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  bool mine() const { return mine_; }
+
+ private:
+  std::atomic<bool>& taken_;
+  bool mine_ = false;
+};
+
+// Offers `next` to the haptic thread and waits for the session that it ran. Null: `next` was not
+// taken, and `error` says why.
+h6Session* exchange(h6Loop& loop, h6Session* next, std::int64_t give_up, h6Error* error) {
+  if (const int core = loop.core; core >= 0) next->team->set_realtime(loop.helper_priority, core);
+  loop.offered.store(next, std::memory_order_release);
+  while (true) {
+    if (h6Session* before = loop.given_back.exchange(nullptr, std::memory_order_acquire))
+      return before;
+    if (!loop.thread->running() && loop.offered.exchange(nullptr))
+      return fail(error, kLoopEnded), nullptr;
+    // The loop may take the offer at this instant; then it gives the former session back soon.
+    if (sched::now_ns() > give_up && loop.offered.exchange(nullptr))
+      return fail(error, H6_ERROR_BUSY,
+                  "no frame began for 2 s: a device's driver hangs, or nobody reads the records of "
+                  "virtual time"),
+             nullptr;
+    sched::sleep_until_ns(sched::now_ns() + kPoll);
+  }
 }
 
 }  // namespace
@@ -440,33 +488,29 @@ void h6SetPace(h6Loop* loop, double pace) {
 
 h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (!loop) return fail(error, "no loop was given"), nullptr;
-  if (!may_take_over(next, *loop->session, error)) return nullptr;
-  if (next->workers) return fail(error, kOfWorkers), nullptr;
-  Owner none = Owner::nobody;
-  if (!next->owner.compare_exchange_strong(none, Owner::loop))
-    return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;
-  if (const int core = loop->core; core >= 0) next->team->set_realtime(loop->helper_priority, core);
-  loop->offered.store(next, std::memory_order_release);
+  if (loop->thread->is_this())
+    return fail(error, H6_ERROR_BUSY, "the haptic thread cannot wait for its own next frame"),
+           nullptr;
   const std::int64_t give_up = sched::now_ns() + kTakeOverTime;
-  while (true) {
-    if (h6Session* before = loop->given_back.exchange(nullptr, std::memory_order_acquire)) {
+  const Turn turn(loop->changing, give_up);
+  if (!turn.mine())
+    return fail(
+               error, H6_ERROR_BUSY,
+               "no turn came for 2 s: other threads change this loop's session, or a driver hangs"),
+           nullptr;
+  // The session of a loop that has ended may be destroyed, so it is not looked at.
+  if (!loop->thread->running()) return fail(error, kLoopEnded), nullptr;
+  if (next && next->workers) return fail(error, kOfWorkers), nullptr;
+  Owner none = Owner::nobody;
+  if (next && !next->owner.compare_exchange_strong(none, Owner::loop))
+    return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;
+  if (may_take_over(next, *loop->session, error))
+    if (h6Session* const before = exchange(*loop, next, give_up, error)) {
       before->owner = Owner::nobody;
       return before;
     }
-    if (!loop->thread->running() && loop->offered.exchange(nullptr)) {
-      next->owner = Owner::nobody;
-      return fail(error, "the loop has ended"), nullptr;
-    }
-    // The loop may take the offer at this instant; then it gives the former session back soon.
-    if (sched::now_ns() > give_up && loop->offered.exchange(nullptr)) {
-      next->owner = Owner::nobody;
-      return fail(error, H6_ERROR_BUSY,
-                  "no frame began for 2 s: a device's driver hangs, or nobody reads the records of "
-                  "virtual time"),
-             nullptr;
-    }
-    sched::sleep_until_ns(sched::now_ns() + 100000);
-  }
+  if (next) next->owner = Owner::nobody;
+  return nullptr;
 }
 
 bool h6LoopRunning(const h6Loop* loop) { return loop && loop->thread->running(); }

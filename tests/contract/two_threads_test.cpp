@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <set>
 #include <string>
@@ -139,28 +140,82 @@ Made make_all(double half, const std::string& name, bool cache) {
 
 }  // namespace
 
-TEST_CASE("two callers of h6ChangeSession that take turns each get the session that ran") {
+TEST_CASE("two threads change a loop's session and a third steps all: each session has one owner") {
+  constexpr int callers = 2;
   Looped all(0, 0);
-  std::mutex turn;
-  h6Session* running = all.session[0];
-  h6Session* mine[2] = {all.session[1], all.session[2]};
-  int changed[2] = {0, 0};
-  on_two([&](int caller) {
-    for (int i = 0; i < h6::test::repeated(200, 20); ++i) {
-      const std::lock_guard<std::mutex> lock(turn);
-      h6Session* const before = h6ChangeSession(all.loop, mine[caller], nullptr);
-      if (before != running) return;
-      running = mine[caller], mine[caller] = before;
-      ++changed[caller];
+  const h6DeviceSample in = h6DefaultDeviceSample();
+  std::atomic<int> at_work{callers};
+  std::atomic<long> stepped{0}, refused{0};
+  // It steps whatever is free at the moment, and also what the loop runs.
+  std::thread third([&] {
+    h6DeviceCommand out;
+    for (std::size_t i = 0; at_work > 0; ++i) {
+      const bool ran = (h6Step(all.session[i % 3], &in, &out) & H6_OUTPUT_FAULT) == 0;
+      ++(ran ? stepped : refused);
     }
   });
-  CHECK((changed[0] == h6::test::repeated(200, 20) && changed[1] == changed[0]));
-  CHECK(std::set<h6Session*>{running, mine[0], mine[1]}.size() == 3);
-  h6DeviceSample in = h6DefaultDeviceSample();
+  h6Session* mine[callers] = {all.session[1], all.session[2]};
+  int changed[callers] = {0, 0}, odd[callers] = {0, 0};
+  on_two([&](int caller) {
+    for (int i = 0; i < h6::test::repeated(2000, 40); ++i) {
+      h6Error error{};
+      h6Session* const before = h6ChangeSession(all.loop, mine[caller], &error);
+      if (!before) {
+        odd[caller] += error.code != H6_ERROR_BUSY;  // the third thread was stepping it
+        continue;
+      }
+      odd[caller] += before == mine[caller];
+      mine[caller] = before, ++changed[caller];
+      h6DeviceCommand out;
+      h6Step(before, &in, &out);
+    }
+    --at_work;
+  });
+  third.join();
+  CHECK((odd[0] == 0 && odd[1] == 0));
+  CHECK((changed[0] > 0 && changed[1] > 0));
+  CHECK((stepped > 0 && refused > 0));
+  // The loop runs one of the three, and the callers own the others.
   h6DeviceCommand out;
-  // The loop runs one of them, and the callers own the others.
-  CHECK(h6Step(running, &in, &out) == H6_OUTPUT_FAULT);
-  for (h6Session* own : mine) CHECK((h6Step(own, &in, &out) & H6_OUTPUT_FAULT) == 0);
+  CHECK(mine[0] != mine[1]);
+  for (const hapsix::Session& s : all.session) {
+    const bool own = s == mine[0] || s == mine[1];
+    CHECK(((h6Step(s, &in, &out) & H6_OUTPUT_FAULT) == 0) == own);
+  }
+}
+
+TEST_CASE("a session is not changed by the haptic thread, nor when the loop has ended") {
+  struct Asker {
+    std::atomic<h6Loop*> loop{nullptr};
+    h6Session* next = nullptr;
+    std::atomic<int> code{0};
+  } asker;
+  Looped all(0, 0);  // of the other sessions
+  asker.next = all.session[1];
+  h6Device device = h6DefaultDevice();
+  device.capabilities.frame_time = true;
+  device.self = &asker;
+  device.read = [](void* self, double, h6DeviceSample* sample) {
+    Asker& a = *static_cast<Asker*>(self);
+    *sample = h6DefaultDeviceSample();
+    if (h6Loop* const loop = a.loop; loop && a.code == 0) {
+      h6Error error{};
+      if (!h6ChangeSession(loop, a.next, &error)) a.code = static_cast<int>(error.code);
+    }
+    return 0;
+  };
+  device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
+  h6LoopDef def = h6DefaultLoopDef();
+  def.realtime = false, def.virtual_time = true;
+  const hapsix::Loop loop = hapsix::start_loop(all.session[2], {&device, 1}, def);
+  asker.loop = loop.get();
+  while (asker.code == 0) std::this_thread::yield();
+  CHECK(asker.code == H6_ERROR_BUSY);
+  h6RequestStop(loop), h6JoinLoop(loop, nullptr);
+  all.session[2] = {};  // the loop that has ended looks at it no more
+  h6Error error{};
+  CHECK(h6ChangeSession(loop, all.session[1], &error) == nullptr);
+  CHECK(std::string(error.message) == "the loop has ended");
 }
 
 TEST_CASE("of two readers of records that take turns each frame goes to one, and none is lost") {
