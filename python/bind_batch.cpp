@@ -54,8 +54,7 @@ class Batch {
   // Sessions begin anew, the bodies of their hands at these poses.
   void reset(const std::vector<std::size_t>& which, const h6Pose* poses) {
     const Turn turn(busy_);
-    Definition at = *definition_;
-    for (auto& b : at.bodies) b = std::make_shared<h6BodyDef>(*b);
+    const Definition at(*definition_);
     for (std::size_t k = 0; k < which.size(); ++k) {
       for (std::size_t h = 0; h < hands_ && poses; ++h)
         at.bodies.at(static_cast<std::size_t>(at.hands[h]->body))->pose = poses[hands_ * k + h];
@@ -173,8 +172,6 @@ void add_batch(py::module_& m) {
       .def(py::init([](std::shared_ptr<PyModel> model, const Definition& definition,
                        std::size_t count, std::uint32_t threads) {
              auto copy = std::make_shared<Definition>(definition);
-             for (auto& body : copy->bodies) body = std::make_shared<h6BodyDef>(*body);
-             for (auto& hand : copy->hands) hand = std::make_shared<h6HandDef>(*hand);
              py::gil_scoped_release release;
              return std::make_shared<Batch>(std::move(model), std::move(copy), count, threads);
            }),

@@ -265,6 +265,11 @@ Definition::Definition(const h6SessionDef& from) : def(from) {
   def.bodies = nullptr, def.hands = nullptr, def.pairs = nullptr;
 }
 
+Definition::Definition(const Definition& from) : pairs(from.pairs), def(from.def) {
+  for (const auto& body : from.bodies) bodies.push_back(std::make_shared<h6BodyDef>(*body));
+  for (const auto& hand : from.hands) hands.push_back(std::make_shared<h6HandDef>(*hand));
+}
+
 void add_definitions(py::module_& m) {
   add_contact(m);
   add_body(m);

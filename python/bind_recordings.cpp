@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // bind_recordings.cpp - frames as structured arrays, recordings, and weights for other simulators.
+#include <mutex>
+
 #include "python/bindings.h"
 #include "python/rows.h"
 
@@ -27,8 +29,13 @@ void declare_rows() {
 
 namespace {
 
+// A recording or recorder belongs to one thread at a time, so Python's threads take turns. A turn
+// begins after the interpreter's lock was let go, else its owner could wait for that lock for ever.
+using Turn = std::lock_guard<std::mutex>;
+
 struct PyRecording {
   Unlocked<Recording> recording;
+  std::mutex mutex;
   h6RecordingInfo info{};
 };
 
@@ -51,6 +58,7 @@ py::array_t<h6FrameRecord> frames_of(PyRecording& r, std::uint64_t first,
   std::int64_t got;
   {
     py::gil_scoped_release release;
+    const Turn turn(r.mutex);
     got = h6GetRecordingFrames(r.recording, first, to, rows, &error);
   }
   if (got < 0) throw Error(error);
@@ -78,6 +86,7 @@ Typed<py::dict, "Dict[int, numpy.ndarray[numpy.float64]]"> bends_of(
   std::int64_t got;
   {
     py::gil_scoped_release release;
+    const Turn turn(r.mutex);
     got = h6GetRecordingBends(r.recording, first, to, rows, &error);
   }
   if (got < 0) throw Error(error);
@@ -135,8 +144,11 @@ void add_reader(py::module_& m) {
 struct PyRecorder {
   std::shared_ptr<PyScene> scene;
   Unlocked<Recorder> recorder;
+  std::mutex mutex;
+  // Without the interpreter's lock.
   void add(const h6FrameRecord* rows, std::size_t count, const std::vector<double>& q = {}) {
     h6Error error{};
+    const Turn turn(mutex);
     if (!h6RecordFramesWithBends(recorder, rows, count, q.empty() ? nullptr : q.data(), q.size(),
                                  &error))
       throw Error(error);
@@ -156,7 +168,7 @@ std::vector<double> q_of(const PySession& s) {
 }
 
 std::shared_ptr<PyRecorder> make_recorder(const std::string& file, std::shared_ptr<PyScene> scene,
-                                          std::shared_ptr<Definition> definition,
+                                          const Definition* definition,
                                           const std::string& program) {
   auto made = std::make_shared<PyRecorder>();
   made->scene = std::move(scene);
@@ -164,14 +176,16 @@ std::shared_ptr<PyRecorder> make_recorder(const std::string& file, std::shared_p
   def.scene = made->scene ? made->scene->scene.get() : nullptr;
   def.program = program.c_str();
   def.virtual_time = true;
+  std::optional<Definition> copy;
+  if (definition) copy.emplace(*definition);
   py::gil_scoped_release release;
   const auto create = [&](const h6SessionDef* session) {
     def.session = session;
     return Recorder::make(
         [&](h6Error* error) { return h6CreateRecorder(file.c_str(), &def, error); });
   };
-  made->recorder = definition ? definition->with([&](const h6SessionDef& s) { return create(&s); })
-                              : create(nullptr);
+  made->recorder =
+      copy ? copy->with([&](const h6SessionDef& s) { return create(&s); }) : create(nullptr);
   return made;
 }
 
@@ -208,6 +222,7 @@ void add_recorder(py::module_& m) {
           [](PyRecorder& r, const std::optional<std::string>& summary) {
             h6Error error{};
             py::gil_scoped_release release;
+            const Turn turn(r.mutex);
             if (!h6FinishRecorder(r.recorder, summary ? summary->c_str() : nullptr, &error))
               throw Error(error);
           },

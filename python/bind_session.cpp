@@ -347,8 +347,9 @@ void add_session(py::module_& m) {
   add_contacts(m);
   py::class_<PySession, SessionPtr> c(m, "Session", "Bodies, hands and their state.");
   c.def(py::init([](std::shared_ptr<PyModel> model, const Definition& definition) {
+          const Definition copy(definition);
           py::gil_scoped_release release;
-          return make_session(std::move(model), definition);
+          return make_session(std::move(model), copy);
         }),
         py::arg("model"), py::arg("definition"),
         "Each hand's sample begins where its body is, at rest.");

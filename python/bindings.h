@@ -154,6 +154,10 @@ struct Definition {
 
   Definition() = default;
   explicit Definition(const h6SessionDef& from);
+  // A copy shares no body and no hand. Whoever lets go of the interpreter's lock needs one: another
+  // Python thread may change the original then.
+  Definition(const Definition& from);
+  Definition& operator=(const Definition&) = delete;
   // Calls use(def) with a definition that points to everything.
   template <class Use>
   auto with(Use&& use) const {
