@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The guides are true: every command in them is run, in their order, in a folder of its own; links
-// lead somewhere; Python runs where h5py is there.
+// lead somewhere; the Python of every document runs where h5py and pandas are there.
 #include <cstdlib>
 #include <regex>
 #include <sstream>
@@ -46,8 +46,21 @@ int run_script(const Sandbox& box, const std::string& what, const fs::path& scri
                const fs::path& log) {
   const fs::path bin = fs::path(HAPSIX_PROGRAM).parent_path();
   return shell("cd '" + box.folder().string() + "' && HAPSIX_CACHE='" + box.cache().string() +
-               "' HAPSIX='" + HAPSIX_SOURCE_DIR + "' PATH=\"" + bin.string() + ":$PATH\" " + what +
-               " '" + script.string() + "' > '" + log.string() + "' 2>&1 < /dev/null");
+               "' HAPSIX='" + HAPSIX_SOURCE_DIR + "' PATH=\"" + bin.string() +
+               ":$PATH\" PYTHONPATH='" + (bin / "python").string() + "' " + what + " '" +
+               script.string() + "' > '" + log.string() + "' 2>&1 < /dev/null");
+}
+
+// Runs the Python of a document, all its blocks as one program.
+void run_python(Sandbox& box, const fs::path& document) {
+  if (shell("/usr/bin/python3 -c 'import h5py, numpy, pandas' 2> /dev/null") != 0) {
+    MESSAGE("skipped: no h5py, numpy or pandas for the Python of ", document.filename().string());
+    return;
+  }
+  const fs::path script = box.stream(), log = box.stream();
+  spill(script, blocks(document, "python"));
+  const int ran = run_script(box, "/usr/bin/python3", script, log);
+  CHECK_MESSAGE(ran == 0, document.filename(), "\n", slurp(log));
 }
 
 }  // namespace
@@ -63,17 +76,32 @@ TEST_CASE("every command of every guide runs") {
     spill(script, commands);
     const int code = run_script(box, "bash -e -o pipefail", script, log);
     CHECK_MESSAGE(code == 0, guide.filename(), "\n", slurp(log));
-    const std::string python = blocks(guide, "python");
-    if (python.empty()) continue;
-    if (shell("/usr/bin/python3 -c 'import h5py' 2> /dev/null") != 0) {
-      MESSAGE("skipped: no h5py for the Python of ", guide.filename().string());
-      continue;
-    }
-    spill(script, python);
-    const int ran = run_script(box, "/usr/bin/python3", script, log);
-    CHECK_MESSAGE(ran == 0, guide.filename(), "\n", slurp(log));
+    if (!blocks(guide, "python").empty()) run_python(box, guide);
   }
   CHECK(with_commands >= 6);
+}
+
+TEST_CASE("the Python of README.md runs, and no other document has some that does not") {
+  const fs::path readme = fs::path(HAPSIX_SOURCE_DIR) / "README.md";
+  REQUIRE(blocks(readme, "python").size() > 200);
+  Sandbox box;
+  run_python(box, readme);
+  int seen = 0;
+  fs::recursive_directory_iterator file(HAPSIX_SOURCE_DIR), end;
+  for (; file != end; ++file) {
+    const std::string name = file->path().filename().string();
+    if (file->is_directory() && (name == "build" || name.starts_with("."))) {
+      file.disable_recursion_pending();
+    } else if (name.ends_with(".md")) {
+      ++seen;
+      CAPTURE(file->path());
+      for (const char* unknown : {"py", "python3", "pycon"})
+        CHECK(blocks(file->path(), unknown).empty());
+      const bool runs = file->path() == readme || file->path().parent_path() == guides;
+      CHECK((runs || blocks(file->path(), "python").empty()));
+    }
+  }
+  CHECK(seen > 15);
 }
 
 TEST_CASE("the guides have no command outside the blocks that are run") {
