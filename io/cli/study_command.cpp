@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// study_command.cpp - hapsix study: a scene run over ranges of its settings, a row for each run.
+// study_command.cpp - hapsix study: scenes run over ranges of their settings, a row for each run.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -61,7 +61,7 @@ std::string number_field(double value) { return "," + Json(value).dump(); }
 
 std::string result_row(const study::Plan& plan, std::size_t run, const Trial& trial) {
   const RunTotals& t = trial.totals;
-  const double unit = plan.unit();
+  const double unit = plan.unit(run);
   std::string out = row_begin(plan, run) + "," + io::verdict_name(t.verdict);
   out += "," + std::to_string(t.frames) + "," + std::to_string(t.contacts_max);
   for (const double value :
@@ -101,10 +101,13 @@ void use_processes(const Program& program, const Options& o, study::Work& work) 
 Outcome do_runs(const Program& program, const Options& o, const study::Plan& plan,
                 study::Table& table) {
   study::Work work;
-  if (o.scheduler.empty())
+  if (o.scheduler.empty()) {
     use_processes(program, o, work);
-  else
-    study::use_scheduler(o.scheduler, {"study", o.file, plan.scene_file().string()}, work);
+  } else {
+    std::vector<std::string> job = {"study", o.file};
+    for (const fs::path& scene : plan.scene_files()) job.push_back(scene.string());
+    study::use_scheduler(o.scheduler, job, work);
+  }
   for (std::size_t run = 0; run < plan.runs(); ++run)
     if (!table.has(run)) work.runs.push_back(run);
   work.processes = std::min(work.processes, work.runs.size());
@@ -188,9 +191,10 @@ int study_command(const Program& program, const Options& o) {
 void add_study(CLI::App& app, Program& program) {
   CLI::App* command = app.add_subcommand(
       "study",
-      "A scene over ranges of its settings, in several processes: a row of a table for each run");
+      "A scene, or several, over ranges of their settings, in several processes: a row of a table "
+      "for each run");
   auto o = std::make_shared<Options>();
-  command->add_option("STUDY.json", o->file, "A scene and what varies; see below")->required();
+  command->add_option("STUDY.json", o->file, "Scenes and what varies; see below")->required();
   command
       ->add_option("-o,--output", o->folder,
                    "Its folder: runs.csv, times.csv (seconds of each run) and runs.svg in the end, "
@@ -213,7 +217,8 @@ void add_study(CLI::App& app, Program& program) {
       "  \"vary\": {\"contact.method\": [\"firm\", \"global\"],\n"
       "           \"bodies.block.field.offset\": {\"from\": 0, \"to\": 0.4, \"count\": 5}},\n"
       "  \"draw\": {\"bodies.peg.pose.p.x\": {\"low\": -0.2, \"high\": 0.2}}, \"repeats\": "
-      "20}\n\n" +
+      "20}\n"
+      "\"scene\" may be a list of scenes, each of which then has all of these runs.\n\n" +
       command->get_footer());
   command->callback(
       [&program, o] { program.work = [&program, o] { return study_command(program, *o); }; });

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """cluster.py - does the runs of a study or a map on the workers of a scheduler of Dask's distributed.
 
-The program starts it with: ADDRESS PROGRAM VERSION SIMD, then `study STUDY SCENE` or the arguments of
+The program starts it with: ADDRESS PROGRAM VERSION SIMD, then `study STUDY SCENE...` or the arguments of
 `hapsix map`. It reads numbers of runs, a line each, and answers each with one line: its row, "?RUN
 SENTENCE" for a run that no worker could end, or "!SENTENCE" when nothing can go on. Workers need the
 program in the same version and nothing else of this tree. Files go to them by the hash of their content,
@@ -102,18 +102,31 @@ def do_run(run, job, digests, *contents):
     return row[:-1]
 
 
-def describe_study(study, scene):
+def describe_study(study, *scenes):
     """What the workers get of a study: its job and the content of its files."""
-    assets = {}
-    with open(scene) as file:
-        text = json.dumps(with_assets(json.load(file), os.path.dirname(os.path.abspath(scene)), assets))
+    assets, texts, names = {}, {}, []
     with open(study) as file:
         plan = json.load(file)
-    plan = with_assets(plan, os.path.dirname(os.path.abspath(scene)), assets)
-    plan["scene"] = "scene.json"
-    return {"words": ["study", "@FOLDER@/study.json", "-o", "@FOLDER@"],
-            "texts": {"study.json": json.dumps(plan), "scene.json": text},
-            "names": sorted(set(names_in(json.loads(text), assets) + names_in(plan, assets)))}, assets
+    given = plan.pop("scene")
+    for i, scene in enumerate(scenes):
+        base = os.path.dirname(os.path.abspath(scene))
+        with open(scene) as file:
+            text = with_assets(json.load(file), base, assets)
+        local = with_assets(plan, base, assets)
+        if isinstance(given, list):
+            # The table has it: that of the file, as the program does it, and not that of the copy.
+            text["name"] = text.get("name") or os.path.splitext(os.path.basename(scene))[0]
+            if local != plan:
+                print("!files cannot vary in a list of scenes on a scheduler: each scene has its own", flush=True)
+                sys.exit(1)
+        plan = local
+        names += names_in(text, assets)
+        texts[f"scene{i}.json"] = json.dumps(text)
+    names += names_in(plan, assets)
+    plan["scene"] = list(texts) if isinstance(given, list) else "scene0.json"
+    texts["study.json"] = json.dumps(plan)
+    return {"words": ["study", "@FOLDER@/study.json", "-o", "@FOLDER@"], "texts": texts,
+            "names": sorted(set(names))}, assets
 
 
 def names_in(value, assets):

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::size_t kMostRuns = 1000000;
+constexpr std::size_t kMostRuns = 1000000, kMostScenes = 100;
 constexpr std::size_t kLongestKey = 300;  // each word is a level of JSON, and those cost stack
 
 struct Varied {
@@ -166,60 +166,104 @@ std::string content_of(const fs::path& file) {
   return text.str();
 }
 
+// One scene of a study.
+struct Base {
+  std::string name;  // in the table
+  fs::path file;
+  io::Scene scene;
+  Json text;
+};
+
+// The file of a scene; a generated one is exported first.
 Result<fs::path> scene_file_of(const std::string& name, const fs::path& study,
-                               const fs::path& folder) {
+                               const fs::path& exported) {
   const fs::path file = fs::path(name).is_absolute() ? fs::path(name) : study.parent_path() / name;
   std::error_code error;
   if (fs::is_regular_file(file, error)) return file;
-  const fs::path exported = folder / "scene";
   if (fs::exists(exported / "scene.json", error)) return exported / "scene.json";
   Result<io::Scene> made = io::make_scene(name);
   if (!made)
     return Failure{io::shown(name) + ": there is neither such a file nor such a generated scene"};
   // Aside first: a kill leaves no half scene.
-  const fs::path aside = folder / "scene.unfinished";
+  fs::path aside = exported;
+  aside += ".unfinished";
   fs::remove_all(aside, error);
+  fs::create_directories(exported.parent_path(), error);
   if (const Outcome out = io::export_scene(*made, aside); !out) return out.failure();
   fs::rename(aside, exported, error);
   if (error) return Failure{"cannot write " + exported.string() + ": " + error.message()};
   return exported / "scene.json";
 }
 
+Result<Base> read_base(const std::string& name, const fs::path& study, const fs::path& exported,
+                       bool outside) {
+  const Result<fs::path> at = scene_file_of(name, study, exported);
+  if (!at) return at.failure();
+  // What was exported into the folder is our own.
+  Result<io::Scene> scene =
+      *at == exported / "scene.json" ? io::read_scene(*at) : io::read_scene(*at, outside);
+  if (!scene) return scene.failure();
+  Base out{scene->name, *at, std::move(*scene), {}};
+  each_file(out.scene, [](fs::path& f) { f = fs::absolute(f).lexically_normal(); });
+  out.text = Json::parse(io::scene_text(out.scene));
+  return out;
+}
+
+// The names in "scene": one, or a list of them.
+std::vector<std::string> scene_names_of(const Json& given) {
+  if (given.is_string()) return {given.get<std::string>()};
+  std::vector<std::string> out;
+  for (const Json& name : given) {
+    if (!name.is_string()) throw Mistake{"a scene of the list is no name"};
+    out.push_back(name.get<std::string>());
+  }
+  if (out.empty() || out.size() > kMostScenes)
+    throw Mistake{"a list of scenes has 1 to " + std::to_string(kMostScenes)};
+  return out;
+}
+
 }  // namespace
 
 struct Plan::Parts {
-  fs::path file;         // of the scene
-  bool outside = false;  // its files may lie outside its folder
-  io::Scene base;
-  Json scene;  // of the base
+  std::vector<Base> bases;
+  bool listed = false;   // the scenes are a list, and so a key
+  bool outside = false;  // their files may lie outside their folders
   std::vector<Varied> vary;
   std::vector<Drawn> draws;
   std::uint64_t repeats = 1, seed = 1;
   std::vector<std::string> keys;
   std::string identity;
 
-  std::size_t combinations() const {
-    std::size_t n = 1;
+  std::size_t runs_a_scene() const {
+    std::size_t n = repeats;
     for (const Varied& v : vary) n *= v.values.size();
     return n;
   }
+  const Base& base(std::size_t run) const { return bases[run / runs_a_scene()]; }
   // The values of a run, one for each key; the last of `vary` changes fastest, then repeats.
   std::vector<Json> values(std::size_t run) const {
     std::vector<Json> out(keys.size());
+    if (listed) out[0] = base(run).name;
+    const std::size_t first = listed ? 1 : 0;
     std::size_t rest = run / repeats;
     for (std::size_t i = vary.size(); i-- > 0; rest /= vary[i].values.size())
-      out[i] = vary[i].values[rest % vary[i].values.size()];
+      out[first + i] = vary[i].values[rest % vary[i].values.size()];
     for (std::size_t i = 0; i < draws.size(); ++i)
-      out[vary.size() + i] =
+      out[first + vary.size() + i] =
           draws[i].low + (draws[i].high - draws[i].low) * draw(seed, run % repeats, i);
     return out;
   }
-  // Runs in which every value occurs: the first, and those that differ from it in one value.
+  // Runs in which every value occurs with every scene: the first of the scene, and those that
+  // differ from it in one value.
   std::vector<std::size_t> with_each_value() const {
-    std::vector<std::size_t> out{0};
-    std::size_t step = repeats;
-    for (std::size_t i = vary.size(); i-- > 0; step *= vary[i].values.size())
-      for (std::size_t j = 1; j < vary[i].values.size(); ++j) out.push_back(j * step);
+    std::vector<std::size_t> out;
+    for (std::size_t b = 0; b < bases.size(); ++b) {
+      const std::size_t begin = b * runs_a_scene();
+      std::size_t step = repeats;
+      out.push_back(begin);
+      for (std::size_t i = vary.size(); i-- > 0; step *= vary[i].values.size())
+        for (std::size_t j = 1; j < vary[i].values.size(); ++j) out.push_back(begin + j * step);
+    }
     return out;
   }
   void read(const Json& study) {
@@ -228,7 +272,9 @@ struct Plan::Parts {
     const Json given_draw = study.value("draw", Json::object());
     repeats = whole_of(study, "repeats", 1, kMostRuns);
     seed = whole_of(study, "seed", 1, std::uint64_t{1} << 53);
-    std::size_t runs = check_runs(repeats);
+    listed = study["scene"].is_array();
+    if (listed) keys.push_back("scene");
+    std::size_t runs = check_runs(repeats * scene_names_of(study["scene"]).size());
     for (const auto& [key, given] : given_vary.items()) {
       check_key(key);
       vary.push_back(varied(key, given));
@@ -242,8 +288,22 @@ struct Plan::Parts {
       keys.push_back(key);
     }
   }
+  Outcome read_bases(const Json& study, const fs::path& file, const fs::path& folder) {
+    for (const std::string& name : scene_names_of(study["scene"])) {
+      const fs::path exported =
+          listed ? folder / "scenes" / std::to_string(bases.size()) : folder / "scene";
+      Result<Base> base = read_base(name, file, exported, outside);
+      if (!base) return base.failure();
+      for (const Base& other : bases)
+        if (other.name == base->name)
+          throw Mistake{"two scenes of the list have the name '" + io::shown(other.name) +
+                        "': give one of them another \"name\""};
+      bases.push_back(std::move(*base));
+    }
+    return Done{};
+  }
   // Files that vary lie beside the scene, as its own do, and no stranger's study reads others.
-  Outcome settle_files(io::Scene& scene) const {
+  Outcome settle_files(const fs::path& file, io::Scene& scene) const {
     fs::path strange;
     each_file(scene, [&](fs::path& f) {
       f = (file.parent_path() / f).lexically_normal();
@@ -256,14 +316,17 @@ struct Plan::Parts {
   }
   void identify(const Json& study) {
     std::ostringstream out;
-    out << study.dump() << '\n' << scene.dump() << '\n';
-    each_file(base, [&](fs::path& file) {
-      const std::string content = content_of(file);
-      out << io::hex(io::hash_bytes(content.data(), content.size())) << '\n';
-    });
-    for (const io::SceneHand& hand : base.hands)
-      out << io::hex(io::hash_bytes(hand.path.data(), hand.path.size() * sizeof(io::PathRow)))
-          << '\n';
+    out << study.dump() << '\n';
+    for (Base& base : bases) {
+      out << base.text.dump() << '\n';
+      each_file(base.scene, [&](fs::path& file) {
+        const std::string content = content_of(file);
+        out << io::hex(io::hash_bytes(content.data(), content.size())) << '\n';
+      });
+      for (const io::SceneHand& hand : base.scene.hands)
+        out << io::hex(io::hash_bytes(hand.path.data(), hand.path.size() * sizeof(io::PathRow)))
+            << '\n';
+    }
     out << h6BuildInfo() << '\n';  // another processor may give other bits
     identity = out.str();
   }
@@ -280,21 +343,13 @@ Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outsi
   try {
     const Json study = Json::parse(text);
     if (!study.is_object() || study.value("hapsix_study", Json()) != 1 ||
-        !study.contains("scene") || !study["scene"].is_string())
+        !study.contains("scene") || !(study["scene"].is_string() || study["scene"].is_array()))
       return Failure{name + ": a study begins with \"hapsix_study\": 1 and names a \"scene\""};
     auto parts = std::make_unique<Parts>();
-    parts->read(study);
-    const Result<fs::path> at = scene_file_of(study["scene"], fs::absolute(file), folder);
-    if (!at) return at.failure();
-    // What was exported into the folder is our own.
-    Result<io::Scene> base =
-        *at == folder / "scene" / "scene.json" ? io::read_scene(*at) : io::read_scene(*at, outside);
-    if (!base) return base.failure();
-    parts->file = *at;
     parts->outside = outside;
-    parts->base = std::move(*base);
-    each_file(parts->base, [](fs::path& f) { f = fs::absolute(f).lexically_normal(); });
-    parts->scene = Json::parse(io::scene_text(parts->base));
+    parts->read(study);
+    if (const Outcome all = parts->read_bases(study, fs::absolute(file), folder); !all)
+      return all.failure();
     parts->identify(study);
     Plan plan(std::move(parts));
     for (const std::size_t run : plan.parts_->with_each_value())
@@ -308,11 +363,16 @@ Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outsi
   }
 }
 
-std::size_t Plan::runs() const { return parts_->combinations() * parts_->repeats; }
+std::size_t Plan::runs() const { return parts_->bases.size() * parts_->runs_a_scene(); }
 const std::vector<std::string>& Plan::keys() const { return parts_->keys; }
 std::size_t Plan::repeat(std::size_t run) const { return run % parts_->repeats; }
-const fs::path& Plan::scene_file() const { return parts_->file; }
-double Plan::unit() const { return io::metres(parts_->base.unit); }
+const fs::path& Plan::scene_file(std::size_t run) const { return parts_->base(run).file; }
+double Plan::unit(std::size_t run) const { return io::metres(parts_->base(run).scene.unit); }
+std::vector<fs::path> Plan::scene_files() const {
+  std::vector<fs::path> out;
+  for (const Base& base : parts_->bases) out.push_back(base.file);
+  return out;
+}
 const std::string& Plan::identity() const { return parts_->identity; }
 
 std::vector<std::string> Plan::values(std::size_t run) const {
@@ -335,20 +395,23 @@ std::vector<Json> paths_of(const Json& scene) {
 }  // namespace
 
 Result<io::Scene> Plan::scene(std::size_t run) const {
-  Json text = parts_->scene;
+  const Base& base = parts_->base(run);
+  Json text = base.text;
   const std::vector<Json> values = parts_->values(run);
   try {
-    for (std::size_t i = 0; i < values.size(); ++i) put(text, parts_->keys[i], values[i]);
+    for (std::size_t i = parts_->listed ? 1 : 0; i < values.size(); ++i)
+      put(text, parts_->keys[i], values[i]);
   } catch (const Mistake& mistake) {
     return Failure{mistake.sentence};
   }
-  if (paths_of(text) != paths_of(parts_->scene))
+  if (paths_of(text) != paths_of(base.text))
     return Failure{"the path of a hand cannot vary: a study has one, read with its scene"};
   Result<io::Scene> scene = io::read_scene_text(text.dump(), "run " + std::to_string(run));
   if (!scene) return scene;
-  if (const Outcome settled = parts_->settle_files(*scene); !settled) return settled.failure();
-  for (std::size_t h = 0; h < scene->hands.size() && h < parts_->base.hands.size(); ++h)
-    scene->hands[h].path = parts_->base.hands[h].path;
+  if (const Outcome settled = parts_->settle_files(base.file, *scene); !settled)
+    return settled.failure();
+  for (std::size_t h = 0; h < scene->hands.size() && h < base.scene.hands.size(); ++h)
+    scene->hands[h].path = base.scene.hands[h].path;
   return scene;
 }
 

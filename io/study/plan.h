@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// plan.h - STUDY.json: a scene, the settings that vary, and what is drawn at random; one scene a
-// run.
+// plan.h - STUDY.json: a scene or several, the settings that vary, and what is drawn at random; one
+// scene a run.
 //
 //   { "hapsix_study": 1, "scene": "peg-in-hole",
 //     "vary":    { "contact.method": ["firm", "global"],
@@ -11,7 +11,8 @@
 // A key is the way to a setting of the scene file, its words joined by dots; bodies go by their
 // name, hands by their body or number, members of a vector by x, y, z, w or number. Values are in
 // the scene's unit. Every combination of `vary` runs `repeats` times; repeat r has the same draws
-// in each of them.
+// in each of them. "scene" may be a list: then each scene has all of these runs, and every key must
+// be one of each scene.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -26,8 +27,9 @@ namespace h6::study {
 
 class Plan {
  public:
-  // Reads a study. A generated scene is exported to `folder`/scene first, unless it stands there.
-  // Every value is checked in one run; the sentence of a mistake names the key and that run.
+  // Reads a study. A generated scene is exported to `folder`/scene first (those of a list to
+  // `folder`/scenes/0 and so on), unless it stands there. Every value is checked in one run of each
+  // scene; the sentence of a mistake names the key and that run.
   static Result<Plan> read(const std::filesystem::path& file, const std::filesystem::path& folder,
                            bool outside);
   Plan(Plan&&) noexcept;
@@ -35,13 +37,15 @@ class Plan {
   ~Plan();
 
   std::size_t runs() const;
-  const std::vector<std::string>& keys() const;  // of `vary`, then of `draw`
+  // "scene" where there is a list, then those of `vary`, then of `draw`.
+  const std::vector<std::string>& keys() const;
   Result<io::Scene> scene(std::size_t run) const;
   std::vector<std::string> values(std::size_t run) const;  // one for each key, as JSON
   std::size_t repeat(std::size_t run) const;
-  const std::filesystem::path& scene_file() const;  // of the scene, also of a generated one
-  double unit() const;                              // metres in the scene's unit of length
-  // All that decides what the runs give: study, scene, content of its files, version.
+  const std::filesystem::path& scene_file(std::size_t run) const;  // also of a generated scene
+  std::vector<std::filesystem::path> scene_files() const;          // of each scene, in their order
+  double unit(std::size_t run) const;  // metres in the scene's unit of length
+  // All that decides what the runs give: study, scenes, content of their files, version.
   const std::string& identity() const;
 
  private:

@@ -9,8 +9,8 @@
 namespace h6::study {
 
 // Fills in which program does the runs: Python, which hands them to the scheduler at `address`.
-// `job` is {"study", STUDY, SCENE}, or the command and arguments of this program that a worker runs
-// with --worker.
+// `job` is {"study", STUDY, SCENE...}, or the command and arguments of this program that a worker
+// runs with --worker.
 void use_scheduler(const std::string& address, const std::vector<std::string>& job, Work& work);
 
 }  // namespace h6::study

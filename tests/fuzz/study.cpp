@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "io/scene/scene_file.h"
@@ -28,12 +29,18 @@ constexpr const char* kScene = R"({"hapsix": 1, "units": "mm", "bodies": [
    "pose": {"p": [0, 0, 30], "q": [1, 0, 0, 0]}}],
   "hands": [{"body": "peg", "device": "arm"}]})";
 
-// A study's folder with a scene that was exported before: every name of a generated scene is it.
+// A study's folder with scenes that were exported before: every name of a generated scene is one.
 const fs::path& folder() {
   static const fs::path made = [] {
     const fs::path at = fs::path(as_file({}, "beside")).parent_path() / "study";
     fs::create_directories(at / "scene");
     std::ofstream(at / "scene" / "scene.json") << kScene;
+    for (int i = 0; i < 100; ++i) {
+      const fs::path one = at / "scenes" / std::to_string(i);
+      fs::create_directories(one);
+      const std::string name = "\"name\": \"" + std::to_string(i) + "\", ";
+      std::ofstream(one / "scene.json") << std::string(kScene).insert(1, name);
+    }
     return at;
   }();
   return made;
@@ -93,7 +100,7 @@ void check_run(const study::Plan& plan, const Json& study, std::size_t run) {
     promise(run > 0, "a study whose first run cannot be read is refused");
     return;
   }
-  check_files(*scene, plan.scene_file());
+  check_files(*scene, plan.scene_file(run));
 }
 
 }  // namespace

@@ -107,6 +107,30 @@ class Studies(unittest.TestCase):
         self.assertEqual(self.table("there").count("\n"), 25)
         self.assertTrue(glob.glob(self.at("tmp/hapsix-study-*/*-block.stl")), "the mesh came by its hash")
 
+    def test_scenes_of_a_list_reach_the_workers_and_none_may_vary_its_files(self):
+        for name in ("peg-in-hole", "box-on-wall"):
+            subprocess.run([PROGRAM, "scene", "export", name, self.at(name)], check=True, capture_output=True,
+                           env=self.environment)
+        with open(self.at("peg-in-hole/scene.json")) as file:
+            nameless = json.load(file)
+        del nameless["name"]  # the table names it after its file
+        self.write("peg-in-hole/scene.json", nameless)
+        plan = {"hapsix_study": 1, "scene": ["peg-in-hole/scene.json", "box-on-wall/scene.json", "cone-in-gap"],
+                "draw": {"contact.stiffness": {"low": 5000, "high": 20000}}, "repeats": 3}
+        self.write("study.json", plan)
+        self.assertEqual(self.study("here", "--jobs", "2")[0], 0)
+        cluster = Cluster(self.folder, 2, dict(self.environment, HAPSIX_CACHE=self.at("far")))
+        self.addCleanup(cluster.close)
+        code, error = self.study("there", "--scheduler", cluster.address)
+        self.assertEqual(code, 0, error)
+        self.assertEqual(self.table("there"), self.table("here"))
+        self.assertEqual([line.split(",")[2] for line in self.table("there").splitlines()[1::3]],
+                         ["scene", "box-on-wall", "cone-in-gap"])
+        self.write("files.json", dict(plan, scene=plan["scene"][:2], vary={"bodies.0.field.mesh": ["block.stl"]}))
+        code, error = self.study("files", "--scheduler", cluster.address, plan="files.json")
+        self.assertEqual(code, 1, error)
+        self.assertIn("files cannot vary in a list of scenes", error)
+
     def test_a_study_that_is_killed_goes_on_there(self):
         self.write("study.json", dict(PLAN, repeats=6))
         self.assertEqual(self.study("here", "--jobs", "2")[0], 0)
