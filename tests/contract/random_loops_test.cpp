@@ -11,6 +11,7 @@
 #include <map>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "hapsix/hapsix.hpp"
@@ -259,9 +260,18 @@ class Sequence {
     std::vector<h6FrameRecord> rows(kRows);
     std::vector<double> bends(kRows * kModes, 7);
     const bool with_bends = random_() % 4;
-    const std::size_t n =
-        h6ReadRecordsWithBends(rarely() ? nullptr : loop_.get(), rarely() ? nullptr : rows.data(),
-                               with_bends ? bends.data() : nullptr, random_() % (kRows + 1));
+    h6Loop* const loop = rarely() ? nullptr : loop_.get();
+    h6FrameRecord* const out = rarely() ? nullptr : rows.data();
+    const std::size_t room = random_() % (kRows + 1);
+    const auto read = [&] {
+      return h6ReadRecordsWithBends(loop, out, with_bends ? bends.data() : nullptr, room);
+    };
+    // A loop that waits for its reader has a frame sooner or later, however busy the machine is.
+    std::size_t n = read();
+    while (n == 0 && waits_ && loop && out && room > 0 && h6LoopRunning(loop)) {
+      std::this_thread::yield();
+      n = read();
+    }
     tallied("h6ReadRecordsWithBends", n > 0);
     REQUIRE(n <= kRows);
     for (std::size_t i = 0; i < n; ++i) {
