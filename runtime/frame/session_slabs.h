@@ -7,70 +7,75 @@
 #pragma once
 #include <cstddef>
 #include <mutex>
+#include <new>
 #include <utility>
-#include <vector>
 
 #include "runtime/base/arena.h"
 
 namespace h6 {
 
-// Any thread may call. No frame does. A slab ends when all of its pieces were given back.
+// Any thread may call. No frame does. A slab ends when all of its pieces were given back. What is
+// known of a slab stands at its begin and in its unused pieces, so slabs need no other memory.
 class SessionSlabs {
  public:
   SessionSlabs() = default;
   SessionSlabs(const SessionSlabs&) = delete;
   SessionSlabs& operator=(const SessionSlabs&) = delete;
   ~SessionSlabs() {
-    for (const Slab& slab : slabs_) release({}, slab.memory, kSlab);
+    while (first_) release({}, std::exchange(first_, first_->next), kSlab);
   }
 
-  // Memory of this size, aligned as by allocate. Null if there is none. May throw std::bad_alloc;
-  // then nothing has changed.
+  // Memory of this size, aligned as by allocate. Null if there is none.
   void* take(std::size_t bytes) {
     if (bytes == 0 || bytes > kSlab / 2) return allocate({}, bytes);
     const std::lock_guard lock(mutex_);
     const std::size_t each = (bytes + kAlignment - 1) / kAlignment * kAlignment;
-    for (std::size_t i = slabs_.size(); i-- > 0;)
-      if (slabs_[i].each == each && !slabs_[i].unused.empty()) return take_from(slabs_[i]);
-    std::vector<char*> unused(kSlab / each);
-    Slab& slab = slabs_.emplace_back(Slab{nullptr, each, {}});
-    slab.memory = static_cast<char*>(allocate({}, kSlab));
-    if (!slab.memory) return slabs_.pop_back(), nullptr;
-    for (std::size_t i = 0; i < unused.size(); ++i) unused[i] = slab.memory + each * i;
-    slab.unused = std::move(unused);  // it never grows, so to give back needs no memory
-    return take_from(slab);
+    for (Slab* slab = first_; slab; slab = slab->next)
+      if (slab->each == each && (slab->unused || slab->begun < pieces(*slab)))
+        return take_from(*slab);
+    void* const memory = allocate({}, kSlab);
+    if (!memory) return nullptr;
+    first_ = new (memory) Slab{first_, each};
+    return take_from(*first_);
   }
   // Memory that `take` gave for this size.
   void give_back(void* memory, std::size_t bytes) {
     if (bytes == 0 || bytes > kSlab / 2) return release({}, memory, bytes);
     const std::lock_guard lock(mutex_);
-    for (std::size_t i = 0; i < slabs_.size(); ++i) {
-      Slab& slab = slabs_[i];
-      if (memory < slab.memory || memory >= slab.memory + kSlab) continue;
-      slab.unused.push_back(static_cast<char*>(memory));
-      if (slab.unused.size() < kSlab / slab.each) return;
-      release({}, slab.memory, kSlab);
-      slabs_.erase(slabs_.begin() + static_cast<std::ptrdiff_t>(i));
-      return;
+    for (Slab** link = &first_; *link; link = &(*link)->next) {
+      Slab* const slab = *link;
+      if (memory < begin(*slab) || memory >= begin(*slab) + kSlab) continue;
+      slab->unused = new (memory) Unused{slab->unused};
+      if (--slab->held > 0) return;
+      *link = slab->next;
+      return release({}, slab, kSlab);
     }
   }
 
  private:
   static constexpr std::size_t kSlab = 8 * kHugePage;
-  struct Slab {
-    char* memory;
-    std::size_t each;           // bytes of a piece
-    std::vector<char*> unused;  // pieces
+  struct Unused {
+    Unused* next;
   };
+  struct Slab {
+    Slab* next;
+    std::size_t each;          // bytes of a piece
+    std::size_t begun = 0;     // pieces that were taken at least once; the others stay untouched
+    std::size_t held = 0;      // pieces in use
+    Unused* unused = nullptr;  // pieces that were given back
+  };
+  static_assert(sizeof(Slab) <= kAlignment);
 
+  static char* begin(Slab& slab) { return reinterpret_cast<char*>(&slab); }
+  static std::size_t pieces(const Slab& slab) { return (kSlab - kAlignment) / slab.each; }
   static void* take_from(Slab& slab) {
-    void* const piece = slab.unused.back();
-    slab.unused.pop_back();
-    return piece;
+    ++slab.held;
+    if (slab.unused) return std::exchange(slab.unused, slab.unused->next);
+    return begin(slab) + kAlignment + slab.each * slab.begun++;
   }
 
   std::mutex mutex_;
-  std::vector<Slab> slabs_;
+  Slab* first_ = nullptr;
 };
 
 }  // namespace h6

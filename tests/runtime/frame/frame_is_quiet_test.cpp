@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "hapsix/batch.h"
+#include "runtime/frame/session_slabs.h"
 #include "tests/support/ball_in_bowl.h"
 #include "tests/support/bridge.h"
 #include "tests/support/forced_target.h"
@@ -226,6 +227,20 @@ TEST_CASE("frames with a body that bends allocate nothing and take no lock") {
             CAPTURE(modes);
             check_quiet(scene, 150, modes == 64 ? 0 : 5);
           }
+}
+
+TEST_CASE("a slab of many sessions is one piece of the heap, and its tables stand in it") {
+  if (kSanitized) return;  // the heap is the sanitizer's then
+  h6::SessionSlabs slabs;
+  std::vector<void*> pieces(150);
+  watching = true;
+  for (void*& piece : pieces) piece = slabs.take(100000);
+  for (std::size_t i = 0; i < pieces.size(); i += 2) slabs.give_back(pieces[i], 100000);
+  for (std::size_t i = 0; i < pieces.size(); i += 2) pieces[i] = slabs.take(100000);
+  watching = false;
+  CHECK(allocations.exchange(0) == 1);
+  for (void* piece : pieces) slabs.give_back(piece, 100000);
+  locks = 0;
 }
 
 TEST_CASE("stepping many sessions in one call allocates nothing and takes no lock") {
