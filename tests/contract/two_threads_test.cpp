@@ -157,11 +157,11 @@ TEST_CASE("two threads change a loop's session and a third steps all: each sessi
   h6Session* mine[callers] = {all.session[1], all.session[2]};
   int changed[callers] = {0, 0}, odd[callers] = {0, 0};
   on_two([&](int caller) {
-    for (int i = 0; i < h6::test::repeated(2000, 40); ++i) {
+    while (changed[caller] < h6::test::repeated(2000, 40) && odd[caller] == 0) {
       h6Error error{};
       h6Session* const before = h6ChangeSession(all.loop, mine[caller], &error);
       if (!before) {
-        odd[caller] += error.code != H6_ERROR_BUSY;  // the third thread was stepping it
+        odd[caller] += error.code != H6_ERROR_BUSY;  // the third thread steps it: once more
         continue;
       }
       odd[caller] += before == mine[caller];
@@ -173,7 +173,6 @@ TEST_CASE("two threads change a loop's session and a third steps all: each sessi
   });
   third.join();
   CHECK((odd[0] == 0 && odd[1] == 0));
-  CHECK((changed[0] > 0 && changed[1] > 0));
   CHECK((stepped > 0 && refused > 0));
   // The loop runs one of the three, and the callers own the others.
   h6DeviceCommand out;
@@ -207,6 +206,7 @@ TEST_CASE("a session is not changed by the haptic thread, nor when the loop has 
   device.write = [](void*, double, const h6DeviceCommand*) { return 0; };
   h6LoopDef def = h6DefaultLoopDef();
   def.realtime = false, def.virtual_time = true;
+  def.ring_frames = 0;  // it would wait for a reader
   const hapsix::Loop loop = hapsix::start_loop(all.session[2], {&device, 1}, def);
   asker.loop = loop.get();
   while (asker.code == 0) std::this_thread::yield();
