@@ -333,20 +333,20 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
 
 // The turn of one caller of h6ChangeSession. Only callers wait here, and no longer than `give_up`,
 // which std::mutex could not promise.
-class Turn {
+class ChangeTurn {
  public:
-  Turn(std::atomic<bool>& taken, std::int64_t give_up) : taken_(taken) {
+  ChangeTurn(std::atomic<bool>& taken, std::int64_t give_up) : taken_(taken) {
     while (taken_.exchange(true, std::memory_order_acquire)) {
       if (sched::now_ns() > give_up) return;
       sched::sleep_until_ns(sched::now_ns() + kPoll);
     }
     mine_ = true;
   }
-  ~Turn() {
+  ~ChangeTurn() {
     if (mine_) taken_.store(false, std::memory_order_release);
   }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
+  ChangeTurn(const ChangeTurn&) = delete;
+  ChangeTurn& operator=(const ChangeTurn&) = delete;
   bool mine() const { return mine_; }
 
  private:
@@ -492,7 +492,7 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
     return fail(error, H6_ERROR_BUSY, "the haptic thread cannot wait for its own next frame"),
            nullptr;
   const std::int64_t give_up = sched::now_ns() + kTakeOverTime;
-  const Turn turn(loop->changing, give_up);
+  const ChangeTurn turn(loop->changing, give_up);
   if (!turn.mine())
     return fail(
                error, H6_ERROR_BUSY,
