@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // sample_field_bench.cpp - distance and gradient at n points: "near" all in bricks, "mixed" within
-// 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_corners":
-// four distances about each of n points near the surface. "creased": near points where one cell in
-// ten of those at the surface is cut into quarters; "refined": where every one is.
+// 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_corners"
+// and "sample_ends": four and six distances about each of n points near the surface. "creased":
+// near points where one cell in ten of those at the surface is cut into quarters; "refined": where
+// every one is.
 #include "kernels/field/sample_field.h"
 
 #include <memory>
 
 #include "bench/kernels/field_bench.h"
-#include "kernels/field/sample_corners.h"
+#include "kernels/field/sample_around.h"
 
 namespace {
 
@@ -18,9 +19,9 @@ using namespace h6::kernels::bench;
 struct Data {
   const test::AnalyticField& field;
   ShellPoints points;
-  std::vector<float> out[4], want[4];
+  std::vector<float> out[6], want[6];
   Data(std::size_t n, double spread, const test::AnalyticField& in) : field(in), points(n, spread) {
-    for (int k = 0; k < 4; ++k) out[k].resize(n), want[k].resize(n);
+    for (int k = 0; k < 6; ++k) out[k].resize(n), want[k].resize(n);
   }
 };
 
@@ -31,16 +32,18 @@ void call(const Kernel& kernel, const Data& d, std::vector<float>* out) {
          nullptr, d.points.x.size(), out[0].data(), out[1].data(), out[2].data(), out[3].data());
 }
 
-template <class Kernel>
-void call_corners(const Kernel& kernel, const Data& d, std::vector<float>* out) {
-  float* const at[4] = {out[0].data(), out[1].data(), out[2].data(), out[3].data()};
+using Around = void (*)(const FieldView&, const Affine&, const PointsView&, float, float* const*);
+
+void call_around(Around kernel, const Data& d, std::vector<float>* out) {
+  float* at[6];
+  for (int k = 0; k < 6; ++k) at[k] = out[k].data();
   kernel(d.field.view(), test::kIdentity,
          PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
          0.5f, at);
 }
 
 bool agrees(const Data& d) {
-  for (int k = 0; k < 4; ++k)
+  for (int k = 0; k < 6; ++k)
     for (std::size_t i = 0; i < d.out[k].size(); ++i)
       if (!(std::fabs(d.out[k][i] - d.want[k][i]) <= 1e-4f)) return false;
   return true;
@@ -53,11 +56,20 @@ Case make(std::size_t n, double spread, const test::AnalyticField& field) {
           [=] { return agrees(*d); }};
 }
 
-Case make_corners(std::size_t n, const test::AnalyticField& field) {
+Case make_around(std::size_t n, const test::AnalyticField& field, Around kernel, Around reference) {
   auto d = std::make_shared<Data>(n, 1.5, field);
-  call_corners(sample_corners_ref, *d, d->want);
-  return {[=] { call_corners(sample_corners, *d, d->out); },
-          [=] { call_corners(sample_corners_ref, *d, d->out); }, [=] { return agrees(*d); }};
+  call_around(reference, *d, d->want);
+  return {[=] { call_around(kernel, *d, d->out); }, [=] { call_around(reference, *d, d->out); },
+          [=] { return agrees(*d); }};
+}
+
+// `field` makes the field when a case first runs.
+template <class Field>
+void add_around(const std::string& rest, std::size_t n, const Field& field) {
+  add("kernels/sample_corners/" + rest, n,
+      [=] { return make_around(n, field(), sample_corners, sample_corners_ref); });
+  add("kernels/sample_ends/" + rest, n,
+      [=] { return make_around(n, field(), sample_ends, sample_ends_ref); });
 }
 
 const bool registered = [] {
@@ -68,15 +80,15 @@ const bool registered = [] {
     }
   }
   for (std::size_t n : {64, 1024, 16384})
-    add("kernels/sample_corners/n:" + std::to_string(n), n,
-        [=] { return make_corners(n, ball_field()); });
+    add_around("n:" + std::to_string(n), n,
+               []() -> const test::AnalyticField& { return ball_field(); });
   for (const auto& [name, every] : {std::pair{"creased", 10}, std::pair{"refined", 1}})
     for (std::size_t n : {1024, 8192}) {
       const std::string rest = std::string(name) + "/n:" + std::to_string(n);
       add("kernels/sample_field/" + rest, n,
           [=, every = every] { return make(n, 2.0, cut_field(every)); });
-      add("kernels/sample_corners/" + rest, n,
-          [=, every = every] { return make_corners(n, cut_field(every)); });
+      add_around(rest, n,
+                 [every = every]() -> const test::AnalyticField& { return cut_field(every); });
     }
   return true;
 }();

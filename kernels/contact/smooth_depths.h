@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// smooth_depths.h - depths and gradients without the error of trilinear interpolation.
+#pragma once
+#include "kernels/views.h"
+
+namespace h6::kernels {
+
+// Distances [voxel] at contacts and at the ends of a cross of one voxel about each: the contact,
+// + x, - x, + y, - y, + z, - z along the field's axes.
+struct Crosses {
+  const float* at[7];
+  float band;     // farther from the surface than this a distance may be a bound [voxel]
+  float turn[9];  // field axes to the axes of the gradients, row-major
+};
+
+// Between samples a curved surface lies beside the trilinear one: METHOD.md, Sec. 3, "Firm". With t
+// the place of a contact in its cell on an axis, f the second difference over its cross on that
+// axis,
+//     even    = max(0, 1 - (sum |f| / kSmoothTo)^2), 0 where a distance of the cross may be a bound
+//     depth  += voxel even sum(t (1 - t) f / 2) clamp(depth / (kSmoothFrom voxel), 0, 1)
+//     g      -= even ((1 - 2 t) f / 2), made unit again
+// `to_field` maps the points to the field; depth and `voxel` [m]; (gx, gy, gz) is a unit vector.
+inline constexpr float kSmoothTo = 0.5f;    // a sharper field stays as it is [1/voxel]
+inline constexpr float kSmoothFrom = 0.1f;  // from this depth on the whole error is taken [voxel]
+void smooth_depths(const Crosses& crosses, const Affine& to_field, const PointsView& points,
+                   float voxel, float* depth, float* gx, float* gy, float* gz);
+void smooth_depths_ref(const Crosses& crosses, const Affine& to_field, const PointsView& points,
+                       float voxel, float* depth, float* gx, float* gy, float* gz);
+
+}  // namespace h6::kernels
