@@ -69,13 +69,18 @@ class Lead {
   SessionPtr session_;
 };
 
-// The contacts' net work over the loop, divided by the greatest work that they gave or took on the
-// way; 0 where nothing touches. The body's frame is at its centre of mass.
-double net_work(const io::LoadedScene& loaded, const MethodColumn& method, const Loop& loop,
-                const h6Vec3& centre) {
+// The contacts' net work over a loop, 0 where nothing touches.
+struct NetWork {
+  double of_range = 0;  // divided by the greatest difference of work on the way
+  double of_way = 0;    // divided by the force times the way: as a coefficient of friction, < 0
+};
+
+// The body's frame is at its centre of mass.
+NetWork net_work(const io::LoadedScene& loaded, const MethodColumn& method, const Loop& loop,
+                 const h6Vec3& centre) {
   Lead lead(loaded, method);
-  if (!lead) return 0;
-  double work = 0, least = 0, most = 0;
+  if (!lead) return {};
+  double work = 0, least = 0, most = 0, dragged = 0;
   h6Pose last = loop.at(centre, 0);
   h6Wrench f0 = lead.at(last);
   for (int i = 1; i <= kLoopSteps; ++i) {
@@ -84,9 +89,10 @@ double net_work(const io::LoadedScene& loaded, const MethodColumn& method, const
     work += 0.5 * dot(f0.force + f1.force, next.p - last.p) +
             0.5 * dot(f0.torque + f1.torque, turn(last.q, next.q));
     least = std::min(least, work), most = std::max(most, work);
+    dragged += 0.5 * norm(f0.force + f1.force) * norm(next.p - last.p);
     last = next, f0 = f1;
   }
-  return most > least ? work / (most - least) : 0;
+  return most > least ? NetWork{work / (most - least), work / dragged} : NetWork{};
 }
 
 struct Place {
@@ -124,9 +130,10 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
       "mm (760 points) in a hole of 6.2. The fields' lattices are turned by 0.75 rad against the "
       "surfaces. The table gives the contacts' net work over a loop, friction included, relative "
       "to the range of work on the way: the root mean square over the loops of what they make, of "
-      "what they take, and the most that they make. A conservative force gives 0.";
+      "what they take, the most that they make, and what they take relative to the force times the "
+      "way, which is how a coefficient of friction would feel. A conservative force gives 0.";
   std::vector<Place> all = places();
-  std::vector<std::vector<double>> found(all.size() * columns.size(), std::vector<double>(loops));
+  std::vector<std::vector<NetWork>> found(all.size() * columns.size(), std::vector<NetWork>(loops));
   std::vector<std::unique_ptr<io::LoadedScene>> scenes;
   for (Place& place : all) {
     auto loaded = io::load_scene(std::move(place.scene));
@@ -146,17 +153,18 @@ Study study_loops(const std::vector<MethodColumn>& columns, const Console& conso
   for (std::size_t at = 0; at < found.size(); ++at) {
     const std::string name = all[at / columns.size()].name;
     if (at % columns.size() == 0) out.table.push_back({name});
-    double made = 0, taken = 0, most = 0, most_made = 0;
-    for (const double w : found[at]) {
+    double made = 0, taken = 0, most = 0, most_made = 0, felt = 0;
+    for (const auto& [w, of_way] : found[at]) {
       (w > 0 ? made : taken) += w * w / static_cast<double>(loops);
       most = std::max(most, std::fabs(w)), most_made = std::max(most_made, w);
+      felt += of_way < 0 ? of_way * of_way / static_cast<double>(loops) : 0;
     }
     const double rms = std::sqrt(made + taken);
-    made = std::sqrt(made), taken = std::sqrt(taken);
+    made = std::sqrt(made), taken = std::sqrt(taken), felt = std::sqrt(felt);
     out.table.back().push_back(number(made, 3) + ", " + number(taken, 3) + ", " +
-                               number(most_made, 3));
+                               number(most_made, 3) + ", " + number(felt, 3));
     out.json[name][columns[at % columns.size()].name] = {
-        {"rms", rms}, {"most", most}, {"made", made}, {"taken", taken}};
+        {"rms", rms}, {"most", most}, {"made", made}, {"taken", taken}, {"felt", felt}};
   }
   return out;
 }
