@@ -50,9 +50,10 @@ void record_bend(Sandbox& box, const Args& more) {
 
 TEST_CASE("a recording as CSV: a row for each frame, and every contact of every frame") {
   Sandbox box;
-  REQUIRE(
-      run(box, {"run", "peg-in-hole", "--virtual-time", "--duration", "0.8", "--record", "run.h5"})
-          .code == 0);
+  // Under `firm` contacts are deeper or shallower than the report says, by up to 0.025 voxel.
+  REQUIRE(run(box, {"run", "peg-in-hole", "--method", "robust", "--virtual-time", "--duration",
+                    "0.8", "--record", "run.h5"})
+              .code == 0);
   const Ended rigid = run(box, {"export", "run.h5", "-o", "run.csv", "--bends", "q.csv"});
   CHECK(rigid.code == 1);
   CHECK_MESSAGE(rigid.err.find("nothing in its scene bends") != std::string::npos, rigid.err);

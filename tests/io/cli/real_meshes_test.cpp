@@ -148,9 +148,9 @@ TEST_CASE("a nut pulled along its bolt goes as far as the play of the thread, an
     const double turn = nut::max_force * per_radian / nut::grip.rotational_stiffness();
     const double found = turned(body(held));
     CAPTURE(found);
-    // Under firm pushes that lean rub a little, by 0.01 of their force. The thread is so flat that
-    // this is a third of the turn.
-    CHECK(near(found, turn, (method == "firm" ? 0.35 : 0.15) * turn));
+    // Under firm pushes that lean rub a little. The thread is so flat that a coefficient of 0.02
+    // is half of the turn.
+    CHECK(near(found, turn, (method == "firm" ? 0.5 : 0.15) * turn));
     const double lift = body(held).p[2] - nut::start - turn * per_radian;
     CAPTURE(lift);
     CHECK(lift > nut::play - 0.1 * nut::voxel);

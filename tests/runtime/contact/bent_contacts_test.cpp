@@ -98,6 +98,8 @@ void compare_with_all_points(bool warped) {
   int round = 0;
   for (const h6Method method : {H6_METHOD_NONE, H6_METHOD_FIRM}) {
     CAPTURE(std::string(h6MethodName(method)));
+    // `firm` smooths depths inside.
+    const double near = method == H6_METHOD_FIRM ? 0.025 * BallOnBridge::kVoxel : 2e-6;
     scene.def.contact.method = method;
     h6Error error;
     REQUIRE_MESSAGE(scene.open(&error), error.message);
@@ -144,7 +146,8 @@ void compare_with_all_points(bool warped) {
       touching += found.size();
       steps_with_contacts += !found.empty();
       for (std::size_t i = 0; i < c.count; i += 7) {
-        CHECK(std::fabs(double(c.depth[i]) + distance[c.point[i]]) < 2e-6);
+        CHECK(std::fabs(double(c.depth[i]) + distance[c.point[i]]) <
+              (c.depth[i] > 0 ? near : 2e-6));
         // Arms are about the ball's centre of mass.
         const Vec3 p = from(b.pose.p) + Vec3(c.rx[i], c.ry[i], c.rz[i]);
         const Vec3 q_world = origin + turn_a * bent_point(scene.bridge, q, c.point[i]);
