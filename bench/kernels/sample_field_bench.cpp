@@ -34,12 +34,12 @@ void call(const Kernel& kernel, const Data& d, std::vector<float>* out) {
 
 using Around = void (*)(const FieldView&, const Affine&, const PointsView&, float, float* const*);
 
-void call_around(Around kernel, const Data& d, std::vector<float>* out) {
+void call_around(Around kernel, float step, const Data& d, std::vector<float>* out) {
   float* at[6];
   for (int k = 0; k < 6; ++k) at[k] = out[k].data();
   kernel(d.field.view(), test::kIdentity,
          PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
-         0.5f, at);
+         step, at);
 }
 
 bool agrees(const Data& d) {
@@ -56,20 +56,21 @@ Case make(std::size_t n, double spread, const test::AnalyticField& field) {
           [=] { return agrees(*d); }};
 }
 
-Case make_around(std::size_t n, const test::AnalyticField& field, Around kernel, Around reference) {
+Case make_around(std::size_t n, const test::AnalyticField& field, float step, Around kernel,
+                 Around reference) {
   auto d = std::make_shared<Data>(n, 1.5, field);
-  call_around(reference, *d, d->want);
-  return {[=] { call_around(kernel, *d, d->out); }, [=] { call_around(reference, *d, d->out); },
-          [=] { return agrees(*d); }};
+  call_around(reference, step, *d, d->want);
+  return {[=] { call_around(kernel, step, *d, d->out); },
+          [=] { call_around(reference, step, *d, d->out); }, [=] { return agrees(*d); }};
 }
 
 // `field` makes the field when a case first runs.
 template <class Field>
 void add_around(const std::string& rest, std::size_t n, const Field& field) {
   add("kernels/sample_corners/" + rest, n,
-      [=] { return make_around(n, field(), sample_corners, sample_corners_ref); });
+      [=] { return make_around(n, field(), 0.5f, sample_corners, sample_corners_ref); });
   add("kernels/sample_ends/" + rest, n,
-      [=] { return make_around(n, field(), sample_ends, sample_ends_ref); });
+      [=] { return make_around(n, field(), 1, sample_ends, sample_ends_ref); });
 }
 
 const bool registered = [] {

@@ -72,7 +72,7 @@ class Lead {
 // The contacts' net work over a loop, 0 where nothing touches.
 struct NetWork {
   double of_range = 0;  // divided by the greatest difference of work on the way
-  double of_way = 0;    // divided by the force times the way: as a coefficient of friction, < 0
+  double of_way = 0;    // divided by the force times the way; negative where work is taken
 };
 
 // The body's frame is at its centre of mass.

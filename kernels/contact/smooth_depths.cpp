@@ -9,48 +9,41 @@
 #include "hwy/foreach_target.h"
 // After foreach_target.h.
 #include "hwy/highway.h"
-#include "kernels/tail-inl.h"
+#include "kernels/field/sample_field-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace h6::kernels::HWY_NAMESPACE {
 
-using DF = hn::ScalableTag<float>;
-using VF = hn::Vec<DF>;
-
-// The place of points in their cells on one axis, 0 to 1.
-HWY_INLINE VF in_cell(const float* m, VF x, VF y, VF z) {
-  const DF d;
-  VF at = hn::MulAdd(hn::Set(d, m[2]), z, hn::Set(d, m[3]));
-  at = hn::MulAdd(hn::Set(d, m[0]), x, hn::MulAdd(hn::Set(d, m[1]), y, at));
-  return hn::Sub(at, hn::Floor(at));
-}
-
-// The error of trilinear interpolation, of the distance and of its gradient in field axes.
-struct Error {
-  VF distance, tilt[3];
+// The error of the trilinear distance, the slope that takes the gradient's place, and its share.
+struct Smooth {
+  VF error, slope[3], share;
 };
-HWY_INLINE Error error_at(const Crosses& crosses, const Affine& to_field, const PointsView& points,
-                          std::size_t i, std::size_t live) {
+HWY_INLINE Smooth smooth_at(const Crosses& crosses, const Affine& to_field,
+                            const PointsView& points, std::size_t i, std::size_t live) {
   const DF d;
-  const VF one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f),
-           here = load_n(d, crosses.at[0] + i, live);
+  const VF one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), zero = hn::Zero(d);
+  const VF here = load_n(d, crosses.at[0] + i, live), twice = hn::Add(here, here);
   const VF x = load_n(d, points.x + i, live), y = load_n(d, points.y + i, live);
-  const VF z = load_n(d, points.z + i, live), twice = hn::Add(here, here);
-  VF distance = hn::Zero(d), sharp = distance, tilt[3];
+  const VF z = load_n(d, points.z + i, live);
+  VF error = zero, sharp = zero, steep2 = zero, slope[3];
+  VF room = hn::Sub(hn::Set(d, crosses.band - 1), hn::Abs(here));
   for (int k = 0; k < 3; ++k) {
     const VF above = load_n(d, crosses.at[2 * k + 1] + i, live);
-    const VF f = hn::Sub(hn::Add(above, load_n(d, crosses.at[2 * k + 2] + i, live)), twice);
-    const VF t = in_cell(to_field.m[k], x, y, z), bent = hn::Mul(f, half);
-    distance = hn::MulAdd(hn::NegMulAdd(t, t, t), bent, distance);
-    tilt[k] = hn::Mul(hn::NegMulAdd(hn::Add(one, one), t, one), bent);
+    const VF below = load_n(d, crosses.at[2 * k + 2] + i, live);
+    const VF f = hn::Sub(hn::Add(above, below), twice);
+    const VF place = affine_row(to_field.m[k], x, y, z), t = hn::Sub(place, hn::Floor(place));
+    error = hn::MulAdd(hn::NegMulAdd(t, t, t), hn::Mul(f, half), error);
     sharp = hn::Add(sharp, hn::Abs(f));
+    slope[k] = hn::Mul(hn::Sub(above, below), half);
+    steep2 = hn::MulAdd(slope[k], slope[k], steep2);
+    const VF beyond = hn::Sub(hn::Set(d, crosses.last[k] - 1), place);
+    room = hn::Min(room, hn::Min(hn::Sub(place, one), beyond));
   }
-  VF sure = hn::Sub(hn::Set(d, 2 * (crosses.band - 1)), hn::Abs(twice));
-  sure = hn::Min(hn::Max(sure, hn::Zero(d)), one);
+  const VF sure = hn::Min(hn::Max(hn::Add(room, room), zero), one);
   const VF part = hn::Mul(sharp, hn::Set(d, 1 / kSmoothTo));
-  const VF even = hn::Mul(sure, hn::Max(hn::NegMulAdd(part, part, one), hn::Zero(d)));
-  return {hn::Mul(even, distance),
-          {hn::Mul(even, tilt[0]), hn::Mul(even, tilt[1]), hn::Mul(even, tilt[2])}};
+  const VF even = hn::Mul(sure, hn::Max(hn::NegMulAdd(part, part, one), zero));
+  return {
+      hn::Mul(even, error), {slope[0], slope[1], slope[2]}, hn::Mul(even, hn::Min(steep2, one))};
 }
 
 void smooth_simd(const Crosses& crosses, const Affine& to_field, const PointsView& points,
@@ -61,15 +54,17 @@ void smooth_simd(const Crosses& crosses, const Affine& to_field, const PointsVie
   float* const to[3] = {gx, gy, gz};
   for (std::size_t i = 0; i < points.count; i += hn::Lanes(d)) {
     const std::size_t live = points.count - i;
-    const Error error = error_at(crosses, to_field, points, i, live);
+    const Smooth smooth = smooth_at(crosses, to_field, points, i, live);
     const VF deep = load_n(d, depth + i, live);
     const VF inside = hn::Min(hn::Max(hn::Mul(deep, per_full), zero), one);
-    store_n(hn::MulAdd(hn::Mul(unit, error.distance), inside, deep), d, depth + i, live);
+    store_n(hn::MulAdd(hn::Mul(unit, smooth.error), inside, deep), d, depth + i, live);
     VF g[3], length2 = zero;
     for (int k = 0; k < 3; ++k) {
-      g[k] = load_n(d, to[k] + i, live);
-      for (int axis = 0; axis < 3; ++axis)
-        g[k] = hn::NegMulAdd(hn::Set(d, crosses.turn[3 * k + axis]), error.tilt[axis], g[k]);
+      VF s = hn::Mul(hn::Set(d, crosses.turn[3 * k]), smooth.slope[0]);
+      for (int axis = 1; axis < 3; ++axis)
+        s = hn::MulAdd(hn::Set(d, crosses.turn[3 * k + axis]), smooth.slope[axis], s);
+      const VF old = load_n(d, to[k] + i, live);
+      g[k] = hn::MulAdd(smooth.share, hn::Sub(s, old), old);
       length2 = hn::MulAdd(g[k], g[k], length2);
     }
     const VF scale = hn::Div(one, hn::Sqrt(length2));

@@ -25,8 +25,9 @@ void smooth_rows(Contacts& c, const Body& b, const kernels::Affine& place, std::
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
   kernels::sample_ends(b.field->view, place, arms, 1, at + 1);
   kernels::Crosses crosses{
-      {at[0], at[1], at[2], at[3], at[4], at[5], at[6]}, b.field->view.band, {}};
+      {at[0], at[1], at[2], at[3], at[4], at[5], at[6]}, b.field->view.band, {}, {}};
   for (int k = 0; k < 9; ++k) crosses.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
+  for (int k = 0; k < 3; ++k) crosses.last[k] = static_cast<float>(8 * b.field->view.size[k] - 1);
   kernels::smooth_depths(crosses, place, arms, static_cast<float>(b.field->voxel), c.depth + begin,
                          c.gx + begin, c.gy + begin, c.gz + begin);
 }

@@ -22,7 +22,7 @@ struct Rows {
   std::size_t count;
   std::vector<Column> at, place, g;
   Column depth;
-  Crosses crosses{{}, 3.0f, {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  Crosses crosses{{}, 3.0f, {47, 47, 47}, {0, -1, 0, 1, 0, 0, 0, 0, 1}};
   Rows(std::size_t n, std::size_t shift) : count(n), depth(n, shift) {
     Random random(7 + n);
     for (std::size_t k = 0; k < 7; ++k) at.emplace_back(n, shift + k);
@@ -78,8 +78,12 @@ struct Quadratic {
 struct Answer {
   double before, depth, exact;  // [voxel]
   double tilt_before, tilt;     // of the gradient from the exact one [rad]
+  double moved;                 // the gradient, by smoothing [rad]
 };
-Answer answer(const Quadratic& field, const double p[3]) {
+// What `crosses` says of band and grid counts. The axes of gradients are the field's, turned by a
+// right angle about z where `turned`.
+Answer answer(const Quadratic& field, const double p[3], float band = 9, float last = 50,
+              bool turned = false) {
   float place[3], at[7], depth, g[3];
   double exact[3], length = 0, trilinear[3], flat = 0;
   at[0] = float(field.trilinear(p));
@@ -95,7 +99,9 @@ Answer answer(const Quadratic& field, const double p[3]) {
   }
   length = std::sqrt(length), flat = std::sqrt(flat);
   for (int k = 0; k < 3; ++k) g[k] = float(trilinear[k] / flat);
-  Crosses crosses{{}, 9.0f, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  if (turned) std::swap(g[0], g[1]), g[0] = -g[0];
+  Crosses crosses{{}, band, {last, last, last}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  if (turned) crosses = {{}, band, {last, last, last}, {0, -1, 0, 1, 0, 0, 0, 0, 1}};
   for (int k = 0; k < 7; ++k) crosses.at[k] = at + k;
   depth = -at[0];  // of voxels of 1 m
   const auto angle = [&](const auto* v, double over) {
@@ -107,9 +113,13 @@ Answer answer(const Quadratic& field, const double p[3]) {
     }
     return std::sqrt(cross);
   };
-  Answer out{-at[0], 0, -field.at(p), angle(trilinear, flat), 0};
+  Answer out{-at[0], 0, -field.at(p), angle(trilinear, flat), 0, 0};
   smooth_depths_ref(crosses, kHere, {place, place + 1, place + 2, 1}, 1, &depth, g, g + 1, g + 2);
+  if (turned) std::swap(g[0], g[1]), g[1] = -g[1];
   out.depth = depth, out.tilt = angle(g, 1);
+  double same = 0;
+  for (int k = 0; k < 3; ++k) same += g[k] * trilinear[k] / flat;
+  out.moved = std::acos(std::min(same, 1.0));
   return out;
 }
 
@@ -144,7 +154,7 @@ TEST_CASE("smooth_depths: on a gently curved field depth and gradient are nearly
     const Quadratic field{{0.05, -0.04, 0.03}};
     double p[3];
     for (double& x : p) x = float(random.uniform(19.7, 20.3));
-    const Answer a = answer(field, p);
+    const Answer a = answer(field, p, 9, 50, i % 2);
     if (a.before < 0.1) continue;
     before = std::max(before, std::fabs(a.before - a.exact));
     after = std::max(after, std::fabs(a.depth - a.exact));
@@ -167,6 +177,49 @@ TEST_CASE("smooth_depths: planes, sharp fields and points that do not touch keep
     CHECK(outside.before < 0);
     CHECK(outside.depth == outside.before);
   }
+}
+
+TEST_CASE(
+    "smooth_depths: a gradient from the cell beside the contact's becomes exact all the same") {
+  // A contact on a node of a cylinder that is aligned with the lattice, as rounding gives it.
+  const float place[3] = {20, 20, 20}, at[7] = {-0.4f, -0.35f, -0.35f, -0.4f, -0.4f, 0.6f, -1.4f};
+  Crosses crosses{{}, 9, {50, 50, 50}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  for (int k = 0; k < 7; ++k) crosses.at[k] = at + k;
+  for (const float side : {-1.0f, 1.0f}) {
+    float depth = 0.4f, g[3] = {side * 0.05f, 0, std::sqrt(1 - 0.05f * 0.05f)};
+    smooth_depths_ref(crosses, kHere, {place, place + 1, place + 2, 1}, 1, &depth, g, g + 1, g + 2);
+    CHECK(std::fabs(depth - 0.4f) < 1e-6);
+    CHECK(std::fabs(g[0]) < 0.05f * 0.05f);
+    CHECK(g[2] > 0.99999f);
+  }
+}
+
+TEST_CASE("smooth_depths: nothing moves where a distance of the cross may be no distance") {
+  const Quadratic field{{0.1, 0.1, 0}};
+  const double inside[3] = {19.2, 20.75, 20.5};
+  CHECK(answer(field, inside).moved > 1e-3);
+  const double reach = -answer(field, inside).before;
+  // The band ends, or the grid does.
+  const float ends = float(std::fabs(reach) + 1);
+  for (const float band : {ends, ends - 0.1f, 0.5f}) {
+    const Answer a = answer(field, inside, band);
+    CHECK(a.depth == a.before);
+    CHECK(a.moved < 1e-3);
+  }
+  CHECK(answer(field, inside, ends + 0.2f).moved > 1e-3);
+  for (const float last : {21.75f, 21.5f}) CHECK(answer(field, inside, 9, last).moved < 1e-3);
+  CHECK(answer(field, inside, 9, 22).moved > 1e-3);
+}
+
+TEST_CASE("smooth_depths: where a field is no distance and its slope ends, the gradient stays") {
+  const float place[3] = {20.5f, 20.5f, 20.5f},
+              at[7] = {-0.4f, -0.4f, -0.4f, -0.4f, -0.4f, -0.4f, -0.4f};
+  Crosses crosses{{}, 9, {50, 50, 50}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  for (int k = 0; k < 7; ++k) crosses.at[k] = at + k;
+  float depth = 0.4f, g[3] = {0.6f, 0, 0.8f};
+  smooth_depths_ref(crosses, kHere, {place, place + 1, place + 2, 1}, 1, &depth, g, g + 1, g + 2);
+  CHECK(std::fabs(g[0] - 0.6f) < 1e-6);
+  CHECK(std::fabs(g[2] - 0.8f) < 1e-6);
 }
 
 TEST_CASE("smooth_depths: a depth moves by less than a fortieth of a voxel, without jumps") {
