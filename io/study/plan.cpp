@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/study/plan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -174,16 +175,26 @@ struct Base {
   Json text;
 };
 
-// The file of a scene; a generated one is exported first.
-Result<fs::path> scene_file_of(const std::string& name, const fs::path& study,
-                               const fs::path& exported) {
+struct SceneFile {
+  fs::path file;
+  bool exported;  // by this program, so what it names is our own
+};
+
+// The file of a scene; a generated one is exported first, to a folder of its name. Only names of
+// generated scenes become folders, and those have letters, digits and hyphens alone.
+Result<SceneFile> scene_file_of(const std::string& name, const fs::path& study,
+                                const fs::path& folder) {
   const fs::path file = fs::path(name).is_absolute() ? fs::path(name) : study.parent_path() / name;
   std::error_code error;
-  if (fs::is_regular_file(file, error)) return file;
-  if (fs::exists(exported / "scene.json", error)) return exported / "scene.json";
-  Result<io::Scene> made = io::make_scene(name);
-  if (!made)
+  if (fs::is_regular_file(file, error)) return SceneFile{file, false};
+  const std::vector<io::SceneName> known = io::scene_names();
+  if (std::none_of(known.begin(), known.end(),
+                   [&](const io::SceneName& one) { return one.name == name; }))
     return Failure{io::shown(name) + ": there is neither such a file nor such a generated scene"};
+  const fs::path exported = folder / "scenes" / name;
+  if (fs::exists(exported / "scene.json", error)) return SceneFile{exported / "scene.json", true};
+  const Result<io::Scene> made = io::make_scene(name);
+  if (!made) return made.failure();
   // Aside first: a kill leaves no half scene.
   fs::path aside = exported;
   aside += ".unfinished";
@@ -192,18 +203,16 @@ Result<fs::path> scene_file_of(const std::string& name, const fs::path& study,
   if (const Outcome out = io::export_scene(*made, aside); !out) return out.failure();
   fs::rename(aside, exported, error);
   if (error) return Failure{"cannot write " + exported.string() + ": " + error.message()};
-  return exported / "scene.json";
+  return SceneFile{exported / "scene.json", true};
 }
 
-Result<Base> read_base(const std::string& name, const fs::path& study, const fs::path& exported,
+Result<Base> read_base(const std::string& name, const fs::path& study, const fs::path& folder,
                        bool outside) {
-  const Result<fs::path> at = scene_file_of(name, study, exported);
+  const Result<SceneFile> at = scene_file_of(name, study, folder);
   if (!at) return at.failure();
-  // What was exported into the folder is our own.
-  Result<io::Scene> scene =
-      *at == exported / "scene.json" ? io::read_scene(*at) : io::read_scene(*at, outside);
+  Result<io::Scene> scene = io::read_scene(at->file, !at->exported && outside);
   if (!scene) return scene.failure();
-  Base out{scene->name, *at, std::move(*scene), {}};
+  Base out{scene->name, at->file, std::move(*scene), {}};
   each_file(out.scene, [](fs::path& f) { f = fs::absolute(f).lexically_normal(); });
   out.text = Json::parse(io::scene_text(out.scene));
   return out;
@@ -225,6 +234,7 @@ std::vector<std::string> scene_names_of(const Json& given) {
 }  // namespace
 
 struct Plan::Parts {
+  std::vector<std::string> names;  // in "scene"
   std::vector<Base> bases;
   bool listed = false;   // the scenes are a list, and so a key
   bool outside = false;  // their files may lie outside their folders
@@ -274,7 +284,8 @@ struct Plan::Parts {
     seed = whole_of(study, "seed", 1, std::uint64_t{1} << 53);
     listed = study["scene"].is_array();
     if (listed) keys.push_back("scene");
-    std::size_t runs = check_runs(repeats * scene_names_of(study["scene"]).size());
+    names = scene_names_of(study["scene"]);
+    std::size_t runs = check_runs(repeats * names.size());
     for (const auto& [key, given] : given_vary.items()) {
       check_key(key);
       vary.push_back(varied(key, given));
@@ -288,11 +299,9 @@ struct Plan::Parts {
       keys.push_back(key);
     }
   }
-  Outcome read_bases(const Json& study, const fs::path& file, const fs::path& folder) {
-    for (const std::string& name : scene_names_of(study["scene"])) {
-      const fs::path exported =
-          listed ? folder / "scenes" / std::to_string(bases.size()) : folder / "scene";
-      Result<Base> base = read_base(name, file, exported, outside);
+  Outcome read_bases(const fs::path& file, const fs::path& folder) {
+    for (const std::string& name : names) {
+      Result<Base> base = read_base(name, file, folder, outside);
       if (!base) return base.failure();
       for (const Base& other : bases)
         if (other.name == base->name)
@@ -348,7 +357,7 @@ Result<Plan> Plan::read(const fs::path& file, const fs::path& folder, bool outsi
     auto parts = std::make_unique<Parts>();
     parts->outside = outside;
     parts->read(study);
-    if (const Outcome all = parts->read_bases(study, fs::absolute(file), folder); !all)
+    if (const Outcome all = parts->read_bases(fs::absolute(file), folder); !all)
       return all.failure();
     parts->identify(study);
     Plan plan(std::move(parts));

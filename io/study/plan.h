@@ -27,9 +27,9 @@ namespace h6::study {
 
 class Plan {
  public:
-  // Reads a study. A generated scene is exported to `folder`/scene first (those of a list to
-  // `folder`/scenes/0 and so on), unless it stands there. Every value is checked in one run of each
-  // scene; the sentence of a mistake names the key and that run.
+  // Reads a study. A generated scene is exported to `folder`/scenes/NAME first, unless it stands
+  // there. Every value is checked in one run of each scene; the sentence of a mistake names the key
+  // and that run.
   static Result<Plan> read(const std::filesystem::path& file, const std::filesystem::path& folder,
                            bool outside);
   Plan(Plan&&) noexcept;

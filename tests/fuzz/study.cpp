@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/scene/scene_file.h"
+#include "io/scenes/scenes.h"
 #include "io/study/plan.h"
 #include "tests/fuzz/targets.h"
 
@@ -29,16 +30,16 @@ constexpr const char* kScene = R"({"hapsix": 1, "units": "mm", "bodies": [
    "pose": {"p": [0, 0, 30], "q": [1, 0, 0, 0]}}],
   "hands": [{"body": "peg", "device": "arm"}]})";
 
-// A study's folder with scenes that were exported before: every name of a generated scene is one.
+// A study's folder, in which each generated scene was exported before. Beside the study lies the
+// scene `s`, with the file that it names.
 const fs::path& folder() {
   static const fs::path made = [] {
-    const fs::path at = fs::path(as_file({}, "beside")).parent_path() / "study";
-    fs::create_directories(at / "scene");
-    std::ofstream(at / "scene" / "scene.json") << kScene;
-    for (int i = 0; i < 100; ++i) {
-      const fs::path one = at / "scenes" / std::to_string(i);
+    const fs::path beside = fs::path(as_file({}, "beside")).parent_path(), at = beside / "study";
+    std::ofstream(beside / "s") << kScene, std::ofstream(beside / "scene.json") << kScene;
+    for (const io::SceneName& scene : io::scene_names()) {
+      const fs::path one = at / "scenes" / scene.name;
       fs::create_directories(one);
-      const std::string name = "\"name\": \"" + std::to_string(i) + "\", ";
+      const std::string name = "\"name\": \"" + scene.name + "\", ";
       std::ofstream(one / "scene.json") << std::string(kScene).insert(1, name);
     }
     return at;

@@ -259,6 +259,27 @@ TEST_CASE("a study of several scenes gives each the same runs, with the bits tha
   refused(R"(["box-on-wall", "peg-in-hole"])", "the scene has no 'box'", "bodies.box.mass");
 }
 
+TEST_CASE("a study runs its own scenes, whatever a study that failed left in the folder") {
+  Sandbox box;
+  const auto study = [&](const std::string& scenes, const char* vary) {
+    spill(box.file("study.json"), R"({"hapsix_study": 1, "scene": )" + scenes + R"(, "vary": {)" +
+                                      vary + R"(}, "repeats": 2})");
+  };
+  constexpr const char* kGood = R"("contact.method": ["firm", "global"])";
+  const std::pair<const char*, const char*> of[] = {
+      {R"("peg-in-hole")", R"("box-on-wall")"},
+      {R"(["peg-in-hole", "cone-in-gap"])", R"(["box-on-wall", "peg-in-hole"])"}};
+  for (const auto& [failed, next] : of) {
+    fs::remove_all(box.file("used")), fs::remove_all(box.file("fresh"));
+    fs::create_directories(box.file("used"));
+    study(failed, R"("contact.method": ["firmer"])");
+    CHECK(run(box, {"study", "study.json", "-o", "used"}).code == 1);
+    study(next, kGood);
+    const std::string table = whole_table(box, "used", "1");
+    CHECK((table == whole_table(box, "fresh", "1")));
+  }
+}
+
 TEST_CASE("the studies of the examples run, each of their rows") {
   // The examples lie at the same place in every tree; one repeat of each combination is enough.
   const fs::path root = fs::path(__FILE__).parent_path() / "../../..";
