@@ -86,9 +86,17 @@ std::string run_one(const study::Plan& plan, std::size_t run) {
   return trial ? result_row(plan, run, *trial) : failed_row(plan, run, trial.error());
 }
 
-std::size_t errors_in(const study::Table& table) {
+// A row's last 18 columns, which begin with the verdict; "" where the run has no row yet. Names of
+// scenes and values stand before them, and are no verdict whatever they say.
+std::string results_of(const study::Plan& plan, const study::Table& table, std::size_t run) {
+  const std::string& row = table.rows()[run];
+  return row.substr(std::min(row_begin(plan, run).size() + 1, row.size()));
+}
+
+std::size_t errors_in(const study::Plan& plan, const study::Table& table) {
   std::size_t n = 0;
-  for (const std::string& row : table.rows()) n += row.find(",error,") != std::string::npos;
+  for (std::size_t run = 0; run < plan.runs(); ++run)
+    n += results_of(plan, table, run).rfind("error,", 0) == 0;
   return n;
 }
 
@@ -122,13 +130,10 @@ Outcome do_runs(const Program& program, const Options& o, const study::Plan& pla
   return work.runs.empty() ? Outcome(Done{}) : study::share_out(work);
 }
 
-// The rows' last 18 columns begin with the verdict; quoted fields have no part in those.
 Outcome draw(const Options& o, const study::Plan& plan, const study::Table& table) {
   std::vector<study::Seen> rows;
   for (std::size_t run = 0; run < plan.runs(); ++run) {
-    const std::string begin = row_begin(plan, run) + ",";
-    std::stringstream rest(
-        table.rows()[run].substr(std::min(begin.size(), table.rows()[run].size())));
+    std::stringstream rest(results_of(plan, table, run));
     std::string verdict, skipped, depth;
     std::getline(rest, verdict, ',');
     for (int i = 0; i < 3; ++i) std::getline(rest, skipped, ',');
@@ -143,8 +148,8 @@ Outcome draw(const Options& o, const study::Plan& plan, const study::Table& tabl
                               study::picture(fs::path(o.file).stem().string(), plan.keys(), rows));
 }
 
-int report(const Console& console, const study::Table& table) {
-  const std::size_t errors = errors_in(table), runs = table.rows().size();
+int report(const Console& console, const study::Plan& plan, const study::Table& table) {
+  const std::size_t errors = errors_in(plan, table), runs = plan.runs();
   if (!console.json)
     std::printf("%zu runs, %zu of them failed: %s\n", runs, errors, table.file().c_str());
   console.result({{"runs", runs}, {"failed", errors}, {"table", table.file().string()}});
@@ -183,7 +188,7 @@ int study_command(const Program& program, const Options& o) {
   const fs::path parquet = fs::path(table->file()).replace_extension(".parquet");
   if (const Result<bool> packed = study::write_parquet(table->file(), parquet); !packed)
     console.warn({"the table is CSV only: " + packed.error()});
-  return report(console, *table);
+  return report(console, *plan, *table);
 }
 
 }  // namespace

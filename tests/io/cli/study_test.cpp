@@ -280,6 +280,20 @@ TEST_CASE("a study runs its own scenes, whatever a study that failed left in the
   }
 }
 
+TEST_CASE("a scene or a value that is called error is no failed run") {
+  Sandbox box;
+  REQUIRE(run(box, {"scene", "export", "box-on-wall", "."}).code == 0);
+  Json scene = Json::parse(slurp(box.file("scene.json")));
+  scene["name"] = "error";
+  spill(box.file("scene.json"), scene.dump());
+  spill(
+      box.file("study.json"),
+      R"({"hapsix_study": 1, "scene": ["scene.json", "peg-in-hole"], "vary": {"name": ["error"]}})");
+  const std::vector<std::string> rows = lines(whole_table(box, "out", "1"));  // none has failed
+  REQUIRE(rows.size() == 3);
+  CHECK(fields(rows[1])[2] == "error");
+}
+
 TEST_CASE("the studies of the examples run, each of their rows") {
   // The examples lie at the same place in every tree; one repeat of each combination is enough.
   const fs::path root = fs::path(__FILE__).parent_path() / "../../..";
