@@ -27,7 +27,7 @@ class SessionSlabs {
 
   // Memory of this size, aligned as by allocate. Null if there is none.
   void* take(std::size_t bytes) {
-    if (bytes == 0 || bytes > kSlab / 2) return allocate({}, bytes);
+    if (bytes == 0 || bytes > kLargest) return allocate({}, bytes);
     const std::lock_guard lock(mutex_);
     const std::size_t each = (bytes + kAlignment - 1) / kAlignment * kAlignment;
     for (Slab* slab = first_; slab; slab = slab->next)
@@ -40,7 +40,7 @@ class SessionSlabs {
   }
   // Memory that `take` gave for this size.
   void give_back(void* memory, std::size_t bytes) {
-    if (bytes == 0 || bytes > kSlab / 2) return release({}, memory, bytes);
+    if (bytes == 0 || bytes > kLargest) return release({}, memory, bytes);
     const std::lock_guard lock(mutex_);
     for (Slab** link = &first_; *link; link = &(*link)->next) {
       Slab* const slab = *link;
@@ -54,6 +54,8 @@ class SessionSlabs {
 
  private:
   static constexpr std::size_t kSlab = 8 * kHugePage;
+  // A slab holds at least two pieces. A larger piece would waste half of it.
+  static constexpr std::size_t kLargest = (kSlab / kAlignment - 1) / 2 * kAlignment;
   struct Unused {
     Unused* next;
   };

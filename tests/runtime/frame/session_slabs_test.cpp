@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <random>
@@ -55,4 +56,26 @@ TEST_CASE("pieces of one size lie side by side, and what was given back is taken
   slabs.give_back(reinterpret_cast<void*>(at[20]), kBytes);
   CHECK(reinterpret_cast<std::uintptr_t>(slabs.take(kBytes)) == at[20]);
   for (const std::uintptr_t p : at) slabs.give_back(reinterpret_cast<void*>(p), kBytes);
+}
+
+TEST_CASE("a slab holds two pieces of the largest size, and a larger one gets memory of its own") {
+  constexpr std::size_t kHalf = 4 * h6::kHugePage;  // of a slab
+  // The begin of a slab is no piece's, so memory on the limit of a huge page is no slab's.
+  const auto alone = [](const void* p) {
+    return reinterpret_cast<std::uintptr_t>(p) % h6::kHugePage == 0;
+  };
+  h6::SessionSlabs slabs;
+  for (const std::size_t bytes : {kHalf - h6::kAlignment + 1, kHalf}) {
+    void* const p = slabs.take(bytes);
+    REQUIRE(p != nullptr);
+    CHECK(alone(p));
+    slabs.give_back(p, bytes);
+  }
+  const std::size_t most = kHalf - h6::kAlignment;
+  char* const a = static_cast<char*>(slabs.take(most));
+  char* const b = static_cast<char*>(slabs.take(most));
+  REQUIRE((a != nullptr && b != nullptr));
+  CHECK(!alone(a));
+  CHECK(b - a == static_cast<std::ptrdiff_t>(most));
+  slabs.give_back(a, most), slabs.give_back(b, most);
 }
