@@ -201,11 +201,17 @@ void add_recorder(py::module_& m) {
           "record",
           [](PyRecorder& r, const PySession& s) {
             h6FrameRecord row;
+            std::vector<double> q;
             py::gil_scoped_release release;
-            h6GetRecord(s.session, s.samples.data(), s.commands.data(), &row);
-            r.add(&row, 1, r.scene ? q_of(s) : std::vector<double>{});
+            {
+              const Turn turn(s.mutex);
+              h6GetRecord(s.session, s.samples.data(), s.commands.data(), &row);
+              if (r.scene) q = q_of(s);
+            }
+            r.add(&row, 1, q);
           },
-          py::arg("session"), "Adds the session's last frame.")
+          py::arg("session"),
+          "Adds the session's last frame, a whole one also where another thread steps it.")
       .def(
           "record",
           [](PyRecorder& r, const py::array_t<h6FrameRecord, py::array::c_style>& rows) {

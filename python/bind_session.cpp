@@ -74,6 +74,7 @@ void add_contacts(py::module_& m) {
             std::int32_t *parts = part.mutable_data(), *triangles = triangle.mutable_data();
             {
               py::gil_scoped_release release;
+              const std::lock_guard turn(p.session->mutex);
               h6NameContacts(p.session->session, p.body, parts, triangles);
             }
             return py::make_tuple(part, triangle);
@@ -98,35 +99,52 @@ auto rows(T Row::*member, std::array<Row, H6_MAX_HANDS> PySession::*of, bool wri
   };
 }
 
-h6Status step(PySession& s) {
+// Numbers of a sample that a call gives: (hands, n), or (n,) for one hand.
+template <class T>
+struct Given {
+  T h6DeviceSample::*member;
+  const double* values = nullptr;  // null: the sample stays
+  Given(const PySession& s, T h6DeviceSample::*of, const Rows<double>* from, const char* name)
+      : member(of) {
+    if (!from) return;
+    const auto n = static_cast<py::ssize_t>(kNumbers<T>);
+    if (from->size() != n * static_cast<py::ssize_t>(s.hands) || from->shape(from->ndim() - 1) != n)
+      throw py::value_error(std::string(name) + " must have the shape (" + std::to_string(s.hands) +
+                            ", " + std::to_string(n) + ")");
+    values = from->data();
+  }
+  void put(PySession& s) const {
+    for (std::size_t h = 0; values && h < s.hands; ++h)
+      std::memcpy(&(s.samples[h].*member), values + h * kNumbers<T>, sizeof(T));
+  }
+};
+
+// One turn: the samples that it puts in place are those of its frame.
+template <class Put>
+h6Status step_after(PySession& s, const Put& put) {
   py::gil_scoped_release release;
+  const std::lock_guard turn(s.mutex);
+  put();
   const h6Status status = h6Step(s.session, s.samples.data(), s.commands.data());
   s.show();
   return status;
 }
 
-// Numbers of a sample that a call gives: (hands, n), or (n,) for one hand.
-template <class T>
-void put(PySession& s, T h6DeviceSample::*member, const Rows<double>* values, const char* name) {
-  if (!values) return;
-  const auto n = static_cast<py::ssize_t>(kNumbers<T>);
-  if (values->size() != n * static_cast<py::ssize_t>(s.hands) ||
-      values->shape(values->ndim() - 1) != n)
-    throw py::value_error(std::string(name) + " must have the shape (" + std::to_string(s.hands) +
-                          ", " + std::to_string(n) + ")");
-  for (std::size_t h = 0; h < s.hands; ++h)
-    std::memcpy(&(s.samples[h].*member), values->data() + h * kNumbers<T>, sizeof(T));
+h6Status step(PySession& s) {
+  return step_after(s, [] {});
 }
 
 h6Status step_with(PySession& s, const Rows<double>& pose,
                    const std::optional<Rows<double>>& velocity,
                    const std::optional<Rows<double>>& wrench,
                    std::optional<std::uint32_t> buttons) {
-  put(s, &h6DeviceSample::pose, &pose, "pose");
-  put(s, &h6DeviceSample::velocity, velocity ? &*velocity : nullptr, "velocity");
-  put(s, &h6DeviceSample::wrench, wrench ? &*wrench : nullptr, "wrench");
-  for (std::size_t h = 0; h < s.hands && buttons; ++h) s.samples[h].buttons = *buttons;
-  return step(s);
+  const Given at(s, &h6DeviceSample::pose, &pose, "pose");
+  const Given by(s, &h6DeviceSample::velocity, velocity ? &*velocity : nullptr, "velocity");
+  const Given with(s, &h6DeviceSample::wrench, wrench ? &*wrench : nullptr, "wrench");
+  return step_after(s, [&] {
+    at.put(s), by.put(s), with.put(s);
+    for (std::size_t h = 0; h < s.hands && buttons; ++h) s.samples[h].buttons = *buttons;
+  });
 }
 
 // Most calls give a pose alone, as an array of doubles: three arguments less save 0.6 µs of the 2.1
@@ -134,8 +152,8 @@ h6Status step_with(PySession& s, const Rows<double>& pose,
 h6Status step_at(PySession& s, const py::array& pose) {
   const Rows<double> doubles =
       Rows<double>::check_(pose) ? py::reinterpret_borrow<Rows<double>>(pose) : Rows<double>(pose);
-  put(s, &h6DeviceSample::pose, &doubles, "pose");
-  return step(s);
+  const Given at(s, &h6DeviceSample::pose, &doubles, "pose");
+  return step_after(s, [&] { at.put(s); });
 }
 
 // One frame for each row of poses (n, hands, 7), without the interpreter: the frames as rows.
@@ -148,6 +166,7 @@ py::array_t<h6FrameRecord> follow(PySession& s, const Rows<double>& poses) {
   h6FrameRecord* to = out.mutable_data();
   const double* from = poses.data();
   py::gil_scoped_release release;
+  const std::lock_guard turn(s.mutex);
   for (std::size_t i = 0; i < frames; ++i) {
     for (std::size_t h = 0; h < s.hands; ++h)
       std::memcpy(&s.samples[h].pose, from + 7 * (i * s.hands + h), sizeof(h6Pose));
@@ -172,6 +191,7 @@ std::int32_t hand_at(const PySession& s, std::int32_t hand) {
 }
 
 py::array_t<double> body_of(const PySession& s, std::int32_t body) {
+  const SessionTurn turn(s);
   const h6BodyState state = h6GetBody(s.session, body_at(s, body));
   py::array_t<double> out(13);
   std::memcpy(out.mutable_data(), &state, sizeof state);
@@ -179,12 +199,14 @@ py::array_t<double> body_of(const PySession& s, std::int32_t body) {
 }
 
 py::array_t<double> deformation_of(const PySession& s, std::int32_t body) {
+  const SessionTurn turn(s);
   double q[H6_MAX_MODES];
   const std::size_t modes = h6GetDeformation(s.session, body_at(s, body), q, nullptr, H6_MAX_MODES);
   return py::array_t<double>(static_cast<py::ssize_t>(modes), q);
 }
 
 Typed<py::dict, "_Safety"> safety_of(const PySession& s, std::int32_t hand) {
+  const SessionTurn turn(s);
   h6HandSafety safety;
   h6GetSafety(s.session, hand_at(s, hand), &safety);
   py::dict frames;
@@ -196,18 +218,21 @@ Typed<py::dict, "_Safety"> safety_of(const PySession& s, std::int32_t hand) {
 }
 
 py::array_t<h6FrameReport> frame_of(const PySession& s) {
+  const SessionTurn turn(s);
   py::array_t<h6FrameReport> row(1);
   *row.mutable_data() = h6GetFrame(s.session);
   return row.attr("reshape")(py::tuple(0));
 }
 
 py::array_t<h6FrameReport> report_of(const SessionPtr& s) {
+  const SessionTurn turn(*s);
   s->shows_report = true;
   s->show();
   return view(&s->report, {}, {}, py::cast(s));
 }
 
 py::array_t<double> states_of(const SessionPtr& s) {
+  const SessionTurn turn(*s);
   s->shows_states = true;
   s->show();
   return view(reinterpret_cast<const double*>(s->states.data()),
@@ -216,6 +241,7 @@ py::array_t<double> states_of(const SessionPtr& s) {
 }
 
 py::array_t<h6Overlap> overlaps_of(const PySession& s) {
+  const SessionTurn turn(s);
   const auto made = overlaps(s.session);
   py::array_t<h6Overlap> out(made.size());
   std::copy(made.begin(), made.end(), out.mutable_data());
@@ -271,6 +297,7 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
           [](S& s, std::int32_t body, const Numbers<h6Pose>& pose,
              const Numbers<h6Velocity>& velocity) {
             const h6BodyState state{struct_of<h6Pose>(pose), struct_of<h6Velocity>(velocity)};
+            const SessionTurn turn(s);
             h6SetBody(s.session, body_at(s, body), &state);
             s.show();
           },
@@ -279,6 +306,7 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
       .def(
           "contacts",
           [](const SessionPtr& s, std::int32_t body) {
+            const SessionTurn turn(*s);
             return PyContacts{s, h6GetContacts(s->session, body_at(*s, body)), body};
           },
           py::arg("body"), "Contacts of a shell body in the last frame, as views.")
@@ -293,6 +321,7 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
           "restart_fit",
           [](S& s) {
             py::gil_scoped_release release;
+            const std::lock_guard turn(s.mutex);
             h6Error error{};
             if (!h6RestartFit(s.session, &error)) throw Error(error);
             s.show();
@@ -308,11 +337,20 @@ void add_state(py::class_<PySession, SessionPtr>& c) {
           py::arg("hand"), "The Coupling in use, with derived values.")
       .def("safety", &safety_of, py::arg("hand"), "dict: state, fault, frames with each cause")
       .def(
-          "arm", [](S& s) { h6Arm(s.session); }, "Clears faults and starts again softly.")
+          "arm",
+          [](S& s) {
+            const SessionTurn turn(s);
+            h6Arm(s.session);
+          },
+          "Clears faults and starts again softly.")
       .def(
           "disarm", [](S& s) { h6Disarm(s.session); }, "Lets every output decay to zero.")
       .def(
-          "note_interval", [](S& s, double seconds) { h6NoteInterval(s.session, seconds); },
+          "note_interval",
+          [](S& s, double seconds) {
+            const SessionTurn turn(s);
+            h6NoteInterval(s.session, seconds);
+          },
           py::arg("seconds"), "From the last commands to the next [s], for a loop in real time.")
       .def_property_readonly(
           "hands", [](const S& s) { return s.hands; }, "how many there are")
@@ -345,7 +383,10 @@ SessionPtr make_session(std::shared_ptr<PyModel> model, const Definition& of) {
 void add_session(py::module_& m) {
   declare_rows();
   add_contacts(m);
-  py::class_<PySession, SessionPtr> c(m, "Session", "Bodies, hands and their state.");
+  py::class_<PySession, SessionPtr> c(
+      m, "Session",
+      "Bodies, hands and their state. Threads that share one take turns, call by call; its arrays "
+      "are views, which a step of another thread changes.");
   c.def(py::init([](std::shared_ptr<PyModel> model, const Definition& definition) {
           const Definition copy(definition);
           py::gil_scoped_release release;

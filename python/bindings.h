@@ -9,6 +9,7 @@
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -176,6 +177,9 @@ struct Definition {
 };
 
 struct PySession {
+  // A session belongs to one thread at a time, so Python's threads take turns, call by call.
+  // Whoever has let go of the interpreter's lock holds the mutex itself.
+  mutable std::mutex mutex;
   std::shared_ptr<PyModel> model;
   Unlocked<Session> session;
   std::size_t hands = 0, bodies = 0;
@@ -191,6 +195,19 @@ struct PySession {
     for (std::size_t b = 0; shows_states && b < bodies; ++b)
       states[b] = h6GetBody(session, static_cast<std::int32_t>(b));
   }
+};
+// The turn of a call that keeps the interpreter's lock. It lets go of that lock while it waits,
+// since the turn's owner may wait for the lock.
+class SessionTurn {
+ public:
+  explicit SessionTurn(const PySession& s) : lock_(s.mutex, std::try_to_lock) {
+    if (lock_) return;
+    py::gil_scoped_release release;
+    lock_.lock();
+  }
+
+ private:
+  std::unique_lock<std::mutex> lock_;
 };
 std::shared_ptr<PySession> make_session(std::shared_ptr<PyModel> model, const Definition& of);
 

@@ -402,7 +402,7 @@ class Recorder:
         """Makes the file. summary: one JSON object, or None."""
     @overload
     def record(self, session: Session) -> None:
-        """Adds the session's last frame."""
+        """Adds the session's last frame, a whole one also where another thread steps it."""
     @overload
     def record(self, frames: NDArray[np.void]) -> None:
         """Adds the rows that Session.follow returned; shapes of bodies that bend are not
@@ -496,7 +496,8 @@ class Scene:
         """Where the scene's hand wants to be at a time [s]: pose (7,), velocity (6,)."""
 
 class Session:
-    """Bodies, hands and their state."""
+    """Bodies, hands and their state. Threads that share one take turns, call by call; its
+    arrays are views, which a step of another thread changes."""
     def __init__(self, model: Model, definition: Definition) -> None:
         """Each hand's sample begins where its body is, at rest."""
     def arm(self) -> None:

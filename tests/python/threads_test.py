@@ -146,6 +146,30 @@ class Threads(unittest.TestCase):
             on_four(read)
             self.assertEqual(wrong, [])
 
+    def test_a_frame_is_recorded_whole_while_another_thread_steps_the_session(self):
+        session = pressed(frames=1)
+        poses = np.tile(session.pose, (20000, 1, 1))
+        poses[:, 0, 0] += 1e-9 * np.arange(len(poses))  # a sample of its own in each frame
+        with tempfile.TemporaryDirectory() as folder:
+            recorder = hapsix.Recorder(os.path.join(folder, "run.h5"), SCENE)
+            for _ in range(3):
+                followed = []
+                thread = threading.Thread(target=lambda: followed.append(session.follow(poses)))
+                thread.start()
+                while thread.is_alive():
+                    recorder.record(session)
+                thread.join()
+                recorder.record(session)
+                recorder.record(followed[0])
+            recorder.finish()
+            rows = hapsix.Recording(os.path.join(folder, "run.h5")).frames()
+        frame, x = rows["report"]["frame"], rows["hand"]["pose"]["p"]["x"][:, 0]
+        order = np.argsort(frame, kind="stable")
+        same = np.diff(frame[order]) == 0
+        self.assertGreater(same.sum(), 0)
+        # All rows of a frame have its sample.
+        self.assertEqual((np.diff(x[order])[same] != 0).sum(), 0)
+
 
 if __name__ == "__main__":
     unittest.main()
