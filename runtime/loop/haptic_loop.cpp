@@ -265,8 +265,9 @@ void keep_record(h6Loop& loop, const sched::TickTiming& timing) {
   loop.ring->push(row, loop.bends.data());
 }
 
-constexpr std::int64_t kTakeOverTime = 2'000'000'000;  // longest wait of h6ChangeSession [ns]
-constexpr std::int64_t kPoll = 100'000;                // between two looks of its wait [ns]
+// The longest waits of h6ChangeSession for its turn and then for a frame, each [ns].
+constexpr std::int64_t kTakeOverTime = 2'000'000'000;
+constexpr std::int64_t kPoll = 100'000;  // between two looks of its wait [ns]
 constexpr const char* kLoopEnded = "the loop has ended";
 constexpr int kHelperPriority = 79;  // below the haptic thread's
 
@@ -331,11 +332,12 @@ bool check(const h6Session* session, const h6Device* devices, const h6LoopDef& d
   return check_reserved(def, "loop: ", error) && check_settings(loop_settings(), &def, "", error);
 }
 
-// The turn of one caller of h6ChangeSession. Only callers wait here, and no longer than `give_up`,
-// which std::mutex could not promise.
+// The turn of one caller of h6ChangeSession. Only callers wait here, and no longer than
+// kTakeOverTime, which std::mutex could not promise.
 class ChangeTurn {
  public:
-  ChangeTurn(std::atomic<bool>& taken, std::int64_t give_up) : taken_(taken) {
+  explicit ChangeTurn(std::atomic<bool>& taken) : taken_(taken) {
+    const std::int64_t give_up = sched::now_ns() + kTakeOverTime;
     while (taken_.exchange(true, std::memory_order_acquire)) {
       if (sched::now_ns() > give_up) return;
       sched::sleep_until_ns(sched::now_ns() + kPoll);
@@ -356,7 +358,8 @@ class ChangeTurn {
 
 // Offers `next` to the haptic thread and waits for the session that it ran. Null: `next` was not
 // taken, and `error` says why.
-h6Session* exchange(h6Loop& loop, h6Session* next, std::int64_t give_up, h6Error* error) {
+h6Session* exchange(h6Loop& loop, h6Session* next, h6Error* error) {
+  const std::int64_t give_up = sched::now_ns() + kTakeOverTime;
   if (const int core = loop.core; core >= 0) next->team->set_realtime(loop.helper_priority, core);
   loop.offered.store(next, std::memory_order_release);
   while (true) {
@@ -491,8 +494,7 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (loop->thread->is_this())
     return fail(error, H6_ERROR_BUSY, "the haptic thread cannot wait for its own next frame"),
            nullptr;
-  const std::int64_t give_up = sched::now_ns() + kTakeOverTime;
-  const ChangeTurn turn(loop->changing, give_up);
+  const ChangeTurn turn(loop->changing);
   if (!turn.mine())
     return fail(
                error, H6_ERROR_BUSY,
@@ -505,7 +507,7 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
   if (next && !next->owner.compare_exchange_strong(none, Owner::loop))
     return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;
   if (may_take_over(next, *loop->session, error))
-    if (h6Session* const before = exchange(*loop, next, give_up, error)) {
+    if (h6Session* const before = exchange(*loop, next, error)) {
       before->owner = Owner::nobody;
       return before;
     }

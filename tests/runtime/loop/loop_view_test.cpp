@@ -182,32 +182,66 @@ TEST_CASE("a loop that has ended takes no session") {
   h6DestroySession(next);
 }
 
+// A device whose reads hang while they are told to.
+struct Hanging {
+  std::atomic<bool> hangs{true}, reads{false};
+  h6Device device = Scene::device();
+  Hanging() {
+    device.self = this;
+    device.read = [](void* self, double, h6DeviceSample* out) {
+      Hanging& h = *static_cast<Hanging*>(self);
+      for (h.reads = true; h.hangs;) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      *out = hand_at(pose(0, 0, 5.2 * mm));
+      return 0;
+    };
+  }
+  // A loop of this session that hangs in its first frame.
+  h6Loop* start(h6Session* session) {
+    h6LoopDef def = h6DefaultLoopDef();
+    def.realtime = false;
+    h6Loop* const loop = h6StartLoop(session, &device, &def, nullptr);
+    REQUIRE(loop);
+    while (!reads) std::this_thread::yield();
+    return loop;
+  }
+};
+
 TEST_CASE("a session is not taken over while a device hangs, and the caller gets it back") {
   Scene scene;
-  std::atomic<bool> hangs{true};
-  h6Device device = Scene::device();
-  device.self = &hangs;
-  device.read = [](void* self, double, h6DeviceSample* out) {
-    while (static_cast<std::atomic<bool>*>(self)->load())
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    *out = hand_at(pose(0, 0, 5.2 * mm));
-    return 0;
-  };
-  h6LoopDef def = h6DefaultLoopDef();
-  def.realtime = false;
-  h6Loop* loop = h6StartLoop(scene.session, &device, &def, nullptr);
-  REQUIRE(loop);
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // the first read has begun
+  Hanging hanging;
+  h6Loop* const loop = hanging.start(scene.session);
   h6Session* next = h6CreateSession(scene.model.handle, &scene.def, nullptr);
   h6Error error{};
   CHECK(h6ChangeSession(loop, next, &error) == nullptr);
   CHECK(error.code == H6_ERROR_BUSY);
-  hangs = false;
+  hanging.hangs = false;
   h6Session* old = h6ChangeSession(loop, next, &error);
   CHECK(old == scene.session);  // it was free to be offered again
   h6DestroyLoop(loop);
   scene.session = next;
   h6DestroySession(old);
+}
+
+TEST_CASE("a caller whose turn comes late still has its whole time for a frame") {
+  Scene scene;
+  Hanging hanging;
+  h6Loop* const loop = hanging.start(scene.session);
+  h6Session* next[] = {h6CreateSession(scene.model.handle, &scene.def, nullptr),
+                       h6CreateSession(scene.model.handle, &scene.def, nullptr)};
+  h6Error error[2]{};
+  h6Session* before[2]{};
+  std::thread first([&] { before[0] = h6ChangeSession(loop, next[0], &error[0]); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  std::thread second([&] { before[1] = h6ChangeSession(loop, next[1], &error[1]); });
+  first.join();  // after 2 s; the turn is the second's, who has waited for 1.6 s
+  std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  hanging.hangs = false;
+  second.join();
+  CHECK(before[0] == nullptr);
+  CHECK(error[0].code == H6_ERROR_BUSY);
+  CHECK_MESSAGE(before[1] == scene.session, error[1].message);
+  h6DestroyLoop(loop);
+  for (h6Session* session : next) h6DestroySession(session);
 }
 
 TEST_CASE("in a pause time stands still; in slow motion devices see the time of the frames") {
