@@ -31,6 +31,7 @@ enum Request { kNothing, kArm, kDisarm };
 
 struct h6Loop {
   h6Session* session = nullptr;
+  h6::SessionKind kind;     // of all its sessions
   h6Allocator allocator{};  // of the session that the loop began with
   h6LoopDef def{};
   h6Device devices[H6_MAX_HANDS] = {};
@@ -172,7 +173,7 @@ void change_session(h6Loop& loop) {
   h6Session* const before = loop.session;
   loop.session = next;
   ++loop.record.settings;
-  // The last word: from here on the caller may look at the loop's session.
+  // The last word: from here on the session before is the caller's.
   loop.given_back.store(before, std::memory_order_release);
 }
 
@@ -400,6 +401,7 @@ h6Loop* h6StartLoop(h6Session* session, const h6Device* devices, const h6LoopDef
     std::unique_ptr<h6Loop, decltype(let_go)> loop(create<h6Loop>(session->allocator), let_go);
     if (!loop) throw std::bad_alloc();
     loop->session = session;
+    loop->kind = kind_of(*session);
     loop->allocator = session->allocator;
     loop->def = used;
     for (std::size_t h = 0; h < session->hands.size(); ++h) {
@@ -500,13 +502,13 @@ h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error) {
                error, H6_ERROR_BUSY,
                "no turn came for 2 s: other threads change this loop's session, or a driver hangs"),
            nullptr;
-  // The session of a loop that has ended may be destroyed, so it is not looked at.
+  // Another thread may join the loop at any time and destroy its session, which is not looked at.
   if (!loop->thread->running()) return fail(error, kLoopEnded), nullptr;
   if (next && next->workers) return fail(error, kOfWorkers), nullptr;
   Owner none = Owner::nobody;
   if (next && !next->owner.compare_exchange_strong(none, Owner::loop))
     return fail(error, H6_ERROR_BUSY, "another loop or step runs the next session"), nullptr;
-  if (may_take_over(next, *loop->session, error))
+  if (may_take_over(next, loop->kind, error))
     if (h6Session* const before = exchange(*loop, next, error)) {
       before->owner = Owner::nobody;
       return before;

@@ -115,12 +115,23 @@ void take_over(h6Session& next, const h6Session& before) {
   next.frame = before.frame;
 }
 
-bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error) {
-  if (!next || next->model != before.model || next->bodies.size() != before.bodies.size() ||
-      next->hands.size() != before.hands.size() || next->settings.dt != before.settings.dt)
+SessionKind kind_of(const h6Session& session) {
+  SessionKind kind{
+      session.model, session.bodies.size(), session.hands.size(), session.settings.dt, {}, {}};
+  for (std::size_t h = 0; h < session.hands.size(); ++h) {
+    kind.body[h] = session.hands[h].body;
+    kind.mode[h] = session.hands[h].mode;
+  }
+  return kind;
+}
+
+bool may_take_over(const h6Session* next, const SessionKind& before, h6Error* error) {
+  const SessionKind kind = next ? kind_of(*next) : SessionKind{};
+  if (!next || kind.model != before.model || kind.bodies != before.bodies ||
+      kind.hands != before.hands || kind.dt != before.dt)
     return fail(error, "a loop goes on with a session of the same model, bodies, hands and rate");
-  for (std::size_t h = 0; h < next->hands.size(); ++h)
-    if (next->hands[h].body != before.hands[h].body || next->hands[h].mode != before.hands[h].mode)
+  for (std::size_t h = 0; h < kind.hands; ++h)
+    if (kind.body[h] != before.body[h] || kind.mode[h] != before.mode[h])
       return fail(error, "a loop goes on with hands on the same bodies, in the same modes");
   return true;
 }
@@ -130,7 +141,7 @@ bool may_take_over(const h6Session* next, const h6Session& before, h6Error* erro
 extern "C" bool h6TakeOver(h6Session* next, const h6Session* before, h6Error* error) {
   if (!before || next == before)
     return h6::fail(error, "a session goes on where another one stands");
-  if (!h6::may_take_over(next, *before, error)) return false;
+  if (!h6::may_take_over(next, h6::kind_of(*before), error)) return false;
   if (h6::run_by_loop(*next) || h6::run_by_loop(*before))
     return h6::fail(error, H6_ERROR_BUSY, "a loop runs this session: h6ChangeSession is for that");
   h6::take_over(*next, *before);

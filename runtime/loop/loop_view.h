@@ -2,6 +2,8 @@
 // loop_view.h - hands the newest poses and contacts of a running loop to a viewer, in place.
 // Neither side ever waits; a value that the viewer does not fetch in time is replaced.
 #pragma once
+#include <cstddef>
+#include <cstdint>
 
 #include "hapsix/hapsix.h"
 #include "sched/host_memory.h"
@@ -34,6 +36,16 @@ class LoopView {
 // Lets `next` go on where `before` is: poses, velocities, hands and their safety chains. Settings
 // stay those of `next`. Both sessions have the same bodies and hands.
 void take_over(h6Session& next, const h6Session& before);
-bool may_take_over(const h6Session* next, const h6Session& before, h6Error* error);
+// What both sessions have in common. A loop keeps it, so that nobody but the haptic thread looks at
+// the loop's session.
+struct SessionKind {
+  const h6Model* model = nullptr;
+  std::size_t bodies = 0, hands = 0;
+  double dt = 0;
+  std::int32_t body[H6_MAX_HANDS] = {};
+  std::uint32_t mode[H6_MAX_HANDS] = {};
+};
+SessionKind kind_of(const h6Session& session);
+bool may_take_over(const h6Session* next, const SessionKind& before, h6Error* error);
 
 }  // namespace h6

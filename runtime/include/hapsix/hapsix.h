@@ -312,8 +312,8 @@ H6_API void   h6SetPace(h6Loop* loop, double pace);
  * Returns the previous session, which the caller destroys; or NULL with `error` filled, and nothing
  * has changed. Waits for other callers, 2 s at most, and then for the frame in progress, 2 s at most
  * (H6_ERROR_BUSY: a driver hangs). Any thread: callers take turns, and each gets the session that ran
- * until its own one came. The haptic thread is refused (H6_ERROR_BUSY). The loop must not be
- * destroyed meanwhile. */
+ * until its own one came. The haptic thread is refused (H6_ERROR_BUSY). Meanwhile another thread may
+ * join the loop and destroy its session, but not the loop. */
 H6_API h6Session* h6ChangeSession(h6Loop* loop, h6Session* next, h6Error* error);
 /* The same between two steps of a program that steps by itself. False: `error` is filled, no change. */
 H6_API bool   h6TakeOver(h6Session* next, const h6Session* before, h6Error* error);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A viewer sees a running loop and may change its settings and pace.
 #include <doctest/doctest.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "hapsix/hapsix.h"
@@ -242,6 +244,50 @@ TEST_CASE("a caller whose turn comes late still has its whole time for a frame")
   CHECK_MESSAGE(before[1] == scene.session, error[1].message);
   h6DestroyLoop(loop);
   for (h6Session* session : next) h6DestroySession(session);
+}
+
+TEST_CASE("a caller compares a session with a loop's without a look at the loop's") {
+  // Another thread may join the loop and destroy its session at any time. Here the session cannot
+  // be read meanwhile: a look at it is a crash.
+  struct Pages {
+    std::vector<std::pair<void*, std::size_t>> all;
+    void protect(int how) const {
+      for (const auto& [memory, bytes] : all) REQUIRE(mprotect(memory, bytes, how) == 0);
+    }
+  } pages;
+  Scene scene;
+  h6SessionDef paged = scene.def;
+  paged.threads = 1;
+  paged.allocator.user = &pages;
+  paged.allocator.allocate = [](void* user, std::size_t bytes, std::size_t) -> void* {
+    void* const memory =
+        mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) return nullptr;
+    static_cast<Pages*>(user)->all.push_back({memory, bytes});
+    return memory;
+  };
+  paged.allocator.release = [](void* user, void* memory, std::size_t bytes) {
+    auto& all = static_cast<Pages*>(user)->all;
+    all.erase(std::find(all.begin(), all.end(), std::pair(memory, bytes)));
+    munmap(memory, bytes);
+  };
+  h6Session* const session = h6CreateSession(scene.model.handle, &paged, nullptr);
+  REQUIRE(session);
+  const Pages of_session = pages;
+  h6SessionDef faster = scene.def;
+  faster.rate = 2000;
+  h6Session* const next = h6CreateSession(scene.model.handle, &faster, nullptr);
+  REQUIRE(next);
+  Hanging hanging;
+  h6Loop* const loop = hanging.start(session);
+  of_session.protect(PROT_NONE);
+  h6Error error{};
+  CHECK(h6ChangeSession(loop, next, &error) == nullptr);
+  of_session.protect(PROT_READ | PROT_WRITE);
+  CHECK(std::string(error.message).find("same model") != std::string::npos);
+  hanging.hangs = false;
+  h6DestroyLoop(loop);
+  h6DestroySession(session), h6DestroySession(next);
 }
 
 TEST_CASE("in a pause time stands still; in slow motion devices see the time of the frames") {
