@@ -155,7 +155,7 @@ struct Definition {
 
   Definition() = default;
   explicit Definition(const h6SessionDef& from);
-  // A copy shares no body and no hand. Whoever lets go of the interpreter's lock needs one: another
+  // A copy shares no body and no hand. A call that lets go of the interpreter's lock needs one: another
   // Python thread may change the original then.
   Definition(const Definition& from);
   Definition& operator=(const Definition&) = delete;
@@ -178,7 +178,7 @@ struct Definition {
 
 struct PySession {
   // A session belongs to one thread at a time, so Python's threads take turns, call by call.
-  // Whoever has let go of the interpreter's lock holds the mutex itself.
+  // A call that has let go of the interpreter's lock holds the mutex itself.
   mutable std::mutex mutex;
   std::shared_ptr<PyModel> model;
   Unlocked<Session> session;
