@@ -155,8 +155,8 @@ struct Definition {
 
   Definition() = default;
   explicit Definition(const h6SessionDef& from);
-  // A copy shares no body and no hand. A call that lets go of the interpreter's lock needs one: another
-  // Python thread may change the original then.
+  // A copy shares no body and no hand. A call that lets go of the interpreter's lock needs one:
+  // another Python thread may change the original then.
   Definition(const Definition& from);
   Definition& operator=(const Definition&) = delete;
   // Calls use(def) with a definition that points to everything.
