@@ -22,7 +22,6 @@ using namespace h6;
 using h6::device::PluginDevice;
 using h6::test::Floor;
 using h6::test::FloorRun;
-using h6::test::force;
 using nlohmann::json;
 
 namespace {
@@ -109,10 +108,12 @@ TEST_CASE("a program's poses move the part, and each datagram is answered with t
   REQUIRE(run.until([](const h6FrameRecord& r) { return r.hand[0].buttons == 2; }));
   CHECK(std::fabs(run.rows.back().hand[0].pose.p.z - 5e-3) < 1e-12);  // at home
   program.z = -0.02;
-  REQUIRE(run.until([](const h6FrameRecord& r) { return force(r) > 0.5; }));
+  REQUIRE(run.force_comes());
   program.every = 3;  // two of three are lost
-  for (int i = 0; i < 400 && !(program.force > 0.5); ++i)
+  for (int i = 0; i < 400 && !(program.force > 0.5); ++i) {
+    CHECK(run.force_comes());
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
   CHECK(program.force > 0.5);
   CHECK(program.answers > 10);
   run.rows.clear();

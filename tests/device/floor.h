@@ -109,17 +109,19 @@ class FloorRun {
     CHECK(force_comes());
   }
 
-  std::vector<h6FrameRecord> rows;
-
- private:
   // Arms every half second until there is force: a busy machine may latch the output at any time.
   bool force_comes() {
     int looks = 0;
     return until([&](const h6FrameRecord& r) {
+      if (force(r) > 0.5) return true;
       if (looks++ % 100 == 0) h6ArmLoop(loop_);
-      return force(r) > 0.5;
+      return false;
     });
   }
+
+  std::vector<h6FrameRecord> rows;
+
+ private:
   h6Device device_;
   h6Loop* loop_ = nullptr;
 };

@@ -22,7 +22,6 @@ using namespace h6;
 using h6::device::PluginDevice;
 using h6::test::Floor;
 using h6::test::FloorRun;
-using h6::test::force;
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 using boost::system::error_code;
@@ -161,10 +160,12 @@ TEST_CASE("Haply's handle moves the part, its grip's buttons are there, and its 
   CHECK(std::fabs(run.rows.back().hand[0].pose.p.z - 5e-3) < 1e-12);
   CHECK(std::fabs(run.rows.back().hand[0].pose.q.w - 1) < 1e-12);
   service.z = -0.02;
-  REQUIRE(run.until([](const h6FrameRecord& r) { return force(r) > 0.5; }));
+  REQUIRE(run.force_comes());
   CHECK(std::fabs(run.rows.back().hand[0].pose.p.z + 0.015) < 1e-9);
-  for (int i = 0; i < 400 && !(service.force > 0.5); ++i)
+  for (int i = 0; i < 400 && !(service.force > 0.5); ++i) {
+    CHECK(run.force_comes());
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
   CHECK(service.force > 0.5);
   CHECK(service.force <= 3 + 1e-6);
   CHECK(service.commands > 10);
