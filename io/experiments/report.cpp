@@ -145,8 +145,7 @@ std::string markdown_report(const std::vector<SceneRow>& rows,
       " the bit on a processor with the same vector instructions. With others (AVX-512, AVX2) the "
       "last bits of forces differ, and with them the last figures of some pushes, bounces and "
       "limits of stability. H. Xu, J. Barbič, *Adaptive 6-DoF Haptic Contact Stiffness Using the "
-      "Gauss "
-      "Map*, IEEE Trans. Haptics, 2016, is \"the paper\". \"The prototype\" is a throw-away "
+      "Gauss Map*, IEEE Trans. Haptics, 2016, is \"the paper\". \"The prototype\" is a throw-away "
       "program with analytic distance functions; its coupling damped outside its bound and its "
       "contacts could pull. Its verdicts are expected here, its figures only roughly.\n\n";
   if (!rows.empty()) {

@@ -36,8 +36,8 @@ class LoopView {
 // Lets `next` go on where `before` is: poses, velocities, hands and their safety chains. Settings
 // stay those of `next`. Both sessions have the same bodies and hands.
 void take_over(h6Session& next, const h6Session& before);
-// What both sessions have in common. A loop keeps it, so that nobody but the haptic thread looks at
-// the loop's session.
+// Two sessions can take turns in a loop if their kinds are equal. A loop keeps the kind, so that
+// nobody but the haptic thread looks at the loop's session.
 struct SessionKind {
   const h6Model* model = nullptr;
   std::size_t bodies = 0, hands = 0;

@@ -233,10 +233,10 @@ TEST_CASE("a caller whose turn comes late still has its whole time for a frame")
   h6Error error[2]{};
   h6Session* before[2]{};
   std::thread first([&] { before[0] = h6ChangeSession(loop, next[0], &error[0]); });
-  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  std::this_thread::sleep_for(std::chrono::milliseconds(800));
   std::thread second([&] { before[1] = h6ChangeSession(loop, next[1], &error[1]); });
-  first.join();  // after 2 s; the turn is the second's, who has waited for 1.6 s
-  std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  first.join();  // after 2 s; the turn is the second's, who has waited for 1.2 s
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));
   hanging.hangs = false;
   second.join();
   CHECK(before[0] == nullptr);
