@@ -17,11 +17,6 @@ using namespace h6::kernels::test;
 
 namespace {
 
-const AnalyticField& clutter_field() {
-  static const AnalyticField field(16, 17, 18, clutter);
-  return field;
-}
-
 struct Spheres {
   Spheres(std::size_t n, std::size_t shift)
       : x(n, shift), y(n, shift + 1), z(n, shift + 2), radius(n, shift + 3), count(n) {}

@@ -80,8 +80,8 @@ struct Answer {
   double tilt_before, tilt;     // of the gradient from the exact one [rad]
   double moved;                 // the gradient, by smoothing [rad]
 };
-// `band` and `last` are those of the crosses. Where `turned`, the axes of gradients are the field's,
-// turned by a right angle about z.
+// `band` and `last` are those of the crosses. Where `turned`, the axes of gradients are the
+// field's, turned by a right angle about z.
 Answer answer(const Quadratic& field, const double p[3], float band = 9, float last = 50,
               bool turned = false) {
   float place[3], at[7], depth, g[3];

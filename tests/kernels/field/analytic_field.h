@@ -178,4 +178,14 @@ inline int scattered_cut(int x, int y, int z) {
 
 inline constexpr Affine kIdentity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 
+inline const AnalyticField& clutter_field() {
+  static const AnalyticField field(16, 17, 18, clutter);
+  return field;
+}
+// The same with some cells cut.
+inline const AnalyticField& refined_field() {
+  static const AnalyticField field(16, 17, 18, clutter, 3.0, 0.001, 1.0, scattered_cut);
+  return field;
+}
+
 }  // namespace h6::kernels::test

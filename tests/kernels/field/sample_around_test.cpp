@@ -17,15 +17,6 @@ using namespace h6::kernels::test;
 
 namespace {
 
-const AnalyticField& plain_field() {
-  static const AnalyticField field(16, 17, 18, clutter);
-  return field;
-}
-const AnalyticField& refined_field() {
-  static const AnalyticField field(16, 17, 18, clutter, 3.0, 0.001, 1.0, scattered_cut);
-  return field;
-}
-
 constexpr Affine kTurned = {{{0.96f, -0.28f, 0.0f, 20.25f},
                              {0.2688f, 0.9216f, -0.28f, 5.5f},
                              {0.0784f, 0.2688f, 0.96f, -18.125f}}};
@@ -90,7 +81,7 @@ TEST_CASE("sample_around: every place has the bits of sample_field on every targ
       if (n > 20) wide.y[n / 2] = std::numeric_limits<float>::quiet_NaN();
       for (const Pattern& pattern : kPatterns)
         for (const Affine& a : {kIdentity, kTurned})
-          for (const AnalyticField* field : {&plain_field(), &refined_field()}) {
+          for (const AnalyticField* field : {&clutter_field(), &refined_field()}) {
             agree(pattern, *field, a, wide, n);
             agree(pattern, *field, a, inside, n);
           }
@@ -105,8 +96,8 @@ TEST_CASE("sample_around: the places lie where their signs say") {
   std::vector<float> d(n);
   for (const Pattern& pattern : kPatterns) {
     Samples got(n, 0), ref(n, 0);
-    got.take(pattern.kernel, plain_field(), kIdentity, p.view(n), pattern.step);
-    ref.take(pattern.reference, plain_field(), kIdentity, p.view(n), pattern.step);
+    got.take(pattern.kernel, clutter_field(), kIdentity, p.view(n), pattern.step);
+    ref.take(pattern.reference, clutter_field(), kIdentity, p.view(n), pattern.step);
     for (std::size_t c = 0; c < pattern.count; ++c) {
       const int* sign = pattern.sign[c];
       for (std::size_t i = 0; i < n; ++i) {
@@ -114,7 +105,7 @@ TEST_CASE("sample_around: the places lie where their signs say") {
         moved.y[i] = p.y[i] + pattern.step * float(sign[1]);
         moved.z[i] = p.z[i] + pattern.step * float(sign[2]);
       }
-      sample_field_ref(plain_field().view(), kIdentity, moved.view(n), nullptr, n, d.data(),
+      sample_field_ref(clutter_field().view(), kIdentity, moved.view(n), nullptr, n, d.data(),
                        nullptr, nullptr, nullptr);
       std::size_t apart = 0;  // a position may round to another cell
       for (std::size_t i = 0; i < n; ++i)

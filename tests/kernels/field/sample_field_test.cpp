@@ -18,16 +18,6 @@ using namespace h6::kernels::test;
 
 namespace {
 
-const AnalyticField& clutter_field() {
-  static const AnalyticField field(16, 17, 18, clutter);
-  return field;
-}
-
-const AnalyticField& refined_field() {
-  static const AnalyticField field(16, 17, 18, clutter, 3.0, 0.001, 1.0, scattered_cut);
-  return field;
-}
-
 struct Points {
   Points(std::size_t n, std::size_t shift)
       : x(n, shift), y(n, shift + 1), z(n, shift + 2), count(n) {}
