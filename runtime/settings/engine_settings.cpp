@@ -71,7 +71,7 @@ constexpr Setting kContactRows[] = {
     number<&h6ContactDef::series_c>("series_c", "", 4, above(2, 1e6),
                                     "series, firm: the net stiffness is at most this times k"),
     number<&h6ContactDef::firmness>(
-        "firmness", "", 20, between(1, 1e6),
+        "firmness", "", 23, between(1, 1e6),
         "firm: stiffness of one direction of contact inside the common spring, in units of k, from "
         "half a voxel of depth on"),
     number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 4, between(1, 1e6),
