@@ -61,7 +61,7 @@ const Rooms& below() {
 
     room("io/file", {"contract", "sched"});
     room("io/mesh", {"contract", "sched", "kernels/bake", "io/file"});
-    room("io/field", {"contract", "sched", "io/file", "io/mesh"});
+    room("io/field", {"contract", "sched", "kernels/field", "io/file", "io/mesh"});
     room("io/walls", {"contract", "sched", "io/mesh"});
     room("io/bake", {"contract", "sched", "kernels", "kernels/bake", "io/file", "io/mesh",
                      "io/walls", "io/field"});

@@ -14,6 +14,7 @@
 
 #include "io/bake/grid.h"
 #include "io/bake/holes.h"
+#include "io/field/box.h"
 #include "io/field/refine.h"
 #include "io/field/unite.h"
 #include "io/walls/thin_pieces.h"
@@ -97,8 +98,10 @@ void warn_of_gaps(const bake::Surface& surface, const bake::GapWeld& welded, boo
   if (!sentence.empty()) report.warnings.insert(report.warnings.begin(), sentence);
 }
 
-void warn(const bake::Surface& surface, const bake::Grid& grid, bool nothing_inside, double seal,
-          SignMode sign, FieldBakeReport& report) {
+}  // namespace
+
+void bake::warn(const bake::Surface& surface, const bake::Grid& grid, bool nothing_inside,
+                double seal, SignMode sign, FieldBakeReport& report) {
   auto& out = report.warnings;
   if (surface.duplicates > 0)
     out.push_back(plural(surface.duplicates, "triangle is", "triangles are") +
@@ -129,6 +132,8 @@ void warn(const bake::Surface& surface, const bake::Grid& grid, bool nothing_ins
   }
 }
 
+namespace {
+
 // Closes gaps of a share of the voxel.
 Outcome weld(const Mesh& mesh, const FieldBake& options, bake::Surface& surface,
              bake::GapWeld& welded) {
@@ -153,8 +158,8 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
   band = {};
   if (!steps.tell("bricks", from)) return Failure{"cancelled"};
   if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
-  find_features(surface, threads, band.features);
-  band.u.resize(band.rows() * kBrickSamples);
+  band.features = surface.features ? surface.features : find_features(surface, threads);
+  give_slots(grid, band);
   band.free.resize(band.rows());
   band.first_node.resize(band.rows());
   band.towards.resize(band.rows());
@@ -166,7 +171,7 @@ Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned t
         if (!band.crossing.empty()) cross_tile(surface, grid, tile, triangles, band);
       }))
     return Failure{"cancelled"};
-  band.features = {};
+  band.features.reset();
   return Done{};
 }
 
@@ -280,18 +285,11 @@ void warn_of_holes(const bake::Grid& grid, const Openings& openings, const Field
                               " was found that leads into a solid: nothing was sealed");
 }
 
-// A field of a surface, and what the report needs to know about it.
-struct Baked {
-  FieldData field;
-  std::vector<std::uint32_t> thin;         // bricks that may have thin walls
-  std::vector<bake::NodeMask> thin_nodes;  // (thin) where in them
-  bool nothing_inside = false;
-};
+}  // namespace
 
-// The surface is in grid coordinates and gains the facets that seal it. Without `far` the far grid
-// holds the sides alone, unless thin walls may have to be added.
-Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldBake& options,
-                           bool far, const bake::Steps& steps, FieldBakeReport* report) {
+Result<bake::Baked> bake::bake_on_grid(bake::Surface& surface, bake::Grid grid,
+                                       const FieldBake& options, Beyond beyond,
+                                       const bake::Steps& steps, FieldBakeReport* report) {
   using namespace bake;
   const Failure cancelled{"cancelled"};
   const unsigned threads = options.threads;
@@ -315,6 +313,9 @@ Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldB
       out.thin.push_back(band.cell[r]);
       out.thin_nodes.push_back(inside.thin[r]);
     }
+  for (std::size_t r = 0; r < inside.buried.size(); ++r)
+    if (inside.buried[r] != 0) out.unsure.push_back(band.cell[r]);
+  out.unsure.insert(out.unsure.end(), reached.unsure.begin(), reached.unsure.end());
   FieldData& field = out.field;
   field.origin = grid.origin();
   field.voxel_size = grid.voxel;
@@ -324,12 +325,13 @@ Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldB
   if (!steps.tell("samples", 0.8)) return cancelled;
   write_samples(grid, band, reached, inside, threads, field);
   inside.chains.reset();
-  if (!far && (out.thin.empty() || !options.grow_thin))
-    far_sides(grid, band, reached, threads, field.far_grid);
-  else if (const Outcome done =
-               far_distances(surface, grid, band, reached, threads, steps, field.far_grid);
-           !done)
-    return done.failure();
+  if (beyond == Beyond::sides) out.inside = sides_of(grid, band, reached, threads);
+  const bool walls = beyond == Beyond::sides && !out.thin.empty() && options.grow_thin;
+  if (beyond == Beyond::bounds || walls)
+    if (const Outcome done =
+            far_distances(surface, grid, band, reached, threads, steps, field.far_grid);
+        !done)
+      return done.failure();
   if (report) {
     report->sealed_area = double(openings.plugs) * grid.voxel * grid.voxel;
     warn_of_holes(grid, openings, options, *report);
@@ -337,10 +339,12 @@ Result<Baked> bake_on_grid(bake::Surface& surface, bake::Grid grid, const FieldB
   return out;
 }
 
+namespace {
+
 // Which boxes [voxel] hold one of the given nodes, or may if they are large.
 class NearNodes {
  public:
-  NearNodes(const bake::Grid& grid, const Baked& baked)
+  NearNodes(const bake::Grid& grid, const bake::Baked& baked)
       : grid_(grid), nodes_(baked.thin_nodes), row_(grid.cells(), -1) {
     for (std::size_t i = 0; i < baked.thin.size(); ++i) row_[baked.thin[i]] = std::int32_t(i);
   }
@@ -382,10 +386,22 @@ class NearNodes {
 
 constexpr double kGrow = 0.9;  // [voxel] on each side of a thin wall, as on each side of a sheet
 
-// The pieces of the surface that bound walls too thin for the grid, in its coordinates.
-Result<ThinPieces> find_thin(const bake::Surface& surface, const bake::Grid& grid,
-                             const Baked& baked, const FieldBake& options,
-                             FieldBakeReport* report) {
+// Takes the samples of all other bricks out of a field.
+void keep_only(const bake::WantedBricks& wanted, FieldData& field) {
+  const auto& bricks = field.bricks;
+  for (std::size_t c = 0; c < field.brick_index.size(); ++c) {
+    const GridNode at = place_of(c, bricks);
+    const std::size_t tile =
+        place_in({at[0] / 4, at[1] / 4, at[2] / 4}, {bricks[0] / 4, bricks[1] / 4, bricks[2] / 4});
+    if ((wanted[tile] >> bake::Tiles::bit(at) & 1) == 0) field.brick_index[c] = -1;
+  }
+}
+
+}  // namespace
+
+Result<ThinPieces> bake::find_thin(const bake::Surface& surface, const bake::Grid& grid,
+                                   const bake::Baked& baked, const FieldBake& options,
+                                   FieldBakeReport* report) {
   if (baked.thin.empty() || !options.grow_thin) return ThinPieces{};
   Mesh mesh;
   mesh.vertices.assign(surface.vertices.begin(), surface.vertices.end());
@@ -404,11 +420,8 @@ Result<ThinPieces> find_thin(const bake::Surface& surface, const bake::Grid& gri
   return thin;
 }
 
-// Adds the thin walls of a surface to its field on this grid, whose voxels are `cut` voxels of
-// theirs, as open sheets with an offset of kGrow of their voxels.
-Outcome add_thin(const ThinPieces& thin, const bake::Surface& whole, bake::Grid grid, double cut,
-                 FieldBake options, const bake::Steps& steps, FieldData& field) {
-  using namespace bake;
+Outcome bake::add_thin(const ThinPieces& thin, const bake::Surface& whole, bake::Grid grid,
+                       double cut, FieldBake options, const bake::Steps& steps, FieldData& field) {
   Result<Surface> surface = prepare_surface(thin.mesh, options.threads);
   if (!surface) return surface.failure();
   for (Vec3& v : surface->vertices) v = (1 / cut) * v;
@@ -418,12 +431,16 @@ Outcome add_thin(const ThinPieces& thin, const bake::Surface& whole, bake::Grid 
   grid.offset += kGrow / cut;
   grid.seal = 0;
   options.sign = SignMode::flood;
-  const Result<Baked> walls = bake_on_grid(*surface, grid, options, true, steps, nullptr);
+  const WantedBricks* const wanted = std::exchange(grid.wanted, nullptr);
+  Result<Baked> walls = bake_on_grid(*surface, grid, options, Beyond::bounds, steps, nullptr);
   if (!walls) return walls.failure();
+  if (wanted != nullptr) keep_only(*wanted, walls->field);
   field = unite(std::move(field), walls->field, options.threads);
   field.grown = kGrow / cut * grid.voxel;
   return Done{};
 }
+
+namespace {
 
 Result<FieldData> bake_uniform(bake::Surface& surface, const FieldBake& options, bool sealed,
                                const bake::Steps& steps, FieldBakeReport* report) {
@@ -431,7 +448,7 @@ Result<FieldData> bake_uniform(bake::Surface& surface, const FieldBake& options,
   const Result<Grid> grid = choose_grid(surface, options, sealed);
   if (!grid) return grid.failure();
   to_grid(surface, *grid, options.threads);
-  Result<Baked> baked = bake_on_grid(surface, *grid, options, true, steps, report);
+  Result<Baked> baked = bake_on_grid(surface, *grid, options, Beyond::bounds, steps, report);
   if (!baked) return baked.failure();
   const Result<ThinPieces> thin = find_thin(surface, *grid, *baked, options, report);
   if (!thin) return thin.failure();
@@ -444,42 +461,6 @@ Result<FieldData> bake_uniform(bake::Surface& surface, const FieldBake& options,
     warn(surface, *grid, baked->nothing_inside && thin->area == 0, options.seal, options.sign,
          *report);
   return std::move(baked->field);
-}
-
-// Two bakes that share nodes: coarse bricks everywhere, fine ones where those miss the tolerance.
-Result<FieldData> bake_to_tolerance(bake::Surface& surface, const FieldBake& options, bool sealed,
-                                    const bake::Steps& steps, FieldBakeReport* report) {
-  using namespace bake;
-  const Result<TwoGrids> grids = choose_two_grids(surface, options, sealed);
-  if (!grids) return grids.failure();
-  to_grid(surface, grids->fine, options.threads);
-  Result<Baked> fine =
-      bake_on_grid(surface, grids->fine, options, false, steps.part(0, 0.5), report);
-  if (!fine) return fine.failure();
-  const Result<ThinPieces> thin = find_thin(surface, grids->fine, *fine, options, report);
-  if (!thin) return thin.failure();
-  const bool grown = thin->area > 0;
-  if (grown)
-    if (const Outcome done =
-            add_thin(*thin, surface, grids->fine, 1, options, steps.part(0.5, 0.6), fine->field);
-        !done)
-      return done.failure();
-  Surface coarse_surface = surface;  // with what seals it
-  for (Vec3& v : coarse_surface.vertices) v = (1.0 / kCut) * v;
-  FieldBake magnitudes = options;  // the sides are those of the fine bake
-  if (!sealed) magnitudes.sign = SignMode::flood;
-  Result<Baked> coarse =
-      bake_on_grid(coarse_surface, grids->coarse, magnitudes, true, steps.part(0.6, 0.75), nullptr);
-  if (!coarse) return coarse.failure();
-  if (grown)
-    if (const Outcome done = add_thin(*thin, surface, grids->coarse, kCut, options,
-                                      steps.part(0.75, 0.8), coarse->field);
-        !done)
-      return done.failure();
-  if (report)
-    warn(surface, grids->fine, fine->nothing_inside && !grown, options.seal, options.sign, *report);
-  if (!steps.tell("refine", 0.8)) return Failure{"cancelled"};
-  return refine(coarse->field, fine->field, options.tolerance, options.threads);
 }
 
 Result<FieldData> bake_checked(const Mesh& mesh, FieldBake options, FieldBakeReport* report,

@@ -168,6 +168,12 @@ void bin_triangle(const Grid& grid, const Tiles& tiles, const Boxed& boxed, cons
                             float(kTile * (c - r.low[2]))};
     std::uint64_t near = kernels::bricks_within_reach(facet, first, float(reach + kRounding));
     if (near == 0) return;
+    if (grid.wanted != nullptr) {
+      const std::uint64_t wanted = (*grid.wanted)[tiles.of({4 * a, 4 * b, 4 * c})];
+      if ((near & ~wanted) != 0)
+        near &= wanted | kernels::bricks_within_reach(facet, first, float(1 + kRounding));
+      if (near == 0) return;
+    }
     if (4 * a + 4 > grid.bricks[0] || 4 * b + 4 > grid.bricks[1] || 4 * c + 4 > grid.bricks[2])
       near &= bricks_there(grid, tile);
     if (near != 0)

@@ -194,11 +194,11 @@ void set_regions(const Surface& surface, const Features& features, Facets& out) 
   }
 }
 
-// Lists the triangles that may meet the tile, which ends one voxel past its last nodes.
+// Adds the triangles that may meet the tile, which ends one voxel past its last nodes.
 void list_in_tile(Facets& out) {
   constexpr float kLast = 8.0f * kernels::kTileBricks, kRounding = 1e-3f;
-  out.in_tile.resize(out.facet.size());
-  std::size_t count = 0;
+  std::size_t count = out.in_tile.size();
+  out.in_tile.resize(count + out.facet.size());
   for (std::size_t f = 0; f < out.facet.size(); ++f) {
     const kernels::DistanceFacet& facet = out.facet[f];
     bool in = count == 0 || out.in_tile[count - 1] != std::uint32_t(out.owner[f]);
@@ -217,6 +217,8 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
   const std::size_t begin = tiles.first[tile], end = tiles.first[tile + 1];
   out.resize(end - begin);
   out.large.clear();
+  out.in_tile.clear();
+  const std::uint64_t wanted = grid.wanted == nullptr ? ~std::uint64_t{0} : (*grid.wanted)[tile];
   std::size_t count = 0;
   for (std::size_t i = begin; i < std::min(end, begin + kLater); ++i)
     ask_for_triangle(surface, features, tiles.triangle[i]);
@@ -226,6 +228,10 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
     if (i + kLater < end) ask_for_triangle(surface, features, tiles.triangle[i + kLater]);
     if (i + kSoon < end) ask_for_corners(surface, tiles.triangle[i + kSoon]);
     const std::uint32_t t = tiles.triangle[i];
+    if ((tiles.near[i] & wanted) == 0) {
+      out.in_tile.push_back(t);
+      continue;
+    }
     const Whole& whole = kWholes[features.owned[t]];
     double* corner = &out.corners[9 * count];
     double farthest = 0;
@@ -242,7 +248,7 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
       continue;
     }
     out.part[count] = whole.part;
-    out.near[count] = tiles.near[i];
+    out.near[count] = tiles.near[i] & wanted;
     out.owner[count] = std::int32_t(t);
     out.weighed[count++] = whole.weighed;
   }
@@ -255,7 +261,7 @@ void prepare(const Surface& surface, const Grid& grid, const Tiles& tiles, const
       corner[k] = {v.x - 8.0 * brick[0], v.y - 8.0 * brick[1], v.z - 8.0 * brick[2]};
     }
     add_part_near(out.corners, out.part, corner, grid.reach());
-    out.near.resize(out.part.size(), tiles.near[i]);
+    out.near.resize(out.part.size(), tiles.near[i] & wanted);
     out.owner.resize(out.part.size(), std::int32_t(t));
     out.weighed.resize(out.part.size(), 3);
   }
@@ -273,17 +279,29 @@ NodeMask above(const float* u, float level) {
 
 }  // namespace
 
+void give_slots(const Grid& grid, NarrowBand& band) {
+  band.slot.resize(band.rows());
+  constexpr std::uint32_t kShared = ~std::uint32_t{0};
+  std::uint32_t slots = 0;
+  for (std::size_t r = 0; r < band.rows(); ++r)
+    band.slot[r] = grid.wants(band.cell[r]) ? slots++ : kShared;
+  std::replace(band.slot.begin(), band.slot.end(), kShared, slots);
+  band.u.resize((slots + 1) * kBrickSamples);
+  std::fill_n(band.u.data() + slots * kBrickSamples, kBrickSamples, float(grid.reach()));
+}
+
 std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& grid,
                                             std::size_t tile, NarrowBand& band) {
   const Tiles& tiles = band.tiles;
   if (tiles.first[tile] == tiles.first[tile + 1]) return {};
   thread_local Facets facets;
   thread_local const auto room = std::make_unique<kernels::TileRoom>();
-  prepare(surface, grid, tiles, band.features, tile, facets);
+  prepare(surface, grid, tiles, *band.features, tile, facets);
   kernels::tile_distance(facets.facet.data(), facets.region.data(), facets.near.data(),
                          facets.owner.data(), facets.facet.size(), float(grid.reach()), *room);
   const std::array<int, 3> brick = tiles.first_brick(tile);
   const float zero_set = float(grid.near_zero_set());
+  const std::uint64_t wanted = grid.wanted == nullptr ? ~std::uint64_t{0} : (*grid.wanted)[tile];
   std::uint64_t used = 0, weighed = 0;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) used |= tiles.near[i];
   for (std::uint64_t near : facets.near) weighed |= near;
@@ -294,6 +312,12 @@ std::span<const std::uint32_t> measure_tile(const Surface& surface, const Grid& 
     const int in[3] = {b % 4, b / 4 % 4, b / 16};
     const std::size_t r =
         std::size_t(band.row[grid.cell(brick[0] + in[0], brick[1] + in[1], brick[2] + in[2])]);
+    if ((wanted >> b & 1) == 0) {
+      band.first_node[r] = float(grid.reach());
+      band.free[r] = kAllNodes;
+      band.towards[r] = 0;
+      continue;
+    }
     float* u = band.nodes(r);
     if (weighed >> b & 1)
       kernels::brick_distance(*room, std::size_t(b), u);

@@ -241,16 +241,4 @@ Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand
   return Done{};
 }
 
-void far_sides(const Grid& grid, const NarrowBand& band, const Reached& reached, unsigned threads,
-               Samples& far) {
-  const int nx = grid.bricks[0] + 1, ny = grid.bricks[1] + 1, nz = grid.bricks[2] + 1;
-  far.resize(std::size_t(nx) * std::size_t(ny) * std::size_t(nz));
-  sched::parallel_for(std::size_t(nz), threads, [&](std::size_t c) {
-    float* at = far.data() + c * std::size_t(nx) * std::size_t(ny);
-    for (int b = 0; b < ny; ++b)
-      for (int a = 0; a < nx; ++a)
-        *at++ = look_up(grid, band, reached, a, b, int(c)).inside ? -1.0f : 1.0f;
-  });
-}
-
 }  // namespace h6::io::bake

@@ -143,7 +143,9 @@ void look_at_corner(const Surface& surface, const Spokes& spokes, std::uint32_t 
 
 }  // namespace
 
-void find_features(const Surface& surface, unsigned threads, Features& out) {
+std::shared_ptr<const Features> find_features(const Surface& surface, unsigned threads) {
+  const auto features = std::make_shared<Features>();
+  Features& out = *features;
   const Rings rings(surface, threads);
   const std::size_t triangles = surface.triangles.size(), vertices = surface.vertices.size();
   out.owned.resize(triangles);
@@ -182,6 +184,7 @@ void find_features(const Surface& surface, unsigned threads, Features& out) {
       out.owned[t] = bits;
     }
   });
+  return features;
 }
 
 }  // namespace h6::io::bake

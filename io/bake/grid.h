@@ -25,9 +25,16 @@
 #include "io/mesh/mesh.h"
 #include "kernels/bake/triangle_distance.h"
 
+namespace h6::io {
+struct ThinPieces;  // io/walls
+}
+
 namespace h6::io::bake {
 
 using kernels::kBrickSamples;
+
+// (tiles) bit (c*4 + b)*4 + a: brick (a,b,c) of a tile of 4^3 bricks.
+using WantedBricks = std::vector<std::uint64_t>;
 
 // The nodes fill a box around the mesh and share its centre (but for FieldBake::shift), so that a
 // symmetric part gets a symmetric field and a mesh far from the origin keeps its digits.
@@ -37,10 +44,14 @@ struct Grid {
   std::array<std::int32_t, 3> bricks{};
   double offset = 0;  // sigma [voxel]
   double band = 0;    // [voxel]
+  double beyond = 2;  // how far beyond the band distances are exact [voxel]
   double seal = 0;    // width of the holes to close [voxel]; 0 when none is left to close
+  // The bricks that get samples; null: all near the surface. Needs an offset of 0: then crossed
+  // edges alone tell the sides of the others.
+  const WantedBricks* wanted = nullptr;
 
   // The unsigned distance u is exact up to here.
-  double reach() const { return std::max(offset + band + 2.0, seal / 2 + 1.0); }
+  double reach() const { return std::max(offset + band + beyond, seal / 2 + 1.0); }
   // If a cell has a point within the band, one of its corners lies at most half a diagonal beyond.
   double near_zero_set() const { return offset + band + 0.8661 + 1e-3; }
   std::size_t cells() const {
@@ -56,6 +67,15 @@ struct Grid {
     const std::uint32_t line = std::uint32_t(cell) / x;
     return {int(std::uint32_t(cell) - line * x), int(line % y), int(line / y)};
   }
+  bool wants(std::size_t cell) const {
+    if (wanted == nullptr) return true;
+    const std::array<int, 3> at = place(cell);
+    const std::size_t x = std::size_t(bricks[0] + 3) / 4, y = std::size_t(bricks[1] + 3) / 4;
+    return (*wanted)[(std::size_t(at[2] / 4) * y + std::size_t(at[1] / 4)) * x +
+                     std::size_t(at[0] / 4)] >>
+               ((at[2] % 4 * 4 + at[1] % 4) * 4 + at[0] % 4) &
+           1;
+  }
   double middle(int axis) const { return (8.0 * bricks[std::size_t(axis)] - 1.0) / 2; }
   Vec3 from_metres(const Vec3& p) const {
     return {(p.x - centre.x) / voxel + middle(0), (p.y - centre.y) / voxel + middle(1),
@@ -65,6 +85,15 @@ struct Grid {
     return {centre.x - voxel * middle(0), centre.y - voxel * middle(1),
             centre.z - voxel * middle(2)};
   }
+};
+
+// Where a triangle can be the nearest one, as its neighbours bound it (kernels::FacetRegion).
+struct Features {
+  using Gradient = std::array<float, 3>;  // unit vector, or zero: gives no bound
+  // One triangle owns each edge and each corner, and only its owner measures it.
+  Large<std::uint8_t> owned;  // (triangles) bit e: owns edge e, bit 3 + v: owns corner v
+  Large<Gradient> across;     // (3 triangles) from an owned edge into the other triangle
+  Large<Gradient> from;       // (4 vertices) along up to four edges that leave the vertex
 };
 
 // The mesh without its flat and repeated triangles. Vertices are in metres until `to_grid`.
@@ -80,6 +109,7 @@ struct Surface {
   std::size_t odd_edges = 0;                      // edges of an odd number of faces
   bool closed = false;                            // every edge has an even number of faces
   std::vector<std::array<std::uint32_t, 2>> odd;  // edges of an odd number of faces, in order
+  std::shared_ptr<const Features> features;       // kept where several grids measure the surface
 };
 Result<Surface> prepare_surface(const Mesh& mesh, unsigned threads);
 // gaps.cpp: moves vertices of odd edges to others within `tolerance` [m] if this closes the mesh.
@@ -91,12 +121,12 @@ struct GapWeld {
 void weld_gaps(const Mesh& mesh, double tolerance, unsigned threads, Surface& surface,
                GapWeld& welded);
 Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool sealed);
-// For a field with a tolerance: two grids that begin at the same node. The fine voxels are kFinest
-// tolerances.
-struct TwoGrids {
-  Grid coarse, fine;
+// For a field with a tolerance: grids that begin at the same node. The fine voxels are kFinest
+// tolerances; each of the middle ones is two of them wide, each of the coarse ones kCut.
+struct GridLevels {
+  Grid coarse, middle, fine;
 };
-Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& options, bool sealed);
+Result<GridLevels> choose_grids(const Surface& surface, const FieldBake& options, bool sealed);
 // The voxel that decides about sides [m].
 Result<double> finest_voxel(const Surface& surface, const FieldBake& options);
 void to_grid(Surface& surface, const Grid& grid, unsigned threads);
@@ -161,24 +191,17 @@ struct Tiles {
   }
 };
 
-// Where a triangle can be the nearest one, as its neighbours bound it (kernels::FacetRegion).
-struct Features {
-  using Gradient = std::array<float, 3>;  // unit vector, or zero: gives no bound
-  // One triangle owns each edge and each corner, and only its owner measures it.
-  Large<std::uint8_t> owned;  // (triangles) bit e: owns edge e, bit 3 + v: owns corner v
-  Large<Gradient> across;     // (3 triangles) from an owned edge into the other triangle
-  Large<Gradient> from;       // (4 vertices) along up to four edges that leave the vertex
-};
 // features.cpp
-void find_features(const Surface& surface, unsigned threads, Features& out);
+std::shared_ptr<const Features> find_features(const Surface& surface, unsigned threads);
 
 // The bricks near triangles, one row each in the order of cells, with the data of their nodes.
 struct NarrowBand {
   Tiles tiles;
-  Features features;                   // of the surface, for measure_tile
-  std::vector<std::int32_t> row;       // (cells) row of a cell, or -1: farther than reach
-  std::vector<std::uint32_t> cell;     // (rows)
-  Samples u;                           // (rows x 512) unsigned distance, at most reach [voxel]
+  std::shared_ptr<const Features> features;  // of the surface, for measure_tile
+  std::vector<std::int32_t> row;             // (cells) row of a cell, or -1: farther than reach
+  std::vector<std::uint32_t> cell;           // (rows)
+  Samples u;                           // (slots x 512) unsigned distance, at most reach [voxel]
+  std::vector<std::uint32_t> slot;     // (rows) rising; rows that are not wanted share the last
   Masks free;                          // (rows) nodes with u > offset that are not on the surface
   std::vector<float> first_node;       // (rows) u of the row's first node
   std::vector<std::uint32_t> towards;  // (rows) bit i: the zero set is near neighbour brick i
@@ -186,8 +209,8 @@ struct NarrowBand {
   std::vector<std::int32_t> part;      // (rows) or empty
   std::vector<std::int32_t> triangle;  // (rows) of the mesh, near the brick's middle; or -1
   std::size_t rows() const { return cell.size(); }
-  float* nodes(std::size_t r) { return u.data() + r * kBrickSamples; }
-  const float* nodes(std::size_t r) const { return u.data() + r * kBrickSamples; }
+  float* nodes(std::size_t r) { return u.data() + slot[r] * kBrickSamples; }
+  const float* nodes(std::size_t r) const { return u.data() + slot[r] * kBrickSamples; }
 };
 
 // Progress and clock of a bake. Functions return false when the user cancelled.
@@ -222,6 +245,8 @@ class Steps {
   double from_ = 0, to_ = 1;
 };
 
+// distance.cpp: makes room for distances, in the order of rows.
+void give_slots(const Grid& grid, NarrowBand& band);
 // bins.cpp: fills tiles, cells and rows. Fails, with a sentence, when there are too many.
 Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
                         NarrowBand& band);
@@ -244,8 +269,9 @@ std::size_t plug_holes(const Grid& grid, const NarrowBand& band, unsigned thread
 
 // sign.cpp: the set R that the outside reaches without entering u <= offset or crossing a triangle.
 struct Reached {
-  Masks node;                      // (rows)
-  std::vector<std::uint8_t> cell;  // (cells) for cells without a row: not 0: all of it
+  Masks node;                              // (rows)
+  std::vector<std::uint8_t> cell;          // (cells) for cells without a row: not 0: all of it
+  std::vector<std::uint32_t> unsure = {};  // bricks that are not wanted, but need distances
 };
 Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, Cavities cavities,
               unsigned threads);
@@ -270,6 +296,8 @@ struct Inside {
   };
   std::vector<std::vector<Depth>> depths;
   Masks thin;  // (rows) nodes near walls that may be thinner than kThin; empty: there are none
+  std::vector<std::uint8_t> buried;  // (rows) in or beside them lies a sheet that the solid buries;
+                                     // where all bricks are wanted, also near one with no R around
   std::size_t inside_nodes = 0;
 };
 bool look_inside(const Grid& grid, NarrowBand& band, const Reached& reached, unsigned threads,
@@ -281,8 +309,37 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, c
 // far.cpp: signed lower bounds of the distance [m] at every eighth node.
 Outcome far_distances(const Surface& surface, const Grid& grid, const NarrowBand& band,
                       const Reached& reached, unsigned threads, const Steps& steps, Samples& far);
-// The sides alone: -1 inside and 1 outside.
-void far_sides(const Grid& grid, const NarrowBand& band, const Reached& reached, unsigned threads,
-               Samples& far);
+// sign.cpp: (cells) bit i + 2j + 4k: node (4i, 4j, 4k) of the brick lies inside.
+std::vector<std::uint8_t> sides_of(const Grid& grid, const NarrowBand& band, const Reached& reached,
+                                   unsigned threads);
+
+// A field of a surface, and what else the bake needs to know about it.
+struct Baked {
+  FieldData field;
+  std::vector<std::uint32_t> thin;    // bricks that may have thin walls
+  std::vector<NodeMask> thin_nodes;   // (thin) where in them
+  std::vector<std::uint32_t> unsure;  // bricks where crossed edges do not tell the sides
+  std::vector<std::uint8_t> inside;   // sides_of, if asked for
+  bool nothing_inside = false;
+};
+// bake_field.cpp. The surface is in grid coordinates and gains the facets that seal it. With
+// `sides` there are far bounds only where thin walls may have to be added.
+enum class Beyond { bounds, sides, nothing };  // what is found beyond the band
+Result<Baked> bake_on_grid(Surface& surface, Grid grid, const FieldBake& options, Beyond beyond,
+                           const Steps& steps, FieldBakeReport* report);
+// The pieces of the surface that bound walls too thin for the grid, in its coordinates.
+Result<ThinPieces> find_thin(const Surface& surface, const Grid& grid, const Baked& baked,
+                             const FieldBake& options, FieldBakeReport* report);
+// Adds the thin walls of a surface to its field on this grid, whose voxels are `cut` voxels of
+// theirs, as open sheets with an offset of kGrow of their voxels.
+Outcome add_thin(const ThinPieces& thin, const Surface& whole, Grid grid, double cut,
+                 FieldBake options, const Steps& steps, FieldData& field);
+// Adds what the user should know.
+void warn(const Surface& surface, const Grid& grid, bool nothing_inside, double seal, SignMode sign,
+          FieldBakeReport& report);
+
+// to_tolerance.cpp: coarse bricks everywhere, finer samples where those miss the tolerance.
+Result<FieldData> bake_to_tolerance(Surface& surface, const FieldBake& options, bool sealed,
+                                    const Steps& steps, FieldBakeReport* report);
 
 }  // namespace h6::io::bake

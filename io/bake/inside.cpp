@@ -118,6 +118,7 @@ class Look {
   bool run() {
     if (!steps_.tell("sign", 0.65)) return false;
     inside_.needed.resize(band_.rows());
+    inside_.buried.resize(band_.rows());
     inside_.depths.resize(band_.rows());
     inspect_rows();
     if (!deep_.empty()) find_thin();
@@ -135,6 +136,7 @@ class Look {
                                    [&](std::size_t tile) { look(tile); }))
       return false;
     inside_.chains = std::move(chains_);
+    for (std::size_t r = 0; r < band_.rows(); ++r) inside_.buried[r] |= corrected_[r];
     inside_.corrected = std::move(corrected_);
     return true;
   }
@@ -170,11 +172,13 @@ class Look {
         }
         const bool whole = all == ~std::uint64_t{0};
         // The row alone is mostly enough, and the rows around it are scattered over memory.
+        const bool wanted = grid_.wants(band_.cell[r]);
         const bool near = band_.towards[r] >> 13 & 1;
         std::optional<Around> around;
-        if (some == 0 || !near) around.emplace(rows, place);
-        const bool outside = some != 0 || near_outside(reached_, *around);
-        inside_.needed[r] = outside && (near || near_zero_set(band_, *around));
+        if (wanted && (some == 0 || !near)) around.emplace(rows, place);
+        const bool outside = some != 0 || (wanted && near_outside(reached_, *around));
+        inside_.needed[r] = wanted && outside && (near || near_zero_set(band_, *around));
+        inside_.buried[r] = near && !outside && grid_.wanted == nullptr;
         if (!whole) dry_here += some == 0 ? kBrickSamples : kBrickSamples - count(nodes);
         live_[r] = inside_.needed[r] && !whole;
         if (!beside_.empty())

@@ -84,9 +84,9 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
     return Failure{"the mesh has no triangle with area: there is nothing to make a field of"};
   const Result<bake::Grid> grid = [&]() -> Result<bake::Grid> {
     if (options.tolerance == 0) return bake::choose_grid(box, options, audit.closed);
-    const Result<bake::TwoGrids> two = bake::choose_two_grids(box, options, audit.closed);
-    if (!two) return two.failure();
-    return two->coarse;
+    const Result<bake::GridLevels> levels = bake::choose_grids(box, options, audit.closed);
+    if (!levels) return levels.failure();
+    return levels->coarse;
   }();
   if (!grid) return grid.failure();
   FieldPlan plan;

@@ -26,14 +26,14 @@ struct Chunk {
 
 // The next chunks, from brick `begin` on, as many as have room in the buffer for their waiting
 // bricks.
-std::vector<Chunk> next_chunks(const std::vector<std::uint32_t>& kept, std::size_t begin) {
+std::vector<Chunk> next_chunks(const std::vector<std::uint32_t>& slots, std::size_t begin) {
   std::vector<Chunk> chunks;
-  const std::size_t first_row = kept[begin];  // all rows before it have been read
-  for (std::size_t at = begin, buffered = 0; at < kept.size(); at += kChunk) {
-    const std::size_t end = std::min(kept.size(), at + kChunk);
-    const std::size_t late = std::clamp(first_row, at, end);
+  const std::size_t first_slot = slots[begin];  // all before it have been read
+  for (std::size_t at = begin, buffered = 0; at < slots.size(); at += kChunk) {
+    const std::size_t end = std::min(slots.size(), at + kChunk);
+    const std::size_t late = std::clamp(first_slot, at, end);
     const std::size_t late_end =
-        at == begin ? late : std::clamp<std::size_t>(kept[at - 1] + 1, late, end);
+        at == begin ? late : std::clamp<std::size_t>(slots[at - 1] + 1, late, end);
     if (buffered + (late_end - late) > kBuffer) break;
     chunks.push_back({at, end, late, late_end, buffered});
     buffered += late_end - late;
@@ -63,17 +63,18 @@ void sign_row(const Grid& grid, const NarrowBand& band, const Reached& reached,
 void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, const Inside& inside,
                    unsigned threads, FieldData& field) {
   field.brick_index.assign(grid.cells(), -1);
-  std::vector<std::uint32_t> kept;
+  std::vector<std::uint32_t> kept, slots;  // rows; their places before
   for (std::size_t r = 0; r < band.rows(); ++r) {
     if (!inside.needed[r]) continue;
     field.brick_index[band.cell[r]] = std::int32_t(kept.size());
     kept.push_back(std::uint32_t(r));
+    slots.push_back(band.slot[r]);
   }
   if (!band.part.empty()) field.part.resize(kept.size());
   field.triangle.resize(kept.size());
   Samples buffer;
   for (std::size_t begin = 0; begin < kept.size();) {
-    const std::vector<Chunk> chunks = next_chunks(kept, begin);
+    const std::vector<Chunk> chunks = next_chunks(slots, begin);
     begin = chunks.back().end;
     const std::size_t buffered =
         chunks.back().buffer + (chunks.back().late_end - chunks.back().late_begin);
@@ -85,7 +86,7 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, c
         const bool late = i >= chunk.late_begin && i < chunk.late_end;
         sign_row(grid, band, reached, inside, r,
                  late ? buffer.data() + (chunk.buffer + i - chunk.late_begin) * kBrickSamples
-                      : band.nodes(i));
+                      : band.u.data() + i * kBrickSamples);
         if (!band.part.empty()) field.part[i] = band.part[r];
         field.triangle[i] = band.triangle[r];
       }
@@ -95,7 +96,7 @@ void write_samples(const Grid& grid, NarrowBand& band, const Reached& reached, c
       const Chunk& chunk = chunks[c];
       std::copy_n(buffer.data() + chunk.buffer * kBrickSamples,
                   (chunk.late_end - chunk.late_begin) * kBrickSamples,
-                  band.nodes(chunk.late_begin));
+                  band.u.data() + chunk.late_begin * kBrickSamples);
     });
   }
   band.u.resize(kept.size() * kBrickSamples);

@@ -77,11 +77,19 @@ std::vector<RowNodes> cramped_nodes(const Grid& grid, const NarrowBand& band, co
 }
 
 void reach_pockets(const Surface& surface, const Grid& grid, const NarrowBand& band,
-                   const Masks& free, unsigned threads, Flood& outside) {
+                   const Masks& free, unsigned threads, Flood& outside,
+                   std::vector<std::uint32_t>& unsure) {
   Masks dry(band.rows());
   sched::parallel_for(dry.size(), threads,
                       [&](std::size_t r) { dry[r] = free[r] & ~outside.wet()[r]; });
-  Pockets pockets(surface, grid, band, cramped_nodes(grid, band, dry, threads), threads);
+  std::vector<RowNodes> cramped = cramped_nodes(grid, band, dry, threads);
+  std::erase_if(cramped, [&](const RowNodes& nodes) {
+    const std::uint32_t cell = band.cell[nodes.row];
+    if (grid.wants(cell)) return false;
+    unsure.push_back(cell);
+    return true;
+  });
+  Pockets pockets(surface, grid, band, cramped, threads);
   constexpr int kRounds = 8;  // down a groove, a few voxels at a time
   const auto reach = [&](Pockets::By by) {
     return outside.from_nodes(pockets.reached(outside.wet(), by), 1);
@@ -100,12 +108,37 @@ Reached flood(const Surface& surface, const Grid& grid, const NarrowBand& band, 
   const Masks& free = band.free;
   Flood outside(grid, band, free, Flood::Edges::cut, threads);
   outside.from_border();
+  std::vector<std::uint32_t> unsure;
   // In a soup every crack would be a pocket, and parity has no meaning there, so pockets stay
   // inside.
   if (!band.crossing.empty() && surface.closed)
-    reach_pockets(surface, grid, band, free, threads, outside);
-  if (cavities == Cavities::hollow) return open_cavities(grid, band, free, threads, outside);
-  return {outside.take_wet(), std::move(outside.cells())};
+    reach_pockets(surface, grid, band, free, threads, outside, unsure);
+  if (cavities == Cavities::hollow) {
+    Reached empty = open_cavities(grid, band, free, threads, outside);
+    empty.unsure = std::move(unsure);
+    return empty;
+  }
+  return {outside.take_wet(), std::move(outside.cells()), std::move(unsure)};
+}
+
+std::vector<std::uint8_t> sides_of(const Grid& grid, const NarrowBand& band, const Reached& reached,
+                                   unsigned threads) {
+  std::vector<std::uint8_t> inside(grid.cells());
+  const std::size_t layer = grid.cell(0, 0, 1);
+  sched::parallel_for(std::size_t(grid.bricks[2]), threads, [&](std::size_t c) {
+    for (std::size_t cell = c * layer; cell < (c + 1) * layer; ++cell) {
+      const std::int32_t row = band.row[cell];
+      if (row < 0) {
+        inside[cell] = reached.cell[cell] == 0 ? 0xff : 0;
+        continue;
+      }
+      const NodeMask& out = reached.node[std::size_t(row)];
+      for (std::size_t i = 0; i < 8; ++i)
+        inside[cell] |=
+            std::uint8_t(!out.get(4 * (64 * (i >> 2) + 8 * (i >> 1 & 1) + (i & 1))) << i);
+    }
+  });
+  return inside;
 }
 
 }  // namespace h6::io::bake

@@ -322,7 +322,7 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
   return grid;
 }
 
-Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& options, bool sealed) {
+Result<GridLevels> choose_grids(const Surface& surface, const FieldBake& options, bool sealed) {
   const double voxel = kFinest * options.tolerance;  // the fine one
   FieldBake o = options;
   o.voxel_size = kCut * voxel;
@@ -334,9 +334,22 @@ Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& optio
     o.padding_voxels += int(std::min(64.0, std::ceil(options.seal / o.voxel_size))) + 2;
   Result<Grid> coarse = choose_grid(surface, o, sealed);
   if (!coarse) return coarse.failure();
-  TwoGrids two{*coarse, *coarse};
-  for (std::size_t k = 0; k < 3; ++k) two.fine.bricks[k] = kCut * coarse->bricks[k];
-  const int most = *std::max_element(two.fine.bricks.begin(), two.fine.bricks.end());
+  const Vec3 origin = coarse->origin();
+  // The grid that begins at the same node, with `cut` voxels to a coarse one.
+  const auto finer = [&](int cut) {
+    Grid grid = *coarse;
+    grid.voxel = o.voxel_size / cut;
+    for (std::size_t k = 0; k < 3; ++k) grid.bricks[k] = cut * coarse->bricks[k];
+    grid.centre = {origin.x + grid.voxel * grid.middle(0), origin.y + grid.voxel * grid.middle(1),
+                   origin.z + grid.voxel * grid.middle(2)};
+    grid.band = std::min(1.5 * cut, cut * coarse->band);
+    if (cut < kCut) grid.beyond = 1;  // these distances only tell where finer ones are needed
+    grid.offset = cut * coarse->offset;
+    return grid;
+  };
+  GridLevels levels{*coarse, finer(kCut / 2), finer(kCut)};
+  const auto& bricks = levels.fine.bricks;
+  const int most = *std::max_element(bricks.begin(), bricks.end());
   char text[200];
   if (most > kMaxBricksOnSide) {
     std::snprintf(text, sizeof text,
@@ -345,21 +358,16 @@ Result<TwoGrids> choose_two_grids(const Surface& surface, const FieldBake& optio
                   options.tolerance, 8 * most, 1.1 * options.tolerance * most / kMaxBricksOnSide);
     return Failure{text};
   }
-  two.fine.voxel = voxel;
-  const Vec3 origin = coarse->origin();
-  two.fine.centre = {origin.x + voxel * two.fine.middle(0), origin.y + voxel * two.fine.middle(1),
-                     origin.z + voxel * two.fine.middle(2)};
-  two.fine.band = std::min(6.0, kCut * coarse->band);
-  two.fine.offset = kCut * coarse->offset;
-  two.fine.seal = sealed ? 0 : options.seal / voxel;
-  if (two.fine.seal > 32 || (two.fine.seal > 0 && two.fine.offset < 0.6 && !winding)) {
+  Grid& fine = levels.fine;
+  fine.seal = sealed ? 0 : options.seal / voxel;
+  if (fine.seal > 32 || (fine.seal > 0 && fine.offset < 0.6 && !winding)) {
     std::snprintf(text, sizeof text,
                   "with a tolerance of %.4g m, holes up to %.4g m can be sealed, with an offset of "
                   "at least %.4g m",
                   options.tolerance, 32 * voxel, 0.6 * voxel);
     return Failure{text};
   }
-  return two;
+  return levels;
 }
 
 Result<double> finest_voxel(const Surface& surface, const FieldBake& options) {

@@ -36,7 +36,7 @@ inline constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 // The nodes of brick `at` and of its far faces; kUnknown where they lie in no brick. Returns false
 // where the brick itself has no samples.
-inline bool read_box(const FieldData& field, const GridNode& at, float (&out)[kBox]) {
+inline bool read_box(const FieldData& field, const GridNode& at, float* out) {
   const float* source[8];
   for (int k = 0; k < 8; ++k) {
     const std::int32_t row =
@@ -44,17 +44,20 @@ inline bool read_box(const FieldData& field, const GridNode& at, float (&out)[kB
     source[k] = row < 0 ? nullptr : &field.samples[std::size_t(row) * 512];
     if (source[0] == nullptr) return false;
   }
-  for (int row = 0; row < kBoxSide * kBoxSide; ++row) {
-    const int y = row % kBoxSide, z = row / kBoxSide, from = (y >> 3) << 1 | (z >> 3) << 2;
-    const int first = ((z & 7) * 8 + (y & 7)) * 8;
-    const float *const eight = source[from], *const last = source[from | 1];
-    float* const to = out + kBoxSide * row;
-    if (eight != nullptr)
-      std::copy_n(eight + first, 8, to);
-    else
-      std::fill_n(to, 8, kUnknown);
-    to[8] = last == nullptr ? kUnknown : last[first];
-  }
+  static constexpr std::array<float, 512> kNone = [] {
+    std::array<float, 512> none{};
+    none.fill(kUnknown);
+    return none;
+  }();
+  for (const float*& s : source)
+    if (s == nullptr) s = kNone.data();
+  float* to = out;
+  for (int z = 0; z < kBoxSide; ++z)
+    for (int y = 0; y < kBoxSide; ++y, to += kBoxSide) {
+      const int from = (y >> 3) << 1 | (z >> 3) << 2, first = ((z & 7) * 8 + (y & 7)) * 8;
+      std::copy_n(source[from] + first, 8, to);
+      to[8] = source[from | 1][first];
+    }
   return true;
 }
 

@@ -49,10 +49,11 @@ class Sampled {
   // Bit i: cell i of the 3 x 3 x 3 around a cell of the brick has `factor`.
   std::uint32_t around(int x, int y, int z, int factor) const {
     std::uint32_t bits = 0;
-    for (int i = 0; i < 27; ++i)
-      bits |=
-          std::uint32_t(factor_[place(x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1)] == factor)
-          << i;
+    int i = 0;
+    for (int c = z - 1; c <= z + 1; ++c)
+      for (int b = y - 1; b <= y + 1; ++b)
+        for (int a = x - 1; a <= x + 1; ++a)
+          bits |= std::uint32_t(factor_[place(a, b, c)] == factor) << i++;
     return bits;
   }
 
@@ -71,7 +72,8 @@ class Sampled {
     const std::int32_t i = refined < 0 ? 0 : field.fine_index[512 * std::size_t(refined) + local];
     if (i != 0) return i < 0 ? 4 : 2;
     bool whole = true;  // at the band's end a corner may be missing
-    for (int c = 1; c < 8; ++c)
+    const bool at_face = (x & 7) == 7 || (y & 7) == 7 || (z & 7) == 7;
+    for (int c = 1; c < 8 && at_face; ++c)
       whole = whole && row(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) >= 0;
     return whole ? 1 : 0;
   }
@@ -84,8 +86,10 @@ class Sampled {
 template <std::size_t count>
 void take(const std::array<std::uint32_t, count>& touches, std::uint32_t cells,
           std::uint32_t others, const float (&from)[count], float* values) {
-  for (std::size_t n = 0; n < count; ++n)
-    if ((touches[n] & cells) != 0 && (touches[n] & others) == 0) values[n] = from[n];
+  for (std::size_t n = 0; n < count; ++n) {
+    const bool taken = ((touches[n] & cells) != 0) & ((touches[n] & others) == 0);
+    values[n] = taken ? from[n] : values[n];
+  }
 }
 
 void conform_halves(const float (&corners)[8], std::uint32_t ones, float* values) {

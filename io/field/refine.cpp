@@ -12,6 +12,7 @@
 
 #include "io/field/box.h"
 #include "io/field/conform.h"
+#include "kernels/field/missed_halves.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
@@ -20,6 +21,8 @@ namespace {
 // Errors are measured at fine nodes and are larger between them, and faces towards coarser cells
 // take the error of these: with 0.6 the worst place of a plate of 0.2 mm was 0.94 tolerances off.
 constexpr double kMeasured = 0.3;
+// The same at nodes of the middle field, which are fewer.
+constexpr double kSuspected = 0.15;
 // Farther beyond its band, a node of the fine bake may hold a bound in place of a distance.
 constexpr double kExactBeyondBand = 1.9;  // [fine voxel]
 // A place in the band has a node within half a fine cell's diagonal, which may lie beyond the band.
@@ -28,15 +31,22 @@ constexpr double kTestedBeyondBand = 0.867;  // [fine voxel]
 // The nodes of the fine bake.
 class FineNodes {
  public:
-  explicit FineNodes(const FieldData& fine)
+  FineNodes(const FieldData& fine, const std::vector<std::uint8_t>& inside)
       : fine_(fine),
+        inside_(inside),
         exact_below_(float(fine.band + kExactBeyondBand * fine.voxel_size)),
-        tested_(float(fine.band + kTestedBeyondBand * fine.voxel_size)) {
-    for (std::size_t k = 0; k < 3; ++k) far_size_[k] = fine.bricks[k] + 1;
-  }
+        tested_(float(fine.band + kTestedBeyondBand * fine.voxel_size)) {}
 
   const FieldData& field() const { return fine_; }
+  // Prefetches the samples of a brick.
+  void ask_for(const GridNode& at) const {
+    const std::int32_t row = row_of(fine_, at);
+    if (row < 0) return;
+    const float* const samples = &fine_.samples[std::size_t(row) * 512];
+    for (int n = 0; n < 512; n += 16) __builtin_prefetch(samples + n);
+  }
   bool exact(float sample) const { return std::fabs(sample) < exact_below_; }
+  float tested() const { return tested_; }
   // Only exact nodes are tested.
   bool tested(float sample) const { return std::fabs(sample) < tested_; }
 
@@ -45,12 +55,12 @@ class FineNodes {
   void at_coarse_nodes(const GridNode& at, const float* coarse, float* out) const {
     const std::int32_t row = row_of(fine_, at);
     const float* const fine = row < 0 ? nullptr : &fine_.samples[std::size_t(row) * 512];
-    const bool side = fine == nullptr && far_inside(at);
+    const unsigned inside = inside_[place_in(at, fine_.bricks)];
     for (int k = 0; k < 8; ++k) {
       const int x = k & 1, y = k >> 1 & 1, z = k >> 2, to = (z * 8 + y) * 8 + x;
       const float* const known = coarse == nullptr ? nullptr : coarse + to;
       if (fine == nullptr) {
-        out[to] = at_coarse_node(side, known);
+        out[to] = at_coarse_node(inside >> k & 1, known);
         continue;
       }
       const float value = fine[4 * to];
@@ -77,9 +87,13 @@ class FineNodes {
     }
     return false;
   }
-  // The side of a node of the far grid.
-  bool far_inside(const GridNode& node) const {
-    return std::signbit(fine_.far_grid[place_in(node, far_size_)]);
+  // The side of the first node of a brick; past the last brick is outside.
+  bool inside(const GridNode& brick) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (brick[k] >= fine_.bricks[k]) return false;
+    const std::int32_t row = row_of(fine_, brick);
+    return row < 0 ? inside_[place_in(brick, fine_.bricks)] & 1
+                   : fine_.samples[std::size_t(row) * 512] < 0;
   }
 
  private:
@@ -92,8 +106,8 @@ class FineNodes {
   }
 
   const FieldData& fine_;
+  const std::vector<std::uint8_t>& inside_;
   float exact_below_, tested_;  // [m]
-  std::array<std::int32_t, 3> far_size_{};
 };
 
 // The coarse bricks: those of the coarse bake, and those near a surface that only the fine bake has
@@ -161,18 +175,20 @@ class Chooser {
   // Returns null where the coarse samples are good enough.
   std::unique_ptr<Finer> choose(const GridNode& brick) const {
     std::unique_ptr<Finer> finer;
-    float coarse[kBox], exact[kBox], flat[kBox];
+    float coarse[kBox], exact[kernels::kMissedBoxRoom] = {}, flat[kBox];
     read_box(out_, brick, coarse);
     for (int box = 0; box < 64; ++box) {
       const int x = box % 4, y = box / 4 % 4, z = box / 16;
-      if (!read_box(nodes_.field(), {kCut * brick[0] + x, kCut * brick[1] + y, kCut * brick[2] + z},
-                    exact))
-        continue;
+      const GridNode at{kCut * brick[0] + x, kCut * brick[1] + y, kCut * brick[2] + z};
+      nodes_.ask_for({at[0] + 2, at[1], at[2]});
+      if (!read_box(nodes_.field(), at, exact)) continue;
       float corner[27];
       for (int n = 0; n < 27; ++n)
         corner[n] = coarse[81 * (2 * z + n / 9) + 9 * (2 * y + n / 3 % 3) + 2 * x + n % 3];
+      unsigned missing = kernels::missed_halves(corner, 2, exact, allowed_, nodes_.tested());
+      if (missing == 0) continue;
+      missing &= whole_cells(corner);
       interpolate<3, 4>(corner, flat);
-      const unsigned missing = cells_that_miss(exact, flat) & whole_cells(corner);
       for (int i = 0; i < 8; ++i) {
         if ((missing >> i & 1) == 0) continue;
         if (!finer) finer = std::make_unique<Finer>();
@@ -191,25 +207,6 @@ class Chooser {
     return (std::fabs(exact - found) > allowed_) & nodes_.tested(exact);
   }
 
-  // Bit i: cell i of a box has a node whose value misses the tolerance.
-  unsigned cells_that_miss(const float (&exact)[kBox], const float (&found)[kBox]) const {
-    unsigned cells = 0;
-    for (int z = 0; z < 2; ++z) {
-      int wrong[81] = {}, any = 0;  // over the five nodes along z
-      for (int layer = 4 * z; layer <= 4 * z + 4; ++layer)
-        for (int n = 0; n < 81; ++n)
-          wrong[n] |= int(misses(exact[81 * layer + n], found[81 * layer + n]));
-      for (const int w : wrong) any |= w;
-      for (int n = 0; n < 81 && any != 0; ++n) {
-        if (wrong[n] == 0) continue;
-        const unsigned x = (n % 9 <= 4 ? 5u : 0u) | (n % 9 >= 4 ? 10u : 0u);
-        const unsigned y = (n / 9 <= 4 ? 3u : 0u) | (n / 9 >= 4 ? 12u : 0u);
-        cells |= (x & y) << 4 * z;
-      }
-    }
-    return cells;
-  }
-
   // Bit i: all corners of cell i are known. Else it lies outside the band.
   static unsigned whole_cells(const float (&corner)[27]) {
     unsigned cells = 0;
@@ -225,15 +222,20 @@ class Chooser {
   }
 
   // Adds the finer samples of a cell, whose first node in the box is `first`. Returns their index.
-  std::int32_t cut(const float (&exact)[kBox], const float (&flat)[kBox], int first,
-                   Finer& finer) const {
+  std::int32_t cut(const float* exact, const float (&flat)[kBox], int first, Finer& finer) const {
     float quarter[125], half[27], found[125];
-    for (int n = 0; n < 125; ++n) {
-      // A node that the fine bake does not know lies beyond the band.
-      const int at = first + 81 * (n / 25) + 9 * (n / 5 % 5) + n % 5;
-      quarter[n] = nodes_.exact(exact[at]) ? exact[at] : flat[at];
-    }
-    for (int n = 0; n < 27; ++n) half[n] = quarter[50 * (n / 9) + 10 * (n / 3 % 3) + 2 * (n % 3)];
+    float* to = quarter;
+    for (int z = 0; z < 5; ++z)
+      for (int y = 0; y < 5; ++y)
+        for (int x = 0; x < 5; ++x) {
+          // A node that the fine bake does not know lies beyond the band.
+          const int at = first + 81 * z + 9 * y + x;
+          *to++ = nodes_.exact(exact[at]) ? exact[at] : flat[at];
+        }
+    to = half;
+    for (int z = 0; z < 5; z += 2)
+      for (int y = 0; y < 5; y += 2)
+        for (int x = 0; x < 5; x += 2) *to++ = quarter[25 * z + 5 * y + x];
     interpolate<3, 2>(half, found);
     int wrong = 0;
     for (int n = 0; n < 125; ++n) wrong |= int(misses(quarter[n], found[n]));
@@ -293,16 +295,50 @@ void take_far(const FieldData& coarse, const FineNodes& nodes, FieldData& out) {
     const GridNode n = place_of(i, size);
     const float known = coarse.far_grid[i], o = float(out.offset);
     float bound = std::fabs(known);
-    const bool inside = nodes.far_inside({kCut * n[0], kCut * n[1], kCut * n[2]});
+    const bool inside = nodes.inside({kCut * n[0], kCut * n[1], kCut * n[2]});
     if (known < 0 && !inside) bound = bound <= o ? 0 : std::sqrt(bound * bound + o * o) - o;
     out.far_grid[i] = inside ? -bound : bound;
   }
 }
 
+// The fine bricks of one coarse brick.
+std::uint64_t suspects_of(const FieldData& coarse, const FieldData& middle, const GridNode& brick,
+                          float allowed, float tested) {
+  float corners[kBox], exact[kernels::kMissedBoxRoom] = {}, corner[125];
+  bool read = false;
+  std::uint64_t bits = 0;
+  for (int i = 0; i < 8; ++i) {
+    const int x = i & 1, y = i >> 1 & 1, z = i >> 2;
+    if (!read_box(middle, {2 * brick[0] + x, 2 * brick[1] + y, 2 * brick[2] + z}, exact)) continue;
+    if (!read && !read_box(coarse, brick, corners)) std::fill_n(corners, kBox, kUnknown);
+    read = true;
+    for (int row = 0; row < 25; ++row)
+      std::copy_n(corners + 81 * (4 * z + row / 5) + 9 * (4 * y + row % 5) + 4 * x, 5,
+                  corner + 5 * row);
+    const unsigned halves = kernels::missed_halves(corner, 4, exact, allowed, tested);
+    for (int k = 0; k < 8; ++k)
+      if (halves >> k & 1)
+        bits |= std::uint64_t{1} << (16 * (2 * z + (k >> 2)) + 4 * (2 * y + (k >> 1 & 1)) + 2 * x +
+                                     (k & 1));
+  }
+  return bits;
+}
+
 }  // namespace
 
-FieldData refine(const FieldData& coarse, const FieldData& fine, double tolerance,
-                 unsigned threads) {
+std::vector<std::uint64_t> suspect_bricks(const FieldData& coarse, const FieldData& middle,
+                                          double tolerance, unsigned threads) {
+  const float allowed = float(kSuspected * tolerance);
+  const float tested = float(middle.band + kTestedBeyondBand * middle.voxel_size);
+  std::vector<std::uint64_t> bits(coarse.brick_index.size());
+  sched::parallel_for(bits.size(), threads, [&](std::size_t c) {
+    bits[c] = suspects_of(coarse, middle, place_of(c, coarse.bricks), allowed, tested);
+  });
+  return bits;
+}
+
+FieldData refine(const FieldData& coarse, const FieldData& fine,
+                 const std::vector<std::uint8_t>& inside, double tolerance, unsigned threads) {
   FieldData out;
   out.origin = coarse.origin;
   out.voxel_size = coarse.voxel_size;
@@ -310,7 +346,7 @@ FieldData refine(const FieldData& coarse, const FieldData& fine, double toleranc
   out.band = coarse.band;
   out.offset = fine.offset;
   out.grown = fine.grown;
-  const FineNodes nodes(fine);
+  const FineNodes nodes(fine, inside);
   take_bricks(coarse, fine, nodes, threads, out);
   take_names(coarse, fine, out);
   std::vector<std::size_t> cell_of(out.brick_count());

@@ -65,6 +65,50 @@ Errors errors_of(const FieldData& field, const Mesh& mesh, std::size_t places) {
   return e;
 }
 
+// The surface of the solid cells between planes x, y and z.
+template <class Solid>
+Mesh solid_cells(const std::array<std::vector<double>, 3>& planes, Solid&& solid) {
+  int cells[3];
+  for (std::size_t k = 0; k < 3; ++k) cells[k] = int(planes[k].size()) - 1;
+  const auto in = [&](std::array<int, 3> c) {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (c[k] < 0 || c[k] >= cells[k]) return false;
+    return bool(solid(c[0], c[1], c[2]));
+  };
+  Mesh mesh;
+  for (int i = 0; i < cells[0] * cells[1] * cells[2]; ++i) {
+    const std::array<int, 3> c{i % cells[0], i / cells[0] % cells[1], i / cells[0] / cells[1]};
+    for (std::size_t axis = 0; axis < 3 && in(c); ++axis)
+      for (const int step : {-1, 1}) {
+        std::array<int, 3> next = c;
+        next[axis] += step;
+        if (in(next)) continue;
+        const auto base = std::uint32_t(mesh.vertices.size());
+        for (const auto& [u, v] : {std::array{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
+          std::array<int, 3> at = c;
+          at[axis] += step > 0;
+          at[(axis + 1) % 3] += u;
+          at[(axis + 2) % 3] += v;
+          mesh.vertices.push_back({planes[0][std::size_t(at[0])], planes[1][std::size_t(at[1])],
+                                   planes[2][std::size_t(at[2])]});
+        }
+        mesh.triangles.push_back({base, base + 1, base + 2});
+        mesh.triangles.push_back({base, base + 2, base + 3});
+      }
+  }
+  return h6::io::weld(mesh);
+}
+
+void check_errors(const Mesh& mesh, double tolerance, Vec3 shift) {
+  CAPTURE(shift.x);
+  const FieldData field = bake_to(mesh, tolerance, shift);
+  CHECK(consistent(field));
+  const Errors e = errors_of(field, mesh, 20000);
+  CHECK(e.worst <= tolerance);
+  CHECK(e.missing == 0);
+  CHECK(e.wrong_side == 0);
+}
+
 // In the engine, where a sample takes two bytes.
 std::size_t bytes_of(const FieldData& f) {
   return 1472 * f.brick_count() + 1024 * f.fine_index.size() / 512 + 64 * f.half_count() +
@@ -125,6 +169,37 @@ TEST_CASE("a field baked to a tolerance is continuous across its cells") {
     worst = std::max(worst, std::fabs(before - after));
   }
   CHECK(worst < 1e-5);  // voxel; samples are floats
+}
+
+TEST_CASE("what is smaller than a coarse voxel is in a field to a tolerance, wherever nodes lie") {
+  // Posts and holes on a plate, up to three tolerances wide and high.
+  const double t = 2e-4;
+  std::array<std::vector<double>, 3> planes;
+  for (std::size_t k = 0; k < 2; ++k)
+    for (int i = 0; i <= 4; ++i) {
+      planes[k].push_back(37 * t * i);
+      planes[k].push_back((37 * i + 2.5 + 0.5 * i) * t);
+    }
+  planes[2] = {0, 12 * t, 14 * t, 16 * t};
+  const Mesh mesh = solid_cells(planes, [](int x, int y, int z) {
+    if (x % 2 == 1 || y % 2 == 1) return z < 2;
+    return z < ((x + y) % 4 == 0 ? 3 : 1);
+  });
+  for (const double by : {0.0, 0.17, 0.31, 0.46}) check_errors(mesh, t, {by, -by, by / 2});
+  check_errors(turned(mesh, 0.4, 0.7), t, {});
+}
+
+TEST_CASE(
+    "a hollow behind a neck that only fine voxels pass is outside of a field to a tolerance") {
+  const double t = 4e-4;
+  std::array<std::vector<double>, 3> planes;
+  for (std::size_t k = 0; k < 3; ++k) planes[k] = {0, 15 * t, 40 * t, 42.2 * t, 70 * t, 85 * t};
+  const Mesh mesh = solid_cells(planes, [](int x, int y, int z) {
+    const bool hollow = x > 0 && x < 4 && y > 0 && y < 4 && z > 0 && z < 4;
+    return !hollow && !(x == 2 && y == 2 && z == 4);
+  });
+  for (const double by : {0.0, 0.2, 0.4}) check_errors(mesh, t, {by, by / 2, -by});
+  check_errors(turned(mesh, 0.3, 0.2), t, {});
 }
 
 TEST_CASE("a field baked to a tolerance is the same on any number of threads") {

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+// to_tolerance.cpp - a field to a tolerance: coarse bricks everywhere, finer samples where those
+// miss it.
+//
+//   coarse ----------------------------------> samples, far bounds
+//      |
+//   middle (half as wide) -> suspects --> fine (a quarter as wide), only there --> finer samples
+//                                             |
+//                          crossed edges everywhere --> sides, thin walls
+//
+// The middle voxels take a sixteenth of the work that fine ones with as wide a band would take, and
+// a coarse sample that is wrong between its nodes is wrong at theirs, too.
+#include <utility>
+
+#include "io/bake/grid.h"
+#include "io/field/refine.h"
+#include "io/walls/thin_pieces.h"
+
+namespace h6::io::bake {
+namespace {
+
+// With more triangles in a coarse brick than this, most of the time goes into triangles, and to
+// look at them in middle voxels takes longer than all fine bricks do.
+constexpr std::size_t kDense = 20;
+
+// A bake to a tolerance: coarse bricks everywhere, fine ones where those may miss it.
+class Refined {
+ public:
+  Refined(Surface& surface, const GridLevels& grids, const FieldBake& options, const Steps& steps,
+          FieldBakeReport* report)
+      : surface_(surface), grids_(grids), options_(options), steps_(steps), report_(report) {}
+
+  Result<FieldData> run(bool sealed) {
+    // With an offset, sides depend on distances in all fine bricks. Which hollows are empty may
+    // depend on the voxels.
+    const bool crossings_suffice =
+        sealed && grids_.fine.offset == 0 && options_.cavities == Cavities::solid;
+    if (crossings_suffice) {
+      surface_.features = find_features(surface_, options_.threads);
+      if (const Outcome done = bake_coarse(0); !done) return done.failure();
+      if (surface_.triangles.size() < kDense * coarse_.field.brick_count())
+        if (const Outcome done = suspect(); !done) return done.failure();
+    }
+    if (const Outcome done = bake_fine(); !done) return done.failure();
+    if (!crossings_suffice) {
+      if (!sealed) options_.sign = SignMode::flood;  // the sides are those of the fine bake
+      if (const Outcome done = bake_coarse(0.6); !done) return done.failure();
+    }
+    return add_walls();
+  }
+
+ private:
+  // The surface is in fine voxels, with what seals it, but during `body` in voxels `by` times as
+  // wide. A power of two changes no digit.
+  template <class Body>
+  void widened(double by, Body&& body) {
+    for (Vec3& v : surface_.vertices) v = (1 / by) * v;
+    body();
+    for (Vec3& v : surface_.vertices) v = by * v;
+  }
+
+  Outcome bake_coarse(double from) {
+    Result<Baked> coarse{Baked{}};
+    widened(kCut, [&] {
+      coarse = bake_on_grid(surface_, grids_.coarse, options_, Beyond::bounds,
+                            steps_.part(from, from + 0.1), nullptr);
+    });
+    if (!coarse) return coarse.failure();
+    coarse_ = std::move(*coarse);
+    return Done{};
+  }
+
+  // Finds the bricks where the coarse samples are not good enough at the nodes of the middle grid,
+  // or where it takes fine voxels to tell. The outside reaches no less in fine voxels. A surface
+  // that it reaches only there has the inside on both sides in middle ones, so it is in bricks that
+  // are unsure, or its fold misses.
+  Outcome suspect() {
+    Result<Baked> middle{Baked{}};
+    widened(2, [&] {
+      middle = bake_on_grid(surface_, grids_.middle, options_, Beyond::nothing,
+                            steps_.part(0.1, 0.2), nullptr);
+    });
+    if (!middle) return middle.failure();
+    wanted_ = suspect_bricks(coarse_.field, middle->field, options_.tolerance, options_.threads);
+    for (const auto* bricks : {&middle->thin, &middle->unsure})
+      for (const std::uint32_t cell : *bricks) want_around(grids_.middle.place(cell), 2);
+    grids_.fine.wanted = &wanted_;
+    return Done{};
+  }
+
+  // Wants the fine bricks within `size` fine bricks and in one layer around.
+  bool want_around(const std::array<int, 3>& at, int size) {
+    bool more = false;
+    const auto& bricks = grids_.fine.bricks;
+    int low[3], high[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::max(0, size * at[k] - 1);
+      high[k] = std::min(bricks[k] - 1, size * at[k] + size);
+    }
+    for (int z = low[2]; z <= high[2]; ++z)
+      for (int y = low[1]; y <= high[1]; ++y)
+        for (int x = low[0]; x <= high[0]; ++x) {
+          std::uint64_t& tile = wanted_[grids_.coarse.cell(x / kCut, y / kCut, z / kCut)];
+          const std::uint64_t bit = std::uint64_t{1} << Tiles::bit({x, y, z});
+          more |= (tile & bit) == 0;
+          tile |= bit;
+        }
+    return more;
+  }
+
+  // The middle voxels may not have seen what the fine ones see. Returns whether more is wanted.
+  bool want_more() {
+    bool more = false;
+    for (const auto* bricks : {&fine_.thin, &fine_.unsure})
+      for (const std::uint32_t cell : *bricks) more |= want_around(grids_.fine.place(cell), 1);
+    return more;
+  }
+
+  Outcome bake_fine() {
+    double from = 0.2, to = 0.5;
+    do {
+      Result<Baked> fine = bake_on_grid(surface_, grids_.fine, options_, Beyond::sides,
+                                        steps_.part(from, to), report_);
+      if (!fine) return fine.failure();
+      fine_ = std::move(*fine);
+      from = std::exchange(to, (to + 0.6) / 2);
+    } while (grids_.fine.wanted != nullptr && want_more());
+    return Done{};
+  }
+
+  Result<FieldData> add_walls() {
+    const Result<ThinPieces> thin = find_thin(surface_, grids_.fine, fine_, options_, report_);
+    if (!thin) return thin.failure();
+    const bool grown = thin->area > 0;
+    if (grown) {
+      if (const Outcome done = add_thin(*thin, surface_, grids_.fine, 1, options_,
+                                        steps_.part(0.7, 0.75), fine_.field);
+          !done)
+        return done.failure();
+      if (const Outcome done = add_thin(*thin, surface_, grids_.coarse, kCut, options_,
+                                        steps_.part(0.75, 0.8), coarse_.field);
+          !done)
+        return done.failure();
+    }
+    if (report_)
+      warn(surface_, grids_.fine, fine_.nothing_inside && !grown, options_.seal, options_.sign,
+           *report_);
+    if (!steps_.tell("refine", 0.8)) return Failure{"cancelled"};
+    return refine(coarse_.field, fine_.field, fine_.inside, options_.tolerance, options_.threads);
+  }
+
+  Surface& surface_;
+  GridLevels grids_;
+  FieldBake options_;
+  const Steps& steps_;
+  FieldBakeReport* report_;
+  WantedBricks wanted_;
+  Baked coarse_, fine_;
+};
+
+}  // namespace
+
+Result<FieldData> bake_to_tolerance(Surface& surface, const FieldBake& options, bool sealed,
+                                    const Steps& steps, FieldBakeReport* report) {
+  const Result<GridLevels> grids = choose_grids(surface, options, sealed);
+  if (!grids) return grids.failure();
+  to_grid(surface, grids->fine, options.threads);
+  return Refined(surface, *grids, options, steps, report).run(sealed);
+}
+
+}  // namespace h6::io::bake
