@@ -3,6 +3,7 @@
 // pair by pair, and the polynomial of the nodes that lie inside all supports.
 //
 // Included once for each SIMD target.
+#include <cmath>
 #include <cstring>
 
 #include "kernels/weights/gauss_tree_stages.h"
@@ -31,12 +32,13 @@ constexpr float kTogether = 0.1f;       // widths: size and distance of leaves t
 constexpr std::size_t kOpened = 256;    // leaves collected before they are opened
 
 // How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre;
-// precise enough while targets are within a width of the centre. differences: in all other cases.
-enum class Form { products, differences };
+// precise enough while targets are within a width of the centre. flat: the same over one sphere of
+// unit vectors, where all shares are 1; see lay_flat. differences: in all other cases.
+enum class Form { flat, products, differences };
 
-// Columns of listed contacts. Form products: 2 x and e^2 - |x|^2 over each sphere, the first sphere
-// times the share; where all shares are 1, no share and x in place of 2 x. Form differences: the
-// share, then x.
+// Columns of listed contacts. Form products: the share, then 2 x and e^2 - |x|^2 over each sphere,
+// the first sphere times the share. Form flat: x along both tangents and e^2 - |x|^2, from kFirst
+// on. Form differences: the share, then x.
 template <int kAxes>
 struct List {
   static constexpr int kShare = 0, kFirst = 1;  // then 4 columns a sphere: x y z, rest
@@ -64,6 +66,10 @@ struct Targets {
   Form form = Form::products;
   float centre[kAxes];
   float radius[kSpheres], width2[kSpheres];
+  // Form flat: two tangents at the centre, and of each target its place along both, the value from
+  // which a pair counts, and the scale of its sum.
+  float tangent[2][3];
+  HWY_ALIGN float flat[4][kMostLeaves * kGaussLeaf];
   // Coefficients of 1, x, y, z, |x|^2 about the centre (products: of N's times T's), one sum a
   // lane.
   VF term[kTerms];
@@ -88,7 +94,7 @@ HWY_INLINE VF twice(VF v) { return hn::Add(v, v); }
 
 // ---- pairs
 
-template <int kAxes, Form kForm, std::size_t kCount, bool kUnit = false>
+template <int kAxes, Form kForm, std::size_t kCount>
 HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
   constexpr int kSpheres = kAxes / 3;
   const DF d;
@@ -103,11 +109,10 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
       at[r][k] = hn::Set(d, t.at(k, first)[r] - origin);
     }
     for (int s = 0; s < kSpheres; ++s) at2[r][s] = norm2_of(at[r] + 3 * s);
-    for (int k = 0; k < (kUnit ? kAxes : 0); ++k) at[r][k] = twice(at[r][k]);
     sum[r] = hn::Zero(d);
   }
   for (std::size_t k = 0; k < t.list.count; k += kLanes) {
-    const VF share = kUnit ? hn::Zero(d) : hn::Load(d, column[0] + k);
+    const VF share = hn::Load(d, column[0] + k);
     VF x[kSpheres][4];
     for (int s = 0; s < kSpheres; ++s)
       for (int a = 0; a < (kForm == Form::products ? 4 : 3); ++a)
@@ -119,8 +124,7 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
         const VF* a = at[r] + 3 * s;
         VF v;
         if constexpr (kForm == Form::products) {
-          v = s == 0 && !kUnit ? hn::NegMulAdd(share, at2[r][0], x[0][3])
-                               : hn::Sub(x[s][3], at2[r][s]);
+          v = s == 0 ? hn::NegMulAdd(share, at2[r][0], x[0][3]) : hn::Sub(x[s][3], at2[r][s]);
           for (int i = 0; i < 3; ++i) v = hn::MulAdd(x[s][i], a[i], v);
         } else {
           v = width2[s];
@@ -147,21 +151,100 @@ HWY_INLINE void add_pairs(Targets<kAxes>& t, std::size_t first) {
   }
 }
 
+// Two tangents of the unit sphere at c.
+HWY_INLINE void take_tangents(const float* c, float height2, float (*tangent)[3]) {
+  float *const p = tangent[0], *const q = tangent[1];
+  const int far = std::fabs(c[0]) < std::fabs(c[1]) ? 0 : 1;  // an axis far from c
+  for (int k = 0; k < 3; ++k) p[k] = (k == far ? 1.0f : 0.0f) - c[far] / height2 * c[k];
+  const float per_p = 1 / std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+  const float per_c = 1 / std::sqrt(height2);
+  for (int k = 0; k < 3; ++k) p[k] *= per_p;
+  for (int k = 0; k < 3; ++k)
+    q[k] = (c[(k + 1) % 3] * p[(k + 2) % 3] - c[(k + 2) % 3] * p[(k + 1) % 3]) * per_c;
+}
+
+// The part of x along an axis.
+HWY_INLINE VF along(const VF* x, const float* axis) {
+  const DF d;
+  return hn::MulAdd(x[2], hn::Set(d, axis[2]),
+                    hn::MulAdd(x[1], hn::Set(d, axis[1]), hn::Mul(x[0], hn::Set(d, axis[0]))));
+}
+
+// Lays targets flat. Contacts are unit vectors, so the height of one over the tangent plane at the
+// targets' centre C follows from its distance x:
+//     2 C.x = 1 - |C|^2 - |x|^2
+// With c = e^2 - |x|^2, e^2 - |x - t|^2 is then b (c + 2 t'.x - l) where t' and x have two axes,
+// and b = 1 + C.t / |C|^2. Returns whether all lengths are so near to 1 that this is precise.
+HWY_INLINE bool lay_flat(Targets<3>& t) {
+  const DF d;
+  const float* const c = t.centre;
+  const float height2 = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
+  if (!(height2 > 0.5f)) return false;
+  take_tangents(c, height2, t.tangent);
+  const VF one = hn::Set(d, 1.0f), rest = hn::Set(d, t.width2[0] - (1 - height2));
+  VF most = hn::Zero(d);
+  for (std::size_t p = 0; p < t.leaves * kGaussLeaf; p += kLanes) {
+    VF at[3];
+    for (int k = 0; k < 3; ++k) at[k] = hn::Sub(hn::Load(d, t.at(k, p)), hn::Set(d, c[k]));
+    const VF up = hn::Mul(along(at, c), hn::Set(d, 1 / height2)), scale = hn::Add(one, up);
+    const VF twice_per_scale = hn::Div(hn::Set(d, 2.0f), scale);
+    for (int k = 0; k < 2; ++k)
+      hn::Store(hn::Mul(along(at, t.tangent[k]), twice_per_scale), d, t.flat[k] + p);
+    hn::Store(hn::Div(hn::MulAdd(up, rest, norm2_of(at)), scale), d, t.flat[2] + p);
+    hn::Store(scale, d, t.flat[3] + p);
+    most = hn::Max(most, hn::Abs(up));
+  }
+  // An error of |x|^2 counts b - 1 times.
+  const float worst = hn::GetLane(hn::MaxOfLanes(d, most));
+  return worst < 0.5f && worst * *t.g.uneven <= 0x1p-21f * t.width2[0];
+}
+
+template <std::size_t kCount>
+HWY_INLINE void add_flat_pairs(Targets<3>& t, std::size_t first) {
+  const DF d;
+  const float *const x = t.list.column[1], *const y = t.list.column[2], *const c = t.list.column[3];
+  VF at[kCount][2], least[kCount], sum[kCount];
+  HWY_UNROLL(8)
+  for (std::size_t r = 0; r < kCount; ++r) {
+    for (int k = 0; k < 2; ++k) at[r][k] = hn::Set(d, t.flat[k][first + r]);
+    least[r] = hn::Set(d, t.flat[2][first + r]);
+    sum[r] = hn::Zero(d);
+  }
+  for (std::size_t k = 0; k < t.list.count; k += kLanes) {
+    const VF vx = hn::Load(d, x + k), vy = hn::Load(d, y + k), vc = hn::Load(d, c + k);
+    HWY_UNROLL(8)
+    for (std::size_t r = 0; r < kCount; ++r) {
+      VF v = hn::MulAdd(vx, at[r][0], hn::Sub(vc, least[r]));
+      v = hn::MulAdd(vy, at[r][1], v);
+      sum[r] = hn::Add(sum[r], hn::Max(v, hn::Zero(d)));
+    }
+  }
+  HWY_UNROLL(8)
+  for (std::size_t r = 0; r < kCount; ++r) {
+    float* const out = t.sum[first + r];
+    const VF scale = hn::Set(d, t.flat[3][first + r]);
+    hn::Store(hn::MulAdd(sum[r], scale, hn::Load(d, out)), d, out);
+  }
+}
+
 template <int kAxes>
 HWY_NOINLINE void work_off(Targets<kAxes>& t) {
   // The number of targets that share loads: as many as the registers hold.
   constexpr std::size_t kCount = kLanes == 16 && kAxes == 3 ? 4 : 2;
   const DF d;
-  if (t.list.count == 0) return;
-  for (auto& column : t.list.column) hn::StoreU(hn::Zero(d), d, column + t.list.count);
-  for (std::size_t r = 0; r < t.leaves * kGaussLeaf; r += kCount) {
-    if (t.form == Form::products && kAxes == 3 && t.g.unit) {
-      add_pairs<kAxes, Form::products, kCount, true>(t, r);
-    } else if (t.form == Form::products) {
-      add_pairs<kAxes, Form::products, kCount>(t, r);
-    } else {
-      add_pairs<kAxes, Form::differences, kCount>(t, r);
+  const std::size_t rows = t.leaves * kGaussLeaf, count = t.list.count;
+  if (count == 0) return;
+  for (auto& column : t.list.column) hn::StoreU(hn::Zero(d), d, column + count);
+  if (t.form == Form::flat) {
+    if constexpr (kAxes == 3) {
+      hn::StoreU(hn::Set(d, -1e30f), d, t.list.column[3] + count);  // counts at no target
+      for (std::size_t r = 0; r < rows; r += 4) add_flat_pairs<4>(t, r);
     }
+  } else if (t.form == Form::products) {
+    for (std::size_t r = 0; r < rows; r += kCount) add_pairs<kAxes, Form::products, kCount>(t, r);
+  } else {
+    for (std::size_t r = 0; r < rows; r += kCount)
+      add_pairs<kAxes, Form::differences, kCount>(t, r);
   }
   t.list.count = 0;
 }

@@ -25,6 +25,7 @@ void lay_out(GaussDensity& g, std::size_t count, GaussColumns& columns) {
   columns.take(g.key, rows);
   for (auto& order : g.order) columns.take(order, rows);
   columns.take(g.phi, rows);
+  columns.take(g.uneven, 1);
   g.levels = 0;
   for (std::size_t nodes = rows / kGaussLeaf; nodes > 0;) {
     GaussLevel& level = g.level[g.levels++];

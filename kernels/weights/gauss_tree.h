@@ -34,7 +34,8 @@ struct GaussDensity {
   int axes;                // 3, or 6: N and T
   const float* column[6];  // in the caller's order
   float width[2];
-  bool unit;  // all s_j are 1
+  bool unit;      // all s_j are 1
+  float* uneven;  // how far a square of a length over the first sphere is from 1, at most
   // In order of the curve, leaf by leaf: 16 of each column, then 16 times s_j over the largest s.
   float* leaves;
   std::uint32_t *source, *key;

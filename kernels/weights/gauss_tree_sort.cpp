@@ -26,10 +26,11 @@ using DU = hn::RebindToUnsigned<DF>;
 using VF = hn::Vec<DF>;
 using VU = hn::Vec<DU>;
 
-// Flat coordinates of one sphere's vectors, and the box around them.
+// Flat coordinates of one sphere's vectors, the box around them, and how far the square of a length
+// is from 1, at most.
 struct Flat {
   float *u, *v;
-  float low[2], extent;
+  float low[2], extent, uneven;
 };
 
 struct Up {
@@ -59,7 +60,7 @@ HWY_INLINE void flatten(const float* const* column, std::size_t count, Flat& fla
   const Up up = up_of(column, count);
   const float *const px = column[(up.axis + 1) % 3], *const py = column[(up.axis + 2) % 3];
   const float* const pz = column[up.axis];
-  VF low[2] = {one, one}, high[2] = {hn::Neg(one), hn::Neg(one)};
+  VF low[2] = {one, one}, high[2] = {hn::Neg(one), hn::Neg(one)}, uneven = zero;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const std::size_t live = count - i;
     const VF x = load_n(d, px + i, live), y = load_n(d, py + i, live);
@@ -79,7 +80,10 @@ HWY_INLINE void flatten(const float* const* column, std::size_t count, Flat& fla
     low[1] = hn::Min(low[1], hn::IfThenElse(real, v, one));
     high[0] = hn::Max(high[0], hn::IfThenElse(real, u, hn::Neg(one)));
     high[1] = hn::Max(high[1], hn::IfThenElse(real, v, hn::Neg(one)));
+    const VF square = hn::MulAdd(z, z, hn::MulAdd(y, y, hn::Mul(x, x)));
+    uneven = hn::Max(uneven, hn::IfThenElseZero(real, hn::Abs(hn::Sub(square, one))));
   }
+  flat.uneven = hn::GetLane(hn::MaxOfLanes(d, uneven));
   flat.extent = 0;
   for (int k = 0; k < 2; ++k) {
     flat.low[k] = hn::GetLane(hn::MinOfLanes(d, low[k]));
@@ -141,8 +145,9 @@ HWY_INLINE VU hilbert(VU x, VU y, int bits) {
 HWY_INLINE int keys_of_sphere(const GaussDensity& g, std::size_t count, int budget) {
   const DU d;
   const std::size_t rows = g.level[0].count * kGaussLeaf;  // the leaves are not filled yet
-  Flat flat{g.leaves, g.leaves + rows, {}, 0};
+  Flat flat{g.leaves, g.leaves + rows, {}, 0, 0};
   flatten(g.column, count, flat);
+  *g.uneven = flat.uneven;
   const int bits = budget / 2;
   const float scale = cells_per_unit(flat.extent, bits);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
@@ -166,8 +171,8 @@ HWY_INLINE int bits_to(float extent, float width, float cell, int most) {
 HWY_INLINE int keys_of_product(const GaussDensity& g, std::size_t count, int budget) {
   const DU d;
   const std::size_t rows = g.level[0].count * kGaussLeaf;  // the leaves are not filled yet
-  Flat flat[2] = {{g.leaves, g.leaves + rows, {}, 0},
-                  {g.leaves + 2 * rows, g.leaves + 3 * rows, {}, 0}};
+  Flat flat[2] = {{g.leaves, g.leaves + rows, {}, 0, 0},
+                  {g.leaves + 2 * rows, g.leaves + 3 * rows, {}, 0, 0}};
   for (int s = 0; s < 2; ++s) flatten(g.column + 3 * s, count, flat[s]);
   const int first = bits_to(flat[0].extent, g.width[0], 2.0f, 6);
   const int second = bits_to(flat[1].extent, g.width[1], 0.03125f, HWY_MIN(8, budget / 2 - first));

@@ -26,7 +26,7 @@ namespace h6::kernels::HWY_NAMESPACE {
 
 // Opens the collected leaves. Sums and counts stay in registers: a leaf takes less time than a
 // store and load between it and the next.
-template <int kAxes, Form kForm, bool kUnit = false>
+template <int kAxes, Form kForm>
 HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
   constexpr int kSpheres = kAxes / 3;
   const DF d;
@@ -39,10 +39,12 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
     in2[s] = hn::Set(d, in > 0 ? in * in : -1.0f);
   }
   for (int k = 0; k < 5; ++k) term[k] = t.term[k];
+  const float* const leaves = t.g.leaves;
   std::size_t count = t.list.count;
   for (std::size_t c = 0; c < t.cuts; ++c) {
+    const float* const leaf = leaves + t.cut[c] * (kAxes + 1) * kGaussLeaf;
     for (std::size_t p = 0; p < kGaussLeaf; p += kLanes) {
-      const float* column = leaf_column(t.g, t.cut[c], 0) + p;
+      const float* const column = leaf + p;
       const VF share = hn::Load(d, column + kAxes * kGaussLeaf);
       VF away[kAxes], gap[kSpheres];
       MF near = hn::Gt(share, hn::Zero(d)), inside = near;
@@ -64,16 +66,21 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
       const auto append = [&](int k, VF v) HWY_ATTR {
         hn::StoreU(compress(d, v, cut), d, t.list.column[k] + count);
       };
-      if (!kUnit) append(0, share);
-      HWY_UNROLL(2)
-      for (int s = 0; s < kSpheres; ++s) {
-        VF factor = hn::Set(d, 2.0f), rest = gap[s];
-        if (s == 0 && !kUnit) factor = hn::Mul(factor, share), rest = hn::Mul(rest, share);
-        for (int k = 0; k < 3; ++k)
-          append(1 + 4 * s + k, kForm == Form::products
-                                    ? kUnit ? away[3 * s + k] : hn::Mul(factor, away[3 * s + k])
-                                    : hn::Load(d, column + (3 * s + k) * kGaussLeaf));
-        if (kForm == Form::products) append(4 + 4 * s, rest);
+      if constexpr (kForm == Form::flat) {
+        for (int k = 0; k < 2; ++k) append(1 + k, along(away, t.tangent[k]));
+        append(3, gap[0]);
+      } else {
+        append(0, share);
+        HWY_UNROLL(2)
+        for (int s = 0; s < kSpheres; ++s) {
+          VF factor = hn::Set(d, 2.0f), rest = gap[s];
+          if (s == 0) factor = hn::Mul(factor, share), rest = hn::Mul(rest, share);
+          for (int k = 0; k < 3; ++k)
+            append(1 + 4 * s + k, kForm == Form::products
+                                      ? hn::Mul(factor, away[3 * s + k])
+                                      : hn::Load(d, column + (3 * s + k) * kGaussLeaf));
+          if (kForm == Form::products) append(4 + 4 * s, rest);
+        }
       }
       count += hn::CountTrue(d, cut);
     }
@@ -91,8 +98,8 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
 
 template <int kAxes>
 HWY_INLINE void open(Targets<kAxes>& t) {
-  if (t.form == Form::products && kAxes == 3 && t.g.unit) {
-    open_leaves<kAxes, Form::products, true>(t);
+  if (kAxes == 3 && t.form == Form::flat) {
+    open_leaves<kAxes, kAxes == 3 ? Form::flat : Form::products>(t);
   } else if (t.form == Form::products) {
     open_leaves<kAxes, Form::products>(t);
   } else {
@@ -251,6 +258,8 @@ HWY_INLINE void sum_targets(const GaussDensity& g, std::size_t count, std::size_
       if (t.radius[s] > g.width[s]) t.form = Form::differences;
       unit /= t.width2[s];
     }
+    if constexpr (kAxes == 3)
+      if (t.form == Form::products && g.unit && lay_flat(t)) t.form = Form::flat;
     visit(t, g.levels - 1, 0, 1);  // the top level is one block
     open(t);
     work_off(t);

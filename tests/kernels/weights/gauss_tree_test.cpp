@@ -69,3 +69,23 @@ TEST_CASE("gauss_tree: weights are right where contacts lie so dense that leaves
     });
   }
 }
+
+TEST_CASE("gauss_tree: weights of equal contacts are right whether or not directions are unit") {
+  for (const float off : {0.0f, 1e-6f, 1e-4f, 0.01f, 0.5f}) {
+    for (Set set : {Set::clump, Set::walls, Set::two_clusters}) {
+      Contacts c = contacts_of(set, 5003, kPaper);
+      for (std::size_t i = 0; i < c.count; ++i)
+        for (int k = 0; k < 6; ++k) c.column[k][i] *= 1 + off * static_cast<float>(i % 5);
+      const DirectionsView view = c.view(false);
+      for (const GaussWidths widths : {kPaper, GaussWidths{0.3f, 1.2f}}) {
+        const std::vector<float> want = reference_of(view, Hat::sum, widths, 100);
+        on_every_target([&](const std::string& target) {
+          if (target == "SCALAR" && off > 1e-6f) return;  // slow
+          CAPTURE(off);
+          CAPTURE(static_cast<int>(set));
+          CHECK(worst_of(weights_of<Tree>(view, Hat::sum, widths), want, 100) <= kTolerance);
+        });
+      }
+    }
+  }
+}
