@@ -15,7 +15,6 @@
 #include "io/bake/grid.h"
 #include "io/bake/holes.h"
 #include "io/field/box.h"
-#include "io/field/refine.h"
 #include "io/field/unite.h"
 #include "io/walls/thin_pieces.h"
 #include "sched/clock.h"

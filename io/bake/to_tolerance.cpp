@@ -8,8 +8,9 @@
 //                                             |
 //                          crossed edges everywhere --> sides, thin walls
 //
-// The middle voxels take a sixteenth of the work that fine ones with as wide a band would take, and
-// a coarse sample that is wrong between its nodes is wrong at theirs, too.
+// The middle voxels take a sixteenth of the work that fine ones with as wide a band would take.
+// Coarse samples that miss between the middle nodes miss there, too, by less: so half of what makes
+// a cell finer makes a brick a suspect.
 #include <utility>
 
 #include "io/bake/grid.h"
@@ -37,14 +38,18 @@ class Refined {
         sealed && grids_.fine.offset == 0 && options_.cavities == Cavities::solid;
     if (crossings_suffice) {
       surface_.features = find_features(surface_, options_.threads);
-      if (const Outcome done = bake_coarse(0); !done) return done.failure();
-      if (surface_.triangles.size() < kDense * coarse_.field.brick_count())
-        if (const Outcome done = suspect(); !done) return done.failure();
+      if (const Outcome done = bake_coarse(0, options_.sign); !done) return done.failure();
+      if (surface_.triangles.size() >= kDense * coarse_.field.brick_count())
+        surface_.features.reset();  // they take memory, and one more bake finds them again
+      else if (const Outcome done = suspect(); !done)
+        return done.failure();
     }
     if (const Outcome done = bake_fine(); !done) return done.failure();
+    surface_.features.reset();
     if (!crossings_suffice) {
-      if (!sealed) options_.sign = SignMode::flood;  // the sides are those of the fine bake
-      if (const Outcome done = bake_coarse(0.6); !done) return done.failure();
+      // The sides are those of the fine bake.
+      const SignMode sign = sealed ? options_.sign : SignMode::flood;
+      if (const Outcome done = bake_coarse(0.6, sign); !done) return done.failure();
     }
     return add_walls();
   }
@@ -59,10 +64,12 @@ class Refined {
     for (Vec3& v : surface_.vertices) v = by * v;
   }
 
-  Outcome bake_coarse(double from) {
+  Outcome bake_coarse(double from, SignMode sign) {
     Result<Baked> coarse{Baked{}};
+    FieldBake options = options_;
+    options.sign = sign;
     widened(kCut, [&] {
-      coarse = bake_on_grid(surface_, grids_.coarse, options_, Beyond::bounds,
+      coarse = bake_on_grid(surface_, grids_.coarse, options, Beyond::bounds,
                             steps_.part(from, from + 0.1), nullptr);
     });
     if (!coarse) return coarse.failure();
@@ -71,9 +78,8 @@ class Refined {
   }
 
   // Finds the bricks where the coarse samples are not good enough at the nodes of the middle grid,
-  // or where it takes fine voxels to tell. The outside reaches no less in fine voxels. A surface
-  // that it reaches only there has the inside on both sides in middle ones, so it is in bricks that
-  // are unsure, or its fold misses.
+  // or where it takes fine voxels to tell. Where only fine voxels let the outside in, the middle
+  // bake has the inside on both sides of a surface: such bricks are unsure, or their samples miss.
   Outcome suspect() {
     Result<Baked> middle{Baked{}};
     widened(2, [&] {
@@ -108,7 +114,8 @@ class Refined {
     return more;
   }
 
-  // The middle voxels may not have seen what the fine ones see. Returns whether more is wanted.
+  // The middle voxels may not have seen what the fine ones see. Returns whether more is wanted;
+  // then all is found, since each more step would show a little more of a thin shell.
   bool want_more() {
     bool more = false;
     for (const auto* bricks : {&fine_.thin, &fine_.unsure})
@@ -118,14 +125,15 @@ class Refined {
 
   Outcome bake_fine() {
     double from = 0.2, to = 0.5;
-    do {
+    while (true) {
       Result<Baked> fine = bake_on_grid(surface_, grids_.fine, options_, Beyond::sides,
                                         steps_.part(from, to), report_);
       if (!fine) return fine.failure();
       fine_ = std::move(*fine);
-      from = std::exchange(to, (to + 0.6) / 2);
-    } while (grids_.fine.wanted != nullptr && want_more());
-    return Done{};
+      if (grids_.fine.wanted == nullptr || !want_more()) return Done{};
+      grids_.fine.wanted = nullptr;
+      from = std::exchange(to, 0.6);
+    }
   }
 
   Result<FieldData> add_walls() {

@@ -228,7 +228,8 @@ class Chooser {
     for (int z = 0; z < 5; ++z)
       for (int y = 0; y < 5; ++y)
         for (int x = 0; x < 5; ++x) {
-          // A node that the fine bake does not know lies beyond the band.
+          // A node that the fine bake does not know lies beyond the band, or in a brick whose
+          // coarse samples are good enough.
           const int at = first + 81 * z + 9 * y + x;
           *to++ = nodes_.exact(exact[at]) ? exact[at] : flat[at];
         }

@@ -194,7 +194,7 @@ HWY_INLINE bool lay_flat(Targets<3>& t) {
     hn::Store(scale, d, t.flat[3] + p);
     most = hn::Max(most, hn::Abs(up));
   }
-  // An error of |x|^2 counts b - 1 times.
+  // An error of |x|^2 counts |C.t| / |C|^2 times.
   const float worst = hn::GetLane(hn::MaxOfLanes(d, most));
   return worst < 0.5f && worst * *t.g.uneven <= 0x1p-21f * t.width2[0];
 }

@@ -17,7 +17,9 @@
 using namespace field_check;
 using h6::io::bake_field;
 using h6::io::FieldBake;
+using h6::io::FieldBakeReport;
 using h6::io::FieldView;
+using h6::io::SignMode;
 
 namespace {
 
@@ -219,6 +221,26 @@ TEST_CASE("a field baked to a tolerance is the same on any number of threads") {
   CHECK(same(one->fine_index, three->fine_index));
   CHECK(same(one->halves, three->halves));
   CHECK(same(one->quarters, three->quarters));
+}
+
+TEST_CASE("a hole that winding closes leaks with neither a tolerance nor a voxel size") {
+  Mesh mesh = box({0, 0, 0}, {0.03, 0.02, 0.02}, 8);
+  mesh.triangles.pop_back();
+  const auto leaks = [&](double tolerance, SignMode sign) {
+    FieldBake options;
+    (tolerance > 0 ? options.tolerance : options.voxel_size) = 4e-4;
+    options.sign = sign;
+    if (sign == SignMode::flood) options.offset = 0;
+    FieldBakeReport report;
+    REQUIRE(bake_field(mesh, options, &report));
+    return std::any_of(report.warnings.begin(), report.warnings.end(), [](const std::string& w) {
+      return w.find("leaks in") != std::string::npos;
+    });
+  };
+  for (const double tolerance : {0.0, 4e-4}) {
+    CHECK_FALSE(leaks(tolerance, SignMode::winding));
+    CHECK(leaks(tolerance, SignMode::flood));
+  }
 }
 
 TEST_CASE("a tolerance that no grid keeps, or beside a voxel size, is refused in one sentence") {
