@@ -14,7 +14,6 @@
 
 #include "io/bake/grid.h"
 #include "io/bake/holes.h"
-#include "io/field/box.h"
 #include "io/field/unite.h"
 #include "io/walls/thin_pieces.h"
 #include "sched/clock.h"
@@ -385,17 +384,6 @@ class NearNodes {
 
 constexpr double kGrow = 0.9;  // [voxel] on each side of a thin wall, as on each side of a sheet
 
-// Takes the samples of all other bricks out of a field.
-void keep_only(const bake::WantedBricks& wanted, FieldData& field) {
-  const auto& bricks = field.bricks;
-  for (std::size_t c = 0; c < field.brick_index.size(); ++c) {
-    const GridNode at = place_of(c, bricks);
-    const std::size_t tile =
-        place_in({at[0] / 4, at[1] / 4, at[2] / 4}, {bricks[0] / 4, bricks[1] / 4, bricks[2] / 4});
-    if ((wanted[tile] >> bake::Tiles::bit(at) & 1) == 0) field.brick_index[c] = -1;
-  }
-}
-
 }  // namespace
 
 Result<ThinPieces> bake::find_thin(const bake::Surface& surface, const bake::Grid& grid,
@@ -433,7 +421,9 @@ Outcome bake::add_thin(const ThinPieces& thin, const bake::Surface& whole, bake:
   const WantedBricks* const wanted = std::exchange(grid.wanted, nullptr);
   Result<Baked> walls = bake_on_grid(*surface, grid, options, Beyond::bounds, steps, nullptr);
   if (!walls) return walls.failure();
-  if (wanted != nullptr) keep_only(*wanted, walls->field);
+  grid.wanted = wanted;
+  for (std::size_t c = 0; c < grid.cells(); ++c)
+    if (!grid.wants(c)) walls->field.brick_index[c] = -1;
   field = unite(std::move(field), walls->field, options.threads);
   field.grown = kGrow / cut * grid.voxel;
   return Done{};
