@@ -29,19 +29,26 @@ struct CellItems {
 inline constexpr std::size_t cell_items_room(std::size_t contacts) {
   return 2 * contacts + kCellMost;
 }
+// Which items a contact is a part of.
+struct ItemsOfContacts {
+  float* part;         // (contacts) how much of it belongs to its cell's item, in [0, 1]
+  std::int32_t* cell;  // (contacts) that item, where part and share are above 0
+  std::int32_t* own;   // (contacts) its own item, where part is below 1 and share above 0
+};
 
-// Lists the items, cell by cell: first the cell's own, where it has one, then those of its
-// contacts. part[i]: how much of contact i belongs to its cell, in [0, 1]. Returns their number.
+// Lists the items, cell by cell: first those of its contacts, then its own, where it has one.
+// Elsewhere cell and own hold any number from 0 to that of the items. Returns this number.
 std::size_t list_cell_items(const CellContacts& c, const GaussWidths& widths,
-                            const CellItems& items, float* part);
+                            const CellItems& items, const ItemsOfContacts& of);
 std::size_t list_cell_items_ref(const CellContacts& c, const GaussWidths& widths,
-                                const CellItems& items, float* part);
+                                const CellItems& items, const ItemsOfContacts& of);
 
-// weight_i = facing_i share_i / (part_i phi_cell + (1 - part_i) phi_i), phi = share / item_weight
-// of the items that list_cell_items wrote; 0 where share_i = 0.
-void weigh_by_items(const CellContacts& c, const float* part, const float* item_share,
+// weight_i = facing_i share_i / (part_i phi_cell + (1 - part_i) phi_own), phi = share / item_weight
+// of the items that list_cell_items wrote; 0 where share_i = 0. The item columns have room for one
+// item more.
+void weigh_by_items(const CellContacts& c, const ItemsOfContacts& of, const float* item_share,
                     const float* item_weight, float* weight);
-void weigh_by_items_ref(const CellContacts& c, const float* part, const float* item_share,
+void weigh_by_items_ref(const CellContacts& c, const ItemsOfContacts& of, const float* item_share,
                         const float* item_weight, float* weight);
 
 }  // namespace h6::kernels

@@ -58,46 +58,38 @@ Mean join(const CellContacts& c, const Columns& column, const GaussWidths& width
 }  // namespace
 
 std::size_t list_cell_items_ref(const CellContacts& c, const GaussWidths& widths,
-                                const CellItems& items, float* part) {
+                                const CellItems& items, const ItemsOfContacts& of) {
   const Columns column(c.contacts);
   std::size_t count = 0;
   for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
     end = end_of_cell(c, begin);
-    const Mean item = join(c, column, widths, begin, end, part);
-    if (item.share > 0) {
-      for (int k = 0; k < 6; ++k) items.direction[k][count] = item.direction[k];
-      items.share[count++] = item.share;
-    }
+    const Mean item = join(c, column, widths, begin, end, of.part);
     for (std::size_t i = begin; i < end; ++i) {
-      const float alone = (1 - part[i]) * share_of(c, i);
+      const float alone = (1 - of.part[i]) * share_of(c, i);
+      of.own[i] = static_cast<std::int32_t>(count);
       if (!(alone > 0)) continue;
       for (int k = 0; k < 6; ++k) items.direction[k][count] = column.k[k][i];
       items.share[count++] = alone;
     }
+    std::fill(of.cell + begin, of.cell + end, static_cast<std::int32_t>(count));
+    if (!(item.share > 0)) continue;
+    for (int k = 0; k < 6; ++k) items.direction[k][count] = item.direction[k];
+    items.share[count++] = item.share;
   }
   return count;
 }
 
-void weigh_by_items_ref(const CellContacts& c, const float* part, const float* item_share,
+void weigh_by_items_ref(const CellContacts& c, const ItemsOfContacts& of, const float* item_share,
                         const float* item_weight, float* weight) {
-  std::size_t at = 0;
-  const auto density = [&] {
-    const float phi = item_share[at] / item_weight[at];
-    ++at;
-    return phi;
-  };
-  for (std::size_t begin = 0, end; begin < c.contacts.count; begin = end) {
-    end = end_of_cell(c, begin);
-    bool joined = false;
-    for (std::size_t i = begin; i < end; ++i) joined = joined || part[i] * share_of(c, i) > 0;
-    const float of_cell = joined ? density() : 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      const float share = share_of(c, i);
-      const float alone = (1 - part[i]) * share > 0 ? density() : 0;
-      weight[i] = share > 0
-                      ? c.contacts.facing[i] * share / (part[i] * of_cell + (1 - part[i]) * alone)
-                      : 0;
-    }
+  const auto density = [&](std::int32_t item) { return item_share[item] / item_weight[item]; };
+  for (std::size_t i = 0; i < c.contacts.count; ++i) {
+    const float share = share_of(c, i), part = of.part[i];
+    weight[i] = 0;
+    if (!(share > 0)) continue;
+    float phi = 0;
+    if (part > 0) phi += part * density(of.cell[i]);
+    if (part < 1) phi += (1 - part) * density(of.own[i]);
+    weight[i] = c.contacts.facing[i] * share / phi;
   }
 }
 

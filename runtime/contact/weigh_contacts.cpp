@@ -153,11 +153,15 @@ void weigh_gauss(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
 struct Items {
   kernels::CellItems column{};
   float* weight = nullptr;
+  kernels::ItemsOfContacts of{};
   kernels::CellItems from(std::size_t row) const {
     kernels::CellItems items = column;
     for (float*& direction : items.direction) direction += row;
     items.share += row;
     return items;
+  }
+  kernels::ItemsOfContacts of_contacts(std::size_t row) const {
+    return {of.part + row, of.cell + row, of.own + row};
   }
 };
 
@@ -176,6 +180,9 @@ Items take_items(kernels::GaussColumns& columns, std::size_t contacts) {
   for (float*& column : items.column.direction) columns.take(column, room);
   columns.take(items.column.share, room);
   columns.take(items.weight, room);
+  columns.take(items.of.part, contacts);
+  columns.take(items.of.cell, contacts);
+  columns.take(items.of.own, contacts);
   return items;
 }
 
@@ -207,7 +214,7 @@ CellSlices slice_cells(const Contacts& c) {
   return slices;
 }
 
-// Lists the items of all slices, one after the other. c.load serves as scratch.
+// Lists the items of all slices, one after the other.
 CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, const Items& items,
                       sched::FrameTeam* team) {
   CellSlices slices = slice_cells(c);
@@ -219,7 +226,7 @@ CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, con
   for_slices(slices.count, team, [&](std::size_t i) {
     const std::size_t begin = slices.begin[i];
     found[i] = kernels::list_cell_items(cells_between(c, begin, slices.begin[i + 1]), widths,
-                                        items.from(first(i)), c.load + begin);
+                                        items.from(first(i)), items.of_contacts(begin));
     if (!team) slices.item[i + 1] = slices.item[i] + found[i];
   });
   for (std::size_t i = 0; team && i < slices.count; ++i) {
@@ -246,7 +253,7 @@ void weigh_cells(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* sc
       rule, team, columns.at + columns.used, items.weight);
   for_slices(slices.count, team, [&](std::size_t i) {
     const std::size_t begin = slices.begin[i], item = slices.item[i];
-    kernels::weigh_by_items(cells_between(c, begin, slices.begin[i + 1]), c.load + begin,
+    kernels::weigh_by_items(cells_between(c, begin, slices.begin[i + 1]), items.of_contacts(begin),
                             items.column.share + item, items.weight + item, c.weight + begin);
   });
 }

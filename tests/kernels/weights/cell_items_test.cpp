@@ -54,23 +54,26 @@ struct Cells {
 struct Items {
   std::vector<std::vector<float>> column;  // N T share
   std::vector<float> part, weight;
+  std::vector<std::int32_t> cell, own;
   std::size_t count = 0;
   template <class List>
-  Items(Cells& c, const List& list) : part(c.cell.size(), -1) {
+  Items(Cells& c, const List& list)
+      : part(c.cell.size(), -1), cell(c.cell.size(), -1), own(c.cell.size(), -1) {
     column.assign(7, std::vector<float>(cell_items_room(c.cell.size())));
     CellItems items{{}, column[6].data()};
     for (std::size_t k = 0; k < 6; ++k) items.direction[k] = column[k].data();
-    count = list(c.view(), kWidths, items, part.data());
+    count = list(c.view(), kWidths, items, of_contacts());
   }
+  ItemsOfContacts of_contacts() { return {part.data(), cell.data(), own.data()}; }
   // Weights whose items have the densities of the specification.
   template <class Weigh>
   void weigh(Cells& c, const Weigh& by_items) {
-    std::vector<float> of_item(count);
+    std::vector<float> of_item(count + 1);
     gauss_weights_ref({column[0].data(), column[1].data(), column[2].data(), column[3].data(),
                        column[4].data(), column[5].data(), nullptr, column[6].data(), count},
                       Hat::product, kWidths, 0, count, of_item.data());
     weight.assign(c.cell.size(), -1);
-    by_items(c.view(), part.data(), column[6].data(), of_item.data(), weight.data());
+    by_items(c.view(), of_contacts(), column[6].data(), of_item.data(), weight.data());
   }
 };
 
@@ -84,7 +87,7 @@ std::vector<float> exact_weights(Cells& c) {
 
 TEST_CASE("cell_items: SIMD lists the reference's items and weights on every target and count") {
   on_every_target([](const std::string&) {
-    for (std::size_t n = 0; n <= 67; ++n) {
+    for (std::size_t n = 0; n <= 150; n += n < 67 ? 1 : 17) {
       CAPTURE(n);
       for (const double spread : {0.0, 0.2, 0.6}) {
         Cells c(n, spread, n % 4);
@@ -94,6 +97,9 @@ TEST_CASE("cell_items: SIMD lists the reference's items and weights on every tar
           REQUIRE(got.part[i] == doctest::Approx(want.part[i]).epsilon(1e-4));
           CHECK(got.part[i] >= 0);
           CHECK(got.part[i] <= 1);
+          if (!(c.column[6][i] * c.column[7][i] > 0)) continue;
+          if (got.part[i] > 0) CHECK(got.cell[i] == want.cell[i]);
+          if (got.part[i] < 1) CHECK(got.own[i] == want.own[i]);
         }
         for (std::size_t k = 0; k < 7; ++k)
           for (std::size_t i = 0; i < got.count; ++i)
