@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sample_around.cpp - the SIMD twin of sample_around_ref.cpp.
+// sample_around.cpp - the SIMD twin of sample_corners_ref.
 //
-// Each axis has two or three values, which the places share. Some points at a time go through three
+// Each axis has two values, which the corners share. Some points at a time go through three
 // loops: find the cells, look their bricks up, sample. So no lane waits for the memory of the step
 // before, and indices go through memory, which is cheaper than taking them out of a register.
 #include "kernels/field/sample_around.h"
@@ -21,29 +21,21 @@ namespace h6::kernels::HWY_NAMESPACE {
 
 constexpr std::size_t kBatch = 64;  // points; a multiple of every vector length
 
-// The places about a point: how many, and on each axis the sides that they lie on, in order.
-struct AtCorners {
-  static constexpr int kCount = 4, kSides = 2;
-  static constexpr float kSide[kSides] = {-1, 1};
-  static constexpr int side(int place, int axis) { return kCornerSign[place][axis] > 0; }
-};
-struct AtEnds {
-  static constexpr int kCount = 6, kSides = 3;
-  static constexpr float kSide[kSides] = {-1, 0, 1};
-  static constexpr int side(int place, int axis) { return kEndSign[place][axis] + 1; }
-};
+// On each axis a corner lies on one of two sides.
+constexpr int kCorners = 4, kSides = 2;
+constexpr float kSide[kSides] = {-1, 1};
+constexpr int side_of(int corner, int axis) { return kCornerSign[corner][axis] > 0; }
 
-template <class P>
 struct Batch {
-  HWY_ALIGN float fraction[3][P::kSides][kBatch];  // by axis and side
-  HWY_ALIGN std::int32_t slot[P::kCount][kBatch];  // index in the table, then its entry
-  HWY_ALIGN std::int32_t node[P::kCount][kBatch];  // then byte offset in the bricks
-  bool plain[kBatch];  // of a vector's first point: all places lie in bricks
+  HWY_ALIGN float fraction[3][kSides][kBatch];    // by axis and side
+  HWY_ALIGN std::int32_t slot[kCorners][kBatch];  // index in the table, then its entry
+  HWY_ALIGN std::int32_t node[kCorners][kBatch];  // then byte offset in the bricks
+  bool plain[kBatch];  // of a vector's first point: all corners lie in bricks
 };
 
 // Places in cut cells. They are sampled together, after the others.
 struct CutPlaces {
-  static constexpr std::size_t kRoom = AtEnds::kCount * kBatch + hn::MaxLanes(DF());
+  static constexpr std::size_t kRoom = kCorners * kBatch + hn::MaxLanes(DF());
   std::size_t count = 0;
   std::int32_t row[kRoom], code[kRoom];  // of their bricks, of their cells
   float fraction[3][kRoom];
@@ -51,58 +43,53 @@ struct CutPlaces {
 };
 
 // The sides of an axis for a vector of points.
-template <class P>
 struct Sides {
-  VF at[P::kSides];
+  VF at[kSides];
 };
-template <class P>
-HWY_INLINE Sides<P> sides_of(const float* m, VF x, VF y, VF z, float step) {
-  Sides<P> sides;
-  HWY_UNROLL(3)
-  for (int s = 0; s < P::kSides; ++s) {
-    const float row[4] = {m[0], m[1], m[2], m[3] + step * P::kSide[s]};
+HWY_INLINE Sides sides_of(const float* m, VF x, VF y, VF z, float step) {
+  Sides sides;
+  HWY_UNROLL(2)
+  for (int s = 0; s < kSides; ++s) {
+    const float row[4] = {m[0], m[1], m[2], m[3] + step * kSide[s]};
     sides.at[s] = affine_row(row, x, y, z);
   }
   return sides;
 }
 
-template <class P>
 HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const PointsView& points,
-                       float step, std::size_t first, std::size_t i, Batch<P>& batch) {
+                       float step, std::size_t first, std::size_t i, Batch& batch) {
   const DF d;
   const DI di;
   const std::size_t live = points.count - first - i;
   const VF x = load_n(d, points.x + first + i, live), y = load_n(d, points.y + first + i, live);
   const VF z = load_n(d, points.z + first + i, live);
   const VF zero = hn::Zero(d);
-  Sides<P> q[3];
+  Sides q[3];
   auto inside = hn::FirstN(d, live);
   HWY_UNROLL(3)
   for (int a = 0; a < 3; ++a) {
-    q[a] = sides_of<P>(to_field.m[a], x, y, z, step);
+    q[a] = sides_of(to_field.m[a], x, y, z, step);
     const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 1));
-    inside =
-        hn::And(inside, hn::And(hn::Ge(q[a].at[0], zero), hn::Le(q[a].at[P::kSides - 1], last)));
+    inside = hn::And(inside, hn::And(hn::Ge(q[a].at[0], zero), hn::Le(q[a].at[kSides - 1], last)));
   }
   batch.plain[i] = hn::CountTrue(d, inside) >= HWY_MIN(live, hn::Lanes(d));
-  Axis axis[3][P::kSides];
+  Axis axis[3][kSides];
   for (int a = 0; a < 3; ++a)
-    for (int s = 0; s < P::kSides; ++s) {
+    for (int s = 0; s < kSides; ++s) {
       axis[a][s] = split_axis(hn::IfThenElseZero(inside, q[a].at[s]), field.size[a]);
       hn::Store(axis[a][s].fraction, d, batch.fraction[a][s] + i);
     }
-  HWY_UNROLL(6)
-  for (int c = 0; c < P::kCount; ++c) {
+  HWY_UNROLL(4)
+  for (int c = 0; c < kCorners; ++c) {
     const Cell cell =
-        cell_of(field, axis[0][P::side(c, 0)], axis[1][P::side(c, 1)], axis[2][P::side(c, 2)]);
+        cell_of(field, axis[0][side_of(c, 0)], axis[1][side_of(c, 1)], axis[2][side_of(c, 2)]);
     hn::Store(cell.slot, di, batch.slot[c] + i);
     hn::Store(cell.node, di, batch.node[c] + i);
   }
 }
 
 // Lists the lanes whose place has a code.
-template <class P>
-HWY_INLINE void list_cut(const Batch<P>& batch, int place, std::size_t i, VI row, VI code,
+HWY_INLINE void list_cut(const Batch& batch, int place, std::size_t i, VI row, VI code,
                          CutPlaces& cut) {
   const DF d;
   const DI di;
@@ -116,17 +103,16 @@ HWY_INLINE void list_cut(const Batch<P>& batch, int place, std::size_t i, VI row
   HWY_UNROLL(3)
   for (int a = 0; a < 3; ++a)
     hn::StoreU(
-        compress(d, hn::Load(d, batch.fraction[a][P::side(place, a)] + i), hn::RebindMask(d, some)),
+        compress(d, hn::Load(d, batch.fraction[a][side_of(place, a)] + i), hn::RebindMask(d, some)),
         d, cut.fraction[a] + n);
   cut.count += hn::CountTrue(di, some);
 }
 
 // Lists the places in cut cells of a vector of points.
-template <class P>
-HWY_NOINLINE void list_cut_cells(const FieldView& field, const Batch<P>& batch, std::size_t live,
+HWY_NOINLINE void list_cut_cells(const FieldView& field, const Batch& batch, std::size_t live,
                                  std::size_t i, CutPlaces& cut) {
   const DI di;
-  for (int c = 0; c < P::kCount; ++c) {
+  for (int c = 0; c < kCorners; ++c) {
     const VI entry = hn::Load(di, batch.slot[c] + i);
     const auto refined = hn::And(hn::FirstN(di, live), hn::Gt(entry, hn::Set(di, kRefined - 1)));
     if (hn::AllFalse(di, refined)) continue;
@@ -138,13 +124,12 @@ HWY_NOINLINE void list_cut_cells(const FieldView& field, const Batch<P>& batch, 
   }
 }
 
-template <class P>
-HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i, Batch<P>& batch,
+HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i, Batch& batch,
                         CutPlaces& cut) {
   const DI di;
   auto beyond_any = hn::FirstN(di, 0), refined = beyond_any;
-  HWY_UNROLL(6)
-  for (int c = 0; c < P::kCount; ++c) {
+  HWY_UNROLL(4)
+  for (int c = 0; c < kCorners; ++c) {
     const VI entry = gather_entries(field.table, batch.slot[c] + i);
     hn::Store(entry, di, batch.slot[c] + i);
     const auto beyond = hn::Lt(entry, hn::Zero(di));
@@ -159,19 +144,18 @@ HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i,
     list_cut_cells(field, batch, live, i, cut);
 }
 
-template <class P>
-HWY_INLINE void sample_plain(const FieldView& field, const Batch<P>& batch, std::size_t live,
+HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::size_t live,
                              std::size_t i, float* const* at, std::size_t to) {
   const DF d;
   const VF quantum = hn::Set(d, kNearQuantum);
-  HWY_UNROLL(6)
-  for (int c = 0; c < P::kCount; ++c) {
+  HWY_UNROLL(4)
+  for (int c = 0; c < kCorners; ++c) {
     VI pair[4];
     gather_pairs(field.bricks, batch.node[c] + i, kNearCorners, pair);
     VF value, none;
-    interpolate<false>(corners_of(pair), hn::Load(d, batch.fraction[0][P::side(c, 0)] + i),
-                       hn::Load(d, batch.fraction[1][P::side(c, 1)] + i),
-                       hn::Load(d, batch.fraction[2][P::side(c, 2)] + i), quantum, quantum, value,
+    interpolate<false>(corners_of(pair), hn::Load(d, batch.fraction[0][side_of(c, 0)] + i),
+                       hn::Load(d, batch.fraction[1][side_of(c, 1)] + i),
+                       hn::Load(d, batch.fraction[2][side_of(c, 2)] + i), quantum, quantum, value,
                        none, none, none);
     store_n(value, d, at[c] + to, live);
   }
@@ -202,7 +186,6 @@ HWY_INLINE void sample_cut(const FieldView& field, const CutPlaces& cut, std::si
 }
 
 // Points with a place in a far cell or outside the grid.
-template <class P>
 HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
                               const PointsView& points, float step, std::size_t k,
                               float* const* at) {
@@ -210,21 +193,20 @@ HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
   const std::size_t live = points.count - k;
   const VF x = load_n(d, points.x + k, live), y = load_n(d, points.y + k, live);
   const VF z = load_n(d, points.z + k, live);
-  Sides<P> q[3];
-  for (int a = 0; a < 3; ++a) q[a] = sides_of<P>(to_field.m[a], x, y, z, step);
-  for (int c = 0; c < P::kCount; ++c) {
+  Sides q[3];
+  for (int a = 0; a < 3; ++a) q[a] = sides_of(to_field.m[a], x, y, z, step);
+  for (int c = 0; c < kCorners; ++c) {
     VF value, none;
-    sample_points<false>(field, q[0].at[P::side(c, 0)], q[1].at[P::side(c, 1)],
-                         q[2].at[P::side(c, 2)], value, none, none, none);
+    sample_points<false>(field, q[0].at[side_of(c, 0)], q[1].at[side_of(c, 1)],
+                         q[2].at[side_of(c, 2)], value, none, none, none);
     store_n(value, d, at[c] + k, live);
   }
 }
 
-template <class P>
-void sample_about(const FieldView& field, const Affine& to_field, const PointsView& points,
+void corners_simd(const FieldView& field, const Affine& to_field, const PointsView& points,
                   float step, float* const* at) {
   const std::size_t width = hn::Lanes(DF());
-  Batch<P> batch;
+  Batch batch;
   CutPlaces cut;
   for (std::size_t first = 0; first < points.count; first += kBatch) {
     const std::size_t some = HWY_MIN(kBatch, points.count - first);
@@ -234,21 +216,12 @@ void sample_about(const FieldView& field, const Affine& to_field, const PointsVi
     for (std::size_t i = 0; i < some; i += width) look_up(field, some - i, i, batch, cut);
     for (std::size_t i = 0; i < some; i += width) {
       if (HWY_LIKELY(batch.plain[i]))
-        sample_plain<P>(field, batch, some - i, i, at, first + i);
+        sample_plain(field, batch, some - i, i, at, first + i);
       else
-        sample_anew<P>(field, to_field, points, step, first + i, at);
+        sample_anew(field, to_field, points, step, first + i, at);
     }
     for (std::size_t k = 0; k < cut.count; k += width) sample_cut(field, cut, k, first, at);
   }
-}
-
-void corners_simd(const FieldView& field, const Affine& to_field, const PointsView& points,
-                  float step, float* const* at) {
-  sample_about<AtCorners>(field, to_field, points, step, at);
-}
-void ends_simd(const FieldView& field, const Affine& to_field, const PointsView& points, float step,
-               float* const* at) {
-  sample_about<AtEnds>(field, to_field, points, step, at);
 }
 
 }  // namespace h6::kernels::HWY_NAMESPACE
@@ -258,15 +231,10 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(corners_simd);
-HWY_EXPORT(ends_simd);
 
 void sample_corners(const FieldView& field, const Affine& to_field, const PointsView& points,
                     float step, float* const at[4]) {
   HWY_DYNAMIC_DISPATCH(corners_simd)(field, to_field, points, step, at);
-}
-void sample_ends(const FieldView& field, const Affine& to_field, const PointsView& points,
-                 float step, float* const at[6]) {
-  HWY_DYNAMIC_DISPATCH(ends_simd)(field, to_field, points, step, at);
 }
 
 }  // namespace h6::kernels

@@ -18,10 +18,11 @@ void sample_corners(const FieldView& field, const Affine& to_field, const Points
 void sample_corners_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
                         float step, float* const at[4]);
 
-// The same with kEndSign. `step` [voxel]: the length of an arm.
+// The same with kEndSign and steps of one voxel, where the point's own place in its cell is that of
+// the ends in theirs: `to_field` of an end may round to another place, so the bits differ.
 void sample_ends(const FieldView& field, const Affine& to_field, const PointsView& points,
-                 float step, float* const at[6]);
+                 float* const at[6]);
 void sample_ends_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
-                     float step, float* const at[6]);
+                     float* const at[6]);
 
 }  // namespace h6::kernels

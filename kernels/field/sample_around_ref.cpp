@@ -24,8 +24,8 @@ void sample_corners_ref(const FieldView& field, const Affine& to_field, const Po
 }
 
 void sample_ends_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
-                     float step, float* const at[6]) {
-  sample_at(kEndSign, field, to_field, points, step, at);
+                     float* const at[6]) {
+  sample_at(kEndSign, field, to_field, points, 1, at);
 }
 
 }  // namespace h6::kernels

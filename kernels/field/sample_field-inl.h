@@ -84,24 +84,25 @@ HWY_INLINE VI gather_entries(const std::int32_t* table, const std::int32_t* at) 
 #endif
 }
 
-// The two int16 at each byte offset of `pool` plus a constant.
+// The two int16 at each byte offset of `pool` plus constants.
+template <int kPairs>
 HWY_INLINE void gather_pairs(const std::int16_t* pool, const std::int32_t* at,
-                             const int (&behind)[4], VI (&pair)[4]) {
+                             const int (&behind)[kPairs], VI (&pair)[kPairs]) {
   const DI di;
   const char* const bytes = reinterpret_cast<const char*>(pool);
 #if HWY_TARGET == HWY_SCALAR
-  for (int k = 0; k < 4; ++k) pair[k] = hn::Set(di, load_32(bytes + at[0] + behind[k]));
+  for (int k = 0; k < kPairs; ++k) pair[k] = hn::Set(di, load_32(bytes + at[0] + behind[k]));
 #else
-  V4 four[4][kFours];
+  V4 four[kPairs][kFours];
   HWY_UNROLL(4)
   for (std::size_t i = 0; i < kFours; ++i) {
     const char *const a = bytes + at[4 * i], *const b = bytes + at[4 * i + 1];
     const char *const c = bytes + at[4 * i + 2], *const e = bytes + at[4 * i + 3];
     HWY_UNROLL(4)
-    for (int k = 0; k < 4; ++k)
+    for (int k = 0; k < kPairs; ++k)
       four[k][i] = four_of(a + behind[k], b + behind[k], c + behind[k], e + behind[k]);
   }
-  for (int k = 0; k < 4; ++k) pair[k] = join_fours(di, four[k]);
+  for (int k = 0; k < kPairs; ++k) pair[k] = join_fours(di, four[k]);
 #endif
 }
 

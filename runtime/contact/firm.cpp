@@ -23,7 +23,7 @@ constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled
 void smooth_rows(Contacts& c, const Body& b, const kernels::Affine& place, std::size_t begin,
                  std::size_t end, float* const at[7]) {
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
-  kernels::sample_ends(b.field->view, place, arms, 1, at + 1);
+  kernels::sample_ends(b.field->view, place, arms, at + 1);
   kernels::Crosses crosses{
       {at[0], at[1], at[2], at[3], at[4], at[5], at[6]}, b.field->view.band, {}, {}};
   for (int k = 0; k < 9; ++k) crosses.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
