@@ -2,11 +2,11 @@
 // sample_ends.cpp - the SIMD twin of sample_ends_ref.
 //
 // The ends of a cross of one voxel lie in the six cells beside the point's own, each at the point's
-// place in its cell. So the seven cells share 12 of their 32 nodes with the point's own, and 16
-// pairs of nodes are fetched in place of 24. Some points at a time go through three loops, as in
-// sample_around.cpp. Where every end fetched its own nodes this kernel took 1.13 times as long, and
-// a frame of 1,000 contacts 1.05 times (kernels/sample_ends, frame/clutter, frame/conforming;
-// AVX2).
+// place in its cell. All seven cells have 32 nodes, since every node of the point's own is in three
+// of the others; so 16 pairs are fetched in place of 24. Some points at a time go through three
+// loops, as in sample_around.cpp. Where every end fetched its own nodes this kernel took 1.13 times
+// as long, and a frame of 1,000 contacts 1.05 times (kernels/sample_ends, frame/clutter,
+// frame/conforming; AVX2).
 #include "kernels/field/sample_around.h"
 
 #undef HWY_TARGET_INCLUDE
