@@ -2,7 +2,8 @@
 // tail-inl.h - loads and stores of the first n lanes that touch no memory past them.
 //
 // Included once for each SIMD target. Where the instruction set has no masked access (SSE), Highway
-// reads or writes a whole vector, which can fault at the end of a page. A buffer is used there.
+// reads or writes a whole vector, which can fault at the end of a page, and a masked load of one
+// lane reads it always. A buffer is used there.
 #include <cstddef>
 #include <cstring>
 
@@ -24,7 +25,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 template <class D, class T = hn::TFromD<D>>
 HWY_INLINE hn::Vec<D> load_n(D d, const T* p, std::size_t n) {
   if (HWY_LIKELY(n >= hn::Lanes(d))) return hn::LoadU(d, p);
-#if HWY_MEM_OPS_MIGHT_FAULT
+#if HWY_MEM_OPS_MIGHT_FAULT || HWY_TARGET == HWY_SCALAR
   HWY_ALIGN T lanes[hn::MaxLanes(d)] = {};
   std::memcpy(lanes, p, n * sizeof(T));
   return hn::Load(d, lanes);

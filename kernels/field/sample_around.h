@@ -18,8 +18,9 @@ void sample_corners(const FieldView& field, const Affine& to_field, const Points
 void sample_corners_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
                         float step, float* const at[4]);
 
-// The same with kEndSign and steps of one voxel, where the point's own place in its cell is that of
-// the ends in theirs: `to_field` of an end may round to another place, so the bits differ.
+// The same with kEndSign and steps of one voxel. Each end has the fractions of the point's own
+// cell, so its distance differs from that of sample_field by rounding: 1e-4 voxel in grids of
+// 1,024.
 void sample_ends(const FieldView& field, const Affine& to_field, const PointsView& points,
                  float* const at[6]);
 void sample_ends_ref(const FieldView& field, const Affine& to_field, const PointsView& points,

@@ -4,7 +4,7 @@
 // The ends of a cross of one voxel lie in the six cells beside the point's own, each at the point's
 // place in its cell. All seven cells have 32 nodes, since every node of the point's own is in three
 // of the others; so 16 pairs are fetched in place of 24. Some points at a time go through three
-// loops, as in sample_around.cpp. Where every end fetched its own nodes this kernel took 1.13 times
+// loops, as in sample_around.cpp. Where every end fetched its own nodes this kernel took 1.12 times
 // as long, and a frame of 1,000 contacts 1.05 times (kernels/sample_ends, frame/clutter,
 // frame/conforming; AVX2).
 #include "kernels/field/sample_around.h"
@@ -28,7 +28,7 @@ struct EndBatch {
   HWY_ALIGN float fraction[3][kBatch];
   HWY_ALIGN std::int32_t slot[kEnds][kBatch];  // index in the table
   HWY_ALIGN std::int32_t node[kEnds][kBatch];  // then byte offset in the bricks
-  bool plain[kBatch];  // of a vector's first point: all ends lie in bricks without finer samples
+  HWY_ALIGN std::int32_t plain[kBatch];  // not 0: all ends lie in bricks without finer samples
 };
 
 struct Places {
@@ -73,7 +73,7 @@ HWY_INLINE void locate_ends(const FieldView& field, const Affine& to_field,
     const VF last = hn::Set(d, static_cast<float>(8 * field.size[a] - 2));
     inside = hn::And(inside, hn::And(hn::Ge(along[a], one), hn::Le(along[a], last)));
   }
-  batch.plain[i] = hn::CountTrue(d, inside) >= HWY_MIN(live, hn::Lanes(d));
+  hn::Store(hn::VecFromMask(di, hn::RebindMask(di, inside)), di, batch.plain + i);
   ThreeCells cells[3];
   for (int a = 0; a < 3; ++a) {
     cells[a] = three_cells(hn::IfThenElse(inside, along[a], one), field.size[a]);
@@ -88,8 +88,7 @@ HWY_INLINE void locate_ends(const FieldView& field, const Affine& to_field,
   }
 }
 
-HWY_INLINE void look_up_ends(const FieldView& field, std::size_t live, std::size_t i,
-                             EndBatch& batch) {
+HWY_INLINE void look_up_ends(const FieldView& field, std::size_t i, EndBatch& batch) {
   const DI di;
   auto other = hn::FirstN(di, 0);
   HWY_UNROLL(6)
@@ -100,11 +99,12 @@ HWY_INLINE void look_up_ends(const FieldView& field, std::size_t live, std::size
     const VI first = near_offset(entry, hn::Load(di, batch.node[c] + i));
     hn::Store(hn::IfThenZeroElse(here, first), di, batch.node[c] + i);
   }
-  batch.plain[i] = batch.plain[i] && hn::AllFalse(di, hn::And(other, hn::FirstN(di, live)));
+  const VI plain = hn::Load(di, batch.plain + i);
+  hn::Store(hn::IfThenZeroElse(other, plain), di, batch.plain + i);
 }
 
-// Interpolates along x between two nodes and then along an axis, at two rows. The rows of the
-// point's cell are y0z0, y1z0, y0z1, y1z1.
+// Fetches two rows beside the point's cell and interpolates each along x. `behind`: the bytes from
+// the first node of the end's cell to each.
 HWY_INLINE void two_rows(const FieldView& field, const std::int32_t* at, const int (&behind)[2],
                          VF x, VF (&row)[2]) {
   VI pair[2];
@@ -124,7 +124,9 @@ HWY_INLINE void sample_between(const FieldView& field, const EndBatch& batch, st
   VI ahead[4], before[4];
   gather_pairs(field.bricks, batch.node[0] + i, c, ahead);
   gather_pairs(field.bricks, batch.node[1] + i, c, before);
-  VF row[4], front[4], back[4];  // along x, in the point's cell and in those before and behind it
+  // Rows are y0z0, y1z0, y0z1, y1z1: those of the point's cell, of the one ahead and of the one
+  // before.
+  VF row[4], front[4], back[4];
   HWY_UNROLL(4)
   for (int k = 0; k < 4; ++k) {
     const VF x0 = high_half(before[k]), x1 = low_half(ahead[k]);
@@ -145,34 +147,42 @@ HWY_INLINE void sample_between(const FieldView& field, const EndBatch& batch, st
   put(5, lerp(lerp(far[0], far[1], y), lerp(row[0], row[1], y), z));
 }
 
-// Points with an end outside the grid, in a far cell, or in a brick with finer samples.
+// Samples the points that have an end outside the grid, in a far cell or in a brick with finer
+// samples. Others keep their values, so no point's bits depend on its neighbours.
 HWY_NOINLINE void sample_ends_anew(const FieldView& field, const Affine& to_field,
-                                   const PointsView& points, std::size_t k, float* const* at) {
+                                   const PointsView& points, std::size_t k, hn::Mask<DF> plain,
+                                   float* const* at) {
   const DF d;
+  const std::size_t live = points.count - k;
   for (int c = 0; c < kEnds; ++c) {
     Affine to = to_field;
     for (int a = 0; a < 3; ++a) to.m[a][3] += static_cast<float>(kEndSign[c][a]);
     const Places q = places_of(to, points, k);
     VF value, none;
     sample_points<false>(field, q.x, q.y, q.z, value, none, none, none);
-    store_n(value, d, at[c] + k, points.count - k);
+    value = hn::IfThenElse(plain, load_n(d, at[c] + k, live), value);
+    store_n(value, d, at[c] + k, live);
   }
 }
 
 void ends_simd(const FieldView& field, const Affine& to_field, const PointsView& points,
                float* const* at) {
-  const std::size_t width = hn::Lanes(DF());
+  const DF d;
+  const DI di;
+  const std::size_t width = hn::Lanes(d);
   EndBatch batch;
   for (std::size_t first = 0; first < points.count; first += kBatch) {
     const std::size_t some = HWY_MIN(kBatch, points.count - first);
     for (std::size_t i = 0; i < some; i += width)
       locate_ends(field, to_field, points, first, i, batch);
-    for (std::size_t i = 0; i < some; i += width) look_up_ends(field, some - i, i, batch);
+    for (std::size_t i = 0; i < some; i += width) look_up_ends(field, i, batch);
     for (std::size_t i = 0; i < some; i += width) {
-      if (HWY_LIKELY(batch.plain[i]))
+      const auto plain = hn::RebindMask(d, hn::Ne(hn::Load(di, batch.plain + i), hn::Zero(di)));
+      // A field may have no bricks at all.
+      if (HWY_LIKELY(!hn::AllFalse(d, plain)))
         sample_between(field, batch, some - i, i, at, first + i);
-      else
-        sample_ends_anew(field, to_field, points, first + i, at);
+      if (HWY_UNLIKELY(hn::CountTrue(d, plain) < HWY_MIN(some - i, width)))
+        sample_ends_anew(field, to_field, points, first + i, plain, at);
     }
   }
 }

@@ -165,8 +165,9 @@ struct Items {
   }
 };
 
-constexpr std::size_t kLeastCells = 1024;  // contacts of a slice of cells, listed in 8 us
+constexpr std::size_t kLeastCells = 1024;  // contacts of a slice of cells, listed in some 9 us
 constexpr std::size_t kMostSlices = 32;
+static_assert(kGroupRows <= kernels::kCellMost);  // a cell lies in one group
 
 // Between the items of two slices there is room for the whole vectors that the first one stores.
 std::size_t items_room(std::size_t contacts) {
@@ -239,7 +240,7 @@ CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, con
   return slices;
 }
 
-// `firm`: c.slack holds how much each contact counts; c.load is not filled yet.
+// `firm`: c.slack holds how much each contact counts.
 void weigh_cells(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
   if (!c.cell)
     return weigh_view({c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, rule, team,

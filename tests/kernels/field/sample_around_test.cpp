@@ -123,3 +123,25 @@ TEST_CASE("sample_around: the places lie where their signs say") {
     }
   }
 }
+
+TEST_CASE("sample_around: no point's bits depend on its neighbours") {
+  on_every_target([](const std::string&) {
+    Random random(9);
+    const std::size_t n = 64;
+    Points p(n, 0, random, 40, 80);
+    for (const Pattern& pattern : kPatterns) {
+      Samples alone(n, 0), beside(n, 0);
+      alone.take(pattern.kernel, clutter_field(), kTurned, p.view(n), pattern.step);
+      Points other(n, 0, random, -20, 150);
+      for (std::size_t i = 0; i < n; ++i) {
+        if (i % 3 == 0) continue;
+        other.x[i] = p.x[i], other.y[i] = p.y[i], other.z[i] = p.z[i];
+      }
+      other.x[30] = std::numeric_limits<float>::quiet_NaN();
+      beside.take(pattern.kernel, clutter_field(), kTurned, other.view(n), pattern.step);
+      for (std::size_t c = 0; c < pattern.count; ++c)
+        for (std::size_t i = 0; i < n; ++i)
+          if (i % 3 != 0) CHECK(alone.at[c][i] == beside.at[c][i]);
+    }
+  });
+}

@@ -97,6 +97,10 @@ TEST_CASE("cell_items: SIMD lists the reference's items and weights on every tar
           REQUIRE(got.part[i] == doctest::Approx(want.part[i]).epsilon(1e-4));
           CHECK(got.part[i] >= 0);
           CHECK(got.part[i] <= 1);
+          for (const std::int32_t item : {got.cell[i], got.own[i]}) {
+            CHECK(item >= 0);
+            CHECK(std::size_t(item) <= got.count);
+          }
           if (!(c.column[6][i] * c.column[7][i] > 0)) continue;
           if (got.part[i] > 0) CHECK(got.cell[i] == want.cell[i]);
           if (got.part[i] < 1) CHECK(got.own[i] == want.own[i]);
@@ -136,6 +140,30 @@ TEST_CASE("cell_items: contacts that differ from their cell by epsilon keep thei
     CHECK(items.weight[i] == doctest::Approx(exact[i]).epsilon(0.02));
   }
   CHECK(compared > 150);
+}
+
+TEST_CASE("cell_items: the item of a contact that hardly stands alone has its direction") {
+  on_every_target([](const std::string&) {
+    int seen = 0;
+    for (int step = 0; step < 400; ++step) {
+      Cells c(16, 0);
+      std::fill(c.cell.begin(), c.cell.end(), 1u);
+      std::fill(c.field.begin(), c.field.end(), 3);
+      for (std::size_t i = 0; i < 16; ++i) {
+        for (std::size_t k = 0; k < 6; ++k) c.column[k][i] = c.column[k][0];
+        c.column[6][i] = 1, c.column[7][i] = 5e-4f;
+      }
+      // Half an epsilon from the mean it begins to stand alone.
+      c.column[1][5] += 0.026666f + 1e-8f * float(step);
+      Items items(c, list_cell_items);
+      if (items.part[5] == 1) continue;
+      ++seen;
+      const auto own = std::size_t(items.own[5]);
+      for (std::size_t k = 0; k < 6; ++k)
+        CHECK(items.column[k][own] == doctest::Approx(c.column[k][5]).epsilon(1e-5));
+    }
+    CHECK(seen > 10);
+  });
 }
 
 TEST_CASE("cell_items: a weight changes by little however one contact's direction moves on") {
