@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// cell_items_bench.cpp - items of n contacts in cells of 1 to 16, of which two fifths are alone;
-// and the weights of the contacts from those of the items.
+// cell_items_bench.cpp - times the list of items of n contacts, and the weights of the contacts
+// from those of the items. Cells have 1 to 16 contacts, half of them one.
 #include "kernels/weights/cell_items.h"
 
-#include <algorithm>
 #include <memory>
 #include <vector>
 

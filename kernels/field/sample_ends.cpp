@@ -43,7 +43,7 @@ HWY_INLINE Places places_of(const Affine& to_field, const PointsView& points, st
           affine_row(to_field.m[2], x, y, z)};
 }
 
-// The point's cell on one axis, and the cells before and behind it.
+// Holds the cell of a point on one axis, and the cells before and behind it.
 struct ThreeCells {
   Axis at[3];
 };

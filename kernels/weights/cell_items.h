@@ -29,7 +29,7 @@ struct CellItems {
 inline constexpr std::size_t cell_items_room(std::size_t contacts) {
   return 2 * contacts + kCellMost;
 }
-// Which items a contact is a part of.
+// Says which items each contact is a part of.
 struct ItemsOfContacts {
   float* part;         // (contacts) how much of it belongs to its cell's item, in [0, 1]
   std::int32_t* cell;  // (contacts) that item, where part and share are above 0
