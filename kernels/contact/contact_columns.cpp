@@ -197,16 +197,22 @@ void gap_simd(const ContactColumns& c, const float* depth, double beta, const do
   }
 }
 
-void loads_simd(const float* kappa, const float* slack, const float* depth, std::size_t count,
-                float* load, float* weight) {
+void loads_simd(const SeriesLoads& c, float touch) {
   const DF d;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const std::size_t live = count - i;
-    const auto force = hn::Mul(load_n(d, kappa + i, live), load_n(d, slack + i, live));
-    const auto deep = load_n(d, depth + i, live);
+  const auto whole = hn::Set(d, touch);
+  for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
+    const std::size_t live = c.count - i;
+    const auto u = load_n(d, c.slack + i, live);
+    auto kappa = load_n(d, c.kappa + i, live);
+    kappa = hn::IfThenElse(hn::Lt(u, whole), hn::Mul(kappa, hn::Div(u, whole)), kappa);
+    const auto slack = hn::Sub(u, hn::Mul(hn::Set(d, 0.5f), hn::Min(u, whole)));
+    const auto force = hn::Mul(kappa, slack);
+    const auto deep = load_n(d, c.depth + i, live);
     const auto share = hn::IfThenElseZero(hn::Gt(deep, hn::Zero(d)), hn::Div(force, deep));
-    store_n(force, d, load + i, live);
-    store_n(share, d, weight + i, live);
+    store_n(kappa, d, c.kappa + i, live);
+    store_n(slack, d, c.slack + i, live);
+    store_n(force, d, c.load + i, live);
+    store_n(share, d, c.weight + i, live);
   }
 }
 
@@ -248,10 +254,7 @@ void series_gap(const ContactColumns& c, const float* depth, double beta, const 
                 float* e) {
   HWY_DYNAMIC_DISPATCH(gap_simd)(c, depth, beta, u, e);
 }
-void series_loads(const float* kappa, const float* slack, const float* depth, std::size_t count,
-                  float* load, float* weight) {
-  HWY_DYNAMIC_DISPATCH(loads_simd)(kappa, slack, depth, count, load, weight);
-}
+void series_loads(const SeriesLoads& c, float touch) { HWY_DYNAMIC_DISPATCH(loads_simd)(c, touch); }
 
 }  // namespace h6::kernels
 #endif

@@ -87,10 +87,17 @@ void series_gap(const ContactColumns& c, const float* depth, double beta, const 
 void series_gap_ref(const ContactColumns& c, const float* depth, double beta, const double u[6],
                     float* e);
 
-// load_i = kappa_i slack_i; weight_i = load_i / depth_i, or 0 where the depth is not above 0.
-void series_loads(const float* kappa, const float* slack, const float* depth, std::size_t count,
-                  float* load, float* weight);
-void series_loads_ref(const float* kappa, const float* slack, const float* depth, std::size_t count,
-                      float* load, float* weight);
+// After series_solve (kernels/weights/series_solve.h: p and w, here touch [m]): kappa_i becomes the
+// stiffness at the solution, kappa_i p'(slack_i), and slack_i its share p / p', so that load_i =
+// kappa_i slack_i. Where touch is 0 both stay. weight_i = load_i / depth_i, or 0 where the depth
+// is not above 0.
+struct SeriesLoads {
+  float *kappa, *slack;
+  const float* depth;
+  float *load, *weight;
+  std::size_t count;
+};
+void series_loads(const SeriesLoads& c, float touch);
+void series_loads_ref(const SeriesLoads& c, float touch);
 
 }  // namespace h6::kernels

@@ -110,11 +110,13 @@ void series_gap_ref(const ContactColumns& c, const float* depth, double beta, co
   }
 }
 
-void series_loads_ref(const float* kappa, const float* slack, const float* depth, std::size_t count,
-                      float* load, float* weight) {
-  for (std::size_t i = 0; i < count; ++i) {
-    load[i] = kappa[i] * slack[i];
-    weight[i] = depth[i] > 0 ? load[i] / depth[i] : 0.0f;
+void series_loads_ref(const SeriesLoads& c, float touch) {
+  for (std::size_t i = 0; i < c.count; ++i) {
+    const float u = c.slack[i];
+    if (u < touch) c.kappa[i] *= u / touch;
+    c.slack[i] = u - 0.5f * std::min(u, touch);
+    c.load[i] = c.kappa[i] * c.slack[i];
+    c.weight[i] = c.depth[i] > 0 ? c.load[i] / c.depth[i] : 0.0f;
   }
 }
 

@@ -13,9 +13,9 @@ inline constexpr int kUpper6 =
 
 // Sums over the contacts that are active at y.
 struct SeriesSums {
-  double system[kUpper6] = {};  // sum kappa J J^T
-  double pull[6] = {};          // sum kappa (e - J.y) J
-  double energy = 0;            // sum kappa (e - J.y)^2
+  double system[kUpper6] = {};  // sum kappa p' J J^T
+  double pull[6] = {};          // sum kappa p J
+  double energy = 0;            // 2 sum kappa P
 };
 
 // Solves (c I + system) x = b by Cholesky: the matrix is at least c I, so no pivot vanishes.

@@ -107,6 +107,20 @@ HWY_INLINE hn::Vec<DF> stiffness_at(const SeriesColumns& c, VD per_c, const Axes
   return hn::DemoteTo(DF(), hn::Div(facing, soft));
 }
 
+// A contact's response to its slack u >= 0, without kappa: p, p' and 2 P of series_solve.h.
+struct Response {
+  VD load, stiffness, twice_energy;
+};
+HWY_INLINE Response respond(VD u, VD touch) {
+  const DD d;
+  const VD below = hn::Min(u, touch), above = hn::Sub(u, below);
+  // Where touch is 0 no slack is below it.
+  const VD share = hn::IfThenElse(hn::Lt(u, touch), hn::Div(u, touch), hn::Set(d, 1.0));
+  const VD part = hn::Mul(share, below);
+  return {hn::MulAdd(hn::Set(d, 0.5), part, above), share,
+          hn::MulAdd(hn::Set(d, 1.0 / 3), hn::Mul(part, below), hn::Mul(above, u))};
+}
+
 // Options of a pass over the contacts, which always sums pull and energy.
 enum Pass : int {
   kStiffen = 1,  // fills kappa, and finds the largest e of a contact that can carry load, or 0
@@ -121,6 +135,7 @@ HWY_NOINLINE double pass_slice(const SeriesColumns& c, const SeriesParameters& p
                                std::size_t stride = 1) {
   const DD d;
   const VD zero = hn::Zero(d), per_lever = hn::Set(d, 1 / p.lever), per_c = hn::Set(d, 1 / p.c);
+  const VD touch = hn::Set(d, p.touch);
   VD system[kUpper6], pull[6], energy = zero, max_e = zero;
   for (int k = 0; k < kUpper6; ++k) system[k] = zero;
   for (int k = 0; k < 6; ++k) pull[k] = zero;
@@ -149,14 +164,15 @@ HWY_NOINLINE double pass_slice(const SeriesColumns& c, const SeriesParameters& p
     if (hn::AllFalse(d, active)) continue;
     if constexpr (!(kPass & kStiffen)) k = load_n(DF(), kappa + i, live);
     const VD w = hn::IfThenElseZero(active, hn::PromoteTo(d, k));
-    const VD wu = hn::Mul(w, u);
-    energy = hn::MulAdd(wu, u, energy);
+    const Response response = respond(hn::Max(u, zero), touch);
+    const VD load = hn::Mul(w, response.load), stiffness = hn::Mul(w, response.stiffness);
+    energy = hn::MulAdd(w, response.twice_energy, energy);
     int entry = 0;
     HWY_UNROLL(8)
     for (int row = 0; row < 6; ++row) {
-      pull[row] = hn::MulAdd(wu, J.v[row], pull[row]);
+      pull[row] = hn::MulAdd(load, J.v[row], pull[row]);
       if constexpr (kPass & kSystem) {
-        const VD wJ = hn::Mul(w, J.v[row]);
+        const VD wJ = hn::Mul(stiffness, J.v[row]);
         for (int col = row; col < 6; ++col, ++entry)
           system[entry] = hn::MulAdd(wJ, J.v[col], system[entry]);
       }

@@ -55,13 +55,15 @@ SeriesResult series_solve_ref(const SeriesColumnsT<T>& c, const SeriesParameters
         double J[6];
         const double u = slack_at(c, p, i, at, J);
         if (!(u > 0)) continue;
-        const double w = double{kappa[i]};
+        const double w = double{kappa[i]}, t = p.touch;
+        const double stiff = u < t ? w * u / t : w;
+        const double load = u < t ? w * u * u / (2 * t) : w * (u - t / 2);
         int entry = 0;
         for (int row = 0; row < 6; ++row) {
-          sums.pull[row] += w * u * J[row];
-          for (int col = row; col < 6; ++col) sums.system[entry++] += w * J[row] * J[col];
+          sums.pull[row] += load * J[row];
+          for (int col = row; col < 6; ++col) sums.system[entry++] += stiff * J[row] * J[col];
         }
-        sums.energy += w * u * u;
+        sums.energy += u < t ? w * u * u * u / (3 * t) : w * ((u - t) * u + t * t / 3);
       }
       return sums;
     };

@@ -20,6 +20,8 @@ namespace {
 
 // The spring's last extension, times this, must cover its next one.
 constexpr double kAhead = 2;
+// `firm`: the slack over which a contact's stiffness grows to its whole [voxel]. METHOD.md, Sec. 3.
+constexpr double kTouch = 0.03;
 constexpr std::size_t kGapSlice = 2048;  // contacts whose e is filled at a time
 
 kernels::SliceRunner slices_on(sched::FrameTeam* team) {
@@ -57,13 +59,16 @@ void fill_series_gap(Contacts& c, double beta, const Vec6& u, std::size_t begin,
                       c.load + begin);
 }
 
-kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6],
-                                   sched::FrameTeam* team) {
+kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double voxel, double lever,
+                                   double y[6], sched::FrameTeam* team) {
+  kernels::SeriesParameters parameters{def.series_c, spring_lever(def, lever)};
+  if (def.method == H6_METHOD_FIRM) parameters.touch = kTouch * voxel;
   const kernels::SeriesColumns columns{c.nx, c.ny,   c.nz,     c.rx,   c.ry,
                                        c.rz, c.load, c.weight, c.count};
-  const kernels::SeriesResult result = kernels::series_solve(
-      columns, {def.series_c, spring_lever(def, lever)}, y, c.kappa, c.slack, slices_on(team));
-  kernels::series_loads(c.kappa, c.slack, c.depth, c.count, c.load, c.weight);
+  const kernels::SeriesResult result =
+      kernels::series_solve(columns, parameters, y, c.kappa, c.slack, slices_on(team));
+  kernels::series_loads({c.kappa, c.slack, c.depth, c.load, c.weight, c.count},
+                        static_cast<float>(parameters.touch));
   return result;
 }
 
@@ -99,7 +104,7 @@ void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& 
     });
   }
   const kernels::SeriesResult result =
-      solve_series(c, set.contact, series_lever(a.radius, a.voxel), shell.series_y, team);
+      solve_series(c, set.contact, a.voxel, series_lever(a.radius, a.voxel), shell.series_y, team);
   h6FrameReport& report = lane.report;
   report.series_iterations =
       std::max(report.series_iterations, static_cast<std::uint32_t>(result.iterations));

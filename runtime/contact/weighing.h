@@ -82,9 +82,9 @@ void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size
 void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
                           sched::FrameTeam* team, void* scratch);
 // Fills kappa (from weight, the inner stiffness), slack, load (from e) and weight. y holds the
-// start and then the extension; `team` may be null.
-kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double lever, double y[6],
-                                   sched::FrameTeam* team);
+// start and then the extension; `voxel`: of the body; `team` may be null.
+kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double voxel, double lever,
+                                   double y[6], sched::FrameTeam* team);
 inline kernels::WrenchColumns series_columns(const Contacts& c) {
   return {c.slack, c.kappa, c.nx, c.ny, c.nz, c.gx, c.gy, c.gz, c.rx, c.ry, c.rz, c.count};
 }

@@ -219,7 +219,7 @@ int h6WeighContacts(const h6ContactDef* given, const h6ContactArrays* contacts, 
     }
     fill_inner_stiffness(c, contact, voxel, nullptr, work.scratch);
     fill_series_gap(c, contact.damping, u, 0, rows);
-    solve_series(c, contact, lever, y, nullptr);
+    solve_series(c, contact, voxel, lever, y, nullptr);
     sums = sum_series_weighted(c, contact, lever, exact);
   } else {
     weigh_columns(c, contact, voxel, lever, nullptr, work.scratch);

@@ -96,13 +96,22 @@ TEST_CASE("contact_columns: SIMD agrees with the reference on every target, coun
       series_gap_ref(view, depth, 1e-3, u, want[4].begin());
       CHECK(worst(got[4], want[4], n, 1e-9) <= 1);
 
-      const float *const kappa = got[0].begin(), *const slack = c.column[10].begin();
-      series_loads(kappa, slack, depth, n, got[5].begin(), got[6].begin());
-      series_loads_ref(kappa, slack, depth, n, want[5].begin(), want[6].begin());
-      CHECK(same_bits(got[5].begin(), want[5].begin(), n));
-      CHECK(same_bits(got[6].begin(), want[6].begin(), n));
-      CHECK(got[5].padding_untouched());
-      CHECK(got[6].padding_untouched());
+      for (const float touch : {0.0f, 0.4f}) {
+        for (auto* const to : {&got, &want}) {
+          auto& out = *to;
+          for (std::size_t i = 0; i < n; ++i) {
+            out[3][i] = static_cast<float>(i % 5);
+            out[4][i] = std::max(0.0f, c.column[10][i]);  // slack
+          }
+          const SeriesLoads loads{out[3].begin(), out[4].begin(), depth,
+                                  out[5].begin(), out[6].begin(), n};
+          to == &got ? series_loads(loads, touch) : series_loads_ref(loads, touch);
+        }
+        for (std::size_t k = 3; k <= 6; ++k) {
+          CHECK(same_bits(got[k].begin(), want[k].begin(), n));
+          CHECK(got[k].padding_untouched());
+        }
+      }
     }
   });
 }

@@ -54,6 +54,7 @@ struct Patch {
   }
 };
 
+// Solves, and makes kappa and slack the stiffness and the load over it, as series_loads does.
 template <class T>
 struct Solved {
   std::vector<T> kappa, slack;
@@ -67,6 +68,12 @@ struct Solved {
     Mat6 A = p.c * Mat6::Identity();
     for (std::size_t i = 0; i < patch.count(); ++i) {
       const Vec6 J = patch.axis(i, p.lever);
+      if (double(slack[i]) < p.touch) {
+        kappa[i] = static_cast<T>(double(kappa[i]) * double(slack[i]) / p.touch);
+        slack[i] = static_cast<T>(double(slack[i]) / 2);
+      } else {
+        slack[i] = static_cast<T>(double(slack[i]) - p.touch / 2);
+      }
       wrench += double(kappa[i]) * double(slack[i]) * J;
       if (slack[i] > 0) A += double(kappa[i]) * J * J.transpose();
     }
@@ -160,8 +167,14 @@ TEST_CASE("series_solve: SIMD agrees with the reference on every target and coun
   on_every_target([](const std::string&) {
     for (std::size_t n = 0; n <= 67; ++n) {
       const Patch<float> p = random_patch(n, 5 + n);
-      const SeriesParameters q{4, 0.02};
-      const Solved<float> want(p, q);
+      SeriesParameters q{4, 0.02};
+      q.touch = n % 2 ? 1e-4 : 0;
+      struct {
+        Vec6 y = Vec6::Zero();
+        std::vector<float> kappa, slack;
+      } want;
+      want.kappa.resize(n), want.slack.resize(n);
+      series_solve_ref(p.view(), q, want.y.data(), want.kappa.data(), want.slack.data());
       Vec6 y = Vec6::Zero();
       Column kappa(n, n % 5), slack(n, n % 3);
       const SeriesResult got = series_solve(p.view(), q, y.data(), kappa.begin(), slack.begin());
@@ -190,7 +203,8 @@ TEST_CASE(
   for (int i = 0; i < 1000; ++i) hidden.add({0.01, 1e-5 * i, 0}, {0, 0, 1}, -1e-4);
   hidden.add({0.005, 0, 0}, {0, 1, 0}, 4e-4);
   for (const Patch<float>& p : {ball, hidden, random_patch(900, 3), random_patch(5001, 4)}) {
-    const SeriesParameters q{4, 0.02};
+    SeriesParameters q{4, 0.02};
+    q.touch = p.count() % 2 ? 3e-5 : 0;
     const Solved<float> want(p, q);
     on_every_target([&](const std::string&) {
       Vec6 y = Vec6::Zero();
@@ -303,6 +317,34 @@ TEST_CASE("series_solve: a lone contact carries exactly k times its depth, where
   }
 }
 
+TEST_CASE("series_solve: with a touch a contact begins without a jump of load or of stiffness") {
+  const Patch<double> flat = wall(3);
+  const double touch = 0.02 * mm;
+  // Another contact rises until it carries load beside those of the wall.
+  const auto at = [&](double e, double width) {
+    Patch<double> p = flat;
+    p.add({4 * mm, 9 * mm, -5 * mm}, Vec3(0.3, 0, 1).normalized(), e);
+    return Solved<double>(p, {4, flat.lever(), 1e-13, 40, width});
+  };
+  for (const double width : {0.0, touch}) {
+    double none = -0.3 * mm, some = 0.6 * mm;  // where it carries no load, and where it does
+    for (int i = 0; i < 60; ++i) {
+      const double middle = (none + some) / 2;
+      (at(middle, width).slack.back() > 0 ? some : none) = middle;
+    }
+    CHECK(some > none);
+    CHECK(at(some, width).wrench.isApprox(at(none, width).wrench, 1e-6));
+    const Mat6 jump = at(some + 1e-6 * touch, width).net - at(none, width).net;
+    CHECK((jump.norm() > 0.1) == (width == 0));
+    CHECK((jump.norm() < 1e-4) == (width > 0));
+  }
+  // Far above, the contact has its whole stiffness, and carries less by half the touch.
+  Patch<double> lone;
+  lone.add({0, 0, -5 * mm}, {0, 0, 1}, 0.2 * mm);
+  const Solved<double> s(lone, {4, 5 * mm, 1e-13, 40, touch});
+  CHECK(s.kappa[0] * s.slack[0] == h6::test::near(0.2 * mm - touch / 2).epsilon(1e-9));
+}
+
 TEST_CASE("series_solve: a contact about to touch carries nothing, and no contact ever pulls") {
   Patch<double> p;
   p.add({0, 0, -5 * mm}, {0, 0, 1}, -0.1 * mm);
@@ -330,7 +372,7 @@ TEST_CASE("series_solve: a contact that faces away carries nothing") {
   CHECK((with.wrench - without.wrench).norm() <= 1e-6 * without.wrench.norm());
 }
 
-TEST_CASE("series_solve: the net stiffness is the exact derivative of the wrench") {
+void check_derivative(double touch) {
   Random random(11);
   Planes planes;
   for (int i = 0; i < 60; ++i) {
@@ -343,7 +385,7 @@ TEST_CASE("series_solve: the net stiffness is the exact derivative of the wrench
     planes.e.push_back(random.uniform(-0.2e-3, 0.5e-3));
   }
   const double L = 0.02, c = 4;
-  const SeriesParameters p{c, L, 1e-13, 40};
+  const SeriesParameters p{c, L, 1e-13, 40, touch};
   const auto wrench = [&](const Vec3& dx, const Vec3& turn) {
     Vec6 w = Solved<double>(planes.moved(dx, turn), p).wrench;
     w.tail<3>() *= L;  // of the scaled axes: now in m^2
@@ -390,18 +432,24 @@ TEST_CASE("series_solve: the net stiffness is the exact derivative of the wrench
     }
 }
 
-TEST_CASE("series_solve: at most 12 steps from cold, at most 3 from the last frame, at any size") {
-  for (const Patch<double>& shape : shapes()) {
-    const SeriesParameters p{4, shape.lever()};
-    Solved<double> cold(shape, p);
-    CHECK(cold.result.iterations <= 12);
-    CHECK(cold.result.residual <= 1e-6);
-    Patch<double> later = shape;
-    for (double& e : later.column[6]) e *= 1.002;
-    const Solved<double> warm(later, p, cold.y);
-    CHECK(warm.result.iterations <= 3);
-    CHECK(warm.result.residual <= 1e-6);
-  }
+TEST_CASE("series_solve: the net stiffness is the exact derivative of the wrench") {
+  check_derivative(0);
+  check_derivative(0.1 * mm);
+}
+
+TEST_CASE("series_solve: 12 steps do from cold, 3 from the last frame (4 with a touch)") {
+  for (const double touch : {0.0, 0.01 * mm})
+    for (const Patch<double>& shape : shapes()) {
+      const SeriesParameters p{4, shape.lever(), 1e-6, 12, touch};
+      Solved<double> cold(shape, p);
+      CHECK(cold.result.iterations <= 12);
+      CHECK(cold.result.residual <= 1e-6);
+      Patch<double> later = shape;
+      for (double& e : later.column[6]) e *= 1.002;
+      const Solved<double> warm(later, p, cold.y);
+      CHECK(warm.result.iterations <= (touch > 0 ? 4 : 3));
+      CHECK(warm.result.residual <= 1e-6);
+    }
 }
 
 TEST_CASE("series_solve: where steps run out the residual says so") {
