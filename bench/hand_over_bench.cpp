@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // hand_over_bench.cpp - measures the cost of sharing a frame's work with the resident helper:
+//     sched/line                a cache line, from one core to another
 //     sched/hand_over               an empty slice, from the caller to the helper and back
 //     sched/sums/us:N               arithmetic in registers, in slices of 1 us
 //     sched/columns/rows:N          sums of columns that the caller has just written; the caller
@@ -15,6 +16,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "sched/clock.h"
@@ -48,6 +50,42 @@ double middle(std::vector<double>& us) {
   if (us.empty()) return 0;
   std::nth_element(us.begin(), us.begin() + static_cast<std::ptrdiff_t>(us.size() / 2), us.end());
   return us[us.size() / 2];
+}
+
+// Two threads write one line in turn. A virtual machine may move its cores between those of the
+// host, so the time of a line can change within seconds, and with it the gain of a second thread:
+// `least_ns` and `most_ns` are of a hundred blocks.
+void line(benchmark::State& state) {
+  constexpr int kBlocks = 100, kTurns = 10000;
+  alignas(64) std::atomic<int> ball{0};
+  std::vector<double> ns;
+  int caught = 0;
+  for (auto _ : state) {
+    ball = 0;
+    std::thread other([&] {
+      for (int turn = 0; turn < kBlocks * kTurns; ++turn, ++caught) {
+        while (ball.load(std::memory_order_acquire) != 1) {
+        }
+        ball.store(0, std::memory_order_release);
+      }
+    });
+    const Pinned pinned;
+    for (int block = 0; block < kBlocks; ++block) {
+      const std::int64_t start = now_ns();
+      for (int turn = 0; turn < kTurns; ++turn) {
+        ball.store(1, std::memory_order_release);
+        while (ball.load(std::memory_order_acquire) != 0) {
+        }
+      }
+      ns.push_back(static_cast<double>(now_ns() - start) / (2 * kTurns));
+    }
+    other.join();
+  }
+  if (caught != kBlocks * kTurns) return state.SkipWithError("a turn was lost");
+  std::sort(ns.begin(), ns.end());
+  state.counters["line_ns"] = ns[ns.size() / 2];
+  state.counters["least_ns"] = ns.front();
+  state.counters["most_ns"] = ns.back();
 }
 
 // The helper starts before the caller is pinned, or it would inherit the caller's core.
@@ -165,6 +203,7 @@ void columns(benchmark::State& state, std::size_t rows) {
 
 [[maybe_unused]] const bool registered = [] {
   const auto once = [](benchmark::internal::Benchmark* b) { b->Iterations(1)->UseRealTime(); };
+  once(benchmark::RegisterBenchmark("sched/line", line));
   once(benchmark::RegisterBenchmark("sched/hand_over", hand_over));
   for (const std::size_t us : {2, 4, 8, 16, 32})
     once(benchmark::RegisterBenchmark(("sched/sums/us:" + std::to_string(us)).c_str(), sums, us));
