@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "sched/parallel_for.h"
@@ -25,35 +24,56 @@ struct Facet {
   std::uint32_t component;
 };
 
-// Facets keep their boxes in columns, so that a search for the facets in a box runs in SIMD.
+// Facets keep their boxes and planes in columns, so that a search for the facets in a box runs in
+// SIMD. Lengths are from a node near by, as floats have few digits.
 class Facets {
  public:
+  explicit Facets(const Vec3& origin) : origin_(origin) {}
   bool empty() const { return facets_.empty(); }
   void add(const Facet& t) {
-    constexpr float kFar = std::numeric_limits<float>::infinity();
+    const Vec3 n = cross(t.e, t.f), unit = (1 / norm(n)) * n;
     for (int k = 0; k < 3; ++k) {
-      low_[k].push_back(std::nextafter(float(component(t.low, k)), -kFar));
-      high_[k].push_back(std::nextafter(float(component(t.high, k)), kFar));
+      low_[k].push_back(float(component(t.low, k) - component(origin_, k)) - kSlack);
+      high_[k].push_back(float(component(t.high, k) - component(origin_, k)) + kSlack);
+      normal_[k].push_back(float(component(unit, k)));
     }
+    height_.push_back(float(dot(unit, t.a - origin_)));
     facets_.push_back(t);
   }
-  // Returns the facets whose boxes meet a box, and few others.
+  // Returns the facets whose boxes and planes meet a box, and few others.
   std::vector<const Facet*> in(const Vec3& low, const Vec3& high) const {
-    std::vector<std::int32_t> apart(facets_.size(), 0);
+    float middle[3], half[3];
     for (int k = 0; k < 3; ++k) {
-      const float from = float(component(low, k)), to = float(component(high, k));
-      for (std::size_t i = 0; i < apart.size(); ++i)
-        apart[i] |= (low_[k][i] > to) | (high_[k][i] < from);
+      middle[k] = float((component(low, k) + component(high, k)) / 2 - component(origin_, k));
+      half[k] = float(component(high, k) - component(low, k)) / 2;
     }
-    std::vector<const Facet*> in;
-    for (std::size_t i = 0; i < apart.size(); ++i)
-      if (!apart[i]) in.push_back(&facets_[i]);
+    std::vector<std::int32_t> apart(facets_.size());
+    for (std::size_t i = 0; i < apart.size(); ++i) {
+      float height = -height_[i], most = kSlack;
+      std::int32_t out = 0;
+      for (int k = 0; k < 3; ++k) {
+        out |= (low_[k][i] > middle[k] + half[k]) | (high_[k][i] < middle[k] - half[k]);
+        height += normal_[k][i] * middle[k];
+        most += std::fabs(normal_[k][i]) * half[k];
+      }
+      apart[i] = out | (std::fabs(height) > most);
+    }
+    std::vector<const Facet*> in(facets_.size());
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < apart.size(); ++i) {
+      in[count] = &facets_[i];
+      count += apart[i] == 0;
+    }
+    in.resize(count);
     return in;
   }
 
  private:
+  static constexpr float kSlack = 1e-3f;  // more than floats round by
+  Vec3 origin_;
   std::vector<Facet> facets_;
-  std::array<std::vector<float>, 3> low_, high_;
+  std::array<std::vector<float>, 3> low_, high_, normal_;
+  std::vector<float> height_;  // of the plane over the origin
 };
 
 namespace {
@@ -378,21 +398,69 @@ std::vector<RowNodes> Pockets::reached(const Masks& wet, By by) {
   return out;
 }
 
+// The reached nodes of a brick and of two more on each side: bit x + 2 of line (y + 2, z + 2).
+class Pockets::Window {
+ public:
+  Window(const Grid& grid, const NarrowBand& band, const std::array<int, 3>& brick,
+         const Masks& wet) {
+    for (std::size_t i = 0; i < 27; ++i) {
+      const int by[3] = {int(i % 3) - 1, int(i / 3 % 3) - 1, int(i / 9) - 1};
+      std::array<int, 3> at;
+      bool in = true;
+      for (std::size_t k = 0; k < 3; ++k) {
+        at[k] = brick[k] + by[k];
+        in = in && at[k] >= 0 && at[k] < grid.bricks[k];
+      }
+      const std::int32_t row = in ? band.row[grid.cell(at[0], at[1], at[2])] : -1;
+      if (row >= 0) add(wet[std::size_t(row)], by);
+    }
+    const double most = grid.reach() * grid.reach();
+    for (std::size_t i = 0; i < kInView; ++i) within_[i] = dot(along(i), along(i)) <= most;
+  }
+  // Those in the view of a node of the brick.
+  InView about(std::size_t node) const {
+    const std::size_t x = node % 8, y = node / 8 % 8, z = node / 64;
+    InView view;
+    for (std::size_t k = kAcross; k-- > 0;) {
+      std::uint32_t layer = 0;
+      for (std::size_t j = kAcross; j-- > 0;)
+        layer = layer << kAcross | (line_[z + k][y + j] >> x & ((1u << kAcross) - 1));
+      view = view << kAcross * kAcross | InView(layer);
+    }
+    return view & within_;
+  }
+
+ private:
+  static constexpr int kLines = 8 + 2 * kView;
+  void add(const NodeMask& nodes, const int (&by)[3]) {
+    for (int z = std::max(0, -kView - 8 * by[2]); z < std::min(8, 8 + kView - 8 * by[2]); ++z)
+      for (int y = std::max(0, -kView - 8 * by[1]); y < std::min(8, 8 + kView - 8 * by[1]); ++y) {
+        const std::uint32_t eight = nodes.z[std::size_t(z)] >> (8 * y) & 0xff;
+        line_[z + 8 * by[2] + kView][y + 8 * by[1] + kView] |=
+            by[0] < 0 ? eight >> (8 - kView) : eight << (8 * by[0] + kView);
+      }
+  }
+  std::uint32_t line_[kLines][kLines] = {};
+  InView within_;  // the nodes that are not too far from the middle
+};
+
 // Finds the nodes that are reached, and drops those and the nodes that are inside.
 RowNodes Pockets::judge(Row& row, const Masks& wet, By by) const {
   RowNodes found{row.row, {}};
   const std::array<int, 3> brick = grid_.place(band_.cell[row.row]);
-  Facets facets;  // near the nodes of the row
+  const Window window(grid_, band_, brick, wet);
+  const std::array<int, 3> first = {8 * brick[0], 8 * brick[1], 8 * brick[2]};
+  Facets facets({double(first[0]), double(first[1]), double(first[2])});  // in view of the row
   std::erase_if(row.nodes, [&](Node& node) {
     if (wet[row.row].get(node.place)) return true;
-    const std::array<int, 3> p = {8 * brick[0] + node.place % 8, 8 * brick[1] + node.place / 8 % 8,
-                                  8 * brick[2] + node.place / 64};
-    const InView view = wet_about(p, wet);
+    const std::array<int, 3> p = {first[0] + node.place % 8, first[1] + node.place / 8 % 8,
+                                  first[2] + node.place / 64};
+    const InView view = window.about(node.place);
     if (by == By::lines && view == node.view) return false;
     node.view = view;
     Side side = (node.linked & view).any() ? Side::outside : Side::unknown;
     if (!node.walked && view.any()) {
-      if (facets.empty()) facets = facets_of(row.row);
+      if (facets.empty()) add_facets(row.row, facets);
       side = look(facets, p, by, node);
     }
     if (side == Side::outside) found.nodes.set(node.place);
@@ -401,42 +469,26 @@ RowNodes Pockets::judge(Row& row, const Masks& wet, By by) const {
   return found;
 }
 
-// Returns the facets near the nodes of a row.
-Facets Pockets::facets_of(std::size_t row) const {
+// Adds the facets in view of the nodes of a row.
+void Pockets::add_facets(std::size_t row, Facets& facets) const {
   const Tiles& tiles = band_.tiles;
   const std::array<int, 3> brick = grid_.place(band_.cell[row]);
   const std::size_t tile = tiles.of(brick);
-  Facets facets;
+  const Vec3 slack{1e-6, 1e-6, 1e-6}, sight{kView, kView, kView},
+      first{8.0 * brick[0], 8.0 * brick[1], 8.0 * brick[2]}, from = first - sight,
+                                                             to = first + Vec3{7, 7, 7} + sight;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
     if (!(tiles.near[i] >> Tiles::bit(brick) & 1)) continue;
     const std::uint32_t triangle = tiles.triangle[i];
     const auto& t = surface_.triangles[triangle];
     const Vec3 &a = surface_.vertices[t[0]], &b = surface_.vertices[t[1]],
                &c = surface_.vertices[t[2]];
-    const Vec3 slack{1e-6, 1e-6, 1e-6};
-    facets.add({a, b - a, c - a, min(min(a, b), c) - slack, max(max(a, b), c) + slack,
-                component_[triangle]});
+    const Vec3 low = min(min(a, b), c) - slack, high = max(max(a, b), c) + slack;
+    if (low.x > to.x || low.y > to.y || low.z > to.z || high.x < from.x || high.y < from.y ||
+        high.z < from.z)
+      continue;
+    facets.add({a, b - a, c - a, low, high, component_[triangle]});
   }
-  return facets;
-}
-
-// The reached nodes in the view of a node.
-InView Pockets::wet_about(const std::array<int, 3>& p, const Masks& wet) const {
-  InView view;
-  for (std::size_t i = 0; i < view.size(); ++i) {
-    const std::array<int, 3> d = step_to(i);
-    if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > grid_.reach() * grid_.reach()) continue;
-    std::array<int, 3> n;
-    bool in = true;
-    for (std::size_t k = 0; k < 3; ++k) {
-      n[k] = p[k] + d[k];
-      in = in && n[k] >= 0 && n[k] < 8 * grid_.bricks[k];
-    }
-    const std::int32_t r = in ? band_.row[grid_.cell(n[0] / 8, n[1] / 8, n[2] / 8)] : -1;
-    view[i] = r >= 0 &&
-              wet[std::size_t(r)].get(std::size_t(((n[2] & 7) * 8 + (n[1] & 7)) * 8 + (n[0] & 7)));
-  }
-  return view;
 }
 
 // Looks along lines to the reached nodes in view; where they do not decide, may let the node walk.

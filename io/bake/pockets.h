@@ -37,11 +37,11 @@ class Pockets {
     std::uint32_t row;
     std::vector<Node> nodes;  // not yet decided
   };
+  class Window;
   enum class Side { outside, inside, unknown };
 
   RowNodes judge(Row& row, const Masks& wet, By by) const;
-  Facets facets_of(std::size_t row) const;
-  InView wet_about(const std::array<int, 3>& p, const Masks& wet) const;
+  void add_facets(std::size_t row, Facets& facets) const;
   Side look(const Facets& facets, const std::array<int, 3>& p, By by, Node& node) const;
 
   const Surface& surface_;
