@@ -89,7 +89,7 @@ void add_contact(py::module_& m) {
   c.def_readwrite("torque_length", &T::torque_length, "l0 [m]; 0: derived");
   c.def_readwrite("series_c", &T::series_c, "`series`, `firm`: net stiffness is at most c k");
   c.def_readwrite("firmness", &T::firmness, "`firm`: rho, in units of k");
-  c.def_readwrite("firmness_shallow", &T::firmness_shallow, "`firm`: rho at the surface");
+  c.def_readwrite("firmness_shallow", &T::firmness_shallow, "`firm`: rho near the surface");
   c.def_readwrite("margin_voxels", &T::margin_voxels,
                   "`series`, `firm`: takes part before it touches");
   c.def_readwrite("cluster_voxels", &T::cluster_voxels,

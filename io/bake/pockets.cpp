@@ -474,9 +474,9 @@ void Pockets::add_facets(std::size_t row, Facets& facets) const {
   const Tiles& tiles = band_.tiles;
   const std::array<int, 3> brick = grid_.place(band_.cell[row]);
   const std::size_t tile = tiles.of(brick);
-  const Vec3 slack{1e-6, 1e-6, 1e-6}, sight{kView, kView, kView},
-      first{8.0 * brick[0], 8.0 * brick[1], 8.0 * brick[2]}, from = first - sight,
-                                                             to = first + Vec3{7, 7, 7} + sight;
+  const Vec3 slack{1e-6, 1e-6, 1e-6}, sight{kView, kView, kView};
+  const Vec3 first{8.0 * brick[0], 8.0 * brick[1], 8.0 * brick[2]};
+  const Vec3 from = first - sight, to = first + Vec3{7, 7, 7} + sight;
   for (std::size_t i = tiles.first[tile]; i < tiles.first[tile + 1]; ++i) {
     if (!(tiles.near[i] >> Tiles::bit(brick) & 1)) continue;
     const std::uint32_t triangle = tiles.triangle[i];

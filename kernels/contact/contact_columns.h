@@ -87,10 +87,10 @@ void series_gap(const ContactColumns& c, const float* depth, double beta, const 
 void series_gap_ref(const ContactColumns& c, const float* depth, double beta, const double u[6],
                     float* e);
 
-// After series_solve (kernels/weights/series_solve.h: p and w, here touch [m]): kappa_i becomes the
-// stiffness at the solution, kappa_i p'(slack_i), and slack_i its share p / p', so that load_i =
-// kappa_i slack_i. Where touch is 0 both stay. weight_i = load_i / depth_i, or 0 where the depth
-// is not above 0.
+// What series_solve leaves becomes loads (kernels/weights/series_solve.h; w is touch [m]). Below w,
+// kappa is multiplied by slack/w and slack is halved; from w on, slack loses w/2. So kappa is then
+// the stiffness at the solution, and load = kappa slack. Where touch is 0 both stay. weight = load /
+// depth, or 0 where the depth is not above 0.
 struct SeriesLoads {
   float *kappa, *slack;
   const float* depth;

@@ -160,11 +160,11 @@ HWY_NOINLINE double pass_slice(const SeriesColumns& c, const SeriesParameters& p
     }
     if constexpr (kPass & kSlack)
       store_n(hn::DemoteTo(DF(), hn::Max(u, zero)), DF(), slack + i, live);
-    const auto active = hn::Gt(u, zero);
+    const auto active = hn::Gt(u, zero);  // not where u is NaN
     if (hn::AllFalse(d, active)) continue;
     if constexpr (!(kPass & kStiffen)) k = load_n(DF(), kappa + i, live);
     const VD w = hn::IfThenElseZero(active, hn::PromoteTo(d, k));
-    const Response response = respond(hn::Max(u, zero), touch);
+    const Response response = respond(hn::IfThenElseZero(active, u), touch);
     const VD load = hn::Mul(w, response.load), stiffness = hn::Mul(w, response.stiffness);
     energy = hn::MulAdd(w, response.twice_energy, energy);
     int entry = 0;

@@ -5,7 +5,7 @@
 // Lengths in metres, forces in units of k (k times a load is a force). With
 //     J_i = [N_i; (r_i x N_i)/L],  a_i = min(|J_i|^2, 2),  kappa_i = facing_i / (1 - a_i/c),  c > 2
 // the spring's extension y (m, scaled like J) is
-//     y = argmin  c/2 |y|^2 + sum_i kappa_i P(e_i - J_i.y),   P' = p,                  convex, C1
+//     y = argmin  c/2 |y|^2 + sum_i kappa_i P(e_i - J_i.y),   P' = p,        convex, C1 (C2: w > 0)
 //     p(u) = 0 for u <= 0,  u^2/(2 w) for u <= w,  u - w/2 beyond
 // and the loads are lambda_i = kappa_i p(e_i - J_i.y) >= 0, with sum_i lambda_i J_i = c y. With
 // w = 0 this is max(0, u). With w > 0 no stiffness jumps where a contact begins to carry load, and
@@ -44,8 +44,9 @@ struct SeriesResult {
 };
 
 // y: the start, and then the solution. kappa, slack (count): kappa_i and max(0, e_i - J_i.y), from
-// which series_loads (contact_columns.h) makes loads and stiffness. slack may be the column e, at the cost of a pass. A start that is not finite counts as 0. The sums over
-// slices of contacts are added in order, so any threads give the same bits.
+// which series_loads (contact_columns.h) makes loads and stiffness. slack may be the column e, at
+// the cost of a pass. A start that is not finite counts as 0. The sums over slices of contacts are
+// added in order, so any threads give the same bits.
 SeriesResult series_solve(const SeriesColumns& contacts, const SeriesParameters& parameters,
                           double y[6], float* kappa, float* slack,
                           const SliceRunner& run_slices = {});

@@ -161,7 +161,7 @@ class Contact:
     firmness: float
     """`firm`: rho, in units of k"""
     firmness_shallow: float
-    """`firm`: rho at the surface"""
+    """`firm`: rho near the surface"""
     fit: str
     """overlap at the start: 'relieve' (default) or 'tight'"""
     fit_offset: float

@@ -16,7 +16,7 @@ struct Contacts {
   float* facing;         // c = clamp(N.g / 0.25, 0, 1), or 1; `firm`: push_directions
   float* weight;         // share of the stiffness
   float* load;           // elastic force over k: weight * depth, or lambda (series) [m]
-  float *slack, *kappa;  // `series`: kernels/weights/series_solve.h               [m], [1]
+  float *slack, *kappa;  // `series`, `firm`: series_solve, then series_loads      [m], [1]
   std::uint32_t* point;  // index into the shell's points
   std::int32_t* field_body;
   std::uint32_t* cell;  // `firm`: Shell::cell; null: every contact is on its own

@@ -21,6 +21,8 @@ namespace {
 // The spring's last extension, times this, must cover its next one.
 constexpr double kAhead = 2;
 // `firm`: the slack over which a contact's stiffness grows to its whole [voxel]. METHOD.md, Sec. 3.
+// The voxel is the smallest of all fields that the body may touch, since one solve has one touch: a
+// field of coarser voxels beside a fine one gets a shorter touch than it would get alone.
 constexpr double kTouch = 0.03;
 constexpr std::size_t kGapSlice = 2048;  // contacts whose e is filled at a time
 

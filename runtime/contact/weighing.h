@@ -81,8 +81,9 @@ void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size
 // `series`.
 void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
                           sched::FrameTeam* team, void* scratch);
-// Fills kappa (from weight, the inner stiffness), slack, load (from e) and weight. y holds the
-// start and then the extension; `voxel`: of the body; `team` may be null.
+// Fills load and weight (from weight, the inner stiffness, and from load, which has e), kappa with
+// the stiffness at the solution, and slack with load / kappa. y holds the start and then the
+// extension; `voxel`: of the body; `team` may be null.
 kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double voxel, double lever,
                                    double y[6], sched::FrameTeam* team);
 inline kernels::WrenchColumns series_columns(const Contacts& c) {

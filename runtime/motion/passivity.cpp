@@ -56,7 +56,8 @@ void add_power(const Settings& set, const Body& body, const Vec6& u, const Vec6&
   power.w2 += c.dot(g);
 }
 
-// The energy in the springs of a frame's contacts [J].
+// At most about the energy in the springs of a frame's contacts [J]: under `firm` a spring that
+// stiffens holds less than half of its load times its depth.
 double elastic_energy(const Contacts& c, double stiffness) {
   double sum = 0;
   for (std::size_t i = 0; i < c.count; ++i)

@@ -75,7 +75,7 @@ constexpr Setting kContactRows[] = {
         "firm: stiffness of one direction of contact inside the common spring, in units of k, from "
         "half a voxel of depth on"),
     number<&h6ContactDef::firmness_shallow>("firmness_shallow", "", 4, between(1, 1e6),
-                                            "firm: the same at the surface"),
+                                            "firm: the same near the surface"),
     number<&h6ContactDef::margin_voxels>(
         "margin_voxels", "voxel", 0.25, between(0, 2),
         "series, firm: no point farther than this takes part before it touches"),

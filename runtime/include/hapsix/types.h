@@ -189,7 +189,7 @@ typedef struct h6ContactDef {
   double   series_c;        /* `series`, `firm`: c in (2, 1e6]; the net stiffness is at most c k           */
   double   firmness;        /* `firm`: rho, stiffness of one direction of contact inside the common
                                spring, in units of k, from half a voxel of depth on; 1 .. 1e6      */
-  double   firmness_shallow; /* `firm`: the same at the surface, 1 .. 1e6                          */
+  double   firmness_shallow; /* `firm`: the same near the surface, 1 .. 1e6                        */
   double   margin_voxels;   /* `series`, `firm`: no point farther than this takes part before it
                                touches, 0 .. 2 voxels of the field                                 */
   double   cluster_voxels;  /* `cluster`, `+cluster`: contacts nearer than this are one, in (0.01,

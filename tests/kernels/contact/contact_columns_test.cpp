@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/kernels/kernel_test.h"
+#include "tests/support/near.h"
 
 using namespace h6::kernels;
 using namespace h6::kernels::test;
@@ -96,21 +97,27 @@ TEST_CASE("contact_columns: SIMD agrees with the reference on every target, coun
       series_gap_ref(view, depth, 1e-3, u, want[4].begin());
       CHECK(worst(got[4], want[4], n, 1e-9) <= 1);
 
-      for (const float touch : {0.0f, 0.4f}) {
-        for (auto* const to : {&got, &want}) {
-          auto& out = *to;
-          for (std::size_t i = 0; i < n; ++i) {
-            out[3][i] = static_cast<float>(i % 5);
-            out[4][i] = std::max(0.0f, c.column[10][i]);  // slack
-          }
-          const SeriesLoads loads{out[3].begin(), out[4].begin(), depth,
-                                  out[5].begin(), out[6].begin(), n};
-          to == &got ? series_loads(loads, touch) : series_loads_ref(loads, touch);
-        }
-        for (std::size_t k = 3; k <= 6; ++k) {
-          CHECK(same_bits(got[k].begin(), want[k].begin(), n));
-          CHECK(got[k].padding_untouched());
-        }
+      // Slacks of none, below the touch and above it.
+      const auto slack = [](std::size_t i) { return i % 3 ? static_cast<float>(i) * 2e-5f : 0.0f; };
+      const float touch = n % 2 ? 4e-4f : 0.0f;
+      for (auto* const out : {&got, &want}) {
+        Column &kappa = (*out)[3], &left = (*out)[4];
+        for (std::size_t i = 0; i < n; ++i)
+          kappa[i] = static_cast<float>(i % 5), left[i] = slack(i);
+        const SeriesLoads loads{kappa.begin(),     left.begin(),      depth,
+                                (*out)[5].begin(), (*out)[6].begin(), n};
+        out == &got ? series_loads(loads, touch) : series_loads_ref(loads, touch);
+      }
+      for (std::size_t k = 3; k <= 6; ++k) {
+        CHECK(same_bits(got[k].begin(), want[k].begin(), n));
+        CHECK(got[k].padding_untouched());
+      }
+      for (std::size_t i = 0; i < n; ++i) {
+        const double u = slack(i), w = touch, kappa = static_cast<double>(i % 5);
+        const double stiffness = u < w ? kappa * u / w : kappa;
+        const double load = kappa * (u < w ? u * u / (2 * w) : u - w / 2);
+        CHECK(got[3][i] == h6::test::near(stiffness).epsilon(1e-6));
+        CHECK(std::fabs(got[5][i] - load) <= 1e-6 * load);
       }
     }
   });

@@ -219,7 +219,8 @@ TEST_CASE(
 
 TEST_CASE("series_solve: slices in any order give the same bits, from a start near or far off") {
   const Patch<float> p = random_patch(9001, 6);
-  const SeriesParameters q{4, 0.02};
+  SeriesParameters q{4, 0.02};
+  q.touch = 3e-5;
   const Solved<float> want(p, q);
   const SliceRunner backwards{[](void*, std::size_t slices, SliceRunner::Work work, void* context) {
     while (slices-- > 0) work(context, slices);
@@ -393,6 +394,12 @@ void check_derivative(double touch) {
   };
   const Patch<double> at = planes.moved(Vec3::Zero(), Vec3::Zero());
   const Solved<double> s(at, p);
+  // Here a slack above the touch has lost half of it, and one below is halved.
+  const auto over = [&](double least) {
+    return std::count_if(s.slack.begin(), s.slack.end(), [&](double u) { return u > least; });
+  };
+  CHECK(over(touch / 2) > 3);
+  if (touch > 0) CHECK(over(0) > over(touch / 2) + 3);
   // A = c S^-2 + sum kappa J J^T, B = sum kappa J J_g^T, unscaled; K = -c S^-2 A^-1 B + geometry.
   Mat6 scale = Mat6::Identity(), A, B = Mat6::Zero();
   scale.bottomRightCorner<3, 3>() *= L * L;

@@ -197,15 +197,40 @@ TEST_CASE("400 contacts at one place push as one does") {
   CHECK((a.K - b.K).norm() <= 1e-3 * a.K.norm());
 }
 
-TEST_CASE("a lone contact is stiffer than k, stiffens with depth, and stays below c k") {
-  double before = 1;
-  for (const double depth : {0.02, 0.1, 0.2, 0.35, 0.5}) {
+TEST_CASE("a lone contact stiffens with depth, from 0 to more than k, and stays below c k") {
+  double before = 0;
+  for (const double depth : {0.001, 0.01, 0.05, 0.1, 0.2, 0.35, 0.5}) {
     Rows one;
     one.add({0, 0, 1}, {0, 0, -5 * mm}, depth * kVoxel);
     const double stiffness = Answer(one).wrench.force.z / (1e4 * depth * kVoxel);
     CHECK(stiffness > before);
     CHECK(stiffness < 4);
+    CHECK((stiffness < 0.1) == (depth < 0.01));
+    CHECK((stiffness > 1.5) == (depth >= 0.05));
     before = stiffness;
+  }
+}
+
+TEST_CASE("a lone contact's load and derivative are those of METHOD's formula, in the touch too") {
+  h6ContactDef def = firm();
+  def.firmness = def.firmness_shallow = 4;
+  const auto load = [&](double depth) {
+    Rows one;
+    one.add({0, 0, 1}, {0, 0, -5 * mm}, depth);
+    return Answer(one, def, H6_EXACT);
+  };
+  const double touch = 0.03 * kVoxel, kappa = 4 / (1 - 1 / 4.0), small = 1e-3 * kVoxel;
+  for (const double depth : {0.01 * kVoxel, 0.03 * kVoxel, 0.3 * kVoxel}) {
+    CAPTURE(depth);
+    const Answer at = load(depth);
+    const double lambda = at.wrench.force.z / 1e4, slack = depth - lambda / 4;
+    CHECK((slack < touch) == (depth < 0.1 * kVoxel));
+    CHECK(lambda ==
+          h6::test::near(kappa * (slack < touch ? slack * slack / (2 * touch) : slack - touch / 2))
+              .epsilon(1e-4));
+    const double slope =
+        (load(depth + small).wrench.force.z - load(depth - small).wrench.force.z) / (2 * small);
+    CHECK(-at.K(2, 2) == h6::test::near(slope).epsilon(1e-2));
   }
 }
 
