@@ -3,6 +3,7 @@
 #include "io/bake/chains.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "sched/parallel_for.h"
 
@@ -193,12 +194,16 @@ Chains::Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
   });
 }
 
-void Chains::pass() {
+bool Chains::pass() {
+  std::atomic<bool> changed{false};
   for (const std::vector<std::uint32_t>& tiles : tiles_)
-    sched::parallel_for(tiles.size(), threads_, [&](std::size_t i) { pass_tile(tiles[i]); });
+    sched::parallel_for(tiles.size(), threads_, [&](std::size_t i) {
+      if (pass_tile(tiles[i])) changed.store(true, std::memory_order_relaxed);
+    });
+  return changed;
 }
 
-void Chains::pass_tile(std::size_t tile) {
+bool Chains::pass_tile(std::size_t tile) {
   thread_local const auto room = std::make_unique<ChainRoom>();
   thread_local std::vector<ChainRoom::Wanted> bricks;
   const TileRows rows(grid_, band_, reached_, tile);
@@ -208,6 +213,7 @@ void Chains::pass_tile(std::size_t tile) {
   });
   room->fill(grid_, band_, reached_, this, rows, bricks, buried_);
   constexpr std::size_t kLine = ChainRoom::kLine, kLayer = ChainRoom::kLayer;
+  bool any = false;
   for (const ChainRoom::Wanted& brick : bricks) {
     Chain* first = room->first(brick.place);
     bool changed = false;
@@ -216,12 +222,14 @@ void Chains::pass_tile(std::size_t tile) {
       changed = true;
     }
     if (!changed) continue;
+    any = true;
     const std::size_t slot = std::size_t(slot_[std::size_t(rows.row[brick.place])]);
     Chain* to = chain_.data() + slot * kBrickSamples;
     for (std::size_t n = 0; n < kBrickSamples; n += 8)
       std::copy_n(first + n / 64 * kLayer + n / 8 % 8 * kLine, 8, to + n);
     some_[slot] = 1;
   }
+  return any;
 }
 
 }  // namespace h6::io::bake

@@ -94,7 +94,7 @@ inline NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
 
 // Chains of some rows, tile by tile. Tiles of one parity are never neighbours, and the rows of a
 // tile have an order, so a pass over the eight parities gives the same bits with any number of
-// threads. A pass extends chains by at least three steps.
+// threads. A pass extends chains by up to three steps in a brick.
 inline constexpr int kStepsAPass = 3;
 class Chains {
  public:
@@ -104,7 +104,7 @@ class Chains {
   Chains(const Grid& grid, const NarrowBand& band, const Reached& reached,
          const std::vector<std::uint8_t>& rows, unsigned threads,
          const std::vector<std::uint8_t>* buried = nullptr);
-  void pass();
+  bool pass();  // false: all chains are the shortest
   bool holds(std::size_t row) const { return slot_[row] >= 0; }
   bool some(std::size_t row) const { return some_[std::size_t(slot_[row])] != 0; }
   const Chain* nodes(std::size_t row) const {
@@ -112,7 +112,7 @@ class Chains {
   }
 
  private:
-  void pass_tile(std::size_t tile);
+  bool pass_tile(std::size_t tile);  // whether a chain got shorter
 
   const Grid& grid_;
   const NarrowBand& band_;

@@ -32,8 +32,6 @@
 namespace h6::io::bake {
 namespace {
 
-constexpr int kDeepPasses = 6;  // how far buried sheets are corrected [nodes]
-
 // Whether a cell of the brick, or one that shares its nodes, has a point within the band. The
 // result is only valid where R is near.
 bool near_zero_set(const NarrowBand& band, const Around& around) {
@@ -325,12 +323,10 @@ class Look {
     }
     if (!any) return true;
     chains_ = std::make_shared<Chains>(grid_, band_, reached_, deep, threads_, &corrected_);
-    const int steps = std::max(kDeepPasses + int(offset_), hops_across());
-    const int passes = (steps + kStepsAPass - 1) / kStepsAPass;
-    for (int pass = 0; pass < passes; ++pass) {
-      chains_->pass();
-      if (!steps_.tell("sign", 0.65 + 0.05 * pass / passes)) return false;
-    }
+    // The shortest chain may have more steps than a longer one, along diagonals. So chains that stop
+    // after some passes are too long: a field baked to a tolerance was up to 1.6 tolerances too deep.
+    for (int pass = 1; chains_->pass(); ++pass)
+      if (!steps_.tell("sign", 0.7 - 0.05 / pass)) return false;
     return true;
   }
 
