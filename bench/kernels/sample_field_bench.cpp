@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // sample_field_bench.cpp - distance and gradient at n points: "near" all in bricks, "mixed" within
-// 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_corners"
+// 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_cross"
 // and "sample_ends": four and six distances about each of n points near the surface. "creased":
 // near points where one cell in ten of those at the surface is cut into quarters; "refined": where
 // every one is.
@@ -72,8 +72,8 @@ void ends(const FieldView& field, const Affine& a, const PointsView& p, float, f
 // `field` makes the field when a case first runs.
 template <class Field>
 void add_around(const std::string& rest, std::size_t n, const Field& field) {
-  add("kernels/sample_corners/" + rest, n,
-      [=] { return make_around(n, field(), 0.5f, sample_corners, sample_corners_ref); });
+  add("kernels/sample_cross/" + rest, n,
+      [=] { return make_around(n, field(), 0.25f, sample_cross, sample_cross_ref); });
   add("kernels/sample_ends/" + rest, n,
       [=] { return make_around(n, field(), 1, ends<sample_ends>, ends<sample_ends_ref>); });
 }

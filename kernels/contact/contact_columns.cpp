@@ -64,49 +64,47 @@ void facing_simd(const ContactColumns& c, float edge, float* facing) {
 struct Slope {
   hn::Vec<DF> g[3], lean;
 };
-HWY_INLINE Slope slope_at(const ContactColumns& c, const Around* around, std::size_t i,
+HWY_INLINE Slope slope_at(const ContactColumns& c, const Crosses* crosses, std::size_t i,
                           std::size_t live) {
   const DF d;
   Slope s{{load_n(d, c.gx + i, live), load_n(d, c.gy + i, live), load_n(d, c.gz + i, live)},
           hn::Set(d, 1.0f)};
-  if (!around) return s;
-  const Around& a = *around;
-  hn::Vec<DF> at[5];
-  for (int k = 0; k < 5; ++k) at[k] = load_n(d, a.at[k] + i, live);
-  const auto p = hn::Add(at[1], at[2]), m = hn::Add(at[3], at[4]);
-  const auto q = hn::Sub(at[1], at[2]), r = hn::Sub(at[3], at[4]);
-  const auto x = hn::Sub(p, m), y = hn::Add(q, r), z = hn::Sub(q, r);
+  if (!crosses) return s;
+  const Crosses& a = *crosses;
+  hn::Vec<DF> at[7];
+  for (int k = 0; k < 7; ++k) at[k] = load_n(d, a.at[k] + i, live);
+  const auto x = hn::Sub(at[1], at[2]), y = hn::Sub(at[3], at[4]), z = hn::Sub(at[5], at[6]);
   const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
-  const float reach = std::sqrt(3.0f) * a.step;
-  auto sure = hn::Sub(hn::Set(d, 2 * (a.band - reach)), hn::Mul(hn::Set(d, 2.0f), hn::Abs(at[0])));
+  auto sure = hn::Sub(hn::Set(d, 2 * (a.band - a.step)), hn::Mul(hn::Set(d, 2.0f), hn::Abs(at[0])));
   sure = hn::Min(hn::Max(sure, zero), one);
-  const auto per_step = hn::Set(d, 1 / (4 * a.step));
+  const auto per_step = hn::Set(d, 1 / (2 * a.step));
   for (int k = 0; k < 3; ++k) {
     auto turned = hn::Mul(hn::Set(d, a.turn[3 * k]), x);
     turned = hn::MulAdd(hn::Set(d, a.turn[3 * k + 1]), y, turned);
     turned = hn::MulAdd(hn::Set(d, a.turn[3 * k + 2]), z, turned);
     s.g[k] = hn::MulAdd(sure, hn::Sub(hn::Mul(turned, per_step), s.g[k]), s.g[k]);
   }
-  const auto bend = hn::NegMulAdd(hn::Set(d, 4.0f), at[0], hn::Add(p, m));
+  const auto ends =
+      hn::Add(hn::Add(hn::Add(at[1], at[2]), hn::Add(at[3], at[4])), hn::Add(at[5], at[6]));
+  const auto bend = hn::NegMulAdd(hn::Set(d, 6.0f), at[0], ends);
   const float span = kLeanFull - kLeanFrom;
-  auto shallow =
-      hn::MulAdd(hn::Set(d, 1 / (2 * a.step * span)), at[0], hn::Set(d, kLeanFull / span));
+  auto shallow = hn::MulAdd(hn::Set(d, 1 / (a.step * span)), at[0], hn::Set(d, kLeanFull / span));
   shallow = hn::Min(hn::Max(shallow, zero), one);
-  const auto sharp = hn::Mul(sure, hn::Mul(bend, hn::Set(d, 1 / (2 * a.step * a.step * kSharp))));
+  const auto sharp = hn::Mul(sure, hn::Mul(bend, hn::Set(d, 1 / (a.step * a.step * kSharp))));
   const auto bent = hn::Div(s.lean, hn::MulAdd(sharp, sharp, one));
   s.lean = hn::MulAdd(shallow, hn::Sub(bent, s.lean), s.lean);
   return s;
 }
 
-void directions_simd(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
-                     float* facing) {
+void directions_simd(const ContactColumns& c, const Crosses* crosses, float* nx, float* ny,
+                     float* nz, float* facing) {
   const DF d;
   const auto one = hn::Set(d, 1.0f), zero = hn::Zero(d);
   for (std::size_t i = 0; i < c.count; i += hn::Lanes(d)) {
     const std::size_t live = c.count - i;
     const hn::Vec<DF> N[3] = {load_n(d, c.nx + i, live), load_n(d, c.ny + i, live),
                               load_n(d, c.nz + i, live)};
-    const Slope s = slope_at(c, around, i, live);
+    const Slope s = slope_at(c, crosses, i, live);
     auto dot = hn::Mul(N[0], s.g[0]);
     dot = hn::MulAdd(N[1], s.g[1], dot);
     dot = hn::MulAdd(N[2], s.g[2], dot);
@@ -233,9 +231,9 @@ HWY_EXPORT(loads_simd);
 void contact_facing(const ContactColumns& c, float edge, float* facing) {
   HWY_DYNAMIC_DISPATCH(facing_simd)(c, edge, facing);
 }
-void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
-                     float* facing) {
-  HWY_DYNAMIC_DISPATCH(directions_simd)(c, around, nx, ny, nz, facing);
+void push_directions(const ContactColumns& c, const Crosses* crosses, float* nx, float* ny,
+                     float* nz, float* facing) {
+  HWY_DYNAMIC_DISPATCH(directions_simd)(c, crosses, nx, ny, nz, facing);
 }
 void firmness(const float* depth, std::size_t count, const Firmness& f, float* present,
               float* stiffness) {

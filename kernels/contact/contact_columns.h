@@ -18,13 +18,14 @@ struct ContactColumns {
 void contact_facing(const ContactColumns& c, float edge, float* facing);
 void contact_facing_ref(const ContactColumns& c, float edge, float* facing);
 
-// The field around a contact: distances at the contact and at the corners of a tetrahedron about
-// it, contact + step (1 1 1), (1 -1 -1), (-1 1 -1), (-1 -1 1) along the field's axes      [voxel]
-struct Around {
-  const float* at[5];
-  float step;     // half the field's finest spacing [voxel]
-  float band;     // farther from the surface than this a distance may be a bound [voxel]
-  float turn[9];  // field axes to the axes of the normals, row-major
+// Distances [voxel] at contacts and at the ends of a cross about each: the contact, + x, - x, + y,
+// - y, + z, - z along the field's axes.
+struct Crosses {
+  const float* at[7];
+  float band;      // farther from the surface than this a distance may be a bound [voxel]
+  float last[3];   // the last node of the grid on each axis; places lie from 0 to it
+  float turn[9];   // field axes to the axes of normals and gradients, row-major
+  float step = 1;  // from the contact to an end: the field's finest spacing [voxel]
 };
 inline constexpr float kMostLean = 3;  // of the direction towards the gradient
 inline constexpr float kSharp = 0.5f;  // curvature of the field that halves it [1/voxel]
@@ -38,18 +39,18 @@ inline constexpr float kStillFacing = -0.25f, kStillFacingLeaning = -0.75f;
 inline constexpr float kLeastAlong = 0.1f;  // of the direction along N, before it is made unit
 
 // The direction in which a contact pushes, and its facing factor. METHOD.md, Sec. 3, "Firm".
-//   G   the slope over the tetrahedron, which does not jump between cells; g where `around` is null
-//       or distances may be bounds
-//   q   the curvature of the field, div G, over kSharp; 0 where `around` is null
+//   G   the slope over the cross, which does not jump between cells; g where `crosses` is null or
+//       distances may be bounds
+//   q   the curvature of the field, div G, over kSharp; 0 where `crosses` is null
 //   s   clamp((depth - kLeanFrom) / (kLeanFull - kLeanFrom), 0, 1)
 //   lean      = s + (1 - s) / (1 + q^2)
 //   facing    = clamp(1 - N.G / (kStillFacing + lean (kStillFacingLeaning - kStillFacing)), 0, 1)
 //   direction = N + min(kMostLean lean, (1 - kLeastAlong) / max(0, -N.G)) G made unit; N where
 //               facing is 0
 // The direction may be written over N.
-void push_directions(const ContactColumns& c, const Around* around, float* nx, float* ny, float* nz,
-                     float* facing);
-void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
+void push_directions(const ContactColumns& c, const Crosses* crosses, float* nx, float* ny,
+                     float* nz, float* facing);
+void push_directions_ref(const ContactColumns& c, const Crosses* crosses, float* nx, float* ny,
                          float* nz, float* facing);
 
 // How much each contact counts in the density, and the stiffness rho of its direction. METHOD.md,
@@ -89,8 +90,8 @@ void series_gap_ref(const ContactColumns& c, const float* depth, double beta, co
 
 // What series_solve leaves becomes loads (kernels/weights/series_solve.h; w is touch [m]). Below w,
 // kappa is multiplied by slack/w and slack is halved; from w on, slack loses w/2. So kappa is then
-// the stiffness at the solution, and load = kappa slack. Where touch is 0 both stay. weight = load /
-// depth, or 0 where the depth is not above 0.
+// the stiffness at the solution, and load = kappa slack. Where touch is 0 both stay. weight = load
+// / depth, or 0 where the depth is not above 0.
 struct SeriesLoads {
   float *kappa, *slack;
   const float* depth;

@@ -26,29 +26,28 @@ void contact_facing_ref(const ContactColumns& c, float edge, float* facing) {
   }
 }
 
-void push_directions_ref(const ContactColumns& c, const Around* around, float* nx, float* ny,
+void push_directions_ref(const ContactColumns& c, const Crosses* crosses, float* nx, float* ny,
                          float* nz, float* facing) {
   for (std::size_t i = 0; i < c.count; ++i) {
     const double N[3] = {c.nx[i], c.ny[i], c.nz[i]};
     double G[3] = {c.gx[i], c.gy[i], c.gz[i]}, lean = 1;
-    if (around) {
-      const Around& a = *around;
-      double d[5];
-      for (int k = 0; k < 5; ++k) d[k] = a.at[k][i];
-      const double slope[3] = {(d[1] + d[2] - d[3] - d[4]) / (4 * double{a.step}),
-                               (d[1] - d[2] + d[3] - d[4]) / (4 * double{a.step}),
-                               (d[1] - d[2] - d[3] + d[4]) / (4 * double{a.step})};
-      const double curvature =
-          (d[1] + d[2] + d[3] + d[4] - 4 * d[0]) / (2 * double{a.step} * a.step);
-      const double reach = std::sqrt(3.0) * a.step;
-      const double sure = std::clamp(2 * (a.band - reach - std::fabs(d[0])), 0.0, 1.0);
+    if (crosses) {
+      const Crosses& a = *crosses;
+      double d[7], ends = 0;
+      for (int k = 0; k < 7; ++k) d[k] = a.at[k][i];
+      for (int k = 1; k < 7; ++k) ends += d[k];
+      const double step = a.step,
+                   slope[3] = {(d[1] - d[2]) / (2 * step), (d[3] - d[4]) / (2 * step),
+                               (d[5] - d[6]) / (2 * step)};
+      const double curvature = (ends - 6 * d[0]) / (step * step);
+      const double sure = std::clamp(2 * (a.band - step - std::fabs(d[0])), 0.0, 1.0);
       for (int k = 0; k < 3; ++k) {
         const double turned = double{a.turn[3 * k]} * slope[0] +
                               double{a.turn[3 * k + 1]} * slope[1] +
                               double{a.turn[3 * k + 2]} * slope[2];
         G[k] += sure * (turned - G[k]);
       }
-      const double depth = -d[0] / (2 * double{a.step});
+      const double depth = -d[0] / step;
       const double deep =
           std::clamp((depth - kLeanFrom) / (double{kLeanFull} - kLeanFrom), 0.0, 1.0);
       const double q = sure * curvature / kSharp;

@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // smooth_depths.h - depths and gradients without the error of trilinear interpolation.
 #pragma once
-#include "kernels/views.h"
+#include "kernels/contact/contact_columns.h"
 
 namespace h6::kernels {
 
-// Distances [voxel] at contacts and at the ends of a cross of one voxel about each: the contact,
-// + x, - x, + y, - y, + z, - z along the field's axes.
-struct Crosses {
-  const float* at[7];
-  float band;     // farther from the surface than this a distance may be a bound [voxel]
-  float last[3];  // the last node of the grid on each axis; places lie from 0 to it
-  float turn[9];  // field axes to the axes of the gradients, row-major
-};
-
-// Between samples a curved surface lies beside the trilinear one: METHOD.md, Sec. 3, "Firm". With t
-// the place of a contact in its cell on an axis, f the second difference over its cross on that
-// axis and s the central one,
+// Between samples a curved surface lies beside the trilinear one: METHOD.md, Sec. 3, "Firm".
+// Crosses have steps of one voxel. With t the place of a contact in its cell on an axis, f the
+// second difference over its cross on that axis and s the central one,
 //     sure   = clamp(2 room, 0, 1), room from the distance to band - 1, from the place to the
 //     grid's
 //              first or last node less 1

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// sample_around.cpp - the SIMD twin of sample_corners_ref.
+// sample_around.cpp - the SIMD twin of sample_cross_ref.
 //
-// Each axis has two values, which the corners share. Some points at a time go through three
+// Each axis has three values, which the ends share. Some points at a time go through three
 // loops: find the cells, look their bricks up, sample. So no lane waits for the memory of the step
 // before, and indices go through memory, which is cheaper than taking them out of a register.
 #include "kernels/field/sample_around.h"
@@ -21,21 +21,21 @@ namespace h6::kernels::HWY_NAMESPACE {
 
 constexpr std::size_t kBatch = 64;  // points; a multiple of every vector length
 
-// On each axis a corner lies on one of two sides.
-constexpr int kCorners = 4, kSides = 2;
-constexpr float kSide[kSides] = {-1, 1};
-constexpr int side_of(int corner, int axis) { return kCornerSign[corner][axis] > 0; }
+// On each axis an end lies on one of two sides, or beside the point.
+constexpr int kEnds = 6, kSides = 3;
+constexpr float kSide[kSides] = {-1, 0, 1};
+constexpr int side_of(int end, int axis) { return kEndSign[end][axis] + 1; }
 
 struct Batch {
-  HWY_ALIGN float fraction[3][kSides][kBatch];    // by axis and side
-  HWY_ALIGN std::int32_t slot[kCorners][kBatch];  // index in the table, then its entry
-  HWY_ALIGN std::int32_t node[kCorners][kBatch];  // then byte offset in the bricks
-  bool plain[kBatch];  // of a vector's first point: all corners lie in bricks
+  HWY_ALIGN float fraction[3][kSides][kBatch];  // by axis and side
+  HWY_ALIGN std::int32_t slot[kEnds][kBatch];   // index in the table, then its entry
+  HWY_ALIGN std::int32_t node[kEnds][kBatch];   // then byte offset in the bricks
+  bool plain[kBatch];                           // of a vector's first point: all ends lie in bricks
 };
 
 // Places in cut cells. They are sampled together, after the others.
 struct CutPlaces {
-  static constexpr std::size_t kRoom = kCorners * kBatch + hn::MaxLanes(DF());
+  static constexpr std::size_t kRoom = kEnds * kBatch + hn::MaxLanes(DF());
   std::size_t count = 0;
   std::int32_t row[kRoom], code[kRoom];  // of their bricks, of their cells
   float fraction[3][kRoom];
@@ -48,7 +48,7 @@ struct Sides {
 };
 HWY_INLINE Sides sides_of(const float* m, VF x, VF y, VF z, float step) {
   Sides sides;
-  HWY_UNROLL(2)
+  HWY_UNROLL(3)
   for (int s = 0; s < kSides; ++s) {
     const float row[4] = {m[0], m[1], m[2], m[3] + step * kSide[s]};
     sides.at[s] = affine_row(row, x, y, z);
@@ -79,8 +79,8 @@ HWY_INLINE void locate(const FieldView& field, const Affine& to_field, const Poi
       axis[a][s] = split_axis(hn::IfThenElseZero(inside, q[a].at[s]), field.size[a]);
       hn::Store(axis[a][s].fraction, d, batch.fraction[a][s] + i);
     }
-  HWY_UNROLL(4)
-  for (int c = 0; c < kCorners; ++c) {
+  HWY_UNROLL(6)
+  for (int c = 0; c < kEnds; ++c) {
     const Cell cell =
         cell_of(field, axis[0][side_of(c, 0)], axis[1][side_of(c, 1)], axis[2][side_of(c, 2)]);
     hn::Store(cell.slot, di, batch.slot[c] + i);
@@ -112,7 +112,7 @@ HWY_INLINE void list_cut(const Batch& batch, int place, std::size_t i, VI row, V
 HWY_NOINLINE void list_cut_cells(const FieldView& field, const Batch& batch, std::size_t live,
                                  std::size_t i, CutPlaces& cut) {
   const DI di;
-  for (int c = 0; c < kCorners; ++c) {
+  for (int c = 0; c < kEnds; ++c) {
     const VI entry = hn::Load(di, batch.slot[c] + i);
     const auto refined = hn::And(hn::FirstN(di, live), hn::Gt(entry, hn::Set(di, kRefined - 1)));
     if (hn::AllFalse(di, refined)) continue;
@@ -128,8 +128,8 @@ HWY_INLINE void look_up(const FieldView& field, std::size_t live, std::size_t i,
                         CutPlaces& cut) {
   const DI di;
   auto beyond_any = hn::FirstN(di, 0), refined = beyond_any;
-  HWY_UNROLL(4)
-  for (int c = 0; c < kCorners; ++c) {
+  HWY_UNROLL(6)
+  for (int c = 0; c < kEnds; ++c) {
     const VI entry = gather_entries(field.table, batch.slot[c] + i);
     hn::Store(entry, di, batch.slot[c] + i);
     const auto beyond = hn::Lt(entry, hn::Zero(di));
@@ -148,8 +148,8 @@ HWY_INLINE void sample_plain(const FieldView& field, const Batch& batch, std::si
                              std::size_t i, float* const* at, std::size_t to) {
   const DF d;
   const VF quantum = hn::Set(d, kNearQuantum);
-  HWY_UNROLL(4)
-  for (int c = 0; c < kCorners; ++c) {
+  HWY_UNROLL(6)
+  for (int c = 0; c < kEnds; ++c) {
     VI pair[4];
     gather_pairs(field.bricks, batch.node[c] + i, kNearCorners, pair);
     VF value, none;
@@ -195,7 +195,7 @@ HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
   const VF z = load_n(d, points.z + k, live);
   Sides q[3];
   for (int a = 0; a < 3; ++a) q[a] = sides_of(to_field.m[a], x, y, z, step);
-  for (int c = 0; c < kCorners; ++c) {
+  for (int c = 0; c < kEnds; ++c) {
     VF value, none;
     sample_points<false>(field, q[0].at[side_of(c, 0)], q[1].at[side_of(c, 1)],
                          q[2].at[side_of(c, 2)], value, none, none, none);
@@ -203,8 +203,8 @@ HWY_NOINLINE void sample_anew(const FieldView& field, const Affine& to_field,
   }
 }
 
-void corners_simd(const FieldView& field, const Affine& to_field, const PointsView& points,
-                  float step, float* const* at) {
+void cross_simd(const FieldView& field, const Affine& to_field, const PointsView& points,
+                float step, float* const* at) {
   const std::size_t width = hn::Lanes(DF());
   Batch batch;
   CutPlaces cut;
@@ -230,11 +230,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace h6::kernels {
 
-HWY_EXPORT(corners_simd);
+HWY_EXPORT(cross_simd);
 
-void sample_corners(const FieldView& field, const Affine& to_field, const PointsView& points,
-                    float step, float* const at[4]) {
-  HWY_DYNAMIC_DISPATCH(corners_simd)(field, to_field, points, step, at);
+void sample_cross(const FieldView& field, const Affine& to_field, const PointsView& points,
+                  float step, float* const at[6]) {
+  HWY_DYNAMIC_DISPATCH(cross_simd)(field, to_field, points, step, at);
 }
 
 }  // namespace h6::kernels

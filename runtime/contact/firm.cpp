@@ -14,23 +14,7 @@ namespace h6 {
 namespace {
 
 constexpr double kPresent = 0.1;  // the depth from which a contact counts in full [voxel]
-constexpr double kAround =
-    0.5;  // from a contact to where its field is sampled, on each axis [voxel]
 constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
-
-// Makes depths and gradients of rows begin..end-1 of one pair smooth. at[0] has their distances;
-// the others are columns that are filled later.
-void smooth_rows(Contacts& c, const Body& b, const kernels::Affine& place, std::size_t begin,
-                 std::size_t end, float* const at[7]) {
-  const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
-  kernels::sample_ends(b.field->view, place, arms, at + 1);
-  kernels::Crosses crosses{
-      {at[0], at[1], at[2], at[3], at[4], at[5], at[6]}, b.field->view.band, {}, {}};
-  for (int k = 0; k < 9; ++k) crosses.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
-  for (int k = 0; k < 3; ++k) crosses.last[k] = static_cast<float>(8 * b.field->view.size[k] - 1);
-  kernels::smooth_depths(crosses, place, arms, static_cast<float>(b.field->voxel), c.depth + begin,
-                         c.gx + begin, c.gy + begin, c.gz + begin);
-}
 
 // Rows begin..end-1 of one pair. The distances go to columns that are filled later. `shifted`:
 // depths have relief or play in them. A refined field is as exact as its tolerance says, so its
@@ -40,17 +24,24 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
   float* const at[7] = {c.tx + begin,    c.ty + begin,   c.tz + begin,    c.slack + begin,
                         c.kappa + begin, c.load + begin, c.weight + begin};
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
-  const float per_voxel = static_cast<float>(-1 / b.field->voxel);
+  const kernels::FieldView& field = b.field->view;
+  const auto per_voxel = static_cast<float>(-1 / b.field->voxel);
   for (std::size_t i = begin; i < end && !shifted; ++i) c.tx[i] = per_voxel * c.depth[i];
   if (shifted)
-    kernels::sample_field(b.field->view, place, arms, nullptr, arms.count, at[0], nullptr, nullptr,
+    kernels::sample_field(field, place, arms, nullptr, arms.count, at[0], nullptr, nullptr,
                           nullptr);
-  if (b.field->finest == b.field->voxel) smooth_rows(c, b, place, begin, end, at);
-  const auto step = static_cast<float>(kAround * b.field->finest / b.field->voxel);
-  kernels::sample_corners(b.field->view, place, arms, step, at + 1);
-  kernels::Around around{{at[0], at[1], at[2], at[3], at[4]}, step, b.field->view.band, {}};
-  for (int k = 0; k < 9; ++k) around.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
-  kernels::push_directions(kernel_columns(c, begin, end), &around, c.nx + begin, c.ny + begin,
+  kernels::Crosses crosses{{at[0], at[1], at[2], at[3], at[4], at[5], at[6]}, field.band, {}, {}};
+  for (int k = 0; k < 9; ++k) crosses.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
+  for (int k = 0; k < 3; ++k) crosses.last[k] = static_cast<float>(8 * field.size[k] - 1);
+  if (b.field->finest < b.field->voxel) {
+    crosses.step = static_cast<float>(b.field->finest / b.field->voxel);
+    kernels::sample_cross(field, place, arms, crosses.step, at + 1);
+  } else {
+    kernels::sample_ends(field, place, arms, at + 1);
+    kernels::smooth_depths(crosses, place, arms, static_cast<float>(b.field->voxel),
+                           c.depth + begin, c.gx + begin, c.gy + begin, c.gz + begin);
+  }
+  kernels::push_directions(kernel_columns(c, begin, end), &crosses, c.nx + begin, c.ny + begin,
                            c.nz + begin, c.facing + begin);
 }
 

@@ -145,25 +145,27 @@ TEST_CASE("contact_columns: firmness agrees with the reference on every target a
 
 namespace {
 
+constexpr int kCross[7][3] = {{0, 0, 0},  {1, 0, 0}, {-1, 0, 0}, {0, 1, 0},
+                              {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+
 // Distances of a plane or of a ball around contacts, in a field that is turned.
-struct AroundColumns {
+struct CrossColumns {
   std::vector<Column> at;
-  Around around{{}, 0.5f, 3.0f, {0, -1, 0, 1, 0, 0, 0, 0, 1}};
-  AroundColumns(std::size_t n, std::size_t shift) {
+  Crosses crosses{{}, 3.0f, {}, {0, -1, 0, 1, 0, 0, 0, 0, 1}, 0.5f};
+  CrossColumns(std::size_t n, std::size_t shift) {
     Random random(7 + n);
-    for (std::size_t k = 0; k < 5; ++k) at.emplace_back(n, shift + k);
+    for (std::size_t k = 0; k < 7; ++k) at.emplace_back(n, shift + k);
     for (std::size_t i = 0; i < n; ++i) {
       double slope[3];
       random.direction(slope);
       const double here = random.uniform(-3, 0.5), bend = random.uniform(-1, 1);
-      const int corner[5][3] = {{0, 0, 0}, {1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
-      for (std::size_t k = 0; k < 5; ++k) {
+      for (std::size_t k = 0; k < 7; ++k) {
         double d = here + (k > 0 ? 0.5 * 0.25 * bend : 0);
-        for (int axis = 0; axis < 3; ++axis) d += 0.5 * corner[k][axis] * slope[axis];
+        for (int axis = 0; axis < 3; ++axis) d += 0.5 * kCross[k][axis] * slope[axis];
         at[k][i] = float(d);
       }
     }
-    for (std::size_t k = 0; k < 5; ++k) around.at[k] = at[k].begin();
+    for (std::size_t k = 0; k < 7; ++k) crosses.at[k] = at[k].begin();
   }
 };
 
@@ -173,13 +175,13 @@ TEST_CASE("contact_columns: directions of push agree with the reference on every
   on_every_target([](const std::string&) {
     for (std::size_t n = 0; n <= 67; ++n) {
       Contacts c(n, n % 4);
-      AroundColumns a(n, n % 3);
-      for (const Around* around : std::initializer_list<const Around*>{nullptr, &a.around}) {
+      CrossColumns a(n, n % 3);
+      for (const Crosses* crosses : std::initializer_list<const Crosses*>{nullptr, &a.crosses}) {
         std::vector<Column> got, want;
         for (std::size_t k = 0; k < 4; ++k) got.emplace_back(n, k), want.emplace_back(n, 0);
-        push_directions(c.view(), around, got[0].begin(), got[1].begin(), got[2].begin(),
+        push_directions(c.view(), crosses, got[0].begin(), got[1].begin(), got[2].begin(),
                         got[3].begin());
-        push_directions_ref(c.view(), around, want[0].begin(), want[1].begin(), want[2].begin(),
+        push_directions_ref(c.view(), crosses, want[0].begin(), want[1].begin(), want[2].begin(),
                             want[3].begin());
         // A direction may be the small difference of N and three times G.
         for (std::size_t k = 0; k < 4; ++k) CHECK(worst(got[k], want[k], n, 5e-6) <= 1);
@@ -202,18 +204,43 @@ TEST_CASE(
   const float n[3] = {1, 0, 0}, g[3] = {0, 0, 1}, zero[3] = {0, 0, 0};
   const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, zero, zero, zero, 1};
   const auto push_of = [&](double bend) {
-    float at[5], to[3], facing;
-    const double height[5] = {0, 0.5, -0.5, -0.5, 0.5};
-    for (int k = 0; k < 5; ++k) at[k] = float(-0.2 + height[k] + (k > 0 ? 0.125 * bend : 0));
-    const Around around{
-        {at, at + 1, at + 2, at + 3, at + 4}, 0.5f, 3.0f, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    push_directions_ref(one, &around, to, to + 1, to + 2, &facing);
+    float at[7], to[3], facing;
+    for (int k = 0; k < 7; ++k) at[k] = float(-0.2 + kCross[k][2] + (k > 0 ? bend / 6 : 0));
+    const Crosses crosses{{at, at + 1, at + 2, at + 3, at + 4, at + 5, at + 6},
+                          3.0f,
+                          {},
+                          {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    push_directions_ref(one, &crosses, to, to + 1, to + 2, &facing);
     CHECK(facing == 1);  // an edge without a normal along the push still pushes
     return double{to[2]};
   };
   CHECK(push_of(0) > 0.94);  // a knife edge on a block: mostly along the block's gradient
   CHECK(push_of(8) < 0.2);   // a block on a knife edge: mostly along the block's normal
   for (double bend = 0; bend < 8; bend += 0.5) CHECK(push_of(bend + 0.5) < push_of(bend));
+}
+
+TEST_CASE("contact_columns: nothing pushes along a prism, however the lattice lies about it") {
+  // The distance near an edge or a groove that runs along z, turned about z. Four distances at the
+  // corners of a tetrahedron take its curvature for a slope along z.
+  const float n[3] = {-1, 0, 0}, g[3] = {1, 0, 0}, zero[3] = {0, 0, 0};
+  const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, zero, zero, zero, 1};
+  for (double turn = 0; turn < 6.3; turn += 0.1)
+    for (const double curvature : {-1.0, 0.3, 2.0})
+      for (const float step : {0.25f, 1.0f}) {
+        const double c = std::cos(turn), s = std::sin(turn);
+        float at[7], to[3], facing;
+        for (int k = 0; k < 7; ++k) {
+          const double x = step * kCross[k][0], y = step * kCross[k][1], across = c * y - s * x;
+          at[k] = float(-0.1 + c * x + s * y + 0.5 * curvature * across * across);
+        }
+        const Crosses crosses{{at, at + 1, at + 2, at + 3, at + 4, at + 5, at + 6},
+                              3.0f,
+                              {},
+                              {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                              step};
+        push_directions_ref(one, &crosses, to, to + 1, to + 2, &facing);
+        CHECK(std::fabs(to[2]) < 1e-6);
+      }
 }
 
 TEST_CASE("contact_columns: a torque direction is square to its normal, of length 1 without l0") {

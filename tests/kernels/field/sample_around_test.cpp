@@ -31,11 +31,9 @@ struct Points {
   PointsView view(std::size_t n) { return {x.begin(), y.begin(), z.begin(), n}; }
 };
 
-// The places about a point, and the kernels that sample there.
+// The kernels that sample at the ends of a cross.
 using Kernel = void (*)(const FieldView&, const Affine&, const PointsView&, float, float* const*);
 struct Pattern {
-  std::size_t count;
-  const int (*sign)[3];
   Kernel kernel, reference;
   float step;
   float error;  // 0: every bit is the same
@@ -44,9 +42,9 @@ template <void (*kKernel)(const FieldView&, const Affine&, const PointsView&, fl
 void ends(const FieldView& field, const Affine& a, const PointsView& p, float, float* const* at) {
   kKernel(field, a, p, at);
 }
-const Pattern kPatterns[] = {{4, kCornerSign, sample_corners, sample_corners_ref, 0.5f, 0},
-                             {4, kCornerSign, sample_corners, sample_corners_ref, 0.125f, 0},
-                             {6, kEndSign, ends<sample_ends>, ends<sample_ends_ref>, 1.0f, 5e-5f}};
+const Pattern kPatterns[] = {{sample_cross, sample_cross_ref, 0.5f, 0},
+                             {sample_cross, sample_cross_ref, 0.25f, 0},
+                             {ends<sample_ends>, ends<sample_ends_ref>, 1.0f, 5e-5f}};
 
 struct Samples {
   std::vector<Column> at;
@@ -65,10 +63,9 @@ void agree(const Pattern& pattern, const AnalyticField& field, const Affine& a, 
            std::size_t n) {
   Samples got(n, 1), want(n, 0);
   got.take(pattern.kernel, field, a, p.view(n), pattern.step);
-  for (std::size_t c = 0; c < pattern.count; ++c) {
+  for (std::size_t c = 0; c < 6; ++c) {
     Affine to = a;
-    for (int axis = 0; axis < 3; ++axis)
-      to.m[axis][3] += pattern.step * float(pattern.sign[c][axis]);
+    for (int axis = 0; axis < 3; ++axis) to.m[axis][3] += pattern.step * float(kEndSign[c][axis]);
     sample_field(field.view(), to, p.view(n), nullptr, n, want.at[c].begin(), nullptr, nullptr,
                  nullptr);
     if (pattern.error == 0) CHECK(same_bits(got.at[c].begin(), want.at[c].begin(), n));
@@ -107,8 +104,8 @@ TEST_CASE("sample_around: the places lie where their signs say") {
     Samples got(n, 0), ref(n, 0);
     got.take(pattern.kernel, clutter_field(), kIdentity, p.view(n), pattern.step);
     ref.take(pattern.reference, clutter_field(), kIdentity, p.view(n), pattern.step);
-    for (std::size_t c = 0; c < pattern.count; ++c) {
-      const int* sign = pattern.sign[c];
+    for (std::size_t c = 0; c < 6; ++c) {
+      const int* sign = kEndSign[c];
       for (std::size_t i = 0; i < n; ++i) {
         moved.x[i] = p.x[i] + pattern.step * float(sign[0]);
         moved.y[i] = p.y[i] + pattern.step * float(sign[1]);
@@ -139,7 +136,7 @@ TEST_CASE("sample_around: no point's bits depend on its neighbours") {
       }
       other.x[30] = std::numeric_limits<float>::quiet_NaN();
       beside.take(pattern.kernel, clutter_field(), kTurned, other.view(n), pattern.step);
-      for (std::size_t c = 0; c < pattern.count; ++c)
+      for (std::size_t c = 0; c < 6; ++c)
         for (std::size_t i = 0; i < n; ++i)
           if (i % 3 != 0) CHECK(alone.at[c][i] == beside.at[c][i]);
     }
