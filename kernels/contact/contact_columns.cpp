@@ -88,7 +88,8 @@ HWY_INLINE Slope slope_at(const ContactColumns& c, const Crosses* crosses, std::
       hn::Add(hn::Add(hn::Add(at[1], at[2]), hn::Add(at[3], at[4])), hn::Add(at[5], at[6]));
   const auto bend = hn::NegMulAdd(hn::Set(d, 6.0f), at[0], ends);
   const float span = kLeanFull - kLeanFrom;
-  auto shallow = hn::MulAdd(hn::Set(d, 1 / (a.step * span)), at[0], hn::Set(d, kLeanFull / span));
+  auto shallow =
+      hn::MulAdd(hn::Set(d, 1 / (2 * a.step * span)), at[0], hn::Set(d, kLeanFull / span));
   shallow = hn::Min(hn::Max(shallow, zero), one);
   const auto sharp = hn::Mul(sure, hn::Mul(bend, hn::Set(d, 1 / (a.step * a.step * kSharp))));
   const auto bent = hn::Div(s.lean, hn::MulAdd(sharp, sharp, one));

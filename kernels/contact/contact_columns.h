@@ -25,7 +25,7 @@ struct Crosses {
   float band;      // farther from the surface than this a distance may be a bound [voxel]
   float last[3];   // the last node of the grid on each axis; places lie from 0 to it
   float turn[9];   // field axes to the axes of normals and gradients, row-major
-  float step = 1;  // from the contact to an end: the field's finest spacing [voxel]
+  float step = 1;  // from the contact to an end [voxel]
 };
 inline constexpr float kMostLean = 3;  // of the direction towards the gradient
 inline constexpr float kSharp = 0.5f;  // curvature of the field that halves it [1/voxel]
@@ -39,6 +39,7 @@ inline constexpr float kStillFacing = -0.25f, kStillFacingLeaning = -0.75f;
 inline constexpr float kLeastAlong = 0.1f;  // of the direction along N, before it is made unit
 
 // The direction in which a contact pushes, and its facing factor. METHOD.md, Sec. 3, "Firm".
+// Crosses have steps of half the field's finest spacing.
 //   G   the slope over the cross, which does not jump between cells; g where `crosses` is null or
 //       distances may be bounds
 //   q   the curvature of the field, div G, over kSharp; 0 where `crosses` is null

@@ -47,7 +47,7 @@ void push_directions_ref(const ContactColumns& c, const Crosses* crosses, float*
                               double{a.turn[3 * k + 2]} * slope[2];
         G[k] += sure * (turned - G[k]);
       }
-      const double depth = -d[0] / step;
+      const double depth = -d[0] / (2 * step);
       const double deep =
           std::clamp((depth - kLeanFrom) / (double{kLeanFull} - kLeanFrom), 0.0, 1.0);
       const double q = sure * curvature / kSharp;

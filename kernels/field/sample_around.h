@@ -16,11 +16,12 @@ void sample_cross(const FieldView& field, const Affine& to_field, const PointsVi
 void sample_cross_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
                       float step, float* const at[6]);
 
-// The same with steps of one voxel. Each end has the fractions of the point's own cell, so its
-// distance differs from that of sample_field by rounding: 1e-4 voxel in grids of 1,024.
+// The same with steps of one voxel, at[0 .. 5], and of half a voxel, at[6 .. 11]. Each place has
+// the fractions of the point's own cell, so its distance differs from that of sample_field by
+// rounding: 1e-4 voxel in grids of 1,024.
 void sample_ends(const FieldView& field, const Affine& to_field, const PointsView& points,
-                 float* const at[6]);
+                 float* const at[12]);
 void sample_ends_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
-                     float* const at[6]);
+                     float* const at[12]);
 
 }  // namespace h6::kernels

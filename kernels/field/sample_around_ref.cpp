@@ -15,8 +15,9 @@ void sample_cross_ref(const FieldView& field, const Affine& to_field, const Poin
 }
 
 void sample_ends_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
-                     float* const at[6]) {
+                     float* const at[12]) {
   sample_cross_ref(field, to_field, points, 1, at);
+  sample_cross_ref(field, to_field, points, 0.5f, at + 6);
 }
 
 }  // namespace h6::kernels

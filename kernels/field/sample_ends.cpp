@@ -2,11 +2,12 @@
 // sample_ends.cpp - the SIMD twin of sample_ends_ref.
 //
 // The ends of a cross of one voxel lie in the six cells beside the point's own, each at the point's
-// place in its cell. All seven cells have 32 nodes, since every node of the point's own is in three
-// of the others; so 16 pairs are fetched in place of 24. Some points at a time go through three
-// loops, as in sample_around.cpp. Where every end fetched its own nodes this kernel took 1.12 times
-// as long, and a frame of 1,000 contacts 1.05 times (kernels/sample_ends, frame/clutter,
-// frame/conforming; AVX2).
+// place in its cell, and the places half-way there lie in these cells or in its own. All seven
+// cells have 32 nodes, since every node of the point's own is in three of the others; so 16 pairs
+// are fetched in place of 24. Some points at a time go through three loops, as in
+// sample_around.cpp. Where every end fetched its own nodes this kernel took 1.12 times as long, and
+// a frame of 1,000 contacts 1.05 times (kernels/sample_ends, frame/clutter, frame/conforming;
+// AVX2).
 #include "kernels/field/sample_around.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -112,39 +113,60 @@ HWY_INLINE void two_rows(const FieldView& field, const std::int32_t* at, const i
   for (int k = 0; k < 2; ++k) row[k] = lerp(low_half(pair[k]), high_half(pair[k]), x);
 }
 
+// Along one axis the distance is linear from plane to plane of nodes. Writes the values at the ends
+// of the cross and half-way there. `plane`: bilinear in the planes before the point's cell, of the
+// cell and behind it; t: the point's place between the middle ones.
+HWY_INLINE void put_axis(int axis, const VF (&plane)[4], VF t, std::size_t live, float* const* at,
+                         std::size_t to) {
+  const DF d;
+  const VF quantum = hn::Set(d, kNearQuantum), half = hn::Set(d, 0.5f);
+  const auto put = [&](int column, VF value)
+                       HWY_ATTR { store_n(hn::Mul(value, quantum), d, at[column] + to, live); };
+  put(2 * axis, lerp(plane[2], plane[3], t));
+  put(2 * axis + 1, lerp(plane[0], plane[1], t));
+  const auto low = hn::Lt(t, half);
+  const VF u = hn::IfThenElse(low, hn::Add(t, half), hn::Sub(t, half));
+  const VF first = hn::IfThenElse(low, plane[0], plane[1]);
+  const VF middle = hn::IfThenElse(low, plane[1], plane[2]);
+  const VF last = hn::IfThenElse(low, plane[2], plane[3]);
+  put(kEnds + 2 * axis, lerp(middle, last, u));
+  put(kEnds + 2 * axis + 1, lerp(first, middle, u));
+}
+
 HWY_INLINE void sample_between(const FieldView& field, const EndBatch& batch, std::size_t live,
                                std::size_t i, float* const* at, std::size_t to) {
   const DF d;
-  const VF quantum = hn::Set(d, kNearQuantum);
   const VF x = hn::Load(d, batch.fraction[0] + i), y = hn::Load(d, batch.fraction[1] + i);
   const VF z = hn::Load(d, batch.fraction[2] + i);
-  const auto put = [&](int end, VF value)
-                       HWY_ATTR { store_n(hn::Mul(value, quantum), d, at[end] + to, live); };
   constexpr const int(&c)[4] = kNearCorners;
   VI ahead[4], before[4];
   gather_pairs(field.bricks, batch.node[0] + i, c, ahead);
   gather_pairs(field.bricks, batch.node[1] + i, c, before);
-  // Rows are y0z0, y1z0, y0z1, y1z1: those of the point's cell, of the one ahead and of the one
-  // before.
-  VF row[4], front[4], back[4];
+  // Rows are y0z0, y1z0, y0z1, y1z1.
+  VF node[4][4], row[4], plane[4];
   HWY_UNROLL(4)
   for (int k = 0; k < 4; ++k) {
-    const VF x0 = high_half(before[k]), x1 = low_half(ahead[k]);
-    row[k] = lerp(x0, x1, x);
-    front[k] = lerp(x1, high_half(ahead[k]), x);
-    back[k] = lerp(low_half(before[k]), x0, x);
+    node[0][k] = low_half(before[k]), node[1][k] = high_half(before[k]);
+    node[2][k] = low_half(ahead[k]), node[3][k] = high_half(ahead[k]);
+    row[k] = lerp(node[1][k], node[2][k], x);
   }
-  put(0, lerp(lerp(front[0], front[1], y), lerp(front[2], front[3], y), z));
-  put(1, lerp(lerp(back[0], back[1], y), lerp(back[2], back[3], y), z));
+  HWY_UNROLL(4)
+  for (int k = 0; k < 4; ++k)
+    plane[k] = lerp(lerp(node[k][0], node[k][1], y), lerp(node[k][2], node[k][3], y), z);
+  put_axis(0, plane, x, live, at, to);
   VF far[2];
-  two_rows(field, batch.node[2] + i, {c[1], c[3]}, x, far);
-  put(2, lerp(lerp(row[1], far[0], y), lerp(row[3], far[1], y), z));
   two_rows(field, batch.node[3] + i, {c[0], c[2]}, x, far);
-  put(3, lerp(lerp(far[0], row[0], y), lerp(far[1], row[2], y), z));
-  two_rows(field, batch.node[4] + i, {c[2], c[3]}, x, far);
-  put(4, lerp(lerp(row[2], row[3], y), lerp(far[0], far[1], y), z));
+  plane[0] = lerp(far[0], far[1], z);
+  plane[1] = lerp(row[0], row[2], z), plane[2] = lerp(row[1], row[3], z);
+  two_rows(field, batch.node[2] + i, {c[1], c[3]}, x, far);
+  plane[3] = lerp(far[0], far[1], z);
+  put_axis(1, plane, y, live, at, to);
   two_rows(field, batch.node[5] + i, {c[0], c[1]}, x, far);
-  put(5, lerp(lerp(far[0], far[1], y), lerp(row[0], row[1], y), z));
+  plane[0] = lerp(far[0], far[1], y);
+  plane[1] = lerp(row[0], row[1], y), plane[2] = lerp(row[2], row[3], y);
+  two_rows(field, batch.node[4] + i, {c[2], c[3]}, x, far);
+  plane[3] = lerp(far[0], far[1], y);
+  put_axis(2, plane, z, live, at, to);
 }
 
 // Samples the points that have an end outside the grid, in a far cell or in a brick with finer
@@ -154,9 +176,10 @@ HWY_NOINLINE void sample_ends_anew(const FieldView& field, const Affine& to_fiel
                                    float* const* at) {
   const DF d;
   const std::size_t live = points.count - k;
-  for (int c = 0; c < kEnds; ++c) {
+  for (int c = 0; c < 2 * kEnds; ++c) {
     Affine to = to_field;
-    for (int a = 0; a < 3; ++a) to.m[a][3] += static_cast<float>(kEndSign[c][a]);
+    const float step = c < kEnds ? 1.0f : 0.5f;
+    for (int a = 0; a < 3; ++a) to.m[a][3] += step * static_cast<float>(kEndSign[c % kEnds][a]);
     const Places q = places_of(to, points, k);
     VF value, none;
     sample_points<false>(field, q.x, q.y, q.z, value, none, none, none);
@@ -196,7 +219,7 @@ namespace h6::kernels {
 HWY_EXPORT(ends_simd);
 
 void sample_ends(const FieldView& field, const Affine& to_field, const PointsView& points,
-                 float* const at[6]) {
+                 float* const at[12]) {
   HWY_DYNAMIC_DISPATCH(ends_simd)(field, to_field, points, at);
 }
 

@@ -16,15 +16,18 @@ namespace {
 constexpr double kPresent = 0.1;  // the depth from which a contact counts in full [voxel]
 constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
 
-// Rows begin..end-1 of one pair. The distances go to columns that are filled later. `shifted`:
-// depths have relief or play in them. A refined field is as exact as its tolerance says, so its
-// depths stay as they are.
+// At most kDirectionSlice rows, begin..end-1, of one pair. Distances at the contacts and a voxel
+// away go to columns that are filled later. `shifted`: depths have relief or play in them. A
+// refined field is as exact as its tolerance says, so its depths stay as they are.
 void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool shifted,
                std::size_t begin, std::size_t end) {
-  float* const at[7] = {c.tx + begin,    c.ty + begin,   c.tz + begin,    c.slack + begin,
-                        c.kappa + begin, c.load + begin, c.weight + begin};
-  const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
   const kernels::FieldView& field = b.field->view;
+  const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
+  float half_way[6][kDirectionSlice];
+  float* const at[13] = {c.tx + begin,    c.ty + begin,   c.tz + begin,     c.slack + begin,
+                         c.kappa + begin, c.load + begin, c.weight + begin, half_way[0],
+                         half_way[1],     half_way[2],    half_way[3],      half_way[4],
+                         half_way[5]};
   const auto per_voxel = static_cast<float>(-1 / b.field->voxel);
   for (std::size_t i = begin; i < end && !shifted; ++i) c.tx[i] = per_voxel * c.depth[i];
   if (shifted)
@@ -33,14 +36,16 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
   kernels::Crosses crosses{{at[0], at[1], at[2], at[3], at[4], at[5], at[6]}, field.band, {}, {}};
   for (int k = 0; k < 9; ++k) crosses.turn[k] = static_cast<float>(b.R(k / 3, k % 3));
   for (int k = 0; k < 3; ++k) crosses.last[k] = static_cast<float>(8 * field.size[k] - 1);
+  const auto step = static_cast<float>(b.field->finest / (2 * b.field->voxel));
   if (b.field->finest < b.field->voxel) {
-    crosses.step = static_cast<float>(b.field->finest / b.field->voxel);
-    kernels::sample_cross(field, place, arms, crosses.step, at + 1);
+    kernels::sample_cross(field, place, arms, step, at + 7);
   } else {
     kernels::sample_ends(field, place, arms, at + 1);
     kernels::smooth_depths(crosses, place, arms, static_cast<float>(b.field->voxel),
                            c.depth + begin, c.gx + begin, c.gy + begin, c.gz + begin);
   }
+  crosses.step = step;
+  for (int k = 1; k < 7; ++k) crosses.at[k] = at[6 + k];
   kernels::push_directions(kernel_columns(c, begin, end), &crosses, c.nx + begin, c.ny + begin,
                            c.nz + begin, c.facing + begin);
 }

@@ -205,11 +205,13 @@ TEST_CASE(
   const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, zero, zero, zero, 1};
   const auto push_of = [&](double bend) {
     float at[7], to[3], facing;
-    for (int k = 0; k < 7; ++k) at[k] = float(-0.2 + kCross[k][2] + (k > 0 ? bend / 6 : 0));
+    for (int k = 0; k < 7; ++k)
+      at[k] = float(-0.2 + 0.5 * kCross[k][2] + (k > 0 ? 0.25 * bend / 6 : 0));
     const Crosses crosses{{at, at + 1, at + 2, at + 3, at + 4, at + 5, at + 6},
                           3.0f,
                           {},
-                          {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+                          {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                          0.5f};
     push_directions_ref(one, &crosses, to, to + 1, to + 2, &facing);
     CHECK(facing == 1);  // an edge without a normal along the push still pushes
     return double{to[2]};
@@ -226,7 +228,7 @@ TEST_CASE("contact_columns: nothing pushes along a prism, however the lattice li
   const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, zero, zero, zero, 1};
   for (double turn = 0; turn < 6.3; turn += 0.1)
     for (const double curvature : {-1.0, 0.3, 2.0})
-      for (const float step : {0.25f, 1.0f}) {
+      for (const float step : {0.125f, 0.5f}) {
         const double c = std::cos(turn), s = std::sin(turn);
         float at[7], to[3], facing;
         for (int k = 0; k < 7; ++k) {
