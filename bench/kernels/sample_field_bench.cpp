@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // sample_field_bench.cpp - distance and gradient at n points: "near" all in bricks, "mixed" within
 // 20 voxels of the surface. The set stays in cache between runs when it fits. "sample_cross"
-// and "sample_ends": four and six distances about each of n points near the surface. "creased":
+// and "sample_ends": six and twelve distances about each of n points near the surface. "creased":
 // near points where one cell in ten of those at the surface is cut into quarters; "refined": where
 // every one is.
 #include "kernels/field/sample_field.h"
@@ -19,9 +19,9 @@ using namespace h6::kernels::bench;
 struct Data {
   const test::AnalyticField& field;
   ShellPoints points;
-  std::vector<float> out[6], want[6];
+  std::vector<float> out[12], want[12];
   Data(std::size_t n, double spread, const test::AnalyticField& in) : field(in), points(n, spread) {
-    for (int k = 0; k < 6; ++k) out[k].resize(n), want[k].resize(n);
+    for (int k = 0; k < 12; ++k) out[k].resize(n), want[k].resize(n);
   }
 };
 
@@ -35,15 +35,15 @@ void call(const Kernel& kernel, const Data& d, std::vector<float>* out) {
 using Around = void (*)(const FieldView&, const Affine&, const PointsView&, float, float* const*);
 
 void call_around(Around kernel, float step, const Data& d, std::vector<float>* out) {
-  float* at[6];
-  for (int k = 0; k < 6; ++k) at[k] = out[k].data();
+  float* at[12];
+  for (int k = 0; k < 12; ++k) at[k] = out[k].data();
   kernel(d.field.view(), test::kIdentity,
          PointsView{d.points.x.data(), d.points.y.data(), d.points.z.data(), d.points.x.size()},
          step, at);
 }
 
 bool agrees(const Data& d) {
-  for (int k = 0; k < 6; ++k)
+  for (int k = 0; k < 12; ++k)
     for (std::size_t i = 0; i < d.out[k].size(); ++i)
       if (!(std::fabs(d.out[k][i] - d.want[k][i]) <= 1e-4f)) return false;
   return true;
@@ -66,11 +66,7 @@ Case make_around(std::size_t n, const test::AnalyticField& field, float step, Ar
 
 template <void (*kKernel)(const FieldView&, const Affine&, const PointsView&, float* const*)>
 void ends(const FieldView& field, const Affine& a, const PointsView& p, float, float* const* at) {
-  static std::vector<float> half_way[6];
-  float* to[12];
-  for (int k = 0; k < 6; ++k)
-    half_way[k].resize(p.count), to[k] = at[k], to[6 + k] = half_way[k].data();
-  kKernel(field, a, p, to);
+  kKernel(field, a, p, at);
 }
 
 // `field` makes the field when a case first runs.

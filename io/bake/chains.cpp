@@ -203,6 +203,8 @@ bool Chains::pass() {
   return changed;
 }
 
+constexpr int kStepsAPass = 3;  // in each brick
+
 bool Chains::pass_tile(std::size_t tile) {
   thread_local const auto room = std::make_unique<ChainRoom>();
   thread_local std::vector<ChainRoom::Wanted> bricks;

@@ -94,8 +94,7 @@ inline NodeMask spread(const std::array<const NodeMask*, 27>& nodes) {
 
 // Chains of some rows, tile by tile. Tiles of one parity are never neighbours, and the rows of a
 // tile have an order, so a pass over the eight parities gives the same bits with any number of
-// threads. A pass extends chains by up to three steps in a brick.
-inline constexpr int kStepsAPass = 3;
+// threads. A pass extends every chain that is not the shortest by one step at least.
 class Chains {
  public:
   // `rows`: the rows that hold chains. `buried` (must outlive this): the rows with a buried sheet

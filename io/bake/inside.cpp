@@ -323,8 +323,9 @@ class Look {
     }
     if (!any) return true;
     chains_ = std::make_shared<Chains>(grid_, band_, reached_, deep, threads_, &corrected_);
-    // The shortest chain may have more steps than a longer one, along diagonals. So chains that stop
-    // after some passes are too long: a field baked to a tolerance was up to 1.6 tolerances too deep.
+    // A chain along diagonals has fewer steps than a shorter one along the axes. So chains that
+    // stop after some passes are too long: places in a field baked to a tolerance were wrong by up
+    // to 1.6 tolerances.
     for (int pass = 1; chains_->pass(); ++pass)
       if (!steps_.tell("sign", 0.7 - 0.05 / pass)) return false;
     return true;

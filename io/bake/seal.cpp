@@ -46,7 +46,9 @@ Masks swept(const Grid& grid, const NarrowBand& band, const Reached& wide, doubl
   std::vector<std::uint8_t> rows(band.rows());
   for (std::size_t r = 0; r < rows.size(); ++r) rows[r] = (band.free[r] & ~wide.node[r]).any();
   Chains chains(grid, band, wide, rows, threads);
-  for (int steps = 0; steps < int(radius) + 2; steps += kStepsAPass) chains.pass();
+  // A pass extends chains by one step at least: more end at the borders of bricks.
+  for (int step = 0; step < int(radius) + 2 && chains.pass(); ++step) {
+  }
   const int touch = int(grid.offset / double(kChainUnit));
   return for_rows(band, threads, [&](std::size_t r) {
     NodeMask mask = wide.node[r];

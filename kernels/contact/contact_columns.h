@@ -19,7 +19,7 @@ void contact_facing(const ContactColumns& c, float edge, float* facing);
 void contact_facing_ref(const ContactColumns& c, float edge, float* facing);
 
 // Distances [voxel] at contacts and at the ends of a cross about each: the contact, + x, - x, + y,
-// - y, + z, - z along the field's axes.
+// - y, + z, - z along the field's axes. smooth_depths reads `last`, push_directions `step`.
 struct Crosses {
   const float* at[7];
   float band;      // farther from the surface than this a distance may be a bound [voxel]

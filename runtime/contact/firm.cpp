@@ -23,6 +23,7 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
                std::size_t begin, std::size_t end) {
   const kernels::FieldView& field = b.field->view;
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
+  // Half the finest spacing away. The contacts have no more columns that are filled later.
   float half_way[6][kDirectionSlice];
   float* const at[13] = {c.tx + begin,    c.ty + begin,   c.tz + begin,     c.slack + begin,
                          c.kappa + begin, c.load + begin, c.weight + begin, half_way[0],

@@ -151,8 +151,9 @@ constexpr int kCross[7][3] = {{0, 0, 0},  {1, 0, 0}, {-1, 0, 0}, {0, 1, 0},
 // Distances of a plane or of a ball around contacts, in a field that is turned.
 struct CrossColumns {
   std::vector<Column> at;
-  Crosses crosses{{}, 3.0f, {}, {0, -1, 0, 1, 0, 0, 0, 0, 1}, 0.5f};
-  CrossColumns(std::size_t n, std::size_t shift) {
+  Crosses crosses{{}, 3.0f, {}, {0, -1, 0, 1, 0, 0, 0, 0, 1}};
+  CrossColumns(std::size_t n, std::size_t shift, float step) {
+    crosses.step = step;
     Random random(7 + n);
     for (std::size_t k = 0; k < 7; ++k) at.emplace_back(n, shift + k);
     for (std::size_t i = 0; i < n; ++i) {
@@ -160,8 +161,8 @@ struct CrossColumns {
       random.direction(slope);
       const double here = random.uniform(-3, 0.5), bend = random.uniform(-1, 1);
       for (std::size_t k = 0; k < 7; ++k) {
-        double d = here + (k > 0 ? 0.5 * 0.25 * bend : 0);
-        for (int axis = 0; axis < 3; ++axis) d += 0.5 * kCross[k][axis] * slope[axis];
+        double d = here + (k > 0 ? 0.5 * step * step * bend : 0);
+        for (int axis = 0; axis < 3; ++axis) d += step * kCross[k][axis] * slope[axis];
         at[k][i] = float(d);
       }
     }
@@ -175,7 +176,7 @@ TEST_CASE("contact_columns: directions of push agree with the reference on every
   on_every_target([](const std::string&) {
     for (std::size_t n = 0; n <= 67; ++n) {
       Contacts c(n, n % 4);
-      CrossColumns a(n, n % 3);
+      CrossColumns a(n, n % 3, n % 2 == 0 ? 0.5f : 0.125f);
       for (const Crosses* crosses : std::initializer_list<const Crosses*>{nullptr, &a.crosses}) {
         std::vector<Column> got, want;
         for (std::size_t k = 0; k < 4; ++k) got.emplace_back(n, k), want.emplace_back(n, 0);
@@ -183,8 +184,10 @@ TEST_CASE("contact_columns: directions of push agree with the reference on every
                         got[3].begin());
         push_directions_ref(c.view(), crosses, want[0].begin(), want[1].begin(), want[2].begin(),
                             want[3].begin());
-        // A direction may be the small difference of N and three times G.
-        for (std::size_t k = 0; k < 4; ++k) CHECK(worst(got[k], want[k], n, 5e-6) <= 1);
+        // A direction may be the small difference of N and three times G, and the curvature divides
+        // differences of distances by the square of the step.
+        const double step = a.crosses.step, most = 5e-6 * 0.25 / (step * step);
+        for (std::size_t k = 0; k < 4; ++k) CHECK(worst(got[k], want[k], n, most) <= 1);
         for (std::size_t i = 0; i < n; ++i) {
           double length2 = 0, along = 0;
           for (std::size_t k = 0; k < 3; ++k) {
@@ -222,27 +225,35 @@ TEST_CASE(
 }
 
 TEST_CASE("contact_columns: nothing pushes along a prism, however the lattice lies about it") {
-  // The distance near an edge or a groove that runs along z, turned about z. Four distances at the
-  // corners of a tetrahedron take its curvature for a slope along z.
-  const float n[3] = {-1, 0, 0}, g[3] = {1, 0, 0}, zero[3] = {0, 0, 0};
+  // A contact at an edge or a groove that runs along z. The field's third axis is z, too, and the
+  // other two are turned. Four distances at the corners of a tetrahedron take the curvature for a
+  // slope along z.
+  const float n[3] = {1, 0, 0}, g[3] = {1, 0, 0}, zero[3] = {0, 0, 0};
   const ContactColumns one{n, n + 1, n + 2, g, g + 1, g + 2, zero, zero, zero, 1};
-  for (double turn = 0; turn < 6.3; turn += 0.1)
-    for (const double curvature : {-1.0, 0.3, 2.0})
-      for (const float step : {0.125f, 0.5f}) {
-        const double c = std::cos(turn), s = std::sin(turn);
-        float at[7], to[3], facing;
-        for (int k = 0; k < 7; ++k) {
-          const double x = step * kCross[k][0], y = step * kCross[k][1], across = c * y - s * x;
-          at[k] = float(-0.1 + c * x + s * y + 0.5 * curvature * across * across);
+  on_every_target([&](const std::string&) {
+    for (double turn = 0; turn < 6.3; turn += 0.1)
+      for (const double curvature : {-1.0, 0.3, 2.0})
+        for (const float step : {0.125f, 0.5f}) {
+          const double c = std::cos(turn), s = std::sin(turn);
+          float at[7], to[3], facing;
+          for (int k = 0; k < 7; ++k) {
+            // In the world's axes the slope is along x, the curvature along y.
+            const double u = step * kCross[k][0], v = step * kCross[k][1];
+            const double x = c * u - s * v, y = s * u + c * v;
+            at[k] = float(-0.1 + x + 0.5 * curvature * y * y);
+          }
+          const Crosses crosses{{at, at + 1, at + 2, at + 3, at + 4, at + 5, at + 6},
+                                3.0f,
+                                {},
+                                {float(c), float(-s), 0, float(s), float(c), 0, 0, 0, 1},
+                                step};
+          push_directions(one, &crosses, to, to + 1, to + 2, &facing);
+          CHECK(facing == 1);
+          CHECK(to[0] > 0.999);
+          CHECK(std::fabs(to[1]) < 1e-5);
+          CHECK(std::fabs(to[2]) < 1e-5);
         }
-        const Crosses crosses{{at, at + 1, at + 2, at + 3, at + 4, at + 5, at + 6},
-                              3.0f,
-                              {},
-                              {1, 0, 0, 0, 1, 0, 0, 0, 1},
-                              step};
-        push_directions_ref(one, &crosses, to, to + 1, to + 2, &facing);
-        CHECK(std::fabs(to[2]) < 1e-6);
-      }
+  });
 }
 
 TEST_CASE("contact_columns: a torque direction is square to its normal, of length 1 without l0") {
