@@ -324,8 +324,12 @@ class Check {
   void tolerance(const Vec3& p, const RayScene::Near& near, Dice& dice, Tally& t) const {
     const double reach = kPromised * field_.tolerance, u = near.distance;
     if (grown_walls_.distance(p) < u + 2 * field_.grown + reach) return;
-    double found = 0;
-    if (!view_.distance(view_.from_metres(p), found)) {
+    double found = 0, bound = 0;
+    const Vec3 g = view_.from_metres(p);
+    if (!view_.distance(g, found)) {
+      // The field need not have samples near a sheet that lies buried deep in the solid.
+      bool inside = false;
+      if (far_(g, bound, inside) && inside && !outer(near, dice)) return;
       t.asked.add(reach / field_.tolerance);
       ++t.sum.missed;
       return;
