@@ -5,9 +5,9 @@
 // place in its cell, and the places half-way there lie in these cells or in its own. All seven
 // cells have 32 nodes, since every node of the point's own is in three of the others; so 16 pairs
 // are fetched in place of 24. Some points at a time go through three loops, as in
-// sample_around.cpp. Where every end fetched its own nodes this kernel took 1.12 times as long, and
-// a frame of 1,000 contacts 1.05 times (kernels/sample_ends, frame/clutter, frame/conforming;
-// AVX2).
+// sample_around.cpp. While it gave the six ends alone, and each fetched its own nodes, this kernel
+// took 1.12 times as long, and a frame of 1,000 contacts 1.05 times (kernels/sample_ends,
+// frame/clutter, frame/conforming; AVX2).
 #include "kernels/field/sample_around.h"
 
 #undef HWY_TARGET_INCLUDE
