@@ -30,18 +30,18 @@ constexpr std::size_t kListed = 512;    // contacts on the list before it is sum
 constexpr std::size_t kMostLeaves = 2;  // leaves of targets in one walk
 constexpr float kTogether = 0.1f;       // widths: size and distance of leaves that share a walk
 constexpr std::size_t kOpened = 256;    // leaves collected before they are opened
+constexpr float kSmallNode = 0.1f;      // widths: the radius below which a node is listed whole
 
 // How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre;
 // precise enough while targets are within a width of the centre. flat: the same over one sphere of
 // unit vectors, where all shares are 1; see lay_flat. differences: in all other cases.
 enum class Form { flat, products, differences };
 
-// Columns of listed contacts. Form products: the share, then 2 x and e^2 - |x|^2 over each sphere,
-// the first sphere times the share. Form flat: x along both tangents and e^2 - |x|^2, from kFirst
-// on. Form differences: the share, then x.
+// Columns of listed contacts, 4 a sphere behind the share. Form products: the share, then 2 x and
+// e^2 - |x|^2 over each sphere, the first sphere times the share. Form flat: the share, then x
+// along both tangents and e^2 - |x|^2. Form differences: the share, then x.
 template <int kAxes>
 struct List {
-  static constexpr int kShare = 0, kFirst = 1;  // then 4 columns a sphere: x y z, rest
   HWY_ALIGN float column[1 + 4 * kAxes / 3][kListed + 2 * kGaussLeaf];
   std::size_t count = 0;
 };
@@ -202,7 +202,7 @@ HWY_INLINE bool lay_flat(Targets<3>& t) {
 template <std::size_t kCount>
 HWY_INLINE void add_flat_pairs(Targets<3>& t, std::size_t first) {
   const DF d;
-  const float *const x = t.list.column[1], *const y = t.list.column[2], *const c = t.list.column[3];
+  const auto& column = t.list.column;
   VF at[kCount][2], least[kCount], sum[kCount];
   HWY_UNROLL(8)
   for (std::size_t r = 0; r < kCount; ++r) {
@@ -211,11 +211,12 @@ HWY_INLINE void add_flat_pairs(Targets<3>& t, std::size_t first) {
     sum[r] = hn::Zero(d);
   }
   for (std::size_t k = 0; k < t.list.count; k += kLanes) {
-    const VF vx = hn::Load(d, x + k), vy = hn::Load(d, y + k), vc = hn::Load(d, c + k);
+    const VF share = hn::Load(d, column[0] + k), c = hn::Load(d, column[3] + k);
+    const VF x = hn::Load(d, column[1] + k), y = hn::Load(d, column[2] + k);
     HWY_UNROLL(8)
     for (std::size_t r = 0; r < kCount; ++r) {
-      VF v = hn::MulAdd(vx, at[r][0], hn::Sub(vc, least[r]));
-      v = hn::MulAdd(vy, at[r][1], v);
+      VF v = hn::MulAdd(x, at[r][0], hn::NegMulAdd(share, least[r], c));
+      v = hn::MulAdd(y, at[r][1], v);
       sum[r] = hn::Add(sum[r], hn::Max(v, hn::Zero(d)));
     }
   }
@@ -237,7 +238,6 @@ HWY_NOINLINE void work_off(Targets<kAxes>& t) {
   for (auto& column : t.list.column) hn::StoreU(hn::Zero(d), d, column + count);
   if (t.form == Form::flat) {
     if constexpr (kAxes == 3) {
-      hn::StoreU(hn::Set(d, -1e30f), d, t.list.column[3] + count);  // counts at no target
       for (std::size_t r = 0; r < rows; r += 4) add_flat_pairs<4>(t, r);
     }
   } else if (t.form == Form::products) {

@@ -6,7 +6,10 @@
 // inside follows exactly from its moments:
 //     sum_j s_j (e^2 - |V_j - V|^2) = S (e^2 - |V - C|^2) - sum_j s_j |V_j - C|^2,  C the centroid
 // and the product of two hats needs the moments up to |N|^2 |T|^2. Nodes wholly outside add
-// nothing. Leaves that the edge of a support runs through are summed contact by contact.
+// nothing. Leaves that the edge of a support runs through are summed contact by contact. From
+// kGaussMany contacts on, nodes over one sphere that are small beside the hat count there with the
+// mean of e^2 - |V_j - V|^2, or not at all where that is below 0. That is never more than their
+// contacts give one by one, so no contact is hidden by it; in a clump it is 1.2 % less at most.
 //
 // Work is cut into stages and slices. Stages run in order; slices of one stage write to different
 // places and may run at the same time. The bits do not depend on which thread runs a slice.
@@ -20,6 +23,8 @@ inline constexpr int kGaussStages = 5;
 inline constexpr std::size_t kGaussLeaf = 16;  // contacts a leaf, children a node
 inline constexpr int kGaussLevels = 8;         // 16^8 contacts
 inline constexpr int kGaussMoments = 19;       // of a product hat; the others have 2
+
+inline constexpr std::size_t kGaussMany = 16000;
 
 // Nodes of one level, columns of `count` rows padded to a multiple of 16 with rows of weight 0.
 struct GaussLevel {

@@ -3,9 +3,9 @@
 //
 // The tree is walked once for the 16 targets of a leaf, or of two leaves that are near, 16 sibling
 // nodes at a time. A node that no target reaches is dropped. A node inside the supports of all
-// targets joins one polynomial about the targets' centre. Other nodes are opened. In an opened leaf
-// each contact is dropped, joins the polynomial, or goes to a list that every target sums pair by
-// pair.
+// targets joins one polynomial about the targets' centre. Other nodes are opened, or listed whole
+// where they are small and contacts many. In an opened leaf each contact is dropped, joins the
+// polynomial, or goes to a list that every target sums pair by pair.
 #include "kernels/weights/gauss_tree_stages.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -67,6 +67,7 @@ HWY_NOINLINE void open_leaves(Targets<kAxes>& t) {
         hn::StoreU(compress(d, v, cut), d, t.list.column[k] + count);
       };
       if constexpr (kForm == Form::flat) {
+        append(0, share);
         for (int k = 0; k < 2; ++k) append(1 + k, along(away, t.tangent[k]));
         append(3, gap[0]);
       } else {
@@ -107,8 +108,25 @@ HWY_INLINE void open(Targets<kAxes>& t) {
   }
 }
 
-// Handles sixteen siblings of a level and returns the ones to open, a bit each.
-template <int kAxes>
+// Lists small nodes whole, each with the mean of e^2 - |V_j - V|^2 over its contacts.
+HWY_INLINE void list_nodes(Targets<3>& t, MF some, VF mass, VF a2, const VF* away, VF gap) {
+  const DF d;
+  const auto append = [&](int k, VF v) HWY_ATTR {
+    hn::StoreU(compress(d, v, some), d, t.list.column[k] + t.list.count);
+  };
+  append(0, mass);
+  if (t.form == Form::flat) {
+    for (int k = 0; k < 2; ++k) append(1 + k, hn::Mul(mass, along(away, t.tangent[k])));
+  } else {
+    for (int k = 0; k < 3; ++k) append(1 + k, twice(hn::Mul(mass, away[k])));
+  }
+  append(t.form == Form::flat ? 3 : 4, hn::MulSub(mass, gap, a2));
+  t.list.count += hn::CountTrue(d, some);
+}
+
+// Handles sixteen siblings of a level and returns the ones to open, a bit each. With kSmall, small
+// nodes are listed whole.
+template <int kAxes, bool kSmall>
 HWY_INLINE unsigned look_at(Targets<kAxes>& t, const GaussLevel& level, std::size_t block,
                             VF* term) {
   const DF d;
@@ -129,7 +147,16 @@ HWY_INLINE unsigned look_at(Targets<kAxes>& t, const GaussLevel& level, std::siz
       inside = hn::And(inside, hn::And(hn::Le(gap2, hn::Mul(in, in)), hn::Gt(in, hn::Zero(d))));
       gap[s] = hn::Sub(hn::Set(d, t.width2[s]), gap2);
     }
-    open |= bits_of(hn::AndNot(inside, near)) << p;
+    MF cut = hn::AndNot(inside, near);
+    if constexpr (kSmall) {
+      const VF most = hn::Set(d, kSmallNode * t.g.width[0]);
+      const MF small = hn::And(cut, hn::Lt(hn::Load(d, level.radius[0] + first), most));
+      if (!hn::AllFalse(d, small)) {
+        list_nodes(t, small, mass, hn::Load(d, level.moment[kA2] + first), away, gap[0]);
+        cut = hn::AndNot(small, cut);
+      }
+    }
+    open |= bits_of(cut) << p;
     if (hn::AllFalse(d, inside)) continue;
     if constexpr (kAxes == 3) {
       join(term, hn::IfThenElseZero(inside, mass),
@@ -142,7 +169,7 @@ HWY_INLINE unsigned look_at(Targets<kAxes>& t, const GaussLevel& level, std::siz
 }
 
 // Visits the children of the nodes of `block`, a block of level l + 1, whose bits are set.
-template <int kAxes>
+template <int kAxes, bool kSmall>
 void visit(Targets<kAxes>& t, int l, std::size_t block, unsigned nodes) {
   unsigned below[kGaussLeaf];
   VF term[kAxes == 3 ? 5 : 1];
@@ -152,7 +179,9 @@ void visit(Targets<kAxes>& t, int l, std::size_t block, unsigned nodes) {
   std::size_t count = 0;
   for (unsigned left = nodes; left != 0; left &= left - 1) {
     const std::size_t child = block * kGaussLeaf + hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
-    below[count++] = look_at(t, t.g.level[l], child, terms);
+    below[count++] = look_at<kAxes, kSmall>(t, t.g.level[l], child, terms);
+    if constexpr (kSmall)
+      if (t.list.count > kListed) work_off(t);
   }
   if constexpr (kAxes == 3)
     for (int k = 0; k < 5; ++k) t.term[k] = term[k];
@@ -162,7 +191,7 @@ void visit(Targets<kAxes>& t, int l, std::size_t block, unsigned nodes) {
     unsigned cut = below[count++];
     if (cut == 0) continue;
     if (l > 0) {
-      visit(t, l - 1, child, cut);
+      visit<kAxes, kSmall>(t, l - 1, child, cut);
       continue;
     }
     for (; cut != 0; cut &= cut - 1)
@@ -260,7 +289,12 @@ HWY_INLINE void sum_targets(const GaussDensity& g, std::size_t count, std::size_
     }
     if constexpr (kAxes == 3)
       if (t.form == Form::products && g.unit && lay_flat(t)) t.form = Form::flat;
-    visit(t, g.levels - 1, 0, 1);  // the top level is one block
+    // The top level is one block.
+    if (kAxes == 3 && count >= kGaussMany && t.form != Form::differences) {
+      visit<kAxes, kAxes == 3>(t, g.levels - 1, 0, 1);
+    } else {
+      visit<kAxes, false>(t, g.levels - 1, 0, 1);
+    }
     open(t);
     work_off(t);
     float term[Targets<kAxes>::kTerms];
