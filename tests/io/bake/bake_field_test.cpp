@@ -174,6 +174,10 @@ TEST_CASE("bake_field: two overlapping boxes are one solid, and the walls inside
   SUBCASE("within a wide band") { options.band_voxels = 8; }
   const double reach = options.band_voxels;
   const FieldData field = must_bake(mesh, options);
+  for (const unsigned threads : {1u, 5u}) {
+    options.threads = threads;
+    CHECK(same_bits(field, must_bake(mesh, options)));
+  }
   CHECK(field.sign_mode == "closed");
   const double h = field.voxel_size;
   const auto in = [](Vec3 p, Vec3 low, Vec3 high) {
