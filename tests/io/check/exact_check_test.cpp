@@ -346,3 +346,55 @@ TEST_CASE("a plan is the bake's own voxel, offset and size, and its bricks to a 
   REQUIRE(plan);
   CHECK(plan->brick_count > 1000000);
 }
+
+namespace {
+
+// Takes the samples of the bricks that `drop` picks, by their first and last node, from a field.
+// Returns how many it took.
+template <class Drop>
+std::size_t drop_bricks(FieldData& field, Drop&& drop) {
+  std::size_t dropped = 0, cell = 0;
+  for (int z = 0; z < field.bricks[2]; ++z)
+    for (int y = 0; y < field.bricks[1]; ++y)
+      for (int x = 0; x < field.bricks[0]; ++x) {
+        std::int32_t& row = field.brick_index[cell++];
+        if (row < 0 || !drop(node_position(field, {8 * x, 8 * y, 8 * z}),
+                             node_position(field, {8 * x + 8, 8 * y + 8, 8 * z + 8})))
+          continue;
+        row = -1;
+        ++dropped;
+      }
+  return dropped;
+}
+
+}  // namespace
+
+TEST_CASE("a field with a tolerance needs no samples beside a sheet buried deep, but all others") {
+  Mesh mesh = box({0, 0, 0}, {1, 1, 1}, 1);
+  add(mesh, box({0.35, 0.35, 0.35}, {0.65, 0.65, 0.65}, 1));
+  FieldBake options;
+  // So bricks end two thirds of a coarse voxel below the walls at high x, y and z.
+  options.tolerance = 1 / 398.4, options.padding_voxels = 12;
+  const auto field = bake_field(mesh, options, nullptr);
+  REQUIRE_MESSAGE(field, field.error());
+  double there = 0;
+  REQUIRE_FALSE(interpolate(*field, {0.5, 0.5, 0.645}, there));
+  const ExactCheck whole = check(mesh, *field);
+  CHECK(whole.agrees());
+  CHECK(whole.asked > 3000);
+  CHECK(whole.asked < 3900);  // a twelfth of the surface is buried
+
+  // Near the outer walls samples are missed, even in a brick that lies in the solid altogether.
+  const auto in = [](Vec3 p) { return std::min({p.x, p.y, p.z, 1 - p.x, 1 - p.y, 1 - p.z}) > 0; };
+  for (const bool altogether : {true, false}) {
+    CAPTURE(altogether);
+    FieldData holed = *field;
+    const auto drop = [&](Vec3 low, Vec3 high) {
+      return altogether ? in(low) && in(high) && high.x > 0.98 : high.x > 1;
+    };
+    CHECK(drop_bricks(holed, drop) > 10);
+    const ExactCheck c = check(mesh, holed);
+    CHECK(c.missed > 100);  // cells of the bricks beside them, which miss a corner, are 53
+    CHECK_FALSE(c.agrees());
+  }
+}
