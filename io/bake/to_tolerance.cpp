@@ -95,8 +95,7 @@ class Refined {
   }
 
   // Wants the fine bricks within `size` fine bricks and in one layer around.
-  bool want_around(const std::array<int, 3>& at, int size) {
-    bool more = false;
+  void want_around(const std::array<int, 3>& at, int size) {
     const auto& bricks = grids_.fine.bricks;
     int low[3], high[3];
     for (std::size_t k = 0; k < 3; ++k) {
@@ -106,33 +105,38 @@ class Refined {
     for (int z = low[2]; z <= high[2]; ++z)
       for (int y = low[1]; y <= high[1]; ++y)
         for (int x = low[0]; x <= high[0]; ++x) {
-          std::uint64_t& tile = wanted_[grids_.coarse.cell(x / kCut, y / kCut, z / kCut)];
-          const std::uint64_t bit = std::uint64_t{1} << Tiles::bit({x, y, z});
-          more |= (tile & bit) == 0;
-          tile |= bit;
+          wanted_[grids_.coarse.cell(x / kCut, y / kCut, z / kCut)] |= std::uint64_t{1}
+                                                                       << Tiles::bit({x, y, z});
         }
-    return more;
   }
 
-  // The middle voxels may not have seen what the fine ones see. Returns whether more is wanted;
-  // then all is found, since each more step would show a little more of a thin shell.
-  bool want_more() {
-    bool more = false;
+  // The middle voxels may not have seen what the fine ones see, which then want bricks around it.
+  // Mostly these are few. But each more step may show a little more of a thin shell, so after some
+  // steps, or where many are wanted, all are found.
+  bool want_more(int step) {
+    const std::size_t before = wanted_count();
     for (const auto* bricks : {&fine_.thin, &fine_.unsure})
-      for (const std::uint32_t cell : *bricks) more |= want_around(grids_.fine.place(cell), 1);
-    return more;
+      for (const std::uint32_t cell : *bricks) want_around(grids_.fine.place(cell), 1);
+    const std::size_t more = wanted_count() - before;
+    if (step == 3 || more > before / 8) grids_.fine.wanted = nullptr;
+    return more > 0;
+  }
+  std::size_t wanted_count() const {
+    std::size_t count = 0;
+    for (const std::uint64_t bits : wanted_) count += std::size_t(std::popcount(bits));
+    return count;
   }
 
   Outcome bake_fine() {
     double from = 0.2, to = 0.5;
-    while (true) {
+    for (int step = 1;; ++step) {
       Result<Baked> fine = bake_on_grid(surface_, grids_.fine, options_, Beyond::sides,
                                         steps_.part(from, to), report_);
       if (!fine) return fine.failure();
       fine_ = std::move(*fine);
-      if (grids_.fine.wanted == nullptr || !want_more()) return Done{};
-      grids_.fine.wanted = nullptr;
-      from = std::exchange(to, 0.6);
+      if (grids_.fine.wanted == nullptr || !want_more(step)) return Done{};
+      fine_ = {};
+      from = std::exchange(to, (to + 0.6) / 2);
     }
   }
 
