@@ -118,8 +118,9 @@ class Refined {
     for (const auto* bricks : {&fine_.thin, &fine_.unsure})
       for (const std::uint32_t cell : *bricks) want_around(grids_.fine.place(cell), 1);
     const std::size_t more = wanted_count() - before;
+    if (more == 0) return false;
     if (step == 3 || more > before / 8) grids_.fine.wanted = nullptr;
-    return more > 0;
+    return true;
   }
   std::size_t wanted_count() const {
     std::size_t count = 0;

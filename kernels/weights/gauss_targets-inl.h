@@ -26,7 +26,7 @@ using DF = hn::CappedTag<float, kGaussLeaf>;
 using VF = hn::Vec<DF>;
 using MF = hn::Mask<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
-constexpr std::size_t kListed = 512;    // contacts on the list before it is summed
+constexpr std::size_t kListed = 512;    // contacts and nodes on the list before it is summed
 constexpr std::size_t kMostLeaves = 2;  // leaves of targets in one walk
 constexpr float kTogether = 0.1f;       // widths: size and distance of leaves that share a walk
 constexpr std::size_t kOpened = 256;    // leaves collected before they are opened
@@ -34,7 +34,7 @@ constexpr float kSmallNode = 0.1f;      // widths: the radius below which a node
 
 // How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre;
 // precise enough while targets are within a width of the centre. flat: the same over one sphere of
-// unit vectors, where all shares are 1; see lay_flat. differences: in all other cases.
+// unit vectors, where all contacts' shares are 1; see lay_flat. differences: in all other cases.
 enum class Form { flat, products, differences };
 
 // Columns of listed contacts, 4 a sphere behind the share. Form products: the share, then 2 x and

@@ -9,7 +9,8 @@
 // nothing. Leaves that the edge of a support runs through are summed contact by contact. From
 // kGaussMany contacts on, nodes over one sphere that are small beside the hat count there with the
 // mean of e^2 - |V_j - V|^2, or not at all where that is below 0. That is never more than their
-// contacts give one by one, so no contact is hidden by it; in a clump it is 1.2 % less at most.
+// contacts give one by one, so no contact is hidden by it. In a clump weights are at most 1.2 % too
+// large. Where thousands lie at the very edge of a contact's hat, it can weigh up to 1.
 //
 // Work is cut into stages and slices. Stages run in order; slices of one stage write to different
 // places and may run at the same time. The bits do not depend on which thread runs a slice.
@@ -24,7 +25,7 @@ inline constexpr std::size_t kGaussLeaf = 16;  // contacts a leaf, children a no
 inline constexpr int kGaussLevels = 8;         // 16^8 contacts
 inline constexpr int kGaussMoments = 19;       // of a product hat; the others have 2
 
-inline constexpr std::size_t kGaussMany = 16000;
+inline constexpr std::size_t kGaussMany = 16000;  // contacts from which small nodes count whole
 
 // Nodes of one level, columns of `count` rows padded to a multiple of 16 with rows of weight 0.
 struct GaussLevel {

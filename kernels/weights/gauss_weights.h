@@ -39,7 +39,7 @@ struct GaussWidths {
 // Widths below kMinWidth count as kMinWidth: unit normals in float resolve little less. `weight` is
 // indexed by i and must not alias the view. This is the specification, O(count) a row; what a frame
 // runs is gauss_few.h for few contacts, gauss_sweep.h for some thousand and gauss_tree.h for more,
-// or where they are crowded.
+// or where they are crowded. The last is less exact from kGaussMany contacts on.
 void gauss_weights_ref(const DirectionsView& c, Hat hat, const GaussWidths& widths,
                        std::size_t begin, std::size_t end, float* weight);
 
