@@ -10,7 +10,7 @@ inline constexpr int kEndSign[6][3] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
                                        {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
 
 // at[c][k] is the distance at `to_field` of point k plus step kEndSign[c], as sample_field gives
-// it, to the bit. `step` [voxel].
+// it, but for rounding: 1e-4 voxel in grids of 1,024. `step` [voxel].
 void sample_cross(const FieldView& field, const Affine& to_field, const PointsView& points,
                   float step, float* const at[6]);
 void sample_cross_ref(const FieldView& field, const Affine& to_field, const PointsView& points,
