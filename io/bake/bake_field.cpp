@@ -14,6 +14,7 @@
 
 #include "io/bake/grid.h"
 #include "io/bake/holes.h"
+#include "io/bake/plan.h"
 #include "io/field/unite.h"
 #include "io/walls/thin_pieces.h"
 #include "sched/clock.h"
@@ -150,13 +151,23 @@ Outcome weld(const Mesh& mesh, const FieldBake& options, bake::Surface& surface,
 }
 
 // Finds the bricks near the surface and their distances.
-Outcome measure(const bake::Surface& surface, const bake::Grid& grid, unsigned threads,
+// Masks and all else that a row has beside its distances: 310 to 670 bytes where rows are many.
+constexpr std::size_t kBytesARow = 670;
+
+Outcome measure(const FieldBake& options, const bake::Surface& surface, const bake::Grid& grid,
                 const bake::Steps& steps, double from, double to, bake::NarrowBand& band) {
   using namespace bake;
+  const unsigned threads = options.threads;
   band = {};
   if (!steps.tell("bricks", from)) return Failure{"cancelled"};
   if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
   band.features = surface.features ? surface.features : find_features(surface, threads);
+  const auto wanted = std::size_t(
+      std::count_if(band.cell.begin(), band.cell.end(), [&](auto c) { return grid.wants(c); }));
+  if (const Outcome room = room_for(
+          double(wanted * kBrickSamples * sizeof(float) + band.rows() * kBytesARow), options);
+      !room)
+    return room;
   give_slots(grid, band);
   band.free.resize(band.rows());
   band.first_node.resize(band.rows());
@@ -194,7 +205,7 @@ Outcome shut_by_winding(const FieldBake& options, const bake::Steps& steps, bake
     const double reach = grid.reach();
     grid.seal *= 2;
     if (grid.reach() > reach)
-      if (const Outcome done = measure(surface, grid, threads, steps, 0.3, 0.35, band); !done)
+      if (const Outcome done = measure(options, surface, grid, steps, 0.3, 0.35, band); !done)
         return done;
     doors = shut_doors(surface, *openings.winding, grid, band, grid.seal, threads, known);
   }
@@ -207,7 +218,7 @@ Outcome shut_by_winding(const FieldBake& options, const bake::Steps& steps, bake
   openings.plugs = plugs.put(keep_shut ? 0.75 : 0, surface);
   const bool again = openings.plugs > 0 || grid.reach() < reach;
   if (again)
-    if (const Outcome done = measure(surface, grid, threads, steps, 0.35, 0.6, band); !done)
+    if (const Outcome done = measure(options, surface, grid, steps, 0.35, 0.6, band); !done)
       return done;
   if (!keep_shut) return Done{};
   if (again) doors = shut_doors(surface, *openings.winding, grid, band, width, threads, known);
@@ -229,7 +240,7 @@ Outcome measure_sealed(const FieldBake& options, const bake::Steps& steps, bake:
         "the triangles are not wound like a solid: they are sheets or face both ways; let the sign "
         "be found by flood"};
   const double measured = grid.seal > 0 ? 0.3 : 0.6;
-  if (const Outcome done = measure(surface, grid, threads, steps, 0.05, measured, band); !done)
+  if (const Outcome done = measure(options, surface, grid, steps, 0.05, measured, band); !done)
     return done;
   if (openings.winding) return shut_by_winding(options, steps, surface, grid, band, openings);
   if (grid.seal == 0) return Done{};
@@ -237,7 +248,7 @@ Outcome measure_sealed(const FieldBake& options, const bake::Steps& steps, bake:
   const double reach = grid.reach();
   grid.seal = 0;
   if (openings.plugs == 0 && grid.reach() == reach) return Done{};
-  return measure(surface, grid, threads, steps, 0.35, 0.6, band);
+  return measure(options, surface, grid, steps, 0.35, 0.6, band);
 }
 
 // Finds the way in where a solid drains.

@@ -4,8 +4,12 @@
 // The sign is that of H. Xu, J. Barbic, "Signed distance fields for polygon soup meshes", 2014.
 // inside.cpp derives the samples inside.
 #pragma once
+#include <cstdint>
+#include <optional>
+
 #include "hapsix/result.h"
 #include "io/field/field_data.h"
+#include "io/file/free_memory.h"
 #include "io/file/progress.h"
 #include "io/mesh/mesh.h"
 
@@ -53,6 +57,9 @@ struct FieldBake {
   // Whether walls too thin for the voxels grow (bake_field). For studies; no scene file has it.
   bool grow_thin = true;
   unsigned threads = 0;  // 0: all
+  // The bytes that are free, or no value where nothing tells. A bake asks when it knows its bricks,
+  // and fails with a sentence if it would take more. Tests put their own in its place.
+  std::optional<std::uint64_t> (*free_memory)() = [] { return io::free_memory(); };
 };
 
 // The report of a bake for its user.

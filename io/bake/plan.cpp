@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // plan.cpp - counts the bricks near the triangles, by boxes around pieces of them.
+//
+// A field with a tolerance takes its memory where its surface turns: at edges, at small radii, and
+// where two sheets are near. So such bricks are counted, too.
 #include "io/bake/plan.h"
 
 #include <algorithm>
@@ -18,11 +21,22 @@ using Corners = std::array<Vec3, 3>;
 
 constexpr double kPiece = 4;     // [voxel] longest edge
 constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
-// Peak of a bake over the bytes of its field; of a refined field the fine bricks reach twice as
-// far.
-constexpr double kPeak = 1.6, kRefinedPeak = 4;
-constexpr std::size_t kProgram = 65'000'000;  // of the program itself
-constexpr std::size_t kBytesATriangle = 300;
+// Normals that differ by more than 40 degrees in a brick are a turn.
+constexpr double kTurn = 0.77;
+// Of the peak of a bake [bytes], fitted to the peaks of 26 meshes.
+constexpr double kProgram = 50e6;  // of the program itself
+constexpr double kUniformPeak = 2.1, kUniformTriangle = 300;
+struct Refined {
+  double triangle, brick, turn, cell;
+};
+// In a closed solid only the bricks in which the surface turns need fine voxels, else all do.
+constexpr Refined kSome{800, 0, 55e3, 600}, kAll{800, 50e3, 50e3, 600};
+// Of the finer samples that stay in such a brick: 3 to 37 kB.
+constexpr std::size_t kFinerBytes = 8000;
+// Of the time [s].
+constexpr Refined kSomeTime{3e-6, 0, 1.5e-4, 0}, kAllTime{3e-6, 2.5e-4, 0, 0};
+// An estimate this many times too high is not believed: the bake itself says what it takes.
+constexpr double kTooHigh = 2;
 
 // Estimates the number of pieces that a triangle is cut into.
 double pieces_of(const Corners& c) {
@@ -35,11 +49,26 @@ double pieces_of(const Corners& c) {
 // The set of bricks near triangles.
 class Bricks {
  public:
-  Bricks(const bake::Grid& grid) : grid_(grid), reach_(grid.near_zero_set()) {
+  // With `turns`, bricks in which the surface turns are counted.
+  Bricks(const bake::Grid& grid, bool turns) : grid_(grid), reach_(grid.near_zero_set()) {
     near_.resize(grid.cells());
+    if (turns) normal_.resize(grid.cells());
+    turned_.resize(normal_.size());
   }
+  void add(const Corners& c) {
+    const Vec3 n = cross(c[1] - c[0], c[2] - c[0]);
+    const double twice_area = norm(n);
+    if (!(twice_area > 0)) return;
+    mark(c, (1 / twice_area) * n);
+  }
+  std::size_t near() const { return std::size_t(std::count(near_.begin(), near_.end(), true)); }
+  std::size_t turned() const {
+    return std::size_t(std::count(turned_.begin(), turned_.end(), true));
+  }
+
+ private:
   // Halves the triangle's longest edge until the pieces are small, and marks the box of each.
-  void mark(const Corners& c) {
+  void mark(const Corners& c, const Vec3& normal) {
     int a = 0;
     double longest2 = -1;
     for (int k = 0; k < 3; ++k) {
@@ -51,8 +80,8 @@ class Bricks {
       const Vec3 &p = c[std::size_t(a)], &q = c[std::size_t((a + 1) % 3)],
                  &r = c[std::size_t((a + 2) % 3)];
       const Vec3 m{(p.x + q.x) / 2, (p.y + q.y) / 2, (p.z + q.z) / 2};
-      mark({p, m, r});
-      mark({m, q, r});
+      mark({p, m, r}, normal);
+      mark({m, q, r}, normal);
       return;
     }
     int low[3], high[3];
@@ -65,15 +94,39 @@ class Bricks {
     }
     for (int z = low[2]; z <= high[2]; ++z)
       for (int y = low[1]; y <= high[1]; ++y)
-        for (int x = low[0]; x <= high[0]; ++x) near_[grid_.cell(x, y, z)] = true;
+        for (int x = low[0]; x <= high[0]; ++x) mark(grid_.cell(x, y, z), normal);
   }
-  std::size_t count() const { return std::size_t(std::count(near_.begin(), near_.end(), true)); }
+  void mark(std::size_t cell, const Vec3& normal) {
+    near_[cell] = true;
+    if (normal_.empty()) return;
+    Vec3& first = normal_[cell];
+    if (dot(first, first) == 0) first = normal;
+    if (dot(first, normal) < kTurn) turned_[cell] = true;
+  }
 
- private:
   const bake::Grid& grid_;
   double reach_;
-  std::vector<bool> near_;
+  std::vector<bool> near_, turned_;  // (cells); turned_: or empty
+  std::vector<Vec3> normal_;         // (cells) of the first triangle, or empty
 };
+
+std::string gigabytes(double bytes) {
+  char text[40];
+  if (bytes < 1e9)
+    std::snprintf(text, sizeof text, "%.0f MB", 1e-6 * bytes);
+  else
+    std::snprintf(text, sizeof text, "%.1f GB", 1e-9 * bytes);
+  return text;
+}
+
+Failure does_not_fit(const std::string& about, double bytes, double free) {
+  // Bricks grow with the area in voxels.
+  const double by = std::ceil(10.5 * std::sqrt(bytes / std::max(1.0, free))) / 10;
+  char text[80];
+  std::snprintf(text, sizeof text, "choose voxels, or a tolerance, %.1f times as large", by);
+  return Failure{"this bake takes " + about + gigabytes(bytes) + " of memory, and " +
+                 gigabytes(free) + " are free: " + text};
+}
 
 }  // namespace
 
@@ -93,7 +146,8 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
   plan.finest = options.tolerance > 0 ? kFinest * options.tolerance : grid->voxel;
   plan.voxel_size = grid->voxel, plan.offset = grid->offset * grid->voxel;
   plan.bricks = grid->bricks;
-  Bricks bricks(*grid);
+  const bool refined = options.tolerance > 0;
+  Bricks bricks(*grid, refined);
   const auto corners = [&](std::size_t t) {
     const auto& f = mesh.triangles[t];
     return Corners{grid->from_metres(mesh.vertices[f[0]]), grid->from_metres(mesh.vertices[f[1]]),
@@ -103,41 +157,43 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) pieces += pieces_of(corners(t));
   const auto stride = std::size_t(std::max(1.0, std::ceil(pieces / kPieces)));
   for (std::size_t t = 0; t < mesh.triangles.size(); t += stride)
-    if (pieces_of(corners(t)) < kPieces) bricks.mark(corners(t));
-  plan.brick_count = bricks.count();
+    if (pieces_of(corners(t)) < kPieces) bricks.add(corners(t));
+  plan.brick_count = bricks.near();
   const std::size_t cells = grid->cells();
   plan.bytes =
       plan.brick_count * 512 * sizeof(float) + cells * (sizeof(std::int32_t) + sizeof(float));
-  // While it bakes, a field with a tolerance is also there in fine voxels, on the same area.
-  if (options.tolerance > 0) plan.bytes *= 1 + kCut * kCut;
+  plan.bytes += kFinerBytes * bricks.turned();
   plan.engine_bytes = plan.brick_count * kernels::kBrickStride * sizeof(std::int16_t) +
                       (cells - plan.brick_count) * 8 * sizeof(std::int16_t) +
                       cells * sizeof(std::int32_t);
-  const bool refined = options.tolerance > 0;
-  plan.peak_bytes = kProgram + std::size_t((refined ? kRefinedPeak : kPeak) * double(plan.bytes)) +
-                    kBytesATriangle * mesh.triangles.size();
-  plan.seconds = 0.05 + (refined ? 50 : 1) * 9e-6 * double(plan.brick_count) +
-                 1e-6 * double(mesh.triangles.size());
+  const double triangles = double(mesh.triangles.size()), all = double(plan.brick_count);
+  if (refined) {
+    const auto sum = [&](const Refined& of) {
+      return of.triangle * triangles + of.brick * all + of.turn * double(bricks.turned()) +
+             of.cell * double(cells);
+    };
+    const bool some = grid->offset == 0 && audit.closed && options.sign != SignMode::flood &&
+                      options.cavities == Cavities::solid;
+    plan.peak_bytes = std::size_t(kProgram + sum(some ? kSome : kAll));
+    plan.seconds = 0.05 + sum(some ? kSomeTime : kAllTime);
+  } else {
+    plan.peak_bytes =
+        std::size_t(kProgram + kUniformPeak * double(plan.bytes) + kUniformTriangle * triangles);
+    plan.seconds = 0.05 + 9e-6 * all + 1e-6 * triangles;
+  }
   return plan;
 }
 
+Outcome room_for(double bytes, const FieldBake& options) {
+  const std::optional<std::uint64_t> free = options.free_memory();
+  if (!free || bytes <= double(*free)) return Done{};
+  return does_not_fit("another ", bytes, double(*free));
+}
+
 Result<std::string> needs_of(const FieldPlan& plan, std::uint64_t free) {
-  const auto gigabytes = [](double bytes) {
-    char text[40];
-    if (bytes < 1e9)
-      std::snprintf(text, sizeof text, "%.0f MB", 1e-6 * bytes);
-    else
-      std::snprintf(text, sizeof text, "%.1f GB", 1e-9 * bytes);
-    return std::string(text);
-  };
   const double peak = double(plan.peak_bytes);
-  char text[160];
-  if (plan.peak_bytes > free) {
-    std::snprintf(text, sizeof text, "choose voxels, or a tolerance, %.1f times as large",
-                  std::ceil(10.5 * std::sqrt(peak / std::max(1.0, double(free)))) / 10);
-    return Failure{"this bake takes about " + gigabytes(peak) + " of memory, and " +
-                   gigabytes(double(free)) + " are free: " + text};
-  }
+  if (peak > kTooHigh * double(free)) return does_not_fit("about ", peak, double(free));
+  char text[40];
   std::snprintf(text, sizeof text, " of memory and %.1g s", plan.seconds);
   return "about " + gigabytes(peak) + text;
 }

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "io/bake/grid.h"
+#include "io/bake/plan.h"
 #include "io/field/refine.h"
 #include "io/walls/thin_pieces.h"
 
@@ -23,6 +24,9 @@ namespace {
 // With more triangles in a coarse brick than this, most of the time goes into triangles, and to
 // look at them in middle voxels takes longer than all fine bricks do.
 constexpr std::size_t kDense = 20;
+
+// A refined field takes this share of its fine bricks: the most of 26 meshes.
+constexpr double kFiner = 0.6;
 
 // A bake to a tolerance: coarse bricks everywhere, fine ones where those may miss it.
 class Refined {
@@ -159,7 +163,10 @@ class Refined {
       warn(surface_, grids_.fine, fine_.nothing_inside && !grown, options_.seal, options_.sign,
            *report_);
     if (!steps_.tell("refine", 0.8)) return Failure{"cancelled"};
-    return refine(coarse_.field, fine_.field, fine_.inside, options_.tolerance, options_.threads);
+    const double samples = double(fine_.field.samples.size() * sizeof(float));
+    if (const Outcome room = room_for(kFiner * samples, options_); !room) return room.failure();
+    return refine(std::move(coarse_.field), std::move(fine_.field), fine_.inside,
+                  options_.tolerance, options_.threads);
   }
 
   Surface& surface_;

@@ -175,6 +175,9 @@ class Chooser {
   // Returns null where the coarse samples are good enough.
   std::unique_ptr<Finer> choose(const GridNode& brick) const {
     std::unique_ptr<Finer> finer;
+    // Grown here and copied at the end, the samples of a brick take no more than their room.
+    thread_local std::vector<float> halves, quarters;
+    halves.clear(), quarters.clear();
     float coarse[kBox], exact[kernels::kMissedBoxRoom] = {}, flat[kBox];
     read_box(out_, brick, coarse);
     for (int box = 0; box < 64; ++box) {
@@ -195,9 +198,10 @@ class Chooser {
         const int cell[3] = {i & 1, i >> 1 & 1, i >> 2};
         finer
             ->index[std::size_t(64 * (2 * z + cell[2]) + 8 * (2 * y + cell[1]) + 2 * x + cell[0])] =
-            cut(exact, flat, 4 * (81 * cell[2] + 9 * cell[1] + cell[0]), *finer);
+            cut(exact, flat, 4 * (81 * cell[2] + 9 * cell[1] + cell[0]), halves, quarters);
       }
     }
+    if (finer) finer->halves = halves, finer->quarters = quarters;
     return finer;
   }
 
@@ -222,7 +226,8 @@ class Chooser {
   }
 
   // Adds the finer samples of a cell, whose first node in the box is `first`. Returns their index.
-  std::int32_t cut(const float* exact, const float (&flat)[kBox], int first, Finer& finer) const {
+  std::int32_t cut(const float* exact, const float (&flat)[kBox], int first,
+                   std::vector<float>& halves, std::vector<float>& quarters) const {
     float quarter[125], half[27], found[125];
     float* to = quarter;
     for (int z = 0; z < 5; ++z)
@@ -241,11 +246,11 @@ class Chooser {
     int wrong = 0;
     for (int n = 0; n < 125; ++n) wrong |= int(misses(quarter[n], found[n]));
     if (wrong == 0) {
-      finer.halves.insert(finer.halves.end(), half, half + 27);
-      return std::int32_t(finer.halves.size() / 27);
+      halves.insert(halves.end(), half, half + 27);
+      return std::int32_t(halves.size() / 27);
     }
-    finer.quarters.insert(finer.quarters.end(), quarter, quarter + 125);
-    return -std::int32_t(finer.quarters.size() / 125);
+    quarters.insert(quarters.end(), quarter, quarter + 125);
+    return -std::int32_t(quarters.size() / 125);
   }
 
   const FieldData& out_;
@@ -338,8 +343,8 @@ std::vector<std::uint64_t> suspect_bricks(const FieldData& coarse, const FieldDa
   return bits;
 }
 
-FieldData refine(const FieldData& coarse, const FieldData& fine,
-                 const std::vector<std::uint8_t>& inside, double tolerance, unsigned threads) {
+FieldData refine(FieldData coarse, FieldData fine, const std::vector<std::uint8_t>& inside,
+                 double tolerance, unsigned threads) {
   FieldData out;
   out.origin = coarse.origin;
   out.voxel_size = coarse.voxel_size;
@@ -358,9 +363,12 @@ FieldData refine(const FieldData& coarse, const FieldData& fine,
   sched::parallel_for(cell_of.size(), threads, [&](std::size_t row) {
     chosen[row] = chooser.choose(place_of(cell_of[row], out.bricks));
   });
+  take_far(coarse, nodes, out);
+  // The finer samples are here twice until they are joined, so the others go first.
+  Samples().swap(fine.samples);
+  Samples().swap(coarse.samples);
   take_finer(chosen, out);
   conform(threads, out);
-  take_far(coarse, nodes, out);
   return out;
 }
 

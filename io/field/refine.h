@@ -14,8 +14,8 @@ inline constexpr int kCut = 4;  // fine voxels along a coarse one
 // Within the fine band, cells keep the coarse samples where these are right to the tolerance [m] at
 // the fine nodes; else they get two or four samples a voxel. Beyond, and where the fine field has
 // no brick, they keep the coarse samples. The result is continuous.
-FieldData refine(const FieldData& coarse, const FieldData& fine,
-                 const std::vector<std::uint8_t>& inside, double tolerance, unsigned threads);
+FieldData refine(FieldData coarse, FieldData fine, const std::vector<std::uint8_t>& inside,
+                 double tolerance, unsigned threads);
 
 // The fine bricks that need samples: those where coarse ones miss a share of the tolerance at nodes
 // of a field with half their voxels, within its band. Bit (4z + y) * 4 + x of each coarse brick.

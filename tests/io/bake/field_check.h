@@ -125,6 +125,22 @@ inline Mesh shifted(Mesh mesh, Vec3 by) {
   return mesh;
 }
 
+// Random sheets and slivers of all sizes.
+inline Mesh shards(int count) {
+  Mesh mesh;
+  Random random(3);
+  for (int i = 0; i < count; ++i) {
+    const Vec3 at{random(-1, 1), random(-1, 1), random(-1, 1)};
+    const double size = std::pow(10, random(-3, 0));
+    for (int k = 0; k < 3; ++k)
+      mesh.vertices.push_back(
+          at + size * Vec3{random(-1, 1), random(-1, 1), (i % 3 ? 1 : 1e-3) * random(-1, 1)});
+    const auto first = std::uint32_t(3 * i);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
+}
+
 // ---- The judge ----------------------------------------------------------------------------------
 
 // Nearest point by the seven regions of the triangle (C. Ericson, Real-Time Collision Detection).

@@ -14,7 +14,6 @@
 #include "io/check/exact_check.h"
 
 #include "io/bake/bake_field.h"
-#include "io/bake/plan.h"
 #include "io/check/ray_votes.h"
 #include "tests/io/bake/field_check.h"
 #include "tests/support/sanitized.h"
@@ -23,22 +22,6 @@ using namespace field_check;
 using namespace h6::io;
 
 namespace {
-
-// Random sheets and slivers of all sizes.
-Mesh shards(int count) {
-  Mesh mesh;
-  Random random(3);
-  for (int i = 0; i < count; ++i) {
-    const Vec3 at{random(-1, 1), random(-1, 1), random(-1, 1)};
-    const double size = std::pow(10, random(-3, 0));
-    for (int k = 0; k < 3; ++k)
-      mesh.vertices.push_back(
-          at + size * Vec3{random(-1, 1), random(-1, 1), (i % 3 ? 1 : 1e-3) * random(-1, 1)});
-    const auto first = std::uint32_t(3 * i);
-    mesh.triangles.push_back({first, first + 1, first + 2});
-  }
-  return mesh;
-}
 
 std::unique_ptr<RayScene> rays_at(const Mesh& mesh) {
   auto made = RayScene::make(mesh);
@@ -313,38 +296,6 @@ TEST_CASE("one thread or four: the same counts and the same digits") {
   CHECK(one.far_gap == four.far_gap);
   CHECK(one.voted == four.voted);
   CHECK(one.doubtful == four.doubtful);
-}
-
-TEST_CASE("a plan is the bake's own voxel, offset and size, and its bricks to a tenth") {
-  Mesh open = torus(1.0, 0.4);
-  open.triangles.resize(open.triangles.size() - 40);
-  for (const Mesh& mesh : {torus(1.0, 0.4), open, box({0, 0, 0}, {3, 1, 0.5}, 1), shards(50)}) {
-    FieldBake options;
-    options.voxels = 160;
-    const auto plan = plan_field(mesh, audit(mesh), options);
-    REQUIRE(plan);
-    const FieldData field = bake(mesh, 160);
-    CHECK(plan->voxel_size == field.voxel_size);
-    CHECK(plan->offset == field.offset);
-    CHECK(plan->bricks == field.bricks);
-    const double ratio = double(plan->brick_count) / double(field.brick_count());
-    CAPTURE(ratio);
-    CHECK(ratio > 0.85);
-    CHECK(ratio < 1.15);
-    CHECK(plan->seconds > 0);
-  }
-  FieldBake tiny;
-  tiny.voxel_size = 1e-6;
-  CHECK(!plan_field(open, audit(open), tiny));  // the bake's own sentence
-  // Too much surface to look at every triangle: the estimate still comes soon.
-  Mesh heap;
-  for (int i = 0; i < 40; ++i)
-    add(heap, turned(box({-1, -1, -1}, {1, 1, 1}, 1), 0.1 * i, 0.07 * i));
-  FieldBake fine;
-  fine.voxels = 2048;
-  const auto plan = plan_field(heap, audit(heap), fine);
-  REQUIRE(plan);
-  CHECK(plan->brick_count > 1000000);
 }
 
 namespace {

@@ -8,13 +8,10 @@
 #include <fstream>
 #include <string>
 
-#include "io/bake/plan.h"
 #include "io/file/free_memory.h"
 
 namespace fs = std::filesystem;
-using h6::io::FieldPlan;
 using h6::io::free_memory;
-using h6::io::needs_of;
 
 namespace {
 
@@ -68,17 +65,4 @@ TEST_CASE("free memory is the least of the machine's and of what every control g
   root.file("sys/fs/cgroup/memory/memory.usage_in_bytes", "9073741824\n");
   CHECK(free_memory(root.path()) == 0);
   CHECK(free_memory());  // this machine tells
-}
-
-TEST_CASE("a bake that does not fit is refused in one sentence, with voxels that would") {
-  FieldPlan plan;
-  plan.peak_bytes = 4 * kGiga, plan.seconds = 3;
-  const auto fits = needs_of(plan, 5 * kGiga);
-  REQUIRE(fits);
-  CHECK(*fits == "about 4.3 GB of memory and 3 s");
-  const auto small = needs_of(plan, kGiga);
-  REQUIRE_FALSE(small);
-  CHECK(small.error() ==
-        "this bake takes about 4.3 GB of memory, and 1.1 GB are free: choose voxels, or a "
-        "tolerance, 2.1 times as large");
 }
