@@ -12,6 +12,7 @@
 
 #include "io/bake/grid.h"
 #include "io/field/refine.h"
+#include "io/walls/pieces.h"
 #include "kernels/views.h"
 
 namespace h6::io {
@@ -19,7 +20,7 @@ namespace {
 
 using Corners = std::array<Vec3, 3>;
 
-constexpr double kPiece = 4;     // [voxel] longest edge
+constexpr double kPiece = 4;     // [voxel] longest extent
 constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
 // Normals that differ by more than 40 degrees in a brick are a turn.
 constexpr double kTurn = 0.77;
@@ -59,7 +60,7 @@ class Bricks {
     const Vec3 n = cross(c[1] - c[0], c[2] - c[0]);
     const double twice_area = norm(n);
     if (!(twice_area > 0)) return;
-    mark(c, (1 / twice_area) * n);
+    mark(Piece(c[0], c[1], c[2]), (1 / twice_area) * n);
   }
   std::size_t near() const { return std::size_t(std::count(near_.begin(), near_.end(), true)); }
   std::size_t turned() const {
@@ -67,30 +68,23 @@ class Bricks {
   }
 
  private:
-  // Halves the triangle's longest edge until the pieces are small, and marks the box of each.
-  void mark(const Corners& c, const Vec3& normal) {
-    int a = 0;
-    double longest2 = -1;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 &p = c[std::size_t(k)], &q = c[std::size_t((k + 1) % 3)];
-      const double l2 = dot(p - q, p - q);
-      if (l2 > longest2) longest2 = l2, a = k;
-    }
-    if (longest2 > kPiece * kPiece) {
-      const Vec3 &p = c[std::size_t(a)], &q = c[std::size_t((a + 1) % 3)],
-                 &r = c[std::size_t((a + 2) % 3)];
-      const Vec3 m{(p.x + q.x) / 2, (p.y + q.y) / 2, (p.z + q.z) / 2};
-      mark({p, m, r}, normal);
-      mark({m, q, r}, normal);
+  // Cuts the triangle until the pieces are small, and marks the box of each.
+  void mark(const Piece& piece, const Vec3& normal) {
+    if (const auto two = halves(piece, kPiece)) {
+      for (const Piece& half : *two) mark(half, normal);
       return;
+    }
+    Vec3 least = piece.corner[0], most = least;
+    for (int k = 1; k < piece.corners; ++k) {
+      least = min(least, piece.corner[std::size_t(k)]);
+      most = max(most, piece.corner[std::size_t(k)]);
     }
     int low[3], high[3];
     for (int k = 0; k < 3; ++k) {
-      const auto [least, most] =
-          std::minmax({component(c[0], k), component(c[1], k), component(c[2], k)});
       // Nodes 0..7 of a brick, 8 voxels from one brick to the next.
-      low[k] = std::max(0, int(std::ceil((least - reach_ - 7) / 8)));
-      high[k] = std::min(grid_.bricks[std::size_t(k)] - 1, int(std::floor((most + reach_) / 8)));
+      low[k] = std::max(0, int(std::ceil((component(least, k) - reach_ - 7) / 8)));
+      high[k] = std::min(grid_.bricks[std::size_t(k)] - 1,
+                         int(std::floor((component(most, k) + reach_) / 8)));
     }
     for (int z = low[2]; z <= high[2]; ++z)
       for (int y = low[1]; y <= high[1]; ++y)

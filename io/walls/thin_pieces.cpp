@@ -9,6 +9,7 @@
 
 #include "io/mesh/inward_normals.h"
 #include "io/mesh/ray_scene.h"
+#include "io/walls/pieces.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io {
@@ -16,19 +17,18 @@ namespace {
 
 constexpr double kOpposite = 0.70710678;  // cosine of 45 degrees
 
-using Corners = std::array<Vec3, 3>;
-struct Piece {
+struct Thin {
   Vec3 middle;
   double thickness, area;
 };
 struct Facet {
-  Corners corner;
+  std::array<Vec3, 3> corner;
   std::uint32_t triangle;
 };
 // The pieces of some triangles, and as few facets as fill them. Two halves that are thin altogether
 // become one again, so a plate of two triangles does not become a million.
 struct Found {
-  std::vector<Piece> pieces;
+  std::vector<Thin> pieces;
   std::vector<Facet> facets;
 };
 
@@ -41,43 +41,36 @@ class Cutter {
   void cut(std::uint32_t triangle, Found& out) const {
     if (!(faces_.area[triangle] > 0) || flat(triangle)) return;
     const auto& t = mesh_.triangles[triangle];
-    cut(triangle, {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]}, out);
+    cut(triangle, Piece(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]), out);
   }
 
  private:
-  // Whether all of it is thin. Then it has added one facet.
-  bool cut(std::uint32_t triangle, const Corners& c, Found& out) const {
-    if (!asked(c)) return false;
-    std::size_t from = 0;
-    double longest2 = -1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 edge = c[(k + 1) % 3] - c[k];
-      if (dot(edge, edge) > longest2) longest2 = dot(edge, edge), from = k;
-    }
-    const Vec3 &p = c[from], &q = c[(from + 1) % 3], &r = c[(from + 2) % 3];
-    if (longest2 > options_.piece * options_.piece) {
-      const Vec3 middle = 0.5 * (p + q);
-      const bool one = cut(triangle, {p, middle, r}, out);
-      const bool other = cut(triangle, {middle, q, r}, out);
+  // Whether all of it is thin. Then it has added its facets.
+  bool cut(std::uint32_t triangle, const Piece& piece, Found& out) const {
+    if (!asked(piece)) return false;
+    const std::size_t before = out.facets.size();
+    if (const auto two = halves(piece, options_.piece)) {
+      const bool one = cut(triangle, (*two)[0], out), other = cut(triangle, (*two)[1], out);
       if (!one || !other) return false;
-      out.facets.resize(out.facets.size() - 2);
-      out.facets.push_back({c, triangle});
-      return true;
+      out.facets.resize(before);
+    } else {
+      const Vec3 middle = piece.middle();
+      const double thickness = thickness_at(triangle, middle);
+      if (!(thickness < options_.thinner_than)) return false;
+      out.pieces.push_back({middle, thickness, piece.area()});
     }
-    const Vec3 place = (1.0 / 3) * (p + q + r);
-    const double thickness = thickness_at(triangle, place);
-    if (!(thickness < options_.thinner_than)) return false;
-    out.pieces.push_back({place, thickness, 0.5 * norm(cross(q - p, r - p))});
-    out.facets.push_back({c, triangle});
+    const auto& c = piece.corner;
+    out.facets.push_back({{c[0], c[1], c[2]}, triangle});
+    if (piece.corners == 4) out.facets.push_back({{c[0], c[2], c[3]}, triangle});
     return true;
   }
 
-  bool asked(const Corners& c) const {
+  bool asked(const Piece& piece) const {
     if (!options_.asked) return true;
-    Vec3 low = c[0], high = c[0];
-    for (const Vec3& v : c) {
-      low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
-      high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+    Vec3 low = piece.corner[0], high = low;
+    for (int k = 1; k < piece.corners; ++k) {
+      low = min(low, piece.corner[std::size_t(k)]);
+      high = max(high, piece.corner[std::size_t(k)]);
     }
     return options_.asked(low, high);
   }
@@ -118,11 +111,11 @@ void take(const Mesh& whole, const Facet& facet, ThinPieces& out) {
 }
 
 // Sharp edges taper to nothing, so the thinnest place of all says little about the walls.
-void find_typical(std::vector<Piece> pieces, ThinPieces& out) {
+void find_typical(std::vector<Thin> pieces, ThinPieces& out) {
   std::stable_sort(pieces.begin(), pieces.end(),
-                   [](const Piece& a, const Piece& b) { return a.thickness < b.thickness; });
+                   [](const Thin& a, const Thin& b) { return a.thickness < b.thickness; });
   double area = 0;
-  for (const Piece& piece : pieces) {
+  for (const Thin& piece : pieces) {
     area += piece.area;
     if (area < 0.1 * out.area) continue;
     out.thickness = piece.thickness;
@@ -146,10 +139,10 @@ Result<ThinPieces> thin_pieces(const Mesh& mesh, const ThinPieceOptions& options
   });
   ThinPieces out;
   out.mesh.part_names = mesh.part_names;
-  std::vector<Piece> all;
+  std::vector<Thin> all;
   for (const Found& some : found) {
     for (const Facet& facet : some.facets) take(mesh, facet, out);
-    for (const Piece& piece : some.pieces) out.area += piece.area;
+    for (const Thin& piece : some.pieces) out.area += piece.area;
     all.insert(all.end(), some.pieces.begin(), some.pieces.end());
   }
   find_typical(std::move(all), out);
