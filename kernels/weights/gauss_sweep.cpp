@@ -55,6 +55,30 @@ void gather_rows(const GaussSweep& sweep) {
   }
 }
 
+// Finds the boxes of the blocks. They are wider than their contacts by more than a distance rounds.
+void find_boxes(const GaussSweep& sweep) {
+  const DF d;
+  const GaussPairs& pairs = *sweep.product;
+  const std::size_t count = sweep.contacts.count, blocks = band_blocks(count);
+  for (int k = 0; k < 6; ++k) {
+    const float* const at = pairs.at[k];
+    for (std::size_t b = 0; b < blocks; ++b) {
+      const std::size_t begin = b * kBandBlock, end = HWY_MIN(begin + kBandBlock, count);
+      VF low = hn::Set(d, at[begin]), high = low;
+      for (std::size_t i = begin; i < end; i += kLanes) {
+        const VF v = hn::IfThenElse(hn::FirstN(d, end - i), hn::Load(d, at + i), low);
+        low = hn::Min(low, v), high = hn::Max(high, v);
+      }
+      const float least = hn::GetLane(hn::MinOfLanes(d, low)),
+                  most = hn::GetLane(hn::MaxOfLanes(d, high));
+      pairs.centre[k][b] = 0.5f * (least + most);
+      pairs.half[k][b] = 0.5f * (most - least) + 1e-6f * HWY_MAX(-least, most);
+    }
+    for (std::size_t b = blocks; b < blocks + kBandBlock; ++b)
+      pairs.centre[k][b] = kNowhere, pairs.half[k][b] = 0;
+  }
+}
+
 // ---- pairs
 
 // Rows i .. i + kRows - 1.
@@ -105,10 +129,37 @@ HWY_INLINE void add_tile(const GaussPairs& g, const VF* width2, std::size_t i, s
   hn::Store(sum, d, column + j);
 }
 
-// Adds the pairs of a group's rows from `i` on with columns `j` to `end`.
+// Bit k: block first + k, of at most 64 up to `end`, may have contacts near those of block b.
+HWY_INLINE std::uint64_t near_blocks(const GaussPairs& g, const VF* width2, std::size_t b,
+                                     std::size_t first, std::size_t end) {
+  const DF d;
+  const VF more = hn::Set(d, 1 + 1e-5f);
+  std::uint64_t near = 0;
+  for (std::size_t j = first; j < end; j += kLanes) {
+    auto both = hn::FirstN(d, end - j);
+    for (int s = 0; s < 2; ++s) {
+      VF gap2 = hn::Zero(d);
+      for (int k = 3 * s; k < 3 * s + 3; ++k) {
+        const VF apart =
+            hn::Abs(hn::Sub(hn::LoadU(d, g.centre[k] + j), hn::Set(d, g.centre[k][b])));
+        const VF wide = hn::Add(hn::LoadU(d, g.half[k] + j), hn::Set(d, g.half[k][b]));
+        const VF gap = hn::Max(hn::Sub(apart, wide), hn::Zero(d));
+        gap2 = hn::MulAdd(gap, gap, gap2);
+      }
+      both = hn::And(both, hn::Le(gap2, hn::Mul(width2[s], more)));
+    }
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, both, bits);
+    near |= (bits[0] | std::uint64_t{bits[1]} << 8) << (j - first);
+  }
+  return near;
+}
+
+// Adds the pairs of a group's rows from `i` on with columns `from` to `end` of the near blocks, of
+// which bit 0 is the one that holds `from`.
 template <bool kGeodesic>
-HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, std::size_t j,
-                          std::size_t end, float* fresh, float* total) {
+HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::uint64_t near, std::size_t i,
+                          std::size_t from, std::size_t end, float* fresh, float* total) {
   const DF d;
   Group rows;
   HWY_UNROLL(4)
@@ -117,9 +168,21 @@ HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::size_t i, 
     rows.share[r] = hn::Set(d, g.share[i + r]);
     rows.sum[r] = hn::Zero(d);
   }
-  for (; j < HWY_MIN(i + kRows, end); j += kLanes)
-    add_tile<true, kGeodesic>(g, width2, i, j, fresh, rows);
-  for (; j < end; j += kLanes) add_tile<false, kGeodesic>(g, width2, i, j, fresh, rows);
+  const std::size_t behind = i / kLanes * kLanes;
+  std::size_t block = from / kBandBlock;
+  while (near != 0) {
+    // Blocks that follow each other are one range.
+    const std::size_t skip = hwy::Num0BitsBelowLS1Bit_Nonzero64(near);
+    near >>= skip, block += skip;
+    const std::size_t more = ~near == 0 ? 64 : hwy::Num0BitsBelowLS1Bit_Nonzero64(~near);
+    std::size_t j = HWY_MAX(HWY_MAX(from, behind), block * kBandBlock);
+    block += more;
+    near = more == 64 ? 0 : near >> more;
+    const std::size_t to = HWY_MIN(end, block * kBandBlock);
+    for (; j < HWY_MIN(i + kRows, to); j += kLanes)
+      add_tile<true, kGeodesic>(g, width2, i, j, fresh, rows);
+    for (; j < to; j += kLanes) add_tile<false, kGeodesic>(g, width2, i, j, fresh, rows);
+  }
   add_four_sums(d, rows.sum, total + i);
 }
 
@@ -143,9 +206,12 @@ HWY_INLINE void sum_part(const GaussSweep& sweep, std::size_t part) {
       for (std::uint32_t r = 0; r < runs.count; ++r) {
         for (std::uint32_t from = runs.first[r]; from < runs.end[r]; from += kRun) {
           const std::uint32_t to = HWY_MIN(from + kRun, runs.end[r]);
+          std::uint64_t near =
+              ~std::uint64_t{0} >> (63 - (to - 1) / kBandBlock + from / kBandBlock);
+          if (pairs.boxed) near = near_blocks(pairs, width2, b, from / kBandBlock, band_blocks(to));
+          if (near == 0) continue;
           for (std::size_t i = b * kBandBlock; i < rows; i += kRows)
-            add_group<kGeodesic>(pairs, width2, i, HWY_MAX(std::size_t{from}, i / kLanes * kLanes),
-                                 to, fresh, total);
+            add_group<kGeodesic>(pairs, width2, near, i, from, to, fresh, total);
         }
       }
       if (runs.count > 0) farthest = HWY_MAX(farthest, std::size_t{runs.end[runs.count - 1]});
@@ -209,6 +275,7 @@ HWY_AFTER_NAMESPACE();
 namespace h6::kernels {
 
 HWY_EXPORT(gather_rows);
+HWY_EXPORT(find_boxes);
 HWY_EXPORT(sum_pairs);
 HWY_EXPORT(join_parts);
 HWY_EXPORT(weigh_rows);
@@ -244,6 +311,8 @@ GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& wid
   const std::size_t rows = band_blocks(c.count) * kBandBlock;
   for (float*& at : pairs.at) columns.take(at, rows);
   columns.take(pairs.share, rows);
+  for (float*& centre : pairs.centre) columns.take(centre, band_blocks(c.count) + kBandBlock);
+  for (float*& half : pairs.half) columns.take(half, band_blocks(c.count) + kBandBlock);
   for (std::size_t part = 0; part < kGaussSweepParts; ++part) {
     columns.take(pairs.fresh[part], rows);
     columns.take(pairs.sum[part], rows);
@@ -275,6 +344,8 @@ void sort(const GaussSweep& sweep, std::size_t density) {
   sweep.pairs[density] = sort_bands(sweep.bands[density], c, sweep.per_share[density]);
   if (sweep.product == nullptr) return;
   HWY_DYNAMIC_DISPATCH(gather_rows)(sweep);
+  sweep.product->boxed = *sweep.pairs > kGaussBoxes * c.count && gauss_sweep_pays(sweep);
+  if (sweep.product->boxed) HWY_DYNAMIC_DISPATCH(find_boxes)(sweep);
   split_pairs(sweep);
 }
 
