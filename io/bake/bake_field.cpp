@@ -150,17 +150,17 @@ Outcome weld(const Mesh& mesh, const FieldBake& options, bake::Surface& surface,
   return Done{};
 }
 
-// Finds the bricks near the surface and their distances.
 // Masks and all else that a row has beside its distances: 310 to 670 bytes where rows are many.
 constexpr std::size_t kBytesARow = 670;
 
+// Finds the bricks near the surface and their distances.
 Outcome measure(const FieldBake& options, const bake::Surface& surface, const bake::Grid& grid,
                 const bake::Steps& steps, double from, double to, bake::NarrowBand& band) {
   using namespace bake;
   const unsigned threads = options.threads;
   band = {};
   if (!steps.tell("bricks", from)) return Failure{"cancelled"};
-  if (const Outcome found = find_candidates(surface, grid, threads, band); !found) return found;
+  if (const Outcome found = find_candidates(surface, grid, options, band); !found) return found;
   band.features = surface.features ? surface.features : find_features(surface, threads);
   const auto wanted = std::size_t(
       std::count_if(band.cell.begin(), band.cell.end(), [&](auto c) { return grid.wants(c); }));

@@ -57,8 +57,8 @@ struct FieldBake {
   // Whether walls too thin for the voxels grow (bake_field). For studies; no scene file has it.
   bool grow_thin = true;
   unsigned threads = 0;  // 0: all
-  // The bytes that are free, or no value where nothing tells. A bake asks when it knows its bricks,
-  // and fails with a sentence if it would take more. Tests put their own in its place.
+  // The bytes that are free, or no value where nothing tells. A bake asks before it takes much, and
+  // fails with a sentence where it would take more. For tests; no scene file has it.
   std::optional<std::uint64_t> (*free_memory)() = [] { return io::free_memory(); };
 };
 

@@ -7,10 +7,13 @@
 // tiles that it passes.
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 #include "io/bake/grid.h"
+#include "io/bake/plan.h"
 #include "sched/parallel_for.h"
 
 namespace h6::io::bake {
@@ -250,8 +253,13 @@ Failure too_many(const Grid& grid, double excess) {
 
 }  // namespace
 
-Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
+Outcome find_candidates(const Surface& surface, const Grid& grid, const FieldBake& options,
                         NarrowBand& band) {
+  const unsigned threads = options.threads;
+  // Pairs are here twice while they are sorted, and some room is lost while they are found.
+  const std::optional<std::uint64_t> free = options.free_memory();
+  const std::size_t most =
+      std::min<std::uint64_t>(kMaxPairs, free.value_or(UINT64_MAX) / (3 * sizeof(Pair)));
   Tiles& tiles = band.tiles;
   for (std::size_t k = 0; k < 3; ++k) tiles.size[k] = (grid.bricks[k] + 3) / 4;
   const std::size_t tile_count =
@@ -274,7 +282,7 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
       std::vector<Pair>& pairs = mine.slices.emplace_back();
       const std::size_t end = std::min(surface.triangles.size(), (s + 1) * kSlice);
       for (std::size_t t = s * kSlice; t < end; t += Batch::kMost) {
-        if (total.load(std::memory_order_relaxed) > kMaxPairs) return;
+        if (total.load(std::memory_order_relaxed) > most) return;
         const std::size_t before = pairs.size();
         bin_triangles(surface, grid, tiles, t, std::min(end, t + Batch::kMost), pairs);
         for (std::size_t i = before; i < pairs.size(); ++i) {
@@ -285,7 +293,7 @@ Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threa
       }
     }
   });
-  if (total > kMaxPairs) return too_many(grid, 4.0);
+  if (total > most) return most < kMaxPairs ? takes_more_than(double(*free)) : too_many(grid, 4.0);
 
   tiles.first.assign(tile_count + 1, 0);
   std::vector<std::uint64_t> used(tile_count, 0);

@@ -248,7 +248,7 @@ class Steps {
 // distance.cpp: makes room for distances, in the order of rows.
 void give_slots(const Grid& grid, NarrowBand& band);
 // bins.cpp: fills tiles, cells and rows. Fails, with a sentence, when there are too many.
-Outcome find_candidates(const Surface& surface, const Grid& grid, unsigned threads,
+Outcome find_candidates(const Surface& surface, const Grid& grid, const FieldBake& options,
                         NarrowBand& band);
 // distance.cpp: distances of the rows of one tile. Returns the triangles that may meet the tile
 // itself; the list is valid until the same thread measures another tile.
@@ -338,6 +338,9 @@ Outcome add_thin(const ThinPieces& thin, const Surface& whole, Grid grid, double
 void warn(const Surface& surface, const Grid& grid, bool nothing_inside, double seal, SignMode sign,
           FieldBakeReport& report);
 
+// With more triangles in a coarse brick than this, most of the time goes into triangles, and to
+// look at them in middle voxels takes longer than all fine bricks do.
+inline constexpr std::size_t kDense = 20;
 // to_tolerance.cpp: coarse bricks everywhere, finer samples where those miss the tolerance.
 Result<FieldData> bake_to_tolerance(Surface& surface, const FieldBake& options, bool sealed,
                                     const Steps& steps, FieldBakeReport* report);

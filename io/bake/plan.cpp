@@ -20,7 +20,7 @@ namespace {
 
 using Corners = std::array<Vec3, 3>;
 
-constexpr double kPiece = 4;     // [voxel] longest extent
+constexpr double kPiece = 3;     // [voxel] longest extent
 constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
 // Normals that differ by more than 40 degrees in a brick are a turn.
 constexpr double kTurn = 0.77;
@@ -36,8 +36,8 @@ constexpr Refined kSome{800, 0, 55e3, 600}, kAll{800, 50e3, 50e3, 600};
 constexpr std::size_t kFinerBytes = 8000;
 // Of the time [s].
 constexpr Refined kSomeTime{3e-6, 0, 1.5e-4, 0}, kAllTime{3e-6, 2.5e-4, 0, 0};
-// An estimate this many times too high is not believed: the bake itself says what it takes.
-constexpr double kTooHigh = 2;
+// Estimates are up to this many times too high, in tolerances mostly: then the bake itself tells.
+constexpr double kTooHigh = 1.5;
 
 // Estimates the number of pieces that a triangle is cut into.
 double pieces_of(const Corners& c) {
@@ -167,7 +167,8 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
              of.cell * double(cells);
     };
     const bool some = grid->offset == 0 && audit.closed && options.sign != SignMode::flood &&
-                      options.cavities == Cavities::solid;
+                      options.cavities == Cavities::solid &&
+                      mesh.triangles.size() < bake::kDense * plan.brick_count;
     plan.peak_bytes = std::size_t(kProgram + sum(some ? kSome : kAll));
     plan.seconds = 0.05 + sum(some ? kSomeTime : kAllTime);
   } else {
@@ -176,6 +177,11 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
     plan.seconds = 0.05 + 9e-6 * all + 1e-6 * triangles;
   }
   return plan;
+}
+
+Failure takes_more_than(double free) {
+  return Failure{"this bake takes more than the " + gigabytes(free) +
+                 " of memory that are free: choose larger voxels, or a larger tolerance"};
 }
 
 Outcome room_for(double bytes, const FieldBake& options) {

@@ -18,8 +18,8 @@ struct FieldPlan {
   std::size_t brick_count = 0;           // bricks with samples, mostly within a tenth
   std::size_t bytes = 0;                 // of the field in memory; roughly, with a tolerance
   std::size_t engine_bytes = 0;          // of the field in the engine's layout, without finer cells
-  // That the process takes at the bake's peak, or when it writes the field: 0.75 to 2.1 times the
-  // truth (bench/README.md, "Memory"). The bake looks again when it knows its bricks.
+  // The memory of the process at the bake's peak, or while it writes the field. bench/README.md,
+  // "Memory", says how true it is. The bake looks again when it knows its bricks.
   std::size_t peak_bytes = 0;
   double seconds = 0;  // a rough guess, for two threads of a server of 2023
 };
@@ -30,6 +30,9 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
 // "about 1.2 GB of memory and 3 s". Fails, with a sentence, if a bake of this plan cannot fit into
 // the memory that is free [bytes].
 Result<std::string> needs_of(const FieldPlan& plan, std::uint64_t free);
+
+// The sentence for a bake that takes more than what is free [bytes].
+Failure takes_more_than(double free);
 
 // Fails, with a sentence, if a bake cannot take so many more bytes.
 Outcome room_for(double bytes, const FieldBake& options);

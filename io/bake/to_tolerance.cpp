@@ -21,13 +21,6 @@
 namespace h6::io::bake {
 namespace {
 
-// With more triangles in a coarse brick than this, most of the time goes into triangles, and to
-// look at them in middle voxels takes longer than all fine bricks do.
-constexpr std::size_t kDense = 20;
-
-// A refined field takes this share of its fine bricks: the most of 26 meshes.
-constexpr double kFiner = 0.6;
-
 // A bake to a tolerance: coarse bricks everywhere, fine ones where those may miss it.
 class Refined {
  public:
@@ -163,10 +156,12 @@ class Refined {
       warn(surface_, grids_.fine, fine_.nothing_inside && !grown, options_.seal, options_.sign,
            *report_);
     if (!steps_.tell("refine", 0.8)) return Failure{"cancelled"};
-    const double samples = double(fine_.field.samples.size() * sizeof(float));
-    if (const Outcome room = room_for(kFiner * samples, options_); !room) return room.failure();
-    return refine(std::move(coarse_.field), std::move(fine_.field), fine_.inside,
-                  options_.tolerance, options_.threads);
+    const std::uint64_t room = options_.free_memory().value_or(UINT64_MAX);
+    std::optional<FieldData> field =
+        refine(std::move(coarse_.field), std::move(fine_.field), fine_.inside, options_.tolerance,
+               room, options_.threads);
+    if (!field) return takes_more_than(double(room));
+    return std::move(*field);
   }
 
   Surface& surface_;

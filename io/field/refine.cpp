@@ -6,6 +6,7 @@
 #include "io/field/refine.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -164,6 +165,9 @@ void take_names(const FieldData& coarse, const FieldData& fine, FieldData& out) 
 struct Finer {
   std::array<std::int32_t, 512> index{};  // as in FieldData, for these halves and quarters
   std::vector<float> halves, quarters;
+  std::size_t bytes() const {
+    return sizeof *this + sizeof(float) * (halves.size() + quarters.size());
+  }
 };
 
 // Decides for the cells of one coarse brick, box by box. A box is 2 x 2 x 2 cells: one fine brick.
@@ -343,8 +347,9 @@ std::vector<std::uint64_t> suspect_bricks(const FieldData& coarse, const FieldDa
   return bits;
 }
 
-FieldData refine(FieldData coarse, FieldData fine, const std::vector<std::uint8_t>& inside,
-                 double tolerance, unsigned threads) {
+std::optional<FieldData> refine(FieldData coarse, FieldData fine,
+                                const std::vector<std::uint8_t>& inside, double tolerance,
+                                std::uint64_t room, unsigned threads) {
   FieldData out;
   out.origin = coarse.origin;
   out.voxel_size = coarse.voxel_size;
@@ -360,9 +365,13 @@ FieldData refine(FieldData coarse, FieldData fine, const std::vector<std::uint8_
     if (out.brick_index[c] >= 0) cell_of[std::size_t(out.brick_index[c])] = c;
   const Chooser chooser(out, nodes, tolerance);
   std::vector<std::unique_ptr<Finer>> chosen(cell_of.size());
+  std::atomic<std::uint64_t> taken{0};  // bytes
   sched::parallel_for(cell_of.size(), threads, [&](std::size_t row) {
+    if (taken.load(std::memory_order_relaxed) > room) return;
     chosen[row] = chooser.choose(place_of(cell_of[row], out.bricks));
+    if (chosen[row]) taken.fetch_add(chosen[row]->bytes(), std::memory_order_relaxed);
   });
+  if (taken > room) return std::nullopt;
   take_far(coarse, nodes, out);
   // The finer samples are here twice until they are joined, so the others go first.
   Samples().swap(fine.samples);

@@ -14,20 +14,28 @@ Vec3 between(const Vec3& a, const Vec3& b) { return 0.5 * (a + b); }
 
 std::optional<Two> halves_of_triangle(const Piece& piece, double longest2) {
   const auto& c = piece.corner;
-  double edge2[3];  // from corner k to the next
-  for (std::size_t k = 0; k < 3; ++k) edge2[k] = squared(c[(k + 1) % 3] - c[k]);
-  const auto longest = std::size_t(std::max_element(edge2, edge2 + 3) - edge2);
-  if (!(edge2[longest] > longest2)) return std::nullopt;
-  const auto shortest = std::size_t(std::min_element(edge2, edge2 + 3) - edge2);
-  const double second2 = edge2[0] + edge2[1] + edge2[2] - edge2[longest] - edge2[shortest];
-  if (second2 > longest2 && 4 * edge2[shortest] < edge2[longest]) {
-    const Vec3 &a = c[shortest], &b = c[(shortest + 1) % 3], &tip = c[(shortest + 2) % 3];
-    const Vec3 by_a = between(tip, a), by_b = between(tip, b);
-    return Two{Piece(tip, by_a, by_b), Piece(by_a, a, b, by_b)};
+  std::size_t at = 0;  // the longest edge begins here
+  for (std::size_t k = 1; k < 3; ++k)
+    if (squared(c[(k + 1) % 3] - c[k]) > squared(c[(at + 1) % 3] - c[at])) at = k;
+  const Vec3 &a = c[at], &b = c[(at + 1) % 3], &tip = c[(at + 2) % 3];
+  const double length2 = squared(b - a);
+  if (!(length2 > longest2)) return std::nullopt;
+  // The tip stands over the longest edge at this share of it, and so high.
+  const double share = std::clamp(dot(tip - a, b - a) / length2, 0.0, 1.0);
+  const double near_end = std::min(share, 1 - share);
+  const double height2 = squared(tip - a) - share * share * length2;
+  if (near_end * near_end * length2 > std::max(height2, 1e-6 * length2)) {
+    const Vec3 foot = a + share * (b - a);
+    return Two{Piece(a, foot, tip), Piece(foot, b, tip)};
   }
-  const Vec3 &a = c[longest], &b = c[(longest + 1) % 3], &tip = c[(longest + 2) % 3];
+  // The shortest edge lies across: from the tip to b, or from a to the tip.
   const Vec3 middle = between(a, b);
-  return Two{Piece(a, middle, tip), Piece(middle, b, tip)};
+  if (share > 0.5) {
+    const Vec3 other = between(tip, a);
+    return Two{Piece(a, middle, other), Piece(middle, b, tip, other)};
+  }
+  const Vec3 other = between(b, tip);
+  return Two{Piece(b, other, middle), Piece(other, tip, a, middle)};
 }
 
 std::optional<Two> halves_of_strip(const Piece& piece, double longest2) {

@@ -68,7 +68,20 @@ TEST_CASE("a narrow triangle becomes about as many pieces as it is pieces long")
   for (const double length : {10.0, 100.0, 1000.0}) {
     CAPTURE(length);
     const Vec3 a{0, 0, 0}, b{length, 0, 0};
-    CHECK(pieces_of(Piece(a, b, {length, 0.5, 0}), 2).size() < 1.1 * length);
-    CHECK(pieces_of(Piece(a, b, {length / 2, 0.5, 0}), 2).size() < 1.1 * length);
+    for (const double tip : {0.0, 0.03, 0.3, 0.5, 0.52, 0.7, 0.95, 1.0}) {
+      CAPTURE(tip);
+      for (const double height : {1e-4, 0.5})
+        CHECK(pieces_of(Piece(a, b, {tip * length, height, 0}), 2).size() <= 1.3 * length);
+    }
   }
+}
+
+TEST_CASE("a wide triangle becomes some pieces for each square as wide as a piece") {
+  for (const double tip : {0.0, 0.2, 0.5, 0.9, 1.0})
+    for (const double height : {10.0, 60.0, 100.0}) {
+      CAPTURE(tip);
+      CAPTURE(height);
+      const Piece whole({0, 0, 0}, {100, 0, 0}, {100 * tip, height, 0});
+      CHECK(pieces_of(whole, 2).size() < 1.5 * whole.area() + 300);
+    }
 }

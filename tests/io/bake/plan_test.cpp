@@ -82,7 +82,7 @@ TEST_CASE("to a tolerance, many edges are planned with more memory and time than
 TEST_CASE("a bake that cannot fit is refused in one sentence, with voxels that would") {
   FieldPlan plan;
   plan.peak_bytes = 4 * kGiga, plan.seconds = 3;
-  // A plan may be twice too high, and the bake itself looks again.
+  // A plan may be half too high, and the bake itself looks again.
   for (const std::uint64_t free : {5 * kGiga, 3 * kGiga}) {
     const auto fits = needs_of(plan, free);
     REQUIRE(fits);
@@ -95,26 +95,48 @@ TEST_CASE("a bake that cannot fit is refused in one sentence, with voxels that w
         "tolerance, 2.1 times as large");
 }
 
-TEST_CASE("a bake that runs out of memory says so as soon as it knows its bricks") {
-  const Mesh mesh = torus(1.0, 0.4);
-  FieldBake options;
-  options.threads = 2;
-  for (const double tolerance : {0.0, 2.8 / 2000}) {
+TEST_CASE("a bake that runs out of memory says so, wherever it asks for more") {
+  static int asked, enough;  // a pointer to a function captures nothing
+  const auto free_memory = [] {
+    return std::optional<std::uint64_t>(asked++ < enough ? kGiga : 0);
+  };
+  const Mesh mesh = box({0, 0, 0}, {3, 2, 1}, 1);
+  for (const double tolerance : {0.0, 3.0 / 200}) {
     CAPTURE(tolerance);
-    options.tolerance = tolerance;
-    const auto all = bake_field(mesh, options, nullptr);
-    REQUIRE(all);
-    options.free_memory = [] { return std::optional<std::uint64_t>(3'000'000); };
-    const auto none = bake_field(mesh, options, nullptr);
-    REQUIRE_FALSE(none);
-    CHECK(none.error().starts_with("this bake takes another "));
-    CHECK(none.error().find(" MB of memory, and 3 MB are free: choose voxels, or a tolerance, ") !=
-          std::string::npos);
-    options.free_memory = [] { return std::optional<std::uint64_t>(kGiga); };
-    const auto same = bake_field(mesh, options, nullptr);
-    REQUIRE(same);
-    CHECK(same->samples.size() == all->samples.size());
+    FieldBake options;
+    options.tolerance = tolerance, options.voxels = 64, options.threads = 2;
     options.free_memory = [] { return std::optional<std::uint64_t>(); };
-    CHECK(bake_field(mesh, options, nullptr));
+    const auto whole = bake_field(mesh, options, nullptr);
+    REQUIRE(whole);
+    options.free_memory = free_memory;
+    int times = 0;
+    for (enough = 0;; ++enough, ++times) {
+      asked = 0;
+      const auto field = bake_field(mesh, options, nullptr);
+      if (field) {
+        CHECK(field->samples == whole->samples);
+        CHECK(field->quarters == whole->quarters);
+        break;
+      }
+      CHECK(asked == enough + 1);
+      CHECK(field.error().starts_with("this bake takes "));
+      CHECK(field.error().find(" of memory") != std::string::npos);
+      REQUIRE(times < 20);
+    }
+    // Before pairs and rows of each grid, and before the finer samples.
+    CHECK(times == (tolerance > 0 ? 7 : 2));
   }
+}
+
+TEST_CASE("many small triangles are planned as they are baked: with all fine bricks") {
+  FieldBake options;
+  const Mesh coarse = sphere({0, 0, 0}, 1.0, 12), dense = sphere({0, 0, 0}, 1.0, 120);
+  options.tolerance = 0.01;
+  const auto few = plan_field(coarse, audit(coarse), options),
+             many = plan_field(dense, audit(dense), options);
+  REQUIRE(few);
+  REQUIRE(many);
+  REQUIRE(dense.triangles.size() > 20 * many->brick_count);
+  CHECK(many->peak_bytes - 800 * dense.triangles.size() >
+        few->peak_bytes - 800 * coarse.triangles.size() + 30'000 * many->brick_count);
 }

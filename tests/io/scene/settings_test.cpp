@@ -22,7 +22,7 @@ TEST_CASE("every member of a scene's structs has its row") {
   every_member_has_a_row<ShellSource>(shell_source_settings(), 7);  // and bends
   for (const Setting& row : field_source_settings())
     if (row.stands_among())
-      every_member_has_a_row<FieldBake>(*row.inside, 3);  // threads, shift, grow_thin
+      every_member_has_a_row<FieldBake>(*row.inside, 4);  // threads, shift, grow_thin, free_memory
   for (const Setting& row : shell_source_settings())
     if (row.stands_among()) every_member_has_a_row<ShellBake>(*row.inside, 1);  // threads
 }
