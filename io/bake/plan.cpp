@@ -36,8 +36,8 @@ constexpr Refined kSome{800, 0, 55e3, 600}, kAll{800, 50e3, 50e3, 600};
 constexpr std::size_t kFinerBytes = 8000;
 // Of the time [s].
 constexpr Refined kSomeTime{3e-6, 0, 1.5e-4, 0}, kAllTime{3e-6, 2.5e-4, 0, 0};
-// Estimates are up to this many times too high, in tolerances mostly: then the bake itself tells.
-constexpr double kTooHigh = 1.5;
+// A bake whose estimate is up to this many times what is free may fit. It finds out itself.
+constexpr double kTooHigh = 2.1;
 
 // Estimates the number of pieces that a triangle is cut into.
 double pieces_of(const Corners& c) {
@@ -181,7 +181,7 @@ Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const Fie
 
 Failure takes_more_than(double free) {
   return Failure{"this bake takes more than the " + gigabytes(free) +
-                 " of memory that are free: choose larger voxels, or a larger tolerance"};
+                 " of memory that are still free: choose larger voxels, or a larger tolerance"};
 }
 
 Outcome room_for(double bytes, const FieldBake& options) {

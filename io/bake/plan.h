@@ -27,8 +27,8 @@ struct FieldPlan {
 // Fails where the bake would fail, with the same sentence.
 Result<FieldPlan> plan_field(const Mesh& mesh, const MeshAudit& audit, const FieldBake& options);
 
-// "about 1.2 GB of memory and 3 s". Fails, with a sentence, if a bake of this plan cannot fit into
-// the memory that is free [bytes].
+// "about 1.2 GB of memory and 3 s". Fails, with a sentence, if a bake of this plan is far from
+// fitting into the memory that is free [bytes].
 Result<std::string> needs_of(const FieldPlan& plan, std::uint64_t free);
 
 // The sentence for a bake that takes more than what is free [bytes].

@@ -365,6 +365,10 @@ std::optional<FieldData> refine(FieldData coarse, FieldData fine,
     if (out.brick_index[c] >= 0) cell_of[std::size_t(out.brick_index[c])] = c;
   const Chooser chooser(out, nodes, tolerance);
   std::vector<std::unique_ptr<Finer>> chosen(cell_of.size());
+  // The finer samples are here once beside the fine bricks, and twice when these are gone.
+  const auto bytes = [](const Samples& s) { return s.size() * sizeof(float); };
+  room -= std::min<std::uint64_t>(room, bytes(out.samples));
+  room = std::min(room, room / 2 + (bytes(fine.samples) + bytes(coarse.samples)) / 2);
   std::atomic<std::uint64_t> taken{0};  // bytes
   sched::parallel_for(cell_of.size(), threads, [&](std::size_t row) {
     if (taken.load(std::memory_order_relaxed) > room) return;

@@ -27,15 +27,19 @@ std::optional<std::uint64_t> number_in(const fs::path& file, const std::string& 
 
 // The names of one version's files.
 struct Version {
-  const char *limit, *used, *files;
+  const char *limit, *used, *inactive, *active;  // the last two: pages of files
 };
-constexpr Version kSecond{"memory.max", "memory.current", "inactive_file"},
-    kFirst{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"};
+constexpr Version kSecond{"memory.max", "memory.current", "inactive_file", "active_file"},
+    kFirst{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file",
+           "total_active_file"};
 
 void bound(const fs::path& group, const Version& v, std::optional<std::uint64_t>& least) {
   const auto limit = number_in(group / v.limit, ""), used = number_in(group / v.used, "");
   if (!limit || !used) return;
-  const std::uint64_t files = number_in(group / "memory.stat", v.files).value_or(0);
+  const auto stat = [&](const char* name) {
+    return number_in(group / "memory.stat", name).value_or(0);
+  };
+  const std::uint64_t files = stat(v.inactive) + stat(v.active);
   const std::uint64_t kept = *used - std::min(*used, files);
   const std::uint64_t left = *limit - std::min(*limit, kept);
   least = least ? std::min(*least, left) : left;

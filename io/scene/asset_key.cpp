@@ -10,7 +10,7 @@ namespace {
 
 // Raise a number when its baker gives another result for the same input, so that old cache files
 // are no longer used.
-constexpr std::uint32_t field_bake_version = 13, shell_bake_version = 4;
+constexpr std::uint32_t field_bake_version = 14, shell_bake_version = 4;
 
 // Hashes a list of values. Each text and each column enters as its length and hash, so that
 // different lists do not give the same bytes.

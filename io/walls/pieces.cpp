@@ -20,7 +20,8 @@ std::optional<Two> halves_of_triangle(const Piece& piece, double longest2) {
   const Vec3 &a = c[at], &b = c[(at + 1) % 3], &tip = c[(at + 2) % 3];
   const double length2 = squared(b - a);
   if (!(length2 > longest2)) return std::nullopt;
-  // The tip stands over the longest edge at this share of it, and so high.
+  // The tip stands over the longest edge at this share of it, and so high. Of flatter triangles
+  // than a thousandth, the squares do not give the height.
   const double share = std::clamp(dot(tip - a, b - a) / length2, 0.0, 1.0);
   const double near_end = std::min(share, 1 - share);
   const double height2 = squared(tip - a) - share * share * length2;

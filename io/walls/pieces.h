@@ -24,10 +24,10 @@ struct Piece {
 // Two halves of a piece; none if it is nowhere longer than `longest` (> 0, in the unit of its
 // corners).
 //
-// A triangle becomes a shorter one and a strip across, and a strip two shorter strips, so a
-// triangle n times as long as wide becomes some n pieces. Where its tip is over the middle of the
-// longest edge, it is first cut from the tip down. If only longest edges were halved, there would
-// be n^1.58 pieces, since a half can be as long as the whole.
+// A triangle becomes a shorter one and a strip across, and a strip two shorter strips, so a narrow
+// triangle as long as n pieces becomes some n. Where its tip is farther from both ends of the
+// longest edge than it is high, it is first cut from the tip down. If only longest edges were
+// halved, some n^1.58 pieces would come out, since a half can be as long as the whole.
 std::optional<std::array<Piece, 2>> halves(const Piece& piece, double longest);
 
 }  // namespace h6::io

@@ -5,7 +5,7 @@
 // gauss_bands.h sorts the contacts and sums hats over one sphere. A product of two hats costs more,
 // so each pair is evaluated once: it joins a sum over lanes for one contact and a sum over rows for
 // the other. Where pairs are many, two blocks of contacts whose boxes are farther apart than a hat,
-// on either sphere, are passed over. No bit depends on that.
+// on either sphere, are passed over. That changes no bit of finite weights.
 //
 //     columns -> bands, runs -> sums of rows and of columns, part by part -> weights
 //
@@ -19,7 +19,7 @@ namespace h6::kernels {
 inline constexpr int kGaussSweepStages = 3;
 inline constexpr std::size_t kGaussSweepParts = 2;  // slices of the pairs of a product
 // Boxes pay above this number of pairs a contact. A thousand contacts of `robust` on a plane take
-// 0.64 times as long (the frame), 30,000 in a socket 0.69 (the weights); with boxes always, a
+// 0.65 times as long (the frame), 30,000 in a socket 0.69 (the weights); with boxes always, a
 // thousand in a bore took 1.2 times as long.
 inline constexpr std::uint64_t kGaussBoxes = 192;
 // The tree is faster above this number of contacts, or of pairs per contact (one sphere, product).
@@ -30,7 +30,7 @@ inline constexpr std::uint64_t kGaussSweepPairs3 = 512, kGaussSweepPairs6 = 1536
 struct GaussPairs {
   const float* column[6];  // in the caller's order
   float width[2];
-  float *at[6], *share;                                    // in order of the bands
+  float *at[6], *share;        // in order of the bands
   bool boxed;                  // whether blocks have boxes
   float *centre[6], *half[6];  // (blocks) of the boxes around the contacts of each block
   float *fresh[kGaussSweepParts], *sum[kGaussSweepParts];  // part by part
