@@ -229,12 +229,13 @@ bool soon(Condition condition, double limit = 100) {
   return condition();
 }
 
-// Whether the log of a running recording has kSomeFrames. A frame takes some 200 bytes.
+// Whether the log of a running recording has kSomeFrames: it begins with up to 60 kB about the run,
+// and a frame takes some 200 bytes.
 constexpr int kSomeFrames = 40;
 inline bool records(const Sandbox& box, const std::string& name) {
   std::error_code absent;
   const auto bytes = fs::file_size(box.file(name + ".part"), absent);
-  return !absent && bytes > 30'000;
+  return !absent && bytes > 120'000;
 }
 
 // --- meshes, written by hand so that no test relies on the library's own writer -----------------
