@@ -27,6 +27,7 @@ constexpr double kTurn = 0.77;
 // Of the peak of a bake [bytes], fitted to the peaks of 26 meshes.
 constexpr double kProgram = 50e6;  // of the program itself
 constexpr double kUniformPeak = 2.1, kUniformTriangle = 300;
+// The same of a field with a tolerance, for each: coarse bricks and cells, and bricks that turn.
 struct Refined {
   double triangle, brick, turn, cell;
 };

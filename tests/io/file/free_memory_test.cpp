@@ -55,7 +55,8 @@ TEST_CASE("free memory is the least of the machine's and of what every control g
   // The group above has 4 GiB, of which 3 are taken, and 1 of these by pages of files.
   root.file("sys/fs/cgroup/jobs/memory.max", "4294967296\n");
   root.file("sys/fs/cgroup/jobs/memory.current", "3221225472\n");
-  root.file("sys/fs/cgroup/jobs/memory.stat", "anon 1\ninactive_file 536870912\nactive_file 536870912\n");
+  root.file("sys/fs/cgroup/jobs/memory.stat",
+            "anon 1\ninactive_file 536870912\nactive_file 536870912\n");
   CHECK(free_memory(root.path()) == 2 * kGiga);
   // The first version, in a container that does not see its own path.
   root.file("proc/self/cgroup", "12:cpu,cpuacct:/box\n9:memory:/box\n");
