@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "tests/io/bake/field_check.h"
 
@@ -40,6 +41,19 @@ TEST_CASE("a plan is the bake's own voxel, offset and size, and its bricks to a 
   FieldBake tiny;
   tiny.voxel_size = 1e-6;
   CHECK(!plan_field(open, audit(open), tiny));  // the bake's own sentence
+  // A tolerance that takes too many nodes is answered in tolerances, however small it is.
+  for (const double tolerance : {8e-4, 1e-4, 1e-9}) {
+    CAPTURE(tolerance);
+    FieldBake least;
+    least.tolerance = tolerance;
+    const auto none = plan_field(open, audit(open), least);
+    REQUIRE_FALSE(none);
+    CHECK(none.error().starts_with("a tolerance of "));
+    const double enough = std::stod(none.error().substr(none.error().rfind("least ") + 6));
+    CHECK(enough < 2e-3);
+    least.tolerance = 1.001 * enough;
+    CHECK(plan_field(open, audit(open), least));
+  }
   // Too much surface to look at every triangle: the estimate still comes soon.
   Mesh heap;
   for (int i = 0; i < 40; ++i)
