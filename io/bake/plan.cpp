@@ -24,20 +24,22 @@ constexpr double kPiece = 3;     // [voxel] longest extent
 constexpr double kPieces = 3e7;  // a second's work; beyond it, triangles are sampled
 // Normals that differ by more than 40 degrees in a brick are a turn.
 constexpr double kTurn = 0.77;
-// Of the peak of a bake [bytes], fitted to the peaks of 26 meshes.
-constexpr double kProgram = 50e6;  // of the program itself
+// These numbers are fitted to the peaks of 26 meshes [bytes]. The program itself takes kProgram.
+constexpr double kProgram = 50e6;
 constexpr double kUniformPeak = 2.1, kUniformTriangle = 300;
-// The same of a field with a tolerance, for each: coarse bricks and cells, and bricks that turn.
+// A bake to a tolerance takes this for each triangle, each coarse brick, each coarse brick in which
+// the surface turns, and each coarse cell.
 struct Refined {
   double triangle, brick, turn, cell;
 };
 // In a closed solid only the bricks in which the surface turns need fine voxels, else all do.
 constexpr Refined kSome{800, 0, 55e3, 600}, kAll{800, 50e3, 50e3, 600};
-// Of the finer samples that stay in such a brick: 3 to 37 kB.
+// The finer samples that stay in such a brick take 3 to 37 kB.
 constexpr std::size_t kFinerBytes = 8000;
-// Of the time [s].
+// The time is guessed in the same way [s].
 constexpr Refined kSomeTime{3e-6, 0, 1.5e-4, 0}, kAllTime{3e-6, 2.5e-4, 0, 0};
-// A bake whose estimate is up to this many times what is free may fit. It finds out itself.
+// A bake may fit although its estimate is up to this many times what is free. Then it finds out
+// itself.
 constexpr double kTooHigh = 2.1;
 
 // Estimates the number of pieces that a triangle is cut into.

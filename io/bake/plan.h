@@ -19,7 +19,7 @@ struct FieldPlan {
   std::size_t bytes = 0;                 // of the field in memory; roughly, with a tolerance
   std::size_t engine_bytes = 0;          // of the field in the engine's layout, without finer cells
   // The memory of the process at the bake's peak, or while it writes the field. bench/README.md,
-  // "Memory", says how true it is. The bake looks again when it knows its bricks.
+  // "Memory", says how true it is. The bake itself asks what is free.
   std::size_t peak_bytes = 0;
   double seconds = 0;  // a rough guess, for two threads of a server of 2023
 };

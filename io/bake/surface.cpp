@@ -325,17 +325,17 @@ Result<Grid> choose_grid(const Surface& surface, const FieldBake& options, bool 
 Result<GridLevels> choose_grids(const Surface& surface, const FieldBake& options, bool sealed) {
   const double voxel = kFinest * options.tolerance;  // the fine one
   constexpr double kMost = 8 * kMaxBricksOnSide;
-  const auto too_fine = [&](double nodes) {
+  const auto too_fine = [&](double side) {  // [m]
     char text[200];
     std::snprintf(text, sizeof text,
-                  "a tolerance of %.4g m takes %.0f nodes on a side, %.0f are possible: choose at "
+                  "a tolerance of %.4g m takes %.4g nodes on a side, %.0f are possible: choose at "
                   "least %.4g m",
-                  options.tolerance, nodes, kMost, 1.1 * options.tolerance * nodes / kMost);
+                  options.tolerance, side / voxel, kMost, 1.1 * side / (kFinest * kMost));
     return Failure{text};
   };
   const Vec3 size = surface.high - surface.low;
-  const double nodes = std::max({size.x, size.y, size.z}) / voxel;
-  if (nodes > kMost) return too_fine(nodes);
+  const double longest = std::max({size.x, size.y, size.z});
+  if (longest / voxel > kMost) return too_fine(longest);
   FieldBake o = options;
   o.voxel_size = kCut * voxel;
   const bool winding = options.sign == SignMode::winding;
@@ -362,7 +362,7 @@ Result<GridLevels> choose_grids(const Surface& surface, const FieldBake& options
   GridLevels levels{*coarse, finer(kCut / 2), finer(kCut)};
   const auto& bricks = levels.fine.bricks;
   const int most = *std::max_element(bricks.begin(), bricks.end());
-  if (most > kMaxBricksOnSide) return too_fine(8.0 * most);
+  if (most > kMaxBricksOnSide) return too_fine(8 * most * voxel);
   Grid& fine = levels.fine;
   fine.seal = sealed ? 0 : options.seal / voxel;
   if (fine.seal > 32 || (fine.seal > 0 && fine.offset < 0.6 && !winding)) {

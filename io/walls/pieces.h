@@ -21,7 +21,7 @@ struct Piece {
   double area() const;
 };
 
-// Two halves of a piece; none if it is nowhere longer than `longest` (> 0, in the unit of its
+// Two parts of a piece; none if it is nowhere longer than `longest` (> 0, in the unit of its
 // corners).
 //
 // A triangle becomes a shorter one and a strip across, and a strip two shorter strips, so a narrow
