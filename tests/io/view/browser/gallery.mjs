@@ -28,17 +28,23 @@ const shoot = async (name) => {
   console.log(`${name}.png`);
 };
 
-// Runs the program with its view, waits for `contacts` of them and then `after` ms, and does the work.
+// Runs the program with its view, waits for `contacts` of them and then `after` ms, and does the work. The
+// path starts again once the page is there: on a slow machine a short one is over by then. It does so at a
+// slow pace, so that its first second cannot be missed either.
 async function live(args, work, { after = 4000, pace = 1, contacts = 1 } = {}) {
   const run = spawn(program, [...args, '--view', '--no-browser'], { cwd: folder, stdio: ['ignore', 'ignore', 'pipe'] });
   let said = '';
   run.stderr.on('data', (text) => { said += text; });
   try {
     await browser.go(await until(() => said.match(/view: (http:\/\/\S+)/)?.[1], 'the run prints an address', 120));
-    const touching = () => browser.value('window.hapsix?.state()?.contacts ?? -1');
-    await until(async () => (await touching()) >= 0, 'the view is there', 120);
-    await browser.value(`window.hapsix.ask({ do: 'pace', pace: ${pace} })`);
-    await until(async () => (await touching()) >= contacts, 'something touches', 120);
+    const state = (name) => browser.value(`window.hapsix?.state()?.${name} ?? -1`);
+    const ask = (request) => browser.value(`window.hapsix.ask(${JSON.stringify(request)})`);
+    await until(async () => (await state('time')) >= 1, 'a second has passed in the view', 120);
+    await ask({ do: 'pace', pace: 0.02 });
+    await ask({ do: 'reset' });
+    await until(async () => (await state('time')) < 1, 'the path starts again', 120);
+    await ask({ do: 'pace', pace });
+    await until(async () => (await state('contacts')) >= contacts, 'something touches', 120);
     await wait(after);
     await work();
   } finally {
