@@ -186,6 +186,54 @@ HWY_INLINE void add_group(const GaussPairs& g, const VF* width2, std::uint64_t n
   add_four_sums(d, rows.sum, total + i);
 }
 
+// The runs of block b in pieces short enough for a sum: calls use(from, to, near) for each that has
+// blocks near b. Bit 0 of `near` is the block that holds `from`.
+template <class Use>
+HWY_INLINE void for_pieces(const GaussPairs& pairs, const VF* width2, std::size_t b,
+                           const BandRuns& runs, const Use& use) {
+  for (std::uint32_t r = 0; r < runs.count; ++r) {
+    for (std::uint32_t from = runs.first[r]; from < runs.end[r]; from += kRun) {
+      const std::uint32_t to = HWY_MIN(from + kRun, runs.end[r]);
+      std::uint64_t near = ~std::uint64_t{0} >> (63 - (to - 1) / kBandBlock + from / kBandBlock);
+      if (pairs.boxed) near = near_blocks(pairs, width2, b, from / kBandBlock, band_blocks(to));
+      if (near != 0) use(from, to, near);
+    }
+  }
+}
+
+HWY_INLINE void square_widths(const GaussPairs& pairs, VF* width2) {
+  for (int s = 0; s < 2; ++s) width2[s] = hn::Set(DF(), pairs.width[s] * pairs.width[s]);
+}
+
+// Splits the blocks into parts that meet about as many others each. Where there are boxes, one
+// block in eight is looked at.
+void split_pairs(const GaussSweep& sweep) {
+  const GaussBands& g = sweep.bands[0];
+  GaussPairs& pairs = *sweep.product;
+  VF width2[2];
+  square_widths(pairs, width2);
+  const auto met_by = [&](std::size_t b) HWY_ATTR {
+    const BandRuns& runs = g.runs[b];
+    std::size_t met = 0;
+    if (pairs.boxed)
+      for_pieces(pairs, width2, b, runs,
+                 [&](std::uint32_t, std::uint32_t, std::uint64_t near)
+                     HWY_ATTR { met += hwy::PopCount(near); });
+    for (std::uint32_t r = 0; r < runs.count && !pairs.boxed; ++r)
+      met += runs.end[r] - runs.first[r];
+    return met;
+  };
+  const std::size_t blocks = band_blocks(g.grid->count), step = pairs.boxed ? 8 : 1;
+  std::size_t low = 0, high = (blocks + step - 1) / step, before = 0, behind = 0;
+  while (low < high) {
+    if (before <= behind)
+      before += met_by(step * low++);
+    else
+      behind += met_by(step * --high);
+  }
+  pairs.split[0] = 0, pairs.split[1] = HWY_MIN(step * low, blocks), pairs.split[2] = blocks;
+}
+
 template <bool kGeodesic>
 HWY_INLINE void sum_part(const GaussSweep& sweep, std::size_t part) {
   const DF d;
@@ -196,24 +244,18 @@ HWY_INLINE void sum_part(const GaussSweep& sweep, std::size_t part) {
   std::fill_n(fresh, padded, 0.0f);
   std::fill_n(total, padded, 0.0f);
   VF width2[2];
-  for (int s = 0; s < 2; ++s) width2[s] = hn::Set(d, pairs.width[s] * pairs.width[s]);
+  square_widths(pairs, width2);
   const std::size_t end = pairs.split[part + 1];
   for (std::size_t first = pairs.split[part]; first < end; first += kFresh / kBandBlock) {
     std::size_t farthest = 0;
     for (std::size_t b = first; b < HWY_MIN(first + kFresh / kBandBlock, end); ++b) {
       const BandRuns& runs = g.runs[b];
       const std::size_t rows = HWY_MIN((b + 1) * kBandBlock, count);
-      for (std::uint32_t r = 0; r < runs.count; ++r) {
-        for (std::uint32_t from = runs.first[r]; from < runs.end[r]; from += kRun) {
-          const std::uint32_t to = HWY_MIN(from + kRun, runs.end[r]);
-          std::uint64_t near =
-              ~std::uint64_t{0} >> (63 - (to - 1) / kBandBlock + from / kBandBlock);
-          if (pairs.boxed) near = near_blocks(pairs, width2, b, from / kBandBlock, band_blocks(to));
-          if (near == 0) continue;
-          for (std::size_t i = b * kBandBlock; i < rows; i += kRows)
-            add_group<kGeodesic>(pairs, width2, near, i, from, to, fresh, total);
-        }
-      }
+      for_pieces(pairs, width2, b, runs,
+                 [&](std::uint32_t from, std::uint32_t to, std::uint64_t near) HWY_ATTR {
+                   for (std::size_t i = b * kBandBlock; i < rows; i += kRows)
+                     add_group<kGeodesic>(pairs, width2, near, i, from, to, fresh, total);
+                 });
       if (runs.count > 0) farthest = HWY_MAX(farthest, std::size_t{runs.end[runs.count - 1]});
     }
     for (std::size_t j = first * kBandBlock; j < farthest; j += kLanes) {
@@ -276,6 +318,7 @@ namespace h6::kernels {
 
 HWY_EXPORT(gather_rows);
 HWY_EXPORT(find_boxes);
+HWY_EXPORT(split_pairs);
 HWY_EXPORT(sum_pairs);
 HWY_EXPORT(join_parts);
 HWY_EXPORT(weigh_rows);
@@ -323,20 +366,6 @@ GaussSweep with_columns(const DirectionsView& c, Hat hat, const GaussWidths& wid
 
 std::size_t slices_of(std::size_t rows, std::size_t size) { return (rows + size - 1) / size; }
 
-// Gives half of the pairs to each part.
-void split_pairs(const GaussSweep& sweep) {
-  const GaussBands& g = sweep.bands[0];
-  const std::size_t blocks = band_blocks(g.grid->count);
-  std::size_t* const split = sweep.product->split;
-  split[0] = 0, split[2] = blocks;
-  std::uint64_t seen = 0;
-  std::size_t b = 0;
-  for (; 2 * seen < *sweep.pairs && b < blocks; ++b)
-    for (std::uint32_t r = 0; r < g.runs[b].count; ++r)
-      seen += kBandBlock * (g.runs[b].end[r] - g.runs[b].first[r]);
-  split[1] = b;
-}
-
 void sort(const GaussSweep& sweep, std::size_t density) {
   const DirectionsView& c = sweep.contacts;
   const bool weighted = c.facing != nullptr || c.depth != nullptr;
@@ -346,7 +375,7 @@ void sort(const GaussSweep& sweep, std::size_t density) {
   HWY_DYNAMIC_DISPATCH(gather_rows)(sweep);
   sweep.product->boxed = *sweep.pairs > kGaussBoxes * c.count && gauss_sweep_pays(sweep);
   if (sweep.product->boxed) HWY_DYNAMIC_DISPATCH(find_boxes)(sweep);
-  split_pairs(sweep);
+  HWY_DYNAMIC_DISPATCH(split_pairs)(sweep);
 }
 
 void sum(const GaussSweep& sweep, std::size_t slice) {
