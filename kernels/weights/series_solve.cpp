@@ -33,7 +33,7 @@ constexpr float kDoubt = 1e-5f;  // a hundred times the rounding of a sum of som
 constexpr std::size_t kManyToStart = 256;  // fewest contacts for which a start is worth its time
 // Where the first step is longer than this share of the largest e, the start was far off.
 constexpr double kFar = 0.2;
-constexpr std::size_t kLeastSlice = 2048;  // contacts of a slice, 5 us where all carry load
+constexpr std::size_t kLeastSlice = 1024;  // contacts of a slice, 2.5 us where all carry load
 constexpr std::size_t kMostSlices = 32;
 constexpr std::size_t kSliceStep = 128;  // 16 vectors: every slice begins with a sampled one
 

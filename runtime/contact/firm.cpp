@@ -14,9 +14,8 @@ namespace h6 {
 namespace {
 
 constexpr double kPresent = 0.1;  // the depth from which a contact counts in full [voxel]
-constexpr std::size_t kDirectionSlice = 512;  // contacts whose field is sampled at a time
 
-// At most kDirectionSlice rows, begin..end-1, of one pair. Distances at the contacts and a voxel
+// At most kPushedRows rows, begin..end-1, of one pair. Distances at the contacts and a voxel
 // away go to columns that are filled later. `shifted`: depths have relief or play in them. A
 // refined field is as exact as its tolerance says, so its depths stay as they are.
 void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool shifted,
@@ -24,7 +23,7 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
   const kernels::FieldView& field = b.field->view;
   const kernels::PointsView arms{c.rx + begin, c.ry + begin, c.rz + begin, end - begin};
   // Half the finest spacing away. The contacts have no more columns that are filled later.
-  float half_way[6][kDirectionSlice];
+  float half_way[6][kPushedRows];
   float* const at[13] = {c.tx + begin,    c.ty + begin,   c.tz + begin,     c.slack + begin,
                          c.kappa + begin, c.load + begin, c.weight + begin, half_way[0],
                          half_way[1],     half_way[2],    half_way[3],      half_way[4],
@@ -53,24 +52,14 @@ void push_rows(Contacts& c, const Body& b, const kernels::Affine& place, bool sh
 
 }  // namespace
 
-void prepare_firm(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
-  for (const Pair& pair : shell.pairs) {
-    if (pair.begin == pair.end) continue;
-    const std::size_t slices = (pair.end - pair.begin + kDirectionSlice - 1) / kDirectionSlice;
-    const bool shifted = pair.search.fit.count > 0 || set.contact.fit_offset > 0;
-    const Vec6 ahead =
-        Eigen::Map<const Eigen::Matrix<float, 6, 1>>(pair.search.ahead).cast<double>();
-    const auto push = [&](std::size_t i) {
-      const std::size_t begin = pair.begin + i * kDirectionSlice;
-      const std::size_t end = std::min(begin + kDirectionSlice, pair.end);
-      Contacts& c = shell.contacts;
-      push_rows(c, bodies[pair.b], pair.search.arms, shifted, begin, end);
-      kernels::series_gap(kernel_columns(c, begin, end), c.depth + begin, 1, ahead.data(),
-                          c.slack + begin);
-      note_firmness(c, set.contact, bodies[pair.b].field->finest, begin, end);
-    };
-    share_slices(lane, lane.pushing, pair.end - pair.begin, slices, push);
-  }
+void push_firmly(const Settings& set, const Body& b, const Pair& pair, Contacts& c,
+                 std::size_t begin, std::size_t end) {
+  const bool shifted = pair.search.fit.count > 0 || set.contact.fit_offset > 0;
+  const Vec6 ahead = Eigen::Map<const Eigen::Matrix<float, 6, 1>>(pair.search.ahead).cast<double>();
+  push_rows(c, b, pair.search.arms, shifted, begin, end);
+  kernels::series_gap(kernel_columns(c, begin, end), c.depth + begin, 1, ahead.data(),
+                      c.slack + begin);
+  note_firmness(c, set.contact, b.field->finest, begin, end);
 }
 
 void note_firmness(Contacts& c, const h6ContactDef& def, double voxel, std::size_t begin,

@@ -24,7 +24,7 @@ constexpr double kAhead = 2;
 // The voxel is the smallest of all fields that the body may touch, since one solve has one touch: a
 // field of coarser voxels beside a fine one gets a shorter touch than it would get alone.
 constexpr double kTouch = 0.03;
-constexpr std::size_t kGapSlice = 2048;  // contacts whose e is filled at a time
+constexpr std::size_t kLoadSlice = 2048;  // contacts whose loads are filled at a time
 
 kernels::SliceRunner slices_on(sched::FrameTeam* team) {
   if (team == nullptr) return {};
@@ -69,8 +69,12 @@ kernels::SeriesResult solve_series(Contacts& c, const h6ContactDef& def, double 
                                        c.rz, c.load, c.weight, c.count};
   const kernels::SeriesResult result =
       kernels::series_solve(columns, parameters, y, c.kappa, c.slack, slices_on(team));
-  kernels::series_loads({c.kappa, c.slack, c.depth, c.load, c.weight, c.count},
-                        static_cast<float>(parameters.touch));
+  for_slices((c.count + kLoadSlice - 1) / kLoadSlice, team, [&](std::size_t i) {
+    const std::size_t at = i * kLoadSlice;
+    kernels::series_loads({c.kappa + at, c.slack + at, c.depth + at, c.load + at, c.weight + at,
+                           std::min(kLoadSlice, c.count - at)},
+                          static_cast<float>(parameters.touch));
+  });
   return result;
 }
 
@@ -86,24 +90,32 @@ Mat6 series_spring(const h6ContactDef& def, double lever) {
   return G;
 }
 
+// Fills e; under `firm`, push_firmly comes first. A slice does both while its rows are in the
+// cache.
+void prepare_rows(const Settings& set, std::span<const Body> bodies, const Pair& pair, Contacts& c,
+                  Lane& lane) {
+  const Body &a = bodies[pair.a], &b = bodies[pair.b];
+  const std::size_t count = pair.end - pair.begin;
+  if (count == 0) return;
+  const Vec6 u = pair_velocity(a, b);
+  share_slices(lane, lane.pushing, count, (count + kPushedRows - 1) / kPushedRows,
+               [&](std::size_t i) {
+                 const std::size_t begin = pair.begin + i * kPushedRows;
+                 const std::size_t end = std::min(begin + kPushedRows, pair.end);
+                 if (set.contact.method == H6_METHOD_FIRM) push_firmly(set, b, pair, c, begin, end);
+                 if (!a.bend) fill_series_gap(c, set.contact.damping, u, begin, end);
+               });
+}
+
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane) {
   const Body& a = bodies[shell.body];
   Contacts& c = shell.contacts;
-  if (set.contact.method == H6_METHOD_FIRM) prepare_firm(set, bodies, shell, lane);
+  for (const Pair& pair : shell.pairs) prepare_rows(set, bodies, pair, c, lane);
   sched::FrameTeam* const team = weighing_team(c.count, lane);
   fill_inner_stiffness(c, set.contact, a.voxel, team, lane.scratch->weigh);
   if (a.bend) {
     make_bent_rows(set, bodies, shell);
     fill_bent_gap(set, bodies, shell);
-  }
-  for (const Pair& pair : shell.pairs) {
-    if (a.bend) break;
-    const Vec6 u = pair_velocity(a, bodies[pair.b]);
-    const std::size_t slices = (pair.end - pair.begin + kGapSlice - 1) / kGapSlice;
-    for_slices(slices, team, [&](std::size_t i) {
-      const std::size_t begin = pair.begin + i * kGapSlice;
-      fill_series_gap(c, set.contact.damping, u, begin, std::min(begin + kGapSlice, pair.end));
-    });
   }
   const kernels::SeriesResult result =
       solve_series(c, set.contact, a.voxel, series_lever(a.radius, a.voxel), shell.series_y, team);

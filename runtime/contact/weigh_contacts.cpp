@@ -216,7 +216,7 @@ CellSlices slice_cells(const Contacts& c) {
 }
 
 // Lists the items of all slices, one after the other.
-CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, const Items& items,
+CellSlices list_items(const Contacts& c, const Rule& rule, const Items& items,
                       sched::FrameTeam* team) {
   CellSlices slices = slice_cells(c);
   std::size_t found[kMostSlices];
@@ -225,8 +225,9 @@ CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, con
     return team ? 2 * slices.begin[i] + i * kernels::kCellMost : slices.item[i];
   };
   for_slices(slices.count, team, [&](std::size_t i) {
-    const std::size_t begin = slices.begin[i];
-    found[i] = kernels::list_cell_items(cells_between(c, begin, slices.begin[i + 1]), widths,
+    const std::size_t begin = slices.begin[i], end = slices.begin[i + 1];
+    fill_torque_directions(c, rule, 0, begin, end);
+    found[i] = kernels::list_cell_items(cells_between(c, begin, end), rule.widths,
                                         items.from(first(i)), items.of_contacts(begin));
     if (!team) slices.item[i + 1] = slices.item[i] + found[i];
   });
@@ -240,22 +241,30 @@ CellSlices list_items(const Contacts& c, const kernels::GaussWidths& widths, con
   return slices;
 }
 
-// `firm`: c.slack holds how much each contact counts.
+// `firm`: c.slack holds how much each contact counts, c.kappa the stiffness of its direction. Fills
+// T, and weight with the share of that stiffness.
 void weigh_cells(Contacts& c, const Rule& rule, sched::FrameTeam* team, void* scratch) {
-  if (!c.cell)
-    return weigh_view({c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, rule, team,
-                      scratch, c.weight);
+  if (!c.cell) {
+    for_rows(c, team, [&](std::size_t begin, std::size_t end) {
+      fill_torque_directions(c, rule, 0, begin, end);
+    });
+    weigh_view({c.nx, c.ny, c.nz, c.tx, c.ty, c.tz, c.facing, c.slack, c.count}, rule, team,
+               scratch, c.weight);
+    for (std::size_t i = 0; i < c.count; ++i) c.weight[i] *= c.kappa[i];
+    return;
+  }
   kernels::GaussColumns columns = kernels::GaussColumns::in(scratch);
   const Items items = take_items(columns, c.count);
-  const CellSlices slices = list_items(c, rule.widths, items, team);
+  const CellSlices slices = list_items(c, rule, items, team);
   const auto& d = items.column.direction;
   weigh_view(
       {d[0], d[1], d[2], d[3], d[4], d[5], nullptr, items.column.share, slices.item[slices.count]},
       rule, team, columns.at + columns.used, items.weight);
   for_slices(slices.count, team, [&](std::size_t i) {
-    const std::size_t begin = slices.begin[i], item = slices.item[i];
-    kernels::weigh_by_items(cells_between(c, begin, slices.begin[i + 1]), items.of_contacts(begin),
+    const std::size_t begin = slices.begin[i], end = slices.begin[i + 1], item = slices.item[i];
+    kernels::weigh_by_items(cells_between(c, begin, end), items.of_contacts(begin),
                             items.column.share + item, items.weight + item, c.weight + begin);
+    for (std::size_t k = begin; k < end; ++k) c.weight[k] *= c.kappa[k];
   });
 }
 
@@ -308,12 +317,7 @@ void weigh_columns(Contacts& c, const h6ContactDef& def, double voxel, double le
 void fill_inner_stiffness(Contacts& c, const h6ContactDef& def, double voxel,
                           sched::FrameTeam* team, void* scratch) {
   if (def.method == H6_METHOD_SERIES) return fill_facing(c, true, 0, c.count, c.weight);
-  const Rule rule = rule_of(def, voxel);
-  for_rows(c, team, [&](std::size_t begin, std::size_t end) {
-    fill_torque_directions(c, rule, 0, begin, end);
-  });
-  weigh_cells(c, rule, team, scratch);
-  for (std::size_t i = 0; i < c.count; ++i) c.weight[i] *= c.kappa[i];
+  weigh_cells(c, rule_of(def, voxel), team, scratch);
 }
 
 sched::FrameTeam* weighing_team(std::size_t count, Lane& lane) {
