@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // gauss_tree_sum.cpp - densities at the contacts of a leaf, from the nodes of the tree.
 //
-// The tree is walked once for the 16 targets of a leaf, or of two leaves that are near, 16 sibling
-// nodes at a time. A node that no target reaches is dropped. A node inside the supports of all
-// targets joins one polynomial about the targets' centre. Other nodes are opened, or listed whole
-// where they are small and contacts many. In an opened leaf each contact is dropped, joins the
-// polynomial, or goes to a list that every target sums pair by pair.
+// The tree is walked once for the 16 targets of a leaf, or of several leaves that are near each
+// other, 16 sibling nodes at a time. A node that no target reaches is dropped. A node inside the
+// supports of all targets joins one polynomial about the targets' centre. Other nodes are opened,
+// or listed whole where they are small and contacts many. In an opened leaf each contact is
+// dropped, joins the polynomial, or goes to a list that every target sums pair by pair.
 #include "kernels/weights/gauss_tree_stages.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -253,17 +253,17 @@ HWY_INLINE void centre_targets(Targets<kAxes>& t) {
 
 // Whether two leaves are so near each other that one walk serves both.
 template <int kAxes>
-HWY_INLINE bool together(const GaussDensity& g, std::size_t leaf) {
+HWY_INLINE bool together(const GaussDensity& g, std::size_t leaf, std::size_t other) {
   const GaussLevel& leaves = g.level[0];
-  if (!(leaves.moment[kMass][leaf] > 0 && leaves.moment[kMass][leaf + 1] > 0)) return false;
+  if (!(leaves.moment[kMass][leaf] > 0 && leaves.moment[kMass][other] > 0)) return false;
   for (int s = 0; s < kAxes / 3; ++s) {
     float gap2 = 0;
     for (int k = 3 * s; k < 3 * s + 3; ++k) {
-      const float gap = leaves.centre[k][leaf] - leaves.centre[k][leaf + 1];
+      const float gap = leaves.centre[k][leaf] - leaves.centre[k][other];
       gap2 += gap * gap;
     }
     const float reach = kTogether * g.width[s];
-    if (!(leaves.radius[s][leaf] < reach && leaves.radius[s][leaf + 1] < reach &&
+    if (!(leaves.radius[s][leaf] < reach && leaves.radius[s][other] < reach &&
           gap2 < reach * reach))
       return false;
   }
@@ -320,7 +320,9 @@ template <int kAxes>
 HWY_INLINE void sum_slice(const GaussDensity& g, std::size_t count, std::size_t begin,
                           std::size_t end) {
   for (std::size_t leaf = begin; leaf < end;) {
-    const std::size_t leaves = leaf + 1 < end && together<kAxes>(g, leaf) ? 2 : 1;
+    std::size_t leaves = 1;
+    while (leaves < kMostLeaves && leaf + leaves < end && together<kAxes>(g, leaf, leaf + leaves))
+      ++leaves;
     sum_targets<kAxes>(g, count, leaf, leaves);
     leaf += leaves;
   }
