@@ -5,7 +5,8 @@
 // gauss_bands.h sorts the contacts and sums hats over one sphere. A product of two hats costs more,
 // so each pair is evaluated once: it joins a sum over lanes for one contact and a sum over rows for
 // the other. Where pairs are many, two blocks of contacts whose boxes are farther apart than a hat,
-// on either sphere, are passed over. That changes no bit of finite weights.
+// on either sphere, are passed over. That changes no bit of finite weights, but boxes also decide
+// where the parts are split.
 //
 //     columns -> bands, runs -> sums of rows and of columns, part by part -> weights
 //

@@ -27,12 +27,12 @@ using VF = hn::Vec<DF>;
 using MF = hn::Mask<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
 constexpr std::size_t kListed = 512;  // contacts and nodes on the list before it is summed
-// Leaves of targets in one walk, at most, and widths: the size and distance of leaves that share
-// one. With two leaves of 0.1 a clump of 100,000 took 1.34 times as long (gauss6; AVX2, AVX-512).
-constexpr std::size_t kMostLeaves = 8;
-constexpr float kTogether = 0.3f;
-constexpr std::size_t kOpened = 256;  // leaves collected before they are opened
-constexpr float kSmallNode = 0.1f;    // widths: the radius below which a node is listed whole
+// With two leaves of 0.1 a clump of 100,000 took 1.34 times as long by AVX2, 1.39 by AVX-512
+// (kernels/gauss_tree/gauss6/clump).
+constexpr std::size_t kMostLeaves = 8;  // leaves of targets in one walk
+constexpr float kTogether = 0.3f;       // widths: size and distance of leaves that share a walk
+constexpr std::size_t kOpened = 256;    // leaves collected before they are opened
+constexpr float kSmallNode = 0.1f;      // widths: the radius below which a node is listed whole
 
 // How a pair is evaluated. products: c + 2 t.x, with x and t relative to the targets' centre;
 // precise enough while targets are within a width of the centre. flat: the same over one sphere of

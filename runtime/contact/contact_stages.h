@@ -25,10 +25,10 @@ void weigh_contacts(const Settings& set, std::span<const Body> bodies, ShellBody
                     Lane& lane);
 // The team, if the weighing of so many contacts is faster on all of its threads; else null.
 sched::FrameTeam* weighing_team(std::size_t count, Lane& lane);
+inline constexpr std::size_t kPushedRows = 512;  // contacts that get their push and e at a time
 // `firm`, rows begin..end-1 of a pair with body b, kPushedRows at most: replaces N by the direction
 // in which each contact pushes, fills facing, and notes in slack and kappa how much each counts in
 // the density and the stiffness of its direction.
-inline constexpr std::size_t kPushedRows = 512;
 void push_firmly(const Settings& set, const Body& b, const Pair& pair, Contacts& c,
                  std::size_t begin, std::size_t end);
 void weigh_series(const Settings& set, std::span<const Body> bodies, ShellBody& shell, Lane& lane);

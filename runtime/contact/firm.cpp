@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // firm.cpp - what the rule `firm` knows of each contact: the direction in which it pushes, its
 // presence in the density, the stiffness of its direction. METHOD.md, Sec. 3.
-#include <algorithm>
-
 #include "kernels/contact/smooth_depths.h"
 #include "kernels/field/sample_around.h"
 #include "kernels/field/sample_field.h"

@@ -47,7 +47,7 @@ struct Lane {
   std::span<Scratch> scratches;  // one for each thread of the team; none: pairs are not shared
   sched::FrameTeam* team = nullptr;
   // Whether the team shares the pairs, the groups of one pair, the making of contacts, their
-  // directions of push, their weighing, their summing and their friction.
+  // directions of push and e, their weighing, their summing and their friction.
   ShareGate pairing, touching, making, pushing, weighing, summing, rubbing;
   Anytime* anytime = nullptr;  // one for the frame; lanes that run side by side only read it
   bool cold = false;           // other programs have used the caches since the last frame

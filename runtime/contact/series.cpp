@@ -90,19 +90,20 @@ Mat6 series_spring(const h6ContactDef& def, double lever) {
   return G;
 }
 
-// Fills e; under `firm`, push_firmly comes first. A slice does both while its rows are in the
-// cache.
+// Fills e, except for a body that bends (fill_bent_gap). Under `firm`, push_firmly comes first. A
+// slice does both while its rows are in the cache.
 void prepare_rows(const Settings& set, std::span<const Body> bodies, const Pair& pair, Contacts& c,
                   Lane& lane) {
   const Body &a = bodies[pair.a], &b = bodies[pair.b];
   const std::size_t count = pair.end - pair.begin;
-  if (count == 0) return;
+  const bool firm = set.contact.method == H6_METHOD_FIRM;
+  if (count == 0 || (a.bend && !firm)) return;
   const Vec6 u = pair_velocity(a, b);
   share_slices(lane, lane.pushing, count, (count + kPushedRows - 1) / kPushedRows,
                [&](std::size_t i) {
                  const std::size_t begin = pair.begin + i * kPushedRows;
                  const std::size_t end = std::min(begin + kPushedRows, pair.end);
-                 if (set.contact.method == H6_METHOD_FIRM) push_firmly(set, b, pair, c, begin, end);
+                 if (firm) push_firmly(set, b, pair, c, begin, end);
                  if (!a.bend) fill_series_gap(c, set.contact.damping, u, begin, end);
                });
 }

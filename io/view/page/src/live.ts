@@ -213,6 +213,11 @@ function pause() {
   $('pause').classList.toggle('on', paused);
   setPace(paused ? 0 : pace);
 }
+// A new run keeps the pace; paused, nothing of it would be seen.
+function again(from: 'reset' | 'back') {
+  if (paused) pause();
+  ask({ do: from });
+}
 function clutch(on: boolean) {
   clutched = on;
   $('clutch').classList.toggle('on', on);
@@ -231,9 +236,9 @@ $('path').onclick = () => ask({ do: 'grab', on: false });
 $('clutch').onclick = () => clutch(!clutched);
 $('pause').onclick = pause;
 input('pace').oninput = () => { pace = Number(input('pace').value); if (!paused) setPace(pace); };
-$('reset').onclick = () => ask({ do: 'reset' });
+$('reset').onclick = () => again('reset');
 $('keep').onclick = () => ask({ do: 'keep' });
-$('back').onclick = () => ask({ do: 'back' });
+$('back').onclick = () => again('back');
 $('headset').onclick = () => headset?.toggle().catch((e) => hint(`the headset cannot be used: ${e.message}`));
 $('record').onclick = () => ask({ do: 'record', on: !recording });
 input('opacity').oninput = () => view.environmentOpacity(Number(input('opacity').value));
@@ -244,7 +249,7 @@ addEventListener('keydown', (e) => {
   if (e.ctrlKey || e.metaKey || e.altKey) return;
   if (e.key === 'c') clutch(true);
   if (e.key === 'k') ask({ do: 'keep' });
-  if (e.key === 'u') ask({ do: 'back' });
+  if (e.key === 'u') again('back');
 });
 addEventListener('keyup', (e) => { if (e.key === 'c') clutch(false); });
 

@@ -30,7 +30,7 @@ const shoot = async (name) => {
 
 // Runs the program with its view, waits for `contacts` of them and then `after` ms, and does the work. The
 // path starts again once the page is there: on a slow machine a short one is over by then. It does so at a
-// slow pace, so that its first second cannot be missed either.
+// slow pace, so that its first second lasts 50.
 async function live(args, work, { after = 4000, pace = 1, contacts = 1 } = {}) {
   const run = spawn(program, [...args, '--view', '--no-browser'], { cwd: folder, stdio: ['ignore', 'ignore', 'pipe'] });
   let said = '';
