@@ -173,6 +173,23 @@ test('pause stands still, reset begins again, recording leaves a file', async ()
   await until(async () => !(await state()).recording, 'it does not record any more');
 });
 
+test('a run that begins again keeps the pace of the page, and does not stay paused', async () => {
+  const setPace = (pace) => browser.value(`(() => {
+    const slider = document.getElementById('pace'); slider.value = ${pace}; slider.dispatchEvent(new Event('input'));
+  })()`);
+  await until(async () => (await state()).time > 1, 'the first second has passed');
+  await setPace(0.1);
+  await browser.value(`document.getElementById('pause').click()`);
+  await browser.value(`document.getElementById('reset').click()`);
+  await until(async () => (await state()).time < 1, 'the run begins again');
+  const first = (await state()).time, begun = Date.now();
+  await wait(3000);
+  await until(async () => (await state()).time > first, 'time goes on');
+  const went = (await state()).time - first, passed = (Date.now() - begun) / 1000;
+  assert.ok(went < 0.5 * passed, `${went} s of ${passed} at a pace of 0.1`);
+  await setPace(1);
+});
+
 test('a slice of the field is shown', async () => {
   await browser.value(`(() => { const b = document.getElementById('slice-on'); b.checked = true; b.dispatchEvent(new Event('input')); })()`);
   await wait(1200);
