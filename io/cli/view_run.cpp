@@ -117,7 +117,7 @@ class Viewer : public RunObserver {
   void begin(RunSetup& setup, h6Loop* loop, Note note) override {
     setup_ = &setup;
     loop_ = loop;
-    h6SetPace(loop_, pace_);  // as the page shows it
+    h6SetPace(loop_, pace_);  // the page shows this pace
     note_ = std::move(note);
     offset_ = {};
     tell_settings(setup.session.get());

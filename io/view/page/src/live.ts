@@ -213,10 +213,10 @@ function pause() {
   $('pause').classList.toggle('on', paused);
   setPace(paused ? 0 : pace);
 }
-// A new run keeps the pace; paused, nothing of it would be seen.
-function again(from: 'reset' | 'back') {
+// These requests begin a new run, which keeps the pace. Of a paused one nothing would be seen.
+function again(request: object) {
   if (paused) pause();
-  ask({ do: from });
+  ask(request);
 }
 function clutch(on: boolean) {
   clutched = on;
@@ -236,11 +236,11 @@ $('path').onclick = () => ask({ do: 'grab', on: false });
 $('clutch').onclick = () => clutch(!clutched);
 $('pause').onclick = pause;
 input('pace').oninput = () => { pace = Number(input('pace').value); if (!paused) setPace(pace); };
-$('reset').onclick = () => again('reset');
+$('reset').onclick = () => again({ do: 'reset' });
 $('keep').onclick = () => ask({ do: 'keep' });
-$('back').onclick = () => again('back');
+$('back').onclick = () => again({ do: 'back' });
 $('headset').onclick = () => headset?.toggle().catch((e) => hint(`the headset cannot be used: ${e.message}`));
-$('record').onclick = () => ask({ do: 'record', on: !recording });
+$('record').onclick = () => again({ do: 'record', on: !recording });
 input('opacity').oninput = () => view.environmentOpacity(Number(input('opacity').value));
 for (const id of ['slice-on', 'slice-axis', 'slice-at']) $(id).oninput = askSlice;
 addEventListener('keydown', (e) => {
@@ -249,7 +249,7 @@ addEventListener('keydown', (e) => {
   if (e.ctrlKey || e.metaKey || e.altKey) return;
   if (e.key === 'c') clutch(true);
   if (e.key === 'k') ask({ do: 'keep' });
-  if (e.key === 'u') again('back');
+  if (e.key === 'u') again({ do: 'back' });
 });
 addEventListener('keyup', (e) => { if (e.key === 'c') clutch(false); });
 
